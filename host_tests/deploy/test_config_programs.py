@@ -26,7 +26,7 @@ _UNEQUAL = "class E:\n    def __eq__(self, other):\n        raise OSError\nVEHIC
     ],
 )
 def test_it_is_refused_in_one_line(tmp_path, monkeypatch, text):
-    monkeypatch.setattr(config_check, "LONGEST_S", 5)
+    monkeypatch.setattr(config_check, "LONGEST_S", 2)
     path = tmp_path / "config.py"
     path.write_text(text)
     fault = config_check.judge(path, "rp2", "Raspberry Pi Pico with RP2040").fault

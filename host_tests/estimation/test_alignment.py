@@ -16,12 +16,11 @@ from kickstand_tools.estimation.alignment import PHONES, mounted_windows
 from kickstand_tools.logs.log import Log
 from kickstand_tools.signals.rotations import rotation_matrix, rotation_vector
 
-PROFILES = "street", "track", "city", "hills", "sweeper"
 RATE_HZ = 200
 
 
 @functools.cache
-def simulated(profile="street", seed=21, seconds=240.0):
+def simulated(profile="street", seed=21, seconds=180.0):
     return api.simulate_ride(profile, seed, seconds)
 
 
@@ -60,10 +59,12 @@ def check(found, true, yaw_deg=3.0, roll_deg=1.5):
     assert pitch < 3.0
 
 
-@pytest.mark.parametrize(("seed", "speed"), [(21, True), (22, False)], ids=["speed", "no speed"])
-@pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.parametrize(
+    ("profile", "seed", "speed"),
+    [("street", 21, True), ("city", 21, True), ("track", 22, False), ("hills", 22, False), ("sweeper", 22, False)],
+)
 def test_a_ride_aligns_a_sensor_that_is_mounted_at_random(profile, seed, speed):
-    made = simulated(profile, seed)
+    made = simulated(profile, seed, 240.0)
     found = api.fit_ride(log_of(made, speed))
     check(found, made.vehicle_from_sensor)
     stated = np.array([found.pitch_deg, found.yaw_deg, found.roll_deg])
@@ -72,9 +73,8 @@ def test_a_ride_aligns_a_sensor_that_is_mounted_at_random(profile, seed, speed):
     assert (found.lag_s is not None) == speed
 
 
-@pytest.mark.parametrize("profile", ["track", "hills"])
-def test_the_display_shows_the_lean_with_this_alignment(profile):
-    made = simulated(profile)
+def test_the_display_shows_the_lean_with_this_alignment():
+    made = simulated("hills", 22, 240.0)
     log = log_of(made, speed=False)
     lean = api.replay(log, api.fit_ride(log).calibration).lean_deg - made.truth["lean_deg"]
     assert np.sqrt(np.mean(lean**2)) < 1.0  # 1.5 was asked for
@@ -82,7 +82,7 @@ def test_the_display_shows_the_lean_with_this_alignment(profile):
 
 def test_it_is_no_worse_than_two_poses_of_a_sensor_without_six_positions():
     """In yaw, which a kickstand pose hardly determines, and in roll, which an offset of the accelerometer falsifies."""
-    made = simulated("hills", 22)
+    made = simulated("hills", 22, 240.0)
     kickstand, upright = (api.Log.from_readings(pose, RATE_HZ) for pose in (made.kickstand, made.upright))
     two = errors_deg(api.fit_two_positions(kickstand, upright), made.vehicle_from_sensor)
     ride = errors_deg(api.fit_ride(log_of(made, speed=False)), made.vehicle_from_sensor)
@@ -173,28 +173,19 @@ def test_a_sensor_in_the_hand_before_and_after_the_ride_is_left_out():
     assert log.t_s[-1] - 40.0 < found.used_s[1] <= log.t_s[-1] - 20.0
 
 
-def test_frozen_absurd_and_missing_readings_are_left_out():
+def test_frozen_absurd_and_missing_readings_are_left_out_and_a_late_rough_speed_will_do():
     made = simulated()
-    log = log_of(made, speed=False)
+    log = log_of(made)
+    log.speed_mps[RATE_HZ::RATE_HZ] = np.round(made.truth["speed_mps"][:-RATE_HZ:RATE_HZ] * 3.6) / 3.6
     log.accel_g[10000:14000], log.gyro_dps[10000:14000] = log.accel_g[10000], log.gyro_dps[10000]
     log.accel_g[77::5000] = 1000.0
     log.gyro_dps[99::5000] = 1e5
     kept = np.r_[0:20000, 26000 : len(log.t_s)]
-    check(
-        api.fit_ride(Log(log.t_s[kept], log.accel_g[kept], log.gyro_dps[kept])), made.vehicle_from_sensor, roll_deg=2.0
-    )
-
-
-def test_a_phones_rate_and_a_late_rough_speed_will_do():
-    made = simulated()
-    log = log_of(made)
-    late = np.full(len(log.t_s), np.nan)
-    late[RATE_HZ::RATE_HZ] = np.round(made.truth["speed_mps"][:-RATE_HZ:RATE_HZ] * 3.6) / 3.6
-    few = slice(None, None, 4)
-    found = api.fit_ride(Log(log.t_s[few], log.accel_g[few], log.gyro_dps[few], late[few]))
+    seen = []
+    found = api.fit_ride(log.part(kept), progress=lambda done, total: seen.append((done, total)))
+    assert seen == sorted(seen) and seen[-1][0] == seen[-1][1], "progress ends with all done"
     check(found, made.vehicle_from_sensor, roll_deg=2.0)
-    assert found.lag_s is not None
-    assert 0.6 < found.lag_s < 1.3
+    assert found.lag_s == pytest.approx(1.0, abs=0.4)
 
 
 def car(seconds=300.0):
@@ -219,13 +210,12 @@ def moved(log, degrees):
 
 WRONG = {
     "a car": (lambda log: car(), ("not-leaning",)),
-    "short": (lambda log: Log(log.t_s[:6000], log.accel_g[:6000], log.gyro_dps[:6000]), ("ride-short",)),
+    "short": (lambda log: log.part(slice(6000)), ("ride-short",)),
     "parked": (lambda log: log_of(simulated("parked", 1, 60.0)), ("ride-short",)),
     "straight": (lambda log: log_of(simulated("city", 5, 60.0)), ("no-bends",)),
     "rad/s": (lambda log: changed(log, gyro=np.radians(log.gyro_dps)), ("rates-in-radians",)),
     "speed stuck": (lambda log: changed(log, speed=log.speed_mps * 0.0), ("speed-stuck",)),
     "half the speed": (lambda log: changed(log, speed=log.speed_mps * 0.5), ("speed-unit",)),
-    "moved": (lambda log: moved(log, 30.0), ("ride-contradicts", "ride-halves", "ride-uncertain")),
     "moved a little": (lambda log: moved(log, 12.0), ("ride-contradicts", "ride-halves", "ride-uncertain")),
     "gyro of the opposite sign": (lambda log: changed(log, gyro=-log.gyro_dps), ("left-handed",)),
     "nothing but absurd readings": (lambda log: changed(log, log.accel_g * 1e4), ("ride-short",)),
@@ -242,10 +232,12 @@ def test_what_is_no_ride_of_a_mounted_sensor_is_refused(name):
     assert code is None or raised.value.code in code
 
 
-def test_few_samples_a_second_are_refused():
+def test_few_samples_a_second_and_an_unknown_mounting_of_a_phone_are_refused():
     log = log_of(simulated())
     with pytest.raises(api.InputError, match=r"a sample every 0\.10 s: at least 20 a second"):
-        api.fit_ride(Log(log.t_s[::20], log.accel_g[::20], log.gyro_dps[::20]))
+        api.fit_ride(log.part(slice(None, None, 20)))
+    with pytest.raises(api.InputError, match="portrait, landscape, flat"):
+        api.fit_ride(log, phone="upside down")
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -295,15 +287,3 @@ def test_the_command(tmp_path):
     command.refused(tmp_path, "calibrate", "ride", log, "--out", log, words="is also an input")
     words = "s of riding: at least 30 s with bends are needed"
     command.refused(tmp_path, "calibrate", "ride", short, "--out", tmp_path / "NEW.json", words=words)
-
-
-def test_an_unknown_mounting_of_a_phone_is_refused():
-    with pytest.raises(api.InputError, match="portrait, landscape, flat"):
-        api.fit_ride(log_of(simulated()), phone="upside down")
-
-
-def test_progress_ends_with_all_done():
-    seen = []
-    api.fit_ride(log_of(simulated()), progress=lambda done, total: seen.append((done, total)))
-    assert seen[-1][0] == seen[-1][1]
-    assert [done for done, _ in seen] == sorted(done for done, _ in seen)

@@ -40,39 +40,6 @@ def test_a_row_for_each_sample_with_the_logs_own_time(ride, tmp_path):
     assert np.all(got["lean_sigma_deg"] > 0.0)
 
 
-def test_accelerations_that_are_not_the_bikes_are_said_in_the_file_in_words_and_in_json(tmp_path):
-    drawn = drawn_ride(3028, 90.0, ["foreign"])
-    log = drawn.logs[0]
-    rows = np.column_stack((log.t_s, log.accel_g, log.gyro_dps))
-    write_table(tmp_path / "RIDE.csv", command.HEADER.split(","), rows.round(5).tolist())
-    write_calibration(tmp_path / "RIDE.cal.json", drawn.calibrations[0])
-    result = works("smooth", tmp_path / "RIDE.csv", "--out", tmp_path / "LEAN.csv")
-    assert "% of the riding the accelerations are not those of a bike on its wheels" in result.err
-    found = read(tmp_path / "LEAN.csv")["doubtful"]
-    assert set(found) == {0.0, 1.0}
-    assert np.mean(found[drawn.riding(0)]) > 0.5
-    remarks = json.loads(works("report", tmp_path / "RIDE.csv", "--json").out)["remarks"]
-    (remark,) = (remark for remark in remarks if remark["code"] == "not-the-bikes")
-    assert remark["values"][0] > 50.0
-    assert remark["words"] in result.err.replace("\n", " ")
-
-
-def test_a_stretch_of_a_ride(ride, tmp_path):
-    directory, _, _ = ride
-    works("smooth", directory / "RIDE.csv", "--from", 20, "--to", 30, "--out", tmp_path / "LEAN.csv")
-    assert len(read(tmp_path / "LEAN.csv")) == 501
-
-
-def test_another_mounts_calibration_is_told(tmp_path):
-    known = simulated("street", 2, 90.0)
-    rows = np.column_stack((known.log.t_s, known.log.accel_g, known.log.gyro_dps))[::4]
-    write_table(tmp_path / "RIDE.csv", command.HEADER.split(","), rows.round(5).tolist())
-    known.calibration.vehicle_from_sensor = np.roll(known.calibration.vehicle_from_sensor, 1, axis=0)
-    write_calibration(tmp_path / "CAL.json", known.calibration)
-    result = works("smooth", tmp_path / "RIDE.csv", "--calibration", tmp_path / "CAL.json", "--out", tmp_path / "L.csv")
-    assert "the calibration's up is 92 degrees off" in result.err
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -89,25 +56,26 @@ def test_a_calibration_that_does_not_serve_is_refused(ride, tmp_path, change, wo
     refused(tmp_path, "smooth", directory / "RIDE.csv", *given, words=words)
 
 
-@pytest.mark.parametrize(
-    ("rows", "words"),
-    [
-        ([], "is empty"),
-        (["0,0,1,0,0,0,0"], "too short"),
-        (["0,0,1,0,0,0,0", "1,0,1.1,0,0,0,0", "2,0,1,0,0,0,0"], "under 10"),
-    ],
-)
-def test_a_log_that_is_none_is_refused(ride, tmp_path, rows, words):
-    directory, _, _ = ride
-    log = tmp_path / "LOG.csv"
-    log.write_text("\n".join([command.HEADER, *rows, ""]) if rows else "")
-    given = "--calibration", directory / "RIDE.cal.json", "--out", tmp_path / "LEAN.csv"
-    assert words in refused(tmp_path, "smooth", log, *given)
-
-
 def test_the_ride_itself_is_not_overwritten(ride):
     directory, _, _ = ride
     refused(directory, "smooth", directory / "RIDE.csv", "--out", directory / "RIDE.csv", words="also an input")
+
+
+def test_accelerations_that_are_not_the_bikes_are_said_in_the_file_in_words_and_in_json(tmp_path):
+    drawn = drawn_ride(3028, 90.0, ["foreign"])
+    log = drawn.logs[0]
+    rows = np.column_stack((log.t_s, log.accel_g, log.gyro_dps))
+    write_table(tmp_path / "RIDE.csv", command.HEADER.split(","), rows.round(5).tolist())
+    write_calibration(tmp_path / "RIDE.cal.json", drawn.calibrations[0])
+    result = works("smooth", tmp_path / "RIDE.csv", "--out", tmp_path / "LEAN.csv")
+    assert "% of the riding the accelerations are not those of a bike on its wheels" in result.err
+    found = read(tmp_path / "LEAN.csv")["doubtful"]
+    assert set(found) == {0.0, 1.0}
+    assert np.mean(found[drawn.riding(0)]) > 0.5
+    remarks = json.loads(works("report", tmp_path / "RIDE.csv", "--json").out)["remarks"]
+    (remark,) = (remark for remark in remarks if remark["code"] == "not-the-bikes")
+    assert remark["values"][0] > 50.0
+    assert remark["words"] in result.err.replace("\n", " ")
 
 
 def test_a_report_has_the_smoothed_lean_and_the_live_one_if_wanted(ride):

@@ -189,13 +189,6 @@ def test_a_hostile_manifest_is_one_line_or_a_row(tmp_path, alone, content, words
         assert run_fleet(read_manifest(str(path)), tmp_path / "out").seen.statuses["error"] == 1
 
 
-def test_an_error_names_the_log_once(tmp_path, alone):
-    (tmp_path / "MANIFEST.csv").write_text("vehicle,path,kind\nv,none.csv,car\n")
-    result = command.works("fleet", tmp_path / "MANIFEST.csv", "--out", tmp_path / "out")
-    line = next(line for line in result.out.splitlines() if line.startswith("error:"))
-    assert line.count("none.csv") == 1
-
-
 def test_a_mount_that_seems_to_have_moved_counts_though_nobody_knows_when(tmp_path, monkeypatch):
     """As a motorcycle's does that is taken for a car: it leans on its stand. Names are short, and the kind is said."""
 
@@ -230,7 +223,7 @@ def test_a_mutated_manifest_is_read_or_refused_in_one_line(tmp_path):
     path = tmp_path / "MANIFEST.csv"
     content = b"vehicle,path,kind,mount\n" + b"".join(b"v%d,logs/%d.csv,car,m\n" % (k, k) for k in range(20))
     seen = set()
-    for number in range(200):
+    for number in range(100):
         path.write_bytes(mutations.broken([content], number)[1])
         try:
             seen.add(bool(read_manifest(str(path))))

@@ -2,6 +2,9 @@
 
 import numpy as np
 import pytest
+from kickstand_tools.analysis.ride import vehicle_channels
+from kickstand_tools.analysis.stops.brake_test import find_stops
+from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.fleet.brake_tests import brake_tests
 from kickstand_tools.fleet.manifest import Period, read_manifest
 from kickstand_tools.fleet.period import work_on_period
@@ -80,10 +83,6 @@ def test_mirrored_axes_are_not_aligned(tmp_path):
 
 def test_brake_tests_of_a_car_without_the_lean_filter(fleet, results):
     made = fleet.vehicles[0]
-    from kickstand_tools.analysis.ride import vehicle_channels
-    from kickstand_tools.analysis.stops.brake_test import find_stops
-    from kickstand_tools.calibration.file import CalibrationFile
-
     row = results[made.name].alignment
     known = CalibrationFile(
         gyro_bias_dps=np.array(row["gyro_bias_dps"]),
@@ -99,7 +98,7 @@ def test_brake_tests_of_a_car_without_the_lean_filter(fleet, results):
         assert one.initial_speed_mps == pytest.approx(other.initial_speed_mps, rel=0.02)
 
 
-@pytest.mark.parametrize(("degrees", "axis"), [(5.5, (1, 0.3, 0)), (6.0, (0, 0.2, 1)), (8.0, (0.2, 1, 0.3))])
+@pytest.mark.parametrize(("degrees", "axis"), [(5.5, (1, 0.3, 0)), (8.0, (0.2, 1, 0.3))])
 def test_a_small_turn_between_two_logs(tmp_path, degrees, axis):
     first, sensor = drive(21)
     sensor.mount = turn_of(degrees, axis) @ sensor.mount

@@ -131,7 +131,5 @@ def test_from_and_to_count_from_the_recordings_own_start(tmp_path):
     assert table["ax_g"][0] == pytest.approx(whole.log.accel_g[np.searchsorted(whole.log.t_s + 0.01, 5.0), 0], abs=1e-5)
     known = np.flatnonzero(np.isfinite(table["utc_s"]))
     assert table["utc_s"][known[0]] - table["t_s"][known[0]] == pytest.approx(app_exports.START_UTC_S, abs=0.02)
-    late = ["--from", 100]
-    command.refused(
-        tmp_path, "import", source, "--out", out, *late, words="lasts 28.0 s: there is nothing from 100 s on"
-    )
+    late = "import", source, "--out", out, "--from", 100
+    command.refused(tmp_path, *late, words="lasts 28.0 s: there is nothing from 100 s on")

@@ -70,12 +70,12 @@ def test_a_minus_turns_all_axes_or_one(tmp_path):
     assert [taken.sign for taken in found.taken] == ["", "turned", "turned in part", ""]
 
 
-SPEEDS = {"m/s": 1.0, "km/h": 3.6, "kph": 3.6, "mph": 2.236936, "knots": 1.943844, "kt": 1.943844}
-
-
-@pytest.mark.parametrize("unit", SPEEDS)
-def test_speeds(unit):
-    assert SPEEDS[unit] * units.factor(unit, units.SPEEDS, "speed") == pytest.approx(1.0, abs=1e-6)
+def test_speeds_and_spellings_of_units():
+    speeds = {"m/s": 1.0, "km/h": 3.6, "kph": 3.6, "mph": 2.236936, "knots": 1.943844, "kt": 1.943844}
+    for unit, size in speeds.items():
+        assert size * units.factor(unit, units.SPEEDS, "speed") == pytest.approx(1.0, abs=1e-6), unit
+    same = {"m/s^2": "m/s2", "m s-2": "m/s2", "G": "g", "°/s": "deg/s", "KM/H": "km/h", "μs": "us"}
+    assert {text: units.unit(text) for text in same} == same
 
 
 def test_positions_in_minutes(tmp_path):
@@ -132,14 +132,6 @@ def test_a_cell_without_a_time():
     assert (found == times.NO_TIME).tolist() == [False, False, True, True, True, True, False]
 
 
-@pytest.mark.parametrize(
-    ("text", "want"),
-    [("m/s^2", "m/s2"), ("m s-2", "m/s2"), ("G", "g"), ("°/s", "deg/s"), ("KM/H", "km/h"), ("μs", "us")],
-)
-def test_spellings_of_units(text, want):
-    assert units.unit(text) == want
-
-
 def test_a_table_that_nobody_knows_is_met_with_the_line_to_type(tmp_path, monkeypatch):
     """And the line, typed as it stands, works."""
     monkeypatch.chdir(tmp_path)
@@ -183,9 +175,8 @@ def test_units_that_no_name_states_are_told_by_size(tmp_path, row, units):
 
 def test_what_a_table_lacks_is_said(tmp_path):
     (tmp_path / "log.csv").write_text("time,ax,ay,az,speed\n0,0,1,0,3\n1,0,1,0,3\n")
-    line = command.refused(
-        tmp_path, "import", tmp_path / "log.csv", "--out", tmp_path / "R.csv", words="and no gyro found in it: "
-    )
+    given = "import", tmp_path / "log.csv", "--out", tmp_path / "R.csv"
+    line = command.refused(tmp_path, *given, words="and no gyro found in it: ")
     assert "t=time,ax=ax,ay=ay,az=az,gx=?,gy=?,gz=?,speed=speed" in line
 
 

@@ -39,8 +39,7 @@ def test_past_any_reading(name, quoted):
                 cells = dict.fromkeys(HEADER.split(","), "0") | {"t_s": f"{time}", "az_g": "1"}
                 cells |= {name: f"{sign * factor * limit:.10g}"} if time == 4 else {}
                 rows.append(",".join(cells.values()))
-            if quoted:
-                rows[0] = rows[0].replace("0", '"0"', 1)
+            rows[0] = rows[0].replace("0", '"0"', quoted)
             log = io.StringIO("\n".join([HEADER, *rows]) + "\n")
             if name == "t_s":  # from one second to a far one: milliseconds, which another check refuses
                 words = "milliseconds" if good else "line 6: t_s is '.*', past any reading: its unit is seconds"

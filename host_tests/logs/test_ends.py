@@ -1,13 +1,13 @@
 """A recorder that lost its power: what is broken at the end of its log is left out; in the middle it is refused."""
 
 import gzip
-import json
 
 import analysis_rides
 import command
 import numpy as np
 import pytest
 from kickstand_tools.errors import InputError
+from kickstand_tools.logs import reader
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.refusals import sentence
 
@@ -82,15 +82,11 @@ def test_in_the_middle_it_is_refused_with_its_line(tmp_path, broken):
 
 
 def test_every_command_says_it(tmp_path):
-    ride = analysis_rides.short(tmp_path, speed_hz=1)
+    """report and export read as replay does, see test_frozen.py."""
+    ride = analysis_rides.short(tmp_path)
     ride.write_bytes(ride.read_bytes()[:-20])
-    for arguments in (
-        ("replay", ride, "--out", tmp_path / "LEAN.csv"),
-        ("report", ride),
-        ("export", ride, "--to", "csv", "--out", tmp_path / "RIDE-out.csv"),
-        ("cut", ride, "--from", "5", "--out", tmp_path / "CUT.csv"),
-    ):
-        said = command.works(*arguments).err
+    for arguments in (("replay", ride), ("cut", ride, "--from", "5")):
+        said = command.works(*arguments, "--out", tmp_path / "OUT.csv").err
         assert said.count("\n") == 1
         assert said.startswith(f"warning: {ride}: line 3401, the last one, was cut")
 
@@ -112,14 +108,10 @@ def test_rounded_times_are_spread_in_every_command(tmp_path):
     assert np.all(np.diff(found["t_s"]) > 0.009)
     assert found["t_s"] == pytest.approx(exact["t_s"], abs=0.004)
     assert found["lean_deg"] == pytest.approx(exact["lean_deg"], abs=0.15)
-    data = json.loads(command.works("report", ride, "--json").out)
-    assert data["duration_s"] == pytest.approx(exact["t_s"][-1], abs=0.01)
 
 
 @pytest.mark.parametrize("block_bytes", [300, 50_000, 1 << 22])
 def test_times_are_spread_alike_however_the_log_is_read(tmp_path, monkeypatch, block_bytes):
-    from kickstand_tools.logs import reader
-
     true = np.arange(12_000) / 104
     path = tmp_path / "log.csv"
     rows = [f"{t:.2f},0.{k % 9}1,-0.02,1.01,0.5,-0.5,0.1{k % 7}" for k, t in enumerate(true)]

@@ -1,11 +1,10 @@
 """Readings that froze are a gap, not a standstill; a quiet sensor at rest is no frozen one."""
 
-import json
-
 import analysis_rides
 import command
 import numpy as np
 import pytest
+from kickstand_tools.analysis import report
 from kickstand_tools.api import Log, open_ride, overview, replay
 from kickstand_tools.calibration import drive
 from kickstand_tools.calibration.file import CalibrationFile
@@ -56,13 +55,6 @@ def test_a_freeze_is_marked_to_the_sample(monkeypatch, blocks_of):
     assert sentence(notice).endswith("to 5.0 s: they are left out, and the lean begins anew after each")
 
 
-@pytest.mark.parametrize(("samples", "is_one"), [(50, False), (52, True)])
-def test_how_long_it_takes(samples, is_one):
-    readings = riding(8)
-    readings[300 : 300 + samples] = readings[300]
-    assert np.any(frozen(log_of(readings))) == is_one
-
-
 def test_at_each_end_and_twice():
     readings = riding(10)
     readings[:200], readings[400:500], readings[900:] = readings[0], readings[400], readings[900]
@@ -73,7 +65,7 @@ def test_at_each_end_and_twice():
     assert "from 0.0 to 2.0 s and 2 times more, 4.0 s in all" in sentence(notices[0])
 
 
-@pytest.mark.parametrize("digits", [5, 4, 3, 2, 1])
+@pytest.mark.parametrize("digits", [5, 3, 1])
 @pytest.mark.parametrize("noise", [1.0, 0.3])
 def test_a_vehicle_at_rest_is_not_frozen(digits, noise):
     """A quiet sensor, the engine off, in logs with fewer and fewer digits: with one, most readings are the same."""
@@ -85,7 +77,7 @@ def test_a_vehicle_at_rest_is_not_frozen(digits, noise):
         assert np.all(same)
 
 
-@pytest.mark.parametrize("digits", [5, 3, 2, 1])
+@pytest.mark.parametrize("digits", [5, 1])
 def test_a_phone_that_freezes_in_a_ride_is_not(digits):
     readings = riding(30, 4, digits)
     readings[1000:2000] = readings[1000]
@@ -113,26 +105,18 @@ def test_the_commands_say_it(tmp_path):
     for k in range(1300, 1500):  # in the first turn
         rows[k] = rows[k].partition(",")[0] + "," + ",".join(rows[1300].split(",")[1:7]) + ","
     ride.write_text("\n".join([header, *rows]) + "\n")
-    out = tmp_path / "LEAN.csv"
+    out = tmp_path / "out.csv"
     words = f"warning: {ride}: the readings froze from 13.0 to 15.0 s: they are left out"
     assert words in command.works("replay", ride, "--out", out).err
     lean = analysis_rides.table(out)
-    assert len(lean) == len(rows)
     assert np.flatnonzero(np.isnan(lean["lean_deg"])).tolist() == list(range(1301, 1500))
     said = command.works("report", ride)
-    assert words in said.err
-    assert "Readings frozen" in said.out
-    data = json.loads(command.works("report", ride, "--json").out)
-    assert data["frozen_s"] == pytest.approx(2.0, abs=0.05)
-    assert data["missing_s"] == pytest.approx(0.0, abs=0.05)
-    exported = tmp_path / "out.csv"
-    assert words in command.works("export", ride, "--to", "csv", "--out", exported).err
-    assert len(analysis_rides.table(exported)) == len(rows) - 199
-    seen = overview(open_ride(ride))
-    assert not np.any((seen.course.t_s > 13.1) & (seen.course.t_s < 14.9))
-    stretch = ("--from", "13.5", "--to", "14.5")
-    for arguments in ("report",), ("plot", "--out", tmp_path / "pictures"):
-        command.refused(tmp_path, arguments[0], ride, *arguments[1:], *stretch, words="all readings are frozen")
+    assert words in said.err and "Readings frozen" in said.out
+    data = report.as_data(overview(open_ride(ride)))
+    assert (data["frozen_s"], data["missing_s"]) == (pytest.approx(2.0, abs=0.05), pytest.approx(0.0, abs=0.05))
+    assert words in command.works("export", ride, "--to", "csv", "--out", out).err
+    assert len(analysis_rides.table(out)) == len(rows) - 199
+    command.refused(tmp_path, "report", ride, "--from", "13.5", "--to", "14.5", words="all readings are frozen")
 
 
 @pytest.mark.parametrize("engine", ["cpython", "micropython"])

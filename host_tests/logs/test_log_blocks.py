@@ -85,17 +85,6 @@ def test_a_mistake_far_down_is_named(tmp_path, monkeypatch, row, block_bytes):
     assert MISTAKES[row] in str(error.value)
 
 
-def test_a_damaged_gzip_file_is_refused_after_its_good_part(tmp_path, monkeypatch):
-    monkeypatch.setattr(reader, "BLOCK_BYTES", 5000)
-    path = write(tmp_path / "ride.csv.gz", [HEADER, *rows(20000)])
-    packed = path.read_bytes()
-    path.write_bytes(packed[:-2000] + b"\xff" * 2000)
-    blocks = reader.read_blocks(path)
-    assert len(next(blocks).time_us)
-    with pytest.raises(InputError, match="damaged"):
-        list(blocks)
-
-
 def test_memory_does_not_grow_with_the_log(tmp_path, monkeypatch):
     """But for the cells of its last hour, by which it is judged: here of its last half minute."""
     monkeypatch.setattr(reader, "BLOCK_BYTES", 1 << 16)

@@ -3,6 +3,7 @@
 import gzip
 import io
 import json
+import os
 
 import analysis_rides
 import command
@@ -30,7 +31,6 @@ def log(tmp_path):
         (2.0, 3.0, 200, 300),
         (None, 1.0, 0, 100),
         (9.0, None, 900, 999),
-        (-1.0, None, 899, 999),
         (None, -9.0, 0, 99),
         (-5.0, -4.0, 499, 599),
         (0.0, 100.0, 0, 999),
@@ -39,7 +39,7 @@ def log(tmp_path):
 @pytest.mark.parametrize("block_bytes", [500, 1 << 22])
 def test_which_samples(log, monkeypatch, from_s, to_s, first, last, block_bytes):
     monkeypatch.setattr(reader, "BLOCK_BYTES", block_bytes)
-    for source in log, io.StringIO(log.read_text()), read_log(log):
+    for source in log, read_log(log):
         found = read_log(Stretch(source, from_s, to_s))
         assert found.start_s == pytest.approx(7.0 + first / 100)
         assert found.time_us.tolist() == [10_000 * k for k in range(last - first + 1)]
@@ -81,12 +81,11 @@ def test_cut_writes_the_lines_as_they_are(log, tmp_path):
 def test_what_cut_refuses(log, tmp_path):
     out = tmp_path / "cut.csv"
     command.refused(tmp_path, "cut", log, "--out", out, words="Give --from, --to or both")
-    command.refused(tmp_path, "cut", log, "--from", "60", "--out", out, words="the log is 10.0 s long")
     command.refused(tmp_path, "cut", log, "--from", "1", "--out", log, words="is also an input")
     command.refused(tmp_path, "cut", log, "--from", "early", "--out", out, words="'early' is no time: give seconds")
 
 
-def test_replay_report_and_plot_take_a_stretch(tmp_path):
+def test_replay_and_report_take_a_stretch(tmp_path):
     ride = analysis_rides.short(tmp_path, speed_hz=1)
     out = tmp_path / "LEAN.csv"
     command.works("replay", ride, "--from", "18", "--to", "26", "--out", out)
@@ -96,10 +95,6 @@ def test_replay_report_and_plot_take_a_stretch(tmp_path):
     assert data["duration_s"] == 8.0
     assert data["stops"] == []
     assert 18.0 <= data["max_right_deg"]["time_s"] <= 26.0  # the ride's own time
-    pytest.importorskip("matplotlib")
-    pytest.importorskip("plotly")
-    command.works("plot", ride, "--to", "26", "--out", tmp_path / "pictures")
-    assert (tmp_path / "pictures" / "RIDE.png").exists()
 
 
 @pytest.mark.parametrize("name", ["replay", "smooth", "export"])
@@ -130,14 +125,9 @@ def test_a_stretch_is_warned_of_another_mounts_calibration_as_the_ride_is(tmp_pa
 
 def test_a_stretch_exported_keeps_its_time_of_day(tmp_path):
     """A log without a clock ends when it was written; a stretch of it ends earlier by what is left out."""
-    import os
-
-    from kickstand_tools.analysis.export.export import export
-    from kickstand_tools.analysis.ride import open_ride
-
     ride = analysis_rides.short(tmp_path)  # 34 s
     os.utime(ride, (1_700_000_100, 1_700_000_100))
     out = tmp_path / "out.csv"
-    export(open_ride(Stretch(ride, 10.0, 20.0)), "racechrono", out)
+    api.export(api.open_ride(Stretch(ride, 10.0, 20.0)), "racechrono", out)
     first = out.read_text().splitlines()[12]
     assert float(first.split(",")[0]) == pytest.approx(1_700_000_100 - 34 + 10, abs=1.5)

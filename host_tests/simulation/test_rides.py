@@ -71,14 +71,8 @@ def test_in_balance_no_force_to_the_side_and_the_yaw_rate_of_the_lean():
     assert seen == {True, False}
 
 
-def test_nothing_jumps():
-    ride = Ride(HILLY, vibration_g=0.0)
-    motion = np.array([ride.motion(x) for x in np.arange(0.0, ride.seconds + 5.0, 0.001)])
-    step = np.abs(np.diff(motion, axis=0)).max(axis=0)
-    assert step[:3].max() < 0.02 and step[3:].max() < 0.5
-
-
 def test_kickstand_and_upright_poses():
+    assert Ride([kickstand(5, lean_deg=15)]).motion(1.0)[0] == pytest.approx(np.sin(np.radians(15)))  # on the right
     ride = Ride([kickstand(5), upright(5)])
     assert ride.truth(0.0)[3] == "kickstand"
     assert ride.truth(1.0)[0] == pytest.approx(KICKSTAND_DEG)
@@ -89,18 +83,6 @@ def test_kickstand_and_upright_poses():
     lean = np.array([ride.truth(x)[0] for x in np.arange(7.0, 12.0, 0.01)])
     assert 0.01 < np.abs(lean).max() < 0.2  # held by a person
     assert ride.truth(9.0)[1:] == (0.0, 0.0, "upright")
-
-
-def test_kickstand_on_the_right():
-    assert Ride([kickstand(5, lean_deg=15)]).motion(1.0)[0] == pytest.approx(np.sin(np.radians(15)))
-
-
-def test_braking_pushes_backward_and_uphill_forward():
-    script = [upright(1), accelerate(20, 5), brake(5, 4), straight(2, slope_deg=5), straight(2)]
-    ride = Ride(script, vibration_g=0.0)
-    assert max(ride.motion(t)[2] for t in np.arange(1, 6, 0.1)) > 0.4
-    assert min(ride.motion(t)[2] for t in np.arange(6, 10, 0.1)) < -0.4
-    assert ride.motion(13.0)[2] == pytest.approx(np.sin(np.radians(5)))
 
 
 def test_vibration_has_the_size_asked_for_and_stops_with_the_engine():

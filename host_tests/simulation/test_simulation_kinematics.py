@@ -70,17 +70,6 @@ def test_force_is_the_second_derivative_of_the_sensors_place():
     assert np.abs(force - specific_force(motion, bike))[EDGE:-EDGE].max() < 0.01
 
 
-@pytest.mark.parametrize("lean_deg", [-80.0, -12.0, 0.0, 35.0])
-def test_at_rest_the_force_is_one_g_along_the_vertical(lean_deg):
-    n = 200
-    lean, pitch = np.full(n, np.radians(lean_deg)), np.full(n, 0.1)
-    motion = Motion(RATE, np.zeros(n), np.full(n, 0.05), np.zeros(n), lean, pitch, np.zeros(n))
-    force = specific_force(motion, Bike()) / STANDARD_GRAVITY
-    assert np.allclose(np.linalg.norm(force, axis=1), 1.0)
-    assert np.allclose(np.degrees(np.arctan2(force[:, 0], force[:, 1])), lean_deg)
-    assert np.allclose(force[:, 2], np.sin(0.1))
-
-
 def held_turn(lean_deg: float, bike: Bike, speed: float = 18.0, **more: float) -> tuple[physics.Roll, int]:
     """A turn's roll and a sample in its steady middle."""
     command = commands([Leg("straight", 3.0, speed, 0.0), Leg("turn", 8.0, speed, lean_deg, **more)], RATE)

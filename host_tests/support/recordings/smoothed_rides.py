@@ -7,7 +7,6 @@ import numpy as np
 from kickstand_tools.api import replay, smooth
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
-from kickstand_tools.replay import replay_engine
 from kickstand_tools.simulation.ride import ride
 from kickstand_workshop.evaluation.runs import as_log, calibrated_by_poses
 from other_bike import other_ride
@@ -24,8 +23,7 @@ class Known:
 
     def live(self):
         """(n) the firmware's lean."""
-        engine = replay_engine.Replay(self.calibration.to_firmware(), self.calibration.delay_s())
-        return np.array([engine.step(*row)[0] for row in self.log.rows()])
+        return replay(self.log, self.calibration).lean_deg
 
     def part(self, kept):
         """The samples where kept (n) is True."""
