@@ -18,25 +18,20 @@ def spinning(seed):
     return Log(np.arange(600) / 100.0, np.tile([0.0, 1.0, 0.0], (600, 1)), rates, name="spin.csv")
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_a_lean_filter_that_has_lost_itself(seed):
-    notices = []
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        ride = joined(list(open_ride(spinning(seed), CalibrationFile(aligned=True)).blocks(notices=notices)))
-    lost = np.isnan(ride.lean_sigma_deg)
-    assert not np.any(ride.trusted[lost])
-    assert not np.any(ride.sure[lost])
-    said = [sentence(notice) for notice in notices if notice.code == "absurd-readings"]
-    assert len(said) == np.any(lost)
-    if said:
-        found = re.match(r"readings that no vehicle gives, at (\S+) s up to 2\d\d\d deg/s and 1.0 g", said[0])
-        assert found
-        assert float(found[1]) == pytest.approx(ride.t_s[np.argmax(lost)], abs=0.06)
-
-
-def test_some_of_them_do():
-    assert any(
-        np.isnan(joined(list(open_ride(spinning(seed), CalibrationFile(aligned=True)).blocks())).lean_sigma_deg).any()
-        for seed in range(6)
-    )
+def test_a_lean_filter_that_has_lost_itself():
+    """As it does in some of six rides."""
+    lost_in = 0
+    for seed in range(6):
+        notices = []
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            ride = joined(list(open_ride(spinning(seed), CalibrationFile(aligned=True)).blocks(notices=notices)))
+        lost = np.isnan(ride.lean_sigma_deg)
+        assert not np.any(ride.trusted[lost] | (ride.sure[lost] > 0.0))
+        said = [sentence(notice) for notice in notices if notice.code == "absurd-readings"]
+        assert len(said) == np.any(lost)
+        if said:
+            lost_in += 1
+            found = re.match(r"readings that no vehicle gives, at (\S+) s up to 2\d\d\d deg/s and 1.0 g", said[0])
+            assert found and float(found[1]) == pytest.approx(ride.t_s[np.argmax(lost)], abs=0.06)
+    assert lost_in

@@ -98,8 +98,7 @@ def test_the_straights_and_their_line(seen, panels, drawn):
     assert drawn["straights"]["x"] == pytest.approx(dots.x, abs=1e-5)
 
 
-@pytest.mark.parametrize("car", [False, True])
-@pytest.mark.parametrize("speed", [False, True])
+@pytest.mark.parametrize(("car", "speed"), [(False, True), (True, False), (False, False)])
 def test_a_car_has_no_lean_and_a_speed_is_drawn_where_there_is_one(seen, car, speed):
     made = replace(seen, ride=replace(seen.ride, calibration=CalibrationFile(vehicle="car" if car else "motorcycle")))
     made = replace(made, summary=replace(seen.summary, speed_mps=seen.summary.speed_mps if speed else Peak()))
@@ -144,7 +143,7 @@ def test_what_is_not_known_is_not_drawn(seen):
     assert len(chart(made, "Alignment").traces) == len(chart(seen, "Alignment").traces) - 1
 
 
-@pytest.mark.parametrize("most", [(1.0, 1.0), (0.0, 6.0), (6.0, 4.0), (12.0, 11.0), (25.0, 46.0), (60.0, 60.0)])
+@pytest.mark.parametrize("most", [(1.0, 1.0), (0.0, 6.0), (12.0, 11.0), (60.0, 60.0)])
 def test_labels_of_the_share_of_each_lean_do_not_stand_on_one_another(seen, most):
     """However little the bike leaned."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -73,11 +73,6 @@ def test_a_stretch_without_speed_that_goes_straight_on_is_ridden():
     assert words_of(Stretch(standing(40, 0.05, 1.5), 5.0, 30.0)).too_little == ""
 
 
-def test_a_stretch_of_one_sample_that_rests_has_a_report():
-    said = words_of(Stretch(standing(12, 0.003, 0.1), 11.985))
-    assert said.too_little == "0:00 of log, all of it standing: too little for a report."
-
-
 def test_a_log_that_was_cut_says_so_first(tmp_path):
     path = analysis_rides.short(tmp_path)
     path.write_text("\n".join(path.read_text().splitlines()[:900]) + "\n")

@@ -29,6 +29,7 @@ def test_no_drawing_is_stale(pictures):
     assert not stale, f"{', '.join(stale)}: {STALE}"
 
 
+@pytest.mark.nightly
 def test_the_plot_of_the_ride_is_not_stale():
     """By its look: matplotlib's files differ from version to version."""
     fresh, kept = (

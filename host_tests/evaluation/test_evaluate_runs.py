@@ -38,7 +38,7 @@ def test_every_filter_has_the_signs_right(name, lean_deg):
 
 @pytest.fixture(scope="module")
 def swept():
-    return runs.run(runs.Job("sweeper", 1, seconds=150.0, traces=True))
+    return runs.run(runs.Job("sweeper", 1, seconds=120.0, traces=True))
 
 
 def test_every_estimator_is_scored(swept):
@@ -69,14 +69,8 @@ def test_the_calibration_is_from_the_poses_alone():
     assert calibration.six_done and calibration.aligned
 
 
-def test_errors_of_the_set_up_reach_the_calibration():
-    made = ride("street", 2, 60.0, upright_error_deg=1.5, pitch_change_deg=0.0, share=0.0)
-    matrix = runs.calibrated_by_poses(made).vehicle_from_sensor
-    up = matrix[1] @ made.vehicle_from_sensor.T
-    assert np.degrees(np.arctan2(up[0], up[1])) == pytest.approx(1.5, abs=0.15)
-
-
-def test_the_jobs_set_up_errors_are_ridden():
+def test_the_jobs_set_up_errors_are_ridden(monkeypatch):
+    monkeypatch.setattr(estimators, "OTHERS", {"complementary": estimators.OTHERS["complementary"]})
     jobs = [runs.Job("parked", 0, 60.0, error, pitch_change_deg=0.0, traces=True) for error in (0.0, 1.5)]
     fair, off = (runs.run(job).traces["complementary"] for job in jobs)
     assert np.mean(off - fair) == pytest.approx(-1.5, abs=0.3)
@@ -147,7 +141,8 @@ def test_the_recorded_motorcycle(shared_data):
 def test_the_command_prints_a_table_and_writes_json_and_picture(tmp_path):
     pytest.importorskip("matplotlib")
     out = tmp_path / "out"
-    result = works("evaluate", "--profiles", "street,parked", "--seeds", 1, "--seconds", 60, "--out", out)
+    more = "--seeds", 1, "--seconds", 40
+    result = works("evaluate", "--profiles", "street,parked", *more, "--out", out)
     assert "kickstand" in result.out
     assert "street (1)" in result.out
     assert "nan" not in result.out
@@ -156,13 +151,9 @@ def test_the_command_prints_a_table_and_writes_json_and_picture(tmp_path):
     assert set(data["profiles"]) == {"street", "parked"}
     assert data["profiles"]["parked"]["kickstand"]["lag_ms"] is None
     assert (out / "lean.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_json_on_standard_output_is_the_same_for_the_same_seed():
-    arguments = ["evaluate", "--profiles", "parked", "--seeds", 1, "--seconds", 60, "--json"]
-    first, second = (json.loads(works(*arguments).out) for _ in range(2))
-    assert first == second
-    assert math.isfinite(first["profiles"]["parked"]["formula"]["rms"])
+    again = json.loads(works("evaluate", "--profiles", "parked", *more, "--json").out)  # on standard output
+    assert again["profiles"]["parked"] == data["profiles"]["parked"]
+    assert math.isfinite(again["profiles"]["parked"]["formula"]["rms"])
 
 
 def test_an_unknown_profile_is_refused(tmp_path):

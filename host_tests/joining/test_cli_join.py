@@ -123,6 +123,7 @@ def test_tracks_are_read_with_their_speed(tmp_path, track, kind):
 
 
 def test_what_is_no_track_of_this_ride_is_refused(tmp_path, log, track):
+    short = api.Track(*(values[:20] for values in track.columns().values()), name="short")
     other = phone_tracks.track(api.simulate_ride("hills", seed=2, seconds=200.0))
     for name, words, make in (
         ("other.gpx", "nowhere does the ride turn as the track does", lambda p: phone_tracks.write_gpx(p, other)),
@@ -131,7 +132,7 @@ def test_what_is_no_track_of_this_ride_is_refused(tmp_path, log, track):
         ("text.fit", "is no FIT file, or a damaged one", lambda p: p.write_text("lat,lon\n" * 99)),
         ("track.kml", "ends in .gpx or .fit", lambda p: p.write_text("")),
         ("no.gpx", "there is no such file", lambda p: None),
-        ("short.gpx", "has 20 points", lambda p: phone_tracks.write_gpx(p, first(track, 20))),
+        ("short.gpx", "has 20 points", lambda p: phone_tracks.write_gpx(p, short)),
     ):
         make(tmp_path / name)
         command.refused(tmp_path, "join", log, tmp_path / name, "--out", tmp_path / "JOINED.csv", words=words)
@@ -147,13 +148,3 @@ def test_a_ride_with_positions_and_outputs_that_destroy_are_refused(tmp_path, lo
     command.works("join", log, gpx, "--out", tmp_path / "JOINED.csv")
     again = "join", tmp_path / "JOINED.csv", gpx, "--out", tmp_path / "AGAIN.csv"
     command.refused(tmp_path, *again, words="has positions already")
-
-
-def test_from_python_a_ride_in_memory_is_written_too(tmp_path, ride, track):
-    log = api.Log.from_readings(ride.readings, ride.rate_hz)
-    count = api.write_joined(tmp_path / "JOINED.csv", api.join_track(log, track))
-    assert count == len(placed(tmp_path / "JOINED.csv")) > 150
-
-
-def first(track: api.Track, count: int) -> api.Track:
-    return api.Track(*(values[:count] for values in track.columns().values()), name="first")

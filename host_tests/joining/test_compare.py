@@ -23,7 +23,7 @@ def shifted(log, later_s, drift):
 
 @pytest.fixture(scope="module")
 def ride():
-    return drawn_ride(1, 160.0, ["firm", "firm"], "street")
+    return drawn_ride(1, 130.0, ["firm", "firm"], "street")
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def files(ride, tmp_path_factory):
 def test_the_clocks_are_found(found, ride):
     assert found.clocks.later_s == pytest.approx(LATER_S + 0.5 / 200.0, abs=0.01)
     assert found.clocks.drift == pytest.approx(SLOW, abs=60e-6)
-    at_s = np.array([120.0])
+    at_s = np.array([100.0])
     assert found.clocks.of_b(at_s) == pytest.approx((at_s - LATER_S) * (1.0 - SLOW), abs=0.015)
     assert found.clocks.correlation > 0.9
 

@@ -13,7 +13,7 @@ from kickstand_tools.errors import InputError
 from kickstand_tools.joining.track import Track
 from kickstand_tools.joining.track_files import read_track
 
-COUNT = 300
+COUNT = 150
 
 
 def some_track():

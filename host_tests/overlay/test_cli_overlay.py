@@ -48,7 +48,7 @@ def filled(pictures: np.ndarray, gauge: Gauge) -> np.ndarray:
     return sides / max(np.abs(sides).max(), 1.0)
 
 
-@pytest.mark.parametrize(("form", "fps"), [(".mov", 30), (".webm", 60)])
+@pytest.mark.parametrize(("form", "fps"), [(".mov", 10), (".webm", 15)])
 def test_a_transparent_clip(tmp_path, ride, lean, left_s, form, fps):
     out = tmp_path / f"clip{form}"
     begin = round(left_s, 2)
@@ -100,7 +100,7 @@ def test_a_part_of_a_video_that_began_before_the_ride(tmp_path, ride):
     out = "--out", tmp_path / "out.mp4"
     said = command.refused(tmp_path, *given, *out, words="lasts from -3.0 to 3.0 s of the ride")
     assert "--from 0.0 --to 3.0" in said
-    for part in (("--from", 0, "--to", 3), ("--to", 3), ("--from", 0)):
+    for part in (("--to", 3), ("--from", 0)):
         command.works(*given, *part, *out)
         assert len(gopro.frames(tmp_path / "out.mp4")) == pytest.approx(30, abs=1), part
 
@@ -159,17 +159,6 @@ def test_what_is_no_video_of_the_ride_is_refused(tmp_path, ride):
     command.refused(tmp_path, "overlay", ride, "--video", film, "--offset", 1, "--out", film, words="is also an input")
 
 
-def test_half_a_ride_is_refused_and_says_what_both_have(tmp_path, ride):
-    film = gopro.film(tmp_path / "film.mp4", 8.0)
-    half = tmp_path / "HALF.csv"
-    lines = ride.read_text().splitlines(keepends=True)
-    half.write_text("".join(lines[: len(lines) // 2]))
-    calibration = "--calibration", ride.with_name("RIDE.cal.json")
-    ends_s = (len(lines) // 2 - 2) / 100.0
-    given = "overlay", half, *calibration, "--video", film, "--offset", f"{ends_s - 4.0:.2f}"
-    command.refused(tmp_path, *given, "--out", tmp_path / "out.mp4", words=f"which ends at {ends_s:.1f} s")
-
-
 def test_when_it_is_stopped_nothing_is_left(tmp_path, ride):
     """Neither a file nor ffmpeg, which would go on writing it."""
     film = gopro.film(tmp_path / "film.mp4", 5.0)
@@ -216,7 +205,7 @@ def test_a_gopros_readings_are_read_in_deg_s_on_the_videos_time(tmp_path):
 def test_live_shows_what_the_display_showed(tmp_path, ride):
     """At the first lean the two differ: the display did not know what came after."""
     for more in ((), ("--live",)):
-        part = "--from", 6, "--to", 11, "--height", 240
+        part = "--from", 6, "--to", 9, "--fps", 10, "--height", 240
         command.works("overlay", ride, *part, *more, "--out", tmp_path / f"clip{len(more)}.webm")
     smoothed, live = (gopro.frames(tmp_path / f"clip{k}.webm").astype(int) for k in (0, 1))
     assert np.abs(smoothed - live).max() > 100

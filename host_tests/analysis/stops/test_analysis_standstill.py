@@ -13,7 +13,7 @@ from kickstand_tools.calibration.two import fit_two_positions
 from kickstand_tools.simulation.files import simulate
 
 
-@pytest.fixture(scope="module", params=[1, 2])
+@pytest.fixture(scope="module", params=[1, pytest.param(2, marks=pytest.mark.nightly)])
 def track(tmp_path_factory, request) -> Channels:
     """Without a speed, as an MPU6050 reads it: smooth, fast, with held turns and one stop, the last of it."""
     directory = tmp_path_factory.mktemp("track")
