@@ -107,7 +107,7 @@ def scripted(tmp_path_factory):
     return analysis_rides.write(tmp_path_factory.mktemp("ride"), segments, speed_hz=1)
 
 
-@pytest.mark.parametrize(("axis", "angle_deg"), zip(AXES, (-3.0, 2.0, -3.0), strict=True))
+@pytest.mark.parametrize(("axis", "angle_deg"), list(zip(AXES, (-3.0, 2.0, -3.0), strict=True)))
 def test_an_error_of_the_alignment_is_seen(scripted, axis, angle_deg):
     quality = overview(open_ride(scripted, with_calibration(scripted, axis, angle_deg))).quality
     assert quality.straight_s > 30.0

@@ -141,7 +141,7 @@ def test_the_recorded_motorcycle(shared_data):
 def test_the_command_prints_a_table_and_writes_json_and_picture(tmp_path):
     pytest.importorskip("matplotlib")
     out = tmp_path / "out"
-    more = "--seeds", 1, "--seconds", 40
+    more = "--seeds", 1, "--seconds", 60
     result = works("evaluate", "--profiles", "street,parked", *more, "--out", out)
     assert "kickstand" in result.out
     assert "street (1)" in result.out

@@ -9,6 +9,7 @@ import pytest
 from app_exports import riding
 from kickstand_tools import api
 from kickstand_tools.imports.importing import NAMES
+from kickstand_tools.replay import replay_engine
 
 
 @pytest.fixture
@@ -142,7 +143,8 @@ def test_a_replays_output_and_kickstands_own_vbo(tmp_path, ride):
     words = "no channel Y_Accel, Z_Accel, X_Accel, PitchRate"
     line = refused(tmp_path, tmp_path / "r.vbo", words)
     assert "take the log that it was made from" in line
-    (tmp_path / "LEAN.csv").write_text("t_s,lean_deg,lean_formula_deg,left_g\n0,1,1,0\n")
+    names = ("t_s", *replay_engine.COLUMNS)
+    (tmp_path / "LEAN.csv").write_text(app_exports.lines(names, [range(len(names))] * 3))
     refused(tmp_path, tmp_path / "LEAN.csv", "holds a lean, no readings: give the log")
 
 

@@ -48,15 +48,15 @@ def filled(pictures: np.ndarray, gauge: Gauge) -> np.ndarray:
     return sides / max(np.abs(sides).max(), 1.0)
 
 
-@pytest.mark.parametrize(("form", "fps"), [(".mov", 10), (".webm", 15)])
+@pytest.mark.parametrize(("form", "fps"), [(".mov", 60), (".webm", 30)])
 def test_a_transparent_clip(tmp_path, ride, lean, left_s, form, fps):
     out = tmp_path / f"clip{form}"
     begin = round(left_s, 2)
-    arguments = "--from", begin, "--to", begin + 8.0, "--fps", fps, "--height", 480
+    arguments = "--from", begin, "--to", begin + 8.0, "--fps", fps, "--height", 240
     said = command.works("overlay", ride, *arguments, "--out", out).out
     assert said == f"written: {out}, {8 * fps} frames, 8.0 s, {fps} per second\n"
     pictures = gopro.frames(out, "rgba")
-    gauge = Gauge(480)
+    gauge = Gauge(240)
     assert pictures.shape == (8 * fps, gauge.height, gauge.width, 4)
     assert pictures[:, 0, 0, 3].max() < 10
     assert pictures[..., 3].max() > 245
@@ -205,7 +205,7 @@ def test_a_gopros_readings_are_read_in_deg_s_on_the_videos_time(tmp_path):
 def test_live_shows_what_the_display_showed(tmp_path, ride):
     """At the first lean the two differ: the display did not know what came after."""
     for more in ((), ("--live",)):
-        part = "--from", 6, "--to", 9, "--fps", 10, "--height", 240
+        part = "--from", 6, "--to", 9, "--height", 240
         command.works("overlay", ride, *part, *more, "--out", tmp_path / f"clip{len(more)}.webm")
     smoothed, live = (gopro.frames(tmp_path / f"clip{k}.webm").astype(int) for k in (0, 1))
     assert np.abs(smoothed - live).max() > 100

@@ -32,7 +32,7 @@ def test_the_roll_rate_is_the_change_of_the_true_lean(pair):
     assert np.corrcoef(since[:later], pair.true_lean(0)[:later])[0, 1] > 0.95
 
 
-@pytest.mark.parametrize(("mount", "kind"), zip(MOUNTS, DRAWN, strict=True))
+@pytest.mark.parametrize(("mount", "kind"), list(zip(MOUNTS, DRAWN, strict=True)))
 def test_at_rest_there_is_gravity_and_no_rate(mount, kind):
     ride = drawn_ride(5, 40.0, [mount], kind)
     force, rates = turned_back(ride, 0)
