@@ -5,14 +5,12 @@ from dataclasses import fields
 import analysis_rides
 import numpy as np
 import pytest
-from kickstand.lean import formula
 from kickstand_tools.analysis.channels import Channels
 from kickstand_tools.analysis.downsample import downsampled, joined
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.summary import Summary
 from kickstand_tools.logs import reader
 from kickstand_tools.replay import replay_engine
-from kickstand_tools.replay.meter_along import formula_lean_deg
 
 
 @pytest.fixture(scope="module")
@@ -25,14 +23,6 @@ def course(ride) -> Channels:
     return joined(list(ride.blocks()))
 
 
-def test_the_formula_on_arrays_is_the_firmwares():
-    rng = np.random.default_rng(0)
-    left, up, yaw = rng.normal(0.0, 0.7, (3, 5000))
-    yaw[::50], left[:20], up[:20] = 0.0, 0.03, 0.01
-    want = [formula.formula_lean_deg((x, y, 0.0), p) for x, y, p in zip(left, up, yaw)]
-    assert np.max(np.abs(formula_lean_deg(left, up, yaw) - want)) < 1e-6
-
-
 def test_channels_are_those_of_the_meter(ride, course):
     log = reader.read_log(ride.log)
     engine = replay_engine.Replay(ride.calibration.to_firmware())
@@ -43,7 +33,7 @@ def test_channels_are_those_of_the_meter(ride, course):
         rolling.append(engine.meter.filter.rolling)
         trusted.append(engine.meter.trusted)
     for name, column in zip(replay_engine.COLUMNS, np.transpose(rows)):
-        if name not in ("static_lean_deg", "lean_formula_deg", "lean_sigma_deg"):  # the formula: above
+        if name not in ("static_lean_deg", "lean_formula_deg", "lean_sigma_deg"):  # test_meter_along.py
             assert np.max(np.abs(getattr(course, name) - column)) < 1e-5, name
     assert np.array_equal(course.shown_g, shown)
     assert np.array_equal(course.rolling, rolling)

@@ -15,11 +15,10 @@ import pytest
 from kickstand_tools.analysis.channels import Channels
 from kickstand_tools.analysis.export import export_columns, export_racechrono, export_vbo
 from kickstand_tools.analysis.export.export import export
-from kickstand_tools.analysis.ride import open_ride, vehicle_channels
+from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.log import Log
-from kickstand_tools.replay.replay_engine import Replay
 
 EVENING_S = 1_700_000_000.0  # 22:13:20 UTC on 14/11/2023
 VALUES = {
@@ -140,21 +139,6 @@ def test_a_left_turn_under_braking_has_the_signs_of_each_format(tmp_path):
     export(ride, "csv", out)
     row = dict(zip(export_columns.COLUMNS, out.read_text().split("\n")[-2].split(",")))
     assert [float(row[f"{name}_rate_dps"]) for name in ("pitch", "yaw", "roll")] == pytest.approx([-5.0, 7.0, 9.0])
-
-
-def test_sigma_is_that_of_the_filter_in_degrees(tmp_path):
-    motorcycle = CalibrationFile(aligned=True)
-    log = squarely()
-    engine = Replay(motorcycle.to_firmware())
-    variance = []
-    for row in log.rows():
-        engine.take(*row)
-        variance.append(engine.meter.filter.variance)
-    seen = vehicle_channels(log, motorcycle)
-    assert seen.lean_sigma_deg == pytest.approx(np.sqrt(variance) * 180.0 / np.pi, abs=1e-3)
-    assert not seen.trusted.any()
-    export(open_ride(log, motorcycle), "csv", tmp_path / "out")  # as in a replay: where the display shows none
-    assert np.isnan(np.genfromtxt(tmp_path / "out", delimiter=",", names=True)["lean_sigma_deg"]).all()
 
 
 def test_the_lean_is_the_smoothed_one_or_with_live_the_displays(tmp_path):

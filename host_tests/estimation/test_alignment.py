@@ -20,7 +20,7 @@ RATE_HZ = 200
 
 
 @functools.cache
-def simulated(profile="street", seed=21, seconds=180.0):
+def simulated(profile="street", seed=21, seconds=150.0):
     return api.simulate_ride(profile, seed, seconds)
 
 

@@ -86,33 +86,33 @@ def test_a_refused_calibration_is_reported_not_scored(monkeypatch):
     assert not result.scores
 
 
-def recorded(rest_s: float = 2.0, turned: float = 0.3) -> Log:
-    """A level ride, the phone turned about the vertical: straight acceleration, then a left turn."""
+C, S = np.cos(0.3), np.sin(0.3)
+MOUNTED = CalibrationFile(
+    gyro_bias_dps=np.array([1.0, -2.0, 0.5]),
+    vehicle_from_sensor=np.array([[C, 0.0, S], [0.0, 1.0, 0.0], [-S, 0.0, C]]),
+    aligned=True,
+)
+
+
+def recorded() -> Log:
+    """A level ride, the phone turned about the vertical: straight acceleration after 2 s, then a left turn."""
     n, rate = 3000, 50.0
     t = np.arange(n) / rate
-    speed = np.clip((t - rest_s) * 2.0, 0.0, 10.0)
+    speed = np.clip((t - 2.0) * 2.0, 0.0, 10.0)
     yaw = np.where(t > 20.0, 0.4, 0.0)
     lean = -np.arctan(speed * yaw / STANDARD_GRAVITY)
     forward = np.gradient(speed, t) / STANDARD_GRAVITY
     size = np.hypot(1.0, speed * yaw / STANDARD_GRAVITY)
     vehicle = np.column_stack((np.zeros(n), size, forward))  # balanced: the force lies in the bike's plane
     rates = np.degrees(np.column_stack((yaw * np.sin(lean), yaw * np.cos(lean), np.gradient(lean, t))))
-    c, s = np.cos(turned), np.sin(turned)
-    mounting = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    mounting = MOUNTED.vehicle_from_sensor
     speeds = np.where(np.arange(n) % 50 == 0, speed, np.nan)
-    return Log(t, vehicle @ mounting, rates @ mounting + [1.0, -2.0, 0.5], speeds, name="made.csv")
-
-
-def mounted(turned: float) -> CalibrationFile:
-    """The calibration of recorded()."""
-    c, s = np.cos(turned), np.sin(turned)
-    matrix = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-    return CalibrationFile(gyro_bias_dps=np.array([1.0, -2.0, 0.5]), vehicle_from_sensor=matrix, aligned=True)
+    return Log(t, vehicle @ mounting, rates @ mounting + MOUNTED.gyro_bias_dps, speeds, name="made.csv")
 
 
 def test_the_reference_is_speed_times_yaw_rate():
     log = recorded()
-    reference = real_ride.reference_lean(log, mounted(0.3))
+    reference = real_ride.reference_lean(log, MOUNTED)
     lean = np.arctan(10.0 * 0.4 / STANDARD_GRAVITY)
     expected = -np.degrees(np.arctan(10.0 * 0.4 * np.cos(lean) / STANDARD_GRAVITY))
     assert reference[2500] == pytest.approx(expected, abs=0.3)
@@ -123,7 +123,7 @@ def test_a_recording_without_speed_is_refused():
     log = recorded()
     log.speed_mps[:] = np.nan
     with pytest.raises(InputError, match="no speed"):
-        real_ride.reference_lean(log, mounted(0.3))
+        real_ride.reference_lean(log, MOUNTED)
 
 
 def test_the_recorded_motorcycle(shared_data):

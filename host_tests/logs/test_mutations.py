@@ -5,7 +5,6 @@ import json
 import warnings
 from pathlib import Path
 
-import analysis_rides
 import command
 import mutations
 import numpy as np
@@ -27,7 +26,6 @@ from kickstand_tools.simulation.scripted import script
 from rich.console import Console
 
 COUNT = 1000
-OF_THE_COMMAND = 25  # every so many-th of them goes through the command, too
 CALIBRATION = CalibrationFile(aligned=True)
 
 
@@ -56,17 +54,6 @@ USES = {
     "ride": lambda log, out: fit_ride(log),
     "import": lambda log, out: write_imported(out, import_recording(log)),
 }
-# The same by the command: its arguments behind the log
-COMMANDS = [
-    lambda log, out: ("replay", log, "--out", out / "LEAN.csv"),
-    lambda log, out: ("report", log, "--from", "0.5"),
-    lambda log, out: ("report", log, "--json"),
-    lambda log, out: ("export", log, "--to", "vbo", "--out", out / "RIDE.vbo"),
-    lambda log, out: ("cut", log, "--to", "1.5", "--out", out / "CUT.csv.gz"),
-    lambda log, out: ("import", log, "--out", out / "RIDE.csv"),
-    lambda log, out: ("calibrate", "ride", log, "--out", out / "CAL.json"),
-    lambda log, out: ("calibrate", "six", log, log, log, log, log, log, "--out", out / "CAL.json"),
-]
 
 
 @pytest.fixture(scope="module")
@@ -117,29 +104,3 @@ def test_each_ends_in_a_result_or_in_one_line(bases, tmp_path):
         log.unlink()
     assert 0.2 * COUNT < results < 1.8 * COUNT  # both happen, and often
     assert len(lines) > 20
-
-
-def test_the_command_says_one_line(bases, tmp_path):
-    analysis_rides.calibration(tmp_path / "RIDE.cal.json")
-    out = tmp_path / "out"
-    out.mkdir()
-    for number in range(0, COUNT, OF_THE_COMMAND):
-        name, content, ways = mutations.broken(bases, number + number // OF_THE_COMMAND % len(mutations.WAYS))
-        log = tmp_path / name
-        log.write_bytes(content)
-        arguments = COMMANDS[number // OF_THE_COMMAND % len(COMMANDS)](log, out)
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            result = command.run(*arguments)
-        where = f"{arguments[0]} of {ways}: {result.err}"
-        assert "unexpected" not in result.err, where
-        written = [path for path in out.rglob("*") if path.is_file()]
-        if result.status:
-            assert result.status == 2, where
-            assert result.err.count("\n") == 1, where
-            assert not written, where
-        else:
-            assert all(line.startswith("warning: ") for line in result.err.splitlines()), where
-        for path in written:
-            path.unlink()
-        log.unlink()

@@ -1,5 +1,6 @@
 """Simulated rides for the tests of the analysis: a perfect sensor, turned into the vehicle's axes already."""
 
+import functools
 import json
 from pathlib import Path
 
@@ -28,6 +29,16 @@ def write(directory: Path, segments: list, rate_hz: int = 100, speed_hz: int = 0
 
     speed_hz: how often the log has a speed, 0 for never.
     """
+    return _put(directory, _text(segments, rate_hz, speed_hz, vibration_g))
+
+
+def _put(directory: Path, text: str) -> Path:
+    calibration(directory / "RIDE.cal.json")
+    (directory / "RIDE.csv").write_text(text)
+    return directory / "RIDE.csv"
+
+
+def _text(segments: list, rate_hz: int, speed_hz: int, vibration_g: float) -> str:
     ride = script.Ride(segments, vibration_g)
     header = command.HEADER + (",speed_mps" if speed_hz else "")
     lines = [header]
@@ -37,28 +48,19 @@ def write(directory: Path, segments: list, rate_hz: int = 100, speed_hz: int = 0
         if speed_hz:
             line += f",{ride.truth(t_s)[1]:.2f}" if n % (rate_hz // speed_hz) == 0 else ","
         lines.append(line)
-    path = directory / "RIDE.csv"
-    path.write_text("\n".join(lines) + "\n")
-    calibration(directory / "RIDE.cal.json")
-    return path
+    return "\n".join(lines) + "\n"
 
 
-def short(directory: Path, **more) -> Path:
+def short(directory: Path, rate_hz: int = 100, speed_hz: int = 0) -> Path:
     """A ride under a minute: stand, set off, a turn to each side, a hard stop."""
-    return write(
-        directory,
-        [
-            script.upright(4),
-            script.accelerate(15, 5),
-            script.turn(-30, 4),
-            script.straight(2),
-            script.turn(42, 4),
-            script.straight(2),
-            script.brake(0, 3),
-            script.wait(4),
-        ],
-        **more,
-    )
+    return _put(directory, _short(rate_hz, speed_hz))
+
+
+@functools.cache
+def _short(rate_hz: int, speed_hz: int) -> str:
+    parts = [script.upright(4), script.accelerate(15, 5), script.turn(-30, 4), script.straight(2)]
+    parts += [script.turn(42, 4), script.straight(2), script.brake(0, 3), script.wait(4)]
+    return _text(parts, rate_hz, speed_hz, 0.02)
 
 
 def table(path: Path) -> np.ndarray:

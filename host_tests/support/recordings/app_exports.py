@@ -243,7 +243,7 @@ def racechrono(ride: Riding, sign: float = 1.0, version: int = 3) -> str:
     return "\n".join([*head, *rows]) + "\n"
 
 
-def racebox(ride: Riding, per_mps: float = 3.6, laps: bool = False, motorcycle: bool = False) -> str:
+def racebox(ride: Riding, per_mps: float = 3.6, laps: bool = False) -> str:
     """x forward, y left, z up; Speed without a unit, per_mps times m/s."""
     names = "Record,Time,Latitude,Longitude,Altitude,Speed,GForceX,GForceY,GForceZ,Lap,GyroX,GyroY,GyroZ".split(",")
     rows = []
@@ -255,19 +255,17 @@ def racebox(ride: Riding, per_mps: float = 3.6, laps: bool = False, motorcycle: 
             + [f"{per_mps * ride.speed_mps[k]:.2f}", f"{forward:.3f}", f"{left:.3f}", f"{up:.3f}", "0"]
             + [f"{about_forward:.2f}", f"{about_left:.2f}", f"{about_up:.2f}"]
         )
-    if motorcycle:
-        names[7] = "LeanAngle"
     before = "Format,RaceBox CSV\nTrack,Home\nLap 1, 33.821, sectors, 9.01,6.759,9.764,0,8.288\n\n" if laps else ""
     return before + lines(names, rows)
 
 
-def vbo(ride: Riding, speed: str = "kmh", inertial: bool = True) -> str:
+def vbo(ride: Riding, speed: str = "kmh") -> str:
     """Sections; minutes, positive in the west; an IMU04's channels in their own signs."""
     per_mps = {"kmh": 3.6, "knots": 3600.0 / 1852.0}[speed]
     names = ["sats", "time", "lat", "long", "velocity", "heading", "height"]
-    units = ["g", "g", "g", "deg/s", "deg/s", "deg/s"] if inertial else []
+    units = ["g", "g", "g", "deg/s", "deg/s", "deg/s"]
     titles = ["satellites", "time", "latitude", "longitude", f"velocity {speed}", "heading", "height"]
-    extra = ["X_Accel", "Y_Accel", "Z_Accel", "YawRate", "PitchRate", "RollRate"] if inertial else []
+    extra = ["X_Accel", "Y_Accel", "Z_Accel", "YawRate", "PitchRate", "RollRate"]
     rows = []
     for k, t in enumerate(ride.t_s.tolist()):
         left, up, forward = ride.force_g[k].tolist()
@@ -275,9 +273,8 @@ def vbo(ride: Riding, speed: str = "kmh", inertial: bool = True) -> str:
         second = t + 0.25
         row = f"011 0930{second:05.2f} {60.0 * ride.lat_deg[k]:+012.5f} {-60.0 * ride.lon_deg[k]:+012.5f} "
         row += f"{per_mps * ride.speed_mps[k]:07.3f} 000.00 +00034.50"
-        if inertial:
-            measured = (forward, left, up, -about_up, -about_left, about_forward)
-            row += "".join(f" {value:+.6E}" for value in measured)
+        measured = (forward, left, up, -about_up, -about_left, about_forward)
+        row += "".join(f" {value:+.6E}" for value in measured)
         rows.append(row)
     head = ["File created on 17/05/2024 at 09:31:00", "", "[header]", *titles, *extra, "", "[channel units]", *units]
     head += ["", "[comments]", "(c) nobody", "", "[column names]", " ".join(names + extra), "", "[data]"]
