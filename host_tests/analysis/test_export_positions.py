@@ -1,6 +1,5 @@
 """A ride's positions in the files of other programs, read back by the programs' own rules."""
 
-import csv
 import functools
 from datetime import UTC, datetime
 from pathlib import Path
@@ -116,26 +115,6 @@ def test_every_row_of_a_vbo_has_the_place_on_the_line_between_positions(tmp_path
     moving = placed & (np.interp(t_s, ride.t_s, ride.speed_mps) > 3.0)
     wrong = (rows["heading"] - np.degrees(course) + 180.0) % 360.0 - 180.0
     assert np.max(np.abs(wrong[moving])) < 5.0
-
-
-@pytest.mark.parametrize("form", ["csv", "parquet"])
-def test_data_frames_have_the_positions_to_the_centimetre(tmp_path, form):
-    frame = (pandas.read_csv if form == "csv" else pandas.read_parquet)(exported(form, tmp_path))
-    given = log()
-    for name in ("lat_deg", "lon_deg", "utc_s"):
-        assert np.allclose(frame[name], getattr(given, name), rtol=0.0, atol=1e-3 if name == "utc_s" else 1e-7,
-                           equal_nan=True)  # fmt: skip
-
-
-def test_racechrono_has_places_and_the_time_of_the_satellites(tmp_path):
-    lines = exported("racechrono", tmp_path).read_text().split("\n")
-    rows = list(csv.DictReader(lines[lines.index("") + 1 :]))[2:]
-    known = [row for row in rows if row["latitude"]]
-    assert len(known) == np.count_nonzero(np.isfinite(log().lat_deg))
-    t_s = np.array([float(row["elapsed_time"]) for row in known])
-    assert [float(row["timestamp"]) for row in known] == pytest.approx(t_s + START_S, abs=2e-3)
-    lat, lon = ([float(row[name]) for row in known] for name in ("latitude", "longitude"))
-    assert np.max(away_m(lat, lon, t_s)) < 0.05
 
 
 @pytest.mark.parametrize("form", ["gpx", "racechrono", "vbo"])

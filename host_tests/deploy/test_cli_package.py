@@ -72,14 +72,6 @@ def test_an_installation_stays_that_of_the_checkout():
     assert all("pip install -e " in line for line in lines)
 
 
-def test_an_installed_wheel_finds_its_firmware(tmp_path, monkeypatch):
-    """As in site-packages: beside the package, with no checkout around it."""
-    package = tmp_path / "site-packages" / "kickstand_tools"
-    (package / "firmware" / "kickstand").mkdir(parents=True)
-    monkeypatch.setattr(firmware_path, "__file__", str(package / "firmware_path.py"))
-    assert firmware_path.directory() == package / "firmware"
-
-
 @pytest.fixture
 def dev(monkeypatch, tmp_path):
     """tools/dev.py as a module, set on a project of its own."""
@@ -184,7 +176,6 @@ needs_sh = pytest.mark.skipif(os.name == "nt", reason="the stand-in for Python i
     ("script", "words"),
     [
         ("echo 'The virtual environment was not created: ensurepip is not available.'; exit 1", "python3-venv"),
-        ("echo 'python3: No module named venv'; exit 1", "python3-venv"),
         ("echo 'Error: [Errno 13] Permission denied'; exit 1", "Permission denied"),
         ("exit 0", "no pip"),
     ],

@@ -168,21 +168,10 @@ def test_a_mutated_ride_gives_blocks_or_problems():
             parse(mutations.broken([blocks[0]], number)[1])
 
 
-@pytest.mark.parametrize(
-    ("text", "shape", "fits"),
-    [
-        (b"(1, 'a')\r\n", (int, str), True),
-        (b"(1, 'a')", (int, int), False),
-        (b"(True, 'a')", (int, str), False),
-        (b"(-1, 'a')", (int, str), False),
-        (b"1.0", int, False),
-        (b"('x', None)", (str, None), True),
-        (b"print()", str, False),
-    ],
-)
-def test_what_an_answer_may_be(text, shape, fits):
-    if fits:
+def test_what_an_answer_may_be():
+    for text, shape in ((b"(1, 'a')\r\n", (int, str)), (b"('x', None)", (str, None))):
         connection.literal(text, shape)
-    else:
+    others = (b"(1, 'a')", (int, int)), (b"(True, 'a')", (int, str)), (b"(-1, 'a')", (int, str))
+    for text, shape in (*others, (b"1.0", int), (b"print()", str)):
         with pytest.raises(InputError, match="makes no sense"):
             connection.literal(text, shape)

@@ -17,10 +17,11 @@ from kickstand_tools.logs.log import Log
 from kickstand_tools.signals.rotations import rotation_matrix, rotation_vector
 
 RATE_HZ = 200
+SIGNS = list(itertools.product((1.0, -1.0), repeat=3))
 
 
 @functools.cache
-def simulated(profile="street", seed=21, seconds=150.0):
+def simulated(profile="street", seed=21, seconds=180.0):
     return api.simulate_ride(profile, seed, seconds)
 
 
@@ -104,19 +105,19 @@ def test_the_offset_across_the_bike_is_found():
 
 
 def test_axes_of_the_wrong_hand_are_refused():
-    """Of the 48 exchanges and reversals of axes the 24 right-handed ones are only another mounting."""
-    log = log_of(simulated("city", 21), speed=False)
+    """Of the 48 exchanges and reversals of axes the 24 right-handed ones are only another mounting. Every fifth is
+    tried here, all of them in checks/test_handedness.py."""
+    log = log_of(simulated(), speed=False)
     want = first_guess.axes(mounted_windows(log)).matrix
-    for order in itertools.permutations(range(3)):
-        for signs in itertools.product((1.0, -1.0), repeat=3):
-            axes = np.eye(3)[list(order)] * np.array(signs)[:, None]
-            if np.linalg.det(axes) > 0.0:
-                matrix = first_guess.axes(mounted_windows(mounted(log, axes))).matrix
-                assert np.degrees(np.linalg.norm(rotation_vector(matrix @ axes @ want.T))) < 0.1
-            else:
-                with pytest.raises(api.RefusedInput) as raised:
-                    api.fit_ride(mounted(log, axes))
-                assert raised.value.code == "left-handed"
+    for order, signs in [*itertools.product(itertools.permutations(range(3)), SIGNS)][::5]:
+        axes = np.eye(3)[list(order)] * np.array(signs)[:, None]
+        if np.linalg.det(axes) > 0.0:
+            matrix = first_guess.axes(mounted_windows(mounted(log, axes))).matrix
+            assert np.degrees(np.linalg.norm(rotation_vector(matrix @ axes @ want.T))) < 0.1
+        else:
+            with pytest.raises(api.RefusedInput) as raised:
+                api.fit_ride(mounted(log, axes))
+            assert raised.value.code == "left-handed"
 
 
 def test_only_a_phones_mounting_shows_an_accelerometer_of_the_opposite_sign():
@@ -240,10 +241,9 @@ def test_few_samples_a_second_and_an_unknown_mounting_of_a_phone_are_refused():
         api.fit_ride(log, phone="upside down")
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_recorded_car_is_refused(shared_data, seed):
+def test_a_recorded_car_is_refused(shared_data):
     """However it is mounted, with its speed and without."""
-    rotation = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    rotation = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     rotation *= np.linalg.det(rotation)
     drives = sorted(shared_data.glob("car-*.csv.gz"))
     assert len(drives) == 4
@@ -270,7 +270,7 @@ def test_a_recorded_motorcycle(shared_data):
 
 
 def test_the_command(tmp_path):
-    made = simulated("city", 21)
+    made = simulated()
     log, short = tmp_path / "RIDE.csv", tmp_path / "SHORT.csv"
     rows = np.column_stack((made.time, made.readings[:, :3], made.readings[:, 4:]))[::2]
     for path, part in ((log, rows), (short, rows[:2000])):

@@ -56,9 +56,9 @@ def test_signals_of_logs_of_one_name_and_of_two_mounts_do_not_overwrite_each_oth
         files.open_log(str(drive)).t_s
     )
     assert sum("second" in path.name for path in written) == 2  # the mount's name is in them
-    run_fleet(periods, tmp_path / "again", with_signals=True)
-    again = (tmp_path / "again" / "signals").rglob("*.parquet")
-    assert {path.name for path in again} == {path.name for path in written}
+    run_fleet(periods[:1], tmp_path / "again", with_signals=True)
+    again = {path.name for path in (tmp_path / "again" / "signals").rglob("*.parquet")}
+    assert len(again) == 2 and again <= {path.name for path in written}
     pictures = [row["plot"] for row in parquet.read_table(tmp_path / "out" / "alignments.parquet").to_pylist()]
     assert len(set(pictures)) == 3
 

@@ -86,7 +86,7 @@ LACKING = {
     "RaceBox, motorcycle": (
         app_exports.racebox,
         "GForceY LeanAngle",
-        "in its motorcycle mode: export it with that mode",
+        "as in its motorcycle mode: export it with",
     ),
     "VBO": (app_exports.vbo, "Y_Accel", "no channel Y_Accel"),
     "AiM": (app_exports.aim, "YawRate", "no channel YawRate: export the accelerometer's and the gyro's three channels"),

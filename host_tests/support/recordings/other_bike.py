@@ -5,8 +5,6 @@ derivatives: of the place for the force, of the attitude's matrix for the rates.
 rider who moves; the vibration is white. World axes: x, y level, z up. Vehicle axes: left, up, forward.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
@@ -16,16 +14,6 @@ FINE_HZ, RATE_HZ = 800, 200
 UP_ERROR_DEG, PITCH_ERROR_DEG, STAND_DEG = 1.5, 1.0, 11.0  # of the two poses, and the tilt between them
 VIBRATION_G, VIBRATION_DPS = 0.12, 1.5  # rms of white noise in each sample
 RIDER_DEG = 2.0  # rms by which the rider, moving about, makes the bike's lean differ from the one of balance
-
-
-@dataclass
-class OtherRide:
-    """log (n samples), calibration by two sloppy poses, and the truth (n): lean in degrees, speed in m/s."""
-
-    log: Log
-    calibration: CalibrationFile
-    lean_deg: np.ndarray
-    speed_mps: np.ndarray
 
 
 def sweepers(chance):
@@ -59,7 +47,9 @@ KINDS = {"sweepers": sweepers, "held": held, "track": track}
 
 
 def other_ride(kind, seed, seconds, height_m=0.0, speed=False):
-    """seconds: no longer than this, to whole legs. height_m: of the sensor above the roll axis. speed: give it once a
+    """Log (n samples), calibration by two sloppy poses, and the truth (n): lean in degrees, speed in m/s.
+
+    seconds: no longer than this, to whole legs. height_m: of the sensor above the roll axis. speed: give it once a
     second, 0.4 s late."""
     chance = np.random.default_rng([seed, *kind.encode()])
     legs = KINDS[kind](chance)
@@ -97,7 +87,7 @@ def other_ride(kind, seed, seconds, height_m=0.0, speed=False):
         given[::RATE_HZ] = np.interp(middle[::RATE_HZ] - 0.4, time, v)
     log = Log(middle, force @ mounting, rates @ mounting, given)
     calibration = CalibrationFile(vehicle_from_sensor=wrong @ mounting, aligned=True, six_done=True, gyro_delay_s=0.0)
-    return OtherRide(log, calibration, np.degrees(np.interp(middle, time, chassis)), np.interp(middle, time, v))
+    return log, calibration, np.degrees(np.interp(middle, time, chassis)), np.interp(middle, time, v)
 
 
 def _course(legs):

@@ -41,8 +41,8 @@ def simulated(profile, seed, seconds):
 
 def other(kind, seed, **more):
     """By other_bike."""
-    made = other_ride(kind, seed, **more)
-    return Known(made.log, made.calibration, made.lean_deg, np.cumsum(made.speed_mps > 0.5) > 0)
+    log, calibration, lean_deg, speed_mps = other_ride(kind, seed, **more)
+    return Known(log, calibration, lean_deg, np.cumsum(speed_mps > 0.5) > 0)
 
 
 def rms(values):
