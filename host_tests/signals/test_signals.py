@@ -134,11 +134,14 @@ def test_a_correlation_with_all_of_the_cause_is_less_than_along_one_direction():
 def test_all_shifts_at_once():
     first, second = CHANCE.normal(size=300), np.zeros(100)
     second[:] = first[120:220]
-    good = CHANCE.random(300) > 0.1
-    found, count = correlations(first, good, second, np.ones(100, bool))
+    good, other = CHANCE.random(300) > 0.1, CHANCE.random(100) > 0.2
+    found, count = correlations(first, good, second, other)
     assert int(np.argmax(found)) == 120 + 99
     assert found[219] == pytest.approx(1.0)
-    assert count[219] == np.count_nonzero(good[120:220])
+    assert count[219] == np.count_nonzero(good[120:220] & other)
+    there, here = (good[50:150] & other), slice(50, 150)
+    whole = np.sum(first[here][there] ** 2) * np.sum(second[there] ** 2)
+    assert found[149] == pytest.approx(np.sum((first[here] * second)[there]) / np.sqrt(whole), abs=1e-6)
     ratio = log_likelihood_ratio(found, count, 1.0)
     assert ratio[219] > 100.0
     assert np.all(ratio[found < 0.0] == 0.0)
