@@ -69,8 +69,13 @@ def test_the_calibration_is_from_the_poses_alone():
     assert calibration.six_done and calibration.aligned
 
 
-def test_the_jobs_set_up_errors_are_ridden(monkeypatch):
+@pytest.fixture
+def one_other(monkeypatch):
+    """Of the other filters one: each takes seconds."""
     monkeypatch.setattr(estimators, "OTHERS", {"complementary": estimators.OTHERS["complementary"]})
+
+
+def test_the_jobs_set_up_errors_are_ridden(one_other):
     jobs = [runs.Job("parked", 0, 60.0, error, pitch_change_deg=0.0, traces=True) for error in (0.0, 1.5)]
     fair, off = (runs.run(job).traces["complementary"] for job in jobs)
     assert np.mean(off - fair) == pytest.approx(-1.5, abs=0.3)
@@ -138,7 +143,7 @@ def test_the_recorded_motorcycle(shared_data):
     assert scores["kickstand"].rms_deg < 2.98
 
 
-def test_the_command_prints_a_table_and_writes_json_and_picture(tmp_path):
+def test_the_command_prints_a_table_and_writes_json_and_picture(tmp_path, one_other):
     pytest.importorskip("matplotlib")
     out = tmp_path / "out"
     more = "--seeds", 1, "--seconds", 60

@@ -231,6 +231,7 @@ Client.register_plugin = interrupted
 """
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="Ctrl-C comes at once on this system")
 def test_ctrl_c_while_this_process_connects_is_heard_when_it_has(tmp_path):
     program = tmp_path / "program.py"

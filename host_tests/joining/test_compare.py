@@ -87,10 +87,11 @@ def test_a_lean_that_is_late_is_said_to_be(ride):
     assert seen.smoothed.delay_s == pytest.approx(0.04, abs=0.01)
 
 
-def test_words_json_and_a_picture(files):
+def test_words_json_and_a_picture(files, found, monkeypatch):
     said = command.works("compare", files / "A.csv", files / "B.csv", "--plot", files / "C.png").out
     assert "B begins 0.0" in said and "smoothed: they differ by" in said and "live: they differ by" in said
     assert (files / "C.png").read_bytes().startswith(b"\x89PNG")
+    monkeypatch.setattr(agreement, "compare_rides", lambda *_: found)
     data = json.loads(command.works("compare", files / "A.csv", files / "B.csv", "--json").out)
     assert set(data) == {"clocks", "live", "smoothed", "remarks"}
     assert 0.0 < data["smoothed"]["moving_deg"] < 2.0
