@@ -11,10 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.estimation.smooth import smooth
 from kickstand_tools.logs.log import Log
-from kickstand_tools.replay.replay import replay
-from other_bike import FINE_HZ, KINDS, G, _about, _course, _noise, _readings
+from other_bike import FINE_HZ, KINDS, G, _about, _course, _mounting, _noise, _readings, _tolerances
+from smoothed_rides import Known, rms
 
 # And how often. "foreign": accelerations that are not the bike's, of whatever shakes or bends the mount
 MOUNTS = {"firm": 0.5, "holder": 0.1, "aliasing": 0.1, "clipping": 0.1, "drifting": 0.1, "foreign": 0.1}
@@ -165,10 +164,7 @@ def _device(chance, mount, force, rates, v, engine, turns):
     rough = rough[: count * step : step]
     force = force + chance.uniform(0.02, 0.08) * rough * chance.standard_normal((count, 3))
     rates = rates + chance.uniform(0.3, 1.5) * rough * chance.standard_normal((count, 3))
-    gyro, accel = (
-        np.eye(3) + chance.uniform(-1.0, 1.0, (3, 3)) * np.where(np.eye(3) > 0, scale, cross)
-        for scale, cross in ((0.03, 0.02), (0.004, 0.01))
-    )
+    gyro, accel = _tolerances(chance)
     rate_hz = FINE_HZ / step
     middle = np.asarray((np.arange(count) + 0.5) / rate_hz, dtype=np.float64)
     drift = np.cumsum(chance.standard_normal((count, 3)), axis=0) * 0.004 / np.sqrt(rate_hz)
@@ -178,8 +174,7 @@ def _device(chance, mount, force, rates, v, engine, turns):
         force = force + chance.uniform(-0.03, 0.03, 3) * (1.0 - np.exp(-middle / 120.0))[:, None]
     roll = np.radians(chance.uniform(-1.5, 1.5))
     yaw = np.radians(chance.uniform(-1.0, 1.0)) / np.tan(np.radians(chance.uniform(8.0, 14.0)))
-    mounting, _ = np.linalg.qr(chance.standard_normal((3, 3)))
-    mounting *= np.linalg.det(mounting)
+    mounting = _mounting(chance)
     calibration = CalibrationFile(
         vehicle_from_sensor=_about(2, roll) @ _about(1, yaw) @ mounting, aligned=True, six_done=True, gyro_delay_s=0.0
     )
@@ -228,11 +223,7 @@ def _twice(x):
 
 def judged(ride, k=0):
     """Errors (n, riding) of device k in degrees: live (NaN where not shown), smoothed, its standard deviation."""
-    log, calibration, riding = ride.logs[k], ride.calibrations[k], ride.riding(k)
-    true = ride.true_lean(k)
-    shown, found = replay(log, calibration), smooth(log, calibration)
-    live = np.where(np.isnan(shown.lean_sigma_deg), np.nan, shown.lean_deg - true)
-    return live[riding], (found.lean_deg - true)[riding], found.lean_sigma_deg[riding]
+    return Known(ride.logs[k], ride.calibrations[k], ride.true_lean(k), ride.riding(k)).judged()
 
 
 def figures(seed):
@@ -242,10 +233,6 @@ def figures(seed):
     live, off, sigma = judged(ride)
     seen = ~np.isnan(live)
     ratio = np.abs(off) / sigma
-
-    def rms(values):
-        return float(np.sqrt(np.mean(values**2)))
-
     return (
         seed,
         ride.kind,

@@ -68,10 +68,7 @@ def other_ride(kind, seed, seconds, height_m=0.0, speed=False):
     shaken = np.clip(v[: n // step * step : step] / 5.0, 0.1, 1.0)[:, None]
     force = force + VIBRATION_G * shaken * chance.standard_normal((count, 3))
     rates = np.degrees(rates) + VIBRATION_DPS * shaken * chance.standard_normal((count, 3))
-    gyro, accel = (
-        np.eye(3) + chance.uniform(-1.0, 1.0, (3, 3)) * np.where(np.eye(3) > 0, scale, cross)
-        for scale, cross in ((0.03, 0.02), (0.004, 0.01))
-    )
+    gyro, accel = _tolerances(chance)
     drift = np.cumsum(chance.standard_normal((count, 3)), axis=0) * 0.004 / np.sqrt(RATE_HZ)
     rates = rates @ gyro.T + chance.uniform(-0.3, 0.3, 3) + drift
     force = force @ accel.T + chance.uniform(-0.005, 0.005, 3)
@@ -79,8 +76,7 @@ def other_ride(kind, seed, seconds, height_m=0.0, speed=False):
     roll, yaw = np.radians(UP_ERROR_DEG), np.radians(PITCH_ERROR_DEG) / np.tan(np.radians(STAND_DEG))
     roll, yaw = roll * chance.choice((-1.0, 1.0)), yaw * chance.choice((-1.0, 1.0))
     wrong = _about(2, roll) @ _about(1, yaw)
-    mounting, _ = np.linalg.qr(chance.standard_normal((3, 3)))
-    mounting *= np.linalg.det(mounting)
+    mounting = _mounting(chance)
     middle = (np.arange(count) + 0.5) / RATE_HZ
     given = np.full(count, np.nan)
     if speed:
@@ -88,6 +84,20 @@ def other_ride(kind, seed, seconds, height_m=0.0, speed=False):
     log = Log(middle, force @ mounting, rates @ mounting, given)
     calibration = CalibrationFile(vehicle_from_sensor=wrong @ mounting, aligned=True, six_done=True, gyro_delay_s=0.0)
     return log, calibration, np.degrees(np.interp(middle, time, chassis)), np.interp(middle, time, v)
+
+
+def _tolerances(chance):
+    """Matrices of scale and cross-axis errors of a gyro and an accelerometer after the six positions."""
+    return [
+        np.eye(3) + chance.uniform(-1.0, 1.0, (3, 3)) * np.where(np.eye(3) > 0, scale, cross)
+        for scale, cross in ((0.03, 0.02), (0.004, 0.01))
+    ]
+
+
+def _mounting(chance):
+    """How a sensor sits: any rotation."""
+    mounting, _ = np.linalg.qr(chance.standard_normal((3, 3)))
+    return mounting * np.linalg.det(mounting)
 
 
 def _course(legs):

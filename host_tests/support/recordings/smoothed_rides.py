@@ -25,11 +25,15 @@ class Known:
         """(n) the firmware's lean."""
         return replay(self.log, self.calibration).lean_deg
 
+    def judged(self):
+        """Errors (n, riding) in degrees: live (NaN where not shown), smoothed, its standard deviation."""
+        shown, found = replay(self.log, self.calibration), smooth(self.log, self.calibration)
+        live = np.where(np.isnan(shown.lean_sigma_deg), np.nan, shown.lean_deg - self.lean_deg)
+        return live[self.riding], (found.lean_deg - self.lean_deg)[self.riding], found.lean_sigma_deg[self.riding]
+
     def part(self, kept):
         """The samples where kept (n) is True."""
-        log = self.log
-        rows = log.t_s[kept], log.accel_g[kept], log.gyro_dps[kept], log.speed_mps[kept], log.temperature_c[kept]
-        return Known(Log(*rows), self.calibration, self.lean_deg[kept], self.riding[kept])
+        return Known(self.log.part(kept), self.calibration, self.lean_deg[kept], self.riding[kept])
 
 
 def simulated(profile, seed, seconds):
@@ -59,14 +63,8 @@ def figures(row):
     rides = [
         other(kind, seed, seconds=300.0) if is_other else simulated(kind, seed, 300.0) for seed in (201, 202, 203, 204)
     ]
-    shown, off, sigma = [], [], []
-    for known in rides:
-        live, found = replay(known.log, known.calibration), smooth(known.log, known.calibration)
-        seen = known.riding & ~np.isnan(live.lean_sigma_deg)
-        shown.append((live.lean_deg - known.lean_deg)[seen])
-        off.append((found.lean_deg - known.lean_deg)[known.riding])
-        sigma.append(found.lean_sigma_deg[known.riding])
-    shown, off, sigma = (np.concatenate(values) for values in (shown, off, sigma))
+    shown, off, sigma = (np.concatenate(values) for values in zip(*(known.judged() for known in rides)))
+    shown = shown[~np.isnan(shown)]
     within = [np.mean(np.abs(off) < times * sigma) for times in (1.0, 2.0)]
     return rms(shown), np.max(np.abs(shown)), rms(off), np.max(np.abs(off)), *within
 
