@@ -169,6 +169,10 @@ def test_an_alignment_is_good_where_all_of_it_is_known_and_cheap(scripted):
     for quality in (dataclasses.replace(seen.quality, yaw_deg=None), dear):
         said = report.words(dataclasses.replace(seen, quality=quality)).alignment
         assert said.startswith("Alignment: it seems off by ")
+    far = dataclasses.replace(seen.quality, roll_deg=11.0)
+    exchanged = Notice("forward-exchanged", False, "left", 11.0)
+    swapped = dataclasses.replace(seen, quality=far, notices=[exchanged])
+    assert ": were the poses swapped?" in report.words(swapped).alignment
     off = dataclasses.replace(seen, notices=[*seen.notices, Notice("pose-off", 2.0)])
     assert not report.words(off).alignment.startswith("Alignment: good")
 

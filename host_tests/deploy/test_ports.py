@@ -100,12 +100,6 @@ def test_each_esp32_gets_its_own_machine_code(mpy):
     assert {data[2] for data in bytecode.compiled(viper, mpy).values()} == {mpy >> 8 & 0x3F}
 
 
-def test_an_esp32_whose_micropython_runs_no_machine_code_gets_the_sources():
-    """A RISC-V one with MicroPython before 1.24."""
-    with pytest.raises(bytecode.CannotCompile, match="takes no compiled files"):
-        bytecode.compiled(firmware_files.firmware_files(), 0x0306)
-
-
 def knows_the_port(tree):
     """What in a module is of one port only: imports of its modules, the name of the port, registers by address."""
     for node in ast.walk(tree):
