@@ -1,6 +1,7 @@
 """A ride's positions in the files of other programs, read back by the programs' own rules."""
 
 import functools
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -131,6 +132,14 @@ def test_the_time_of_the_satellites_goes_before_any_other(tmp_path, form):
         assert f"{clock:%d/%m/%Y}" in out.read_text()
         if form == "vbo":
             assert vbo_rows(out)["time"][0] == pytest.approx(float(f"{clock:%H%M%S.%f}"), abs=0.02)
+
+
+def test_without_the_time_of_the_satellites_a_track_has_the_logs_own(tmp_path):
+    given = log(1.2e9)
+    bare = replace(given, utc_s=np.full(len(given.t_s), np.nan))
+    point = gpxpy.parse(exported("gpx", tmp_path, bare).read_text()).tracks[0].segments[-1].points[-1]
+    last_s = given.t_s[np.isfinite(given.lat_deg)][-1]
+    assert point.time.timestamp() == pytest.approx(1.2e9 + last_s, abs=2e-3)
 
 
 def test_a_track_across_180_degrees_goes_the_short_way():
