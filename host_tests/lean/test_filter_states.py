@@ -54,19 +54,6 @@ def test_power_on_under_way_leaves_lean_and_speed_uncertain():
         assert (sigma_deg(estimator) > 20.0) is moves
 
 
-def test_it_rolls_once_it_has_sped_up():
-    estimator = LeanFilter()
-    hold(estimator, 3.0)
-    rolling = []
-    for _ in range(300):
-        estimator.update([0.0, 1.0, 2.0 / GRAVITY_MPS2], NO_RATE, DT_US)
-        rolling.append(estimator.rolling)
-    near(estimator.speed_mps, 6.0, 1.0)
-    assert not rolling[50]
-    assert rolling[-1]
-    assert rolling == sorted(rolling)
-
-
 def measured(speed_mps, mps2):
     """Power-on while it speeds up so; after half a second the speed is measured once."""
     estimator = LeanFilter()
@@ -203,19 +190,6 @@ def test_a_large_correction_is_made_once():
     assert abs(leans[30]) < 1.0
     assert leans[60] > 28.0
     assert max(leans) < 30.5
-
-
-def test_where_samples_come_slowly_rest_and_ride_are_seen_as_well():
-    """At 50 Hz all work on a window is done in the sample after it."""
-    estimator = LeanFilter()
-    force, rate = force_and_rate(-20.0)
-    lean = 0.0
-    for k in range(400):
-        lean = estimator.update(force, rate, 20_000 if k else 0)
-    assert estimator.at_rest
-    near(lean, -20.0, 0.05)
-    near(hold(estimator, 6.0, [sin(radians(-20.0)), cos(radians(-20.0)), 0.2], NO_RATE, 20_000), -20.0, 2.0)
-    assert estimator.rolling
 
 
 def test_a_bias_that_is_far_off_is_put_right_at_once_where_rest_is_seen():

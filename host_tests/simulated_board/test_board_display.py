@@ -209,7 +209,7 @@ def test_a_wrong_address_and_no_display_do_not_stop_the_loop():
 
 
 def test_any_address_of_a_backpack_is_found():
-    for address in (0x20, 0x26, 0x38, 0x3B, 0x3E, 0x3F):
+    for address in (0x20, 0x26, 0x38, 0x3F):
 
         def run(board, address=address):
             display = open_display(board)
@@ -285,22 +285,15 @@ def test_noise_in_an_oled_s_ram_is_gone_after_ten_seconds_and_its_picture_moves(
             turns(board, display, 1010)
             starts.add(board.lcd.start_line)
             assert board.lcd.on and board.lcd.text() == as_text(OLD), board.lcd.text()
+            assert board.lcd.unknown == 0  # no command that it has not
         assert starts == {0, 1, 2}
 
     for_each(test, (None,), OLEDS)
 
 
-def test_an_oled_is_given_only_commands_that_it_has():
-    def test(board, display):
-        turns(board, display, 1100)
-        assert board.lcd.unknown == 0
-
-    for_each(test, (None,), OLEDS)
-
-
-def test_plugging_a_thousand_times_takes_no_memory():
+def test_plugging_hundreds_of_times_takes_no_memory():
     """Only MicroPython says how much is in use."""
-    count = 1000 if sys.implementation.name == "micropython" else 20
+    count = 300 if sys.implementation.name == "micropython" else 20
 
     def test(board, display):
         used = []
@@ -315,6 +308,6 @@ def test_plugging_a_thousand_times_takes_no_memory():
                 used.append(gc.mem_alloc())  # type: ignore[attr-defined]
         turns(board, display, 100)
         assert board.lcd.text()[0].strip() == str(count - 1)
-        assert not used or used[-1] - used[1] < 4000, used
+        assert not used or used[-1] - used[0] < 1500, used
 
     for_each(test, (None,))
