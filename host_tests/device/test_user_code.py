@@ -7,7 +7,10 @@ import devices
 import engines
 import pytest
 
-PLAN = {"ride": devices.RIDE, "presses": devices.PRESSES, "until": 30.5}
+POSES = {"ride": devices.RIDE, "presses": devices.PRESSES, "until": devices.LEFT_S + 0.5}
+# With an alignment in flash: a turn to the left; presses through all pages, back to the first
+PLAN = {"ride": [["upright", 2.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 6.0]], "until": 14.0}
+PLAN["presses"] = [[3 + k, 0.15] for k in range(5)]
 WHOLE = """
 import gc
 calls = []
@@ -31,6 +34,8 @@ def run(tmp_path, monkeypatch, capsys):
     """run(source of user.py, plan) -> Record. MicroPython's exceptions, memory and printing are its own."""
 
     def run(source, plan=PLAN, engine="micropython"):
+        if plan["ride"] == PLAN["ride"]:
+            devices.align(tmp_path)
         (tmp_path / "user.py").write_text(source)
         monkeypatch.syspath_prepend(str(tmp_path))
         return devices.run(engine, tmp_path, plan, capsys)
@@ -38,32 +43,32 @@ def run(tmp_path, monkeypatch, capsys):
     return run
 
 
-def goes_on(record):
+def goes_on(record, t_s=13.5):
     """The lean is right at the end of the left turn."""
-    lean = record.lean_at(30.0)
+    lean = record.lean_at(t_s)
     return lean is not None and abs(lean + 30) < 4
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_each_function_is_called(run, engine):
-    record = run(WHOLE, PLAN, engine)
+    record = run(WHOLE, POSES, engine)
     console = record.console
     assert "setup left" in console and console.count("press 1") == 2
     assert "lean 100 False" in console  # not aligned yet
     assert re.search(r"lean 280 True -\d\d? True", console)
-    assert goes_on(record)
+    assert goes_on(record, devices.LEFT_S)
 
 
 def test_its_pages_are_behind_the_others_and_before_alignment_in_the_menu(run):
     # the menu: Own pages is its sixth entry
     presses = [[2, 1.2]] + [[4 + 0.5 * k, 0.15] for k in range(5)] + [[8, 1.2], [10, 0.15], [11, 0.15]]
-    record = run(WHOLE, PLAN | {"presses": presses, "until": 13})
+    record = run(WHOLE, POSES | {"presses": presses, "until": 13})
     assert record.at(7.5)[0].startswith("→Own pages"), record.frames
     assert record.at(9.8)[0].startswith("My page")
     assert record.at(10.8)[0].startswith("Page two")
     assert "press" in record.at(12.9)[1] or "Not aligned" in record.at(12.9)[1]
     presses = [[t, 0.15] for t in (2, 12, 20, 21, 22, 23, 24, 25)]
-    record = run(WHOLE, PLAN | {"presses": presses, "until": 28})
+    record = run(WHOLE, POSES | {"presses": presses, "until": 28})
     assert record.at(24.8)[0].startswith("My page") and record.at(24.8)[1].strip().isdigit()
     assert record.at(27)[0].startswith("Page two")
 
@@ -109,7 +114,7 @@ def test_one_that_is_slow_now_and_then_stays_and_a_number_is_no_page(run):
     ],
 )
 def test_a_page_that_is_none_is_left_out(run, display, body, said):
-    presses = [[t, 0.15] for t in (2, 12, 20, 21, 22, 23, 24, 27)]
+    presses = [*PLAN["presses"], [10, 0.15]]
     record = run(f"def page(app):\n    {body}", PLAN | {"presses": presses, "board": {"display": display}})
     assert record.console.count("user.py: page is left out") + record.console.count("picture is left out") == 1
     assert said in record.console

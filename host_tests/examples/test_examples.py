@@ -5,9 +5,8 @@ import re
 from pathlib import Path
 
 import command
-import engines
 import pytest
-from mpy import run_mpy
+from mpy import BOARD_HEAP, run_mpy
 
 SCRIPT = Path(__file__).resolve().with_name("example_run.py")
 EXAMPLES = SCRIPT.parents[2] / "firmware" / "examples"
@@ -27,7 +26,7 @@ def run_all(flash, name, until, presses=()):
         (flash / "user.py").write_bytes((EXAMPLES / name).read_bytes())
         program = None
     plan = json.dumps({"program": program, "until": until, "presses": presses})
-    said = run_mpy(SCRIPT, heap="8M", stdin=plan, directory=flash)
+    said = run_mpy(SCRIPT, heap=BOARD_HEAP, stdin=plan, directory=flash)
     printed, _, frames = said.rstrip("\n").rpartition("\n")
     return printed, json.loads(frames)
 
@@ -71,9 +70,8 @@ def test_user_page(tmp_path):
     assert frames[-1][0].startswith("Lean")
 
 
-@pytest.mark.parametrize("engine", engines.ENGINES)
-def test_tried_it_is_turned_to_after_the_first_turn(engine):
-    said = command.works("try", EXAMPLES / "user_page.py", *["--cpython"] * (engine == "cpython")).out
+def test_tried_it_is_turned_to_after_the_first_turn():
+    said = command.works("try", EXAMPLES / "user_page.py").out
     loads = [float(load) for load in re.findall(r"\|Load +(\d\.\d\d) x", said)]
     assert max(loads) == pytest.approx(1.41, abs=0.08)  # 1 / cos(45 degrees), in the ride's last turn
 
