@@ -54,17 +54,6 @@ def test_power_on_under_way_leaves_lean_and_speed_uncertain():
         assert (sigma_deg(estimator) > 20.0) is moves
 
 
-def measured(speed_mps, mps2):
-    """Power-on while it speeds up so; after half a second the speed is measured once."""
-    estimator = LeanFilter()
-    force = [0.0, 1.0, mps2 / GRAVITY_MPS2]
-    hold(estimator, 0.05, [0.0, 1.1, 0.0])
-    hold(estimator, 0.5, force)
-    estimator.measure_speed(speed_mps)
-    hold(estimator, 0.7, force)
-    return estimator
-
-
 def speed_sigma_mps(forward_g, before_mps, now_mps):
     """1 sigma after two speeds, measured a second apart, with such a force forward."""
     estimator = LeanFilter()
@@ -83,16 +72,6 @@ def test_a_measured_speed_may_be_late_while_the_measured_ones_change_whatever_th
     steady, changing = speed_sigma_mps(0.0, 12.0, 12.0), speed_sigma_mps(0.0, 6.0, 12.0)
     assert changing > steady + 0.2
     near(speed_sigma_mps(0.3, 12.0, 12.0), steady, 0.05)
-
-
-def test_a_measured_speed_counts_once():
-    estimator = measured(5.0, 0.0)
-    near(estimator.speed_mps, 5.0, 0.2)
-    once, again = measured(5.0, 3.0), measured(5.0, 3.0)
-    again.measure_speed(5.0)
-    for each in (once, again):
-        hold(each, 0.7, [0.0, 1.0, 3.0 / GRAVITY_MPS2])
-    assert again.speed_mps < once.speed_mps - 0.1
 
 
 def test_coming_to_rest_the_force_is_the_vertical():
