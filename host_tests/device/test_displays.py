@@ -9,8 +9,9 @@ import pytest
 SHOTS = 200
 
 
-@pytest.mark.parametrize("engine", engines.ENGINES)
-@pytest.mark.parametrize(("display", "one_bus"), [("ssd1306", False), ("sh1106", True)])
+@pytest.mark.parametrize(
+    ("engine", "display", "one_bus"), [("micropython", "ssd1306", False), ("cpython", "sh1106", True)]
+)
 def test_the_lean_is_that_of_the_character_display(engine, display, one_bus, tmp_path, capsys):
     plan = devices.ALIGNED | {"board": {"display": display, "one_bus": one_bus}}
     plan["config"] = {"LCD_SDA": 4, "LCD_SCL": 5} if one_bus else {}
