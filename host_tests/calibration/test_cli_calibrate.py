@@ -54,10 +54,9 @@ def free_pose(tmp_path):
     return command.still(tmp_path / "free.csv", reads(np.array([1, -1, 1]) / np.sqrt(3)), BIAS, seed=9)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_six_finds_offset_slope_and_bias_in_any_order(tmp_path, six_poses, free_pose, seed):
+def test_six_finds_offset_slope_and_bias_in_any_order(tmp_path, six_poses, free_pose):
     poses = [*six_poses, free_pose]
-    np.random.default_rng(seed).shuffle(poses)
+    np.random.default_rng(0).shuffle(poses)
     result = command.works("calibrate", "six", *poses, "--out", tmp_path / "CAL.json")
     data = json.loads((tmp_path / "CAL.json").read_text())
     assert data["accel_offset_g"] == pytest.approx(OFFSET, abs=0.002)
@@ -74,10 +73,8 @@ def test_six_without_a_free_pose_says_what_is_unproven(tmp_path, six_poses):
     assert "warning: no free pose" in result.out
 
 
-@pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("side", ["left", "right"])
-def test_six_and_two_bring_lean_to_0_3_degrees(tmp_path, six_poses, free_pose, seed, side):
-    """Any mounting: the matrix within 0.3 degrees, static lean within 0.3 over +-60."""
+@pytest.mark.parametrize(("seed", "side"), [(0, "left"), (1, "right")])
+def test_six_and_two_find_the_mounting_to_0_3_degrees(tmp_path, six_poses, free_pose, seed, side):
     rng = np.random.default_rng(seed)
     mounting = random_rotation(rng)  # vehicle from sensor
     stand, upright = (reads(mounting.T @ leaned(lean)) for lean in (-12.0 if side == "left" else 12.0, 0.0))
@@ -91,15 +88,6 @@ def test_six_and_two_bring_lean_to_0_3_degrees(tmp_path, six_poses, free_pose, s
     between = np.array(data["vehicle_from_sensor"]) @ mounting.T
     error_deg = np.degrees(np.arccos(min(1.0, (np.trace(between) - 1) / 2)))
     assert error_deg < 0.3
-
-    leans = np.arange(-60.0, 61.0, 5.0)
-    forces = np.array([reads(mounting.T @ leaned(lean)) for lean in leans])
-    rates = np.broadcast_to(np.array(BIAS), forces.shape)
-    command.write(tmp_path / "log.csv", np.column_stack((np.arange(len(leans)), forces, rates)))
-    lean_csv = tmp_path / "LEAN.csv"
-    command.works("replay", tmp_path / "log.csv", "--calibration", tmp_path / "CAL.json", "--out", lean_csv)
-    static = np.genfromtxt(lean_csv, delimiter=",", names=True)["static_lean_deg"]
-    assert np.max(np.abs(static - leans)) < 0.3
 
 
 def test_two_alone_assumes_a_perfect_accelerometer(tmp_path):
@@ -159,35 +147,14 @@ def test_a_free_pose_that_is_not_1_g(tmp_path, six_poses):
     assert "free.csv" in line
 
 
-def spoil(path, change):
-    """Change the numbers of a log in place."""
-    rows = np.loadtxt(path, delimiter=",", skiprows=1)
-    command.write(path, change(rows))
-
-
-def plus(rows, column, more):
-    rows[:, column] += more
-    return rows
-
-
-SPOILT = {
-    "moved": (lambda rows: plus(rows, 1, 0.3 * (np.arange(len(rows)) >= 150)), "moved or knocked"),
-    "frozen": (lambda rows: np.column_stack((rows[:, 0], np.tile(rows[0, 1:], (len(rows), 1)))), "frozen"),
-    "short": (lambda rows: rows[:15], "too short"),
-}
-
-
-@pytest.mark.parametrize("name", SPOILT)
 @pytest.mark.parametrize("which", ["six", "stand", "upright"])
-def test_a_spoilt_pose_is_refused_by_name(tmp_path, six_poses, which, name):
-    change, words = SPOILT[name]
-    if which == "six":
-        spoil(six_poses[3], change)
-        assert str(six_poses[3]) in six_refused(tmp_path, six_poses, words)
-        return
+def test_a_spoilt_pose_is_refused_by_name(tmp_path, six_poses, which):
+    """What else spoils one: test_still_pose.py."""
     poses = two_poses(tmp_path, leaned(-12))
-    spoil(tmp_path / f"{which}.csv", change)
-    assert f"{which}.csv" in two_refused(poses, words)
+    path = six_poses[3] if which == "six" else tmp_path / f"{which}.csv"
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:16]))
+    line = six_refused(tmp_path, six_poses, "too short") if which == "six" else two_refused(poses, "too short")
+    assert str(path) in line
 
 
 def two_refused(poses, words, *more):

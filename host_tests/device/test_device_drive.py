@@ -8,6 +8,8 @@ import devices
 import engines
 import pytest
 from board_access import level
+from kickstand.calibration.parameters import Calibration
+from kickstand.calibration.store import Store
 from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted import sensor_errors
 
@@ -45,8 +47,6 @@ def bike(source, blocks=8, kickstand=(-12.0,), **plan):
 
 
 def stored(flash):
-    from kickstand.calibration.store import Store
-
     return Store(0x68, 8, str(flash)).load()
 
 
@@ -60,8 +60,9 @@ def forward_error_deg(calibration, seed=None):
     return abs(math.degrees(math.atan2(left, ahead)))
 
 
-@pytest.mark.parametrize("engine", engines.ENGINES)
+@pytest.mark.parametrize("engine", engines.ENGINES[1:])
 def test_a_car_finds_its_alignment_and_says_what_it_waits_for(engine, tmp_path):
+    """On MicroPython, with its floats and its heap: the other drives are CPython's."""
     record = devices.run(engine, tmp_path, car("gps", 5, presses=[[60, SHORT], [65, SHORT]]))
     assert record.at(3.0) == ["Brakings   0/5  ", "stop needed     "]
     assert record.first("brake straight") < 8.0
@@ -96,44 +97,51 @@ def test_a_car_by_its_wheel_stores_at_standstill_only(tmp_path):
 
 
 def test_a_car_whose_sensor_is_mounted_anew_finds_it_out(tmp_path):
-    devices.run("cpython", tmp_path, car("wheel", 5))
-    before = list(stored(tmp_path).vehicle_from_sensor)
-    record = devices.run("cpython", tmp_path, car("wheel", 8, remount=[70.0, 8]))
+    before = Calibration().with_alignment(sensor_errors.Sensor(seed=3).vehicle_from_sensor, [0.0] * 3, 0.0, True)
+    Store(0x68, 8, str(tmp_path)).save(before)
+    record = devices.run("cpython", tmp_path, car("wheel", 7, remount=[20.0, 8]))
     assert record.first("Aligned by drive") < math.inf
-    after = list(stored(tmp_path).vehicle_from_sensor)
-    true = sensor_errors.random_mounting(8)
+    after, true = stored(tmp_path).vehicle_from_sensor, sensor_errors.random_mounting(8)
     assert max(abs(a - b) for a, b in zip(after, true, strict=True)) < 0.12  # the sensor's own errors make 4 degrees
-    assert max(abs(a - b) for a, b in zip(before, true, strict=True)) > 0.5
+    assert max(abs(a - b) for a, b in zip(before.vehicle_from_sensor, true, strict=True)) > 0.5
 
 
-def test_a_wrong_kickstand_side_is_noticed_and_corrected(tmp_path):
-    question = "Side was wrong"
-    record = devices.run("cpython", tmp_path, bike("gps", 3, kickstand=(12.0,)))
-    asked = record.first(question)
-    assert asked < POSES_S + 60.0 and stops(asked, POSES_S)
-    assert record.at(asked)[1] == "hold = fix      "
-    away = record.first("Lean", asked)
-    assert not stops(away, POSES_S)  # it does not stand in the way of riding
-    turned = POSES_S + 30.0 * 2 + 9.0  # in a right turn of 20 degrees
-    assert record.lean_at(turned) is None  # it would be the wrong way round
-    assert record.at(turned) == ["Lean  --        ", "side was wrong? "]
-    fixed = devices.run("cpython", tmp_path, bike("gps", 3, kickstand=(12.0,), presses=[*POSES, [asked + 1, LONG]]))
-    assert fixed.first("Side corrected") < asked + 3.0
-    assert fixed.lean_at(turned) == pytest.approx(20, abs=4)
-    assert fixed.first(question, asked + 3.0) == math.inf
-    assert forward_error_deg(stored(tmp_path)) < 2.0
+QUESTION = "Side was wrong"
+TURN_S = POSES_S + 30.0 * 2 + 9.0  # in a right turn of 20 degrees
 
 
 @pytest.fixture(scope="module")
-def asked(tmp_path_factory):
-    """When the display asks about the side, if nobody presses anything."""
-    plan = bike("gps", 3, kickstand=(12.0,))
-    return devices.run("cpython", tmp_path_factory.mktemp("asked"), plan).first("Side was wrong")
+def unanswered(tmp_path_factory):
+    """The Record of a ride with the poses on the wrong side, in which nobody answers the question."""
+    return devices.run("cpython", tmp_path_factory.mktemp("asked"), bike("gps", 3, kickstand=(12.0,)))
+
+
+@pytest.fixture
+def asked(unanswered):
+    """When the display asks about the side."""
+    return unanswered.first(QUESTION)
+
+
+def test_a_wrong_kickstand_side_is_noticed(unanswered, asked):
+    assert asked < POSES_S + 60.0 and stops(asked, POSES_S)
+    assert unanswered.at(asked)[1] == "hold = fix      "
+    away = unanswered.first("Lean", asked)
+    assert not stops(away, POSES_S)  # it does not stand in the way of riding
+    assert unanswered.lean_at(TURN_S) is None  # it would be the wrong way round
+    assert unanswered.at(TURN_S) == ["Lean  --        ", "side was wrong? "]
+
+
+def test_a_wrong_kickstand_side_is_corrected(asked, tmp_path):
+    fixed = devices.run("cpython", tmp_path, bike("gps", 3, kickstand=(12.0,), presses=[*POSES, [asked + 1, LONG]]))
+    assert fixed.first("Side corrected") < asked + 3.0
+    assert fixed.lean_at(TURN_S) == pytest.approx(20, abs=4)
+    assert fixed.first(QUESTION, asked + 3.0) == math.inf
+    assert forward_error_deg(stored(tmp_path)) < 2.0
 
 
 def test_a_side_that_the_rider_confirms_is_not_asked_for_again(asked, tmp_path):
     record = devices.run("cpython", tmp_path, bike("gps", 3, kickstand=(12.0,), presses=[*POSES, [asked + 1, SHORT]]))
-    assert record.first("Side was wrong", asked + 2.0) == math.inf
+    assert record.first(QUESTION, asked + 2.0) == math.inf
     assert not stored(tmp_path).by_drive
 
 
@@ -141,9 +149,9 @@ def test_a_side_that_the_rider_confirms_is_not_asked_for_again(asked, tmp_path):
 def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
     """A wire that breaks during the ride reads as standing still, a second magnet as twice the speed. The display says
     so at a stop."""
-    plan = bike("wheel", 8, wheel=model, config={"SPEED": "wheel", **config})
+    plan = bike("wheel", 6, wheel=model, config={"SPEED": "wheel", **config})
     record = devices.run("cpython", tmp_path, plan)
-    for town_round in range(8):
+    for town_round in range(6):
         shown = record.lean_at(POSES_S + 30.0 * town_round + 9.0)
         assert shown == pytest.approx(-25 if town_round % 2 else 20, abs=4)
     shown_s = record.first("Speed (stuck at|2.0 times)")
@@ -162,39 +170,27 @@ def test_a_press_for_another_page_does_not_answer_a_hidden_question(asked, tmp_p
     assert not stored(tmp_path).by_drive
 
 
-def test_the_trim_of_the_ride_outlives_a_refined_alignment(tmp_path):
-    """Riding finds that the upright pose was 2 degrees off. Then forward is refined at a stop."""
-    plan = bike("wheel", 7, kickstand=(-12.0, 2.0))
+def test_what_was_wrong_with_both_poses_is_found_while_riding(tmp_path):
+    """Two degrees of pitch on the kickstand give a yaw error of almost ten: forward is refined at a stop, and at most
+    1.5 are left. The upright pose was 2 degrees off: that trim outlives the new alignment. The maxima are kept."""
+    plan = bike("wheel", 8, kickstand=(-12.0, 2.0))
     plan["ride"][1] = ["upright", 10.0, 2.0, 0.0]
-    record = devices.run("cpython", tmp_path, plan)
-    assert stored(tmp_path).by_drive
-    for town_round in range(3, 7):
-        assert record.lean_at(POSES_S + 30.0 * town_round - 1.0) in (-1, 0, 1)  # stands upright
-
-
-def test_pitch_on_the_kickstand_is_found_while_riding(tmp_path):
-    """Two degrees of pitch give a yaw error of almost ten. After ten braking events at most 1.5 are left. The maxima
-    are kept."""
-    plan = bike("wheel", 11, kickstand=(-12.0, 2.0))
     first = devices.run("cpython", tmp_path, {**plan, "until": 19.0})
     assert first.first("Aligned!") < 19.0
     assert forward_error_deg(stored(tmp_path)) > 7.0
-    record = devices.run("cpython", tmp_path, {**plan, "presses": [[POSES_S + 300.0, SHORT]]})
+    record = devices.run("cpython", tmp_path, {**plan, "presses": [[POSES_S + 232.0, SHORT]]})
     assert forward_error_deg(stored(tmp_path)) < 1.5
     assert stored(tmp_path).by_drive
-    assert record.first("Max right +(19|2[0-9])°", POSES_S + 300.0) < math.inf
+    for town_round in range(3, 7):
+        assert record.lean_at(POSES_S + 30.0 * town_round - 1.0) in (-1, 0, 1)  # stands upright
+    assert record.first("Max right +(19|2[0-9])°", POSES_S + 232.0) < math.inf
 
 
-def test_the_display_says_that_the_mount_has_moved(tmp_path):
-    record = devices.run("cpython", tmp_path, bike("wheel", 6, remount=[POSES_S + 100.0, 8]))
-    shown_s = record.first("Mount has moved", POSES_S + 100.0)
-    assert shown_s < math.inf and stops(shown_s, POSES_S)
-
-
-def test_another_message_does_not_bring_the_lean_back_after_the_mount_has_moved(tmp_path):
+def test_the_display_says_that_the_mount_has_moved_and_another_message_does_not_bring_the_lean_back(tmp_path):
     """The wheel's wire breaks later, and nobody has answered the first message."""
-    record = devices.run("cpython", tmp_path, bike("wheel", 12, remount=[POSES_S + 100.0, 8], wheel={"until_s": 215.0}))
+    record = devices.run("cpython", tmp_path, bike("wheel", 6, remount=[POSES_S + 60.0, 8], wheel={"until_s": 130.0}))
     moved = record.first("Mount has moved")
+    assert moved > POSES_S + 60.0 and stops(moved, POSES_S)
     assert moved < record.first("Speed stuck") < math.inf
     assert not record.leans(moved, 500.0)
 
@@ -202,7 +198,7 @@ def test_another_message_does_not_bring_the_lean_back_after_the_mount_has_moved(
 def test_asked_for_on_a_motorcycle_it_keeps_the_old_alignment_until_the_new_one_is_ready(tmp_path):
     """The rider asks for it in the menu, for a sensor that was mounted anew. A fault of the sensor during the drive
     does no harm."""
-    devices.run("cpython", tmp_path, bike("gps", 0))
+    devices.align(tmp_path)
     old = list(stored(tmp_path).vehicle_from_sensor)
     menu = [[2, LONG], *([4 + t, SHORT] for t in range(4)), [9, LONG]]
     plan = {"ride": [["upright", 18.0], *town(5)], "seed": 8, "config": {"SPEED": "gps"}, "gps": {"hz": 5}}
@@ -217,27 +213,24 @@ def test_asked_for_on_a_motorcycle_it_keeps_the_old_alignment_until_the_new_one_
 
 
 @pytest.mark.parametrize(
-    ("source", "model", "config", "said"),
+    ("source", "model", "config", "blocks", "said"),
     [
-        ("gps", {"faults": [["unplugged", 0, 1000]]}, {}, "GPS silent"),
-        ("gps", {"faults": [["garbled", 0, 1000]]}, {}, "GPS garbled"),
-        ("gps", {"faults": [["void", 0, 1000]]}, {}, "GPS: no fix"),
-        ("gps", {"faults": [["stuck", 40, 1000]]}, {}, "GPS: no fix"),
-        ("gps", {"latency_s": 2.5}, {}, "Speed 2.. s late"),
-        ("wheel", {}, {"PULSES_PER_METRE": 0.5 / 3.6}, "Speed 3.. times"),
-        ("wheel", {"until_s": 40.0}, {}, "Speed stuck at"),
+        ("gps", {"faults": [["void", 0, 1000]]}, {}, 2, "GPS: no fix"),
+        ("gps", {"faults": [["stuck", 40, 1000]]}, {}, 2, "GPS: no fix"),
+        ("gps", {"latency_s": 2.5}, {}, 5, "Speed 2.. s late"),
+        ("wheel", {}, {"PULSES_PER_METRE": 0.5 / 3.6}, 5, "Speed 3.. times"),
+        ("wheel", {"until_s": 40.0}, {}, 3, "Speed stuck at"),
     ],
 )
-def test_a_speed_that_cannot_be_used_is_reported_and_nothing_is_stored(source, model, config, said, tmp_path):
-    plan = car(source, 2 if "faults" in model else 5, config=config)
-    record = devices.run("cpython", tmp_path, {**plan, source: model})
+def test_a_speed_that_cannot_be_used_is_reported_and_nothing_is_stored(source, model, config, blocks, said, tmp_path):
+    record = devices.run("cpython", tmp_path, {**car(source, blocks, config=config), source: model})
     assert record.first(said) < math.inf, {tuple(f[1:]) for f in record.frames}
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_speed_that_fails_for_a_while_is_reported_and_does_no_harm(tmp_path):
     faults = [["unplugged", 15, 30], ["garbled", 45, 62]]
-    record = devices.run("cpython", tmp_path, car("gps", 7, gps={"faults": faults}))
+    record = devices.run("cpython", tmp_path, car("gps", 6, gps={"faults": faults}))
     assert record.first("GPS silent") == pytest.approx(21.0, abs=3.0)
     assert record.first("GPS garbled") == pytest.approx(51.0, abs=4.0)
     assert record.first("Aligned by drive") < math.inf
@@ -253,17 +246,13 @@ def test_without_a_speed_source_the_menu_has_no_alignment_by_driving(tmp_path):
 @pytest.mark.parametrize(
     ("config", "named"),
     [
-        ({"SIDE": "lefft"}, "SIDE"),
         ({"SAMPLE_HZ": 300}, "SAMPLE_HZ"),
-        ({"SIDDE": "left"}, "SIDDE"),
         ({"ACCEL_RANGE_G": 3}, "ACCEL_RANGE_G"),
         ({"LCD_I2C": 0}, "LCD_I2C"),
-        ({"BUTTON_PIN": "GP15"}, "BUTTON_PIN"),
         ({"VEHICLE": "car"}, "car needs SPEED"),
         ({"VEHICLE": "bus", "SPEED": "gps"}, "VEHICLE"),
         ({"SPEED": "radar"}, "SPEED"),
         ({"SPEED": "gps", "GPS_RX": 5}, "pin used twice"),
-        ({"SPEED": "gps", "GPS_TX": 15}, "pin used twice"),
         ({"SPEED": "wheel", "WHEEL_PIN": 7}, "pin used twice"),
         ({"SPEED": "wheel", "PULSES_PER_METRE": 0}, "PULSES_PER_METRE"),
         ({"SPEED": "gps", "GPS_BAUD": "9600"}, "GPS_BAUD"),

@@ -1,4 +1,4 @@
-"""Runs one program of firmware/examples on the simulated board, under CPython or MicroPython.
+"""Runs one program of firmware/examples on the simulated board, under MicroPython.
 
 As a script: reads {"program", "until", "presses"} as JSON from standard input and runs it in the current directory (the
 board's flash), on a bike that is aligned and rides a long right turn. Without a program the lean meter is run, with

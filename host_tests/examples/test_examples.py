@@ -1,44 +1,32 @@
-"""The programs in firmware/examples: what each prints, or shows on the display."""
+"""The programs in firmware/examples, on MicroPython: what each prints, or shows on the display."""
 
 import json
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import command
-import engines
 import pytest
-from kickstand_tools import firmware_path
-from mpy import run_mpy
+from mpy import BOARD_HEAP, run_mpy
 
 SCRIPT = Path(__file__).resolve().with_name("example_run.py")
 EXAMPLES = SCRIPT.parents[2] / "firmware" / "examples"
 TURN_DEG = 35.0  # of example_run.py's ride
 
 
-def run(engine, flash, name, until, presses=()):
+def run(flash, name, until, presses=()):
     """What the program printed, and the display's two lines each second. One that is a user.py runs as such."""
-    printed, seen = run_all(engine, flash, name, until, presses)
+    printed, seen = run_all(flash, name, until, presses)
     return printed, seen["frames"]
 
 
-def run_all(engine, flash, name, until, presses=()):
+def run_all(flash, name, until, presses=()):
     """What the program printed, and what example_run.py says of it. name: None for the user.py that is in flash."""
     program = name and str(EXAMPLES / name)
     if name and name.startswith("user_"):
         (flash / "user.py").write_bytes((EXAMPLES / name).read_bytes())
         program = None
     plan = json.dumps({"program": program, "until": until, "presses": presses})
-    if engine == "cpython":
-        environment = os.environ | {"PYTHONPATH": firmware_path.search_path() + os.pathsep + str(flash)}
-        command = [sys.executable, str(SCRIPT)]
-        said = subprocess.run(
-            command, input=plan, env=environment, cwd=flash, capture_output=True, text=True, timeout=300, check=True
-        ).stdout
-    else:
-        said = run_mpy(SCRIPT, heap="8M", stdin=plan, directory=flash)
+    said = run_mpy(SCRIPT, heap=BOARD_HEAP, stdin=plan, directory=flash)
     printed, _, frames = said.rstrip("\n").rpartition("\n")
     return printed, json.loads(frames)
 
@@ -47,9 +35,8 @@ def numbers(line):
     return [float(number) for number in re.findall(r"[-+]?\d+\.\d+", line)]
 
 
-@pytest.mark.parametrize("engine", engines.ENGINES)
-def test_print_sensor(engine, tmp_path):
-    printed, _ = run(engine, tmp_path, "print_sensor.py", 1.5)
+def test_print_sensor(tmp_path):
+    printed, _ = run(tmp_path, "print_sensor.py", 1.5)
     found, *lines = printed.split("\n")
     assert found == "Found an MPU6050"
     assert len([line for line in lines if line]) == 7  # 0.2 s apart, after 0.2 s of setting up
@@ -59,15 +46,13 @@ def test_print_sensor(engine, tmp_path):
     assert temperature == pytest.approx(25.0, abs=0.1)
 
 
-@pytest.mark.parametrize("engine", engines.ENGINES)
-def test_show_text(engine, tmp_path):
-    _, frames = run(engine, tmp_path, "show_text.py", 4.5)
+def test_show_text(tmp_path):
+    _, frames = run(tmp_path, "show_text.py", 4.5)
     assert frames[-1] == ["Hello, rider!   ", "on for 3 s      "]
 
 
-@pytest.mark.parametrize("engine", engines.ENGINES)
-def test_print_lean(engine, tmp_path):
-    printed, _ = run(engine, tmp_path, "print_lean.py", 12.0)
+def test_print_lean(tmp_path):
+    printed, _ = run(tmp_path, "print_lean.py", 12.0)
     lines = [line for line in printed.split("\n") if line.startswith("lean")]
     assert len(lines) > 100
     assert numbers(lines[0])[0] == pytest.approx(0.0, abs=1.0)
@@ -75,47 +60,42 @@ def test_print_lean(engine, tmp_path):
     assert max(numbers(line)[1] for line in lines) > 0.2  # setting off
 
 
-@pytest.mark.parametrize("engine", engines.ENGINES)
-def test_user_page(engine, tmp_path):
+def test_user_page(tmp_path):
     """Five usual pages before it, and the first again behind it."""
-    _, frames = run(engine, tmp_path, "user_page.py", 12.0, presses=[4, 5, 6, 7, 8])
+    _, frames = run(tmp_path, "user_page.py", 12.0, presses=[4, 5, 6, 7, 8])
     shown = re.fullmatch(r"Load     (\d\.\d\d) x", frames[-1][0].rstrip())
     assert shown and float(shown[1]) == pytest.approx(1.22, abs=0.05)  # 1 / cos(35 degrees)
     assert re.fullmatch(r"Lean  3\d deg *", frames[-1][1])
-    _, frames = run(engine, tmp_path, "user_page.py", 10.0, presses=[4, 5, 6, 7, 8, 9])
+    _, frames = run(tmp_path, "user_page.py", 10.0, presses=[4, 5, 6, 7, 8, 9])
     assert frames[-1][0].startswith("Lean")
 
 
-@pytest.mark.parametrize("engine", engines.ENGINES)
-def test_tried_it_is_turned_to_after_the_first_turn(engine):
-    said = command.works("try", EXAMPLES / "user_page.py", *["--cpython"] * (engine == "cpython")).out
+def test_tried_it_is_turned_to_after_the_first_turn():
+    said = command.works("try", EXAMPLES / "user_page.py").out
     loads = [float(load) for load in re.findall(r"\|Load +(\d\.\d\d) x", said)]
     assert max(loads) == pytest.approx(1.41, abs=0.08)  # 1 / cos(45 degrees), in the ride's last turn
 
 
-@pytest.mark.parametrize("engine", engines.ENGINES)
-def test_user_light(engine, tmp_path):
+def test_user_light(tmp_path):
     """It stays off at 35 degrees, and comes on there when its limit is lower."""
-    _, seen = run_all(engine, tmp_path, "user_light.py", 12.0)
+    _, seen = run_all(tmp_path, "user_light.py", 12.0)
     assert not any(seen["lamp"])
     lower = (tmp_path / "user.py").read_text().replace("LIMIT_DEG = 45", "LIMIT_DEG = 30")
     (tmp_path / "user.py").write_text(lower)
-    _, seen = run_all(engine, tmp_path, None, 12.0)
+    _, seen = run_all(tmp_path, None, 12.0)
     assert not any(seen["lamp"][:4]) and all(seen["lamp"][-3:])
 
 
-@pytest.mark.parametrize("engine", engines.ENGINES)
-def test_user_uart(engine, tmp_path):
-    _, seen = run_all(engine, tmp_path, "user_uart.py", 12.0)
+def test_user_uart(tmp_path):
+    _, seen = run_all(tmp_path, "user_uart.py", 12.0)
     lines = seen["sent"].splitlines()
     assert 100 <= len(lines) <= 121
     assert lines[0] == "?"
     assert float(lines[-1]) == pytest.approx(TURN_DEG, abs=3.0)
 
 
-@pytest.mark.parametrize("engine", engines.ENGINES)
-def test_user_battery(engine, tmp_path):
-    _, frames = run(engine, tmp_path, "user_battery.py", 12.0, presses=[4, 5, 6, 7, 8])
+def test_user_battery(tmp_path):
+    _, frames = run(tmp_path, "user_battery.py", 12.0, presses=[4, 5, 6, 7, 8])
     assert frames[-1] == ["Battery  12.6 V ", "ok              "]
 
 

@@ -117,33 +117,6 @@ def test_the_state_stays_within_its_bounds():
     assert x[SPEED] == 0.0
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_the_sums_of_a_sample(seed):
-    """Sums grow; what is measured is corrected by bias, scale and cross-axis errors in the order of the equations."""
-    chance = np.random.default_rng(seed)
-    x, force, rate = random_state(chance)
-    x[SCALE_LEFT:] = chance.uniform(-0.02, 0.02, STATES - SCALE_LEFT)
-    before, sums = x.copy(), [1.0] * 9
-    state = list(x)
-    rolled = predict(state, force, rate, STEP_S, sums)
-    wx, wy, wz = rate - before[BIAS_LEFT : BIAS_LEFT + 3]
-    sx, cxy, czx, czy, sz = before[SCALE_LEFT:]
-    wz -= czx * wx + czy * wy + sz * wz
-    wx -= sx * wx + cxy * wy
-    t, q, v = before[:3]
-    psi = before[YAW_ERROR]
-    acceleration = force[2] - math.sin(q) + v * wy * psi
-    left = force[0] - (math.cos(q) * math.sin(t) + v * wy + psi * acceleration)
-    up = force[1] - (math.cos(q) * math.cos(t) - v * wx)
-    expected = [left, up, wx, wy, wz, *force, left**2]
-    assert np.array(sums) - 1.0 == pytest.approx(np.array(expected))
-    assert rolled == pytest.approx(wz)
-    turning = wx * math.sin(t) + wy * math.cos(t)
-    assert state[LEAN] == pytest.approx(t + STEP_S * (wz - math.tan(q) * turning))
-    assert state[PITCH] == pytest.approx(q + STEP_S * (wy * math.sin(t) - wx * math.cos(t)))
-    assert state[SPEED] == pytest.approx(v + STEP_S * acceleration)
-
-
 @pytest.mark.parametrize("lean", [-0.6, 0.0, 0.6])
 @pytest.mark.parametrize("pitch", [-0.2, 0.2])
 def test_what_the_yaw_error_shows_of_the_pitch_is_no_lean_of_the_bike(lean, pitch):

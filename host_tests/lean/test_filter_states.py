@@ -54,30 +54,6 @@ def test_power_on_under_way_leaves_lean_and_speed_uncertain():
         assert (sigma_deg(estimator) > 20.0) is moves
 
 
-def test_it_rolls_once_it_has_sped_up():
-    estimator = LeanFilter()
-    hold(estimator, 3.0)
-    rolling = []
-    for _ in range(300):
-        estimator.update([0.0, 1.0, 2.0 / GRAVITY_MPS2], NO_RATE, DT_US)
-        rolling.append(estimator.rolling)
-    near(estimator.speed_mps, 6.0, 1.0)
-    assert not rolling[50]
-    assert rolling[-1]
-    assert rolling == sorted(rolling)
-
-
-def measured(speed_mps, mps2):
-    """Power-on while it speeds up so; after half a second the speed is measured once."""
-    estimator = LeanFilter()
-    force = [0.0, 1.0, mps2 / GRAVITY_MPS2]
-    hold(estimator, 0.05, [0.0, 1.1, 0.0])
-    hold(estimator, 0.5, force)
-    estimator.measure_speed(speed_mps)
-    hold(estimator, 0.7, force)
-    return estimator
-
-
 def speed_sigma_mps(forward_g, before_mps, now_mps):
     """1 sigma after two speeds, measured a second apart, with such a force forward."""
     estimator = LeanFilter()
@@ -96,16 +72,6 @@ def test_a_measured_speed_may_be_late_while_the_measured_ones_change_whatever_th
     steady, changing = speed_sigma_mps(0.0, 12.0, 12.0), speed_sigma_mps(0.0, 6.0, 12.0)
     assert changing > steady + 0.2
     near(speed_sigma_mps(0.3, 12.0, 12.0), steady, 0.05)
-
-
-def test_a_measured_speed_counts_once():
-    estimator = measured(5.0, 0.0)
-    near(estimator.speed_mps, 5.0, 0.2)
-    once, again = measured(5.0, 3.0), measured(5.0, 3.0)
-    again.measure_speed(5.0)
-    for each in (once, again):
-        hold(each, 0.7, [0.0, 1.0, 3.0 / GRAVITY_MPS2])
-    assert again.speed_mps < once.speed_mps - 0.1
 
 
 def test_coming_to_rest_the_force_is_the_vertical():
@@ -203,19 +169,6 @@ def test_a_large_correction_is_made_once():
     assert abs(leans[30]) < 1.0
     assert leans[60] > 28.0
     assert max(leans) < 30.5
-
-
-def test_where_samples_come_slowly_rest_and_ride_are_seen_as_well():
-    """At 50 Hz all work on a window is done in the sample after it."""
-    estimator = LeanFilter()
-    force, rate = force_and_rate(-20.0)
-    lean = 0.0
-    for k in range(400):
-        lean = estimator.update(force, rate, 20_000 if k else 0)
-    assert estimator.at_rest
-    near(lean, -20.0, 0.05)
-    near(hold(estimator, 6.0, [sin(radians(-20.0)), cos(radians(-20.0)), 0.2], NO_RATE, 20_000), -20.0, 2.0)
-    assert estimator.rolling
 
 
 def test_a_bias_that_is_far_off_is_put_right_at_once_where_rest_is_seen():

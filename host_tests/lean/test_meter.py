@@ -85,13 +85,6 @@ def test_a_bike_that_sets_off_right_after_the_poses_shows_its_lean_in_the_first_
         near(shown.lean_deg, 30.0, 0.3 if posed else 8.0)
 
 
-def test_a_bike_that_moves_right_after_the_poses_is_not_taken_to_stand():
-    shown = meter()
-    shown.use(shown.calibration, True)
-    ride(shown, 1.0, 15.0, lean_deg=30.0)
-    assert not shown.trusted
-
-
 def test_a_car_shows_its_g_however_it_stands():
     shown = nose_up(ride(meter(leans=False), 1.0), 0.0, 25.0)
     assert shown.trusted
@@ -162,20 +155,6 @@ def test_a_reason_for_distrust_belongs_to_one_calibration():
     assert shown.suppressed_reason == "side was wrong?"
     shown.use(Calibration())
     assert shown.suppressed_reason is None
-
-
-def test_a_car_has_no_lean_to_distrust():
-    shown = ride(meter(leans=False), 3.0)
-    shown.distrust("mount has moved")
-    assert shown.trusted
-
-
-def test_the_trim_of_the_calibration_is_taken_off():
-    calibration = Calibration()
-    calibration.trim_deg = 1.5
-    shown = meter(calibration)
-    near(shown.trim_deg, 1.5, 1e-5)
-    near(ride(shown, 3.0).lean_deg, -1.5, 0.01)
 
 
 def test_what_lasts_less_than_150_ms_is_no_maximum():

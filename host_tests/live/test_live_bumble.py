@@ -120,9 +120,9 @@ def test_a_pin_is_asked_for(on_air):
 
 
 async def annoy(central):
-    """Thirty visits: nonsense, some of it without an answer, and gone again."""
+    """Ten visits: nonsense, some of it without an answer, and gone again."""
     dice = random.Random(5)
-    for _ in range(30):
+    for _ in range(10):
         await central.connect(await central.find(CHRONO, 10))
         for _ in range(dice.randrange(6)):
             kind = dice.choice(((CHRONO, 2), (SERVICE, RATE)))
@@ -133,9 +133,9 @@ async def annoy(central):
     return "still there"
 
 
-def test_thirty_rude_visits_over_the_air(on_air):
-    (central, after), record = on_air(115, [(20, annoy, None), (105, just_write, None)])
+def test_ten_rude_visits_over_the_air(on_air):
+    (central, after), record = on_air(65, [(20, annoy, None), (55, just_write, None)])
     assert central.done.result() == "still there"
     assert after.done.exception() is None and len(after.heard) > 30
     assert record.ends == ["off"]
-    assert [line for line in record.at(114) if "Lean" in line]
+    assert [line for line in record.at(64) if "Lean" in line]

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from mpy import run_tests
+from mpy import BOARD_HEAP, run_tests
 
 
 def test_the_same_on_micropython():
-    run_tests(Path(__file__).with_name("test_live_hostile.py"))
+    run_tests(Path(__file__).with_name("test_live_hostile.py"), BOARD_HEAP)

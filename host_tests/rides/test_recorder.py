@@ -113,14 +113,6 @@ def test_a_fault_of_the_sensor_in_a_ride_is_replayed(tmp_path, computed):
     assert max(abs(a - b) for a, b in zip(exact[: len(leans)], leans, strict=True)) < 0.05
 
 
-def test_a_ride_says_how_warm_the_sensor_was(tmp_path):
-    plan = {"seed": 3, "temp_c": -5.0, "config": {"RECORD": True}, "until": 12}
-    devices.run("cpython", tmp_path, plan)
-    said = [block.centidegrees / 100 for block in rides(tmp_path)[0][1]]
-    assert said
-    assert said == pytest.approx([-5.0] * len(said), abs=0.2)
-
-
 def test_a_wheel_is_not_misread_while_flash_is_erased(tmp_path, monkeypatch):
     """Interrupts are off for 45 ms once a block. Of the edges in that time only one is noticed, and late."""
     boards, writes = [], []

@@ -175,16 +175,6 @@ def test_all_blocks_follow_one_another_and_say_what_they_belong_to(recorder, kee
     assert found[0].calibration().aligned
 
 
-def test_a_ride_without_a_turn_has_no_block(recorder, keeper):
-    start(recorder)
-    assert recorder.active
-    recorder.stop()
-    assert not recorder.active
-    assert keeper.steps == ["begin", "end"]
-    recorder.stop()
-    assert keeper.steps == ["begin", "end"]
-
-
 def test_a_new_ride_ends_the_one_before(recorder, keeper):
     start(recorder)
     add(recorder, 3)
@@ -242,14 +232,6 @@ def test_after_a_gap_the_time_is_the_clocks_and_more_than_half_a_second(waited_u
     assert steps[3] > 500_000
 
 
-def test_a_gap_before_the_first_turn_is_none(recorder, keeper, clock):
-    start(recorder)
-    recorder.mark_gap()
-    add(recorder, 2, clock)
-    recorder.stop()
-    assert times(keeper)[0] - blocks(keeper)[0].time_us == TURN_US
-
-
 def test_a_gap_belongs_to_its_own_ride(recorder, keeper, clock):
     start(recorder)
     add(recorder, 2, clock)
@@ -264,25 +246,14 @@ def test_a_gap_belongs_to_its_own_ride(recorder, keeper, clock):
     assert [turn.speed_mps for turn in found] == [None] * 3
 
 
-def test_a_speed_goes_with_the_next_turn_alone(recorder, keeper):
-    start(recorder)
-    add(recorder, 1)
-    recorder.add_fix(12.0, None)
-    recorder.add_fix(0.0, None)  # the newest one counts, a zero is one
-    add(recorder, 2)
-    recorder.add_fix(12.34, None)
-    add(recorder, 1)
-    recorder.stop()
-    assert [turn.speed_mps for turn in blocks(keeper)[0].turns] == [None, 0.0, None, 12.34]
-
-
-def test_a_position_goes_with_the_next_turn_alone(recorder, keeper):
-    """With a speed or without one."""
+def test_a_position_and_a_speed_go_with_the_next_turn_alone(recorder, keeper):
+    """One without the other too; a speed of zero is one."""
     start(recorder)
     recorder.add_fix(None, ride_writer.place(0))
     recorder.add_fix(None, ride_writer.place(1))  # the newest one counts
     add(recorder, 2)
     recorder.add_fix(5.0, None)
+    recorder.add_fix(0.0, None)
     add(recorder, 1)
     recorder.add_fix(6.0, ride_writer.place(2))
     add(recorder, 1)
@@ -293,7 +264,7 @@ def test_a_position_goes_with_the_next_turn_alone(recorder, keeper):
     first, second = blocks(keeper)
     hundredths = [turn.place and turn.place.utc_s and round(100 * turn.place.utc_s % 100) for turn in first.turns]
     assert hundredths == [20, None, None, 30]
-    assert [turn.speed_mps for turn in first.turns] == [None, None, 5.0, 6.0]
+    assert [turn.speed_mps for turn in first.turns] == [None, None, 0.0, 6.0]
     assert [turn.place for turn in second.turns] == [None]
 
 

@@ -90,15 +90,6 @@ def test_a_lean_that_is_wrong_for_it_is_not_shown_as_good(run):
     assert sum(dt for _, _, trusted, dt in errors if not trusted) < 0.5 * (UNTIL_S - FROM_S)  # it recovers
 
 
-def test_a_normal_flash_loses_nothing(tmp_path):
-    faults = [["slow_flash", [0.0, 1000.0, 0.045]]]
-    plan = {"seed": 2, "config": {"RECORD": True}, "faults": faults, "until": 25, "presses": []}
-    devices.run("cpython", tmp_path, plan)
-    recorded = blocks(tmp_path)
-    assert len(recorded) > 2
-    assert not [seconds for block in recorded for seconds in block.missing_s()]
-
-
 def test_the_status_says_how_long_a_block_takes(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(gc, "mem_free", lambda: 150_000, raising=False)

@@ -7,26 +7,6 @@ from kickstand_tools.simulated_board.fakes import fake_time
 from kickstand_tools.simulated_board.simulator import Board
 
 
-def test_events_run_in_order_at_their_time():
-    clock, seen = Clock(), []
-    clock.at(300, lambda: seen.append(("late", clock.now_us)))
-    clock.at(100, lambda: seen.append(("first", clock.now_us)))
-    clock.at(100, lambda: seen.append(("second", clock.now_us)))
-    clock.advance(99)
-    assert seen == []
-    clock.advance(1)
-    assert seen == [("first", 100), ("second", 100)]
-    clock.advance(1000)
-    assert seen[2] == ("late", 300) and clock.now_us == 1100
-
-
-def test_every_repeats():
-    clock, seen = Clock(), []
-    clock.every(1000, lambda: seen.append(clock.now_us))
-    clock.advance(3500)
-    assert seen == [1000, 2000, 3000]
-
-
 def test_the_deadline_stops_the_clock_and_stays():
     clock, seen = Clock(), []
     clock.set_deadline(500)

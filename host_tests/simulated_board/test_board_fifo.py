@@ -37,18 +37,6 @@ def frames(chip, count, size=FRAME):
     return found
 
 
-def test_whole_frames_in_order():
-    clock, chip = filling()
-    clock.advance(10_000)
-    assert waiting(chip) == 10 * FRAME
-    found = frames(chip, 10)
-    first = found[0][0]
-    assert found == [(first + i, first + i) for i in range(10)]
-    assert waiting(chip) == 0
-    clock.advance(3000)
-    assert frames(chip, 3)[0][0] == first + 10
-
-
 def test_the_frame_is_what_fifo_en_says():
     for fifo_en, size in ((0x78, 12), (0x08, 6), (0x70, 6), (0xF8, 14), (0x10, 2), (0x80, 2), (0x00, 0)):
         clock, chip = filling(fifo_en=fifo_en)

@@ -28,31 +28,6 @@ def test_a_burst_takes_its_time_on_the_wire(board):
         assert board.clock.now_us - start == expected_us, board.clock.now_us - start
 
 
-@firmware()
-def test_every_way_to_read_and_write(board):
-    board.clock.advance(100_000)
-    i2c = open_sensor()
-    assert i2c.readfrom_mem(0x68, 0x75, 1) == b"\x68"
-    i2c.writeto_mem(0x68, 0x6B, b"\x01")
-    board.clock.advance(100_000)
-    assert i2c.writeto(0x68, b"\x19\x07") == 2
-    i2c.writeto(0x68, b"\x19", False)
-    assert i2c.readfrom(0x68, 2) == b"\x07\x00"
-    buffer = bytearray(1)
-    i2c.writeto(0x68, b"\x75", False)
-    i2c.readfrom_into(0x68, buffer)
-    assert buffer == b"\x68"
-    whole = bytearray(4)
-    i2c.readfrom_mem_into(0x68, 0x75, memoryview(whole)[1:2])
-    assert whole == b"\x00\x68\x00\x00"
-
-
-@firmware(lcd_address=63)
-def test_scan(board):
-    assert open_sensor().scan() == [0x68]
-    assert I2C(1, sda=Pin(6), scl=Pin(7)).scan() == [0x3F]
-
-
 def test_one_bus():
     def firmware(board):
         assert open_sensor().scan() == [0x27, 0x69]

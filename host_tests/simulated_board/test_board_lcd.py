@@ -49,11 +49,6 @@ def write(lcd, line, text):
         send(lcd, character if isinstance(character, int) else ord(character), RS)
 
 
-def test_a_display_comes_up_dark():
-    lcd = Lcd(Clock())
-    assert lcd.text() == [" " * 16] * 2 and not lcd.on
-
-
 def test_two_lines_of_text():
     lcd = ready()
     write(lcd, 0, "Lean  23\xdf right")

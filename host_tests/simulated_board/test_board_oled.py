@@ -45,10 +45,6 @@ def test_it_comes_up_dark_with_anything_in_its_ram():
         assert not oled.backlight  # without its charge pump
 
 
-def test_the_low_half_of_the_status_distinguishes_them():
-    assert [Oled(Clock(), kind=kind).read_byte() & 0x0F for kind in KINDS] == [3, 8]
-
-
 def test_a_byte_is_eight_rows_of_a_column():
     for kind in KINDS:
         oled = ready(kind)
@@ -80,22 +76,6 @@ def test_only_the_ssd1306_has_other_addressing_modes():
     other = ready("sh1106")
     send(other, 0x00, 0x8D)
     assert other.unknown == 1
-
-
-def test_inverted_all_on_off_and_without_supply():
-    for kind in KINDS:
-        oled = ready(kind)
-        send(oled, 0x00, 0xA7)
-        assert len(lit(oled)) == 8192
-        send(oled, 0x00, 0xA6)
-        assert not lit(oled)
-        send(oled, 0x00, 0xA5)
-        assert len(lit(oled)) == 8192
-        send(oled, 0x00, 0xAE)
-        assert not lit(oled)
-        send(oled, 0x00, 0xAF)
-        oled.power_off()
-        assert not lit(oled)
 
 
 def test_an_argument_is_no_command_even_in_a_transfer_of_its_own():

@@ -8,17 +8,6 @@ from kickstand_tools.simulated_board.fakes.fake_machine import WDT, Pin
 from kickstand_tools.simulated_board.simulator import Board
 
 
-def test_the_three_ends_of_a_run():
-    def forever(board):
-        while True:
-            fake_time.sleep_ms(10)
-
-    outcome, board = on_board(forever, 2.5)
-    assert outcome == "off" and board.clock.now_us == 2_500_000
-    assert on_board(lambda board: fake_time.sleep_ms(10))[0] == "returned"
-    assert on_board(lambda board: fake_machine.reset())[0] == "reset"
-
-
 def test_power_is_lost_by_off_and_kept_by_reset():
     seen = []
 
@@ -41,22 +30,6 @@ def test_power_is_lost_by_off_and_kept_by_reset():
     on, off = fake_machine.PWRON_RESET, fake_machine.WDT_RESET
     assert seen == [(0, on, 0, False), (0x18, off, 0, True), (0, on, 0, False)], seen
     assert board.boots == 3 and board.clock.now_us == 3_000_000
-
-
-def test_the_watchdog_bites_when_it_is_not_fed():
-    fed_us = []
-
-    def firmware(board):
-        dog = WDT(timeout=1000)
-        for _ in range(30):
-            fake_time.sleep_ms(100)
-            dog.feed()
-        fed_us.append(board.clock.now_us)
-        fake_time.sleep_ms(5000)
-
-    outcome, board = on_board(firmware, 60.0)
-    assert outcome == "reset"
-    assert board.clock.now_us == fed_us[0] + 1_000_000
 
 
 def test_the_watchdog_can_be_stopped_by_its_register_and_ends_with_the_run():
@@ -105,17 +78,6 @@ def test_a_press_bounces_and_then_holds(board):
     assert 300_000 <= up[0] < 300_100 and up[-1] < 305_000
     board.press()
     assert levels(board, 510_000)[0][1] == 0
-
-
-def test_a_button_held_at_power_up():
-    def firmware(board):
-        fake_time.sleep_ms(10)
-        assert Pin(15, Pin.IN, Pin.PULL_UP).value() == 0
-
-    board = Board(level)
-    board.press(0.0, 2.0)
-    with board:
-        assert board.run(lambda: firmware(board), 1.0) == "returned"
 
 
 def test_installed_and_gone_again():

@@ -170,7 +170,6 @@ def _world(plan):
         ride = kind([getattr(script, name)(*more) for name, *more in plan["ride"]])
         motion = ride.motion
     part = sensor_errors.Sensor(seed=seed)
-    part.temp_c = plan.get("temp_c", 25.0)
     world = part.world(motion)
     if "remount" in plan:
         world = remounted(world, motion, seed, *plan["remount"])
@@ -181,7 +180,7 @@ def run_device(plan):
     """Device.record() of a run that is described as data, so that it can be sent to another process.
 
     plan: "until" (s); "lean" as for standing(), or "ride" [[name of a function in rides, arguments...], ...],
-    or "poses" as for poses_of; "seed" of the part (None: perfect); its "temp_c"; "presses" [[at_s, for_s], ...];
+    or "poses" as for poses_of; "seed" of the part (None: perfect); "presses" [[at_s, for_s], ...];
     "faults" [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...];
     "gps", "wheel" and "card": arguments of Device's methods; config "VEHICLE" "car": the ride is a car's; "remount"
     [at_s, seed of the mounting from then on]; "phones": [[[at_s, what a Phone of phones.py does, arguments...], ...],

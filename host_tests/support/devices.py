@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 
 import device_runs
-from mpy import run_mpy
+from mpy import BOARD_HEAP, run_mpy
 
 SCRIPT = Path(device_runs.__file__)
 
@@ -81,7 +81,8 @@ def run(engine, flash, plan, capsys=None):
             gc.unfreeze()
             os.chdir(before)
         return Record(answer, capsys.readouterr().out if capsys else "")
-    said = run_mpy(SCRIPT, heap="8M", stdin=json.dumps(plan), directory=flash)
+    heap = "8M" if "card" in plan else BOARD_HEAP
+    said = run_mpy(SCRIPT, heap=heap, stdin=json.dumps(plan), directory=flash)
     console, _, answer = said.rstrip("\n").rpartition("\n")
     return Record(json.loads(answer), console)
 

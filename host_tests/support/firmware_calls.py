@@ -19,7 +19,6 @@ from kickstand.imu import fifo_frames
 from kickstand.lean import formula
 from kickstand.ui import messages
 from kickstand_tools.calibration import published
-from kickstand_tools.replay.replay_engine import ReplayMeter
 
 
 def matrix_of(values):
@@ -112,19 +111,6 @@ def capture(samples):
     return pose.accel, pose.gyro
 
 
-def meter(matrix, readings, dt_us):
-    """Readings in g and deg/s through the whole chain: [shown lean, formula lean] for each."""
-    calibration = Calibration()
-    for i in range(9):
-        calibration.vehicle_from_sensor[i] = matrix[i]
-    device = ReplayMeter(calibration)
-    out = []
-    for reading in readings:
-        device.update(reading, dt_us)
-        out.append([device.lean_deg, device.lean_formula_deg])
-    return out
-
-
 def circular_dispersion(directions):
     spread = published.CircularDispersion()
     for x, y in directions:
@@ -155,7 +141,6 @@ CALLS = {
     "transform": transform,
     "add_up": add_up,
     "decode": decode,
-    "meter": meter,
 }
 
 

@@ -8,6 +8,8 @@ import pytest
 from kickstand_tools import unix_port
 
 HERE = Path(__file__).resolve().parent
+# The models of a board fit. Each time that the app collects its garbage, all of the heap is looked through.
+BOARD_HEAP = "4M"
 _TESTS = """
 import sys
 sys.path.insert(0, sys.argv[1])
@@ -19,9 +21,9 @@ for name in sorted(dir(module)):
 """
 
 
-def run_tests(module: Path) -> None:
+def run_tests(module: Path, heap: str = "64M") -> None:
     """Every test of a module that needs no more than MicroPython has, in one process."""
-    assert "test_" in run_mpy(_TESTS, str(module.parent), module.stem)
+    assert "test_" in run_mpy(_TESTS, str(module.parent), module.stem, heap=heap)
 
 
 def run_mpy(
