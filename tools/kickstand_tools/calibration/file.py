@@ -17,7 +17,7 @@ from kickstand.units import AXES
 from ..errors import InputError, cause
 from ..logs.reader import check_first_line
 from ..logs.source import File, log_stem, name_of, open_input
-from ..output import write_whole
+from ..output import whole_file
 from ..signals import Array
 from ..signals.calibrated import calibrated, rotated
 
@@ -175,11 +175,8 @@ def write_calibration(target: Path | str | IO[str], calibration: CalibrationFile
     if not isinstance(target, (Path, str)):
         target.write(text)
         return
-
-    def write(temporary: Path) -> None:
+    with whole_file(Path(target)) as temporary:
         temporary.write_text(text, encoding="ascii", newline="\n")
-
-    write_whole(Path(target), write)
 
 
 def calibration_path(log: Path) -> Path:

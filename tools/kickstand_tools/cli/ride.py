@@ -28,7 +28,7 @@ from ..logs.csv_lines import cut_log
 from ..logs.log import Log
 from ..logs.reader import Source, is_log
 from ..logs.stretch import Stretch
-from ..output import check_output, write_whole
+from ..output import check_output, whole_file
 from ..overlay.overlay import overlay
 from ..progress import Bar, spinner
 from ..refusals import WRONG_AXES, sentence
@@ -153,7 +153,8 @@ def compare_command(
     for log, notices in zip((a, b), found.notices.values()):
         warn(log, notices)
     if picture is not None:
-        write_whole(picture, lambda path: agreement.draw(path, found))
+        with whole_file(picture) as path:
+            agreement.draw(path, found)
     if as_json:
         click.echo(json.dumps(found.as_data()))
     else:

@@ -8,7 +8,7 @@ from typing import Any
 
 from .. import firmware_path
 from ..analysis.plot import page
-from ..output import check_directory, new_directory, write_whole
+from ..output import check_directory, new_directory, whole_file
 from ..pictures.lcd_font import ROM
 from ..templates import filled, source_hash
 from . import install_archive, npm_packages, rides_archive, sample_ride, wiring_files
@@ -88,9 +88,5 @@ def write_site(files: dict[str, bytes], out: Path) -> None:
     with new_directory(out):
         for name, data in files.items():
             path = out / name
-            with new_directory(path.parent):
-                write_whole(path, lambda temporary, data=data: _write(temporary, data))
-
-
-def _write(path: Path, data: bytes) -> None:
-    path.write_bytes(data)
+            with new_directory(path.parent), whole_file(path) as temporary:
+                temporary.write_bytes(data)
