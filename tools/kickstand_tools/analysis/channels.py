@@ -72,7 +72,7 @@ class Channels(Table):
 
 
 def channels(block: Block, calibration: CalibrationFile, lean: Array, car: bool = False) -> Channels:
-    """The block in the vehicle's axes. lean (n, LEAN_COLUMNS): the result of _Lean.follow() for it.
+    """The block in the vehicle's axes. lean (n, LEAN_COLUMNS): the result of ride._lean_along() for it.
 
     Forces by Nicolae's (18)-(20) and the matrix, then (25)-(26) and (23). A car has no lean, and its lateral
     acceleration is the force to the left.

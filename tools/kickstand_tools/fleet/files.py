@@ -15,7 +15,7 @@ from ..errors import InputError, cause, extra
 from ..logs.log import Log
 from ..logs.reader import read_log
 from ..logs.source import open_input
-from ..output import whole_file
+from ..output import new_directory, whole_file
 
 MOST_BYTES = 300_000_000  # largest (packed) log in a store: ten hours at 200 Hz have 150 million
 _LONGEST = 100  # longest name in bytes; a file system takes 255, with ending and temporary name
@@ -185,12 +185,7 @@ def write_bytes(path: str, content: bytes) -> None:
         with _in_store(path, "written") as (fs, place):
             fs.pipe_file(place, content)
         return
-    target = Path(path)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{target.parent} cannot be made: {cause(error)}") from error
-    with whole_file(target) as temporary:
+    with new_directory(Path(path).parent), whole_file(Path(path)) as temporary:
         temporary.write_bytes(content)
 
 

@@ -139,7 +139,8 @@ def apart(source: Source) -> tuple[File | Log, Stretch | None]:
 
 
 def _from_beginning(stretch: Stretch) -> Stretch:
-    if not stretch.from_its_end:
+    """With both times from the log's beginning: where one is from its end, the log is read for its length."""
+    if min(stretch.from_s or 0.0, stretch.to_s or 0.0) >= 0.0:
         return stretch
     whole = _again(stretch.source)
     last_s = [float(block.t_s[-1]) for block in _unchecked(whole, [])]
