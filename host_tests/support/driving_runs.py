@@ -120,7 +120,7 @@ def drive(legs, mount, options):
         "stops": alignment.standing.stops,
         "bias": list(alignment.standing.bias),
     }
-    if hasattr(alignment, "events"):
+    if isinstance(alignment, DriveAlignment):
         result["lag"] = alignment.events.lag_s
     if "against" in options:
         result["compare"] = verdict.compare(alignment, options["against"])
