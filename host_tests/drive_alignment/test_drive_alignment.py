@@ -35,11 +35,12 @@ def turned(m, axis, degrees):
     return (r @ np.reshape(m, (3, 3))).ravel().tolist()
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("method", ["improved", "published"])
-def test_a_car_is_aligned(engine, method):
-    calls = [("drive", (around(), MOUNT, {"method": method, "gyro_bias": [6.0, -5.0, 1.0]}))]
-    [result] = run(engine, calls)
+@pytest.mark.parametrize("engine", [*ENGINES, "published"])
+def test_a_car_is_aligned(engine):
+    """By the published method on CPython alone."""
+    options = {"method": "published"} if engine == "published" else {}
+    calls = [("drive", (around(), MOUNT, options | {"gyro_bias": [6.0, -5.0, 1.0]}))]
+    [result] = run("cpython" if options else engine, calls)
     assert result["ready"], result
     assert max(map(abs, errors(result, MOUNT))) < 0.3
     assert result["bias"] == pytest.approx([6.0, -5.0, 1.0], abs=0.05)

@@ -12,6 +12,7 @@ from kickstand.drive_alignment.history import BIN_US, MASK, SIZE, ForceHistory
 from kickstand.drive_alignment.regression import Fit, ForwardRegression
 from kickstand.drive_alignment.speed_check import SpeedCheck
 from kickstand.drive_alignment.vertical import StandingVertical, Vertical
+from kickstand_tools.calibration import published
 
 UP = [0.0, 1.0, 0.0]
 
@@ -21,40 +22,33 @@ def unit(rng):
     return (v / np.linalg.norm(v)).tolist()
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("off_deg", [0.0, 0.01, 45.0, 89.9, 90.1, 179.99, 180.0])
-def test_rotation_between_is_safe_at_every_angle(engine, off_deg):
-    """It is a rotation and takes a to b, within 2e-6, even where a and b are exactly antiparallel."""
+def test_rotation_between_is_safe_at_every_angle(off_deg):
+    """It is a rotation and takes a to b, within 1e-12, even where a and b are exactly antiparallel."""
     rng = np.random.default_rng(3)
     off = np.radians(off_deg)
-    calls, pairs = [], []
-    for axis, b in ((0, UP), (2, UP), (1, [0.0, 0.0, -1.0])):
+    for axis, b in ((0, published.UP), (2, published.UP), (1, published.BACKWARD)):
         for turn in rng.uniform(0, 2 * np.pi, 6):
             side = np.zeros(3)
             free = [i for i in range(3) if b[i] == 0.0]
             side[free[0]], side[free[1]] = np.cos(turn), np.sin(turn)
             a = np.cos(off) * np.array(b) + np.sin(off) * side
-            calls.append(("rotation_between", (a.tolist(), b, axis)))
-            pairs.append((a, np.array(b)))
-    for result, (a, b) in zip(run(engine, calls), pairs, strict=True):
-        r = np.reshape(result, (3, 3))
-        assert np.abs(r @ r.T - np.eye(3)).max() < 2e-6
-        assert np.linalg.det(r) > 0.99
-        assert np.abs(r @ a - b).max() < 2e-6
+            r = published.rotation_between(a, b, axis)
+            assert np.abs(r @ r.T - np.eye(3)).max() < 1e-12
+            assert np.linalg.det(r) > 0.99
+            assert np.abs(r @ a - b).max() < 1e-12
 
 
-@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("sigma_deg", [1.0, 20.0])
-def test_dispersion_is_fishers(engine, sigma_deg):
+def test_dispersion_is_fishers(sigma_deg):
     rng = np.random.default_rng(7)
     angles = 2.5 + np.radians(sigma_deg) * rng.normal(size=400)
     mean = np.angle(np.exp(1j * angles).mean())
     expected = (1 - np.cos(2 * (angles - mean)).mean()) / (2 * abs(np.exp(1j * angles).mean()) ** 2)
-    lengths = rng.uniform(0.1, 3.0, 400)  # make no difference
-    directions = (lengths * [np.cos(angles), np.sin(angles)]).T.tolist()
-    [value] = run(engine, [("dispersion", [directions])])
-    assert value == pytest.approx(expected, rel=2e-3)
+    value = published.circular_dispersion(np.exp(1j * angles).tolist())
+    assert value == pytest.approx(expected, rel=1e-9)
     assert value == pytest.approx(np.radians(sigma_deg) ** 2, rel=0.2)
+    assert published.circular_dispersion([1.0, -1.0]) == published.NO_MEAN
 
 
 def test_history_is_exact_and_wraps_round():

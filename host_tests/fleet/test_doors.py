@@ -20,7 +20,7 @@ from kickstand_tools.fleet.manifest import Period, by_pattern, read_manifest
 from kickstand_tools.fleet.period import failed, work_on_period
 from kickstand_tools.fleet.run import run_fleet
 from kickstand_tools.fleet.show import plot
-from kickstand_tools.output import write_whole
+from kickstand_tools.output import whole_file
 from kickstand_tools.refusals import sentence
 from made_fleet import in_this_process
 
@@ -128,8 +128,8 @@ def test_a_file_that_cannot_be_written_says_why(tmp_path, monkeypatch):
         raise OSError(30, "Read-only file system")
 
     monkeypatch.setattr(Path, "unlink", read_only)
-    with pytest.raises(InputError, match="Read-only file system"):
-        write_whole(tmp_path / "x", read_only)
+    with pytest.raises(InputError, match="Read-only file system"), whole_file(tmp_path / "x"):
+        read_only()
 
 
 PROGRAM = """

@@ -12,7 +12,6 @@ from kickstand_tools.signals.averages import (
     window_means,
     window_spreads,
 )
-from kickstand_tools.signals.calibrated import calibrated, rotated
 from kickstand_tools.signals.cells import Cells, cell_numbers, runs, stretches
 from kickstand_tools.signals.lag import best_lag, correlation, correlations, log_likelihood_ratio, peak_offset, peaks
 from kickstand_tools.signals.leaning import leaning_of
@@ -27,7 +26,7 @@ def test_readings_are_calibrated_and_turned_as_the_firmware_does_it():
     offset, slope, bias = np.array([[0.01, -0.02, 0.03], [1.02, 0.99, 1.01], [1.0, -2.0, 3.0]])
     calibration = CalibrationFile(offset, slope, bias, matrix)
     readings = CHANCE.normal(size=(5, 7))
-    found = rotated(matrix, *calibrated(readings[:, :3], readings[:, 4:], offset, slope, bias))
+    found = calibration.in_vehicle(readings)
     firmware = calibration.to_firmware()
     for k, reading in enumerate(readings):
         force, rate = np.zeros(3), np.zeros(3)

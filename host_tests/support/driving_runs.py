@@ -13,12 +13,10 @@ from kickstand.drive_alignment.regression import Fit, ForwardRegression
 from kickstand.errors import Refusal
 from kickstand.rotation import matrix
 from kickstand.ui import messages
-from kickstand_tools.calibration.published import PublishedAlignment
 
 STAND = [6.0, 0.0, 0.0]
 G = 9.80665
 RATE_HZ = 100
-METHODS = {"improved": DriveAlignment, "published": PublishedAlignment}
 
 
 def around(events=6, braking=-2.0, seconds=3.0, yaw_dps=0.0, pause_s=5.0, stands=True):
@@ -97,7 +95,10 @@ def drive(legs, mount, options):
     [from_s, another mount], against (a matrix to compare with)."""
     vehicle = options.get("vehicle", "car")
     source = SpeedSource(**options.get("source", {}))
-    alignment = METHODS[options.get("method", "improved")](vehicle, options.get("up"), options.get("bias"))
+    method = DriveAlignment
+    if options.get("method") == "published":
+        from kickstand_tools.calibration.published import PublishedAlignment as method  # on CPython only
+    alignment = method(vehicle, options.get("up"), options.get("bias"))
     moved_at, other = options.get("moved", [1e9, mount])
     bias = options.get("gyro_bias", [0.0, 0.0, 0.0])
     states = []
@@ -119,7 +120,7 @@ def drive(legs, mount, options):
         "stops": alignment.standing.stops,
         "bias": list(alignment.standing.bias),
     }
-    if hasattr(alignment, "events"):
+    if isinstance(alignment, DriveAlignment):
         result["lag"] = alignment.events.lag_s
     if "against" in options:
         result["compare"] = verdict.compare(alignment, options["against"])

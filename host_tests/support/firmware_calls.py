@@ -18,7 +18,6 @@ from kickstand.errors import Refusal
 from kickstand.imu import fifo_frames
 from kickstand.lean import formula
 from kickstand.ui import messages
-from kickstand_tools.calibration import published
 
 
 def matrix_of(values):
@@ -111,22 +110,12 @@ def capture(samples):
     return pose.accel, pose.gyro
 
 
-def circular_dispersion(directions):
-    spread = published.CircularDispersion()
-    for x, y in directions:
-        spread.add(x, y, (x * x + y * y) ** 0.5)
-    return spread.value()
-
-
 CALLS = {
-    "dispersion": circular_dispersion,
     "drive": driving_runs.drive,
     "parts": driving_runs.parts,
     "regression": driving_runs.regression,
-    "rotation_between": lambda a, b, axis: _into(9, published.rotation_between, a, b, axis),
     "cross": lambda a, b: _into(3, rotation.cross, a, b),
     "rotate": lambda m, a: _into(3, rotation.rotate, matrix_of(m), a),
-    "multiply": lambda a, b: _into(9, published.multiply, matrix_of(a), matrix_of(b)),
     "angle": rotation.angle_deg,
     "is_rotation": rotation.is_rotation,
     "two_position": align_two_position,

@@ -3,7 +3,7 @@
 import contextlib
 import gzip
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from .errors import InputError, cause
@@ -44,15 +44,17 @@ def new_directory(path: Path) -> Iterator[None]:
                 one.rmdir()
 
 
-def write_whole(path: Path, write: Callable[[Path], None]) -> None:
-    """Call write(temporary path), then rename that file to path. If it fails, a file that was at path stays.
+@contextlib.contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """A temporary path to write to; at the end of the `with` that file becomes path. If it fails, a file that was at
+    path stays. Raises InputError.
 
-    The temporary name has the ending of path, from which write may tell the format.
+    The temporary name has the ending of path, from which libraries tell the format.
     """
     path = path.resolve()  # a symbolic link stays one
     temporary = path.with_name(f".{os.getpid()}-{path.name}")
     try:
-        write(temporary)
+        yield temporary
         os.replace(temporary, path)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {cause(error)}; choose another place") from error
@@ -63,10 +65,6 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
 
 def write_packed(path: Path, parts: Iterable[bytes]) -> None:
     """Write a file of these parts, gzipped if its name ends in .gz, whole or not at all. Raises InputError."""
-
-    def write(temporary: Path) -> None:
-        opened = gzip.open if path.suffix == ".gz" else open
-        with opened(temporary, "wb") as file:
-            file.writelines(parts)
-
-    write_whole(path, write)
+    opened = gzip.open if path.suffix == ".gz" else open
+    with whole_file(path) as temporary, opened(temporary, "wb") as file:
+        file.writelines(parts)

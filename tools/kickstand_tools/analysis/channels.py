@@ -16,8 +16,6 @@ from ..logs.log import ROOM_TEMP_C
 from ..logs.table import Array, Table
 from ..replay.meter_along import formula_lean_deg
 
-LEAN_COLUMNS = 7  # of what channels() takes
-
 
 @dataclass(eq=False)
 class Channels(Table):
@@ -71,40 +69,35 @@ class Channels(Table):
         return np.column_stack((-self.pitch_rate_dps, self.yaw_rate_dps, self.roll_rate_dps))
 
 
-def channels(block: Block, calibration: CalibrationFile, lean: Array, car: bool = False) -> Channels:
-    """The block in the vehicle's axes. lean (n, LEAN_COLUMNS): the result of _Lean.follow() for it.
+def channels(block: Block, calibration: CalibrationFile, lean: dict[str, Array], car: bool = False) -> Channels:
+    """The block in the vehicle's axes. lean: lean_deg, lean_sigma_deg, shown_g, resting, rolling, sure and doubtful.
 
     Forces by Nicolae's (18)-(20) and the matrix, then (25)-(26) and (23). A car has no lean, and its lateral
-    acceleration is the force to the left.
+    acceleration is the force to the left: of its lean only shown_g, resting and sure are taken.
     """
+    none = np.zeros(len(block.time_us))
     if car:
-        lean = lean * [0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0] + [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+        lean = lean | {"lean_deg": none + np.nan, "lean_sigma_deg": none, "rolling": none, "doubtful": none}
     force, rate = calibration.in_vehicle(block.readings)
     left, up, forward = force.T
-    angle = np.radians(np.nan_to_num(lean[:, 0]))
+    angle = np.radians(np.nan_to_num(lean["lean_deg"]))
     temperature = block.readings[:, 3]
     if block.has_temp:
         temperature = np.nan_to_num(temperature, nan=ROOM_TEMP_C)
     return Channels(
-        block.t_s,
-        lean[:, 0],
-        np.full(len(rate), np.nan) if car else formula_lean_deg(left, up, rate[:, 1]),
-        left,
-        up,
-        forward,
-        left * np.cos(angle) - up * np.sin(angle),
-        -rate[:, 0],
-        rate[:, 1],
-        rate[:, 2],
-        block.speed_mps,
-        temperature,
-        lean[:, 1],
-        np.degrees(np.sqrt(np.where(lean[:, 2] >= 0.0, lean[:, 2], np.nan))),
-        lean[:, 3],
-        lean[:, 4],
-        lean[:, 5],
-        lean[:, 6],
-        block.lat_deg,
-        block.lon_deg,
-        block.utc_s,
+        t_s=block.t_s,
+        lean_formula_deg=none + np.nan if car else formula_lean_deg(left, up, rate[:, 1]),
+        left_g=left,
+        up_g=up,
+        forward_g=forward,
+        lateral_g=left * np.cos(angle) - up * np.sin(angle),
+        pitch_rate_dps=-rate[:, 0],
+        yaw_rate_dps=rate[:, 1],
+        roll_rate_dps=rate[:, 2],
+        speed_mps=block.speed_mps,
+        temp_c=temperature,
+        lat_deg=block.lat_deg,
+        lon_deg=block.lon_deg,
+        utc_s=block.utc_s,
+        **lean,
     )

@@ -17,7 +17,7 @@ from ..logs.source import File, Progress, log_stem, name_of
 from ..logs.stretch import Stretch
 from ..logs.table import Array
 from ..replay.meter_along import MeterAlong
-from .channels import LEAN_COLUMNS, Channels, channels
+from .channels import Channels, channels
 
 
 @dataclass
@@ -47,23 +47,23 @@ class Ride:
     def blocks(self, progress: Progress | None = None, notices: list[Notice] | None = None) -> Iterator[Channels]:
         """The channels of the ride, block by block, without frozen readings: these are a gap. progress, notices: see
         read_blocks(); for the whole log, even if the ride is a stretch of it. Raises InputError."""
-        lean, absurd, slow, some = _Lean(self.calibration), False, False, False
+        along, absurd, slow, some = MeterAlong(self.calibration), False, False, False
         log, stretch = apart(self.log)
         for whole, found in self._read(log, progress, notices):
             block = whole.measured
             if not len(block.time_us):
                 continue
-            rows = lean.follow(block, shown=found is None)
-            if notices is not None and not absurd and np.any(rows[:, 2] < 0.0):
+            lean, variance = _lean_along(along, block, shown=found is None)
+            if notices is not None and not absurd and np.any(variance < 0.0):
                 absurd = True
-                notices.append(_absurd(block, int(np.argmax(rows[:, 2] < 0.0))))
+                notices.append(_absurd(block, int(np.argmax(variance < 0.0))))
             slow |= self.smoothed and found is None
             if found is not None:
-                shown = found[~whole.frozen]
-                rows[:, 0], rows[:, 2] = shown[:, 0], np.radians(shown[:, 1]) ** 2
-                rows[:, 5] = rows[:, 2] <= MAX_VARIANCE  # NaN is not
-                rows[:, 6] = shown[:, 4]
-            seen = channels(block, self.calibration, rows, self.car)
+                lean_deg, sigma_deg, _, _, doubtful = found[~whole.frozen].T
+                sure = np.radians(sigma_deg) ** 2 <= MAX_VARIANCE  # NaN is not
+                lean |= {"lean_deg": lean_deg, "lean_sigma_deg": sigma_deg, "doubtful": doubtful}
+                lean["sure"] = sure.astype(float)
+            seen = channels(block, self.calibration, lean, self.car)
             if stretch is not None:
                 which = stretch.holds(block)
                 if not which.any():
@@ -138,27 +138,25 @@ def _absurd(block: Block, at: int) -> Notice:
     return Notice("absurd-readings", block.time_us[at] / 1e6, float(np.max(most[4:])), float(np.max(most[:3])))
 
 
-class _Lean:
-    """The firmware's meter, run along the ride."""
+def _lean_along(along: MeterAlong, block: Block, shown: bool) -> tuple[dict[str, Array], Array]:
+    """What channels() takes, by the firmware's meter; and the variance of its lean (rad2), < 0 where it diverged.
 
-    def __init__(self, calibration: CalibrationFile) -> None:
-        self._along = MeterAlong(calibration)
-
-    def follow(self, block: Block, shown: bool) -> Array:
-        """(n, 7): lean (degrees), displayed forward force (g), variance of the lean (rad2), resting, rolling, sure, 0.
-
-        shown: compute the lean that was shown; else it and sure are 0, which saves a tenth of the time.
-        """
-        n = len(block.time_us)
-        columns: list[list[float]] = [[] for _ in range(LEAN_COLUMNS)]
-        lean_deg, forward, variance, resting, rolling, sure, _ = (column.append for column in columns)
-        for meter in self._along.after_each(block, *self._along.in_vehicle(block)):
-            lean = meter.filter
-            forward(meter.smooth_force[2])
-            variance(lean.variance)
-            resting(lean.at_rest)
-            rolling(lean.rolling)
-            if shown:
-                lean_deg(meter.lean_deg)
-                sure(meter.trusted)
-        return np.column_stack([column or np.zeros(n) for column in columns]).astype(float)
+    shown: compute the lean that was shown; else it and sure are 0, which saves a tenth of the time.
+    """
+    names = ("lean_deg", "shown_g", "variance", "resting", "rolling", "sure", "doubtful")
+    columns: list[list[float]] = [[] for _ in names]
+    lean_deg, forward, variance, resting, rolling, sure, _ = (column.append for column in columns)
+    for meter in along.after_each(block, *along.in_vehicle(block)):
+        lean = meter.filter
+        forward(meter.smooth_force[2])
+        variance(lean.variance)
+        resting(lean.at_rest)
+        rolling(lean.rolling)
+        if shown:
+            lean_deg(meter.lean_deg)
+            sure(meter.trusted)
+    none = np.zeros(len(block.time_us))
+    found = {name: np.array(column, dtype=float) if column else none for name, column in zip(names, columns)}
+    variances = found.pop("variance")
+    found["lean_sigma_deg"] = np.degrees(np.sqrt(np.where(variances >= 0.0, variances, np.nan)))
+    return found, variances

@@ -17,9 +17,9 @@ from kickstand.units import AXES
 from ..errors import InputError, cause
 from ..logs.reader import check_first_line
 from ..logs.source import File, log_stem, name_of, open_input
-from ..output import write_whole
+from ..output import whole_file
 from ..signals import Array
-from ..signals.calibrated import calibrated, rotated
+from ..signals.rotations import rotated
 
 VERSION = 1
 MOST_BYTES = 1_000_000  # largest file; those of kickstand have a thousandth of that
@@ -84,8 +84,9 @@ class CalibrationFile:
         return force, rate
 
     def in_sensor(self, accel_g: Array, gyro_dps: Array) -> tuple[Array, Array]:
-        """Force (n, 3, g) and rate (n, 3, deg/s) along the sensor's own axes."""
-        return calibrated(accel_g, gyro_dps, self.accel_offset_g, self.accel_slope, self.gyro_bias_dps)
+        """Force (n, 3, g) and rate (n, 3, deg/s) along the sensor's own axes, by (18)-(20). A gyro's reading is its
+        rate plus its bias."""
+        return accel_g * self.accel_slope + self.accel_offset_g, gyro_dps - self.gyro_bias_dps
 
     def delay_s(self) -> float:
         """gyro_delay_s, or that of the default DLPF."""
@@ -175,11 +176,8 @@ def write_calibration(target: Path | str | IO[str], calibration: CalibrationFile
     if not isinstance(target, (Path, str)):
         target.write(text)
         return
-
-    def write(temporary: Path) -> None:
+    with whole_file(Path(target)) as temporary:
         temporary.write_text(text, encoding="ascii", newline="\n")
-
-    write_whole(Path(target), write)
 
 
 def calibration_path(log: Path) -> Path:

@@ -18,9 +18,8 @@ from kickstand.errors import Notice
 from kickstand.units import AXES, STANDARD_GRAVITY
 
 from ..signals import Array
-from ..signals.calibrated import rotated
 from ..signals.lag import Lag, best_lag, correlation
-from ..signals.rotations import rotation_vector
+from ..signals.rotations import rotated, rotation_vector
 from .cells import CELL_S, LogCells
 
 if TYPE_CHECKING:

@@ -13,7 +13,6 @@ from ..analysis import alignment_quality
 from ..calibration import drive_events as events
 from ..calibration.drive import DriveFit, fit_drive
 from ..calibration.file import CalibrationFile, read_calibration, write_calibration
-from ..calibration.poses import refuse_same_file
 from ..calibration.six import GOOD_FREE_POSE_G, SixPositions, fit_six_positions
 from ..calibration.two import TwoPositions, fit_two_positions
 from ..checks.log import remarks
@@ -72,7 +71,6 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
 def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None, method: str, out: Path) -> None:
     """How the sensor sits on the vehicle, from logs of driving with speed: stops and braking in a straight line."""
     check_output(out, list(logs))
-    refuse_same_file(logs)
     before = read_calibration(calibration) if calibration else None
     several = len(logs) > 1
     with Bar("driving") as bar:

@@ -28,7 +28,7 @@ from ..logs.csv_lines import cut_log
 from ..logs.log import Log
 from ..logs.reader import Source, is_log
 from ..logs.stretch import Stretch
-from ..output import check_output, write_whole
+from ..output import check_output, whole_file
 from ..overlay.overlay import overlay
 from ..progress import Bar, spinner
 from ..refusals import WRONG_AXES, sentence
@@ -153,7 +153,8 @@ def compare_command(
     for log, notices in zip((a, b), found.notices.values()):
         warn(log, notices)
     if picture is not None:
-        write_whole(picture, lambda path: agreement.draw(path, found))
+        with whole_file(picture) as path:
+            agreement.draw(path, found)
     if as_json:
         click.echo(json.dumps(found.as_data()))
     else:
@@ -168,14 +169,12 @@ def compare_command(
 @click.option("--engine", type=click.Choice(["cpython", "micropython", "rp2040"]), default="cpython")
 @OUT
 @RIGHT_HANDED
-def replay_command(
-    ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, engine: str, out: Path
-) -> None:
+def replay_command(ride: Path, calibration: Path | None, engine: str, out: Path, **stretch: float | None) -> None:
     """Run the firmware's own lean meter over a recorded log."""
     calibration = _given_or_beside(ride, calibration, out)
     parameters = read_calibration(calibration)
     with Bar("replaying") as bar:
-        count, notices = replay_to_csv(_stretch(ride, from_s, to_s), parameters, engine, out, bar.reach)
+        count, notices = replay_to_csv(_stretch(ride, **stretch), parameters, engine, out, bar.reach)
     warn(ride, notices)
     if not parameters.aligned:
         warning(f"{calibration} is not aligned: this is the lean of the sensor, not of the bike")
@@ -188,11 +187,11 @@ def replay_command(
 @STRETCH
 @OUT
 @RIGHT_HANDED
-def smooth_command(ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, out: Path) -> None:
+def smooth_command(ride: Path, calibration: Path | None, out: Path, **stretch: float | None) -> None:
     """Find the lean afterwards, from the whole ride, each sample with its standard deviation."""
     parameters = read_calibration(_given_or_beside(ride, calibration, out))
     with Bar("smoothing") as bar:
-        count, notices = smooth_to_csv(_stretch(ride, from_s, to_s), parameters, out, bar.reach)
+        count, notices = smooth_to_csv(_stretch(ride, **stretch), parameters, out, bar.reach)
     warn(ride, notices)
     click.echo(f"written: {out}, {count} samples")
 
@@ -221,11 +220,9 @@ def export_command(ride: Path, form: str, calibration: Path | None, live: bool, 
 @live
 @JSON
 @RIGHT_HANDED
-def report_command(
-    ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, live: bool, as_json: bool
-) -> None:
+def report_command(ride: Path, calibration: Path | None, live: bool, as_json: bool, **stretch: float | None) -> None:
     """Summarise a ride on one page: maxima, time at large leans, and each stop evaluated as a brake test."""
-    seen = _overview(ride, calibration, live, from_s, to_s)
+    seen = _overview(ride, calibration, live, **stretch)
     if as_json:
         click.echo(json.dumps(as_data(seen)))
     else:
@@ -241,17 +238,11 @@ def report_command(
 @OUT_DIRECTORY
 @RIGHT_HANDED
 def plot_command(
-    ride: Path,
-    calibration: Path | None,
-    from_s: float | None,
-    to_s: float | None,
-    tiles: bool,
-    live: bool,
-    out: Path,
+    ride: Path, calibration: Path | None, tiles: bool, live: bool, out: Path, **stretch: float | None
 ) -> None:
     """Draw a ride: a picture (PNG) and a page to zoom into (HTML)."""
     plot.check(out)
-    seen = _overview(ride, calibration, live, from_s, to_s)
+    seen = _overview(ride, calibration, live, **stretch)
     with spinner("drawing"):
         written = list(plot.draw(seen, out, tiles))
     print_lines(f"written: {path}" for path in written)
@@ -315,9 +306,7 @@ def overlay_command(
     click.echo(f"written: {out}, {made.pictures} frames, {made.end_s - made.begin_s:.1f} s, {made.fps:g} per second")
 
 
-def _opened(
-    source: Path, calibration: Path | None, live: bool, from_s: float | None = None, to_s: float | None = None
-) -> tuple[Ride, list[Notice]]:
+def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> tuple[Ride, list[Notice]]:
     """A ride, and notices about its import. What an app has exported is imported and, where no calibration is given or
     beside it, aligned by itself; a line says so."""
     found = None
@@ -325,7 +314,7 @@ def _opened(
         with spinner("importing"):
             found = import_of_app(source)
     if found is None:
-        return open_ride(_stretch(source, from_s, to_s), calibration, smoothed=not live), []
+        return open_ride(_stretch(source, **stretch), calibration, smoothed=not live), []
     said = f"{source}: imported from {found.app}, {len(found.log.t_s)} samples, {found.rate_hz:.0f} a second"
     beside = calibration_path(source)
     known = calibration or (beside if beside.exists() else None)
@@ -335,12 +324,12 @@ def _opened(
         known = fit.calibration
         said += f"; aligned by its bends, {known_to(fit)}"
     click.echo(said, err=True)
-    return open_ride(_stretch(found.log, from_s, to_s), known, smoothed=not live), found.notices
+    return open_ride(_stretch(found.log, **stretch), known, smoothed=not live), found.notices
 
 
-def _overview(source: Path, calibration: Path | None, live: bool, from_s: float | None, to_s: float | None) -> Overview:
+def _overview(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> Overview:
     """The overview of a ride of _opened(), in front of its notices those of the import; all are printed."""
-    opened, imported = _opened(source, calibration, live, from_s, to_s)
+    opened, imported = _opened(source, calibration, live, **stretch)
     with Bar("reading") as bar:
         seen = overview(opened, bar.reach)
     known = {sentence(notice) for notice in seen.notices}  # the log that was imported is checked again
@@ -354,7 +343,8 @@ def _inputs(source: Path) -> list[Path]:
     return sorted(source.rglob("*")) if source.is_dir() else [source]
 
 
-def _stretch(log: Path | Log, from_s: float | None, to_s: float | None) -> Source:
+def _stretch(log: Path | Log, from_s: float | None = None, to_s: float | None = None) -> Source:
+    """What the options of STRETCH leave of a log."""
     return log if from_s is None and to_s is None else Stretch(log, from_s, to_s)
 
 

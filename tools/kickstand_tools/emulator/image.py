@@ -7,7 +7,7 @@ import urllib.request
 from pathlib import Path
 
 from ..errors import InputError, cause, extra
-from ..output import write_whole
+from ..output import whole_file
 
 NAME = "RPI_PICO-20250911-v1.26.1.uf2"
 SHA256 = "fc2a8096e0d999d3caca11b34381854599d68aee3e905d3cccbd5247ca78d07c"
@@ -39,8 +39,5 @@ def _download(path: Path) -> None:
             f"no MicroPython image: {URL} cannot be had ({cause(error)}); put the file into {path.parent}"
         ) from error
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, lambda temporary: _write(temporary, data))
-
-
-def _write(path: Path, data: bytes) -> None:
-    path.write_bytes(data)
+    with whole_file(path) as temporary:
+        temporary.write_bytes(data)

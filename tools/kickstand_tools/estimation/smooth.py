@@ -10,7 +10,7 @@ from kickstand.errors import Notice
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
 from ..logs.block import Block
-from ..logs.csv_lines import joined_cells, number_cells, text_cells, write_lines
+from ..logs.csv_lines import write_lean
 from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import Progress, name_of
 from ..logs.stretch import within
@@ -80,22 +80,8 @@ def smooth_to_csv(
 
     Memory does not grow with the log. Raises InputError.
     """
-    count, notices = 0, []
-
-    def lines() -> Iterator[bytes]:
-        nonlocal count
-        for block, found in _checked_blocks(log, calibration, progress, notices):
-            count += len(found)
-            yield cells_of(block, found)
-
-    write_lines(out, ("t_s", *COLUMNS), lines())
-    return count, notices
-
-
-def cells_of(block: Block, found: Array) -> bytes:
-    """Lines of LEAN.csv."""
-    columns = (number_cells(column, digits) for column, digits in zip(found.T, DIGITS, strict=True))
-    return joined_cells([text_cells(block.time_text), *columns])
+    notices: list[Notice] = []
+    return write_lean(out, COLUMNS, DIGITS, _checked_blocks(log, calibration, progress, notices)), notices
 
 
 def _checked_blocks(

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..logs.table import Array
-from ..signals.calibrated import rotated
 from ..signals.cells import cell_numbers
 from ..signals.leaning import WINDOW_S
+from ..signals.rotations import rotated
 
 GAP_S = 0.17  # a longer step between two samples: readings are missing
 

@@ -2,12 +2,13 @@
 
 import numpy as np
 
-from ..analysis.channels import LEAN_COLUMNS, Channels, channels
+from ..analysis.channels import Channels, channels
 from ..analysis.downsample import downsampled, joined
 from ..analysis.ride import Ride
 from ..analysis.stops.brake_test import RATE_S, Stop, find_stops
 from ..calibration.file import CalibrationFile
 from ..logs.reader import Source, read_blocks
+from ..logs.table import Array
 
 
 def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
@@ -36,5 +37,6 @@ def car_channels(log: Source, calibration: CalibrationFile) -> list[Channels]:
     for whole in read_blocks(log):
         block = whole.measured
         if len(block.time_us):
-            found.append(channels(block, calibration, np.zeros((len(block.time_us), LEAN_COLUMNS)), car=True))
+            lean: dict[str, Array] = dict.fromkeys(("shown_g", "resting", "sure"), np.zeros(len(block.time_us)))
+            found.append(channels(block, calibration, lean, car=True))
     return found

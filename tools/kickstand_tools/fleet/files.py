@@ -6,7 +6,7 @@ import hashlib
 import io
 import re
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import IO, Any, cast
 from urllib.parse import quote
@@ -15,7 +15,7 @@ from ..errors import InputError, cause, extra
 from ..logs.log import Log
 from ..logs.reader import read_log
 from ..logs.source import open_input
-from ..output import write_whole
+from ..output import new_directory, whole_file
 
 MOST_BYTES = 300_000_000  # largest (packed) log in a store: ten hours at 200 Hz have 150 million
 _LONGEST = 100  # longest name in bytes; a file system takes 255, with ending and temporary name
@@ -181,29 +181,25 @@ def _system(path: str):
 
 def write_bytes(path: str, content: bytes) -> None:
     """Write a file, whole or not at all, and the directories for it. Raises InputError."""
-
-    def write(temporary: Path) -> None:
-        temporary.write_bytes(content)
-
     if is_remote(path):
         with _in_store(path, "written") as (fs, place):
             fs.pipe_file(place, content)
         return
-    target = Path(path)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{target.parent} cannot be made: {cause(error)}") from error
-    write_whole(target, write)
+    with new_directory(Path(path).parent), whole_file(Path(path)) as temporary:
+        temporary.write_bytes(content)
 
 
-def write_by(path: str, write: Callable[[Path], None]) -> None:
-    """Have write(temporary path) write a file, then put it where it belongs, whole or not at all. Raises InputError."""
+@contextlib.contextmanager
+def to_write(path: str) -> Iterator[Path]:
+    """A temporary path to write to; at the end of the `with` that file is put where it belongs, whole or not at all.
+    Raises InputError."""
     if not is_remote(path):
-        write_whole(Path(path), write)
+        with whole_file(Path(path)) as temporary:
+            yield temporary
         return
     with tempfile.TemporaryDirectory() as here:
         temporary = Path(here) / path.rpartition("/")[2]
-        write_whole(temporary, write)
+        with whole_file(temporary) as begun:
+            yield begun
         with _in_store(path, "written") as (fs, place):
             fs.put_file(str(temporary), place)

@@ -18,7 +18,7 @@ from .journal import Journal, StoreJournal
 from .manifest import Period
 from .period import AFTERWARDS, CHANGED, DISK_FULL, PeriodResult, failed, work_on_period
 from .show import plot
-from .show.page import Glance, write_page
+from .show.page import Glance
 
 RESULTS_VERSION = 4  # a new number makes all earlier results obsolete
 PLOTS, SIGNALS = "plots", "signals"
@@ -116,7 +116,7 @@ def write_results(directory: str, results: Iterable[PeriodResult], expected: int
             yield result
 
     tables.write_tables(directory, seen())
-    write_page(files.join(directory, "index.html"), glance, expected)
+    files.write_bytes(files.join(directory, "index.html"), glance.page(expected).encode())
     return glance
 
 

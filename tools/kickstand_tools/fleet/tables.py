@@ -1,8 +1,7 @@
 """Writes the results as Parquet."""
 
-from collections.abc import Iterable
-from pathlib import Path
-from typing import Any
+import contextlib
+from collections.abc import Callable, Iterable, Iterator
 
 from ..errors import InputError, extra
 from . import files, schema
@@ -22,44 +21,34 @@ def check() -> None:
 def write_tables(directory: str, results: Iterable[PeriodResult]) -> None:
     """Write a file NAME.parquet for each of schema.TABLES, whole or not at all. Memory does not grow with the number of
     results, which are gone through once. Raises InputError."""
-    _open_next(directory, list(schema.TABLES), {}, results)
-
-
-def _open_next(directory: str, names: list[str], tables: dict[str, "_Table"], results: Iterable[PeriodResult]) -> None:
-    """Open the table of the first name, then the others, then write all."""
-    if not names:
+    with contextlib.ExitStack() as opened:
+        tables = {name: opened.enter_context(_table(directory, name)) for name in schema.TABLES}
         for result in results:
-            for name, table in tables.items():
-                table.add([result.alignment] if name == "alignments" else getattr(result, name))
-        return
+            for name, add in tables.items():
+                add([result.alignment] if name == "alignments" else getattr(result, name))
+
+
+@contextlib.contextmanager
+def _table(directory: str, name: str) -> Iterator[Callable[[list[Row]], None]]:
+    """A function that adds rows to the file of a table. It writes them in groups."""
+    from pyarrow import Table
     from pyarrow.parquet import ParquetWriter
 
-    name, *others = names
     columns = schema.schema(name)
+    waiting: list[Row] = []
 
-    def write(temporary: Path) -> None:
-        with ParquetWriter(temporary, columns, compression="zstd") as writer:
-            tables[name] = _Table(writer, columns)
-            _open_next(directory, others, tables, results)
-            tables[name].flush()
+    def write() -> None:
+        writer.write_table(Table.from_pylist(waiting, schema=columns))
+        waiting.clear()
 
-    files.write_by(files.join(directory, f"{name}.parquet"), write)
+    def add(rows: list[Row]) -> None:
+        waiting.extend(rows)
+        if len(waiting) >= _GROUP:
+            write()
 
-
-class _Table:
-    """Collects rows and writes them to a file in groups."""
-
-    def __init__(self, writer: Any, columns: Any) -> None:
-        self._writer, self._columns = writer, columns
-        self._rows: list[Row] = []
-
-    def add(self, rows: list[Row]) -> None:
-        self._rows += rows
-        if len(self._rows) >= _GROUP:
-            self.flush()
-
-    def flush(self) -> None:
-        from pyarrow import Table
-
-        self._writer.write_table(Table.from_pylist(self._rows, schema=self._columns))
-        self._rows = []
+    with (
+        files.to_write(files.join(directory, f"{name}.parquet")) as temporary,
+        ParquetWriter(temporary, columns, compression="zstd") as writer,
+    ):
+        yield add
+        write()

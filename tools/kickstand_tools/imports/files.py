@@ -119,16 +119,12 @@ def _check_directory(file: IO[bytes], path: Path) -> None:
 def _unzipped(path: Path) -> Iterator[tuple[str, bytes]]:
     with open_input(path) as file:
         _check_directory(file, path)
-        yield from _entries(file, path)
-
-
-def _entries(file: IO[bytes], path: Path) -> Iterator[tuple[str, bytes]]:
-    with zipfile.ZipFile(file) as archive:
-        if "[Content_Types].xml" in archive.namelist():
-            raise InputError(f"{path}: a table of Excel: export it as CSV")
-        for entry in archive.infolist():
-            if not entry.is_dir() and _wanted(entry.filename):
-                yield entry.filename.replace("\\", "/"), _unpacked(archive, entry, path)
+        with zipfile.ZipFile(file) as archive:
+            if "[Content_Types].xml" in archive.namelist():
+                raise InputError(f"{path}: a table of Excel: export it as CSV")
+            for entry in archive.infolist():
+                if not entry.is_dir() and _wanted(entry.filename):
+                    yield entry.filename.replace("\\", "/"), _unpacked(archive, entry, path)
 
 
 def _unpacked(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, path: Path) -> bytes:

@@ -166,12 +166,10 @@ def check_picture(path: Path) -> None:
 
 def draw(path: Path, found: Agreement) -> None:
     """Write a PNG with the leans of both over time, and their difference."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.ticker import MultipleLocator
 
     figure = Figure(figsize=(14, 7), layout="constrained")
-    FigureCanvasAgg(figure)
     above, below = figure.subplots(2, 1, sharex=True)
     for name, log, width in zip(("smoothed A", "smoothed B"), found.names, (1.6, 0.9)):
         above.plot(found.t_s, found.leans[name], linewidth=width, label=f"{name}: {Path(log).name}")

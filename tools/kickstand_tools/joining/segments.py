@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..logs.table import Array, Table
+from ..signals.cells import stretches
 from .track import Course
 
 STEPS = 30  # most steps of a segment
@@ -39,10 +40,9 @@ class Segments(Table):
 
 def segments(course: Course) -> Segments:
     """The segments of a course."""
-    edges = np.diff(course.good.astype(int), prepend=0, append=0)
     rows = [
         np.arange(start, min(start + STEPS, end))
-        for begin, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1))
+        for begin, end in stretches(course.good)
         for start in range(begin, end, STEPS)
     ]
     rows = [row for row in rows if len(row) >= _FEWEST]

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .cells import TRACK
 from .csv_reader import cells_of
 from .log import FirmwareRow, firmware_rows
 from .table import Array, Table
@@ -25,23 +24,16 @@ class Block(Table):
     time_us: NDArray[np.int64]
     readings: Array
     speed_mps: Array
+    lat_deg: Array
+    lon_deg: Array
+    utc_s: Array
+    frozen: NDArray[np.bool_]
     has_temp: bool
     start_s: float
     done: int  # bytes of the (packed) file that have been read; samples of a log in memory
     lines: list[str] = field(default_factory=list)  # the rows as CSV, none for a log in memory
     names: tuple[str, ...] = ()  # names of the columns in lines
     own_times: bool = True  # False if the times were changed (see even_times.py) and differ from those in lines
-    frozen: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
-    lat_deg: Array = field(default_factory=lambda: np.zeros(0))
-    lon_deg: Array = field(default_factory=lambda: np.zeros(0))
-    utc_s: Array = field(default_factory=lambda: np.zeros(0))
-
-    def __post_init__(self) -> None:
-        for name in TRACK:
-            if len(getattr(self, name)) != len(self.time_us):
-                setattr(self, name, np.full(len(self.time_us), np.nan))
-        if len(self.frozen) != len(self.time_us):
-            self.frozen = np.zeros(len(self.time_us), dtype=bool)
 
     def rows(self) -> Iterator[FirmwareRow]:
         """The samples as firmware_rows() has them, for a replay by the firmware's modules."""

@@ -13,6 +13,7 @@ from kickstand.errors import Notice
 from numpy.typing import NDArray
 
 from ..output import write_packed
+from .block import Block
 from .cells import COLUMNS, OPTIONAL
 from .log import Log
 from .reader import read_blocks
@@ -87,6 +88,22 @@ def _letters(number: NDArray[np.unsignedinteger], digits: int, most: int, least_
 def write_lines(path: Path, names: Sequence[str], lines: Iterable[bytes]) -> None:
     """Write a CSV file from its columns' names and its lines, as write_packed() does. Raises InputError."""
     write_packed(path, itertools.chain([(",".join(names) + "\n").encode()], lines))
+
+
+def write_lean(out: Path, columns: Sequence[str], digits: Sequence[int], rows: Iterable[tuple[Block, Array]]) -> int:
+    """Write a LEAN.csv: the log's own times, then these columns with so many decimals each. rows: blocks of the log
+    with their values (n, columns). Returns the number of samples. Raises InputError."""
+    count = 0
+
+    def lines() -> Iterator[bytes]:
+        nonlocal count
+        for block, found in rows:
+            count += len(found)
+            cells = [number_cells(column, digit) for column, digit in zip(found.T, digits, strict=True)]
+            yield joined_cells([text_cells(block.time_text), *cells])
+
+    write_lines(out, ("t_s", *columns), lines())
+    return count
 
 
 def write_log(path: Path | str, log: Log) -> None:

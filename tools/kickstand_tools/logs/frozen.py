@@ -9,7 +9,6 @@ import numpy as np
 from kickstand.errors import Notice
 from numpy.typing import NDArray
 
-from .block import Block
 from .log import Log
 from .table import Array
 
@@ -22,7 +21,7 @@ _MOTION = [0, 1, 2, 4, 5, 6]  # of the chip's order: without the temperature
 
 
 class FrozenReadings:
-    """Finds frozen readings. mark() takes a log's blocks one after the other."""
+    """Finds frozen readings. mark() takes a log part by part."""
 
     def __init__(self) -> None:
         self._last = np.zeros((0, 6))  # reading at the end of the block before
@@ -33,10 +32,10 @@ class FrozenReadings:
         self._step = np.full(6, np.inf)  # smallest change seen on each axis: the last digit
         self._stretches: list[tuple[float, float]] = []
 
-    def mark(self, block: Block) -> NDArray[np.bool_]:
-        """(n) True where the block's readings are frozen. The first one of equal readings is not."""
-        n = len(block.time_us)
-        values, time_s = np.vstack((self._last, block.readings[:, _MOTION])), block.t_s
+    def mark(self, time_us: NDArray[np.int64], readings: Array) -> NDArray[np.bool_]:
+        """(n) True where readings (n, 7), as in a Block, are frozen. The first one of equal readings is not."""
+        n = len(time_us)
+        values, time_s = np.vstack((self._last, readings[:, _MOTION])), time_us.astype(float) * 1e-6
         time_s = np.concatenate(([self._last_s], time_s)) if len(self._last) else time_s
         change = np.abs(np.diff(values, axis=0))
         self._step = np.minimum(self._step, np.min(np.where(change > 1e-9, change, np.inf), axis=0, initial=np.inf))
@@ -91,6 +90,5 @@ class FrozenReadings:
 
 def without_frozen(log: Log) -> Log:
     """The log without frozen readings: where they were is a gap. The log itself where there are none."""
-    block = Block(log.time_us, log.readings, log.speed_mps, True, log.start_s, 0)
-    kept = ~FrozenReadings().mark(block)
+    kept = ~FrozenReadings().mark(log.time_us, log.readings)
     return log if np.all(kept) else log.part(kept)

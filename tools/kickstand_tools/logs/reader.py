@@ -92,7 +92,7 @@ def read_blocks(
                 f"{name} has over {MOST_SAMPLES / 1e6:.0f} million samples: kickstand cut makes a part of it"
             )
         block.lines = block.lines if lines else []
-        block.frozen = frozen.mark(block)
+        block.frozen = frozen.mark(block.time_us, block.readings)
         checks.add(block.measured)
         yield block
         if progress:
@@ -139,7 +139,8 @@ def apart(source: Source) -> tuple[File | Log, Stretch | None]:
 
 
 def _from_beginning(stretch: Stretch) -> Stretch:
-    if not stretch.from_its_end:
+    """With both times from the log's beginning: where one is from its end, the log is read for its length."""
+    if min(stretch.from_s or 0.0, stretch.to_s or 0.0) >= 0.0:
         return stretch
     whole = _again(stretch.source)
     last_s = [float(block.t_s[-1]) for block in _unchecked(whole, [])]
@@ -168,6 +169,7 @@ def _blocks_of(log: Log) -> Iterator[Block]:
         yield Block(
             time_us[part],
             readings[part],
+            frozen=np.zeros(len(time_us[part]), dtype=bool),
             has_temp=has_temp,
             start_s=log.start_s,
             done=min(start + BLOCK_SAMPLES, len(time_us)),
@@ -241,6 +243,7 @@ def _block(
     return Block(
         time_us,
         np.column_stack([column[name] for name in order]),
+        frozen=np.zeros(len(table), dtype=bool),
         has_temp="temp_c" in places,
         start_s=start_s,
         done=done,

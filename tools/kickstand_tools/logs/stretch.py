@@ -37,11 +37,6 @@ class Stretch:
         """The log's name."""
         return name_of(self.source)
 
-    @property
-    def from_its_end(self) -> bool:
-        """True if one of the times is negative, so that the length of the log has to be known."""
-        return min(self.from_s or 0.0, self.to_s or 0.0) < 0.0
-
     def of_length(self, length_s: float) -> "Stretch":
         """The stretch with both times from the beginning. length_s: length of the log."""
         times = [None if t is None else t if t >= 0.0 else length_s + t for t in (self.from_s, self.to_s)]

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..joining.motion import motion
 from ..logs.reader import Source, read_twice
 from ..logs.source import File, Progress, name_of
-from ..output import write_whole
+from ..output import whole_file
 from .camera_match import camera_offset_s
 from .gpmf import telemetry
 from .shown import Shown, shown
@@ -109,12 +109,9 @@ def overlay(
     else:
         assert offset_s is not None
         arguments = _over(filmed, begin_s - offset_s, end_s - begin_s, fps, given, round(MARGIN * size))
-
-    def written(temporary: Path) -> None:
+    with whole_file(out) as temporary:
         temporary.touch()  # where that fails the system's reason is said, which ffmpeg's words hide
         write_video(temporary, arguments, pictures(), drawn)
-
-    write_whole(out, written)
     return Overlaid(count, rate, begin_s, end_s, offset_s, correlation, notices)
 
 

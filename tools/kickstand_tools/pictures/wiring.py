@@ -1,13 +1,10 @@
 """How sensor, display and button are wired to a Pico and to an ESP32, drawn as SVG. The pins are those of port.py."""
 
 import runpy
-import sys
-import types
 from typing import NamedTuple
-from unittest import mock
 
 from .. import firmware_path
-from ..simulated_board.fakes import chips, cpython
+from ..simulated_board import simulator
 from .drawing import AMBER, BLACK, BLUE, RED, Drawing
 
 
@@ -15,8 +12,7 @@ class Board(NamedTuple):
     """A board seen from above. Its pins from the top down: near, the side that faces the modules, and far."""
 
     title: str
-    port: str  # sys.platform
-    machine: str  # in chips.MACHINES
+    machine: str  # in simulated_board.fakes.chips.MACHINES
     pin_prefix: str  # before the GPIO number in a pin's name
     near: tuple[str, ...]
     far: tuple[str, ...]
@@ -26,7 +22,6 @@ class Board(NamedTuple):
 
 PICO = Board(
     "Raspberry Pi Pico",
-    "rp2",
     "pico",
     "GP",
     tuple("GP0 GP1 GND GP2 GP3 GP4 GP5 GND GP6 GP7 GP8 GP9 GND GP10 GP11 GP12 GP13 GND GP14 GP15".split()),
@@ -36,7 +31,6 @@ PICO = Board(
 )
 ESP32 = Board(
     "ESP32-DevKitC",
-    "esp32",
     "esp32",
     "",
     tuple("GND 23 22 TX RX 21 GND 19 18 5 17 16 4 0 2 15 D1 D0 CLK".split()),
@@ -137,10 +131,7 @@ def _draw_signals(
 
 def _default_pins(board: Board) -> dict[str, dict[str, str]]:
     """{module: {pin of the module: name of the board's pin}}, from port.py as it is on this board."""
-    cpython.supplement()
-    machine = mock.patch.dict(sys.modules, machine=types.ModuleType("machine"))
-    named = mock.patch.object(sys.implementation, "_machine", chips.MACHINES[board.machine], create=True)
-    with machine, named, mock.patch.object(sys, "platform", board.port):
+    with simulator.Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=board.machine):
         port = runpy.run_path(str(firmware_path.PACKAGE / "board" / "port.py"))
 
     def name(number: int) -> str:

@@ -18,7 +18,7 @@ from .. import unix_port
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
 from ..logs.block import Block
-from ..logs.csv_lines import joined_cells, number_cells, text_cells, write_lines
+from ..logs.csv_lines import write_lean
 from ..logs.reader import Source, apart, read_blocks, read_twice
 from ..logs.source import Progress, total_bytes
 from ..logs.stretch import Stretch, within
@@ -95,19 +95,12 @@ def replay_to_csv(
     A long log takes two processes. Memory does not grow with it, except on the emulated Pico, which is too slow for a
     long one. Raises InputError.
     """
-    count, notices = 0, []
+    notices: list[Notice] = []
     whole = log.source if isinstance(log, Stretch) else log
     # for the command alone: a second process imports the main program again, which may not allow that
     run = "two processes" if engine == "cpython" and total_bytes(whole) > _LONG_BYTES else engine
-
-    def lines() -> Iterator[bytes]:
-        nonlocal count
-        for block, results in replay_blocks(log, calibration, run, progress, notices):
-            count += len(results)
-            yield joined_cells([text_cells(block.time_text), *(number_cells(column, 5) for column in results.T)])
-
-    write_lines(out, ("t_s", *replay_engine.COLUMNS), lines())
-    return count, notices
+    rows = replay_blocks(log, calibration, run, progress, notices)
+    return write_lean(out, replay_engine.COLUMNS, [5] * len(replay_engine.COLUMNS), rows), notices
 
 
 def replay_blocks(

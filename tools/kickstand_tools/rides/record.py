@@ -15,7 +15,7 @@ from rich.live import Live
 from ..calibration.file import write_calibration
 from ..deploy.connection import connected, restart
 from ..errors import InputError
-from ..output import check_output, write_whole
+from ..output import check_output, whole_file
 from . import ride_log
 from .stream import LiveReading, Recording, blocks
 
@@ -58,13 +58,10 @@ def record(
             stopped = threading.Event()
             recorded = Recording(stopped, live)
             notes: list[str] = []
-
-            def write(temporary: Path) -> None:
-                opened = gzip.open if out.suffix == ".gz" else open
-                with opened(temporary, "wt", encoding="ascii", newline="") as file, _signals(stopped):
+            opened = gzip.open if out.suffix == ".gz" else open
+            with whole_file(out) as temporary, _signals(stopped):
+                with opened(temporary, "wt", encoding="ascii", newline="") as file:
                     recorded.write(file, blocks(transport, name, notes, stopped), notes)
-
-            write_whole(out, write)
             assert recorded.first
             write_calibration(beside, ride_log.calibration(recorded.first))
         finally:

@@ -26,15 +26,14 @@ LEAST_LEAN = np.radians(2.0 / 57.3)  # rms: a ride that leans less is nearly str
 @dataclass
 class Leaning:
     """matrix (3, 3): vehicle from sensor, rows left, up, forward, roughly. rolled (n, rad): lean without its slow
-    changes (see without_drift()). yaw (n, rad/s): yaw rate, positive to the left; turned (n): the same without slow
-    changes. likeness: correlation of rolled and -turned while riding. speed (m/s): the one that balances yaw rate and
-    lean, by regression. share: rate about left over yaw x sin(lean), by regression: 1 where the axes are right-handed
-    and the rates in deg/s. sigmas: |share| over its standard deviation.
+    changes (see without_drift()). turned (n, rad/s): yaw rate, positive to the left, likewise. likeness: correlation of
+    rolled and -turned while riding. speed (m/s): the one that balances yaw rate and lean, by regression. share: rate
+    about left over yaw rate x sin(lean), by regression: 1 where the axes are right-handed and the rates in deg/s.
+    sigmas: |share| over its standard deviation.
     """
 
     matrix: Array
     rolled: Array
-    yaw: Array
     turned: Array
     likeness: float
     speed: float
@@ -65,7 +64,6 @@ def leaning_of(rate: Array, force: Array, riding: NDArray[np.bool_]) -> Leaning:
     return Leaning(
         np.array([left, up, forward]),
         rolled,
-        yaw,
         turned,
         both / float(np.sqrt(max(float(rolled[riding] @ rolled[riding]) * squared, 1e-30))),
         speed,

@@ -9,6 +9,11 @@ import numpy as np
 from . import Array
 
 
+def rotated(matrix: Array, *vectors: Array) -> tuple[Array, ...]:
+    """Each of vectors (n, 3) along the axes that are the rows of matrix (3, 3), such as vehicle_from_sensor."""
+    return tuple(vector @ matrix.T for vector in vectors)
+
+
 def cross_matrix(vector: Array) -> Array:
     """(..., 3, 3) the skew-symmetric matrix K of vectors (..., 3): K @ other = vector x other."""
     matrix = np.zeros((*vector.shape, 3))

@@ -29,7 +29,8 @@ def to_us(seconds):
 
 class Clock:
     """now_us: the time since the clock was made. Models read it and schedule calls with at(); operations that take time
-    call advance().
+    call advance(). next_us: when that next does more than let time pass, for a deadline, an event or a comparison with
+    the host's clock.
 
     pace: simulated seconds per second of the host: 1.0 for real time, 0 for as fast as the host can.
     """
@@ -39,21 +40,16 @@ class Clock:
         self._events = []  # heap of (due, number, callable): the number keeps equal times in order
         self._number = 0
         self._deadline_us = NEVER_US
-        self._next_us = NEVER_US  # the next deadline, event or comparison with the host's clock
+        self.next_us = NEVER_US
         self._pace = 0
         self._pace_us = NEVER_US
         self._host_lead_us = 0
         self.set_pace(pace)
 
-    @property
-    def next_us(self):
-        """When advance() next does more than let time pass."""
-        return self._next_us
-
     def advance(self, us):
         """Let time pass and run the events that are due. Raises PowerOff at the deadline, and what events raise."""
         target = self.now_us + us
-        if target < self._next_us:
+        if target < self.next_us:
             self.now_us = target
         else:
             self._pass_to(target)
@@ -89,12 +85,12 @@ class Clock:
         due = min(self._deadline_us, self._pace_us)
         if self._events and self._events[0][0] < due:
             due = self._events[0][0]
-        self._next_us = due
+        self.next_us = due
 
     def _pass_to(self, target):
-        while self._next_us <= target:
-            if self._next_us > self.now_us:
-                self.now_us = self._next_us
+        while self.next_us <= target:
+            if self.next_us > self.now_us:
+                self.now_us = self.next_us
             if self._events and self._events[0][0] <= self.now_us:
                 function = heappop(self._events)[2]
                 self._plan()

@@ -36,8 +36,7 @@ class Mpu6050:
     def power_on(self):
         """Set every register as after power-on and after a reset; writes are lost for START_UP_US."""
         regs = self._regs
-        for i in range(128):
-            regs[i] = 0
+        regs[:] = bytes(128)
         regs[reg.PWR_MGMT_1] = self._variant.power_after_reset
         regs[reg.WHO_AM_I] = self.who_am_i
         self.fifo.clear()
@@ -150,15 +149,14 @@ class Mpu6050:
             if value & reg.FIFO_RESET and not value & reg.FIFO_ENABLED:
                 self.fifo.clear()
             if value & reg.SIG_COND_RESET:
-                self._clear_data()
+                self._fill_data(0)
             self._regs[reg.USER_CTRL] = value & 0xF8  # the reset bits clear themselves
         elif register == reg.SIGNAL_PATH_RESET:
-            self._clear_data()
+            self._fill_data(0)
             self._regs[reg.SIGNAL_PATH_RESET] = 0
 
-    def _clear_data(self):
-        for i in range(reg.ACCEL_XOUT_H, reg.GYRO_ZOUT_L + 1):
-            self._regs[i] = 0
+    def _fill_data(self, value):
+        self._regs[reg.ACCEL_XOUT_H : reg.GYRO_ZOUT_L + 1] = bytes([value] * 14)
 
     def _chosen(self, enabled):
         """The data registers that FIFO_EN sends to the FIFO, in order."""
@@ -212,8 +210,7 @@ class Mpu6050:
         if self._override is None:
             self._measure(max(0, self._sample_us(number) - reg.DLPF_DELAY_US[regs[reg.CONFIG] & 7]))
         else:
-            for i in range(reg.ACCEL_XOUT_H, reg.GYRO_ZOUT_L + 1):
-                regs[i] = self._override
+            self._fill_data(self._override)
         regs[reg.INT_STATUS] |= reg.DATA_RDY & regs[reg.INT_ENABLE]
 
     def _measure(self, t_us):

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,14 +26,10 @@ def simulate(
     seed: int,
     out_dir: Path | str,
     seconds: float = 640.0,
-    upright_error_deg: float = 0.0,
-    pitch_change_deg: float | None = None,
-    share: float = 1.0,
     speed: bool = False,
-    road: str | None = None,
-    mount: str | None = None,
+    **conditions: Any,
 ) -> Ride:
-    """Simulate a ride (see ride.ride) of exactly this length and write it to out_dir. Raises InputError.
+    """Simulate a ride of exactly this length and write it to out_dir. conditions: see ride.ride. Raises InputError.
 
     Logs: POSE_1.csv to POSE_7.csv (the last one slanted), KICKSTAND.csv, UPRIGHT.csv, RIDE.csv. TRUTH.csv has one row
     for each row of RIDE.csv. A RIDE.cal.json in out_dir is removed. speed: RIDE.csv gets a speed and a position once a
@@ -41,8 +38,7 @@ def simulate(
     check_profile(profile)
     directory = Path(out_dir)
     check_directory(directory)
-    made = ride(profile, seed, seconds, upright_error_deg, pitch_change_deg, share, road, mount, exact=True)
-    made = _cut(made, seconds)
+    made = _cut(ride(profile, seed, seconds, exact=True, **conditions), seconds)
     try:
         directory.mkdir(parents=True, exist_ok=True)
         # It belongs to an earlier ride and another sensor, but report, plot and export would use it for this one

@@ -100,9 +100,9 @@ class Plan:
         self.legs.append(Leg("standing", self.uniform(3.0, 8.0), 0.0, engine=1.0))
         self._seconds = sum(leg.seconds for leg in self.legs)
 
-    def to_speed(self, speed_mps: float, mps2: float, phase: str = "") -> None:
+    def to_speed(self, speed_mps: float, mps2: float) -> None:
         """Speed up or brake, upright."""
-        name = phase or ("braking" if speed_mps < self.speed else "speeding up")
+        name = "braking" if speed_mps < self.speed else "speeding up"
         self.add(name, max(1.0, abs(speed_mps - self.speed) / mps2), speed_mps, lean_deg=0.0, roll_s=1.0)
 
     def straight(self, seconds: float, speed_mps: float | None = None) -> None:

@@ -23,11 +23,11 @@ from ..analysis.ride import Ride, open_ride
 from ..calibration.file import calibration_path, write_calibration
 from ..errors import InputError
 from ..estimation.alignment import fit_ride
-from ..estimation.smooth import COLUMNS, cells_of, smooth_to_csv
+from ..estimation.smooth import COLUMNS, DIGITS, smooth_to_csv
 from ..imports import mapped
 from ..imports.importing import import_recording, write_imported
 from ..joining.joined import join_track, write_joined
-from ..logs.csv_lines import write_lines
+from ..logs.csv_lines import write_lean
 from ..logs.reader import read_blocks
 from ..refusals import sentence
 from ..remedies import PAGE
@@ -156,15 +156,15 @@ def smooth(log, calibration, progress):
     if any(found is None for found in kept):
         smooth_to_csv(Path(log), ride.calibration, out, progress)
     else:
-        write_lines(out, ("t_s", *COLUMNS), _lean_lines(ride, np.concatenate(kept), progress))
+        write_lean(out, COLUMNS, DIGITS, _again(ride, np.concatenate(kept), progress))
     return {"path": str(out)}
 
 
-def _lean_lines(ride, values, progress):
+def _again(ride, values, progress):
     at = 0
     for block in read_blocks(ride.log, 2, progress, calibration=ride.calibration):
         at, begin = at + len(block.time_us), at
-        yield cells_of(block, values[begin:at])
+        yield block, values[begin:at]
 
 
 @in_json

@@ -8,7 +8,7 @@ from typing import Any
 
 from .. import firmware_path
 from ..analysis.plot import page
-from ..output import check_directory, new_directory, write_whole
+from ..output import check_directory, new_directory, whole_file
 from ..pictures.lcd_font import ROM
 from ..templates import filled, source_hash
 from . import install_archive, npm_packages, rides_archive, sample_ride, wiring_files
@@ -27,11 +27,6 @@ def python_files() -> dict[str, str]:
     return {name: path.read_text(encoding="utf-8") for name, path in (found | tools("web/device.py")).items()}
 
 
-def _chart_scripts(library: bytes) -> str:
-    """The scripts of the charts of a ride as the policy of the page that frames them names them, the library first."""
-    return " ".join(map(source_hash, (library.decode(), *page.SCRIPTS)))
-
-
 def site_files() -> dict[str, bytes]:
     """{path in the site: content} of the whole site. Raises InputError if what they carry cannot be fetched.
 
@@ -43,7 +38,8 @@ def site_files() -> dict[str, bytes]:
     files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # as a text a browser shows
     files |= wiring_files.wiring_files()
     values = {"home": home(), "boards": wiring_files.tables()}
-    values["charts"] = _chart_scripts(files["plotly/plotly.min.js"])
+    library = files["plotly/plotly.min.js"].decode()
+    values["charts"] = " ".join(map(source_hash, (library, *page.SCRIPTS)))  # as a policy names them
     files |= {name: _filled(name, **values) for name in files if name.endswith(".html")}
     files |= {f"sample/{name}": data for name, data in sample_ride.sample_ride().items()}
     files["python.json"] = json.dumps(python_files()).encode()
@@ -88,9 +84,5 @@ def write_site(files: dict[str, bytes], out: Path) -> None:
     with new_directory(out):
         for name, data in files.items():
             path = out / name
-            with new_directory(path.parent):
-                write_whole(path, lambda temporary, data=data: _write(temporary, data))
-
-
-def _write(path: Path, data: bytes) -> None:
-    path.write_bytes(data)
+            with new_directory(path.parent), whole_file(path) as temporary:
+                temporary.write_bytes(data)

@@ -54,8 +54,7 @@ def evaluate_command(
         if as_json:
             click.echo(json.dumps(report.document(found), indent=2))
         else:
-            console = Console()
-            console = console if console.is_terminal else Console(width=_WIDTH)
+            console = _console()
             console.print(report.table(found.results))
             if found.recorded:
                 console.print(report.real_table(found.recorded.scores, found.recorded.name))
@@ -89,9 +88,13 @@ def bands_command(
         plain = {name: {key: rms.tolist() for key, rms in figures.items()} for name, figures in found.items()}
         click.echo(json.dumps({"bands_hz": bands.BANDS_HZ, "rides": plain}))
     else:
-        console = Console()
-        console = console if console.is_terminal else Console(width=_WIDTH)
-        console.print(bands.table(found))
+        _console().print(bands.table(found))
+
+
+def _console() -> Console:
+    """Standard output, wide enough for a table where it is no terminal."""
+    console = Console()
+    return console if console.is_terminal else Console(width=_WIDTH)
 
 
 @click.command()

@@ -14,7 +14,7 @@ from ...logs.reader import Source, read_blocks, read_twice
 from ...logs.source import Progress
 from ...logs.stretch import Stretch
 from ...logs.table import Array
-from ...output import write_whole
+from ...output import whole_file
 from ..channels import Channels
 from ..downsample import downsampled, rounded_to
 from ..ride import Ride
@@ -95,7 +95,8 @@ def export(
             count += len(block.t_s)
             yield block
 
-    write_whole(Path(out), lambda temporary: _WRITE[form](temporary, rows(), start_s))
+    with whole_file(Path(out)) as temporary:
+        _WRITE[form](temporary, rows(), start_s)
     if notices is not None and step_s and count < given:
         notices.append(Notice("rows-share", given, count, step_s))
     return count

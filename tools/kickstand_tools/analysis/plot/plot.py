@@ -4,7 +4,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from ...errors import InputError, extra
-from ...output import check_directory, new_directory, write_whole
+from ...output import check_directory, new_directory, whole_file
 from ..overview import Overview
 from . import page, picture
 
@@ -23,6 +23,8 @@ def draw(seen: Overview, directory: Path, tiles: bool = False) -> list[Path]:
     """Write both; their paths. tiles: as page.draw() takes it. Raises InputError."""
     paths = [directory / f"{seen.ride.stem}.png", directory / f"{seen.ride.stem}.html"]
     with new_directory(directory):
-        write_whole(paths[0], lambda path: picture.draw(path, seen))
-        write_whole(paths[1], lambda path: page.draw(path, seen, tiles))
+        with whole_file(paths[0]) as path:
+            picture.draw(path, seen)
+        with whole_file(paths[1]) as path:
+            page.draw(path, seen, tiles)
     return paths

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from ...logs.table import Array
 from ...signals.averages import integral, smoothed
+from ...signals.cells import stretches
 from ...signals.standstill import STANDING_MPS
 from ..channels import Channels
 from ..downsample import thinned
@@ -95,10 +96,9 @@ def find_stops(channels: Channels) -> list[Stop]:
 
 def stops_of(ride: Channels, still: NDArray[np.bool_]) -> list[Stop]:
     """find_stops() for a whole ride in means over RATE_S. still (n): True where it stands still."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], still, [False]))))
     delay_s = speed_delay_s(ride)
     found, after = [], 0
-    for start, end in zip(edges[::2], edges[1::2]):  # of each standstill
+    for start, end in stretches(still):
         first = max(after, int(np.searchsorted(ride.t_s, ride.t_s[start] - LONGEST_S)))
         last = int(np.searchsorted(ride.t_s, min(ride.t_s[end - 1], ride.t_s[start] + REST_S), side="right"))
         gaps = np.flatnonzero(np.diff(ride.t_s[first:last]) > GAP_S)

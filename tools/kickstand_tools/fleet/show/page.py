@@ -1,20 +1,19 @@
 """index.html: a fleet at one glance. It needs no network and no server."""
 
+import heapq
 import math
 import os
 import statistics
 from array import array
 from collections import Counter, defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
 from ...svg import drawing, element
 from ...templates import filled, source_hash
-from ..files import write_bytes
 from ..period import MOVED, PeriodResult, Row
 from .panel import Panel, date_text
 
@@ -86,9 +85,9 @@ class Glance:
             self.decelerations[1].append(test["mfdd_mps2"])
         if aligned:
             self._qualities.append(row["quality_deg"])
-            self.worst = _first([*self.worst, row], lambda row: -row["quality_deg"], _WORST)
+            self.worst = heapq.nlargest(_WORST, [*self.worst, row], key=lambda row: row["quality_deg"])
         found = [*self.moved, *((move, row["plot"]) for move in result.moved)]
-        self.moved = _first(found, lambda move: -move[0]["turned_deg"], _MOST_MOVED)
+        self.moved = heapq.nlargest(_MOST_MOVED, found, key=lambda move: move[0]["turned_deg"])
         if len(self._rows[aligned]) < _MOST_ROWS:
             self._rows[aligned].append((row, [test["mfdd_mps2"] for test in result.brake_tests]))
 
@@ -118,15 +117,6 @@ class Glance:
             date_text=date_text,
             file_name=lambda log: Path(log).name,
         )
-
-
-def write_page(path: str, glance: Glance, expected: int) -> None:
-    """Write the page, whole or not at all. Raises InputError."""
-    write_bytes(path, glance.page(expected).encode())
-
-
-def _first(rows: list[Any], key: Callable[[Any], float], count: int) -> list[Any]:
-    return sorted(rows, key=key)[:count]
 
 
 def _share(part: int, whole: int) -> str:

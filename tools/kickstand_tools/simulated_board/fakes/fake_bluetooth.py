@@ -94,8 +94,5 @@ class PairingBle(Ble):
 
     _PAIRING = ("bond", "mitm", "io", "le_secure")
 
-    def gap_pair(self, conn_handle):
-        self._on()
-
     def gap_passkey(self, conn_handle, action, passkey):
         self._on().take_passkey(passkey)

@@ -2,7 +2,7 @@
 
 import gzip
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -59,7 +59,6 @@ class MadeVehicle:
     moved_deg: float = 0.0
     moved_log: int | None = None
     moved_s: float = float("nan")
-    writers: list[Callable[[Path], None]] = field(default_factory=list)
 
     @property
     def reasons(self) -> str:
@@ -92,22 +91,15 @@ def make_fleet(
         for k, trouble in enumerate(troubles):
             vehicle = _vehicle(np.random.default_rng([seed, 2, k]), directory / "drives", k, trouble, seconds, rate_hz)
             made.append(vehicle)
-            for path, write in zip(vehicle.paths, vehicle.writers):
-                write(path)
-            vehicle.writers = []
             if progress:
                 progress(k + 1, len(troubles))
-        rows = [(v.name, path.relative_to(directory), _manifest_kind(v.kind)) for v in made for path in v.paths]
+        kinds = {"motorcycle": "motorcycle", "car": "car", "bus": "car"}  # in a manifest
+        rows = [(v.name, path.relative_to(directory), kinds[v.kind]) for v in made for path in v.paths]
         write_table(directory / "MANIFEST.csv", ("vehicle", "path", "kind"), rows)
         write_table(directory / "TRUTH.csv", (*_COLUMNS, *MATRIX), (list(_truth(v)) for v in made))
     except OSError as error:
         raise InputError(f"{directory} cannot be written: {cause(error)}") from error
     return made
-
-
-def _manifest_kind(kind: str) -> str:
-    """The kind written to the manifest: a bus counts as a car."""
-    return kind if kind == "motorcycle" else "car"
 
 
 def _shares(chance: np.random.Generator, vehicles: int) -> list[str]:
@@ -151,8 +143,7 @@ def _vehicle(
         broken = trouble if drive == 0 and trouble in ("garbage", "empty", "cut", "missing") else ""
         start_s = first_utc_s + drive * _DAY_S * chance.uniform(0.1, 1.5)
         made.paths.append(directory / f"{name}-{drive + 1}{suffix}")
-        log = drive_log(chance, kind, route, sensor, receiver, start_s, moved)
-        made.writers.append(_writer(log, broken))
+        _write(made.paths[-1], drive_log(chance, kind, route, sensor, receiver, start_s, moved), broken)
     return made
 
 
@@ -162,23 +153,21 @@ def _turn(chance: np.random.Generator, degrees: float) -> Array:
     return rotation_matrix(np.radians(degrees) * axis / np.linalg.norm(axis))
 
 
-def _writer(log: Log, broken: str) -> Callable[[Path], None]:
-    def write(path: Path) -> None:
-        content = log_bytes(log)
-        if path.suffix == ".gz":
-            content = gzip.compress(content, 1, mtime=0)
-        if broken == "missing":
-            path.unlink(missing_ok=True)
-            return
-        if broken == "empty":
-            content = b""
-        elif broken == "garbage":
-            content = bytes(range(128, 256)) * 20
-        elif broken == "cut":
-            content = content[: len(content) * 9 // 10]
-        path.write_bytes(content)
-
-    return write
+def _write(path: Path, log: Log, broken: str) -> None:
+    """broken: what is wrong with the file, a key of TROUBLES, or ""."""
+    content = log_bytes(log)
+    if path.suffix == ".gz":
+        content = gzip.compress(content, 1, mtime=0)
+    if broken == "missing":
+        path.unlink(missing_ok=True)
+        return
+    if broken == "empty":
+        content = b""
+    elif broken == "garbage":
+        content = bytes(range(128, 256)) * 20
+    elif broken == "cut":
+        content = content[: len(content) * 9 // 10]
+    path.write_bytes(content)
 
 
 def log_bytes(log: Log) -> bytes:

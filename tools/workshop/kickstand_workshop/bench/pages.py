@@ -6,12 +6,11 @@
 import gzip
 import statistics
 import sys
-import threading
 from typing import Any, NamedTuple
 
-from kickstand_tools.web import serve, site
+from kickstand_tools.web import site
 
-from ..pictures.page import CHROMIUM, available
+from ..browser import CHROMIUM, opened
 
 PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
 READY = {  # by page: what can be used then
@@ -52,23 +51,16 @@ def measure(browser: Any, address: str, files: dict[str, bytes], name: str) -> F
 
 def main() -> None:
     """Print the medians of RUNS."""
-    if not available():
+    if not CHROMIUM.exists():
         sys.exit(f"no {CHROMIUM}: on Debian the package chromium")
-    from playwright.sync_api import sync_playwright
-
     files = site.site_files()
-    with serve.server(files, 0) as server, sync_playwright() as playwright:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        address = f"http://{serve.HOST}:{server.server_address[1]}/"
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+    with opened(files) as (browser, address):
         for name in READY:
             runs = [measure(browser, address, files, name) for _ in range(RUNS)]
             paint_ms, ready_ms, size = map(statistics.median, zip(*runs))
             print(
                 f"{name or 'index.html':12} paint {paint_ms:5.0f} ms  ready {ready_ms:5.0f} ms  {size / 1000:5.0f} kB"
             )
-        browser.close()
-        server.shutdown()
 
 
 if __name__ == "__main__":

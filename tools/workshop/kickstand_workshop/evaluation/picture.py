@@ -32,11 +32,9 @@ def check() -> None:
 
 def draw(path: Path, rides: dict[str, dict[str, NDArray[np.float64]]]) -> None:
     """Write a PNG. rides: the traces of Result or of real_ride.Comparison by title of the ride. Needs matplotlib."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(15, 3.7 * (len(rides) + 1)), layout="constrained")
-    FigureCanvasAgg(figure)
     axes = figure.subplots(len(rides) + 1, 1, squeeze=False)[:, 0]
     _lines(axes[0], next(iter(rides)), next(iter(rides.values())), whole=True)
     for axis, (title, leans) in zip(axes[1:], rides.items()):

@@ -108,7 +108,8 @@ def document(evaluation: Evaluation) -> dict[str, Any]:
         for r in evaluation.results
     ]
     recorded = None if evaluation.recorded is None else _scores(evaluation.recorded.scores)
-    return _without_nan({"profiles": by_profile(evaluation.results), "rides": rides, "recorded": recorded})
+    found = {"profiles": by_profile(evaluation.results), "rides": rides, "recorded": recorded}
+    return json.loads(json.dumps(found), parse_constant=lambda _: None)  # NaN, which JSON does not have, is one
 
 
 def write(evaluation: Evaluation, directory: Path) -> tuple[Path, Path]:
@@ -129,12 +130,3 @@ def _scores(scores: Mapping[str, Score | RealScore]) -> dict[str, dict[str, floa
 
 def _shown(value: float, form: str) -> str:
     return _UNKNOWN if np.isnan(value) else format(value, form)
-
-
-def _without_nan(value: Any) -> Any:
-    """The same with None for NaN, which JSON does not have."""
-    if isinstance(value, dict):
-        return {key: _without_nan(entry) for key, entry in value.items()}
-    if isinstance(value, list):
-        return [_without_nan(entry) for entry in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -47,22 +47,12 @@ class Result:
     refusal: str | None = None
 
 
-def jobs(
-    profiles: list[str],
-    seeds: int,
-    seconds: float = 640.0,
-    upright_error_deg: float = 0.0,
-    pitch_change_deg: float = 1.0,
-    traces: bool = False,
-) -> list[Job]:
-    """One Job for each profile and seed. traces: for the first seed. Raises InputError for an unknown profile."""
+def jobs(profiles: list[str], seeds: int, traces: bool = False, **each: float) -> list[Job]:
+    """One Job for each profile and seed. traces: for the first seed. each: other fields of Job. Raises InputError for
+    an unknown profile."""
     for name in profiles:
         check_profile(name)
-    return [
-        Job(name, seed, seconds, upright_error_deg, pitch_change_deg, traces and seed == 0)
-        for seed in range(seeds)
-        for name in profiles
-    ]
+    return [Job(name, seed, traces=traces and seed == 0, **each) for seed in range(seeds) for name in profiles]
 
 
 @dataclass

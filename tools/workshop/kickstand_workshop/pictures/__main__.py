@@ -2,6 +2,7 @@
 
 from kickstand_tools import firmware_path
 
+from ..browser import CHROMIUM
 from . import page, ride
 from .drawn import drawn
 
@@ -11,7 +12,7 @@ def main() -> None:
     for name, svg in drawn().items():
         (directory / name).write_text(svg, encoding="utf-8")
     (directory / "ride.png").write_bytes(ride.draw())
-    if page.available():
+    if CHROMIUM.exists():
         (directory / page.NAME).write_bytes(page.draw())
     else:
         print(f"no Chromium: {page.NAME} stays as it is")

@@ -2,17 +2,16 @@
 
 import hashlib
 import io
-import threading
 import time
 from collections.abc import Callable
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
-from kickstand_tools.web import serve, site
+from kickstand_tools.web import site
+
+from .. import browser
 
 NAME = "first_minute.webp"
-CHROMIUM = Path("/usr/bin/chromium")
 _SIZE = (1000, 560)
 _WIDTH = 720  # of the picture, pixels
 _WAIT_MS = 60_000
@@ -28,11 +27,6 @@ _SAYS = "text => document.querySelector('#display').ariaLabel.includes(text)"
 _ASKS = "text => document.querySelector('#todo').textContent.includes(text)"
 
 
-def available() -> bool:
-    """True if there is a Chromium to take the picture with."""
-    return CHROMIUM.exists()
-
-
 def looks() -> str:
     """A hash of the page's files that decide how it looks. The picture carries it, so that a test knows a stale one."""
     return hashlib.sha256(b"".join((site.PAGE / name).read_bytes() for name in _DRAWN)).hexdigest()
@@ -40,17 +34,11 @@ def looks() -> str:
 
 def draw() -> bytes:
     """The first minute on the page as an animated WebP file."""
-    from playwright.sync_api import sync_playwright
-
-    with serve.server(site.site_files(), 0) as server, sync_playwright() as playwright:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        page = browser.new_page(viewport={"width": _SIZE[0], "height": _SIZE[1]}, color_scheme="light")
+    with browser.opened(site.site_files()) as (chromium, address):
+        page = chromium.new_page(viewport={"width": _SIZE[0], "height": _SIZE[1]}, color_scheme="light")
         page.set_default_timeout(_WAIT_MS)
-        page.goto(f"http://{serve.HOST}:{server.server_address[1]}/")
+        page.goto(address)
         shots = _ride(page)
-        browser.close()
-        server.shutdown()
     return _animated(shots)
 
 

@@ -50,15 +50,15 @@ class Watch:
             self.changes += 1
         if text[0].startswith(("Error", "Incomplete", "config.py")):
             self._say("the program has failed")
-        busy = self._during_fault(t_s, 0.0)
+        busy = self._during_fault(t_s)
         self._alive(t_s, busy)
         lean = shown_lean(text)
         self._accurate(t_s, lean)
         self._fresh(t_s, lean)
         self._explained(t_s, text[0])
 
-    def _during_fault(self, t_s: float, after_s: float) -> bool:
-        return any(begin <= t_s < end + after_s for _, begin, end in self._trip.faults)
+    def _during_fault(self, t_s: float) -> bool:
+        return any(begin <= t_s < end for _, begin, end in self._trip.faults)
 
     def _alive(self, t_s: float, busy: bool) -> None:
         count = self._board.sensor_bus.transfers.get(SENSOR, 0)
@@ -99,7 +99,7 @@ class Watch:
 
     def _explained(self, t_s: float, line: str) -> None:
         """Check that the message in place of the lean disappears when the fault is over."""
-        if self._trip.ride.truth(t_s)[1] < 4.0 or self._during_fault(t_s, 0.0) or not SAYS_WHY.match(line):
+        if self._trip.ride.truth(t_s)[1] < 4.0 or self._during_fault(t_s) or not SAYS_WHY.match(line):
             self._why_since = None
             return
         self._why_since = self._why_since if self._why_since is not None else t_s

@@ -1,0 +1,24 @@
+"""The site of `kickstand web` in a Chromium without a window."""
+
+import contextlib
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from kickstand_tools.web import serve
+
+CHROMIUM = Path("/usr/bin/chromium")
+
+
+@contextlib.contextmanager
+def opened(files: dict[str, bytes]) -> Iterator[tuple[Any, str]]:
+    """A context with the browser, as playwright has it, and the address of a server of these files."""
+    from playwright.sync_api import sync_playwright
+
+    with serve.server(files, 0) as server, sync_playwright() as playwright:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield browser, f"http://{serve.HOST}:{server.server_address[1]}/"
+        browser.close()
+        server.shutdown()
