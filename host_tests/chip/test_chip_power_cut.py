@@ -61,9 +61,9 @@ def test_old_or_new_wherever_a_save_is_cut(at_prompt, tmp_path):
     assert operations >= SAVES + 2  # a block was erased on the way
 
 
-@pytest.mark.parametrize("operation", [1, 8, 9, 10])
+@pytest.mark.parametrize("operation", [8, *(pytest.param(n, marks=pytest.mark.nightly) for n in (1, 9, 10))])
 def test_a_board_starts_and_saves_after_a_cut(at_prompt, operation):
-    """The power really goes in the middle of an operation, and comes back. An erase is among these."""
+    """The power really goes in the middle of an operation, and comes back. The eighth is an erase."""
     at_prompt.exec(_TOOLS)
     at_prompt.chip.flash.cut_power(operation, 0.5)
     del at_prompt.said[:]
