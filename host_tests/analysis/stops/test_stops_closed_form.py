@@ -229,6 +229,10 @@ def test_a_speed_that_does_not_close(off_g, counts):
     assert len(find_stops(ride)) == counts
 
 
+def test_a_vehicle_that_rolls_out_has_not_braked():
+    assert find_stops(braking(10.0, 0.4).channels()) == []
+
+
 def test_a_speed_in_the_log_has_the_last_word():
     """The accelerometer's slope is 3 % too large: the log's speed corrects it."""
     road = braking(20.0, 5.0)
