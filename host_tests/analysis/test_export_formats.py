@@ -132,6 +132,7 @@ def test_a_left_turn_under_braking_has_the_signs_of_each_format(tmp_path):
     expected = {"lateral_acc": 0.2, "longitudinal_acc": -0.4, "x_acc": 0.2, "y_acc": 1.0, "z_acc": -0.4}
     expected |= {f"{axis}_rate_of_rotation": dps for axis, dps in zip("xyz", (5.0, 7.0, 9.0))}
     assert found == pytest.approx(expected, abs=1e-3)
+    assert row["lean_angle"] == ""  # a car has none
     export(ride, "vbo", out)
     cells = [float(cell) for cell in out.read_text().split("\n")[-2].split(" ")]
     assert cells[7:9] == [-0.4, 0.2]  # long accel > 0 forward, lat accel > 0 in a left turn

@@ -35,7 +35,7 @@ def test_wheel_pulses_on_the_chip(at_prompt):
     assert fault is None
 
 
-@pytest.mark.nightly  # host_tests/simulated_board/test_board_speed.py has the limit of pulses
+@pytest.mark.nightly  # the whole device in a storm: host_tests/device/test_device_starved.py
 def test_a_storm_of_pulses_costs_no_reading():
     """A contact beside an ignition cable. Without its limit the interrupt leaves the loop no time at all."""
     storm_s, resets = 1e9, []

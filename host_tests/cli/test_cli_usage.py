@@ -59,6 +59,11 @@ def test_a_fault_of_its_own_is_one_line_too(tmp_path, monkeypatch):
     assert not (tmp_path / "LEAN.csv").exists()
 
 
+def test_the_convention_of_logs_is_in_the_help():
+    words = " ".join(command.works("import", "--help").out.split())
+    assert "At rest the axis that points up reads +1 g, and a rate is positive right-handed about its axis." in words
+
+
 def test_from_a_shell(tmp_path):
     """Standard output empty, one line on standard error, status 2: as a script sees it."""
     arguments = "-m kickstand_tools.cli replay none.csv --calibration x --out y".split()

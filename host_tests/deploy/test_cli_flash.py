@@ -109,7 +109,13 @@ def sources():
 
 
 @pytest.mark.parametrize(
-    ("mpy", "words"), [(0x1305, "another format"), (0x0306, "takes no compiled files"), (0, "takes no compiled files")]
+    ("mpy", "words"),
+    [
+        (0x1305, "another format"),
+        (0x1206, "another format"),
+        (0x0306, "takes no compiled files"),
+        (0, "takes no compiled files"),
+    ],
 )
 def test_a_board_that_takes_other_bytecode_gets_the_sources(board, monkeypatch, mpy, words):
     command.works("flash")

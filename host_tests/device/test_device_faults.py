@@ -164,3 +164,24 @@ def test_a_fifo_out_of_step_is_noticed(byte, aligned, monkeypatch):
     record = devices.run("cpython", aligned, standing([], until=8))
     assert record.lean_at(FAULT_S + 0.3) == STATIC
     assert record.last[0].startswith("Lean  25° right")
+
+
+def test_a_range_that_changed_by_itself_is_put_right(aligned, monkeypatch):
+    """The readings still come and look like readings, so that only the register shows it."""
+    install, boards = simulator.Board.install, []
+
+    def installed(board):
+        def spike():
+            board.sensor.start(0x68, False)
+            board.sensor.write_byte(0x1C)
+            board.sensor.write_byte(0x00)
+
+        boards.append(board)
+        board.at(FAULT_S, spike)
+        install(board)
+
+    monkeypatch.setattr(simulator.Board, "install", installed)
+    record = devices.run("cpython", aligned, standing([], until=8))
+    assert record.first("Sensor", FAULT_S) < FAULT_S + 0.3
+    assert boards[0].sensor.peek(0x1C) != 0x00
+    assert record.lean_at(FAULT_S + 0.1 + RECOVERY_S + 0.1) == STATIC

@@ -29,7 +29,7 @@ def test_no_drawing_is_stale(pictures):
     assert not stale, f"{', '.join(stale)}: {STALE}"
 
 
-@pytest.mark.nightly
+@pytest.mark.nightly  # draws a whole ride; what a plot shows is tested in host_tests/analysis
 def test_the_plot_of_the_ride_is_not_stale():
     """By its look: matplotlib's files differ from version to version."""
     fresh, kept = (

@@ -203,8 +203,9 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.nightly  # the next test's moment does not depend on how busy the machine is
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="Ctrl-C comes at once on this system")
-@pytest.mark.parametrize("after_s", [pytest.param(0.6, marks=pytest.mark.nightly), 1.6])
+@pytest.mark.parametrize("after_s", [0.6, 1.6])
 def test_ctrl_c_while_workers_start_is_heard_when_they_have(tmp_path, after_s):
     """Stopped at once they would print pages of what failed."""
     program = tmp_path / "program.py"
@@ -231,7 +232,6 @@ Client.register_plugin = interrupted
 """
 
 
-@pytest.mark.nightly
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="Ctrl-C comes at once on this system")
 def test_ctrl_c_while_this_process_connects_is_heard_when_it_has(tmp_path):
     program = tmp_path / "program.py"

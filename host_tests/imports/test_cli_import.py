@@ -19,7 +19,7 @@ def test_it_says_what_it_took_for_what_and_what_to_do_next(tmp_path):
     assert words.startswith("phyphox quantity from unit rate axes and sign accelerometer Accelerometer.csv: X")
     for part in ("m/s2", "100 Hz", "+1 g up, on every phone", "rad/s", "50 Hz", "Location.csv: Velocity"):
         assert part in words
-    assert f"written: {out}, 2" in result.out
+    assert f"written: {out}, 2598 samples in 28.0 s" in result.out
     assert " samples in 28.0 s, 100 a second, 1 gap of 2.0 s in all\n" in result.out
     assert f"next: kickstand calibrate ride {out} --out {tmp_path / 'RIDE.cal.json'}\n" in result.out
     assert f"kickstand report {out}\n" in result.out and f"kickstand plot {out} --out plots\n" in result.out

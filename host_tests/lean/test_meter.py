@@ -85,8 +85,17 @@ def test_a_bike_that_sets_off_right_after_the_poses_shows_its_lean_in_the_first_
         near(shown.lean_deg, 30.0, 0.3 if posed else 8.0)
 
 
+def test_a_bike_that_moves_right_after_the_poses_is_not_taken_to_stand():
+    shown = meter()
+    shown.use(shown.calibration, True)
+    ride(shown, 1.0, 15.0, lean_deg=30.0)
+    assert not shown.trusted
+
+
 def test_a_car_shows_its_g_however_it_stands():
     shown = nose_up(ride(meter(leans=False), 1.0), 0.0, 25.0)
+    assert shown.trusted
+    shown.distrust("mount-moved")
     assert shown.trusted
     assert shown.lean_deg == 0.0
 

@@ -19,7 +19,7 @@ def used():
     """Bytes of MicroPython's heap in use."""
     gc.collect()
     gc.collect()
-    return getattr(gc, "mem_alloc", int)()
+    return getattr(gc, "mem_alloc", int)()  # CPython does not say: 0
 
 
 class Forgetful(Phone):

@@ -72,7 +72,6 @@ def test_conditions_and_early_returns(changed):
     assert sorted(changed(text)) == ["continue", "for b in []:", "if not a:", "pass"]
 
 
-@pytest.mark.nightly
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
 def test_noticed_unnoticed_and_for_ever(tmp_path):
     """In processes of its own, since it forks."""

@@ -145,6 +145,9 @@ def test_readings_that_are_missing_in_a_ride_are_reported(board, tmp_path, monke
     assert result.err.count("\n") == 1
 
 
-def test_a_board_without_rides(board, tmp_path):
+def test_a_board_without_rides_or_without_the_recorder(board, tmp_path):
     assert "no rides on the board" in command.works("pull", "--out", tmp_path / "out").out
+    del board.modules["kickstand.rides"]  # as in 0.2.0, whose modules are all in one folder
+    words = "kickstand flash brings it up to date"
+    command.refused(tmp_path, "pull", "--out", tmp_path / "out", words=words)
     command.refused(tmp_path, "pull", "--out", tmp_path / "out" / "a" / "b", words="make it first")

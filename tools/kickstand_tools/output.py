@@ -31,9 +31,10 @@ def check_directory(path: Path) -> None:
 @contextlib.contextmanager
 def new_directory(path: Path) -> Iterator[None]:
     """Make a directory and those above it. Those that are empty at the end of the `with` are removed again."""
-    made = [one for one in (path, *path.parents) if not one.exists()]
+    made: list[Path] = []
     try:
         try:
+            made = [one for one in (path, *path.parents) if not one.exists()]
             path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"{path} cannot be made: {cause(error)}") from error

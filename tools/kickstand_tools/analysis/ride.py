@@ -155,8 +155,8 @@ def _lean_along(along: MeterAlong, block: Block, shown: bool) -> tuple[dict[str,
         if shown:
             lean_deg(meter.lean_deg)
             sure(meter.trusted)
-    none = np.zeros(len(block.time_us))
-    found = {name: np.array(column, dtype=float) if column else none for name, column in zip(names, columns)}
+    n = len(block.time_us)
+    found = {name: np.array(column or np.zeros(n), dtype=float) for name, column in zip(names, columns)}
     variances = found.pop("variance")
     found["lean_sigma_deg"] = np.degrees(np.sqrt(np.where(variances >= 0.0, variances, np.nan)))
     return found, variances

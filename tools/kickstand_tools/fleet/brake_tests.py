@@ -37,6 +37,6 @@ def car_channels(log: Source, calibration: CalibrationFile) -> list[Channels]:
     for whole in read_blocks(log):
         block = whole.measured
         if len(block.time_us):
-            lean: dict[str, Array] = dict.fromkeys(("shown_g", "resting", "sure"), np.zeros(len(block.time_us)))
+            lean: dict[str, Array] = {name: np.zeros(len(block.time_us)) for name in ("shown_g", "resting", "sure")}
             found.append(channels(block, calibration, lean, car=True))
     return found

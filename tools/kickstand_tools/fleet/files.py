@@ -15,7 +15,7 @@ from ..errors import InputError, cause, extra
 from ..logs.log import Log
 from ..logs.reader import read_log
 from ..logs.source import open_input
-from ..output import new_directory, whole_file
+from ..output import whole_file
 
 MOST_BYTES = 300_000_000  # largest (packed) log in a store: ten hours at 200 Hz have 150 million
 _LONGEST = 100  # longest name in bytes; a file system takes 255, with ending and temporary name
@@ -185,7 +185,12 @@ def write_bytes(path: str, content: bytes) -> None:
         with _in_store(path, "written") as (fs, place):
             fs.pipe_file(place, content)
         return
-    with new_directory(Path(path).parent), whole_file(Path(path)) as temporary:
+    directory = Path(path).parent
+    try:  # it stays if the file fails: other workers write to it, too
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{directory} cannot be made: {cause(error)}") from error
+    with whole_file(Path(path)) as temporary:
         temporary.write_bytes(content)
 
 

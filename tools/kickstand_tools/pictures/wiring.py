@@ -130,7 +130,8 @@ def _draw_signals(
 
 
 def _default_pins(board: Board) -> dict[str, dict[str, str]]:
-    """{module: {pin of the module: name of the board's pin}}, from port.py as it is on this board."""
+    """{module: {pin of the module: name of the board's pin}}, from port.py as it is on this board. Not while another
+    simulated board is installed: this one takes its place."""
     with simulator.Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=board.machine):
         port = runpy.run_path(str(firmware_path.PACKAGE / "board" / "port.py"))
 

@@ -26,6 +26,7 @@ def simulate(
     seed: int,
     out_dir: Path | str,
     seconds: float = 640.0,
+    *,
     speed: bool = False,
     **conditions: Any,
 ) -> Ride:

@@ -19,6 +19,8 @@ def opened(files: dict[str, bytes]) -> Iterator[tuple[Any, str]]:
     with serve.server(files, 0) as server, sync_playwright() as playwright:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield browser, f"http://{serve.HOST}:{server.server_address[1]}/"
-        browser.close()
-        server.shutdown()
+        try:
+            yield browser, f"http://{serve.HOST}:{server.server_address[1]}/"
+        finally:
+            browser.close()
+            server.shutdown()

@@ -109,7 +109,7 @@ def document(evaluation: Evaluation) -> dict[str, Any]:
     ]
     recorded = None if evaluation.recorded is None else _scores(evaluation.recorded.scores)
     found = {"profiles": by_profile(evaluation.results), "rides": rides, "recorded": recorded}
-    return json.loads(json.dumps(found), parse_constant=lambda _: None)  # NaN, which JSON does not have, is one
+    return json.loads(json.dumps(found), parse_constant=lambda _: None)  # NaN and infinity, which JSON does not have
 
 
 def write(evaluation: Evaluation, directory: Path) -> tuple[Path, Path]:

@@ -1,0 +1,19 @@
+"""Files are written whole or not at all."""
+
+import pytest
+from kickstand_tools.errors import InputError
+from kickstand_tools.output import whole_file
+
+
+@pytest.mark.parametrize("error", [InputError("is the line cut?"), OSError(28, "no room"), KeyboardInterrupt()])
+def test_what_fails_leaves_the_file_that_was_there_and_nothing_else(tmp_path, error):
+    path = tmp_path / "ride.vbo"
+    path.write_text("old")
+    with pytest.raises((InputError, KeyboardInterrupt)), whole_file(path) as temporary:
+        temporary.write_text("half of the n")
+        raise error
+    assert [one.read_text() for one in tmp_path.iterdir()] == ["old"]
+    with whole_file(path) as temporary:
+        temporary.write_text("new")
+        assert path.read_text() == "old"
+    assert [one.read_text() for one in tmp_path.iterdir()] == ["new"]
