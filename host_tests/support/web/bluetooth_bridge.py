@@ -54,7 +54,11 @@ class Bridge:
                 name, kind, data, answer = self._requests.get_nowait()
                 try:
                     answer.set_result(await getattr(self, "_" + name)(central, kind, data))
-                except Exception as error:
+                except (Exception, asyncio.CancelledError) as error:
+                    # bumble cancels what waits for a connection that is lost: the page is to hear of it and to go on
+                    task = asyncio.current_task()
+                    if task is not None and task.cancelling():
+                        raise
                     answer.set_exception(RuntimeError(f"{name}: {type(error).__name__} {error}"))
 
     async def _connect(self, central, kind, data):
