@@ -18,9 +18,9 @@ def spinning(seed):
     return Log(np.arange(600) / 100.0, np.tile([0.0, 1.0, 0.0], (600, 1)), rates, name="spin.csv")
 
 
-def test_a_lean_filter_that_has_lost_itself():
+def test_readings_that_make_the_lean_filter_diverge():
     """As it does in some of six rides."""
-    lost_in = 0
+    diverged_in = 0
     for seed in range(6):
         notices = []
         with warnings.catch_warnings():
@@ -31,7 +31,7 @@ def test_a_lean_filter_that_has_lost_itself():
         said = [sentence(notice) for notice in notices if notice.code == "absurd-readings"]
         assert len(said) == np.any(lost)
         if said:
-            lost_in += 1
+            diverged_in += 1
             found = re.match(r"readings that no vehicle gives, at (\S+) s up to 2\d\d\d deg/s and 1.0 g", said[0])
             assert found and float(found[1]) == pytest.approx(ride.t_s[np.argmax(lost)], abs=0.06)
-    assert lost_in
+    assert diverged_in

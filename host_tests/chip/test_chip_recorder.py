@@ -118,7 +118,7 @@ def test_a_recorded_ride_replays_as_it_was_shown(at_prompt, tmp_path):
     assert max(leans) - min(leans) > 10
 
 
-@pytest.mark.nightly  # the next one cuts it once, and of saves of the calibration each time
+@pytest.mark.nightly  # the next test cuts the power at one write, test_chip_power_cut.py at each write of a calibration
 def test_wherever_the_power_goes_all_but_the_last_block_is_kept(at_prompt):
     """Before, within and after each operation on the flash; the calibration stays whatever happens."""
     at_prompt.exec(FEED)

@@ -143,9 +143,9 @@ def _lean_along(along: MeterAlong, block: Block, shown: bool) -> tuple[dict[str,
 
     shown: compute the lean that was shown; else it and sure are 0, which saves a tenth of the time.
     """
-    names = ("lean_deg", "shown_g", "variance", "resting", "rolling", "sure", "doubtful")
+    names = ("lean_deg", "shown_g", "variance", "resting", "rolling", "sure")
     columns: list[list[float]] = [[] for _ in names]
-    lean_deg, forward, variance, resting, rolling, sure, _ = (column.append for column in columns)
+    lean_deg, forward, variance, resting, rolling, sure = (column.append for column in columns)
     for meter in along.after_each(block, *along.in_vehicle(block)):
         lean = meter.filter
         forward(meter.smooth_force[2])
@@ -158,5 +158,6 @@ def _lean_along(along: MeterAlong, block: Block, shown: bool) -> tuple[dict[str,
     n = len(block.time_us)
     found = {name: np.array(column or np.zeros(n), dtype=float) for name, column in zip(names, columns)}
     variances = found.pop("variance")
+    found["doubtful"] = np.zeros(n)  # known afterwards only
     found["lean_sigma_deg"] = np.degrees(np.sqrt(np.where(variances >= 0.0, variances, np.nan)))
     return found, variances

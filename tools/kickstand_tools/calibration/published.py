@@ -35,8 +35,8 @@ def rotation_between(a: Array, b: Array, axis: int) -> Array:
 
         R = I + K + K^2 / (1 + c),  K the cross product matrix of a x b, c = a . b
 
-    Near c = -1 that has no digits left. So where c < 0, a half turn D about a coordinate axis comes first, after which
-    c > 0: R = Rodrigues(D a, b) D.
+    Near c = -1 the quotient has no significant digits left. So where c < 0, a half turn D about a coordinate axis comes
+    first, after which c > 0: R = Rodrigues(D a, b) D.
 
     axis: 0, 1 or 2, the coordinate axis of the half turn; it has to be perpendicular to b.
     """

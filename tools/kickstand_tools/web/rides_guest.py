@@ -156,11 +156,12 @@ def smooth(log, calibration, progress):
     if any(found is None for found in kept):
         smooth_to_csv(Path(log), ride.calibration, out, progress)
     else:
-        write_lean(out, COLUMNS, DIGITS, _again(ride, np.concatenate(kept), progress))
+        write_lean(out, COLUMNS, DIGITS, _blocks_with(np.concatenate(kept), ride, progress))
     return {"path": str(out)}
 
 
-def _again(ride, values, progress):
+def _blocks_with(values, ride, progress):
+    """Blocks of the ride's log, each with its rows of values (n samples, columns)."""
     at = 0
     for block in read_blocks(ride.log, 2, progress, calibration=ride.calibration):
         at, begin = at + len(block.time_us), at
