@@ -6,7 +6,7 @@ Nothing shakes, so a standstill is where the lean filter says that the vehicle r
 import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY
-from kickstand_tools.analysis.stops.brake_test import find_stops, stops_by_speed
+from kickstand_tools.analysis.stops.brake_test import find_stops, stops_by_speed, stops_of
 from kickstand_tools.analysis.stops.standstill import standing
 from roads import RATE_HZ, REST_S, Road, braking
 
@@ -168,6 +168,21 @@ class TestStandstill:
         assert stop.side_m == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.parametrize("up", [-0.33, 0.33])
+def test_on_a_steep_road(up):
+    """The sine of 19 degrees, as in the steepest streets: the force at standstill shows it."""
+    road = braking(20.0, 5.0)
+    (stop,) = find_stops(road.channels(forward_g=road.mps2 / STANDARD_GRAVITY + up))
+    assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.002)
+
+
+@pytest.mark.parametrize(("samples", "counts"), [(10, 0), (11, 1)])
+def test_a_standstill_of_a_fifth_of_a_second_shows_no_slope(samples, counts):
+    road = braking(20.0, 5.0)
+    still = (road.t_s >= 18.0 - 1e-6) & (road.t_s < 18.0 + samples / RATE_HZ - 1e-6)
+    assert len(stops_of(road.channels(), still)) == counts
+
+
 def test_a_dive_is_no_braking():
     """The nose is 4 degrees down while the bike brakes: the sensor feels its weight along the bike, which is no
     deceleration. Going down at 10 deg/s where braking begins, a sensor 0.65 m above the hubs is 0.11 m/s faster than
@@ -258,13 +273,25 @@ def test_a_stop_that_the_speed_alone_shows(mps2, counts):
     assert not stops_by_speed(ride)
 
 
+@pytest.mark.parametrize(
+    ("hard", "easy", "counts"), [((4.0, -4.0), (8.0, -0.5), True), ((4.0, -9.0), (16.0, -0.25), False)]
+)
+def test_a_stop_that_the_speed_alone_shows_takes_fifteen_seconds_at_most(hard, easy, counts):
+    """From 20 m/s within 12 s it is one; from 40 m/s within 20 s the last 15 s do not show it."""
+    top_mps = -hard[0] * hard[1] - easy[0] * easy[1]
+    road = Road((REST_S, 0.0), (top_mps / 4.0, 4.0), (3.0, 0.0), hard, easy, (REST_S, 0.0))
+    ride = road.channels()
+    ride.speed_mps[::50] = road.mps[::50]
+    assert stops_by_speed(ride) is counts
+
+
 @pytest.mark.parametrize(("age_s", "stands"), [(2.9, True), (3.1, False)])
 def test_an_old_speed_shows_nothing(age_s, stands):
-    """0 m/s, and then nothing: three seconds later the vehicle may ride again."""
+    """The log's only speed is 0 m/s: three seconds later the vehicle may ride again."""
     road = Road((10.0, 0.0), (20.0, 0.5))
     road.rests[:] = False
     ride = road.channels()
-    ride.speed_mps[[0, 50]] = 5.0, 0.0
+    ride.speed_mps[50] = 0.0
     still = standing(ride)
     assert not still[:50].any()
     assert still[round((1.0 + age_s) * RATE_HZ)] == stands

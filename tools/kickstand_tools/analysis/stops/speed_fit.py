@@ -29,8 +29,6 @@ def speed_delay_s(ride: Channels) -> float:
     0 if the ride does not show it.
     """
     there = np.flatnonzero(~np.isnan(ride.speed_mps))
-    if len(there) < ENOUGH_SPEEDS:
-        return 0.0
     second = np.floor(ride.t_s[there])
     there = there[np.flatnonzero(np.diff(second, prepend=-1.0))]  # one a second
     time, changes = ride.t_s[there], np.diff(ride.speed_mps[there])
