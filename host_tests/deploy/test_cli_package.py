@@ -198,17 +198,31 @@ def test_a_failed_installation_gives_the_reason_and_the_log(dev, monkeypatch, tm
     assert dev.LOG in str(stopped.value)
 
 
-@pytest.mark.parametrize("failing", ["ruff", "pyright", "pytest"])
-def test_each_check_is_run_and_any_failure_counts(dev, monkeypatch, failing):
-    ran = []
+@needs_sh
+@pytest.mark.parametrize(
+    ("script", "how"),
+    [
+        ("exit 0", ["pip install uv", "uv pip install --editable .[test]"]),
+        ('[ "$2" != uv ]', ["pip install uv", "uv pip install --editable .[test]", "pip install --editable .[test]"]),
+        ('[ "$6" != --only-binary ]', ["pip install uv", "pip install --editable .[test]"]),
+    ],
+)
+def test_uv_installs_or_where_it_cannot_pip(dev, monkeypatch, tmp_path, script, how):
+    os.mkdir(dev.VENV)
+    monkeypatch.setattr(dev, "PYTHON", fake_python(tmp_path, f'echo "$@" >>{tmp_path}/ran\n{script}'))
+    dev.install("test")
+    ran = (tmp_path / "ran").read_text().splitlines()
+    assert [re.sub(r"-m |--(no-input|disable\S+|only-binary uv|python \S+) |>=.*", "", line) for line in ran] == how
 
-    def run(*command):
-        ran.append(command)
-        return int(failing in command)
 
-    monkeypatch.setattr(dev, "run", run)
-    monkeypatch.setattr(dev, "PYTHON", sys.executable)
-    monkeypatch.setattr(dev, "COMPILE", "")
+@needs_sh
+@pytest.mark.parametrize("failing", ["ruff check", "ruff format", "pyright", "pytest"])
+def test_each_check_is_run_and_any_failure_counts(dev, monkeypatch, tmp_path, capfd, failing):
+    script = f'echo "$2 $3" >>{tmp_path}/ran; echo "of $2"; case "$2 $3" in "{failing}"*) exit 1; esac'
+    monkeypatch.setattr(dev, "PYTHON", fake_python(tmp_path, script))
     assert dev.test(["-k", "lean"]) == 1
-    assert [command[1] for command in ran] == ["ruff", "ruff", "pyright", "pytest"]
-    assert ran[3][-2:] == ("-k", "lean")
+    ran = {line.strip() for line in (tmp_path / "ran").read_text().splitlines()}
+    assert ran == {dev.COMPILE, "ruff check", "ruff format", "pyright", "pytest -n"}
+    lines = capfd.readouterr().out.splitlines()
+    assert lines[-1] == "failed: " + failing.replace(" check", "")
+    assert lines[-3:-1] == ["pyright", "of pyright"]
