@@ -48,6 +48,7 @@ def main(arguments):
 
 def test(arguments):
     """Run ruff, ruff format, pytest and pyright, each even if one before it has failed; 0 if all succeed, else 1."""
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else each process that a test starts compiles what it imports
     compiling = subprocess.Popen([PYTHON, "-c", COMPILE], cwd=ROOT)
     # beside the others, because it uses a single processor for a minute
     pyright = subprocess.Popen(
