@@ -47,6 +47,7 @@ def test_every_figure_of_a_stop(speed):
     assert stop.distance_m == pytest.approx(40.0 + 20.0 * 0.12 - 5.0 * 0.02**2 / 4.0, rel=near)  # a sample's corner
     assert stop.mfdd_mps2 == pytest.approx(5.0, rel=near)
     assert stop.peak_mps2 == pytest.approx(5.0, rel=near)
+    assert stop.jerk_mps3 == pytest.approx(5.0 / 0.22 * 41 / 44, rel=near)  # a step over 11 samples, its corner over 3
     assert stop.side_m == stop.heading_deg == 0.0
 
 
@@ -178,9 +179,11 @@ def test_on_a_steep_road(up):
 
 @pytest.mark.parametrize(("samples", "counts"), [(10, 0), (11, 1)])
 def test_a_standstill_of_a_fifth_of_a_second_shows_no_slope(samples, counts):
+    """A longer one shows that of a road that falls by 10 %."""
     road = braking(20.0, 5.0)
     still = (road.t_s >= 18.0 - 1e-6) & (road.t_s < 18.0 + samples / RATE_HZ - 1e-6)
-    assert len(stops_of(road.channels(), still)) == counts
+    found = stops_of(road.channels(forward_g=road.mps2 / STANDARD_GRAVITY - 0.1), still)
+    assert [stop.mfdd_mps2 for stop in found] == pytest.approx([5.0 - 2.5 / 11] * counts, rel=0.002)  # its first brakes
 
 
 def test_a_dive_is_no_braking():

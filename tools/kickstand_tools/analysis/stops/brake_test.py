@@ -36,7 +36,7 @@ RATE_S = 0.02  # time between the samples in which stops are searched
 MIN_SPEED_MPS = 10.0 / 3.6
 MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0  # limits of a stop's deceleration: a harder one is a fall or a fault
 LONGEST_S = 60.0
-FEWEST = 10  # more samples than these belong to a stop, and as many to its standstill
+FEWEST = 10  # a standstill of no more samples shows neither slope nor bias
 GAP_S = 0.5  # longest gap in the readings over which speed and pitch are integrated
 REST_S = 2.5  # duration of the standstill that is used
 SETTLE_S = 0.5  # duration of its beginning that is not used, because the fork comes up again
@@ -105,7 +105,7 @@ def stops_of(ride: Channels, still: NDArray[np.bool_]) -> list[Stop]:
         last = min(int(end), int(np.searchsorted(ride.t_s, ride.t_s[start] + REST_S, side="right")))
         gaps = np.flatnonzero(np.diff(ride.t_s[first:last]) > GAP_S)
         first += int(gaps[-1]) + 1 if len(gaps) else 0
-        if start - first > FEWEST and last - start > FEWEST:
+        if first < start and last - start > FEWEST:
             stop = _stop(ride.part(slice(first, last)), start - first, delay_s, 0 < first == after)
             if stop:
                 found.append(stop)
