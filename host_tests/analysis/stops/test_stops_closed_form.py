@@ -6,7 +6,7 @@ Nothing shakes, so a standstill is where the lean filter says that the vehicle r
 import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY
-from kickstand_tools.analysis.stops.brake_test import find_stops, stops_by_speed, stops_of
+from kickstand_tools.analysis.stops.brake_test import closes, find_stops, stops_by_speed, stops_of
 from kickstand_tools.analysis.stops.standstill import standing
 from roads import RATE_HZ, REST_S, Road, braking
 
@@ -249,6 +249,7 @@ def test_a_speed_that_does_not_close(off_g, counts):
     ride = road.channels()
     ride.forward_g[(road.t_s > 5.0) & (road.t_s < 14.0)] -= off_g
     assert len(find_stops(ride)) == counts
+    assert closes(40.0, seconds=40.0) and not closes(40.0, seconds=20.0)  # after long, a speed shows nothing
 
 
 def test_a_vehicle_that_rolls_out_has_not_braked():
