@@ -111,6 +111,17 @@ def test_vbo_decides_by_values_not_by_their_mean(tmp_path):
     assert lines[-2].endswith(" +0.000000E+00")
 
 
+def test_vbo_keeps_the_heading_of_a_vehicle_that_stands(tmp_path):
+    """North, east, and in the next block the same place and one 0.8 mm north of it, as a receiver's noise has it."""
+    ridden, stood = block(0.0, 1.0, 2.0), block(3.0, 4.0)
+    ridden.lat_deg[1:] += 1e-5
+    ridden.lon_deg[2] += 1e-5
+    stood.lat_deg[:], stood.lon_deg[:] = ridden.lat_deg[2], ridden.lon_deg[2]
+    stood.lat_deg[1] += 0.8e-3 / 111_195.0
+    rows = written(export_vbo.write, tmp_path / "x", ridden, stood).split("\r\n")[-6:-1]
+    assert [row.split(" ")[5] for row in rows] == ["000.00", "000.00", "090.00", "090.00", "090.00"]
+
+
 RATE_HZ = 100.0
 SQUARE = CalibrationFile(aligned=True, vehicle="car")  # sensor axes left, up, forward: its readings are the vehicle's
 

@@ -17,7 +17,7 @@ from kickstand_tools.logs.csv_lines import write_log
 
 gpxpy = pytest.importorskip("gpxpy")
 pandas = pytest.importorskip("pandas")
-START_S = app_exports.START_UTC_S
+START_S = app_exports.START_UTC_S + 0.004  # milliseconds matter
 HZ = 5  # positions
 ALIGNED = api.CalibrationFile(aligned=True)
 DEGREE_M = np.radians(app_exports._EARTH_M)

@@ -62,5 +62,5 @@ def test_what_was_integrated_to_a_standstill_that_was_none_is_not_shown(track, m
 )
 def test_a_bend_or_a_speed_beyond_the_vehicles_is_no_stop(mps, side_m, heading_deg):
     """Where only integrated readings show it: 288 km/h, 20 m beside the line, a heading that changes by 40 degrees."""
-    assert brake_test.plausible(20.0, 1.0, 5.0)
+    assert brake_test.plausible(60.0, 10.0, 20.0)
     assert not brake_test.plausible(mps, side_m, heading_deg)

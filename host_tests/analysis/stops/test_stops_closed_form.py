@@ -6,7 +6,7 @@ Nothing shakes, so a standstill is where the lean filter says that the vehicle r
 import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY
-from kickstand_tools.analysis.stops.brake_test import find_stops, stops_by_speed, stops_of
+from kickstand_tools.analysis.stops.brake_test import closes, find_stops, stops_by_speed, stops_of
 from kickstand_tools.analysis.stops.standstill import standing
 from roads import RATE_HZ, REST_S, Road, braking
 
@@ -47,6 +47,7 @@ def test_every_figure_of_a_stop(speed):
     assert stop.distance_m == pytest.approx(40.0 + 20.0 * 0.12 - 5.0 * 0.02**2 / 4.0, rel=near)  # a sample's corner
     assert stop.mfdd_mps2 == pytest.approx(5.0, rel=near)
     assert stop.peak_mps2 == pytest.approx(5.0, rel=near)
+    assert stop.jerk_mps3 == pytest.approx(5.0 / 0.22 * 41 / 44, rel=near)  # a step over 11 samples, its corner over 3
     assert stop.side_m == stop.heading_deg == 0.0
 
 
@@ -98,7 +99,7 @@ def test_where_braking_begins(engine_mps2, mps2, earlier_s):
     assert REST_S + 6.0 + 3.0 + 4.0 - stop.start_s == pytest.approx(earlier_s, abs=0.025)
 
 
-@pytest.mark.parametrize(("pause_s", "counts"), [(0.26, True), (0.8, False)])
+@pytest.mark.parametrize(("pause_s", "counts"), [(0.26, True), (0.56, False)])
 def test_a_pause_just_before_the_standstill(pause_s, counts):
     """Short, the stop goes on; longer, it ends there, and what follows is too slow to count."""
     road = Road(*((REST_S, 0.0), (5.0, 4.0), (3.0, 0.0), (3.9, -5.0), (pause_s, 0.0), (0.1, -5.0), (REST_S, 0.0)))
@@ -178,9 +179,11 @@ def test_on_a_steep_road(up):
 
 @pytest.mark.parametrize(("samples", "counts"), [(10, 0), (11, 1)])
 def test_a_standstill_of_a_fifth_of_a_second_shows_no_slope(samples, counts):
+    """A longer one shows that of a road that falls by 10 %."""
     road = braking(20.0, 5.0)
     still = (road.t_s >= 18.0 - 1e-6) & (road.t_s < 18.0 + samples / RATE_HZ - 1e-6)
-    assert len(stops_of(road.channels(), still)) == counts
+    found = stops_of(road.channels(forward_g=road.mps2 / STANDARD_GRAVITY - 0.1), still)
+    assert [stop.mfdd_mps2 for stop in found] == pytest.approx([5.0 - 2.5 / 11] * counts, rel=0.002)  # its first brakes
 
 
 def test_a_dive_is_no_braking():
@@ -223,6 +226,10 @@ def test_how_far_off_the_straight_line():
     assert stop.heading_deg == pytest.approx(0.5 * (0.98 * 4.0 + 0.01), abs=0.002)  # down to 2 % of the speed
     t = np.linspace(0.0, 4.0, 4001)
     assert stop.side_m == pytest.approx(np.trapezoid((20.0 - 5.0 * t) * np.sin(np.radians(0.5 * t)), t), abs=0.02)
+    ride.yaw_rate_dps *= 20.0  # by 40 degrees: only a speed in the log shows that such a bend ended in a stop
+    assert find_stops(ride) == []
+    ride.speed_mps[::10] = road.mps[::10]
+    assert len(find_stops(ride)) == 1
 
 
 def test_each_stop_begins_after_the_standstill_before():
@@ -242,6 +249,7 @@ def test_a_speed_that_does_not_close(off_g, counts):
     ride = road.channels()
     ride.forward_g[(road.t_s > 5.0) & (road.t_s < 14.0)] -= off_g
     assert len(find_stops(ride)) == counts
+    assert closes(40.0, seconds=40.0) and not closes(40.0, seconds=20.0)  # after long, a speed shows nothing
 
 
 def test_a_vehicle_that_rolls_out_has_not_braked():

@@ -36,6 +36,7 @@ RATE_S = 0.02  # time between the samples in which stops are searched
 MIN_SPEED_MPS = 10.0 / 3.6
 MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0  # limits of a stop's deceleration: a harder one is a fall or a fault
 LONGEST_S = 60.0
+FEWEST = 10  # a standstill of no more samples shows neither slope nor bias
 GAP_S = 0.5  # longest gap in the readings over which speed and pitch are integrated
 REST_S = 2.5  # duration of the standstill that is used
 SETTLE_S = 0.5  # duration of its beginning that is not used, because the fork comes up again
@@ -51,8 +52,9 @@ MAX_SIDE_M, MAX_HEADING_DEG = 15.0, 30.0  # limits of the deviation from a strai
 # How far the integrated speed may be from 0 at the standstill before: OPEN_MPS, and OPEN_MPS2 for each second between.
 # A degree of pitch makes 0.17 m/s2, and a gyro's drift adds to it: over more than SHOWING_S the speed shows nothing.
 OPEN_MPS, OPEN_MPS2, SHOWING_S = 3.0, 0.7, 30.0
-SPEED_S, SURELY = 15.0, 1.5  # a stop that only the speed shows takes at most SPEED_S, with SURELY x MIN_MFDD_MPS2
+SPEED_S, SURELY_MPS2 = 15.0, 1.5  # a stop that only the speed shows takes at most SPEED_S, and is at least so hard
 
+STRAIGHT_S = 0.1  # the mean heading of the first of the braking is the direction ridden before it
 SMOOTH_S = 0.2  # accelerations and jerks are means over this time
 
 
@@ -100,10 +102,10 @@ def stops_of(ride: Channels, still: NDArray[np.bool_]) -> list[Stop]:
     found, after = [], 0
     for start, end in stretches(still):
         first = max(after, int(np.searchsorted(ride.t_s, ride.t_s[start] - LONGEST_S)))
-        last = int(np.searchsorted(ride.t_s, min(ride.t_s[end - 1], ride.t_s[start] + REST_S), side="right"))
+        last = min(int(end), int(np.searchsorted(ride.t_s, ride.t_s[start] + REST_S, side="right")))
         gaps = np.flatnonzero(np.diff(ride.t_s[first:last]) > GAP_S)
         first += int(gaps[-1]) + 1 if len(gaps) else 0
-        if start - first > 10 and last - start > 10:
+        if first < start and last - start > FEWEST:
             stop = _stop(ride.part(slice(first, last)), start - first, delay_s, 0 < first == after)
             if stop:
                 found.append(stop)
@@ -112,7 +114,7 @@ def stops_of(ride: Channels, still: NDArray[np.bool_]) -> list[Stop]:
 
 
 def mfdd_mps2(speed_mps: Array, distance_m: Array) -> float:
-    """Mean fully developed deceleration, dm in the module's docstring.
+    """Mean fully developed deceleration, dm in the module's docstring: for speeds in m/s 25.92 becomes 2.
 
     speed_mps (n): falling from the initial speed to at most a tenth of it. distance_m (n): from the beginning to each.
     """
@@ -121,7 +123,7 @@ def mfdd_mps2(speed_mps: Array, distance_m: Array) -> float:
     sb, se = np.interp([-vb, -ve], -falling, distance_m)
     if not se > sb:
         return float("inf")
-    return float((3.6**2 * (vb * vb - ve * ve)) / (25.92 * (se - sb)))
+    return float((vb * vb - ve * ve) / (2.0 * (se - sb)))
 
 
 def closes(speed_mps: float, seconds: float) -> bool:
@@ -142,7 +144,7 @@ def stops_by_speed(ride: Channels) -> bool:
     for end in np.flatnonzero((speed[1:] < STANDING_MPS) & (speed[:-1] >= STANDING_MPS)) + 1:
         before = slice(int(np.searchsorted(time, time[end] - SPEED_S)), end)
         fall = speed[before] / (time[end] - time[before])
-        if np.any((speed[before] > MIN_SPEED_MPS) & (fall > SURELY * MIN_MFDD_MPS2)):
+        if np.any((speed[before] > MIN_SPEED_MPS) & (fall > SURELY_MPS2)):
             return True
     return False
 
@@ -155,9 +157,8 @@ def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | 
     time = part.t_s
     acceleration, pitch_rate, yaw_rate = _acceleration(part, rest)
     integrated = integral(time, acceleration)
-    speed = (
-        integrated - integrated[-1] + SENSOR_HEIGHT_M * np.radians(pitch_rate)
-    )  # integrated backwards from the standstill
+    # integrated backwards from the standstill
+    speed = integrated - integrated[-1] + SENSOR_HEIGHT_M * np.radians(pitch_rate)
     smooth = smoothed(acceleration, time, SMOOTH_S)
     begin = _onset(smooth, time, rest)
     if begin is None:
@@ -173,14 +174,14 @@ def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | 
     below = np.flatnonzero(v <= 0.02 * v[0])
     if v[0] < MIN_SPEED_MPS or not len(below):
         return None
-    end = begin + int(below[0])
-    v, t = np.maximum(speed[begin : end + 1], 0.0), time[begin : end + 1]
+    braked = slice(begin, begin + int(below[0]) + 1)
+    v, t = np.maximum(speed[braked], 0.0), time[braked]
     distance = integral(t, v)
     mfdd = mfdd_mps2(v, distance)
     if not MIN_MFDD_MPS2 <= mfdd < MAX_MFDD_MPS2:
         return None
-    heading = integral(t, yaw_rate[begin : end + 1])
-    side = np.radians(heading - _line(t, heading))
+    heading = integral(t, yaw_rate[braked])
+    straight = np.mean(heading[t <= t[0] + STRAIGHT_S])
     # the fork's rebound hides the last hundredths of the speed: they are assumed to fall evenly to zero
     tail = v[-1] / mfdd
     stop = Stop(
@@ -189,9 +190,9 @@ def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | 
         float(v[0]),
         float(distance[-1] + 0.5 * v[-1] * tail),
         mfdd,
-        float(-np.min(smooth[begin : end + 1])),
-        float(np.max(np.abs(smoothed(np.gradient(smooth, time), time, SMOOTH_S)[begin : end + 1]))),
-        float(integral(t, v * np.sin(side))[-1]),
+        float(-np.min(smooth[braked])),
+        float(np.max(np.abs(smoothed(np.gradient(smooth, time), time, SMOOTH_S)[braked]))),
+        float(integral(t, v * np.sin(np.radians(heading - straight)))[-1]),
         float(heading[-1]),
         known,
     )
@@ -221,18 +222,13 @@ def _onset(smooth: Array, time: Array, rest: int) -> int | None:
     hard = np.flatnonzero(braking > 0.5 * MIN_MFDD_MPS2)
     if not len(hard):
         return None
-    end = int(hard[-1])
-    near = slice(int(np.searchsorted(time, time[end] - 2.0)), end + 1)
-    level = float(np.percentile(braking[near], 75))
-    weak = np.flatnonzero(braking[: end + 1] < max(ONSET_SHARE * level, 0.25))
-    weak = weak[weak < end - int(0.3 / np.median(np.diff(time)))]  # a pause just before the standstill does not count
+    braking = braking[: int(hard[-1]) + 1]
+    end_s = time[hard[-1]]
+    level = float(np.percentile(braking[int(np.searchsorted(time, end_s - 2.0)) :], 75))
+    weak = np.flatnonzero(braking < max(ONSET_SHARE * level, 0.25))
+    weak = weak[time[weak] < end_s - 0.3]  # a pause just before the standstill does not count
     begin = int(weak[-1]) if len(weak) else 0
     earliest = int(np.searchsorted(time, time[begin] - ONSET_S))
     while begin > earliest and braking[begin] > FAINT_SHARE * level:
         begin -= 1
     return begin
-
-
-def _line(time: Array, heading: Array) -> float:
-    """The direction ridden just before braking: that of its first tenth of a second."""
-    return float(np.mean(heading[time <= time[0] + 0.1]))

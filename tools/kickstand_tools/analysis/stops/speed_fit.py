@@ -29,8 +29,7 @@ def speed_delay_s(ride: Channels) -> float:
     0 if the ride does not show it.
     """
     there = np.flatnonzero(~np.isnan(ride.speed_mps))
-    second = np.floor(ride.t_s[there])
-    there = there[np.flatnonzero(np.diff(second, prepend=-1.0))]  # one a second
+    there = there[np.unique(np.floor(ride.t_s[there]), return_index=True)[1]]  # one a second
     time, changes = ride.t_s[there], np.diff(ride.speed_mps[there])
     pushed = integral(ride.t_s, STANDARD_GRAVITY * ride.forward_g)
     if len(there) < ENOUGH_SPEEDS or np.std(changes) < ENOUGH_CHANGE_MPS:
@@ -60,7 +59,8 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
     """
     time = part.t_s
     values = np.flatnonzero(~np.isnan(part.speed_mps))
-    wanted = np.searchsorted(time, time[values] - delay_s - 1e-6).clip(0, len(time) - 1)  # the samples they belong to
+    # the samples they belong to
+    wanted = np.minimum(np.searchsorted(time, time[values] - delay_s - 1e-6), len(time) - 1)
     values, wanted = (these[time[wanted] >= time[begin] - LEAD_S] for these in (values, wanted))
     if len(wanted) < 2 or wanted[-1] < begin:
         return None
@@ -81,9 +81,8 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
 def _prior(knots: int) -> Array:
     """(knots + 2, knots + 2): its product with the unknowns (k, b at each knot from the end on, d) is expected to be 0,
     with a standard deviation of 1."""
-    prior = np.zeros((knots + 2, knots + 2))
-    prior[0, 0], prior[-1, -1] = 1.0 / SIGMA_SCALE, 1.0 / SIGMA_DELAY_S
-    prior[1, 1] = 1.0 / SIGMA_SLOPE_MPS2
-    for k in range(2, knots + 1):
-        prior[k, k], prior[k, k - 1] = np.array([1.0, -1.0]) / (SIGMA_WALK_MPS2 * KNOT_S**0.5)
-    return prior
+    walk = [SIGMA_WALK_MPS2 * KNOT_S**0.5] * (knots - 1)
+    sigma = np.array([SIGMA_SCALE, SIGMA_SLOPE_MPS2, *walk, SIGMA_DELAY_S])
+    prior = np.eye(knots + 2)
+    prior[range(2, knots + 1), range(1, knots)] = -1.0
+    return prior / sigma[:, None]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...logs.table import Array
 from ...signals.averages import smoothed, window_means, window_spreads
+from ...signals.cells import stretches
 from ...signals.standstill import STANDING_MPS
 from ..channels import Channels
 from ..downsample import spacing_s
@@ -32,19 +33,16 @@ def standing(ride: Channels) -> NDArray[np.bool_]:
     still = _quiet(ride)
     if not np.any(still):
         still = _rested(ride)
-    there = np.flatnonzero(~np.isnan(ride.speed_mps))
-    if len(there):
-        place = np.searchsorted(there, np.arange(len(still)), side="right") - 1
-        latest = there[np.maximum(place, 0)]
-        known = (place >= 0) & (ride.t_s - ride.t_s[latest] < STALE_S)
-        still = np.where(known, ride.speed_mps[latest] < STANDING_MPS, still)
-    return still
+    there = ~np.isnan(ride.speed_mps)
+    latest = np.maximum.accumulate(np.where(there, np.arange(len(there)), 0))
+    known = there[latest] & (ride.t_s - ride.t_s[latest] < STALE_S)
+    return np.where(known, ride.speed_mps[latest] < STANDING_MPS, still)
 
 
 def _quiet(ride: Channels) -> NDArray[np.bool_]:
     still = np.zeros(len(ride.t_s), dtype=bool)
     second = max(4, round(QUIET_S / spacing_s(ride)))
-    if len(still) < 2 * second:
+    if len(still) < second:
         return still
     quiet = np.ones(len(still) - second + 1, dtype=bool)
     for rate in ride.pitch_rate_dps, ride.yaw_rate_dps:
@@ -65,10 +63,8 @@ def _rested(ride: Channels) -> NDArray[np.bool_]:
     """The rests that the lean filter found, for a road so smooth that shaking shows nothing. Each is extended back to
     where the forward force became that of the rest."""
     still = ride.resting > 0.5
-    if not np.any(still):
-        return still
     forward = smoothed(ride.forward_g, ride.t_s, ENGINE_S)
-    for start in np.flatnonzero(np.diff(still.astype(int), prepend=0) > 0):
+    for start, _ in stretches(still):
         weight = np.median(forward[start : start + 10])
         off = np.flatnonzero(np.abs(forward[:start] - weight) > 2 * STILL_G)
         still[(int(off[-1]) + 1 if len(off) else 0) : start] = True
