@@ -9,7 +9,7 @@ from drawn_rides import drawn_ride, judged
 from kickstand_tools.api import Log, smooth
 from kickstand_tools.estimation import smooth as module
 from kickstand_tools.refusals import sentence
-from kickstand_tools.signals.rotations import rotation_matrix
+from kickstand_tools.signals import rotation_matrix
 from smoothed_rides import Known, other, rms, simulated
 
 RIDES = {

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from kickstand.lean.meter import FALLEN_DEG
-from numpy.typing import NDArray
 
 from ..calibration.file import CalibrationFile
 from ..logs.block import Block
 from ..logs.log import ROOM_TEMP_C
-from ..logs.table import Array, Table
+from ..logs.table import Table
 from ..replay.meter_along import formula_lean_deg
+from ..signals import Array, Bools
 
 
 @dataclass(eq=False)
@@ -53,7 +53,7 @@ class Channels(Table):
     utc_s: Array
 
     @property
-    def trusted(self) -> NDArray[np.bool_]:
+    def trusted(self) -> Bools:
         """(n) True where the display shows the lean and holds its maxima; a smoothed one by its standard
         deviation, and FALLEN_DEG."""
         return (self.sure > 0.0) & ~(np.abs(self.lean_deg) >= FALLEN_DEG)

@@ -5,7 +5,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from ..logs.table import Array
+from ..signals import Array
 from .channels import Channels
 
 _LAST = ("lat_deg", "lon_deg", "utc_s")

@@ -15,8 +15,8 @@ from ..logs.block import Block
 from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import File, Progress, log_stem, name_of
 from ..logs.stretch import Stretch
-from ..logs.table import Array
 from ..replay.meter_along import MeterAlong
+from ..signals import Array
 from .channels import Channels, channels
 
 

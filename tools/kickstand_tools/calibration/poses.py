@@ -10,8 +10,8 @@ from kickstand.errors import CaptureError
 
 from ..errors import InputError
 from ..logs.reader import Source, read_log
-from ..logs.table import Array
 from ..refusals import RefusedInput
+from ..signals import Array
 
 _MICRO = 1_000_000  # StillPose sums integers: millionths of g and deg/s
 _SATURATED = 1_990_000  # a still pose is measured with a range of 2 g or more: an axis at 2 g is at its end

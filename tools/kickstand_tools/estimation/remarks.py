@@ -4,10 +4,9 @@ from collections.abc import Iterable
 
 import numpy as np
 from kickstand.errors import Notice
-from numpy.typing import NDArray
 
 from ..refusals import WRONG_AXES, WRONG_MOUNT
-from ..signals import Array
+from ..signals import Array, Bools
 
 DOUBTFUL = 0.2  # share of the riding; more is remarked
 # Largest lean in which a bike is in balance on straights, if the upright pose was right and no luggage sits on one side
@@ -21,7 +20,7 @@ class SmoothedRemarks:
     def __init__(self) -> None:
         self._doubtful_s = self._riding_s = self._leaned = 0.0
 
-    def add(self, seconds: Array, riding: NDArray[np.bool_], doubtful: NDArray[np.bool_], pose_rad: float) -> None:
+    def add(self, seconds: Array, riding: Bools, doubtful: Bools, pose_rad: float) -> None:
         """Take n windows of so many seconds. doubtful: True where accelerations are not the bike's. pose_rad: lean to
         the right, by the upright pose, in which the bike is in balance on straights."""
         riding_s = float(np.sum(seconds[riding]))

@@ -14,7 +14,8 @@ from ..logs.csv_lines import write_lean
 from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import Progress, name_of
 from ..logs.stretch import within
-from ..logs.table import Array, Table
+from ..logs.table import Table
+from ..signals import Array
 from .equations import corrected_rates
 from .hypotheses import ALL, ROLL
 from .least_squares import Estimate

@@ -3,12 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..logs.table import Array
-from ..signals.cells import cell_numbers
+from ..signals import Array, Bools, Ints, cell_numbers, rotated
 from ..signals.leaning import WINDOW_S
-from ..signals.rotations import rotated
 
 GAP_S = 0.17  # a longer step between two samples: readings are missing
 
@@ -29,8 +26,8 @@ class Windows:
     jolt: Array
     speed: Array
     warm: Array
-    gap: NDArray[np.bool_]
-    number: NDArray[np.intp]
+    gap: Bools
+    number: Ints
     before: Array
     after: Array
 

@@ -8,7 +8,7 @@ from ..analysis.ride import Ride
 from ..analysis.stops.brake_test import RATE_S, Stop, find_stops
 from ..calibration.file import CalibrationFile
 from ..logs.reader import Source, read_blocks
-from ..logs.table import Array
+from ..signals import Array
 
 
 def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:

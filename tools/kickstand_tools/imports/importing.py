@@ -15,11 +15,12 @@ from ..errors import InputError
 from ..logs.csv_lines import write_log
 from ..logs.log import Log
 from ..logs.reader import read_log
+from ..signals import Array
 from . import mapped
 from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, sensor_logger, sensorlog, vbo
 from .files import RecordingFile, read_files
 from .join import GAP_NS, join
-from .recording import Array, Recording, Taken
+from .recording import Recording, Taken
 from .units import ACCELERATIONS, SPEEDS, factor, unit
 
 # Each is a module with NAME, the app's; finds(files): the files of each of its recordings among these; and

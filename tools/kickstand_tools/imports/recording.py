@@ -4,9 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from kickstand.errors import Notice
-from numpy.typing import NDArray
 
-from ..logs.table import Array
+from ..signals import Array, Bools
 from .sheets import Sheet
 from .times import NO_TIME, REPEATED, Nanoseconds
 from .units import ACCELERATIONS, RATES, SPEEDS, factor
@@ -96,7 +95,7 @@ class Track:
         same &= np.diff(self.time_ns // SECOND_NS) == 0  # repeated values of a standstill are kept once a second
         self.keep(np.concatenate(([True], ~same)) if len(self.time_ns) else np.zeros(0, dtype=bool))
 
-    def keep(self, which: NDArray[np.bool_]) -> None:
+    def keep(self, which: Bools) -> None:
         """Drop the other rows."""
         for name in ("time_ns", "speed_mps", "lat_deg", "lon_deg"):
             setattr(self, name, getattr(self, name)[which])

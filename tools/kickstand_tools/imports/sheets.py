@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..logs.csv_reader import Cells, cells_of, columns_of_text, numbers_of, separator_of
-from ..logs.table import Array
+from ..signals import Array
 from .files import RecordingFile
 from .times import Nanoseconds, times_ns
 

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..logs.csv_reader import Cells, as_text, filled, numbers_of
+from ..signals import Array, Ints
 from .units import TIMES, unit
 
-Nanoseconds = NDArray[np.int64]
+Nanoseconds = Ints
 
 NO_TIME = np.iinfo(np.int64).min  # value for a cell without a time
 REPEATED = NO_TIME + 1  # value for a row that repeats the sample of an earlier row
@@ -64,18 +65,18 @@ def time_unit(cells: Cells, given: str = "") -> str:
     return unit(given) if given else _guessed(numbers.astype(float))
 
 
-def of_seconds(seconds: NDArray[np.float64]) -> Nanoseconds:
+def of_seconds(seconds: Array) -> Nanoseconds:
     """Seconds (n) as ns; NO_TIME for what is no number."""
     return _scaled(seconds, TIMES["s"])
 
 
-def of_day(clock: NDArray[np.float64]) -> Nanoseconds:
+def of_day(clock: Array) -> Nanoseconds:
     """HHMMSS.SS as numbers (n), the time of a day, as ns; a day later after midnight."""
     whole = np.floor(clock)
     return _after_midnight(whole // 10000 * 3600.0 + whole // 100 % 100 * 60.0 + whole % 100 + (clock - whole))
 
 
-def _after_midnight(seconds: NDArray[np.float64]) -> Nanoseconds:
+def _after_midnight(seconds: Array) -> Nanoseconds:
     ns = of_seconds(seconds)
     good = ns != NO_TIME
     back = np.diff(ns[good], prepend=ns[good][:1]) < -DAY_NS // 2
@@ -94,14 +95,14 @@ def _of_numbers(values: NDArray[Any], unit_name: str, where: str) -> Nanoseconds
     return _scaled(values, scale)
 
 
-def _scaled(values: NDArray[np.float64], scale: int) -> Nanoseconds:
+def _scaled(values: Array, scale: int) -> Nanoseconds:
     good = np.abs(values) < _LATEST_NS / scale
     whole = np.floor(np.where(good, values, 0.0))
     part = np.where(good, values, 0.0) - whole
     return np.where(good, whole.astype(np.int64) * scale + np.rint(part * scale).astype(np.int64), NO_TIME)
 
 
-def _guessed(values: NDArray[np.float64]) -> str:
+def _guessed(values: Array) -> str:
     """The unit of times without one: those from 1970 by their size, others by their steps."""
     good = values[np.isfinite(values)]
     size = float(np.median(np.abs(good)))

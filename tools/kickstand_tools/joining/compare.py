@@ -3,8 +3,7 @@
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from ..logs.table import Array
-from ..signals.averages import moving_mean
+from ..signals import Array, moving_mean
 from .motion import STEP_S, Motion
 from .segments import Segments, without_trend
 from .track import Course

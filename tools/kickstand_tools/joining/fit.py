@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..logs.table import Array
+from ..signals import Array
 from .compare import Comparison
 from .motion import Motion
 from .segments import Segments

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..logs.table import Array, Table
-from ..signals.cells import stretches
+from ..logs.table import Table
+from ..signals import Array, stretches
 from .track import Course
 
 STEPS = 30  # most steps of a segment

@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..logs.table import Array, Table
-from ..signals.geography import distance_m
+from ..logs.table import Table
+from ..signals import Array, Bools, distance_m
 
 LONGEST_S = 6.0  # between two points of one course: watches write one so rarely on straights
 SLOWEST_MPS = 2.5  # of a step that is more than the positions' errors
@@ -73,7 +72,7 @@ class Course:
     end_s: Array
     sigma_deg: Array
     speed_mps: Array
-    good: NDArray[np.bool_]
+    good: Bools
     turn_deg: Array
 
 

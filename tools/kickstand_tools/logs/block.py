@@ -4,11 +4,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..signals import Array, Bools, Ints
 from .csv_reader import cells_of
 from .log import FirmwareRow, firmware_rows
-from .table import Array, Table
+from .table import Table
 
 
 @dataclass
@@ -21,13 +21,13 @@ class Block(Table):
     frozen.py.
     """
 
-    time_us: NDArray[np.int64]
+    time_us: Ints
     readings: Array
     speed_mps: Array
     lat_deg: Array
     lon_deg: Array
     utc_s: Array
-    frozen: NDArray[np.bool_]
+    frozen: Bools
     has_temp: bool
     start_s: float
     done: int  # bytes of the (packed) file that have been read; samples of a log in memory
@@ -52,7 +52,7 @@ class Block(Table):
         place = self.names.index("t_s")
         return [cells_of(line)[place].strip() for line in self.lines]
 
-    def part(self, which: slice | NDArray[np.bool_]) -> "Block":
+    def part(self, which: slice | Bools) -> "Block":
         """The rows of a slice, or those where an array of n is True."""
         if isinstance(which, slice):
             lines = self.lines[which]

@@ -10,11 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 from kickstand.errors import Notice
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from ..signals import Array, Ints
 from .block import Block, joined
-from .table import Array
 
 COARSE = 0.05  # times with ticks under this share of the time between samples stay as they are
 OFTEN = 0.05  # a larger share of repeated times means that the recorder stamps several samples at once
@@ -80,11 +80,11 @@ def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
     return np.asarray(np.maximum.accumulate(times - order) + order, dtype=float)
 
 
-def _one_step(between_us: NDArray[np.int64]) -> bool:
+def _one_step(between_us: Ints) -> bool:
     return bool(np.count_nonzero(between_us == np.median(between_us)) >= EXACT * len(between_us))
 
 
-def _apart(recorded: Array, starts: NDArray[np.intp], counts: NDArray[np.intp], period_s: float) -> Array:
+def _apart(recorded: Array, starts: Ints, counts: Ints, period_s: float) -> Array:
     """Times in which samples of the same time are spread up to the next time, or over their usual duration."""
     until = np.append(recorded[starts[1:]], np.inf)
     longest = np.minimum((until - recorded[starts]) / counts, np.maximum(period_s, 0.0))

@@ -6,18 +6,19 @@ from dataclasses import dataclass, field
 import numpy as np
 from kickstand.errors import Notice
 from kickstand.units import AXES
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
+from ..signals import Array, Ints
 from .cells import TRACK
-from .table import Array, Table
+from .table import Table
 
 ROOM_TEMP_C = 25.0  # temperature for the firmware's modules where a log has none
 
 FirmwareRow = tuple[int, list[float], float]
 
 
-def firmware_rows(time_us: NDArray[np.int64], readings: Array, speed_mps: Array) -> Iterator[FirmwareRow]:
+def firmware_rows(time_us: Ints, readings: Array, speed_mps: Array) -> Iterator[FirmwareRow]:
     """Each sample for a replay by the firmware's modules: time (us), reading (7, the chip's order: g, deg C, deg/s),
     speed (m/s, NaN for none). Where a log has no temperature it is ROOM_TEMP_C."""
     readings = np.column_stack((readings[:, :3], np.nan_to_num(readings[:, 3], nan=ROOM_TEMP_C), readings[:, 4:]))
@@ -82,7 +83,7 @@ class Log(Table):
         return cls(np.arange(len(table)) / rate_hz, table[:, :3], table[:, 4:], temperature_c=table[:, 3], name=name)
 
     @property
-    def time_us(self) -> NDArray[np.int64]:
+    def time_us(self) -> Ints:
         """(n) microseconds since the first sample, the firmware's unit."""
         return np.rint(self.t_s * 1e6).astype(np.int64)
 

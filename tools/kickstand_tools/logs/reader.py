@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from kickstand.errors import Notice
-from numpy.typing import NDArray
 
 from ..checks.log import Checks
 from ..checks.units import check_units
 from ..errors import InputError
+from ..signals import Array, Ints
 from . import cells
 from .block import Block
 from .cells import COLUMNS, OPTIONAL, TRACK
@@ -22,7 +22,6 @@ from .frozen import FrozenReadings
 from .log import Log
 from .source import File, Progress, chunks, name_of, total_bytes
 from .stretch import Stretch
-from .table import Array
 
 if TYPE_CHECKING:
     from ..calibration.file import CalibrationFile
@@ -230,7 +229,7 @@ def _numbers(
 
 def _block(
     table: Array,
-    time_us: NDArray[np.int64],
+    time_us: Ints,
     places: dict[str, int],
     start_s: float,
     text: str,

@@ -3,14 +3,11 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ..errors import InputError
+from ..signals import Array, Bools
 from .block import Block
 from .log import Log
 from .source import File, name_of
-from .table import Array
 
 
 @dataclass
@@ -42,7 +39,7 @@ class Stretch:
         times = [None if t is None else t if t >= 0.0 else length_s + t for t in (self.from_s, self.to_s)]
         return Stretch(self.source, *times)
 
-    def holds(self, block: Block) -> NDArray[np.bool_]:
+    def holds(self, block: Block) -> Bools:
         """(n) True for the samples of a block of the whole log that lie in the stretch, whose times have to be from the
         beginning."""
         begin_us, end_us = self._ends_us()

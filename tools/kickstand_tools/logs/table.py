@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, extra
 from ..signals import Array as Array
+from ..signals import Bools
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -24,7 +25,7 @@ class Table:
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
 
-    def part(self, which: slice | NDArray[np.bool_]) -> Self:
+    def part(self, which: slice | Bools) -> Self:
         """The samples of a slice, or those where an array of n is True. The arrays of a slice are views of this
         table's; what is no array belongs to both."""
         # Table's columns are the fields; a Log's are named as in a CSV

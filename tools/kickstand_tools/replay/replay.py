@@ -22,7 +22,8 @@ from ..logs.csv_lines import write_lean
 from ..logs.reader import Source, apart, read_blocks, read_twice
 from ..logs.source import Progress, total_bytes
 from ..logs.stretch import Stretch, within
-from ..logs.table import Array, Table
+from ..logs.table import Table
+from ..signals import Array
 from . import replay_engine
 from .meter_along import MeterAlong
 

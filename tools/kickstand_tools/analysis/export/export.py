@@ -13,8 +13,8 @@ from ...errors import InputError, extra
 from ...logs.reader import Source, read_blocks, read_twice
 from ...logs.source import Progress
 from ...logs.stretch import Stretch
-from ...logs.table import Array
 from ...output import whole_file
+from ...signals import Array
 from ..channels import Channels
 from ..downsample import downsampled, rounded_to
 from ..ride import Ride

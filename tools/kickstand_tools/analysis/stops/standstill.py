@@ -1,6 +1,6 @@
 """Detects standstills, for the stops of a ride.
 
-Not by signals.standstill.motionless: limits relative to the ride's own shaking detect all of the standing time of
+Not by signals.motionless: limits relative to the ride's own shaking detect all of the standing time of
 simulated rides on the road, those in deg/s and g 54 to 92 %. Only where an idling engine shakes as the road does they
 detect less (17 to 41 % against 91 %).
 """
@@ -8,9 +8,7 @@ detect less (17 to 41 % against 91 %).
 import numpy as np
 from numpy.typing import NDArray
 
-from ...logs.table import Array
-from ...signals.averages import smoothed, window_means, window_spreads
-from ...signals.standstill import STANDING_MPS
+from ...signals import STANDING_MPS, Array, smoothed, window_means, window_spreads
 from ..channels import Channels
 from ..downsample import spacing_s
 

@@ -9,9 +9,9 @@ import numpy as np
 from kickstand.errors import Notice
 
 from ...errors import InputError
-from ...signals.geography import distance_m
+from ...signals import Array, distance_m
 from ..files import RecordingFile
-from ..recording import SECOND_NS, Array, Recording, sensor_of, track_of
+from ..recording import SECOND_NS, Recording, sensor_of, track_of
 from ..sheets import Sheet, names_in, plain, read_sheet, unit_in
 from ..times import Nanoseconds
 from ..units import SPEEDS, factor, unit
