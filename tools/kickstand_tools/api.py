@@ -62,8 +62,8 @@ from .joining.track_files import read_track as read_track
 from .logs.csv_lines import cut_log as cut_log
 from .logs.csv_lines import write_log as write_log
 from .logs.log import Log as Log
+from .logs.log import Stretch as Stretch
 from .logs.reader import read_log as read_log
-from .logs.stretch import Stretch as Stretch
 from .overlay.overlay import Overlaid as Overlaid
 from .overlay.overlay import overlay as overlay
 from .refusals import RefusedInput as RefusedInput

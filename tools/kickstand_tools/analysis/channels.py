@@ -10,9 +10,7 @@ import numpy as np
 from kickstand.lean.meter import FALLEN_DEG
 
 from ..calibration.file import CalibrationFile
-from ..logs.block import Block
-from ..logs.log import ROOM_TEMP_C
-from ..logs.table import Table
+from ..logs.log import ROOM_TEMP_C, Block, Table
 from ..replay.meter_along import formula_lean_deg
 from ..signals import Array, Bools
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from kickstand.errors import Notice
 
+from ..logs.log import Stretch
 from ..logs.source import Progress
-from ..logs.stretch import Stretch
 from ..signals import Array, Bools, smoothed
 from .alignment_quality import Quality, quality
 from .channels import Channels

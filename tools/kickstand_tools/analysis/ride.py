@@ -11,10 +11,9 @@ from kickstand.lean.meter import MAX_VARIANCE
 from ..calibration.file import CalibrationFile, calibration_beside, read_calibration
 from ..errors import InputError
 from ..estimation.smooth import smooth_blocks
-from ..logs.block import Block
+from ..logs.log import Block, Stretch
 from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import File, Progress, log_stem, name_of
-from ..logs.stretch import Stretch
 from ..replay.meter_along import MeterAlong
 from ..signals import Array
 from .channels import Channels, channels

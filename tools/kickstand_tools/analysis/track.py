@@ -4,7 +4,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..logs.block import Block
+from ..logs.log import Block
 from ..signals import Array
 from .channels import Channels
 

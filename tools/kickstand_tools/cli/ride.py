@@ -25,9 +25,8 @@ from ..joining import agreement
 from ..joining.joined import Joined, join_track, write_joined
 from ..joining.track_files import read_track
 from ..logs.csv_lines import cut_log
-from ..logs.log import Log
+from ..logs.log import Log, Stretch
 from ..logs.reader import Source, is_log
-from ..logs.stretch import Stretch
 from ..output import check_output, whole_file
 from ..overlay.overlay import overlay
 from ..progress import Bar, spinner

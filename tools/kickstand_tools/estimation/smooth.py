@@ -9,12 +9,10 @@ from kickstand.errors import Notice
 
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
-from ..logs.block import Block
 from ..logs.csv_lines import write_lean
+from ..logs.log import Block, Table, within
 from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import Progress, name_of
-from ..logs.stretch import within
-from ..logs.table import Table
 from ..signals import Array
 from .equations import corrected_rates
 from .hypotheses import ALL, ROLL

@@ -10,9 +10,8 @@ from kickstand.errors import Notice
 from kickstand.units import LOST_US
 
 from ..errors import InputError
-from ..logs.block import Block
 from ..logs.csv_lines import write_log
-from ..logs.log import Log
+from ..logs.log import Block, Log
 from ..logs.reader import Source, read_blocks, read_twice
 from ..logs.source import Progress, name_of
 from ..output import write_packed

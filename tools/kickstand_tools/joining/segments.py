@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..logs.table import Table
+from ..logs.log import Table
 from ..signals import Array, stretches
 from .track import Course
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..logs.table import Table
+from ..logs.log import Table
 from ..signals import Array, Bools, distance_m
 
 LONGEST_S = 6.0  # between two points of one course: watches write one so rarely on straights

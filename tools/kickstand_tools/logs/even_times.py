@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError
 from ..signals import Array, Ints
-from .block import Block, joined
+from .log import Block
 
 COARSE = 0.05  # times with ticks under this share of the time between samples stay as they are
 OFTEN = 0.05  # a larger share of repeated times means that the recorder stamps several samples at once
@@ -136,13 +136,23 @@ def even_blocks(blocks: Iterator[Block], name: str, remarks: list[Notice]) -> It
     spread = _Spread(name)
     held: Block | None = None
     for block in blocks:
-        whole = block if held is None else joined(held, block)
+        whole = block if held is None else _joined(held, block)
         ready, held = spread.take(whole)
         if ready is not None:
             yield ready
     if held is not None:
         yield spread.rest(held)
     remarks += spread.notices()
+
+
+def _joined(first: Block, second: Block) -> Block:
+    """Two successive blocks as one."""
+    return replace(
+        second,
+        lines=first.lines + second.lines,
+        own_times=first.own_times and second.own_times,
+        **{name: np.concatenate((rows, getattr(second, name))) for name, rows in first.columns().items()},
+    )
 
 
 class _Spread:

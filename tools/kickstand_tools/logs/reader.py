@@ -14,14 +14,12 @@ from ..checks.units import check_units
 from ..errors import InputError
 from ..signals import Array, Ints
 from . import cells
-from .block import Block
 from .cells import COLUMNS, OPTIONAL, TRACK
 from .csv_reader import numbers_in
 from .even_times import even_blocks
 from .frozen import FrozenReadings
-from .log import Log
+from .log import Block, Log, Stretch
 from .source import File, Progress, chunks, name_of, total_bytes
-from .stretch import Stretch
 
 if TYPE_CHECKING:
     from ..calibration.file import CalibrationFile

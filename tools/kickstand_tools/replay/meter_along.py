@@ -10,7 +10,7 @@ import numpy as np
 from kickstand.lean.meter import LeanMeter
 
 from ..calibration.file import CalibrationFile
-from ..logs.block import Block
+from ..logs.log import Block
 from ..signals import Array
 from .replay_engine import NOT_SHOWN, Replay
 

@@ -17,12 +17,10 @@ from kickstand.errors import Notice
 from .. import unix_port
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
-from ..logs.block import Block
 from ..logs.csv_lines import write_lean
+from ..logs.log import Block, Stretch, Table, within
 from ..logs.reader import Source, apart, read_blocks, read_twice
 from ..logs.source import Progress, total_bytes
-from ..logs.stretch import Stretch, within
-from ..logs.table import Table
 from ..signals import Array
 from . import replay_engine
 from .meter_along import MeterAlong

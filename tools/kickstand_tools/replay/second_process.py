@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
-from ..logs.block import Block
+from ..logs.log import Block
 from ..signals import Array
 from .meter_along import MeterAlong
 

@@ -10,9 +10,9 @@ import numpy as np
 from kickstand.errors import Notice
 
 from ...errors import InputError, extra
+from ...logs.log import Stretch
 from ...logs.reader import Source, read_blocks, read_twice
 from ...logs.source import Progress
-from ...logs.stretch import Stretch
 from ...output import whole_file
 from ...signals import Array
 from ..channels import Channels
