@@ -6,8 +6,7 @@ import pytest
 from kickstand_tools import api
 from kickstand_tools.joining.compare import Comparison
 from kickstand_tools.joining.motion import motion
-from kickstand_tools.joining.segments import segments
-from kickstand_tools.joining.track import course
+from kickstand_tools.joining.track import course, segments
 from kickstand_tools.signals import EARTH_M
 
 PROFILES = ("street", "track", "sweeper", "city", "hills")

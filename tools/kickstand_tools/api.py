@@ -32,10 +32,10 @@ from .calibration.drive_events import DriveEvent as DriveEvent
 from .calibration.file import CalibrationFile as CalibrationFile
 from .calibration.file import read_calibration as read_calibration
 from .calibration.file import write_calibration as write_calibration
-from .calibration.six import SixPositions as SixPositions
-from .calibration.six import fit_six_positions as fit_six_positions
-from .calibration.two import TwoPositions as TwoPositions
-from .calibration.two import fit_two_positions as fit_two_positions
+from .calibration.poses import SixPositions as SixPositions
+from .calibration.poses import TwoPositions as TwoPositions
+from .calibration.poses import fit_six_positions as fit_six_positions
+from .calibration.poses import fit_two_positions as fit_two_positions
 from .errors import InputError as InputError
 from .estimation.alignment import RideFit as RideFit
 from .estimation.alignment import fit_ride as fit_ride

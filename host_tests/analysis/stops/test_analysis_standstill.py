@@ -9,7 +9,7 @@ from kickstand_tools.analysis.stops import brake_test
 from kickstand_tools.analysis.stops.brake_test import RATE_S, find_stops
 from kickstand_tools.analysis.stops.standstill import standing
 from kickstand_tools.calibration.file import write_calibration
-from kickstand_tools.calibration.two import fit_two_positions
+from kickstand_tools.calibration.poses import fit_two_positions
 from kickstand_tools.simulation.files import simulate
 
 

@@ -1,6 +1,6 @@
 """The smoothed lean of a recorded ride: at each instant from all readings, earlier and later ones."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,12 +13,12 @@ from ..logs.csv_lines import write_lean
 from ..logs.log import Block, Table, within
 from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import Progress, name_of
-from ..signals import Array
+from ..refusals import WRONG_AXES, WRONG_MOUNT
+from ..signals import Array, Bools
 from .equations import corrected_rates
 from .hypotheses import ALL, ROLL
 from .least_squares import Estimate
 from .noise import jolted
-from .remarks import SmoothedRemarks
 from .unknowns import FORWARD, LEAN, PITCH, Prior
 from .windows import Windows, windows_of
 
@@ -31,6 +31,10 @@ LEANED_SHARE = 0.004
 TIMING_S = 0.004  # s
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps", "doubtful")
 DIGITS = 3, 3, 3, 3, 0
+DOUBTFUL = 0.2  # share of the riding; more is remarked
+# Largest lean in which a bike is in balance on straights, if the upright pose was right and no luggage sits on one side
+POSE_DEG = 1.8
+CAUSES = WRONG_AXES | WRONG_MOUNT  # reasons why accelerations do not fit a bike: then nothing is said of the pose
 
 
 @dataclass(eq=False)
@@ -50,6 +54,30 @@ class SmoothedRide(Table):
     speed_mps: Array
     doubtful: Array
     notices: list[Notice] = field(default_factory=list)
+
+
+class SmoothedRemarks:
+    """Collects a smoothed ride, part by part, with add(), for remarks on errors that the standard deviation does not
+    contain, or only in part."""
+
+    def __init__(self) -> None:
+        self._doubtful_s = self._riding_s = self._leaned = 0.0
+
+    def add(self, seconds: Array, riding: Bools, doubtful: Bools, pose_rad: float) -> None:
+        """Take n windows of so many seconds. doubtful: True where accelerations are not the bike's. pose_rad: lean to
+        the right, by the upright pose, in which the bike is in balance on straights."""
+        riding_s = float(np.sum(seconds[riding]))
+        self._riding_s += riding_s
+        self._doubtful_s += float(np.sum(seconds[riding & doubtful]))
+        self._leaned += riding_s * float(np.degrees(pose_rad))
+
+    def remarks(self, known: Iterable[Notice]) -> list[Notice]:
+        """Those about the whole ride. known: what is remarked of it already."""
+        if not self._riding_s or any(notice.code in CAUSES for notice in known):
+            return []
+        share, pose_deg = self._doubtful_s / self._riding_s, self._leaned / self._riding_s
+        found = [Notice("not-the-bikes", 100.0 * share)] if share > DOUBTFUL else []
+        return [*found, Notice("pose-off", pose_deg)] if abs(pose_deg) > POSE_DEG else found
 
 
 def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None = None) -> SmoothedRide:

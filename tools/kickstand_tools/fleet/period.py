@@ -39,7 +39,7 @@ Row = dict[str, Any]
 
 @dataclass
 class PeriodResult:
-    """The rows of one mount of one vehicle in schema.TABLES, and the points of its picture: for each of some intervals
+    """The rows of one mount of one vehicle in tables.TABLES, and the points of its picture: for each of some intervals
     the change of speed, the force forward, the centripetal acceleration, the force to the left (4, g)."""
 
     alignment: Row

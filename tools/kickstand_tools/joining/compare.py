@@ -5,8 +5,7 @@ from kickstand.units import STANDARD_GRAVITY
 
 from ..signals import Array, moving_mean
 from .motion import STEP_S, Motion
-from .segments import Segments, without_trend
-from .track import Course
+from .track import Course, Segments, without_trend
 
 _MOST_SINE = 0.87  # largest sine of the lean; over 60 degrees the speed or the rate is wrong
 

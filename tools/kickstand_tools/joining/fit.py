@@ -11,8 +11,7 @@ import numpy as np
 from ..signals import Array
 from .compare import Comparison
 from .motion import Motion
-from .segments import Segments
-from .track import Course
+from .track import Course, Segments
 
 AROUND_S = 6.0  # largest distance of the shift from the rough one, with the drift at the ends of the ride
 _TRIED_S = 0.1  # distance of the shifts that are tried

@@ -10,8 +10,7 @@ from ..refusals import OPPOSITE_SIGN
 from ..signals import Array, Bools, correlations, log_likelihood_ratio, moving_mean, peaks
 from .fit import AROUND_S, Fit, apart, fitted
 from .motion import STEP_S, Motion
-from .segments import STEPS, segments
-from .track import LONGEST_S, SLOWEST_MPS, Course, Track, course
+from .track import LONGEST_S, SLOWEST_MPS, STEPS, Course, Track, course, segments
 
 _GRID_S = 0.5
 _SPAN_S = 4.0  # rough shifts are found by changes of course over this time
