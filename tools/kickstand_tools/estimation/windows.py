@@ -68,12 +68,9 @@ class Windows:
         return replace(
             self,
             edges=longer(self.edges, self.edges[-1]),
-            rate=longer(self.rate),
-            force=longer(self.force),
-            jolt=longer(self.jolt),
             speed=longer(self.speed, np.nan),
-            warm=longer(self.warm),
             gap=np.append(self.gap, np.ones(more, dtype=bool)),
+            **{name: longer(getattr(self, name)) for name in ("rate", "force", "jolt", "warm")},
         )
 
 
