@@ -5,7 +5,7 @@ which they were handed over. Steps are then uneven, and some are 0. A sensor sam
 recorded times around each sample, as near to the recorded one as the tick of the recorder's clock allows.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from kickstand.errors import Notice
 from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from ..signals import Array, Ints
+from ..signals import Array, Ints, window_means
 from .log import Block
 
 COARSE = 0.05  # times with ticks under this share of the time between samples stay as they are
@@ -110,21 +110,12 @@ def _mean(values: Array, half: int) -> Array:
     n = len(values)
     span = min(n, 2 * half + 1)
     k = np.arange(n, dtype=float)
-    first, last = _line(k[:span], values[:span]), _line(k[-span:], values[-span:])
+    first, last = (np.polynomial.Polynomial.fit(k[part], values[part], 1) for part in (slice(span), slice(-span, None)))
     if n <= 2 * half:
         return first(k)
     before, after = first(np.arange(-half, 0.0)), last(np.arange(n, n + half, dtype=float))
     base = values[0]  # sums of small numbers are exact enough
-    sums = np.cumsum(np.concatenate(([0.0], before - base, values - base, after - base)))
-    return base + (sums[2 * half + 1 :] - sums[: -2 * half - 1]) / (2 * half + 1)
-
-
-def _line(k: Array, values: Array) -> Callable[[Array], Array]:
-    """The straight line of least squares, as a function of k."""
-    middle, mean = float(np.mean(k)), float(np.mean(values))
-    away = k - middle
-    slope = float(away @ (values - mean)) / max(float(away @ away), 1e-12)
-    return lambda at: mean + slope * (at - middle)
+    return base + window_means(np.concatenate((before, values, after)) - base, 2 * half + 1)
 
 
 def even_blocks(blocks: Iterator[Block], name: str, remarks: list[Notice]) -> Iterator[Block]:
