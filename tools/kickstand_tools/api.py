@@ -37,9 +37,8 @@ from .calibration.poses import (
 from .errors import InputError as InputError
 from .estimation.alignment import RideFit as RideFit, fit_ride as fit_ride
 from .estimation.smooth import SmoothedRide as SmoothedRide, smooth as smooth
-from .fleet.brake_tests import brake_tests as brake_tests
 from .fleet.manifest import Period as Period, by_pattern as by_pattern, read_manifest as read_manifest
-from .fleet.period import PeriodResult as PeriodResult, work_on_period as work_on_period
+from .fleet.period import PeriodResult as PeriodResult, brake_tests as brake_tests, work_on_period as work_on_period
 from .fleet.run import FleetRun as FleetRun, run_fleet as run_fleet
 from .imports.importing import (
     Imported as Imported,

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from kickstand_tools.analysis.channels import Channels
-from kickstand_tools.analysis.downsample import downsampled, joined
+from kickstand_tools.analysis.channels import Channels, downsampled, joined
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.stops import brake_test
 from kickstand_tools.analysis.stops.brake_test import RATE_S, find_stops

@@ -11,8 +11,7 @@ import numpy as np
 from kickstand.lean.upright_trim import MAX_TRIM
 
 from ..signals import Array, Bools
-from .channels import Channels
-from .downsample import spacing_s
+from .channels import Channels, spacing_s
 
 # The rms error of the shown lean by each error, measured with simulated rides whose calibrations were rotated on
 # purpose. With a yaw error, pitching looks like rolling: roll rate' = roll rate cos(yaw) + pitch rate sin(yaw), and the

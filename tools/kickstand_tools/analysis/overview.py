@@ -10,8 +10,7 @@ from ..logs.log import Stretch
 from ..logs.source import Progress
 from ..signals import Array, Bools, smoothed
 from .alignment_quality import Quality, quality
-from .channels import Channels
-from .downsample import downsampled, joined, spacing_s
+from .channels import Channels, downsampled, joined, spacing_s
 from .ride import Ride
 from .stops.brake_test import RATE_S, Stop, stops_of
 from .stops.standstill import standing

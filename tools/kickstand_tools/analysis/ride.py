@@ -16,7 +16,7 @@ from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import File, Progress, log_stem, name_of
 from ..replay.meter_along import MeterAlong
 from ..signals import Array
-from .channels import Channels, channels
+from .channels import Channels, channels, joined
 
 
 @dataclass
@@ -125,8 +125,6 @@ def vehicle_channels(
     >>> bool(abs(channels.lean_deg).max() < 0.1), float(channels.up_g[-1])
     (True, 1.0)
     """
-    from .downsample import joined
-
     return joined(open_ride(log, calibration).blocks(progress))
 
 

@@ -15,8 +15,7 @@ from ...logs.reader import Source, read_blocks, read_twice
 from ...logs.source import Progress
 from ...output import whole_file
 from ...signals import Array
-from ..channels import Channels
-from ..downsample import downsampled, rounded_to
+from ..channels import Channels, downsampled, rounded_to
 from ..ride import Ride
 from ..track import Track, joined, track
 from . import export_columns, export_gpx, export_racechrono, export_vbo

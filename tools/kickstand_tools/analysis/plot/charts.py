@@ -10,7 +10,7 @@ import numpy as np
 from ...refusals import sentence
 from ...signals import Array, smoothed
 from ...times import clock, tick_s
-from ..downsample import spacing_s
+from ..channels import spacing_s
 from ..overview import Overview
 from ..report import angles, judged, peak_words
 from ..summary import BIN_DEG, BINS_DEG, Peak

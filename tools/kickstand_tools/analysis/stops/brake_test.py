@@ -24,8 +24,7 @@ from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
 from ...signals import STANDING_MPS, Array, integral, smoothed, stretches
-from ..channels import Channels
-from ..downsample import thinned
+from ..channels import Channels, thinned
 from .speed_fit import fitted_speed, speed_delay_s
 from .standstill import standing
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...signals import STANDING_MPS, Array, smoothed, window_means, window_spreads
-from ..channels import Channels
-from ..downsample import spacing_s
+from ..channels import Channels, spacing_s
 
 STALE_S = 3.0  # an older speed is not used
 
