@@ -1,4 +1,4 @@
-"""A ride in the vehicle's axes, for plot, report and export; with fewer samples a second as means over stretches of time.
+"""A ride in the vehicle's axes, for plot, report and export; with fewer samples a second as means over stretches.
 
 The lean is the firmware's own, sample by sample, or the smoothed one. Everything that does not depend on the past is
 computed by numpy; a test holds it equal to the firmware.

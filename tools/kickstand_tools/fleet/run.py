@@ -73,7 +73,7 @@ def run_fleet(
             directory = str(Path(out).resolve())  # workers may run elsewhere
             opened.enter_context(new_directory(Path(directory) / PLOTS))
             journal = opened.enter_context(Journal(Path(directory) / "journal.jsonl"))
-        marks = files.identities(dict.fromkeys(path for period in periods for path in period.paths))
+        marks = _marks(periods)
         keys = _keys(periods, marks, with_signals)
         signals_to = files.join(directory, SIGNALS) if with_signals else None
         todo = [k for k, key in enumerate(keys) if key not in journal]
@@ -148,6 +148,11 @@ def _keep(directory: str, journal: Journal | StoreJournal, key: str, kept: Perio
     full = next((row for row in missing if row["reason"] == DISK_FULL), None)
     if full:
         raise InputError(f"{full['message']}; what is finished is kept, the same command goes on")
+
+
+def _marks(periods: list[Period]) -> dict[str, str]:
+    """See files.identities()."""
+    return files.identities(dict.fromkeys(path for period in periods for path in period.paths))
 
 
 def _keys(periods: list[Period], marks: dict[str, str], with_signals: bool) -> list[str]:
