@@ -120,6 +120,11 @@ def feed(
     watch: DriveWatch,
 ) -> None:
     """Run the logs through an alignment; watch.look() is called after each step that may change its state."""
+
+    def measure(speed_mps: float, age_us: int, time_us: int) -> None:
+        alignment.measure_speed(speed_mps, age_us)
+        watch.look(time_us / 1e6)
+
     length_us = BIN_US if isinstance(alignment, DriveAlignment) else 0  # the published one looks at single samples
     for log in logs:
         watch.begin(log.name)
@@ -132,15 +137,15 @@ def feed(
             try:
                 end_us = part.end_us
                 if part.start_mps is not None:
-                    _measure(alignment, part.start_mps, 0, end_us - part.first_us - part.last_us, watch)
+                    measure(part.start_mps, 0, end_us - part.first_us - part.last_us)
                 if part.first_us:
                     alignment.update(part.force, part.rate, part.first_us)
                 for age_us, mps in part.speeds:
-                    _measure(alignment, mps, age_us, end_us - part.last_us - age_us, watch)
+                    measure(mps, age_us, end_us - part.last_us - age_us)
                 if part.last_us:
                     alignment.update(part.force, part.rate, part.last_us)
                 if part.end_mps is not None:
-                    _measure(alignment, part.end_mps, 0, end_us, watch)
+                    measure(part.end_mps, 0, end_us)
             except ValueError as error:  # of a null vector
                 what = f"{log.name}, at {end_us / 1e6:.1f} s: accelerations of nearly 0"
                 raise InputError(f"{what}: at rest 1 g is needed, check the sensor") from error
@@ -153,13 +158,6 @@ def feed(
 def _end_stop(standing: StandingVertical) -> None:
     """End a stop at the end of a log: at the beginning of the next one the vehicle stands elsewhere."""
     standing.update((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 2.0 * MOVED_MPS, 0.0)  # as if it had driven
-
-
-def _measure(
-    alignment: DriveAlignment | PublishedAlignment, speed_mps: float, age_us: int, time_us: int, watch: DriveWatch
-) -> None:
-    alignment.measure_speed(speed_mps, age_us)
-    watch.look(time_us / 1e6)
 
 
 class Steps:
