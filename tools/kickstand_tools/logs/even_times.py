@@ -5,7 +5,7 @@ which they were handed over. Steps are then uneven, and some are 0. A sensor sam
 recorded times around each sample, as near to the recorded one as the tick of the recorder's clock allows.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -110,12 +110,20 @@ def _mean(values: Array, half: int) -> Array:
     n = len(values)
     span = min(n, 2 * half + 1)
     k = np.arange(n, dtype=float)
-    first, last = (np.polynomial.Polynomial.fit(k[part], values[part], 1) for part in (slice(span), slice(-span, None)))
+    first, last = _line(k[:span], values[:span]), _line(k[-span:], values[-span:])
     if n <= 2 * half:
         return first(k)
     before, after = first(np.arange(-half, 0.0)), last(np.arange(n, n + half, dtype=float))
     base = values[0]  # sums of small numbers are exact enough
     return base + window_means(np.concatenate((before, values, after)) - base, 2 * half + 1)
+
+
+def _line(k: Array, values: Array) -> Callable[[Array], Array]:
+    """The straight line of least squares, as a function of k."""
+    middle, mean = float(np.mean(k)), float(np.mean(values))
+    away = k - middle
+    slope = float(away @ (values - mean)) / max(float(away @ away), 1e-12)
+    return lambda at: mean + slope * (at - middle)
 
 
 def even_blocks(blocks: Iterator[Block], name: str, remarks: list[Notice]) -> Iterator[Block]:
