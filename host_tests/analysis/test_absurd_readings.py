@@ -5,7 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
-from kickstand_tools.analysis.downsample import joined
+from kickstand_tools.analysis.channels import joined
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log

@@ -5,8 +5,7 @@ from dataclasses import fields
 import analysis_rides
 import numpy as np
 import pytest
-from kickstand_tools.analysis.channels import Channels
-from kickstand_tools.analysis.downsample import downsampled, joined
+from kickstand_tools.analysis.channels import Channels, downsampled, joined
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.summary import Summary
 from kickstand_tools.logs import reader

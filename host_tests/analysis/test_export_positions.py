@@ -10,7 +10,7 @@ import command
 import numpy as np
 import pytest
 from kickstand_tools import api
-from kickstand_tools.analysis.downsample import downsampled
+from kickstand_tools.analysis.channels import downsampled
 from kickstand_tools.analysis.export import export_gpx
 from kickstand_tools.analysis.track import Track
 from kickstand_tools.logs.csv_lines import write_log

@@ -8,9 +8,8 @@ from kickstand_tools.analysis import report
 from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.logs.log import Log
+from kickstand_tools.logs.log import Log, Stretch
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.logs.stretch import Stretch
 
 
 def standing(seconds, shake_g, shake_dps, speed_mps=np.nan, bias_dps=0.0):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from kickstand.drive_alignment import alignment
 from kickstand.drive_alignment.quality import MIN_EVENTS
-from kickstand_tools.signals.rotations import rotation_vector
+from kickstand_tools.signals import rotation_vector
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 
 pytestmark = pytest.mark.chip

@@ -50,7 +50,7 @@ def test_a_fault_of_its_own_is_one_line_too(tmp_path, monkeypatch):
     def broken(*_):
         raise KeyError("oops")
 
-    monkeypatch.setattr(reader, "_block", broken)
+    monkeypatch.setattr(reader, "_numbers", broken)
     log, cal = command.still(tmp_path / "log.csv", (0, 0, 1)), command.write_cal(tmp_path / "CAL.json")
     result = command.run("replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv")
     assert result.status == 2

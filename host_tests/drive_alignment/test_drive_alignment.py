@@ -7,7 +7,7 @@ import pytest
 from driving_runs import STAND, around
 from engines import ENGINES, run
 from kickstand.drive_alignment import alignment, events, quality, speed_check, verdict, vertical
-from kickstand_tools.signals.rotations import rotation_vector
+from kickstand_tools.signals import rotation_vector
 
 MOUNT = [0.48, 0.36, 0.8, -0.6, 0.8, 0.0, -0.64, -0.48, 0.6]  # no axis of the sensor near one of the vehicle
 PLAIN = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]

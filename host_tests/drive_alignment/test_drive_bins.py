@@ -8,7 +8,7 @@ import pytest
 from kickstand.drive_alignment.alignment import DriveAlignment
 from kickstand.drive_alignment.history import BIN_US
 from kickstand_tools.calibration.drive import fit_logs
-from kickstand_tools.calibration.drive_bins import drive_bins
+from kickstand_tools.calibration.drive_feed import drive_bins
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting

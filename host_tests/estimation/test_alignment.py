@@ -14,7 +14,7 @@ from kickstand_tools import api
 from kickstand_tools.estimation import first_guess
 from kickstand_tools.estimation.alignment import PHONES, mounted_windows
 from kickstand_tools.logs.log import Log
-from kickstand_tools.signals.rotations import rotation_matrix, rotation_vector
+from kickstand_tools.signals import rotation_matrix, rotation_vector
 
 RATE_HZ = 200
 SIGNS = list(itertools.product((1.0, -1.0), repeat=3))

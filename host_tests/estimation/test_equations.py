@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from kickstand_tools.estimation import equations as eq
-from kickstand_tools.estimation import unknowns as of
+from kickstand_tools.estimation import equations as eq, unknowns as of
 from kickstand_tools.estimation.equations import jacobian, process_and_measurements
 from kickstand_tools.estimation.unknowns import FORWARD, LEAN, LEFT, PARAMETERS, PITCH, STATES, UP, Prior
 from kickstand_tools.estimation.windows import Windows, windows_of

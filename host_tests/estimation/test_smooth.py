@@ -9,7 +9,7 @@ from drawn_rides import drawn_ride, judged
 from kickstand_tools.api import Log, smooth
 from kickstand_tools.estimation import smooth as module
 from kickstand_tools.refusals import sentence
-from kickstand_tools.signals.rotations import rotation_matrix
+from kickstand_tools.signals import rotation_matrix
 from smoothed_rides import Known, other, rms, simulated
 
 RIDES = {
@@ -236,16 +236,16 @@ def test_a_long_ride_is_estimated_part_by_part(street, monkeypatch):
     """So that time grows with the length of the ride, and memory does not. Ends of parts are estimated twice, because
     they are known only with what follows; remarks count each second once."""
     whole, sizes, added = smoothed("street"), [], []
-    estimated = module._estimated
+    estimated = module.Smoother.estimated
 
-    def counted(segments, *more):
+    def counted(self, segments, own):
         sizes.append(sum(len(segment.time_us) for segment in segments))
-        return estimated(segments, *more)
+        return estimated(self, segments, own)
 
-    monkeypatch.setattr(module, "_estimated", counted)
+    monkeypatch.setattr(module.Smoother, "estimated", counted)
     monkeypatch.setattr(module, "SEGMENT_S", 10.0)
     monkeypatch.setattr(module, "TOGETHER", 5)
-    monkeypatch.setattr(module.SmoothedRemarks, "add", lambda _, seconds, *more: added.append(np.sum(seconds)))
+    monkeypatch.setattr(module.Smoother, "add", lambda _, seconds, *more: added.append(np.sum(seconds)))
     parts = smooth(street.log, street.calibration)
     assert len(sizes) > 2
     assert len(added) > 1 and sum(added) == pytest.approx(street.log.t_s[-1], abs=0.3 * len(added))

@@ -21,7 +21,7 @@ from kickstand_tools.fleet.journal import Journal
 from kickstand_tools.fleet.manifest import Period, read_manifest
 from kickstand_tools.fleet.period import failed
 from kickstand_tools.fleet.run import run_fleet
-from kickstand_tools.fleet.schema import TABLES, schema
+from kickstand_tools.fleet.tables import TABLES, schema
 
 
 @pytest.fixture(scope="module")

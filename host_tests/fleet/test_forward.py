@@ -12,7 +12,7 @@ from kickstand_tools.fleet.manifest import Period
 from kickstand_tools.logs.csv_lines import write_log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.refusals import RefusedInput
-from kickstand_tools.signals.rotations import rotation_vector
+from kickstand_tools.signals import rotation_vector
 from made_fleet import drive, turn_of, yaw_deg
 
 SEEDS = (101, 102, 106, 109)  # on which the device is off by about a degree

@@ -5,9 +5,8 @@ import pytest
 from kickstand_tools.analysis.ride import vehicle_channels
 from kickstand_tools.analysis.stops.brake_test import find_stops
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.fleet.brake_tests import brake_tests
 from kickstand_tools.fleet.manifest import Period, read_manifest
-from kickstand_tools.fleet.period import work_on_period
+from kickstand_tools.fleet.period import brake_tests, work_on_period
 from kickstand_tools.logs.csv_lines import write_log
 from made_fleet import drive, turn_of, yaw_deg
 

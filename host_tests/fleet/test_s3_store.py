@@ -9,7 +9,7 @@ from kickstand_tools.fleet import files, run
 from kickstand_tools.fleet.manifest import read_manifest
 from kickstand_tools.fleet.period import failed
 from kickstand_tools.fleet.run import run_fleet
-from kickstand_tools.fleet.schema import TABLES
+from kickstand_tools.fleet.tables import TABLES
 from made_fleet import in_this_process
 
 WANTED = (0, 4)  # a car, and a bus with a log that is no text

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from app_exports import riding
 from kickstand_tools import api
-from kickstand_tools.imports import times, units
+from kickstand_tools.imports import units
 from kickstand_tools.logs import csv_reader
 
 NAMES = app_exports.ANY_NAMES
@@ -114,7 +114,7 @@ def column(texts):
 
 @pytest.mark.parametrize("name", TIMES)
 def test_times_of_any_kind_without_a_unit(name):
-    found = times.times_ns(column(TIMES[name]))
+    found = units.times_ns(column(TIMES[name]))
     assert np.allclose(np.diff(found), 10_000_000, atol=600)  # of a double in ns since 1970
     if "1970" in name or "zone" in name or name == "UTC":
         assert found[0] == pytest.approx(START_NS, abs=600)
@@ -123,13 +123,13 @@ def test_times_of_any_kind_without_a_unit(name):
 def test_slow_recorders_in_ms_are_not_taken_for_seconds():
     """Ten and twenty-five samples a second, and as fast as 400."""
     for step, unit in ((100, 1e6), (40, 1e6), (2.5, 1e6), (0.1, 1e9), (0.0025, 1e9), (100_000, 1e3), (2500, 1e3)):
-        found = times.times_ns(np.array([step * k for k in range(20)]))
+        found = units.times_ns(np.array([step * k for k in range(20)]))
         assert np.allclose(np.diff(found), step * unit), (step, unit)
 
 
 def test_a_cell_without_a_time():
-    found = times.times_ns(column(["0.0", "0.01", "", "x", "1e300", "inf", "0.06"]))
-    assert (found == times.NO_TIME).tolist() == [False, False, True, True, True, True, False]
+    found = units.times_ns(column(["0.0", "0.01", "", "x", "1e300", "inf", "0.06"]))
+    assert (found == units.NO_TIME).tolist() == [False, False, True, True, True, True, False]
 
 
 def test_a_table_that_nobody_knows_is_met_with_the_line_to_type(tmp_path, monkeypatch):

@@ -6,9 +6,8 @@ import pytest
 from kickstand_tools import api
 from kickstand_tools.joining.compare import Comparison
 from kickstand_tools.joining.motion import motion
-from kickstand_tools.joining.segments import segments
-from kickstand_tools.joining.track import course
-from kickstand_tools.signals.geography import EARTH_M
+from kickstand_tools.joining.track import course, segments
+from kickstand_tools.signals import EARTH_M
 
 PROFILES = ("street", "track", "sweeper", "city", "hills")
 SECONDS = {"sweeper": 450.0, "city": 300.0, "street": 300.0}  # of a ride that has few bends for its length

@@ -4,8 +4,7 @@ import engines
 import numpy as np
 import pytest
 from bike_motion import force_and_rate
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from numpy.testing import assert_allclose
 
 

@@ -75,8 +75,7 @@ def test_random_acts():
 def run(board, radio):
     from kickstand import devices
     from kickstand.app import App
-    from kickstand.live import live
-    from kickstand.live import radio as live_radio
+    from kickstand.live import live, radio as live_radio
     from kickstand.settings import Settings
 
     dice = random

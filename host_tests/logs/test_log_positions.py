@@ -8,9 +8,8 @@ import pytest
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.csv_lines import cut_log, write_log
 from kickstand_tools.logs.frozen import without_frozen
-from kickstand_tools.logs.log import Log
+from kickstand_tools.logs.log import Log, Stretch
 from kickstand_tools.logs.reader import read_blocks, read_log
-from kickstand_tools.logs.stretch import Stretch
 
 TRACK = ("lat_deg", "lon_deg", "utc_s")
 HEADER = "t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps,lat_deg,lon_deg,utc_s\n"

@@ -4,19 +4,29 @@ import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.signals.averages import (
+from kickstand_tools.signals import (
+    Cells,
+    best_lag,
+    cell_numbers,
+    correlation,
+    correlations,
+    cross_matrix,
     integral,
+    log_likelihood_ratio,
+    motionless,
     moving_mean,
     moving_spread,
+    peak_offset,
+    peaks,
+    rotation_matrix,
+    rotation_vector,
+    runs,
     smoothed,
+    stretches,
     window_means,
     window_spreads,
 )
-from kickstand_tools.signals.cells import Cells, cell_numbers, runs, stretches
-from kickstand_tools.signals.lag import best_lag, correlation, correlations, log_likelihood_ratio, peak_offset, peaks
 from kickstand_tools.signals.leaning import leaning_of
-from kickstand_tools.signals.rotations import cross_matrix, rotation_matrix, rotation_vector
-from kickstand_tools.signals.standstill import motionless
 
 CHANCE = np.random.default_rng(1)
 

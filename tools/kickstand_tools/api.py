@@ -17,62 +17,46 @@ a refusal of the firmware's (kickstand.errors). sentence() puts a notice or a re
 
 from .analysis.channels import Channels as Channels
 from .analysis.export.export import export as export
-from .analysis.overview import Overview as Overview
-from .analysis.overview import overview as overview
-from .analysis.ride import Ride as Ride
-from .analysis.ride import open_ride as open_ride
-from .analysis.ride import vehicle_channels as vehicle_channels
-from .analysis.stops.brake_test import Stop as Stop
-from .analysis.stops.brake_test import find_stops as find_stops
-from .analysis.summary import Summary as Summary
-from .analysis.summary import summary as summary
-from .calibration.drive import DriveFit as DriveFit
-from .calibration.drive import fit_drive as fit_drive
+from .analysis.overview import Overview as Overview, overview as overview
+from .analysis.ride import Ride as Ride, open_ride as open_ride, vehicle_channels as vehicle_channels
+from .analysis.stops.brake_test import Stop as Stop, find_stops as find_stops
+from .analysis.summary import Summary as Summary, summary as summary
+from .calibration.drive import DriveFit as DriveFit, fit_drive as fit_drive
 from .calibration.drive_events import DriveEvent as DriveEvent
-from .calibration.file import CalibrationFile as CalibrationFile
-from .calibration.file import read_calibration as read_calibration
-from .calibration.file import write_calibration as write_calibration
-from .calibration.six import SixPositions as SixPositions
-from .calibration.six import fit_six_positions as fit_six_positions
-from .calibration.two import TwoPositions as TwoPositions
-from .calibration.two import fit_two_positions as fit_two_positions
+from .calibration.file import (
+    CalibrationFile as CalibrationFile,
+    read_calibration as read_calibration,
+    write_calibration as write_calibration,
+)
+from .calibration.poses import (
+    SixPositions as SixPositions,
+    TwoPositions as TwoPositions,
+    fit_six_positions as fit_six_positions,
+    fit_two_positions as fit_two_positions,
+)
 from .errors import InputError as InputError
-from .estimation.alignment import RideFit as RideFit
-from .estimation.alignment import fit_ride as fit_ride
-from .estimation.smooth import SmoothedRide as SmoothedRide
-from .estimation.smooth import smooth as smooth
-from .fleet.brake_tests import brake_tests as brake_tests
-from .fleet.manifest import Period as Period
-from .fleet.manifest import by_pattern as by_pattern
-from .fleet.manifest import read_manifest as read_manifest
-from .fleet.period import PeriodResult as PeriodResult
-from .fleet.period import work_on_period as work_on_period
-from .fleet.run import FleetRun as FleetRun
-from .fleet.run import run_fleet as run_fleet
-from .imports.importing import Imported as Imported
-from .imports.importing import import_recording as import_recording
-from .imports.importing import write_imported as write_imported
-from .joining.agreement import Agreement as Agreement
-from .joining.agreement import compare_rides as compare_rides
-from .joining.joined import Joined as Joined
-from .joining.joined import join_track as join_track
-from .joining.joined import write_joined as write_joined
+from .estimation.alignment import RideFit as RideFit, fit_ride as fit_ride
+from .estimation.smooth import SmoothedRide as SmoothedRide, smooth as smooth
+from .fleet.manifest import Period as Period, by_pattern as by_pattern, read_manifest as read_manifest
+from .fleet.period import PeriodResult as PeriodResult, brake_tests as brake_tests, work_on_period as work_on_period
+from .fleet.run import FleetRun as FleetRun, run_fleet as run_fleet
+from .imports.importing import (
+    Imported as Imported,
+    import_recording as import_recording,
+    write_imported as write_imported,
+)
+from .joining.agreement import Agreement as Agreement, compare_rides as compare_rides
+from .joining.joined import Joined as Joined, join_track as join_track, write_joined as write_joined
 from .joining.track import Track as Track
 from .joining.track_files import read_track as read_track
-from .logs.csv_lines import cut_log as cut_log
-from .logs.csv_lines import write_log as write_log
-from .logs.log import Log as Log
+from .logs.csv_lines import cut_log as cut_log, write_log as write_log
+from .logs.log import Log as Log, Stretch as Stretch
 from .logs.reader import read_log as read_log
-from .logs.stretch import Stretch as Stretch
-from .overlay.overlay import Overlaid as Overlaid
-from .overlay.overlay import overlay as overlay
-from .refusals import RefusedInput as RefusedInput
-from .refusals import sentence as sentence
-from .replay.replay import LeanTable as LeanTable
-from .replay.replay import replay as replay
+from .overlay.overlay import Overlaid as Overlaid, overlay as overlay
+from .refusals import RefusedInput as RefusedInput, sentence as sentence
+from .replay.replay import LeanTable as LeanTable, replay as replay
 from .simulation import ride as _simulation
-from .web.site import site_files as site_files
-from .web.site import write_site as write_site
+from .web.site import site_files as site_files, write_site as write_site
 
 SimulatedRide, simulate_ride = _simulation.Ride, _simulation.ride
 

@@ -9,15 +9,7 @@ import time
 from collections.abc import Iterator
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    Progress,
-    SpinnerColumn,
-    TaskProgressColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 PATIENCE_S = 1.0
 
@@ -32,14 +24,7 @@ class Bar:
     def __init__(
         self, what: str, total: int | None = None, patience_s: float = PATIENCE_S, lines_s: float | None = None
     ) -> None:
-        self._progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TaskProgressColumn(),
-            TimeRemainingColumn(),
-            console=Console(stderr=True),
-            transient=True,
-        )
+        self._progress = Progress(console=Console(stderr=True), transient=True)
         self._task = self._progress.add_task(what, total=total)
         self._patience_s = patience_s
         self._begin_s = time.monotonic()

@@ -4,13 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kickstand_tools.analysis.channels import Channels
-from kickstand_tools.analysis.downsample import downsampled, joined
+from kickstand_tools.analysis.channels import Channels, downsampled, joined
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.stops.brake_test import RATE_S, Stop, find_stops, mfdd_mps2
 from kickstand_tools.calibration.file import read_calibration, write_calibration
-from kickstand_tools.calibration.six import fit_six_positions
-from kickstand_tools.calibration.two import fit_two_positions
+from kickstand_tools.calibration.poses import fit_six_positions, fit_two_positions
 from kickstand_tools.simulation import profiles
 from kickstand_tools.simulation.files import simulate
 from kickstand_tools.simulation.plan import Conditions, Plan

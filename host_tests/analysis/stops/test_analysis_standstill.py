@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from kickstand_tools.analysis.channels import Channels
-from kickstand_tools.analysis.downsample import downsampled, joined
+from kickstand_tools.analysis.channels import Channels, downsampled, joined
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.stops import brake_test
 from kickstand_tools.analysis.stops.brake_test import RATE_S, find_stops
 from kickstand_tools.analysis.stops.standstill import standing
 from kickstand_tools.calibration.file import write_calibration
-from kickstand_tools.calibration.two import fit_two_positions
+from kickstand_tools.calibration.poses import fit_two_positions
 from kickstand_tools.simulation.files import simulate
 
 

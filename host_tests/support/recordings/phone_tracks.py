@@ -7,7 +7,7 @@ from pathlib import Path
 import gpxpy.gpx
 import numpy as np
 from kickstand_tools.api import Track
-from kickstand_tools.signals.geography import EARTH_M
+from kickstand_tools.signals import EARTH_M
 
 START_UTC_S = 1_700_000_000.3  # when the rides began
 LAT_DEG, LON_DEG = 48.1, 11.5

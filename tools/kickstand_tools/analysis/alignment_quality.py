@@ -9,11 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from kickstand.lean.upright_trim import MAX_TRIM
-from numpy.typing import NDArray
 
-from ..logs.table import Array
-from .channels import Channels
-from .downsample import spacing_s
+from ..signals import Array, Bools
+from .channels import Channels, spacing_s
 
 # The rms error of the shown lean by each error, measured with simulated rides whose calibrations were rotated on
 # purpose. With a yaw error, pitching looks like rolling: roll rate' = roll rate cos(yaw) + pitch rate sin(yaw), and the
@@ -76,7 +74,7 @@ def yaw_cost_deg(yaw_deg: float) -> float:
     return YAW_COSTS_DEG * abs(float(np.sin(np.radians(yaw_deg))))
 
 
-def quality(ride: Channels, standing: NDArray[np.bool_]) -> Quality:
+def quality(ride: Channels, standing: Bools) -> Quality:
     """The Quality by a whole ride with evenly spaced samples (see downsampled()). standing (n): True where the vehicle
     stands still."""
     step_s = spacing_s(ride)

@@ -5,15 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from kickstand.errors import Notice
-from numpy.typing import NDArray
 
+from ..logs.log import Stretch
 from ..logs.source import Progress
-from ..logs.stretch import Stretch
-from ..logs.table import Array
-from ..signals.averages import smoothed
+from ..signals import Array, Bools, smoothed
 from .alignment_quality import Quality, quality
-from .channels import Channels
-from .downsample import downsampled, joined, spacing_s
+from .channels import Channels, downsampled, joined, spacing_s
 from .ride import Ride
 from .stops.brake_test import RATE_S, Stop, stops_of
 from .stops.standstill import standing
@@ -92,7 +89,7 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
     return seen
 
 
-def _riding_s(ride: Channels, standing: NDArray[np.bool_], whole: bool = True) -> float:
+def _riding_s(ride: Channels, standing: Bools, whole: bool = True) -> float:
     """How long a vehicle was on the move, s. ride: with evenly spaced samples (see downsampled()). standing (n): True
     where it stands still. whole: not a stretch of a ride, in which a vehicle may go straight on, or keep to one turn,
     from beginning to end."""

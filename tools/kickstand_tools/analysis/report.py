@@ -4,8 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..refusals import CONTRADICTING, SWAPPED_DEG, sentence
-from ..refusals import as_data as remarks_as_data
+from ..refusals import CONTRADICTING, SWAPPED_DEG, as_data as remarks_as_data, sentence
 from ..remedies import COMMANDS, Remedies
 from ..times import clock
 from .alignment_quality import LeanCost, Quality, lean_cost

@@ -11,13 +11,12 @@ from kickstand.lean.meter import MAX_VARIANCE
 from ..calibration.file import CalibrationFile, calibration_beside, read_calibration
 from ..errors import InputError
 from ..estimation.smooth import smooth_blocks
-from ..logs.block import Block
+from ..logs.log import Block, Stretch
 from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import File, Progress, log_stem, name_of
-from ..logs.stretch import Stretch
-from ..logs.table import Array
 from ..replay.meter_along import MeterAlong
-from .channels import Channels, channels
+from ..signals import Array
+from .channels import Channels, channels, joined
 
 
 @dataclass
@@ -126,8 +125,6 @@ def vehicle_channels(
     >>> bool(abs(channels.lean_deg).max() < 0.1), float(channels.up_g[-1])
     (True, 1.0)
     """
-    from .downsample import joined
-
     return joined(open_ride(log, calibration).blocks(progress))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from kickstand.lean.meter import HELD_US
 from kickstand.units import GAP_US, LOST_US
 
-from ..logs.table import Array
+from ..signals import Array
 from .channels import Channels
 
 LEANS_DEG = (30.0, 40.0)

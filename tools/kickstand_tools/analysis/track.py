@@ -4,8 +4,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..logs.block import Block
-from ..logs.table import Array
+from ..logs.log import Block
+from ..signals import Array
 from .channels import Channels
 
 GAP_S = 5.0  # in a longer time without a position the place is not known

@@ -1,1 +1,1 @@
-"""A calibration computed from recorded poses (poses, six, two) or drives (drive), and its file (file)."""
+"""A calibration computed from recorded poses (poses) or drives (drive), and its file (file)."""

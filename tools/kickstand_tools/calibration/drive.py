@@ -14,8 +14,8 @@ from ..errors import InputError
 from ..logs.frozen import without_frozen
 from ..logs.reader import Log, Source, read_log
 from ..logs.source import Progress
-from ..logs.table import Array
 from ..refusals import RefusedInput
+from ..signals import Array
 from .drive_events import DriveEvent, DriveWatch
 from .drive_feed import Steps, feed, standing
 from .file import CalibrationFile

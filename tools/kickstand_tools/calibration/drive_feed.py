@@ -1,20 +1,98 @@
-"""Runs recorded drives through the firmware's classes for alignment by driving."""
+"""Runs recorded drives through the firmware's classes for alignment by driving, in sums over 100 ms by numpy.
 
-from collections.abc import Sequence
+DriveAlignment adds up its samples one by one and works on the sums alone. Adding them up here and handing over whole
+sums gives it the same numbers. Ten minutes at 200 Hz take 0.2 s, sample by sample they take 0.9 s.
+"""
 
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
 from kickstand.drive_alignment.alignment import STALE_US, DriveAlignment
 from kickstand.drive_alignment.history import BIN_US
 from kickstand.drive_alignment.vertical import MOVED_MPS, StandingVertical
+from kickstand.units import GAP_US
 
 from ..errors import InputError
 from ..logs.log import Log
 from ..logs.source import Progress
-from .drive_bins import drive_bins
 from .drive_events import DriveWatch
 from .file import CalibrationFile
 from .published import PublishedAlignment
 
 _CHUNK = 1000  # least number of samples between two calls of progress
+
+
+@dataclass
+class Bin:
+    """Successive samples, which DriveAlignment only adds up until the last of them.
+
+    begins: they do not follow on from the bin before; start_mps: then the speed at their beginning. force (3, g), rate
+    (3, deg/s): means, in the sensor's axes. first_us: the time that all samples but the last cover; last_us: that of
+    the last one, 0 where the bin is not full. speeds: (microseconds before the end of first_us, m/s) in first_us;
+    end_mps: the speed of the last sample. Speeds are None where there is no new value. end_us: the log's time at the
+    last sample; samples: their number.
+    """
+
+    begins: bool
+    start_mps: float | None
+    force: list[float]
+    rate: list[float]
+    first_us: int
+    last_us: int
+    speeds: list[tuple[int, float]]
+    end_mps: float | None
+    end_us: int
+    samples: int
+
+
+def drive_bins(log: Log, calibration: CalibrationFile, length_us: int) -> Iterator[Bin]:
+    """The samples of a log in bins, each the shortest of at least length_us (of one sample each where that is 0)."""
+    time_us = log.time_us
+    step_us = np.diff(time_us, prepend=time_us[0])
+    is_gap = step_us > GAP_US
+    values = np.column_stack(calibration.in_sensor(log.accel_g, log.gyro_dps))
+    integral = np.cumsum(values * np.where(is_gap, 0, step_us)[:, None], axis=0)
+    times, speeds = time_us.tolist(), log.speed_mps.tolist()
+    there = np.flatnonzero(~np.isnan(log.speed_mps)).tolist()
+    begins = [0, *np.flatnonzero(is_gap).tolist(), len(times)]
+    next_speed = 0
+    for first, stop in pairwise(begins):
+        start = first
+        while start == first or start < stop - 1:
+            end = min(bisect_left(times, times[start] + max(1, length_us), start + 1, stop), stop - 1)
+            full = times[end] - times[start] >= max(1, length_us)
+            whole_us = times[end] - times[start]
+            first_us = (times[end - 1] if end > start else times[start]) - times[start] if full else whole_us
+            inside: list[tuple[int, float]] = []
+            start_mps = end_mps = None
+            while next_speed < len(there) and there[next_speed] <= end:
+                k = there[next_speed]
+                next_speed += 1
+                if k == start:
+                    start_mps = speeds[k]
+                elif k == end and full:
+                    end_mps = speeds[k]
+                else:
+                    inside.append((times[start] + first_us - times[k], speeds[k]))
+            means = ((integral[end] - integral[start]) / max(1, whole_us)).tolist()
+            yield Bin(
+                start == first,
+                start_mps,
+                means[:3],
+                means[3:],
+                first_us,
+                whole_us - first_us,
+                inside,
+                end_mps,
+                times[end],
+                end - start + (start == first),
+            )
+            start = end
+            if not full:
+                break
 
 
 def standing(logs: Sequence[Log], calibration: CalibrationFile, steps: "Steps") -> StandingVertical:
@@ -42,6 +120,11 @@ def feed(
     watch: DriveWatch,
 ) -> None:
     """Run the logs through an alignment; watch.look() is called after each step that may change its state."""
+
+    def measure(speed_mps: float, age_us: int, time_us: int) -> None:
+        alignment.measure_speed(speed_mps, age_us)
+        watch.look(time_us / 1e6)
+
     length_us = BIN_US if isinstance(alignment, DriveAlignment) else 0  # the published one looks at single samples
     for log in logs:
         watch.begin(log.name)
@@ -54,15 +137,15 @@ def feed(
             try:
                 end_us = part.end_us
                 if part.start_mps is not None:
-                    _measure(alignment, part.start_mps, 0, end_us - part.first_us - part.last_us, watch)
+                    measure(part.start_mps, 0, end_us - part.first_us - part.last_us)
                 if part.first_us:
                     alignment.update(part.force, part.rate, part.first_us)
                 for age_us, mps in part.speeds:
-                    _measure(alignment, mps, age_us, end_us - part.last_us - age_us, watch)
+                    measure(mps, age_us, end_us - part.last_us - age_us)
                 if part.last_us:
                     alignment.update(part.force, part.rate, part.last_us)
                 if part.end_mps is not None:
-                    _measure(alignment, part.end_mps, 0, end_us, watch)
+                    measure(part.end_mps, 0, end_us)
             except ValueError as error:  # of a null vector
                 what = f"{log.name}, at {end_us / 1e6:.1f} s: accelerations of nearly 0"
                 raise InputError(f"{what}: at rest 1 g is needed, check the sensor") from error
@@ -75,13 +158,6 @@ def feed(
 def _end_stop(standing: StandingVertical) -> None:
     """End a stop at the end of a log: at the beginning of the next one the vehicle stands elsewhere."""
     standing.update((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 2.0 * MOVED_MPS, 0.0)  # as if it had driven
-
-
-def _measure(
-    alignment: DriveAlignment | PublishedAlignment, speed_mps: float, age_us: int, time_us: int, watch: DriveWatch
-) -> None:
-    alignment.measure_speed(speed_mps, age_us)
-    watch.look(time_us / 1e6)
 
 
 class Steps:

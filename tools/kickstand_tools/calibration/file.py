@@ -18,8 +18,7 @@ from ..errors import InputError, cause
 from ..logs.reader import check_first_line
 from ..logs.source import File, log_stem, name_of, open_input
 from ..output import whole_file
-from ..signals import Array
-from ..signals.rotations import rotated
+from ..signals import Array, rotated
 
 VERSION = 1
 MOST_BYTES = 1_000_000  # largest file; those of kickstand have a thousandth of that

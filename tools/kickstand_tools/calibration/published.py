@@ -16,8 +16,7 @@ from kickstand.errors import Refusal
 from kickstand.rotation import vector
 from kickstand.units import GAP_US
 
-from ..signals import Array
-from ..signals.rotations import cross_matrix
+from ..signals import Array, cross_matrix
 
 MAX_DISPERSION = 0.02  # 8 degrees
 MIN_LEVEL_G = 0.03  # a smaller levelled force points anywhere

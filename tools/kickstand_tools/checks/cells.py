@@ -4,10 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..signals import Array
-from ..signals.cells import Cells, EvenCells, cell_numbers, runs, stretches
+from ..signals import Array, Bools, Cells, EvenCells, cell_numbers, runs, stretches
 
 CELL_S = 0.1  # length of a cell: faster changes are vibration
 KEPT = 36_000  # cells with samples that are kept: an hour
@@ -23,7 +21,7 @@ class LogCells:
     even: EvenCells
     force: Array
     rate: Array
-    known: NDArray[np.bool_]
+    known: Bools
     speeds: Array
     places: Array
 

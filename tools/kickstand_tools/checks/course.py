@@ -6,9 +6,7 @@ exchanged, and the motion of the sensor cannot show it. Positions can.
 
 import numpy as np
 
-from ..signals import Array
-from ..signals.geography import distance_m
-from ..signals.lag import best_lag
+from ..signals import Array, best_lag, distance_m
 from .cells import CellTable, LogCells
 
 SLOWEST_MPS = 3.0  # at a lower speed positions show no course

@@ -15,10 +15,8 @@ import itertools
 
 import numpy as np
 from kickstand.errors import Notice
-from numpy.typing import NDArray
 
-from ..signals import Array
-from ..signals.cells import stretches
+from ..signals import Array, Bools, Ints, stretches
 from .bends import KNOWN_DPS, calm_bias, calm_rates
 from .cells import CELL_S, LogCells
 from .turning import Turning
@@ -95,7 +93,7 @@ def liveliest(cells: LogCells) -> Turning | None:
     return Turning(cells.force[places], cells.rate[places], bias, speed, places)
 
 
-def _windows(known: NDArray[np.bool_], seconds: float) -> NDArray[np.int64]:
+def _windows(known: Bools, seconds: float) -> Ints:
     """(windows, cells): indices of cells, for windows of so many seconds without unknown cells."""
     length = round(seconds / CELL_S)
     starts = [k for begin, end in stretches(known) for k in range(begin, end - length + 1, length)]

@@ -16,8 +16,7 @@ from .units import speed_unit
 
 if TYPE_CHECKING:
     from ..calibration.file import CalibrationFile
-    from ..logs.block import Block
-    from ..logs.log import Log
+    from ..logs.log import Block, Log
 
 _LIMITS = np.array(3 * [MOST_G] + [np.inf] + 3 * [MOST_DPS])  # of readings; a log made in Python may have larger ones
 _AGAIN_S = 20.0  # while a log is read, the unit of its speed is checked again after each such time of the log

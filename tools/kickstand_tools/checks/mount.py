@@ -17,9 +17,7 @@ import numpy as np
 from kickstand.errors import Notice
 from kickstand.units import AXES, STANDARD_GRAVITY
 
-from ..signals import Array
-from ..signals.lag import Lag, best_lag, correlation
-from ..signals.rotations import rotated, rotation_vector
+from ..signals import Array, Lag, best_lag, correlation, rotated, rotation_vector
 from .cells import CELL_S, LogCells
 
 if TYPE_CHECKING:

@@ -11,10 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
-from numpy.typing import NDArray
 
-from ..signals import Array
-from ..signals.rotations import cross_matrix, rotation_matrix
+from ..signals import Array, Ints, cross_matrix, rotation_matrix
 from .cells import CELL_S
 
 KNOT_S = 5.0  # an unknown velocity is interpolated between knots of this distance
@@ -34,7 +32,7 @@ class Turning:
     speed (m, 2): index of the cell and m/s, or None; places (w, n): the indices of the windows' cells.
     """
 
-    def __init__(self, force: Array, rate: Array, bias: Array, speed: Array | None, places: NDArray[np.int64]) -> None:
+    def __init__(self, force: Array, rate: Array, bias: Array, speed: Array | None, places: Ints) -> None:
         self._force, self._rate, self._bias = force, rate, bias
         # each: k functions of time whose combination is the velocity, and their derivatives: (k, w, n), per second
         self._velocities = [_knots(*places.shape)]
@@ -149,7 +147,7 @@ def _knots(windows: int, cells: int) -> tuple[Array, Array]:
     return np.repeat(values[:, None], windows, axis=1), np.repeat(changes[:, None], windows, axis=1)
 
 
-def _given(speed: Array, places: NDArray[np.int64], late_s: float) -> tuple[Array, Array]:
+def _given(speed: Array, places: Ints, late_s: float) -> tuple[Array, Array]:
     """The function of a velocity that is the log's speed, delayed by late_s, times a constant direction."""
     second = round(1.0 / CELL_S)
     cells = np.arange(-second, places.max() + 1 + second)

@@ -11,11 +11,9 @@ import numpy as np
 from kickstand.drive_alignment.speed_check import speed_unit_problem
 from kickstand.errors import Refusal
 from kickstand.units import STANDARD_GRAVITY
-from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..signals import Array
-from ..signals.lag import best_lag
+from ..signals import Array, Ints, best_lag
 from .cells import LogCells
 
 LEAST_G = 0.4  # a smaller median force is without gravity; even a pose with an offset of 0.6 g has more
@@ -30,7 +28,7 @@ LAGS_S = np.arange(0.0, 2.1, 0.25)  # by which a satellite receiver's speed may 
 SHORTEST_S, LONGEST_S = 0.5, 2.2  # between two speeds
 
 
-def check_units(name: str, time_us: NDArray[np.int64], accel_g: Array) -> None:
+def check_units(name: str, time_us: Ints, accel_g: Array) -> None:
     """Raise InputError for accelerations without gravity or in m/s2, and for times in ms. time_us (n), accel_g (n, 3):
     of the first samples of the log."""
     usual_g = np.median(np.linalg.norm(accel_g, axis=1))

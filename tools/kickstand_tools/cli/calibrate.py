@@ -13,8 +13,7 @@ from ..analysis import alignment_quality
 from ..calibration import drive_events as events
 from ..calibration.drive import DriveFit, fit_drive
 from ..calibration.file import CalibrationFile, read_calibration, write_calibration
-from ..calibration.six import GOOD_FREE_POSE_G, SixPositions, fit_six_positions
-from ..calibration.two import TwoPositions, fit_two_positions
+from ..calibration.poses import GOOD_FREE_POSE_G, SixPositions, TwoPositions, fit_six_positions, fit_two_positions
 from ..checks.log import remarks
 from ..checks.mount import of_calibration
 from ..estimation.alignment import RideFit, fit_ride

@@ -25,41 +25,19 @@ from ..joining import agreement
 from ..joining.joined import Joined, join_track, write_joined
 from ..joining.track_files import read_track
 from ..logs.csv_lines import cut_log
-from ..logs.log import Log
+from ..logs.log import Log, Stretch
 from ..logs.reader import Source, is_log
-from ..logs.stretch import Stretch
 from ..output import check_output, whole_file
 from ..overlay.overlay import overlay
 from ..progress import Bar, spinner
 from ..refusals import WRONG_AXES, sentence
 from ..replay.replay import replay_to_csv
-from .common import (
-    CALIBRATION,
-    JSON,
-    OUT,
-    OUT_DIRECTORY,
-    OUT_LOG,
-    PATH,
-    RIDE,
-    RIGHT_HANDED,
-    STRETCH,
-    TIME,
-    file_argument,
-    from_to,
-    help_adds,
-    known_to,
-    live,
-    out_option,
-    print_lines,
-    ride_or_export,
-    warn,
-    warning,
-)
+from . import common
 
 
 @click.command()
-@file_argument("source", "FILE|DIR|ZIP")
-@OUT_LOG
+@common.file_argument("source", "FILE|DIR|ZIP")
+@common.OUT_LOG
 @click.option(
     "--columns",
     metavar="t=NAME,ax=NAME,...",
@@ -71,9 +49,9 @@ from .common import (
     metavar="a=UNIT,g=UNIT,...",
     help="Of t, a (or ax, ay, az), g (or gx, gy, gz), speed; a - before the unit reverses the sign.",
 )
-@from_to("Seconds from the start; negative: from the end.", "The same, for the end.")
-@RIGHT_HANDED
-@help_adds(
+@common.from_to("Seconds from the start; negative: from the end.", "The same, for the end.")
+@common.RIGHT_HANDED
+@common.help_adds(
     f"Known: {', '.join(NAMES)}. Any other table of accelerations (with gravity) and rates of rotation needs --columns "
     "and --units."
 )
@@ -87,7 +65,7 @@ def import_command(
         found = import_recording(source, named, _pairs(units or "", "--units"), from_s, to_s)
         write_imported(out, found)
     Console().print(_import_table(found))
-    warn(source, found.notices)
+    common.warn(source, found.notices)
     t_s, gaps_s = found.log.t_s, found.gaps_s
     count = "1 gap" if len(gaps_s) == 1 else f"{len(gaps_s)} gaps"
     gaps = f", {count} of {gaps_s.sum():.1f} s in all" if len(gaps_s) else ""
@@ -105,9 +83,9 @@ def import_command(
 
 
 @click.command()
-@RIDE
-@file_argument("track", "TRACK.gpx|.fit")
-@OUT_LOG
+@common.RIDE
+@common.file_argument("track", "TRACK.gpx|.fit")
+@common.OUT_LOG
 def join_command(ride: Path, track: Path, out: Path) -> None:
     """Put the track of a phone or a watch to a ride of a board without GPS.
 
@@ -119,23 +97,23 @@ def join_command(ride: Path, track: Path, out: Path) -> None:
         given = read_track(track)
     with Bar("reading") as bar:
         joined = join_track(ride, given, bar.reach)
-    warn(ride, joined.notices)
+    common.warn(ride, joined.notices)
     with Bar("writing") as bar:
         count = write_joined(out, joined, bar.reach)
-    print_lines(_joined_lines(joined))
+    common.print_lines(_joined_lines(joined))
     click.echo(f"written: {out}, {count} positions")
     if calibration_path(ride).is_file() and not calibration_path(out).exists():
         click.echo(f"next: kickstand report {out} --calibration {calibration_path(ride)}")
 
 
 @click.command()
-@file_argument("a", "A.csv")
-@file_argument("b", "B.csv")
-@click.option("--calibration-a", type=PATH, help="A's CAL.json; if not given, the one beside it.")
-@click.option("--calibration-b", type=PATH, help="B's CAL.json; if not given, the one beside it.")
-@click.option("--plot", "picture", type=PATH, metavar="FILE.png", help="Draw both leans and their difference.")
-@JSON
-@RIGHT_HANDED
+@common.file_argument("a", "A.csv")
+@common.file_argument("b", "B.csv")
+@click.option("--calibration-a", type=common.PATH, help="A's CAL.json; if not given, the one beside it.")
+@click.option("--calibration-b", type=common.PATH, help="B's CAL.json; if not given, the one beside it.")
+@click.option("--plot", "picture", type=common.PATH, metavar="FILE.png", help="Draw both leans and their difference.")
+@common.JSON
+@common.RIGHT_HANDED
 def compare_command(
     a: Path, b: Path, calibration_a: Path | None, calibration_b: Path | None, picture: Path | None, as_json: bool
 ) -> None:
@@ -151,75 +129,75 @@ def compare_command(
     with Bar("comparing") as bar:
         found = agreement.compare_rides(a, b, of_a, of_b, bar.reach)
     for log, notices in zip((a, b), found.notices.values()):
-        warn(log, notices)
+        common.warn(log, notices)
     if picture is not None:
         with whole_file(picture) as path:
             agreement.draw(path, found)
     if as_json:
         click.echo(json.dumps(found.as_data()))
     else:
-        print_lines(agreement.words(found))
-        print_lines([f"written: {picture}"] if picture is not None else [])
+        common.print_lines(agreement.words(found))
+        common.print_lines([f"written: {picture}"] if picture is not None else [])
 
 
 @click.command()
-@file_argument("ride", "LOG.csv")
-@CALIBRATION
-@STRETCH
+@common.file_argument("ride", "LOG.csv")
+@common.CALIBRATION
+@common.STRETCH
 @click.option("--engine", type=click.Choice(["cpython", "micropython", "rp2040"]), default="cpython")
-@OUT
-@RIGHT_HANDED
+@common.OUT
+@common.RIGHT_HANDED
 def replay_command(ride: Path, calibration: Path | None, engine: str, out: Path, **stretch: float | None) -> None:
     """Run the firmware's own lean meter over a recorded log."""
     calibration = _given_or_beside(ride, calibration, out)
     parameters = read_calibration(calibration)
     with Bar("replaying") as bar:
         count, notices = replay_to_csv(_stretch(ride, **stretch), parameters, engine, out, bar.reach)
-    warn(ride, notices)
+    common.warn(ride, notices)
     if not parameters.aligned:
-        warning(f"{calibration} is not aligned: this is the lean of the sensor, not of the bike")
+        common.warning(f"{calibration} is not aligned: this is the lean of the sensor, not of the bike")
     click.echo(f"written: {out}, {count} samples")
 
 
 @click.command()
-@RIDE
-@CALIBRATION
-@STRETCH
-@OUT
-@RIGHT_HANDED
+@common.RIDE
+@common.CALIBRATION
+@common.STRETCH
+@common.OUT
+@common.RIGHT_HANDED
 def smooth_command(ride: Path, calibration: Path | None, out: Path, **stretch: float | None) -> None:
     """Find the lean afterwards, from the whole ride, each sample with its standard deviation."""
     parameters = read_calibration(_given_or_beside(ride, calibration, out))
     with Bar("smoothing") as bar:
         count, notices = smooth_to_csv(_stretch(ride, **stretch), parameters, out, bar.reach)
-    warn(ride, notices)
+    common.warn(ride, notices)
     click.echo(f"written: {out}, {count} samples")
 
 
 @click.command()
-@ride_or_export
-@CALIBRATION
+@common.ride_or_export
+@common.CALIBRATION
 @click.option("--to", "form", required=True, type=click.Choice(["csv", "gpx", "vbo", "racechrono", "parquet"]))
-@live
-@OUT
-@RIGHT_HANDED
+@common.live
+@common.OUT
+@common.RIGHT_HANDED
 def export_command(ride: Path, form: str, calibration: Path | None, live: bool, out: Path) -> None:
     """Export a ride for maps (gpx), Circuit Tools (vbo), RaceChrono, or data frames (parquet, csv)."""
     check_output(out, [*_inputs(ride), calibration or calibration_path(ride)])
     opened, notices = _opened(ride, calibration, live)
     with Bar("exporting") as bar:
         count = export(opened, form, out, bar.reach, notices)
-    warn(ride, notices)
+    common.warn(ride, notices)
     click.echo(f"written: {out}, {count} rows")
 
 
 @click.command()
-@ride_or_export
-@CALIBRATION
-@STRETCH
-@live
-@JSON
-@RIGHT_HANDED
+@common.ride_or_export
+@common.CALIBRATION
+@common.STRETCH
+@common.live
+@common.JSON
+@common.RIGHT_HANDED
 def report_command(ride: Path, calibration: Path | None, live: bool, as_json: bool, **stretch: float | None) -> None:
     """Summarise a ride on one page: maxima, time at large leans, and each stop evaluated as a brake test."""
     seen = _overview(ride, calibration, live, **stretch)
@@ -230,13 +208,13 @@ def report_command(ride: Path, calibration: Path | None, live: bool, as_json: bo
 
 
 @click.command()
-@ride_or_export
-@CALIBRATION
-@STRETCH
+@common.ride_or_export
+@common.CALIBRATION
+@common.STRETCH
 @click.option("--tiles", is_flag=True, help="Streets below the track: the page asks a server for them when it is open.")
-@live
-@OUT_DIRECTORY
-@RIGHT_HANDED
+@common.live
+@common.OUT_DIRECTORY
+@common.RIGHT_HANDED
 def plot_command(
     ride: Path, calibration: Path | None, tiles: bool, live: bool, out: Path, **stretch: float | None
 ) -> None:
@@ -245,13 +223,13 @@ def plot_command(
     seen = _overview(ride, calibration, live, **stretch)
     with spinner("drawing"):
         written = list(plot.draw(seen, out, tiles))
-    print_lines(f"written: {path}" for path in written)
+    common.print_lines(f"written: {path}" for path in written)
 
 
 @click.command()
-@file_argument("log", "LOG.csv")
-@STRETCH
-@OUT
+@common.file_argument("log", "LOG.csv")
+@common.STRETCH
+@common.OUT
 def cut_command(log: Path, from_s: float | None, to_s: float | None, out: Path) -> None:
     """Cut a stretch out of a log: a still pose for calibrate two or six, or one ride of several."""
     if from_s is None and to_s is None:
@@ -260,32 +238,32 @@ def cut_command(log: Path, from_s: float | None, to_s: float | None, out: Path) 
     notices: list[Notice] = []
     with Bar("cutting") as bar:
         count, seconds = cut_log(log, out, from_s, to_s, bar.reach, notices)
-    warn(log, notices)
+    common.warn(log, notices)
     click.echo(f"written: {out}, {count} samples, {seconds:.1f} s")
 
 
 @click.command()
-@RIDE
-@CALIBRATION
-@click.option("--video", type=PATH, help="A video of the ride; without it a transparent clip is written.")
+@common.RIDE
+@common.CALIBRATION
+@click.option("--video", type=common.PATH, help="A video of the ride; without it a transparent clip is written.")
 @click.option(
     "--offset",
     "offset_s",
-    type=TIME,
+    type=common.TIME,
     metavar="TIME",
     help="The ride's time at the video's first picture: 12.5 if the video begins 12.5 s after the ride, -3 if 3 s "
     "before it. Not needed for a GoPro on the bike.",
 )
 @click.option("--fps", type=click.Choice(["30", "60"]), help="Frames per second; if not given, the video's, or 30.")
-@from_to("Only from this time of the ride on: 90 or 1:30.", "Only up to there; negative: from the end.")
+@common.from_to("Only from this time of the ride on: 90 or 1:30.", "Only up to there; negative: from the end.")
 @click.option(
     "--height",
     type=click.IntRange(240, 4320),
     help="Height in pixels of the video that the clip is meant for; if not given, 1080.",
 )
 @click.option("--mph", is_flag=True, help="Miles an hour instead of kilometres.")
-@live
-@out_option("FILE.mp4 with --video, else FILE.mov or FILE.webm.")
+@common.live
+@common.out_option("FILE.mp4 with --video, else FILE.mov or FILE.webm.")
 def overlay_command(
     ride: Path, calibration: Path | None, video: Path | None, fps: str | None, out: Path, **options: Any
 ) -> None:
@@ -297,7 +275,7 @@ def overlay_command(
     rate = float(fps) if fps else None
     with Bar("reading and drawing") as bar:
         made = overlay(ride, out, calibration, video, fps=rate, progress=bar.reach, **options)
-    warn(ride, made.notices)
+    common.warn(ride, made.notices)
     if made.correlation is not None:
         click.echo(
             f"the video begins at {made.offset_s:.2f} s of the ride, as the camera's gyro has it (correlation "
@@ -322,7 +300,7 @@ def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float
         with Bar("aligning") as bar:
             fit = fit_ride(found.log, None, bar.reach)
         known = fit.calibration
-        said += f"; aligned by its bends, {known_to(fit)}"
+        said += f"; aligned by its bends, {common.known_to(fit)}"
     click.echo(said, err=True)
     return open_ride(_stretch(found.log, **stretch), known, smoothed=not live), found.notices
 
@@ -334,7 +312,7 @@ def _overview(source: Path, calibration: Path | None, live: bool, **stretch: flo
         seen = overview(opened, bar.reach)
     known = {sentence(notice) for notice in seen.notices}  # the log that was imported is checked again
     seen.notices[:0] = [notice for notice in imported if sentence(notice) not in known]
-    warn(source, seen.notices)
+    common.warn(source, seen.notices)
     return seen
 
 

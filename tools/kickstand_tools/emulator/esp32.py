@@ -25,6 +25,7 @@ from .esp32_machine import (
     COMMAND,
     GO,
     HANG,
+    LEVEL as WIRE,
     MESSAGE,
     PIN,
     PRINTED,
@@ -35,9 +36,6 @@ from .esp32_machine import (
     SYNC,
     UART,
     WRITE,
-)
-from .esp32_machine import (
-    LEVEL as WIRE,
 )
 
 _IMAGE_AT, _FLASH_SIZE = 0x1000, 4 << 20

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from kickstand.errors import Notice, Refusal
-from numpy.typing import NDArray
 
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
@@ -21,11 +20,9 @@ from ..logs.frozen import without_frozen
 from ..logs.log import Log
 from ..logs.reader import Source, read_log
 from ..logs.source import Progress
-from ..logs.table import Array
 from ..refusals import RefusedInput
-from ..signals.cells import stretches
+from ..signals import Array, Bools, rotation_vector, stretches
 from ..signals.leaning import averaged
-from ..signals.rotations import rotation_vector
 from .first_guess import MIN_RIDING_S, MOUNTED_DEG, MOUNTED_S, Axes, axes, standing
 from .hypotheses import Hypotheses
 from .least_squares import Estimate
@@ -169,7 +166,7 @@ def mounted_windows(log: Log) -> Windows:
     return _windows(log, (log.t_s >= first) & (log.t_s < min(last, first + LONGEST_S)))
 
 
-def _windows(log: Log, part: NDArray[np.bool_] | slice = slice(None)) -> Windows:
+def _windows(log: Log, part: Bools | slice = slice(None)) -> Windows:
     """The windows of a part of the log, along the sensor's axes. Raises Refusal."""
     t_s, rate = log.t_s[part], np.radians(log.gyro_dps[part])
     if len(t_s) < 2:

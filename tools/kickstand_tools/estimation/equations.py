@@ -22,9 +22,8 @@ velocity is the sensor's less the rates times its place (rigid body). The measur
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
-from numpy.typing import NDArray
 
-from ..logs.table import Array
+from ..signals import Array, Ints
 from . import unknowns as of
 from .unknowns import BIAS, FORWARD, LEAN, LEFT, PITCH, STATES, UP
 from .windows import Windows
@@ -74,7 +73,7 @@ def process_and_measurements(windows: Windows, x: Array) -> Array:
     return found
 
 
-def jacobian(windows: Windows, x: Array, unknown: NDArray[np.intp]) -> Array:
+def jacobian(windows: Windows, x: Array, unknown: Ints) -> Array:
     """(len(unknown), ROWS, n): derivatives of process_and_measurements() by the rows `unknown` of x, as finite
     differences."""
     found, moved = np.empty((len(unknown), ROWS, x.shape[1])), x.copy()

@@ -6,11 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from kickstand.errors import Refusal
 from kickstand.units import STANDARD_GRAVITY
-from numpy.typing import NDArray
 
-from ..logs.table import Array
+from ..signals import Array, Bools, motionless
 from ..signals.leaning import WINDOW_S, Leaning, averaged, leaning_of, speed_in_radians, without_drift
-from ..signals.standstill import motionless
 from .windows import Windows
 
 STILL_S = 1.6  # shorter standstills look like smooth riding
@@ -33,19 +31,19 @@ MAX_SPEED_FACTOR = 1.8  # limit of the log's speed over that of the bends, and o
 USUAL_MPS, USUAL_RADPS = 10.0, 0.14
 
 
-def standing(w: Windows) -> NDArray[np.bool_]:
+def standing(w: Windows) -> Bools:
     """(n) True where the bike stands still, for zero-velocity updates: rates and forces do not change, the mean rate is
     under BIAS_RADPS, and the speed, if known, agrees."""
     return _calm(w, STILL_S) & (np.linalg.norm(averaged(w.rate, STILL_S), axis=1) < BIAS_RADPS)
 
 
-def _calm(w: Windows, over_s: float) -> NDArray[np.bool_]:
+def _calm(w: Windows, over_s: float) -> Bools:
     return ~w.gap & motionless(
         w.rate, w.force, 2 * round(0.5 * over_s / WINDOW_S) + 1, STILL_RADPS, STILL_G, w.known_speed
     )
 
 
-def in_hand(w: Windows) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def in_hand(w: Windows) -> tuple[Bools, Bools]:
     """Two (n): True where the sensor is surely moved about in a hand, or lies with the bike, because up is far from
     where it was; and True in these windows and the seconds before and after, which may not be riding either.
 
@@ -64,7 +62,7 @@ def in_hand(w: Windows) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     return averaged(share, SURELY_S) > 0.99, averaged(share, MOUNTED_S) > 0.01
 
 
-def lean_and_speed(w: Windows, still: NDArray[np.bool_]) -> tuple[Array, Array]:
+def lean_and_speed(w: Windows, still: Bools) -> tuple[Array, Array]:
     """Lean (n, rad) and speed (n, m/s), roughly. still (n): see standing().
 
     Without a speed in the log it is computed from the force in bends: in balance that is 1 / cos(lean), and speed x yaw
@@ -120,7 +118,7 @@ def _bias(w: Windows) -> Array:
     return np.median(averaged(w.rate, CALM_S), axis=0)
 
 
-def _refuse_no_motorcycle(found: Leaning, sideways: Array, riding: NDArray[np.bool_]) -> None:
+def _refuse_no_motorcycle(found: Leaning, sideways: Array, riding: Bools) -> None:
     """Raise Refusal unless the ride is a motorcycle's with enough leaning and right-handed rates. sideways (n): force
     to the left, g, less what changes slowly."""
     in_radians_mps = speed_in_radians(found)

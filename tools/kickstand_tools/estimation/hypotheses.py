@@ -9,9 +9,8 @@ both, and its standard deviation is as large as the difference.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..logs.table import Array
+from ..signals import Array, Ints
 from .solver import RandomWalks, Reduced, minus_two_log_likelihood
 from .unknowns import BESIDE, OFFSET, PARAMETERS, ROTATION, Prior
 
@@ -46,7 +45,7 @@ class Hypotheses:
     minus_two_log_prior: Array
     weight: Array
 
-    def select(self, index: NDArray[np.intp], weight: Array) -> "Hypotheses":
+    def select(self, index: Ints, weight: Array) -> "Hypotheses":
         """The hypotheses with these indices (k), with the posterior weights `weight` (k)."""
         return Hypotheses(
             self.turning[index], self.rolling[index], self.pushed[index], self.minus_two_log_prior[index], weight

@@ -5,11 +5,8 @@ its standard deviation. Outliers of both are down-weighted (Cauchy).
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..logs.table import Array
-from ..signals.cells import stretches
-from ..signals.rotations import rotation_matrix
+from ..signals import Array, Bools, Ints, rotation_matrix, stretches
 from .equations import BALANCED, RESTING, RESTING_RATE, ROWS, SLIDING, jacobian, process_and_measurements
 from .first_guess import lean_and_speed, standing
 from .hypotheses import Hypotheses
@@ -56,7 +53,7 @@ class Estimate:
             self._converge()
         self._use_own_noise()
 
-    def unknowns(self, number: NDArray[np.intp], states: Array) -> Array:
+    def unknowns(self, number: Ints, states: Array) -> Array:
         """(STATES + PARAMETERS, k): states and parameters as equations.py takes them. number (k): index of the window
         of each of states (k, STATES)."""
         return np.concatenate((states.T, self.parameters[number // self._length].T))
@@ -86,7 +83,7 @@ class Estimate:
         found = solve(self._reduced(robust=True), walks, self._likely.weight)[1][:, ROTATION]
         return found[-1] - found[0]
 
-    def _start(self, still: NDArray[np.bool_]) -> None:
+    def _start(self, still: Bools) -> None:
         """Estimate from the beginning. still (n): True where the bike stands."""
         self._likely = self._hypotheses.first()
         self.noise = Noise(self._windows, still)
@@ -98,7 +95,7 @@ class Estimate:
         self.change = np.inf
         self._converge()
 
-    def _false_standstill(self, still: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _false_standstill(self, still: Bools) -> Bools:
         """(n) True in the brief ones that the motion before and after contradicts."""
         contradicted = np.max(np.abs(self._residuals() / self.noise.sigma())[:, CONTRADICTING], axis=1) > CONTRADICTED
         false = np.zeros_like(still)

@@ -6,10 +6,8 @@ as independent.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..logs.table import Array
-from ..signals.averages import moving_mean
+from ..signals import Array, Bools, moving_mean
 from ..signals.leaning import WINDOW_S, averaged
 from . import equations as eq
 from .first_guess import in_hand
@@ -74,7 +72,7 @@ class Noise:
     noise, 1 where the accelerations are the bike's. unbalance: 1 for an average ride; multiplies the noise of BALANCED.
     """
 
-    def __init__(self, windows: Windows, still: NDArray[np.bool_]) -> None:
+    def __init__(self, windows: Windows, still: Bools) -> None:
         self._windows, self._still = windows, still & ~windows.gap
         self._in_hand, self._not_riding = (held & ~still for held in in_hand(windows))
         self._rolling = np.gradient(windows.rate[:, 2]) / WINDOW_S if len(windows) > 1 else np.zeros(1)
@@ -158,12 +156,12 @@ class Noise:
         self.unbalance = float(np.clip(np.sqrt(np.mean(mean**2) / left), LEAST_UNBALANCE, MOST_UNBALANCE))
 
     @property
-    def doubtful(self) -> NDArray[np.bool_]:
+    def doubtful(self) -> Bools:
         """(n) True where the bike rides and its accelerations are so far from a bike's that the misfit is bounded."""
         return self.riding & (self.misfit >= MOST_MISFIT)
 
     @property
-    def _balanced(self) -> NDArray[np.bool_]:
+    def _balanced(self) -> Bools:
         return self.riding & (self.speed > BALANCE_MIN_MPS)
 
     def _of_balance(self) -> Array:

@@ -1,6 +1,6 @@
 """The smoothed lean of a recorded ride: at each instant from all readings, earlier and later ones."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -9,17 +9,16 @@ from kickstand.errors import Notice
 
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
-from ..logs.block import Block
 from ..logs.csv_lines import write_lean
+from ..logs.log import Block, Table, within
 from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import Progress, name_of
-from ..logs.stretch import within
-from ..logs.table import Array, Table
+from ..refusals import WRONG_AXES, WRONG_MOUNT
+from ..signals import Array, Bools
 from .equations import corrected_rates
 from .hypotheses import ALL, ROLL
 from .least_squares import Estimate
 from .noise import jolted
-from .remarks import SmoothedRemarks
 from .unknowns import FORWARD, LEAN, PITCH, Prior
 from .windows import Windows, windows_of
 
@@ -32,6 +31,10 @@ LEANED_SHARE = 0.004
 TIMING_S = 0.004  # s
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps", "doubtful")
 DIGITS = 3, 3, 3, 3, 0
+DOUBTFUL = 0.2  # share of the riding; more is remarked
+# Largest lean in which a bike is in balance on straights, if the upright pose was right and no luggage sits on one side
+POSE_DEG = 1.8
+CAUSES = WRONG_AXES | WRONG_MOUNT  # reasons why accelerations do not fit a bike: then nothing is said of the pose
 
 
 @dataclass(eq=False)
@@ -111,18 +114,16 @@ def smooth_blocks(
         raise InputError("the calibration is not aligned, so the lean is unknown", "align")
     past: list[Block] = []
     waiting: list[Block] = []
-    start_c, remarks = np.nan, SmoothedRemarks()
+    smoother = Smoother(calibration)
     for segment in _segments(read_blocks(log, 2, progress, notices, lines=lines, calibration=calibration)):
         waiting.append(segment)
-        known = segment.readings[~np.isnan(segment.readings[:, 3]), 3]
-        start_c = float(known[0]) if np.isnan(start_c) and len(known) else start_c
         if len(waiting) > TOGETHER:
             past, waiting, before = waiting[:TOGETHER], waiting[TOGETHER:], past[-1:]
-            yield from _together(before, past, waiting, calibration, start_c, remarks)
+            yield from smoother.together(before, past, waiting)
     # the end of a ride may be short: segments before it are estimated with it, up to TOGETHER
-    yield from _together(past[-max(1, TOGETHER - len(waiting)) :], waiting, [], calibration, start_c, remarks)
+    yield from smoother.together(past[-max(1, TOGETHER - len(waiting)) :], waiting, [])
     if notices is not None:
-        notices.extend(remarks.remarks(notices))
+        notices.extend(smoother.remarks(notices))
 
 
 def _segments(blocks: Iterator[Block]) -> Iterator[Block]:
@@ -134,62 +135,79 @@ def _segments(blocks: Iterator[Block]) -> Iterator[Block]:
             yield block.part(slice(begin, end))
 
 
-def _together(
-    before: list[Block],
-    own: list[Block],
-    after: list[Block],
-    calibration: CalibrationFile,
-    start_c: float,
-    remarks: SmoothedRemarks,
-) -> Iterator[tuple[Block, Array | None]]:
-    """Each of the segments `own` with its values, estimated together with those before and after them."""
-    measured = [segment.measured for segment in (*before, *own, *after)]
-    ends = np.cumsum([0, *(len(segment.time_us) for segment in measured)])
-    first = int(ends[len(before)])
-    values = _estimated(measured, calibration, start_c, remarks, slice(first, int(ends[len(before) + len(own)])))
-    for segment in own:
-        if values is None:
-            yield segment, None
-            continue
-        found = np.full((len(segment.time_us), len(COLUMNS)), np.nan)
-        there = ~segment.frozen
-        count = int(np.count_nonzero(there))
-        found[there] = values[first : first + count]
-        first += count
-        yield segment, found
+class Smoother:
+    """Smooths a ride segment by segment, and collects what is to be remarked on: errors that the standard deviation
+    does not contain, or only in part."""
 
+    def __init__(self, calibration: CalibrationFile) -> None:
+        self._calibration = calibration
+        self._start_c = np.nan  # the first temperature of the log
+        self._doubtful_s = self._riding_s = self._leaned = 0.0
 
-def _estimated(
-    segments: list[Block], calibration: CalibrationFile, start_c: float, remarks: SmoothedRemarks, own: slice
-) -> Array | None:
-    """(samples, COLUMNS), NaN where the readings are not a ride's; None for under SLOWEST_HZ samples a second. own:
-    the samples whose lean this call is for, between those that only help to find it; remarks count these alone."""
-    t_s = np.concatenate([segment.t_s for segment in segments])
-    readings = np.concatenate([segment.readings for segment in segments])
-    speed = np.concatenate([segment.speed_mps for segment in segments])
-    nothing = np.full((len(t_s), len(COLUMNS)), np.nan)
-    if len(t_s) < 2:
-        return nothing
-    if float(np.median(np.diff(t_s))) * SLOWEST_HZ > 1.0:
-        return None
-    there, warm = ~np.isnan(readings[:, 3]), np.zeros(len(t_s))
-    if np.any(there) and not np.isnan(start_c):
-        warm = np.interp(t_s, t_s[there], readings[there, 3]) - start_c
-    force, rate = calibration.in_vehicle(readings)
-    rate = np.radians(rate)
-    windows = windows_of(t_s, force, rate, speed, warm)
-    try:
-        estimate = Estimate(windows, Prior.of_pose(calibration.six_done), ALL)
-    except np.linalg.LinAlgError:
-        return nothing  # readings that are not a ride's
-    noise, mine = estimate.noise, np.unique(windows.number[own])
-    roll = float(np.mean(estimate.parameters[:, ROLL]))
-    remarks.add(windows.seconds[mine], noise.riding[mine], noise.doubtful[mine], roll)
-    found = np.column_stack(
-        (at_samples(windows, rate, estimate, calibration.delay_s()), noise.doubtful[windows.number].astype(float))
-    )
-    found[:, :3] = np.degrees(found[:, :3])
-    return found
+    def together(
+        self, before: list[Block], own: list[Block], after: list[Block]
+    ) -> Iterator[tuple[Block, Array | None]]:
+        """Each of the segments `own` with its values, estimated together with those before and after them."""
+        measured = [segment.measured for segment in (*before, *own, *after)]
+        ends = np.cumsum([0, *(len(segment.time_us) for segment in measured)])
+        first = int(ends[len(before)])
+        values = self.estimated(measured, slice(first, int(ends[len(before) + len(own)])))
+        for segment in own:
+            if values is None:
+                yield segment, None
+                continue
+            found = np.full((len(segment.time_us), len(COLUMNS)), np.nan)
+            there = ~segment.frozen
+            count = int(np.count_nonzero(there))
+            found[there] = values[first : first + count]
+            first += count
+            yield segment, found
+
+    def estimated(self, segments: list[Block], own: slice) -> Array | None:
+        """(samples, COLUMNS), NaN where the readings are not a ride's; None for under SLOWEST_HZ samples a second. own:
+        the samples whose lean this call is for, between those that only help to find it; remarks count these alone."""
+        t_s = np.concatenate([segment.t_s for segment in segments])
+        readings = np.concatenate([segment.readings for segment in segments])
+        speed = np.concatenate([segment.speed_mps for segment in segments])
+        nothing = np.full((len(t_s), len(COLUMNS)), np.nan)
+        if len(t_s) < 2:
+            return nothing
+        if float(np.median(np.diff(t_s))) * SLOWEST_HZ > 1.0:
+            return None
+        there, warm = ~np.isnan(readings[:, 3]), np.zeros(len(t_s))
+        if np.any(there):
+            self._start_c = readings[there, 3][0] if np.isnan(self._start_c) else self._start_c
+            warm = np.interp(t_s, t_s[there], readings[there, 3]) - self._start_c
+        force, rate = self._calibration.in_vehicle(readings)
+        rate = np.radians(rate)
+        windows = windows_of(t_s, force, rate, speed, warm)
+        try:
+            estimate = Estimate(windows, Prior.of_pose(self._calibration.six_done), ALL)
+        except np.linalg.LinAlgError:
+            return nothing  # readings that are not a ride's
+        noise, mine = estimate.noise, np.unique(windows.number[own])
+        roll = float(np.mean(estimate.parameters[:, ROLL]))
+        self.add(windows.seconds[mine], noise.riding[mine], noise.doubtful[mine], roll)
+        doubtful = noise.doubtful[windows.number].astype(float)
+        found = np.column_stack((at_samples(windows, rate, estimate, self._calibration.delay_s()), doubtful))
+        found[:, :3] = np.degrees(found[:, :3])
+        return found
+
+    def add(self, seconds: Array, riding: Bools, doubtful: Bools, pose_rad: float) -> None:
+        """Count n windows of so many seconds. doubtful: True where accelerations are not the bike's. pose_rad: lean to
+        the right, by the upright pose, in which the bike is in balance on straights."""
+        riding_s = float(np.sum(seconds[riding]))
+        self._riding_s += riding_s
+        self._doubtful_s += float(np.sum(seconds[riding & doubtful]))
+        self._leaned += riding_s * float(np.degrees(pose_rad))
+
+    def remarks(self, known: Iterable[Notice]) -> list[Notice]:
+        """Those about the whole ride. known: what is remarked of it already."""
+        if not self._riding_s or any(notice.code in CAUSES for notice in known):
+            return []
+        share, pose_deg = self._doubtful_s / self._riding_s, self._leaned / self._riding_s
+        found = [Notice("not-the-bikes", 100.0 * share)] if share > DOUBTFUL else []
+        return [*found, Notice("pose-off", pose_deg)] if abs(pose_deg) > POSE_DEG else found
 
 
 def at_samples(windows: Windows, rate: Array, found: Estimate, delay_s: float) -> Array:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..logs.table import Array
+from ..signals import Array
 
 
 @dataclass

@@ -6,9 +6,8 @@ Parameters are constant within a block of windows and follow a random walk from 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..logs.table import Array
+from ..signals import Array, Ints
 
 # lean and pitch (rad), velocity of the sensor to the left, up and forward (m/s), bias of the gyro (rad/s)
 LEAN, PITCH, LEFT, UP, FORWARD, BIAS = 0, 1, 2, 3, 4, slice(5, 8)
@@ -66,7 +65,7 @@ class Prior:
         return cls(MEAN, sigma, True)
 
     @property
-    def unknown(self) -> NDArray[np.intp]:
+    def unknown(self) -> Ints:
         """The indices (m) of the parameters that are estimated."""
         return np.flatnonzero(self.sigma)
 

@@ -3,12 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..logs.table import Array
-from ..signals.cells import cell_numbers
+from ..signals import Array, Bools, Ints, cell_numbers, rotated
 from ..signals.leaning import WINDOW_S
-from ..signals.rotations import rotated
 
 GAP_S = 0.17  # a longer step between two samples: readings are missing
 
@@ -29,8 +26,8 @@ class Windows:
     jolt: Array
     speed: Array
     warm: Array
-    gap: NDArray[np.bool_]
-    number: NDArray[np.intp]
+    gap: Bools
+    number: Ints
     before: Array
     after: Array
 
@@ -71,12 +68,9 @@ class Windows:
         return replace(
             self,
             edges=longer(self.edges, self.edges[-1]),
-            rate=longer(self.rate),
-            force=longer(self.force),
-            jolt=longer(self.jolt),
             speed=longer(self.speed, np.nan),
-            warm=longer(self.warm),
             gap=np.append(self.gap, np.ones(more, dtype=bool)),
+            **{name: longer(getattr(self, name)) for name in ("rate", "force", "jolt", "warm")},
         )
 
 

@@ -25,11 +25,8 @@ from kickstand.drive_alignment.alignment import MOTORCYCLE
 from kickstand.drive_alignment.events import MAX_INTERVAL_US
 from kickstand.units import GAP_US, STANDARD_GRAVITY
 
-from ..logs.log import Log
-from ..logs.table import Array, Table
-from ..signals.averages import moving_mean
-from ..signals.cells import runs
-from ..signals.standstill import STANDING_MPS
+from ..logs.log import Log, Table
+from ..signals import STANDING_MPS, Array, moving_mean, runs
 
 INTERVAL_S = 0.9  # least time between two speeds that are used
 MOVING_MPS = 2.0

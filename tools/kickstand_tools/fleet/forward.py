@@ -12,8 +12,7 @@ import numpy as np
 from kickstand.drive_alignment.quality import AGREE_DEG, READY_DEG
 
 from ..calibration.drive import UP_DEG, DriveFit
-from ..logs.table import Array
-from ..signals.rotations import rotation_vector
+from ..signals import Array, rotation_vector
 from . import evidence
 from .evidence import Intervals
 

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..logs.table import Array
-from ..signals.rotations import rotation_vector
+from ..signals import Array, rotation_vector
 from . import evidence
 from .evidence import Blocks, Intervals, blocks, fits, frames
 

@@ -13,14 +13,17 @@ from kickstand.drive_alignment.quality import AGREE_DEG
 from kickstand.drive_alignment.speed_check import fit_problem
 from kickstand.errors import AlignmentError
 
-from ..analysis.stops.brake_test import Stop
+from ..analysis.channels import Channels, channels, downsampled, joined
+from ..analysis.ride import Ride
+from ..analysis.stops.brake_test import RATE_S, Stop, find_stops
 from ..calibration.drive import DriveFit, fit_logs, usable
 from ..calibration.file import CalibrationFile
 from ..errors import InputError, cause
 from ..logs.log import Log
+from ..logs.reader import Source, read_blocks
 from ..refusals import RefusedInput, sentence
+from ..signals import Array
 from . import evidence, files, signals
-from .brake_tests import brake_tests
 from .forward import Forward, find_forward
 from .manifest import Period
 from .moved import Move, find_moves
@@ -39,7 +42,7 @@ Row = dict[str, Any]
 
 @dataclass
 class PeriodResult:
-    """The rows of one mount of one vehicle in schema.TABLES, and the points of its picture: for each of some intervals
+    """The rows of one mount of one vehicle in tables.TABLES, and the points of its picture: for each of some intervals
     the change of speed, the force forward, the centripetal acceleration, the force to the left (4, g)."""
 
     alignment: Row
@@ -274,3 +277,34 @@ def _picture(drive: _Drive) -> list[list[float]]:
     table = np.column_stack((terms[:, 1], force[:, 2], terms[:, 2], force[:, 0]))
     step = max(1, math.ceil(len(table) / _PLOTTED))
     return table[::step].round(3).tolist()
+
+
+def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
+    """Every stop of a log from over 10 km/h, as UN Regulation No. 13 measures it (see find_stops). Raises InputError.
+
+    calibration: an aligned one. A car has no lean, so the firmware's lean filter, which takes most of the time, is run
+    for motorcycles only.
+
+    >>> from kickstand_tools.api import Log, fit_two_positions, simulate_ride
+    >>> ride = simulate_ride("street", seed=1, seconds=60.0)
+    >>> poses = [Log.from_readings(pose, ride.rate_hz) for pose in (ride.kickstand, ride.upright)]
+    >>> log = Log.from_readings(ride.readings, ride.rate_hz)
+    >>> log.speed_mps[::200] = ride.truth["speed_mps"][::200]  # once a second
+    >>> stops = brake_tests(log, fit_two_positions(*poses).calibration)
+    >>> stops[-1].initial_speed_mps > 3.0, stops[-1].mfdd_mps2 > 1.0
+    (True, True)
+    """
+    ride = Ride(log, calibration)
+    blocks = car_channels(log, calibration) if ride.car else list(ride.blocks())
+    return find_stops(joined(list(downsampled(blocks, RATE_S))))
+
+
+def car_channels(log: Source, calibration: CalibrationFile) -> list[Channels]:
+    """The channels of a car's log, block by block: in the vehicle's axes, without a lean."""
+    found = []
+    for whole in read_blocks(log):
+        block = whole.measured
+        if len(block.time_us):
+            lean: dict[str, Array] = {name: np.zeros(len(block.time_us)) for name in ("shown_g", "resting", "sure")}
+            found.append(channels(block, calibration, lean, car=True))
+    return found

@@ -47,7 +47,7 @@ def run_fleet(
     timeout_s: float = TIMEOUT_S,
     progress: Callable[[int, int], None] | None = None,
 ) -> FleetRun:
-    """Work on all periods (see read_manifest), and write tables (see schema.TABLES), pictures and index.html to out, a
+    """Work on all periods (see read_manifest), and write tables (see tables.TABLES), pictures and index.html to out, a
     directory or a place in a store (s3://...).
 
     scheduler: the address of a Dask cluster, None for workers on this computer: `workers`, or one per processor.

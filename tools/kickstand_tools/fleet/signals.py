@@ -6,9 +6,8 @@ import io
 import numpy as np
 
 from ..calibration.file import CalibrationFile
-from ..logs.log import Log
+from ..logs.log import Log, float_schema
 from ..logs.source import log_stem
-from ..logs.table import float_schema
 from .files import file_stem, folder_value, printable, write_bytes
 from .manifest import Period
 

@@ -15,11 +15,12 @@ from ..errors import InputError
 from ..logs.csv_lines import write_log
 from ..logs.log import Log
 from ..logs.reader import read_log
+from ..signals import Array
 from . import mapped
 from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, sensor_logger, sensorlog, vbo
 from .files import RecordingFile, read_files
 from .join import GAP_NS, join
-from .recording import Array, Recording, Taken
+from .recording import Recording, Taken
 from .units import ACCELERATIONS, SPEEDS, factor, unit
 
 # Each is a module with NAME, the app's; finds(files): the files of each of its recordings among these; and
@@ -81,7 +82,8 @@ def import_recording(
     >>> round(found.rate_hz), found.log.accel_g[0].round(3).tolist(), found.log.gyro_dps[0].round(2).tolist()
     (100, [0.0, 1.0, 0.0], [0.0, 0.0, 5.73])
     """
-    return _imported(read_files(source), str(source), columns, dict(units or {}), start_s, end_s)
+    recording = _recording(read_files(source), str(source), columns, dict(units or {}))
+    return _imported(recording, str(source), start_s, end_s)
 
 
 def import_of_app(source: Path) -> Imported | None:
@@ -94,18 +96,10 @@ def import_of_app(source: Path) -> Imported | None:
         if source.is_dir() or is_zipfile(source):
             raise
         return None
-    return _imported(files, str(source), None, {}, None, None) if known else None
+    return _imported(_recording(files, str(source), None, {}), str(source)) if known else None
 
 
-def _imported(
-    files: list[RecordingFile],
-    name: str,
-    columns: Mapping[str, str] | None,
-    units: dict[str, str],
-    start_s: float | None,
-    end_s: float | None,
-) -> Imported:
-    recording = _recording(files, name, columns, units)
+def _imported(recording: Recording, name: str, start_s: float | None = None, end_s: float | None = None) -> Imported:
     log, damaged = join(recording, name)
     _check_sign(recording, log)
     if damaged:

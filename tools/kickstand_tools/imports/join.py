@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 from kickstand.units import LOST_US
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..logs.cells import MOST_DPS, MOST_G, TRACK
 from ..logs.even_times import even_times
 from ..logs.log import Log
-from .recording import Array, Recording, Sensor, Track
+from ..signals import Array, Bools, Ints
+from .recording import Recording, Sensor, Track
 
 MOST_MPS = 200.0  # largest speed, and largest degrees of a position
 GAP_NS = LOST_US * 1000  # no interpolation between samples that are further apart
@@ -81,7 +81,7 @@ def in_order(sensor: Sensor, name: str) -> Sensor:
     return replace(sensor, time_ns=even_ns, values=values)
 
 
-def _damaged(time_ns: NDArray[np.int64]) -> NDArray[np.bool_]:
+def _damaged(time_ns: Ints) -> Bools:
     """(n) True for a time that fits neither the one before nor the one after it, which fit each other."""
     wrong = np.zeros(len(time_ns), dtype=bool)
     if len(time_ns) > 2:
@@ -94,7 +94,7 @@ def _damaged(time_ns: NDArray[np.int64]) -> NDArray[np.bool_]:
     return wrong
 
 
-def on_clock(sensor: Sensor, clock_ns: NDArray[np.int64], period_ns: float) -> Array:
+def on_clock(sensor: Sensor, clock_ns: Ints, period_ns: float) -> Array:
     """A sensor's values (n, 3) at the times of another clock (n); NaN outside its own and in its gaps.
 
     Interpolated along straight lines; a sensor that is faster than the clock, whose period is given, is averaged.
@@ -160,7 +160,7 @@ def _period_ns(sensor: Sensor) -> float:
     return float(np.median(np.diff(sensor.time_ns)))
 
 
-def _on_rows(track: Track | None, time_ns: NDArray[np.int64], utc_ns: int | None) -> dict[str, Any]:
+def _on_rows(track: Track | None, time_ns: Ints, utc_ns: int | None) -> dict[str, Any]:
     """Speed, latitude, longitude and UTC (n each): each of the track's values in the row nearest to it in time."""
     found = {name: np.full(len(time_ns), np.nan) for name in TRACK}
     if utc_ns is not None:

@@ -10,10 +10,8 @@ from kickstand.units import STANDARD_GRAVITY
 
 from ..errors import InputError
 from .files import RecordingFile
-from .recording import Recording, Sensor, Taken, rate_hz, track_of
-from .sheets import Sheet, names_in, plain, read_sheet, unit_in
-from .times import EPOCH_NS, Nanoseconds, time_unit
-from .units import ACCELERATIONS, ANGLES, RATES, SPEEDS, TIMES, factor, unit
+from .recording import Recording, Sensor, Sheet, Taken, names_in, plain, rate_hz, read_sheet, track_of, unit_in
+from .units import ACCELERATIONS, ANGLES, EPOCH_NS, RATES, SPEEDS, TIMES, Nanoseconds, factor, time_unit, unit
 
 NAME = "a table"
 ACCEL, GYRO = ("ax", "ay", "az"), ("gx", "gy", "gz")

@@ -1,11 +1,18 @@
-"""The units of apps, with their factors to a log's own: g, deg/s, m/s, seconds, degrees."""
+"""The units of apps, with their factors to a log's own: g, deg/s, m/s, degrees. Their times in nanoseconds: numbers in
+s, ms, us or ns, from any start or from 1970, dates, clocks."""
 
 import math
 import re
+from datetime import UTC, datetime, timedelta
+from typing import Any
 
+import numpy as np
 from kickstand.units import STANDARD_GRAVITY
+from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..logs.csv_reader import Cells, as_text, filled, numbers_of
+from ..signals import Array, Ints
 
 ACCELERATIONS = {"g": 1.0, "m/s2": 1.0 / STANDARD_GRAVITY, "mg": 1e-3}
 RATES = {"deg/s": 1.0, "rad/s": math.degrees(1.0), "mdeg/s": 1e-3}
@@ -29,6 +36,16 @@ _SPELLINGS = {
     "min": "minutes",
 }
 _SAME = {other: name for name, others in _SPELLINGS.items() for other in others.split()}
+Nanoseconds = Ints
+
+NO_TIME = np.iinfo(np.int64).min  # value for a cell without a time
+REPEATED = NO_TIME + 1  # value for a row that repeats the sample of an earlier row
+DATES = "date or clock"
+EPOCH_NS = 10**17  # 1973: a later time counts from 1970
+DAY_NS = 86400 * 10**9
+_LATEST_NS = 4.0e18  # the year 2096; twice as much still fits into 64 bits
+_BLANK = re.compile(r"\s+(?=[+-]\d\d:?\d\d$)")
+_CLOCK = re.compile(r"^\s*(?:(\d+):)?(\d{1,2}):(\d{1,2}(?:\.\d+)?)\s*$")
 
 
 def unit(text: str) -> str:
@@ -47,3 +64,95 @@ def factor(text: str, kinds: dict[str, float], where: str) -> float:
     if unit(bare) not in kinds:
         raise InputError(f"{where}: unit {text!a} is not known: write one of {', '.join(kinds)}")
     return sign * kinds[unit(bare)]
+
+
+def times_ns(cells: Cells, unit_name: str = "", where: str = "the recording") -> Nanoseconds:
+    """Times (n) in ns, NO_TIME for a cell that holds none.
+
+    unit_name: unit of numbers, "" to find it by their size and steps. where: their name in messages. Raises InputError
+    where few cells are times.
+    """
+    numbers = numbers_of(cells)
+    count = int(np.count_nonzero(filled(cells)))
+    if np.count_nonzero(np.isfinite(numbers)) > count // 2:
+        return _of_numbers(numbers, unit_name, where)
+    texts = as_text(cells)
+    clocks = [_CLOCK.match(text) for text in texts]
+    if sum(map(bool, clocks)) > count // 2:
+        parts = [[float(part or 0.0) for part in match.groups()] if match else [np.nan] * 3 for match in clocks]
+        return _after_midnight(np.array(parts) @ np.array([3600.0, 60.0, 1.0]))
+    dates = np.array([_date_ns(text) for text in texts], dtype=np.int64)
+    if np.count_nonzero(dates != NO_TIME) <= count // 2:
+        shown = ascii(texts[0][:30]) if texts else "empty"
+        raise InputError(f"{where}: {shown} is no time: numbers, or dates such as 2024-05-17T09:30:00.25Z, are needed")
+    return dates
+
+
+def _date_ns(text: str) -> int:
+    """Nanoseconds since 1970 of a date in ISO 8601, in UTC if it has no zone; there may be a blank before the zone."""
+    try:
+        date = datetime.fromisoformat(_BLANK.sub("", text.strip()).replace(" UTC", "+00:00"))
+    except ValueError:
+        return NO_TIME
+    since = (date if date.tzinfo else date.replace(tzinfo=UTC)) - datetime(1970, 1, 1, tzinfo=UTC)
+    ns = since // timedelta(microseconds=1) * 1000
+    return ns if abs(ns) < 2.0 * _LATEST_NS else NO_TIME
+
+
+def time_unit(cells: Cells, given: str = "") -> str:
+    """The unit of times, by their size and steps where it is not given; "date or clock" where they are these."""
+    numbers = numbers_of(cells)
+    if np.count_nonzero(np.isfinite(numbers)) <= np.count_nonzero(filled(cells)) // 2:
+        return DATES
+    return unit(given) if given else _guessed(numbers.astype(float))
+
+
+def of_seconds(seconds: Array) -> Nanoseconds:
+    """Seconds (n) as ns; NO_TIME for what is no number."""
+    return _scaled(seconds, TIMES["s"])
+
+
+def of_day(clock: Array) -> Nanoseconds:
+    """HHMMSS.SS as numbers (n), the time of a day, as ns; a day later after midnight."""
+    whole = np.floor(clock)
+    return _after_midnight(whole // 10000 * 3600.0 + whole // 100 % 100 * 60.0 + whole % 100 + (clock - whole))
+
+
+def _after_midnight(seconds: Array) -> Nanoseconds:
+    ns = of_seconds(seconds)
+    good = ns != NO_TIME
+    back = np.diff(ns[good], prepend=ns[good][:1]) < -DAY_NS // 2
+    ns[good] += np.cumsum(back) * DAY_NS
+    return ns
+
+
+def _of_numbers(values: NDArray[Any], unit_name: str, where: str) -> Nanoseconds:
+    known = unit(unit_name) if unit_name else _guessed(values.astype(float))
+    if known not in TIMES:
+        raise InputError(f"{where}: unit {unit_name!a} is not known: write one of {', '.join(TIMES)}")
+    scale = TIMES[known]
+    if values.dtype.kind in "iu":
+        good = np.abs(values.astype(float)) < _LATEST_NS / scale
+        return np.where(good, values.astype(np.int64) * scale, NO_TIME)
+    return _scaled(values, scale)
+
+
+def _scaled(values: Array, scale: int) -> Nanoseconds:
+    good = np.abs(values) < _LATEST_NS / scale
+    whole = np.floor(np.where(good, values, 0.0))
+    part = np.where(good, values, 0.0) - whole
+    return np.where(good, whole.astype(np.int64) * scale + np.rint(part * scale).astype(np.int64), NO_TIME)
+
+
+def _guessed(values: Array) -> str:
+    """The unit of times without one: those from 1970 by their size, others by their steps."""
+    good = values[np.isfinite(values)]
+    size = float(np.median(np.abs(good)))
+    if size > 1e8 and size < 1e10:
+        return "s"
+    for name, from_1970 in (("ns", 1e17), ("us", 1e14), ("ms", 1e11)):
+        if size > from_1970:
+            return name
+    steps = np.diff(good)
+    step = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
+    return "s" if step < 0.9 else "ms" if step < 600.0 else "us" if step < 600e3 else "ns"

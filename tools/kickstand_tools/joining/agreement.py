@@ -13,16 +13,15 @@ from typing import Any
 
 import numpy as np
 from kickstand.errors import Notice
-from numpy.typing import NDArray
 
 from ..calibration.file import CalibrationFile
 from ..errors import InputError, extra
 from ..estimation.smooth import SmoothedRide, smooth
 from ..logs.reader import Source, read_twice
 from ..logs.source import Progress, name_of
-from ..logs.table import Array
 from ..refusals import as_data
 from ..replay.replay import replay
+from ..signals import Array, Bools
 from ..times import clock, tick_s
 from .clocks import Clocks, clocks
 from .motion import motion
@@ -195,7 +194,7 @@ def _interpolated(t_s: Array, values: Array, at_s: Array) -> Array:
     return np.where(near, np.interp(at_s, t_s, values), np.nan)
 
 
-def _known(ride: SmoothedRide | Any, at_s: Array, riding: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _known(ride: SmoothedRide | Any, at_s: Array, riding: Bools) -> tuple[Array, Array]:
     """Lean and its standard deviation (n, degrees), NaN where one is not known or the bike does not ride."""
     lean, sigma = (_interpolated(ride.t_s, values, at_s) for values in (ride.lean_deg, ride.lean_sigma_deg))
     known = riding & ~np.isnan(sigma)
@@ -227,7 +226,7 @@ def _difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Difference | 
     )
 
 
-def _slope_and_delay(a: Array, b: Array, both: NDArray[np.bool_]) -> tuple[float | None, float | None]:
+def _slope_and_delay(a: Array, b: Array, both: Bools) -> tuple[float | None, float | None]:
     """Slope and delay of B's lean against A's. Both are taken as equally exact: the slope is that of the principal
     axis, and the delay is fitted to the mean of both roll rates."""
     one, other = a[both] - a[both].mean(), b[both] - b[both].mean()

@@ -8,14 +8,10 @@ A is the one in whose time and axes everything is given, B the other.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
-from ..logs.table import Array
-from ..signals.averages import moving_mean
-from ..signals.lag import correlations, log_likelihood_ratio, peaks
-from ..signals.rotations import rotation_vector
+from ..signals import Array, Bools, correlations, log_likelihood_ratio, moving_mean, peaks, rotation_vector
 from .fit import USUAL_DRIFT
 from .match import LEAST_EVIDENCE, LEAST_LEAD, LEAST_S, MOST_DRIFT
 from .motion import STEP_S, Motion
@@ -138,7 +134,7 @@ def _alike(a: Motion, b: Motion, of_a: Array, of_b: Array, later_s: float, drift
     return float(np.sum(one * other) / max(np.sqrt(np.sum(one**2) * np.sum(other**2)), 1e-9))
 
 
-def _there(motion: Motion, at_s: Array) -> NDArray[np.bool_]:
+def _there(motion: Motion, at_s: Array) -> Bools:
     place = np.rint(at_s / STEP_S - 0.5).astype(np.int64)
     inside = (place >= 0) & (place < len(motion.there))
     return inside & motion.there[np.clip(place, 0, len(motion.there) - 1)]

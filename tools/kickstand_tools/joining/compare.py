@@ -3,11 +3,9 @@
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from ..logs.table import Array
-from ..signals.averages import moving_mean
+from ..signals import Array, moving_mean
 from .motion import STEP_S, Motion
-from .segments import Segments, without_trend
-from .track import Course
+from .track import Course, Segments, without_trend
 
 _MOST_SINE = 0.87  # largest sine of the lean; over 60 degrees the speed or the rate is wrong
 

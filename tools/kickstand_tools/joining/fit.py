@@ -8,11 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..logs.table import Array
+from ..signals import Array
 from .compare import Comparison
 from .motion import Motion
-from .segments import Segments
-from .track import Course
+from .track import Course, Segments
 
 AROUND_S = 6.0  # largest distance of the shift from the rough one, with the drift at the ends of the ride
 _TRIED_S = 0.1  # distance of the shifts that are tried
@@ -52,9 +51,8 @@ def fitted(motion: Motion, course: Course, segments: Segments, rough_s: float) -
     compared = Comparison(motion, course, segments, rough_s, AROUND_S + 1.0)
     if len(compared.given.begin_s) < _FEWEST:
         return None
-    tried = _tried(compared, rough_s)
-    compared = Comparison(motion, course, segments, tried.shift_s, 2.0)
-    return _polished(compared, tried)
+    shift_s, drift, evidence = _tried(compared, rough_s)
+    return _polished(Comparison(motion, course, segments, shift_s, 2.0), shift_s, drift, evidence)
 
 
 def apart(motion: Motion, course: Course, segments: Segments, fit: Fit) -> float:
@@ -71,16 +69,8 @@ def apart(motion: Motion, course: Course, segments: Segments, fit: Fit) -> float
     return (together - float(costs.min(axis=0).sum())) / len(given.begin_s) / usual
 
 
-@dataclass
-class _Tried:
-    """The best of the shifts and drifts that were tried; the rest as in Fit."""
-
-    shift_s: float
-    drift: float
-    evidence: float
-
-
-def _tried(compared: Comparison, rough_s: float) -> _Tried:
+def _tried(compared: Comparison, rough_s: float) -> tuple[float, float, float]:
+    """The best of the shifts and drifts that are tried, and the evidence for it; see Fit."""
     given, middle_s = compared.given, compared.middle_s
     costs = _costs(compared, rough_s, 0.0, np.ones(1))
     since_s = given.middle_s.mean(axis=1) - middle_s
@@ -97,7 +87,7 @@ def _tried(compared: Comparison, rough_s: float) -> _Tried:
     steps = np.count_nonzero(given.course_weight)
     without = float(_cost(given, given.turned_deg).sum())
     evidence = 0.5 * steps / _STEPS_ALIKE * np.log(without / max(cost, 1e-9))
-    return _Tried(rough_s + shift, drift, float(evidence))
+    return rough_s + shift, drift, float(evidence)
 
 
 def _costs(compared: Comparison, shift_s: float, drift: float, along: Array) -> Array:
@@ -131,18 +121,18 @@ class _Step:
     inverse: Array
 
 
-def _polished(compared: Comparison, tried: _Tried) -> Fit:
+def _polished(compared: Comparison, shift_s: float, drift: float, evidence: float) -> Fit:
     """The best fit by Gauss-Newton steps, in each of which outliers are down-weighted."""
     given = compared.given
-    forward = _least(compared.sped_up(tried.shift_s, tried.drift), given.speed_mps, given.speed_weight)
-    now = np.array([tried.shift_s, tried.drift, 0.0, 0.0, *forward])
+    forward = _least(compared.sped_up(shift_s, drift), given.speed_mps, given.speed_weight)
+    now = np.array([shift_s, drift, 0.0, 0.0, *forward])
     step = _step(compared, now)
     for _ in range(_ROUNDS):
         by = step.inverse @ (step.pulls.sum(axis=0) - _PRIOR * now)
         by[0] = np.clip(by[0], -1.0, 1.0)
         now = now + by
         step = _step(compared, now)
-    return _judged(compared, tried.evidence, now, step)
+    return _judged(compared, evidence, now, step)
 
 
 def _step(compared: Comparison, now: Array) -> _Step:

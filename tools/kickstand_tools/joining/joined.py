@@ -8,23 +8,20 @@ from pathlib import Path
 import numpy as np
 from kickstand.errors import Notice
 from kickstand.units import LOST_US
-from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..logs.block import Block
 from ..logs.csv_lines import write_log
-from ..logs.log import Log
+from ..logs.log import Block, Log
 from ..logs.reader import Source, read_blocks, read_twice
 from ..logs.source import Progress, name_of
-from ..logs.table import Array
 from ..output import write_packed
+from ..signals import Array, Ints
 from .match import Match, match
 from .motion import motion
 from .track import Track
 from .track_files import read_track
 
 SPEED = "speed_mps"
-Integers = NDArray[np.int64]
 _FORMAT = {SPEED: "%.3f", "lat_deg": "%.7f", "lon_deg": "%.7f", "utc_s": "%.3f"}
 
 
@@ -121,7 +118,7 @@ def write_joined(out: Path | str, joined: Joined, progress: Progress | None = No
     return count
 
 
-def _nearest(time_us: Integers, at_us: Integers) -> tuple[Integers, Integers]:
+def _nearest(time_us: Ints, at_us: Ints) -> tuple[Ints, Ints]:
     """Rows, and the indices of the points that belong to them: points within the rows' time and not in a gap of the
     log."""
     points = np.flatnonzero((at_us >= time_us[0]) & (at_us <= time_us[-1]))
@@ -134,7 +131,7 @@ def _nearest(time_us: Integers, at_us: Integers) -> tuple[Integers, Integers]:
     return rows, points[near][::-1][last]
 
 
-def _placed(values: Array, rows: Integers, count: int) -> Array:
+def _placed(values: Array, rows: Ints, count: int) -> Array:
     placed = np.full(count, np.nan)
     placed[rows] = values
     return placed

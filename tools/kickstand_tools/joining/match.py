@@ -4,17 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
-from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..logs.table import Array
 from ..refusals import OPPOSITE_SIGN
-from ..signals.averages import moving_mean
-from ..signals.lag import correlations, log_likelihood_ratio, peaks
+from ..signals import Array, Bools, correlations, log_likelihood_ratio, moving_mean, peaks
 from .fit import AROUND_S, Fit, apart, fitted
 from .motion import STEP_S, Motion
-from .segments import STEPS, segments
-from .track import LONGEST_S, SLOWEST_MPS, Course, Track, course
+from .track import LONGEST_S, SLOWEST_MPS, STEPS, Course, Track, course, segments
 
 _GRID_S = 0.5
 _SPAN_S = 4.0  # rough shifts are found by changes of course over this time
@@ -124,7 +120,7 @@ def _rough_shifts(motion: Motion, steps: Course) -> tuple[bool, list[float]]:
     return bool(other.max() > LEAST_EVIDENCE and other.max() > 2.0 * likely.max()), shifts
 
 
-def _changes_of_track(steps: Course) -> tuple[Array, NDArray[np.bool_]]:
+def _changes_of_track(steps: Course) -> tuple[Array, Bools]:
     """Every _GRID_S the change of course within _SPAN_S, degrees, as the gyro of a leaning bike measures it; and True
     where it is known."""
     middle_s, at_s = (steps.begin_s + steps.end_s) / 2.0, np.arange(0.0, steps.end_s[-1], _GRID_S)
@@ -138,7 +134,7 @@ def _changes_of_track(steps: Course) -> tuple[Array, NDArray[np.bool_]]:
     return change * np.cos(np.arctan(speed * np.radians(change / _SPAN_S) / STANDARD_GRAVITY)), known
 
 
-def _changes_of_ride(motion: Motion) -> tuple[Array, NDArray[np.bool_]]:
+def _changes_of_ride(motion: Motion) -> tuple[Array, Bools]:
     """Likewise the ride's rotation about its up within _SPAN_S, degrees, and True where it is known."""
     at_s, half = np.arange(0.0, motion.seconds, _GRID_S), _SPAN_S / 2.0
     edges_s = np.arange(len(motion.there) + 1) * STEP_S

@@ -8,13 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from kickstand.errors import Notice
-from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..logs.reader import Source, read_blocks
 from ..logs.source import Progress, name_of
-from ..logs.table import Array
-from ..signals.cells import Cells
+from ..signals import Array, Bools, Cells
 
 STEP_S = 0.05
 _MOST_DPS = 20.0  # cells with higher rates have no more weight in the direction of up
@@ -31,7 +29,7 @@ class Motion:
 
     force_g: Array
     rate_dps: Array
-    there: NDArray[np.bool_]
+    there: Bools
     speed: bool
     positions: bool
 

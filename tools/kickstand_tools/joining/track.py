@@ -1,12 +1,16 @@
-"""The track of a phone or a watch: where it was, and when. Its course: the direction of each step, as far as known."""
+"""The track of a phone or a watch: where it was, and when. Its course: the direction of each step, as far as known.
+
+Course and speed are compared with a ride's in segments of half a minute, one by one. Within a segment only changes
+count: its mean and its trend are subtracted. This removes the gyro's residual bias, the direction in which the ride
+began, and hills.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..logs.table import Array, Table
-from ..signals.geography import distance_m
+from ..logs.log import Table
+from ..signals import Array, Bools, distance_m, stretches
 
 LONGEST_S = 6.0  # between two points of one course: watches write one so rarely on straights
 SLOWEST_MPS = 2.5  # of a step that is more than the positions' errors
@@ -15,6 +19,8 @@ STEP_ERROR_M = 1.0  # 1 sigma of a step across its direction: phones' receivers 
 COURSE_ERROR_DEG = 4.0  # 1 sigma of other errors: the gyro's scale factor, and how positions are smoothed
 _OFTEN_S = 0.7
 _AROUND = 2  # number of points before and after from which a speed is computed
+STEPS = 30  # most steps of a segment
+_FEWEST = 8  # least number of steps of a segment
 
 
 @dataclass(eq=False)
@@ -73,7 +79,7 @@ class Course:
     end_s: Array
     sigma_deg: Array
     speed_mps: Array
-    good: NDArray[np.bool_]
+    good: Bools
     turn_deg: Array
 
 
@@ -89,3 +95,55 @@ def course(track: Track) -> Course:
     both = good & np.append(False, good[:-1])
     sigma = np.hypot(np.degrees(STEP_ERROR_M / np.maximum(length_m, 0.1)), COURSE_ERROR_DEG)
     return Course(since_s[:-1], since_s[1:], sigma, speed, good, np.where(both, turn, 0.0))
+
+
+@dataclass
+class Segments(Table):
+    """p segments of up to STEPS good steps in a row, all (p, STEPS); weights are 0 where a segment is shorter.
+
+    begin_s, end_s: times of each step, s since the track's first point. turned_deg: course of each step less that of
+    the segment's first one, > 0 to the left. course_weight: 1/deg2. speed_mps; speed_weight: 1 or 0. Mean and trend of
+    turned_deg and speed_mps are subtracted.
+    """
+
+    begin_s: Array
+    end_s: Array
+    turned_deg: Array
+    course_weight: Array
+    speed_mps: Array
+    speed_weight: Array
+
+    @property
+    def middle_s(self) -> Array:
+        """(p, STEPS) time of the middle of each step."""
+        return (self.begin_s + self.end_s) / 2.0
+
+
+def segments(course: Course) -> Segments:
+    """The segments of a course."""
+    rows = [
+        np.arange(start, min(start + STEPS, end))
+        for begin, end in stretches(course.good)
+        for start in range(begin, end, STEPS)
+    ]
+    rows = [row for row in rows if len(row) >= _FEWEST]
+    place, there = np.zeros((len(rows), STEPS), dtype=int), np.zeros((len(rows), STEPS))
+    for k, row in enumerate(rows):
+        place[k, : len(row)], place[k, len(row) :], there[k, : len(row)] = row, row[-1], 1.0
+    turn = course.turn_deg[place] * there
+    turn[:, :1] = 0.0
+    weight = there / course.sigma_deg[place] ** 2
+    begin_s, end_s = course.begin_s[place], course.end_s[place]
+    made = Segments(begin_s, end_s, np.cumsum(turn, axis=1), weight, course.speed_mps[place], there)
+    made.turned_deg = without_trend(made.turned_deg, weight, made.middle_s)
+    made.speed_mps = without_trend(made.speed_mps, there, made.middle_s)
+    return made
+
+
+def without_trend(values: Array, weight: Array, at_s: Array) -> Array:
+    """(p, STEPS) values less the straight line that fits each row best."""
+    total = np.maximum(weight.sum(axis=1, keepdims=True), 1e-12)
+    since = at_s - (weight * at_s).sum(axis=1, keepdims=True) / total
+    mean = (weight * values).sum(axis=1, keepdims=True) / total
+    spread = np.maximum((weight * since * since).sum(axis=1, keepdims=True), 1e-12)
+    return values - mean - (weight * since * values).sum(axis=1, keepdims=True) / spread * since

@@ -5,9 +5,9 @@ import math
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..signals import Array
 from .csv_reader import cells_of
 
 COLUMNS = ("t_s", "ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps")
@@ -72,7 +72,7 @@ def _made_from(log: str) -> str:
     return f", {found[0]}" if len(found) == 1 else ""
 
 
-def plausible(table: NDArray[np.float64], names: list[str], before_us: int | None) -> bool:
+def plausible(table: Array, names: list[str], before_us: int | None) -> bool:
     """True if read() would find no mistake in these values (n, columns of names; NaN for an empty cell)."""
     for k, name in enumerate(names):
         within = np.abs(table[:, k]) <= _LIMITS[name]
@@ -82,9 +82,7 @@ def plausible(table: NDArray[np.float64], names: list[str], before_us: int | Non
     return bool(np.all(np.diff(time_us) >= 0) and (before_us is None or time_us[0] >= before_us))
 
 
-def read(
-    log: str, text: str, width: int, places: dict[str, int], lines_before: int, before_us: int | None
-) -> NDArray[np.float64]:
+def read(log: str, text: str, width: int, places: dict[str, int], lines_before: int, before_us: int | None) -> Array:
     """(n, columns in the order of places), NaN for an empty optional cell.
 
     Raises InputError for the first mistake, naming its line.

@@ -13,13 +13,11 @@ from kickstand.errors import Notice
 from numpy.typing import NDArray
 
 from ..output import write_packed
-from .block import Block
+from ..signals import Array
 from .cells import COLUMNS, OPTIONAL
-from .log import Log
+from .log import Block, Log, Stretch
 from .reader import read_blocks
 from .source import File, Progress
-from .stretch import Stretch
-from .table import Array
 
 _DIGITS = {"speed_mps": 3, "temp_c": 2, "lat_deg": 7, "lon_deg": 7, "utc_s": 3}
 _ROWS = 15_000  # rows written at a time: their letters fit a processor's cache

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .table import Array
+from ..signals import Array, Bools, Ints
 
 Cells = NDArray[Any]  # (n): int64; float64, NaN where there is no number; or str as objects, "" where there is nothing
 
@@ -76,7 +76,7 @@ def numbers_in(text: bytes, count: int) -> Array | None:
     return found
 
 
-def _numbers(letters: NDArray[np.uint8], end: NDArray[np.intp], length: NDArray[np.intp]) -> Array | None:
+def _numbers(letters: NDArray[np.uint8], end: Ints, length: Ints) -> Array | None:
     """The numbers (n) that stand before places (n) in letters, each of so many letters; None as in numbers_in()."""
     first = letters[end[0] - length[0] : end[0]].tobytes()
     digits = len(first.partition(b".")[2])
@@ -163,7 +163,7 @@ def numbers_of(cells: Cells) -> NDArray[Any]:
     return np.array([np.nan if number is None else number for number in numbers], dtype=float)
 
 
-def filled(cells: Cells) -> NDArray[np.bool_]:
+def filled(cells: Cells) -> Bools:
     """(n) True for cells that are not empty."""
     if cells.dtype.kind in "iuf":
         return ~np.isnan(cells.astype(float))

@@ -10,11 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 from kickstand.errors import Notice
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..errors import InputError
-from .block import Block, joined
-from .table import Array
+from ..signals import Array, Ints, window_means
+from .log import Block
 
 COARSE = 0.05  # times with ticks under this share of the time between samples stay as they are
 OFTEN = 0.05  # a larger share of repeated times means that the recorder stamps several samples at once
@@ -80,11 +80,11 @@ def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
     return np.asarray(np.maximum.accumulate(times - order) + order, dtype=float)
 
 
-def _one_step(between_us: NDArray[np.int64]) -> bool:
+def _one_step(between_us: Ints) -> bool:
     return bool(np.count_nonzero(between_us == np.median(between_us)) >= EXACT * len(between_us))
 
 
-def _apart(recorded: Array, starts: NDArray[np.intp], counts: NDArray[np.intp], period_s: float) -> Array:
+def _apart(recorded: Array, starts: Ints, counts: Ints, period_s: float) -> Array:
     """Times in which samples of the same time are spread up to the next time, or over their usual duration."""
     until = np.append(recorded[starts[1:]], np.inf)
     longest = np.minimum((until - recorded[starts]) / counts, np.maximum(period_s, 0.0))
@@ -115,8 +115,7 @@ def _mean(values: Array, half: int) -> Array:
         return first(k)
     before, after = first(np.arange(-half, 0.0)), last(np.arange(n, n + half, dtype=float))
     base = values[0]  # sums of small numbers are exact enough
-    sums = np.cumsum(np.concatenate(([0.0], before - base, values - base, after - base)))
-    return base + (sums[2 * half + 1 :] - sums[: -2 * half - 1]) / (2 * half + 1)
+    return base + window_means(np.concatenate((before, values, after)) - base, 2 * half + 1)
 
 
 def _line(k: Array, values: Array) -> Callable[[Array], Array]:
@@ -136,13 +135,23 @@ def even_blocks(blocks: Iterator[Block], name: str, remarks: list[Notice]) -> It
     spread = _Spread(name)
     held: Block | None = None
     for block in blocks:
-        whole = block if held is None else joined(held, block)
+        whole = block if held is None else _joined(held, block)
         ready, held = spread.take(whole)
         if ready is not None:
             yield ready
     if held is not None:
         yield spread.rest(held)
     remarks += spread.notices()
+
+
+def _joined(first: Block, second: Block) -> Block:
+    """Two successive blocks as one."""
+    return replace(
+        second,
+        lines=first.lines + second.lines,
+        own_times=first.own_times and second.own_times,
+        **{name: np.concatenate((rows, getattr(second, name))) for name, rows in first.columns().items()},
+    )
 
 
 class _Spread:

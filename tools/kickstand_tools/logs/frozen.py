@@ -7,10 +7,9 @@ rest: there the readings count where those before or after go on at the same val
 
 import numpy as np
 from kickstand.errors import Notice
-from numpy.typing import NDArray
 
+from ..signals import Array, Bools, Ints
 from .log import Log
-from .table import Array
 
 FROZEN_S, FROZEN_SAMPLES = 0.5, 10  # least duration and number of equal readings
 COARSE_G, COARSE_DPS = 0.002, 0.05  # last digits from which on rounding may hide the noise of a phone's sensor
@@ -32,7 +31,7 @@ class FrozenReadings:
         self._step = np.full(6, np.inf)  # smallest change seen on each axis: the last digit
         self._stretches: list[tuple[float, float]] = []
 
-    def mark(self, time_us: NDArray[np.int64], readings: Array) -> NDArray[np.bool_]:
+    def mark(self, time_us: Ints, readings: Array) -> Bools:
         """(n) True where readings (n, 7), as in a Block, are frozen. The first one of equal readings is not."""
         n = len(time_us)
         values, time_s = np.vstack((self._last, readings[:, _MOTION])), time_us.astype(float) * 1e-6

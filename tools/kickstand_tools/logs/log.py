@@ -1,23 +1,68 @@
-"""A recorded log in memory."""
+"""A recorded log in memory, some successive rows of one, and a stretch of one between two times."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Container, Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from kickstand.errors import Notice
 from kickstand.units import AXES
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError
+from ..errors import InputError, extra
+from ..signals import Array, Bools, Ints
 from .cells import TRACK
-from .table import Array, Table
+from .csv_reader import cells_of
+from .source import File, name_of
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from pyarrow import Schema
 
 ROOM_TEMP_C = 25.0  # temperature for the firmware's modules where a log has none
 
 FirmwareRow = tuple[int, list[float], float]
 
 
-def firmware_rows(time_us: NDArray[np.int64], readings: Array, speed_mps: Array) -> Iterator[FirmwareRow]:
+@dataclass
+class Table:
+    """A dataclass whose arrays have one row per sample; its other fields belong to the whole table."""
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """The arrays (n,) by the names of their fields."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
+
+    def part(self, which: slice | Bools) -> Self:
+        """The samples of a slice, or those where an array of n is True. The arrays of a slice are views of this
+        table's; what is no array belongs to both."""
+        # Table's columns are the fields; a Log's are named as in a CSV
+        return replace(self, **{name: values[which] for name, values in Table.columns(self).items()})
+
+    def to_pandas(self) -> "DataFrame":
+        """A data frame of columns(). Raises InputError if pandas is not installed."""
+        try:
+            from pandas import DataFrame
+        except ImportError as error:
+            raise InputError("data frames need pandas: " + extra("rides")) from error
+        return DataFrame(self.columns())
+
+
+def float_schema(units: Mapping[str, str], fine: Container[str], about: dict[str, str]) -> "Schema":
+    """Of a Parquet file: columns with their units, in 64-bit floats those of fine, the rest in 32-bit floats. about:
+    its metadata."""
+    import pyarrow
+
+    return pyarrow.schema(
+        [
+            pyarrow.field(name, pyarrow.float64() if name in fine else pyarrow.float32(), metadata={"unit": unit})
+            for name, unit in units.items()
+        ],
+        metadata=about,
+    )
+
+
+def firmware_rows(time_us: Ints, readings: Array, speed_mps: Array) -> Iterator[FirmwareRow]:
     """Each sample for a replay by the firmware's modules: time (us), reading (7, the chip's order: g, deg C, deg/s),
     speed (m/s, NaN for none). Where a log has no temperature it is ROOM_TEMP_C."""
     readings = np.column_stack((readings[:, :3], np.nan_to_num(readings[:, 3], nan=ROOM_TEMP_C), readings[:, 4:]))
@@ -82,7 +127,7 @@ class Log(Table):
         return cls(np.arange(len(table)) / rate_hz, table[:, :3], table[:, 4:], temperature_c=table[:, 3], name=name)
 
     @property
-    def time_us(self) -> NDArray[np.int64]:
+    def time_us(self) -> Ints:
         """(n) microseconds since the first sample, the firmware's unit."""
         return np.rint(self.t_s * 1e6).astype(np.int64)
 
@@ -111,3 +156,124 @@ class Log(Table):
     def _optional(self, values: ArrayLike) -> Array:
         array = np.asarray(values, dtype=float)
         return array if array.size else np.full(len(self.t_s), np.nan)
+
+
+@dataclass
+class Block(Table):
+    """Some successive rows of a log, in the units of the firmware's modules.
+
+    time_us (n): since the log's first sample. readings (n, 7): acceleration (3, g), temperature (C), rate (3, deg/s),
+    the chip's order. speed_mps, lat_deg, lon_deg, utc_s (n): as in a Log. What the log does not have is NaN. start_s:
+    the recorder's own time at the log's first sample. frozen (n): True where the readings are repeated ones, see
+    frozen.py.
+    """
+
+    time_us: Ints
+    readings: Array
+    speed_mps: Array
+    lat_deg: Array
+    lon_deg: Array
+    utc_s: Array
+    frozen: Bools
+    has_temp: bool
+    start_s: float
+    done: int  # bytes of the (packed) file that have been read; samples of a log in memory
+    lines: list[str] = field(default_factory=list)  # the rows as CSV, none for a log in memory
+    names: tuple[str, ...] = ()  # names of the columns in lines
+    own_times: bool = True  # False if the times were changed (see even_times.py) and differ from those in lines
+
+    def rows(self) -> Iterator[FirmwareRow]:
+        """The samples as firmware_rows() has them, for a replay by the firmware's modules."""
+        return firmware_rows(self.time_us, self.readings, self.speed_mps)
+
+    @property
+    def t_s(self) -> Array:
+        """(n) seconds since the log's first sample."""
+        return self.time_us.astype(float) * 1e-6
+
+    @property
+    def time_text(self) -> list[str]:
+        """The times as texts: those of the file, or the changed ones."""
+        if not self.lines or not self.own_times:
+            return [f"{self.start_s + t:.6f}" for t in self.t_s.tolist()]
+        place = self.names.index("t_s")
+        return [cells_of(line)[place].strip() for line in self.lines]
+
+    def part(self, which: slice | Bools) -> "Block":
+        """The rows of a slice, or those where an array of n is True."""
+        if isinstance(which, slice):
+            lines = self.lines[which]
+        else:
+            lines = [line for line, wanted in zip(self.lines, which.tolist()) if wanted]
+        return replace(super().part(which), lines=lines)
+
+    @property
+    def measured(self) -> "Block":
+        """The rows that are not frozen."""
+        return self.part(~self.frozen) if np.any(self.frozen) else self
+
+
+@dataclass
+class Stretch:
+    """From from_s to to_s of a log, seconds since its first sample; negative: before its last one. None: its end there.
+
+    It can be used wherever a log can. Read as a log its times count from its own first sample. Functions that compute
+    the lean read the whole log, because the lean depends on earlier readings, and return the stretch in the log's
+    times.
+
+    >>> import numpy as np
+    >>> from kickstand_tools.api import Log, read_log
+    >>> log = Log(np.arange(300) / 100.0, np.tile([0.0, 1.0, 0.0], (300, 1)), np.zeros((300, 3)))
+    >>> len(read_log(Stretch(log, 1.0, 2.0)).t_s), len(read_log(Stretch(log, from_s=-0.5)).t_s)
+    (101, 51)
+    """
+
+    source: File | Log
+    from_s: float | None = None
+    to_s: float | None = None
+
+    @property
+    def name(self) -> str:
+        """The log's name."""
+        return name_of(self.source)
+
+    def of_length(self, length_s: float) -> "Stretch":
+        """The stretch with both times from the beginning. length_s: length of the log."""
+        times = [None if t is None else t if t >= 0.0 else length_s + t for t in (self.from_s, self.to_s)]
+        return Stretch(self.source, *times)
+
+    def holds(self, block: Block) -> Bools:
+        """(n) True for the samples of a block of the whole log that lie in the stretch, whose times have to be from the
+        beginning."""
+        begin_us, end_us = self._ends_us()
+        return (block.time_us >= begin_us) & (block.time_us <= end_us)
+
+    def _ends_us(self) -> tuple[float, float]:
+        return round(1e6 * (self.from_s or 0.0)), float("inf") if self.to_s is None else round(1e6 * self.to_s)
+
+    def cut(self, blocks: Iterator[Block]) -> Iterator[Block]:
+        """The blocks of the whole log, cut to the stretch. Raises InputError if it holds no sample."""
+        begin_us, end_us = self._ends_us()
+        if end_us <= begin_us:
+            raise InputError(f"{self.name}: the stretch ends before it begins: give --from the smaller time")
+        from_us, length_s = None, 0.0
+        for block in blocks:
+            length_s = float(block.t_s[-1])
+            if block.time_us[0] > end_us:
+                break
+            within = self.holds(block)
+            if not within.any():
+                continue
+            part = block if within.all() else block.part(within)
+            from_us = int(part.time_us[0]) if from_us is None else from_us
+            yield replace(part, time_us=part.time_us - from_us, start_s=part.start_s + from_us / 1e6)
+        if from_us is None:
+            raise InputError(f"{self.name}: no samples in this stretch: the log is {length_s:.1f} s long")
+
+
+def within(stretch: Stretch | None, block: Block, values: Array) -> Iterator[tuple[Block, Array]]:
+    """A block of the whole log and the values of its rows (n, ...), as far as they lie in the stretch; None: all."""
+    if stretch is None:
+        yield block, values
+    elif (which := stretch.holds(block)).any():
+        yield block.part(which), values[which]

@@ -8,21 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from kickstand.errors import Notice
-from numpy.typing import NDArray
 
 from ..checks.log import Checks
 from ..checks.units import check_units
 from ..errors import InputError
+from ..signals import Array
 from . import cells
-from .block import Block
 from .cells import COLUMNS, OPTIONAL, TRACK
 from .csv_reader import numbers_in
 from .even_times import even_blocks
 from .frozen import FrozenReadings
-from .log import Log
+from .log import Block, Log, Stretch
 from .source import File, Progress, chunks, name_of, total_bytes
-from .stretch import Stretch
-from .table import Array
 
 if TYPE_CHECKING:
     from ..calibration.file import CalibrationFile
@@ -30,6 +27,7 @@ if TYPE_CHECKING:
 BLOCK_BYTES = 1 << 20  # bytes of text in a block, some 15000 samples
 BLOCK_SAMPLES = 60_000  # samples in a block of a log in memory
 MOST_SAMPLES = 10_000_000  # most samples of a log that is read as a whole: 14 hours at 200 Hz take 1 GB of memory
+_READINGS = ("ax_g", "ay_g", "az_g", "temp_c", "gx_dps", "gy_dps", "gz_dps")  # in the order of Block.readings
 
 Source = File | Log | Stretch  # what can be read as a log
 
@@ -214,7 +212,19 @@ def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], rema
         time_us = np.rint(table[:, 0] * 1e6).astype(np.int64)
         start_us = int(time_us[0]) if start_us is None else start_us
         last_us = int(time_us[-1])
-        yield _block(table, time_us - start_us, places, start_us / 1e6, text.decode(), names, done)
+        column: dict[str, Any] = dict.fromkeys(OPTIONAL, np.full(len(table), np.nan))
+        column |= {name: table[:, k] for k, name in enumerate(places)}
+        yield Block(
+            time_us - start_us,
+            np.column_stack([column[name] for name in _READINGS]),
+            frozen=np.zeros(len(table), dtype=bool),
+            has_temp="temp_c" in places,
+            start_s=start_us / 1e6,
+            done=done,
+            lines=[line for line in text.decode().split("\n") if line.strip()],
+            names=tuple(names),
+            **{name: column[name] for name in TRACK},
+        )
 
 
 def _numbers(
@@ -226,31 +236,6 @@ def _numbers(
         return table[:, list(places.values())]
     cells.check_text(name, text, line)
     return cells.read(name, text.decode(), len(names), places, line, before_us)
-
-
-def _block(
-    table: Array,
-    time_us: NDArray[np.int64],
-    places: dict[str, int],
-    start_s: float,
-    text: str,
-    names: list[str],
-    done: int,
-) -> Block:
-    column: dict[str, Any] = dict.fromkeys(OPTIONAL, np.full(len(table), np.nan))
-    column |= {name: table[:, k] for k, name in enumerate(places)}
-    order = ("ax_g", "ay_g", "az_g", "temp_c", "gx_dps", "gy_dps", "gz_dps")
-    return Block(
-        time_us,
-        np.column_stack([column[name] for name in order]),
-        frozen=np.zeros(len(table), dtype=bool),
-        has_temp="temp_c" in places,
-        start_s=start_s,
-        done=done,
-        lines=[line for line in text.split("\n") if line.strip()],
-        names=tuple(names),
-        **{name: column[name] for name in TRACK},
-    )
 
 
 def _last_marked(parts: Iterator[tuple[bytes, int]]) -> Iterator[tuple[bytes, int, bool]]:

@@ -4,9 +4,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..joining.motion import STEP_S, Motion
-from ..logs.table import Array
-from ..signals.averages import moving_mean
-from ..signals.lag import correlations, log_likelihood_ratio, peak_offset, peaks
+from ..signals import Array, correlations, log_likelihood_ratio, moving_mean, peak_offset, peaks
 from .gpmf import Telemetry
 
 _SLOW_S = 5.0  # slower changes are removed, because they may be the gyros' bias

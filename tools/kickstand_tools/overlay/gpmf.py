@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..logs.table import Array
+from ..signals import Array
 from .video import Video, packets
 
 _NUMBERS = {b"b": "i1", b"B": "u1", b"s": "i2", b"S": "u2", b"l": "i4", b"L": "u4", b"j": "i8", b"J": "u8"}

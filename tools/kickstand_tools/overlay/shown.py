@@ -4,13 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from kickstand.errors import Notice
-from numpy.typing import NDArray
 
 from ..analysis.ride import Ride
 from ..analysis.summary import HELD_S
 from ..logs.source import Progress
-from ..logs.table import Array
-from ..signals.averages import smoothed
+from ..signals import Array, Ints, smoothed
 
 _FORCE_S = 0.3  # forces are averaged over this, because engine and road shake them
 _GAP_S = 0.2  # older readings are not shown
@@ -63,7 +61,7 @@ class Shown:
 def shown(ride: Ride, progress: Progress | None = None, notices: list[Notice] | None = None) -> Shown:
     """The values of a whole ride (see open_ride), with the lean that it was opened with. progress, notices: see
     Ride.blocks(). Raises InputError."""
-    columns: list[NDArray[np.float64]] = []
+    columns: list[Array] = []
     for block in ride.blocks(progress, notices):
         lean = np.where(block.trusted, block.lean_deg, np.nan)
         columns.append(np.array([block.t_s, lean, block.forward_g, block.lateral_g, block.speed_mps]))
@@ -81,7 +79,7 @@ def _maximum(t_s: Array, lean: Array) -> Array:
     return np.maximum(np.maximum.accumulate(lasted), 0.0)
 
 
-def _between(at_s: Array, values: Array, before: NDArray[np.int64], t_s: Array, gap_s: float) -> Array:
+def _between(at_s: Array, values: Array, before: Ints, t_s: Array, gap_s: float) -> Array:
     """Values at t_s along straight lines; NaN outside, and between two that are further apart than gap_s."""
     step_s = at_s[before + 1] - at_s[before]
     share = (t_s - at_s[before]) / step_s

@@ -10,8 +10,8 @@ import numpy as np
 from kickstand.lean.meter import LeanMeter
 
 from ..calibration.file import CalibrationFile
-from ..logs.block import Block
-from ..logs.table import Array
+from ..logs.log import Block
+from ..signals import Array
 from .replay_engine import NOT_SHOWN, Replay
 
 TOO_SMALL = 0.01  # g2, as in kickstand.lean: in free fall the force has no direction

@@ -5,9 +5,8 @@ import io
 import struct
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import IO
 
@@ -17,12 +16,11 @@ from kickstand.errors import Notice
 from .. import unix_port
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
-from ..logs.block import Block
 from ..logs.csv_lines import write_lean
+from ..logs.log import Block, Stretch, Table, within
 from ..logs.reader import Source, apart, read_blocks, read_twice
 from ..logs.source import Progress, total_bytes
-from ..logs.stretch import Stretch, within
-from ..logs.table import Array, Table
+from ..signals import Array
 from . import replay_engine
 from .meter_along import MeterAlong
 
@@ -34,9 +32,6 @@ _RESULT_BYTES = struct.calcsize(replay_engine.RESULT)
 _EMULATED_S = 1e6  # limit of the emulated time: practically none, because logs may be long
 
 _SIGMA = replay_engine.COLUMNS.index("lean_sigma_deg")
-
-Replayed = tuple[Block, Array]  # (n, replay_engine.COLUMNS) of the rows that are not frozen
-Engine = Callable[[Iterator[bytes], Progress | None], contextlib.AbstractContextManager[IO[bytes]]]
 
 
 @dataclass(eq=False)
@@ -111,7 +106,7 @@ def replay_blocks(
     at the end."""
     car = calibration.vehicle == "car"
     whole, stretch = apart(log)
-    for block, results in _RUN[engine](whole, calibration, progress, notices):
+    for block, results in _replayed(whole, calibration, engine, progress, notices):
         found = _with_frozen(block, results)
         if car:
             found[:, _SIGMA] = np.nan
@@ -119,9 +114,21 @@ def replay_blocks(
     notices += [Notice("car-replayed")] if car else []
 
 
-def _table(results: bytes) -> Array:
-    """(n, COLUMNS) from the bytes that replay_engine.run writes."""
-    return np.frombuffer(results, dtype="<f8").reshape(-1, len(replay_engine.COLUMNS))
+def _replayed(
+    log: Source, calibration: CalibrationFile, engine: str, progress: Progress | None, notices: list[Notice]
+) -> Iterator[tuple[Block, Array]]:
+    """Each block with the results (n, COLUMNS) for its rows that are not frozen."""
+    log = read_twice(log) if engine in _BY_RECORDS else log
+    shown = None if engine == "rp2040" else progress
+    blocks = read_blocks(log, 2, shown, notices, calibration=calibration)
+    if engine == "cpython":
+        meter = MeterAlong(calibration)
+        return ((block, meter.columns(block.measured)) for block in blocks)
+    if engine == "two processes":
+        from . import second_process  # a browser's Python cannot import it
+
+        return second_process.columns_of(blocks, calibration)
+    return _by_records(_BY_RECORDS[engine](_records(read_blocks(log), calibration), progress), blocks)
 
 
 def _with_frozen(block: Block, results: Array) -> Array:
@@ -133,35 +140,17 @@ def _with_frozen(block: Block, results: Array) -> Array:
     return found
 
 
-def _cpython(
-    log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
-) -> Iterator[Replayed]:
-    meter = MeterAlong(calibration)
-    for block in read_blocks(log, 2, progress, notices, calibration=calibration):
-        yield block, meter.columns(block.measured)
-
-
-def _two_processes(
-    log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
-) -> Iterator[Replayed]:
-    from . import second_process  # a browser's Python cannot import it
-
-    return second_process.columns_of(read_blocks(log, 2, progress, notices, calibration=calibration), calibration)
-
-
 def _by_records(
-    engine: Engine, log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
-) -> Iterator[Replayed]:
+    run: contextlib.AbstractContextManager[IO[bytes]], blocks: Iterator[Block]
+) -> Iterator[tuple[Block, Array]]:
     """By replay_engine.run() on another Python, which reads records and writes results."""
-    log = read_twice(log)
-    with engine(_records(read_blocks(log), calibration), progress) as results:
-        shown = None if engine is rp2040 else progress
-        for block in read_blocks(log, 2, shown, notices, calibration=calibration):
+    with run as results:
+        for block in blocks:
             wanted = _RESULT_BYTES * int(np.count_nonzero(~block.frozen))
             found = results.read(wanted)
             if len(found) < wanted:
                 raise InputError(f"MicroPython stopped ({_last_words(found + results.read())}): use --engine cpython")
-            yield block, _table(found)
+            yield block, np.frombuffer(found, dtype="<f8").reshape(-1, len(replay_engine.COLUMNS))
 
 
 @contextlib.contextmanager
@@ -209,13 +198,8 @@ def rp2040(records: Iterator[bytes], progress: Progress | None) -> Iterator[IO[b
     yield results
 
 
-# micropython: the board's interpreter; rp2040: its 32-bit floats too; two processes: see second_process.py
-_RUN = {
-    "cpython": _cpython,
-    "two processes": _two_processes,
-    "micropython": partial(_by_records, micropython),
-    "rp2040": partial(_by_records, rp2040),
-}
+# The board's interpreter; with its 32-bit floats, too
+_BY_RECORDS = {"micropython": micropython, "rp2040": rp2040}
 
 
 def _last_words(traceback: bytes) -> str:

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
-from ..logs.block import Block
-from ..logs.table import Array
+from ..logs.log import Block
+from ..signals import Array
 from .meter_along import MeterAlong
 
 _AHEAD = 3  # blocks that are read and not yet yielded: so the second process always has one to work on

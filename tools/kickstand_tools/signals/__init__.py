@@ -1,10 +1,332 @@
 """What is done to arrays of samples everywhere: numpy only, no log and no file.
 
-averages.py: moving means, standard deviations, integrals. cells.py: means over cells of time. lag.py: one signal
-against another. rotations.py: rotation vectors and matrices. standstill.py: when a vehicle stands.
+Moving means, standard deviations and integrals; means over cells of time; one signal against another; rotation vectors
+and matrices; standstill; distances. leaning.py: how a motorcycle's lean and yaw rate go together.
 """
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Ints = NDArray[np.integer[Any]]
+
+
+# Moving means and integrals of evenly spaced samples. All are made of one running sum, so their cost does not grow with
+# the window.
+
+
+def window_means(values: Array, n: int) -> Array:
+    """(m - n + 1, ...) the means of all n successive ones of m values (m, ...)."""
+    sums = np.zeros((len(values) + 1, *values.shape[1:]))
+    np.cumsum(values, axis=0, out=sums[1:])
+    return (sums[n:] - sums[:-n]) / n
+
+
+def window_spreads(values: Array, n: int) -> Array:
+    """(m - n + 1, ...) the standard deviations of all n successive ones of m values (m, ...)."""
+    values = values - np.mean(values, axis=0)  # or rounding of large squares would hide the spread
+    squared = window_means(values, n)
+    squared *= -squared
+    values *= values
+    squared += window_means(values, n)
+    return np.sqrt(np.maximum(0.0, squared, out=squared), out=squared)
+
+
+def moving_mean(values: Array, n: int) -> Array:
+    """(m, ...) for each of m values (m, ...) the mean of the n values that begin n // 2 before it. Beyond the ends the
+    first and the last value are repeated."""
+    return values if n < 2 or not len(values) else window_means(_padded(values, n), n)
+
+
+def moving_spread(values: Array, n: int) -> Array:
+    """(m, ...) for each value the standard deviation of the n values that moving_mean() takes."""
+    return np.zeros(values.shape) if n < 2 or not len(values) else window_spreads(_padded(values, n), n)
+
+
+def smoothed(values: Array, time_s: Array, over_s: float) -> Array:
+    """(m) moving mean over an odd number of samples that last about over_s seconds. time_s (m): the samples' times."""
+    if len(values) < 2:
+        return values
+    return moving_mean(values, 2 * round(0.5 * over_s / float(np.median(np.diff(time_s)))) + 1)
+
+
+def integral(time_s: Array, values: Array) -> Array:
+    """(m) the integral of values (m) over time_s (m), from the first sample to each, by the trapezoidal rule."""
+    return np.append(0.0, np.cumsum(np.diff(time_s) * (values[1:] + values[:-1]) / 2.0))
+
+
+def _padded(values: Array, n: int) -> Array:
+    before, after = np.repeat(values[:1], n // 2, 0), np.repeat(values[-1:], n - 1 - n // 2, 0)
+    return np.concatenate((before, values, after))
+
+
+# Samples averaged over cells of time, block by block: vibration averages out, and what remains is small.
+
+
+def cell_numbers(time_s: Array, cell_s: float) -> Ints:
+    """(n) the number of the cell that each time lies in. A time on the edge of two cells, within rounding, is in the
+    later one."""
+    return np.floor(time_s / cell_s + 1e-6).astype(np.int64)
+
+
+def runs(values: NDArray[np.generic]) -> Ints:
+    """(m) the first index of each run of equal values among n > 0 values."""
+    return np.flatnonzero(np.append(True, values[1:] != values[:-1]))
+
+
+def stretches(true: Bools) -> Ints:
+    """(m, 2) the first index, and that after the last, of each run of True among n values."""
+    return np.flatnonzero(np.diff(np.concatenate(([False], true, [False])))).reshape(-1, 2)
+
+
+@dataclass
+class EvenCells:
+    """n successive cells, some without samples. first: number of the first cell. count (n): samples in each. means
+    (n, k), latest (n, j): see Cells.add(); NaN where there is no value."""
+
+    first: int
+    count: Array
+    means: Array
+    latest: Array
+
+    def merged(self, by: int) -> "EvenCells":
+        """Cells that are `by` times as long and begin at multiples of `by`. Their `latest` is the first value in
+        each."""
+        before = self.first % by
+        after = -(before + len(self.count)) % by
+
+        def grouped(values: Array, fill: float) -> Array:
+            width = ((before, after), *[(0, 0)] * (values.ndim - 1))
+            return np.pad(values, width, constant_values=fill).reshape(-1, by, *values.shape[1:])
+
+        count = grouped(self.count, 0.0)
+        total = np.sum(count, axis=1)
+        sums = np.sum(np.nan_to_num(grouped(self.means, 0.0)) * count[:, :, None], axis=1)
+        means = np.divide(sums, total[:, None], out=np.full_like(sums, np.nan), where=total[:, None] > 0.0)
+        latest = grouped(self.latest, np.nan)
+        place = np.argmax(~np.isnan(latest), axis=1)[:, None]
+        return EvenCells(self.first // by, total, means, np.take_along_axis(latest, place, axis=1)[:, 0])
+
+
+class Cells:
+    """Averages samples over cells of time. add() takes them in the order of time, block by block.
+
+    cell_s: length of a cell, s. most: number of cells with samples that are kept, the last ones; 0: all.
+    """
+
+    def __init__(self, cell_s: float, most: int = 0) -> None:
+        self.cell_s, self._most = cell_s, most
+        self._parts: list[Array] = []  # (m, 2 + k + j): number of the cell, count of samples, sums, latest values
+        self._means = 0
+
+    def add(self, time_s: Array, means: Array, latest: Array) -> None:
+        """Take n samples. means (n, k): values that are averaged. latest (n, j): values of which each cell keeps the
+        last that is not NaN."""
+        if not len(time_s):
+            return
+        number = cell_numbers(time_s, self.cell_s)
+        starts = runs(number)
+        self._means, after = means.shape[1], 2 + means.shape[1]
+        new = np.full((len(starts), after + latest.shape[1]), np.nan)
+        new[:, 0] = number[starts]
+        new[:, 1] = np.diff(np.append(starts, len(number)))
+        new[:, 2:after] = np.add.reduceat(means, starts, axis=0)
+        for column, values in enumerate(latest.T, after):
+            there = np.flatnonzero(~np.isnan(values))
+            new[np.searchsorted(starts, there, side="right") - 1, column] = values[there]
+        if self._parts and self._parts[-1][-1, 0] == new[0, 0]:  # the block before ended within this cell
+            begun = self._parts[-1][-1]
+            new[0, 1:after] += begun[1:after]
+            new[0, after:] = np.where(np.isnan(new[0, after:]), begun[after:], new[0, after:])
+            self._parts[-1] = self._parts[-1][:-1]
+        self._parts.append(new)
+        if self._most:
+            self._parts = [np.vstack(self._parts)[-self._most :]]
+
+    def evenly(self, longest: int) -> EvenCells | None:
+        """The cells from the first to the last one with samples; None if there are none, or more than `longest`."""
+        table = np.vstack(self._parts) if self._parts else np.zeros((0, 2))
+        place = (table[:, 0] - table[:1, 0]).astype(np.int64)
+        if not len(place) or place[-1] >= longest:
+            return None
+        even = np.full((place[-1] + 1, table.shape[1] - 1), np.nan)
+        even[:, 0] = 0.0
+        even[place] = table[:, 1:]
+        means = even[:, 1 : 1 + self._means]
+        means /= np.maximum(even[:, :1], 1.0)
+        return EvenCells(int(table[0, 0]), even[:, 0], means, even[:, 1 + self._means :])
+
+
+# The lag of one signal behind another, such as that of a satellite receiver's speed behind the force. Either some lags
+# are tried, and the one with the largest correlation is taken (cross-correlation). Or, where the shift may be anything,
+# all are tried at once by Fourier transforms.
+
+
+@dataclass
+class Correlation:
+    """value: correlation, 0 to 1. direction (k): unit vector along which the cause's covariance with the effect is
+    largest."""
+
+    value: float
+    direction: Array
+
+
+def correlation(effect: Array, cause: Array, whole: bool = False) -> Correlation:
+    """The correlation of effect (n) with the component of cause (n, k) along the direction of their largest covariance.
+
+    whole: normalise by the variance of all components of the cause, not only of the one along `direction`. The value is
+    then smaller where the cause also varies across that direction.
+    """
+    effect, cause = effect - np.mean(effect), cause - np.mean(cause, axis=0)
+    both = effect @ cause
+    direction = both / max(float(np.linalg.norm(both)), 1e-12)
+    along = cause @ direction
+    size = float(np.sqrt((effect @ effect) * (np.sum(cause * cause) if whole else along @ along)))
+    return Correlation(float(effect @ along) / size if size > 0.0 else 0.0, direction)
+
+
+@dataclass
+class Lag(Correlation):
+    """lag_s: delay of the effect against the cause. inside: it is neither the first nor the last of the lags tried."""
+
+    lag_s: float
+    inside: bool
+
+
+def best_lag(
+    lags_s: Iterable[float], pair_at: Callable[[float], tuple[Array, Array] | None], whole: bool = False
+) -> Lag | None:
+    """The lag of the largest correlation, interpolated by a parabola through its square and the two beside it.
+
+    lags_s: evenly spaced, increasing. pair_at: called with a lag, returns the effect (n) and the cause (n, k) that much
+    earlier, or None if there are too few values. whole: see correlation(). Returns None if pair_at always does.
+    """
+    tried = [(lag_s, pair_at(lag_s)) for lag_s in lags_s]
+    found = [(lag_s, correlation(*pair, whole)) for lag_s, pair in tried if pair is not None]
+    if not found:
+        return None
+    values = np.array([each.value for _, each in found])
+    best = int(np.argmax(values))
+    lag_s, at = found[best]
+    inside = 0 < best < len(found) - 1
+    if inside:
+        lag_s += peak_offset(values[best - 1 : best + 2] ** 2) * (found[best + 1][0] - lag_s)
+    return Lag(at.value, at.direction, float(lag_s), inside)
+
+
+def peak_offset(three: Array) -> float:
+    """Where the parabola through three neighbours (3) is highest, in steps from the middle one, -0.5 to 0.5."""
+    before, here, after = three
+    bend = before - 2.0 * here + after
+    return float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
+
+
+def correlations(first: Array, first_good: Bools, second: Array, second_good: Bools) -> tuple[Array, Array]:
+    """The correlation of two signals of zero mean, and the number of samples in it, at each shift.
+
+    first (n), second (m): at the same sample rate. first_good, second_good: True for samples that are used. Returns two
+    arrays (n + m - 1): entry j is for second[i] beside first[i + j - (m - 1)].
+    """
+    size = 1 << int(np.ceil(np.log2(len(first) + len(second))))
+    a, b = np.where(first_good, first, 0.0), np.where(second_good, second, 0.0)
+
+    def crossed(x: Array, y: Array) -> Array:
+        whole = np.fft.irfft(np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size)), size)
+        return np.concatenate((whole[size - len(second) + 1 :], whole[: len(first)]))
+
+    there, other = first_good.astype(float), second_good.astype(float)
+    count = np.maximum(np.rint(crossed(there, other)), 0.0)
+    # The transforms' rounding errors are a share of the whole sums of squares: smaller results mean nothing
+    square = np.maximum(crossed(a * a, other), 1e-9 * (a @ a)) * np.maximum(crossed(there, b * b), 1e-9 * (b @ b))
+    return crossed(a, b) / np.sqrt(np.maximum(square, 1e-30)), count
+
+
+def log_likelihood_ratio(correlation: Array, count: Array, per_sample: float) -> Array:
+    """Natural logarithm of the likelihood ratio of two normal signals: with this correlation over with none; 0 for a
+    negative correlation. correlation, count: see correlations(). per_sample: independent values per sample."""
+    r = np.clip(correlation, 0.0, 0.999)
+    return -0.5 * per_sample * count * np.log1p(-r * r)
+
+
+def peaks(values: Array, apart: int, most: int) -> list[int]:
+    """Indices of the largest values over 0, at most `most`, the largest first, each over `apart` from the others."""
+    left, found = values.copy(), []
+    while len(found) < most and np.max(left) > 0.0:
+        place = int(np.argmax(left))
+        found.append(place)
+        left[max(0, place - apart) : place + apart + 1] = 0.0
+    return found
+
+
+# Rotation vectors (the axis times the angle in rad) and rotation matrices, any number of them at once: the exponential
+# map and its inverse, e.g. Sola, "Quaternion kinematics for the error-state Kalman filter" (2017), section 2.3.
+
+
+def rotated(matrix: Array, *vectors: Array) -> tuple[Array, ...]:
+    """Each of vectors (n, 3) along the axes that are the rows of matrix (3, 3), such as vehicle_from_sensor."""
+    return tuple(vector @ matrix.T for vector in vectors)
+
+
+def cross_matrix(vector: Array) -> Array:
+    """(..., 3, 3) the skew-symmetric matrix K of vectors (..., 3): K @ other = vector x other."""
+    matrix = np.zeros((*vector.shape, 3))
+    x, y, z = np.moveaxis(vector, -1, 0)
+    matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -z, y, -x
+    matrix[..., 1, 0], matrix[..., 2, 0], matrix[..., 2, 1] = z, -y, x
+    return matrix
+
+
+def rotation_matrix(vector: Array) -> Array:
+    """(..., 3, 3) exp: the matrix of rotation vectors (..., 3, rad), by Rodrigues' formula."""
+    angle = np.linalg.norm(vector, axis=-1)[..., None, None] / np.pi
+    cross = cross_matrix(vector)
+    # numpy's sinc(x) is sin(pi x) / (pi x), which is exact near 0
+    return np.eye(3) + np.sinc(angle) * cross + 0.5 * np.sinc(angle / 2.0) ** 2 * (cross @ cross)
+
+
+def rotation_vector(matrix: Array) -> Array:
+    """(..., 3, rad) log: the rotation vector of matrices (..., 3, 3), each of under 180 degrees."""
+    axis = np.stack([matrix[..., i, j] - matrix[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=-1)
+    sine = np.linalg.norm(axis, axis=-1, keepdims=True)  # twice the sine of the angle
+    angle = np.arctan2(sine, np.trace(matrix, axis1=-2, axis2=-1)[..., None] - 1.0)
+    return axis / np.maximum(sine, 1e-12) * angle
+
+
+# Standstill, by how little readings change: for zero-velocity updates and for the gyro's bias.
+
+STANDING_MPS = 0.3  # a lower speed is standing: a receiver's is never quite 0
+STANDS = 4.0  # factor on the limits of the changes at such a speed
+
+
+def motionless(
+    rate: Array, force: Array, n: int, most_rate: float, most_force: float, speed_mps: Array | None = None
+) -> Bools:
+    """(m) True where, over the n of m samples around each, no component of rate (m, 3) and of force (m, 3) has a
+    standard deviation over most_rate and most_force, in their units.
+
+    Samples: means over a fifth of a second, in which an idling engine averages out. speed_mps (m): NaN where there is
+    none. A constant rate passes, as bias or as a steady bend: check its mean in addition.
+    """
+    speed = np.full(len(rate), np.nan) if speed_mps is None else speed_mps
+    allowed = np.where(speed < STANDING_MPS, STANDS, 1.0)
+    calm = np.max(moving_spread(rate, n), axis=1) < allowed * most_rate
+    calm &= np.max(moving_spread(force, n), axis=1) < allowed * most_force
+    return calm & ~(speed >= STANDING_MPS)
+
+
+# Distances on the Earth.
+
+EARTH_M = 6_371_000.0
+
+
+def distance_m(lat: Array, lon: Array, next_lat: Array, next_lon: Array) -> tuple[Array, Array]:
+    """(n) metres east and (n) metres north from each position to the next one (degrees). For distances of
+    kilometres."""
+    apart_deg = (next_lon - lon + 180.0) % 360.0 - 180.0  # also across the meridian of 180 degrees
+    east = np.radians(apart_deg) * np.cos(np.radians(lat)) * EARTH_M
+    return east, np.radians(next_lat - lat) * EARTH_M

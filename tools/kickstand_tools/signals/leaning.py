@@ -9,10 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
-from numpy.typing import NDArray
 
-from . import Array
-from .averages import moving_mean, moving_spread
+from . import Array, Bools, moving_mean, moving_spread
 
 WINDOW_S = 0.2  # rates and forces are means over windows of this length
 SMOOTH_S = 0.6  # the rates whose changes are compared are moving means over this
@@ -41,7 +39,7 @@ class Leaning:
     sigmas: float
 
 
-def leaning_of(rate: Array, force: Array, riding: NDArray[np.bool_]) -> Leaning:
+def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
     """The Leaning of n windows of WINDOW_S. rate (n, 3, rad/s): without bias. force (n, 3). riding (n): True for the
     windows that are used."""
     up = _unit(force[riding].mean(axis=0))

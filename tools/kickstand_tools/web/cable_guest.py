@@ -13,8 +13,7 @@ from pathlib import Path
 from ..calibration.file import calibration_path, write_calibration
 from ..deploy.connection import connected, describe, restart
 from ..errors import InputError
-from ..rides import pull as pulling
-from ..rides import ride_log, stream
+from ..rides import pull as pulling, ride_log, stream
 from .serial_guest import BrowserBoard
 
 

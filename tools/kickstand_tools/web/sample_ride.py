@@ -7,8 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..calibration.file import write_calibration
-from ..calibration.six import fit_six_positions
-from ..calibration.two import fit_two_positions
+from ..calibration.poses import fit_six_positions, fit_two_positions
 from ..simulation.files import simulate, write_poses, write_ride
 
 LOG, CALIBRATION = "simulated-ride.csv.gz", "simulated-ride.cal.json"

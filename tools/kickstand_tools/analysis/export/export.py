@@ -10,13 +10,12 @@ import numpy as np
 from kickstand.errors import Notice
 
 from ...errors import InputError, extra
+from ...logs.log import Stretch
 from ...logs.reader import Source, read_blocks, read_twice
 from ...logs.source import Progress
-from ...logs.stretch import Stretch
-from ...logs.table import Array
 from ...output import whole_file
-from ..channels import Channels
-from ..downsample import downsampled, rounded_to
+from ...signals import Array
+from ..channels import Channels, downsampled, rounded_to
 from ..ride import Ride
 from ..track import Track, joined, track
 from . import export_columns, export_gpx, export_racechrono, export_vbo

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ...logs.csv_lines import csv_lines
-from ...logs.table import float_schema
+from ...logs.log import float_schema
 from ..channels import Channels
 
 # name: (digits, unit)

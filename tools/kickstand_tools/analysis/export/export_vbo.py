@@ -17,8 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...logs.table import Array
-from ...signals.geography import distance_m
+from ...signals import Array, distance_m
 from ..channels import Channels
 
 # (title in [header], name in [column names]); of the others (both, unit, channel)

@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...logs.table import Array
 from ...refusals import sentence
-from ...signals.averages import smoothed
+from ...signals import Array, smoothed
 from ...times import clock, tick_s
-from ..downsample import spacing_s
+from ..channels import spacing_s
 from ..overview import Overview
 from ..report import angles, judged, peak_words
 from ..summary import BIN_DEG, BINS_DEG, Peak

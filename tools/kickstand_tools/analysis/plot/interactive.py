@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...logs.table import Array
+from ...signals import Array
 from .charts import LEFT_COLOUR, RIGHT_COLOUR, Bars, Chart, Charts, Dots, Line, Note, Sides, Trace, envelope
 
 POINTS = 40_000  # most points of a line: with more, a browser no longer zooms smoothly

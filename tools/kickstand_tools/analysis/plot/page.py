@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...signals.geography import EARTH_M
+from ...signals import EARTH_M
 from ...templates import filled, source_hash
 from ..overview import Overview
 from . import interactive, track_map

@@ -7,20 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..overview import Overview
-from .charts import (
-    BRAKE_COLOUR,
-    LEFT_COLOUR,
-    RIGHT_COLOUR,
-    Bars,
-    Chart,
-    Dots,
-    Line,
-    Note,
-    Sides,
-    Trace,
-    charts,
-    envelope,
-)
+from . import charts
 
 POINTS = 6000
 _CHARACTERS, _LINE = 180, 0.16  # of a line of warnings, and its height in inches
@@ -56,15 +43,16 @@ def figure_of(seen: Overview) -> Any:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    wanted = charts(seen)
+    wanted = charts.charts(seen)
     said = [line for words in wanted.warnings for line in textwrap.wrap(words, _CHARACTERS)]
     heights = [chart.height for chart in wanted.over_time] + [wanted.below[0].height]
     with rc_context(_STYLE):
         figure = Figure(figsize=(11, sum(heights) + _LINE * len(said)), layout="constrained")
         FigureCanvasAgg(figure)
-        figure.suptitle(wanted.title, fontsize=12, x=0.01, ha="left", parse_math=False)  # a name may have $ in it
+        aside: Any = {"x": 0.01, "ha": "left", "parse_math": False}  # a name may have $ in it
+        figure.suptitle(wanted.title, fontsize=12, **aside)
         if said:
-            figure.supxlabel("\n".join(said), fontsize=8, x=0.01, ha="left", color=BRAKE_COLOUR, parse_math=False)
+            figure.supxlabel("\n".join(said), fontsize=8, color=charts.BRAKE_COLOUR, **aside)
         rows = figure.add_gridspec(len(heights), len(wanted.below), height_ratios=heights)
         first = None
         for k, chart in enumerate(wanted.over_time):
@@ -78,7 +66,7 @@ def figure_of(seen: Overview) -> Any:
     return figure
 
 
-def draw_chart(axes: Any, chart: Chart) -> None:
+def draw_chart(axes: Any, chart: charts.Chart) -> None:
     """One chart on axes of matplotlib."""
     axes.set(title=chart.title, xlabel=chart.x_title, ylabel=chart.y_title, xlim=chart.x_range, ylim=chart.y_range)
     if chart.square:
@@ -93,33 +81,31 @@ def draw_chart(axes: Any, chart: Chart) -> None:
             line.set_linewidth(2.5)
     for begin, end, words in chart.spans:
         axes.axvspan(begin, end, color="0.88", linewidth=0)
-        _words(axes, Note((begin + end) / 2.0, 1.0, words, "below"), xycoords=axes.get_xaxis_transform())
+        _words(axes, charts.Note((begin + end) / 2.0, 1.0, words, "below"), xycoords=axes.get_xaxis_transform())
     for note in chart.notes:
         _words(axes, note, fontweight="bold")
     axes.text(0.02, 0.98, chart.left, transform=axes.transAxes, va="top")
     axes.text(0.98, 0.99, chart.right, transform=axes.transAxes, ha="right", va="top", fontsize=8)
 
 
-def _words(axes: Any, note: Note, **more: Any) -> None:
+def _words(axes: Any, note: charts.Note, **more: Any) -> None:
     axes.annotate(note.text, (note.x, note.y), textcoords="offset points", **_SIDES[note.side], **more)
 
 
-def _draw_trace(axes: Any, trace: Trace) -> None:
+def _draw_trace(axes: Any, trace: charts.Trace) -> None:
     from matplotlib.colors import LogNorm
 
-    if isinstance(trace, Line):
-        style = {"label": trace.name or None, "linestyle": ":" if trace.dotted else "-"}
-        axes.plot(
-            *envelope(trace.x, trace.y, POINTS, trace.gap_s), color=trace.colour, linewidth=0.9 * trace.width, **style
-        )
-    elif isinstance(trace, Sides):
-        x, y = envelope(trace.x, trace.y, POINTS, trace.gap_s)
-        for clip, colour in ((np.minimum, LEFT_COLOUR), (np.maximum, RIGHT_COLOUR)):
+    if isinstance(trace, charts.Line):
+        style = {"color": trace.colour, "linewidth": 0.9 * trace.width, "linestyle": ":" if trace.dotted else "-"}
+        axes.plot(*charts.envelope(trace.x, trace.y, POINTS, trace.gap_s), label=trace.name or None, **style)
+    elif isinstance(trace, charts.Sides):
+        x, y = charts.envelope(trace.x, trace.y, POINTS, trace.gap_s)
+        for clip, colour in ((np.minimum, charts.LEFT_COLOUR), (np.maximum, charts.RIGHT_COLOUR)):
             axes.fill_between(x, clip(y, 0.0), 0.0, color=colour, alpha=0.85, linewidth=0.3)
-    elif isinstance(trace, Dots):
+    elif isinstance(trace, charts.Dots):
         axes.plot(trace.x, trace.y, ".", color=trace.colour, markersize=3, alpha=0.5)
-    elif isinstance(trace, Bars):
-        colours = np.where(trace.x < 0.0, LEFT_COLOUR, RIGHT_COLOUR).tolist()
+    elif isinstance(trace, charts.Bars):
+        colours = np.where(trace.x < 0.0, charts.LEFT_COLOUR, charts.RIGHT_COLOUR).tolist()
         axes.bar(trace.x, trace.y, width=trace.width, color=colours, linewidth=0)
     else:
         shown = np.ma.masked_equal(trace.values, 0.0)

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...logs.table import Array
-from ...signals.geography import EARTH_M
+from ...signals import EARTH_M, Array, Ints
 from ..overview import Overview
 from ..track import Track, track
 from .charts import LEFT_COLOUR, RIGHT_COLOUR, SPEED_COLOUR, lean_limit, shown_lean_deg
@@ -128,7 +126,7 @@ def _mercator(lat_deg: Array) -> Array:
     return np.arcsinh(np.tan(np.radians(lat_deg)))
 
 
-def _moved(east: Array, north: Array) -> NDArray[np.intp]:
+def _moved(east: Array, north: Array) -> Ints:
     """The numbers of the points to keep: those over SAME_M from the last that is kept, the first in each gap, and the
     first after it."""
     kept, (last_x, last_y) = [0], (east[0], north[0])

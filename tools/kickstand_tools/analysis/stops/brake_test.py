@@ -23,12 +23,8 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
-from ...logs.table import Array
-from ...signals.averages import integral, smoothed
-from ...signals.cells import stretches
-from ...signals.standstill import STANDING_MPS
-from ..channels import Channels
-from ..downsample import thinned
+from ...signals import STANDING_MPS, Array, integral, smoothed, stretches
+from ..channels import Channels, thinned
 from .speed_fit import fitted_speed, speed_delay_s
 from .standstill import standing
 

@@ -7,9 +7,7 @@ shows the shape, but its integral drifts.
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from ...logs.table import Array
-from ...signals.averages import integral, smoothed
-from ...signals.lag import best_lag
+from ...signals import Array, best_lag, integral, smoothed
 from ..channels import Channels
 
 SMOOTH_S = 0.2  # smoothing of the acceleration: delay x acceleration is the error of a late speed

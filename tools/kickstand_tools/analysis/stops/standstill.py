@@ -1,19 +1,14 @@
 """Detects standstills, for the stops of a ride.
 
-Not by signals.standstill.motionless: limits relative to the ride's own shaking detect all of the standing time of
+Not by signals.motionless: limits relative to the ride's own shaking detect all of the standing time of
 simulated rides on the road, those in deg/s and g 54 to 92 %. Only where an idling engine shakes as the road does they
 detect less (17 to 41 % against 91 %).
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...logs.table import Array
-from ...signals.averages import smoothed, window_means, window_spreads
-from ...signals.cells import stretches
-from ...signals.standstill import STANDING_MPS
-from ..channels import Channels
-from ..downsample import spacing_s
+from ...signals import STANDING_MPS, Array, Bools, smoothed, stretches, window_means, window_spreads
+from ..channels import Channels, spacing_s
 
 STALE_S = 3.0  # an older speed is not used
 
@@ -28,7 +23,7 @@ MAX_OFF_G = 0.05  # largest difference of the force from that at rest; in smooth
 UNCALIBRATED_G = 0.12  # largest difference from 1 g, for a ride without rest and a sensor without six positions
 
 
-def standing(ride: Channels) -> NDArray[np.bool_]:
+def standing(ride: Channels) -> Bools:
     """(n) True where the vehicle stands still: by the log's speed, or where there is none by how little it shakes."""
     still = _quiet(ride)
     if not np.any(still):
@@ -39,7 +34,7 @@ def standing(ride: Channels) -> NDArray[np.bool_]:
     return np.where(known, ride.speed_mps[latest] < STANDING_MPS, still)
 
 
-def _quiet(ride: Channels) -> NDArray[np.bool_]:
+def _quiet(ride: Channels) -> Bools:
     still = np.zeros(len(ride.t_s), dtype=bool)
     second = max(4, round(QUIET_S / spacing_s(ride)))
     if len(still) < second:
@@ -59,7 +54,7 @@ def _quiet(ride: Channels) -> NDArray[np.bool_]:
     return still
 
 
-def _rested(ride: Channels) -> NDArray[np.bool_]:
+def _rested(ride: Channels) -> Bools:
     """The rests that the lean filter found, for a road so smooth that shaking shows nothing. Each is extended back to
     where the forward force became that of the rest."""
     still = ride.resting > 0.5
@@ -77,13 +72,13 @@ def _road(values: Array, time: Array) -> Array:
     return slow - smoothed(slow, time, BEND_S)
 
 
-def _calm(values: Array, n: int, share: float) -> NDArray[np.bool_]:
+def _calm(values: Array, n: int, share: float) -> Bools:
     """True where the standard deviation of n successive samples is under this share of the one on the move."""
     spread = window_spreads(values, n)
     return spread < share * np.percentile(spread, RIDING_PERCENTILE)
 
 
-def _weight(ride: Channels, n: int) -> NDArray[np.bool_]:
+def _weight(ride: Channels, n: int) -> Bools:
     """True where the force over n successive samples is that at rest, within the sensor's calibration errors."""
     size = np.sqrt(sum(window_means(axis, n) ** 2 for axis in (ride.left_g, ride.up_g, ride.forward_g)))
     rests = size[window_means(ride.resting, n) > 0.99]

@@ -9,8 +9,7 @@ import numpy as np
 
 from ...errors import InputError
 from ..files import RecordingFile
-from ..recording import Recording, sensor_of, track_of
-from ..sheets import names_in, plain, read_sheet, unit_in
+from ..recording import Recording, names_in, plain, read_sheet, sensor_of, track_of, unit_in
 from ..units import SPEEDS, unit
 
 NAME = "AiM"

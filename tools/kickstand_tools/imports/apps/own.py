@@ -12,9 +12,8 @@ from ...errors import InputError, extra
 from ...logs.cells import COLUMNS
 from ...logs.csv_reader import MOST_CELLS
 from ..files import RecordingFile
-from ..recording import Recording, sensor_of, track_of
-from ..sheets import Sheet, names_in, read_sheet
-from ..times import EPOCH_NS, Nanoseconds
+from ..recording import Recording, Sheet, names_in, read_sheet, sensor_of, track_of
+from ..units import EPOCH_NS, Nanoseconds
 
 NAME = "Kickstand"
 _FORCES = ("left_g", "up_g", "forward_g")

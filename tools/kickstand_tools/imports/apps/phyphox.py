@@ -14,10 +14,8 @@ from ...errors import InputError
 from ...logs.csv_reader import as_text
 from ..files import RecordingFile
 from ..join import with_gravity
-from ..recording import Recording, Sensor, Track, sensor_of, track_of
-from ..sheets import Sheet, names_in, plain, read_sheet, unit_in
-from ..times import EPOCH_NS, Nanoseconds, of_seconds
-from ..units import ACCELERATIONS, RATES, unit
+from ..recording import Recording, Sensor, Sheet, Track, names_in, plain, read_sheet, sensor_of, track_of, unit_in
+from ..units import ACCELERATIONS, EPOCH_NS, RATES, Nanoseconds, of_seconds, unit
 
 NAME = "phyphox"
 _AXIS = re.compile(r"^(?:(.*\S)\s+)?([xyz])\s*\(([^)]*)\)$", re.IGNORECASE)

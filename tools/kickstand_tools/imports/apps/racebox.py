@@ -9,12 +9,10 @@ import numpy as np
 from kickstand.errors import Notice
 
 from ...errors import InputError
-from ...signals.geography import distance_m
+from ...signals import Array, distance_m
 from ..files import RecordingFile
-from ..recording import SECOND_NS, Array, Recording, sensor_of, track_of
-from ..sheets import Sheet, names_in, plain, read_sheet, unit_in
-from ..times import Nanoseconds
-from ..units import SPEEDS, factor, unit
+from ..recording import SECOND_NS, Recording, Sheet, names_in, plain, read_sheet, sensor_of, track_of, unit_in
+from ..units import SPEEDS, Nanoseconds, factor, unit
 
 NAME = "RaceBox"
 _AXES = [f"{sensor}{axis}" for sensor in ("GForce", "Gyro") for axis in "YZX"]  # left, up, forward

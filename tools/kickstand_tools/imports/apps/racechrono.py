@@ -9,8 +9,7 @@ that measured. Kickstand's own export has this form, too.
 
 from ...errors import InputError
 from ..files import RecordingFile
-from ..recording import Recording, sensor_of, track_of
-from ..sheets import names_in, plain, read_sheet
+from ..recording import Recording, names_in, plain, read_sheet, sensor_of, track_of
 
 NAME = "RaceChrono"
 _FIRST = "This file is created using RaceChrono"

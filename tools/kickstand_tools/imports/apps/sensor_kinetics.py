@@ -10,8 +10,7 @@ import re
 from ...errors import InputError
 from ..files import RecordingFile
 from ..join import with_gravity
-from ..recording import Recording, Sensor, sensor_of
-from ..sheets import names_in, read_sheet
+from ..recording import Recording, Sensor, names_in, read_sheet, sensor_of
 
 NAME = "Sensor Kinetics"
 _HEAD = ["time", "x_value", "y_value", "z_value"]

@@ -8,8 +8,7 @@ and gravity have the opposite sign, and AccelerometerUncalibrated is in g, unles
 from ...errors import InputError
 from ..files import RecordingFile
 from ..join import with_gravity
-from ..recording import Recording, Sensor, sensor_of, track_of
-from ..sheets import names_in, read_sheet
+from ..recording import Recording, Sensor, names_in, read_sheet, sensor_of, track_of
 
 NAME = "Sensor Logger"
 _TOTAL, _RAW, _USER, _GRAVITY = "totalacceleration", "accelerometeruncalibrated", "accelerometer", "gravity"

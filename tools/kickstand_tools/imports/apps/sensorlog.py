@@ -10,9 +10,8 @@ import numpy as np
 from ...errors import InputError
 from ..files import RecordingFile
 from ..join import with_gravity
-from ..recording import Recording, Sensor, Track, sensor_of, track_of
-from ..sheets import Sheet, names_in, plain, read_sheet
-from ..times import NO_TIME, REPEATED, Nanoseconds
+from ..recording import Recording, Sensor, Sheet, Track, names_in, plain, read_sheet, sensor_of, track_of
+from ..units import NO_TIME, REPEATED, Nanoseconds
 
 NAME = "SensorLog"
 _UP = "Core Motion, -1 g up: sign turned"

@@ -14,10 +14,8 @@ import numpy as np
 from ...errors import InputError
 from ...logs.csv_reader import columns_of
 from ..files import RecordingFile
-from ..recording import Recording, sensor_of, track_of
-from ..sheets import Sheet, plain
-from ..times import of_day
-from ..units import ACCELERATIONS, RATES, SPEEDS, unit
+from ..recording import Recording, Sheet, plain, sensor_of, track_of
+from ..units import ACCELERATIONS, RATES, SPEEDS, of_day, unit
 
 NAME = "VBO"
 _CHANNELS = {  # of the vehicle: along and about left, up, forward

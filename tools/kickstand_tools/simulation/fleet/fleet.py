@@ -10,9 +10,8 @@ import numpy as np
 from ...errors import InputError, cause, extra
 from ...logs.csv_lines import write_table
 from ...logs.log import Log
-from ...logs.table import Array
 from ...output import check_directory
-from ...signals.rotations import rotation_matrix
+from ...signals import Array, rotation_matrix
 from .route import random_route
 from .vehicle import HANDLING, Receiver, drive_log, random_sensor
 

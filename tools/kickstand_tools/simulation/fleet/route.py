@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from ...logs.table import Array
-from ...signals.averages import moving_mean
+from ...signals import Array, moving_mean
 
 _SMOOTH_S = 0.6  # a driver changes the pedal and the steering wheel within about this
 _SLOPE_M, _SLOPE_DEG, _CAMBER_DEG = 120.0, 1.2, 0.7  # slope and camber have new values each 120 m, with these 1 sigma

@@ -6,8 +6,7 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
 from ...logs.log import Log
-from ...logs.table import Array
-from ...signals.rotations import rotation_vector
+from ...signals import Array, rotation_vector
 from ..ride import random_rotation
 from .route import Handling, Route, balance_lean
 

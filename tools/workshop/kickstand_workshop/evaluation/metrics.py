@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from kickstand_tools.signals.lag import peak_offset
+from kickstand_tools.signals import peak_offset
 from numpy.typing import NDArray
 
 LEANED_DEG = 10.0  # the slope is fitted where the true lean is larger: most of a ride is nearly upright

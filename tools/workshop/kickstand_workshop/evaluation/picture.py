@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from kickstand_tools.errors import InputError, extra
-from kickstand_tools.signals.averages import window_spreads
+from kickstand_tools.signals import window_spreads
 from numpy.typing import NDArray
 
 ZOOM_S = 60.0

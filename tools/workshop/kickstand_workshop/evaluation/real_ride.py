@@ -17,7 +17,7 @@ from kickstand_tools.checks.log import remarks
 from kickstand_tools.errors import InputError
 from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.reader import Log, read_log
-from kickstand_tools.signals.averages import moving_mean
+from kickstand_tools.signals import moving_mean
 from numpy.typing import NDArray
 
 from .estimators import calibrated, estimate

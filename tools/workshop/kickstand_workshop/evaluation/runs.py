@@ -10,8 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.calibration.six import fit_six_positions
-from kickstand_tools.calibration.two import fit_two_positions
+from kickstand_tools.calibration.poses import fit_six_positions, fit_two_positions
 from kickstand_tools.errors import InputError
 from kickstand_tools.logs.log import Log
 from kickstand_tools.simulation.profiles import check_profile
