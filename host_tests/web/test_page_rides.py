@@ -51,6 +51,8 @@ def test_the_charts_are_those_of_the_command(page, ride, calibration):
     drawn = interactive.figure(charts.charts(overview(open_ride(ride, calibration, smoothed=True))))["data"]
     inside = page.page.frame_locator("#plot")
     inside.locator("#chart .main-svg").first.wait_for()
+    assert inside.locator("#chart").evaluate("() => window.origin") == "null", "the frame has rights"
+    assert inside.locator("#map").count() == 0
     shown = json.loads(inside.locator("#chart").evaluate("() => JSON.stringify(CHART.data)"))
     assert [trace.get("name") for trace in shown] == [trace.get("name") for trace in drawn]
     for was, now in zip(drawn, shown):
