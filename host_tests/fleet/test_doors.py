@@ -21,19 +21,12 @@ from kickstand_tools.fleet.period import failed, work_on_period
 from kickstand_tools.fleet.run import run_fleet
 from kickstand_tools.fleet.show import plot
 from kickstand_tools.refusals import sentence
-from made_fleet import in_this_process
 
 
 @pytest.fixture
 def drive(fleet):
     """A log of a car that can be aligned."""
     return Path(read_manifest(str(fleet.manifest))[0].paths[0])
-
-
-@pytest.fixture
-def alone(monkeypatch):
-    """Vehicles are worked on in this process."""
-    monkeypatch.setattr(run, "run_tasks", in_this_process)
 
 
 def copied(source, *targets):

@@ -11,9 +11,18 @@ from kickstand_tools.simulation.scripted.sensor_errors import (
     GYRO_NOISE_DPS,
     MAX_OFFSET_G,
     Sensor,
+    random_mounting,
+    resting,
 )
 
 RIDE = [kickstand(2), upright(2), accelerate(14, 4), turn(-35, 3), brake(0, 4)]
+
+
+def test_mountings_are_rotations():
+    for seed in range(100):
+        matrix = np.reshape(random_mounting(seed), (3, 3))
+        assert np.abs(matrix @ matrix.T - np.eye(3)).max() < 1e-12
+        assert np.linalg.det(matrix) == pytest.approx(1.0)
 
 
 def test_the_sensor_reads_what_its_errors_say():
@@ -43,6 +52,13 @@ def test_seeds_give_different_parts_and_the_same_again():
     ride = Ride(RIDE)
     first, again, other = Sensor(seed=1), Sensor(seed=1), Sensor(seed=2)
     assert first.world(ride.motion)(7.5) == again.world(ride.motion)(7.5) != other.world(ride.motion)(7.5)
+
+
+def test_at_rest_it_reads_one_g_upward_with_its_errors():
+    sensor = Sensor(seed=9, noise=0.0)
+    reading = resting(sensor, (0.0, -2.0, 0.0))(1.0)
+    assert reading[:3] == pytest.approx(np.array([0.0, -1.0, 0.0]) * sensor.accel_scale + sensor.accel_offset_g)
+    assert reading[3:6] == pytest.approx(sensor.gyro_bias_dps)
 
 
 _BOTH = """
