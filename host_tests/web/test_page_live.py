@@ -103,7 +103,7 @@ def test_tools_that_cannot_be_loaded_can_be_asked_for_again(chromium, address, b
         rider.page.wait_for_selector("#live-said:has-text('Is there a network? Press the button again')")
         rider.page.unroute(f"**/{name}")
         rider.page.evaluate("document.querySelector('#live-said').textContent = ''")
-    rider.page.evaluate(MISSING, "install.zip")
+    rider.page.evaluate(MISSING, ["install.zip", 404])
     for press, says in (("#start", "#live-said"), ("#pull", "#pull-said")):
         rider.page.click(press)
         rider.page.wait_for_selector(f"{says}:has-text('install.zip cannot be loaded (HTTP 404)')", timeout=60_000)

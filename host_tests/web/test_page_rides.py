@@ -24,13 +24,6 @@ AWAKE = """() => {
     last = performance.now();
   }, 50);
 }"""
-# A library of the charts that does not run; window.given() gives the real one again
-UNABLE = """() => {
-  const fetched = window.fetch;
-  window.fetch = (url, ...more) =>
-    String(url).endsWith("plotly.min.js") ? Promise.resolve(new Response("?")) : fetched(url, ...more);
-  window.given = () => (window.fetch = fetched);
-}"""
 
 
 def test_the_report_is_that_of_the_command(page, ride, calibration):
@@ -78,7 +71,7 @@ def test_the_lean_of_each_sample_is_that_of_the_command(page, ride, calibration,
 
 def test_what_the_site_does_not_give_is_not_saved(page, ride, calibration):
     page.show(ride, calibration)
-    page.page.evaluate(MISSING, "plotly.min.js")
+    page.page.evaluate(MISSING, ["plotly.min.js", 404])
     page.page.click("#save-page")
     assert "plotly.min.js cannot be loaded (HTTP 404)" in page.said()
     page.page.evaluate("given()")
@@ -86,7 +79,7 @@ def test_what_the_site_does_not_give_is_not_saved(page, ride, calibration):
 
 
 def test_charts_that_a_browser_cannot_draw_are_not_waited_for(page, ride, calibration):
-    page.page.evaluate(UNABLE)
+    page.page.evaluate(MISSING, ["plotly.min.js", 200])
     page.give(ride, calibration)
     page.page.wait_for_function("document.querySelector('#drawing').textContent.includes('could not draw')")
     page.page.evaluate("given()")

@@ -10,10 +10,11 @@ PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "is_mobile":
 LAPTOP: dict[str, Any] = {"viewport": {"width": 1440, "height": 900}}
 READ_S = 120  # at most, until the page shows what is waited for: a busy machine is late with all of it
 
-# Keeps what the board's worker sends, for tests to look at and to repeat
+# Keeps what the board's worker sends, for tests to look at and to repeat; and lets the page draw less often
 KEEP = Path(__file__).with_name("keep.js").read_text()
 
-# The site has no file whose address ends so; window.given() again fetches all. The service worker is passed by.
+# Of a file whose address ends so the site gives nothing but this status; window.given() again fetches all. The service
+# worker is passed by.
 MISSING = Path(__file__).with_name("missing.js").read_text()
 
 
