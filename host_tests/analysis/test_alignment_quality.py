@@ -14,21 +14,17 @@ from kickstand_tools.analysis import report
 from kickstand_tools.analysis.alignment_quality import Quality, lean_cost, yaw_cost_deg
 from kickstand_tools.analysis.report import angles
 from kickstand_tools.api import Log, fit_drive, fit_two_positions, open_ride, overview, simulate_ride, vehicle_channels
+from kickstand_tools.signals.rotations import rotation_matrix
 from kickstand_tools.simulation.scripted import script
 
 NONE = np.zeros(1)
 # "up" leans to the right of the bike's own; "forward" points up; "forward" points to the right
-AXES = {"roll": (1, 0), "pitch": (1, 2), "yaw": (2, 0)}
+AXES = {"roll": (0.0, 0.0, -1.0), "pitch": (1.0, 0.0, 0.0), "yaw": (0.0, 1.0, 0.0)}
 
 
 def turn(name, degrees):
-    """(3, 3): two axes turned into one another, so that this angle of the alignment is off by so much."""
-    a, b = AXES[name]
-    made = np.eye(3)
-    made[a, a] = made[b, b] = np.cos(np.radians(degrees))
-    made[b, a] = np.sin(np.radians(degrees))
-    made[a, b] = -made[b, a]
-    return made
+    """(3, 3): by which this angle of the alignment is off by so much."""
+    return rotation_matrix(np.radians(degrees) * np.array(AXES[name]))
 
 
 def turned(calibration, name, degrees):
@@ -37,7 +33,7 @@ def turned(calibration, name, degrees):
     return dataclasses.replace(calibration, vehicle_from_sensor=matrix)
 
 
-@pytest.fixture(scope="module", params=["street", "city"])
+@pytest.fixture(scope="module", params=["street", pytest.param("city", marks=pytest.mark.nightly)])
 def ride(request):
     """Log of 100 samples a second with a speed, its true calibration and true lean."""
     made = simulate_ride(request.param, seed=2, seconds=150.0)

@@ -8,7 +8,6 @@ import pydoc
 import re
 import sys
 
-import analysis_rides
 import command
 import numpy as np
 import pytest
@@ -77,16 +76,6 @@ def test_any_source_gives_the_same_log(directory):
             for name, values in got.columns().items():
                 assert np.array_equal(values, want.columns()[name], equal_nan=True), name
     assert want.accel_g.shape == want.gyro_dps.shape == (len(want.t_s), 3)
-
-
-def test_replay_gives_what_the_command_writes(directory):
-    out, cal = directory / "LEAN.csv", directory / "RIDE.cal.json"
-    command.works("replay", directory / "RIDE.csv", "--calibration", cal, "--out", out)
-    want = analysis_rides.table(out)
-    with (directory / "RIDE.csv").open("rb") as file:
-        got = api.replay(file, api.read_calibration(cal))
-    for name in want.dtype.names or ():
-        assert np.allclose(getattr(got, name), want[name], atol=1e-5, equal_nan=True), name
 
 
 def test_stops_and_summary_of_arrays_are_those_of_the_report(directory):

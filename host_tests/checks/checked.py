@@ -9,15 +9,13 @@ from kickstand_tools.refusals import sentence
 from kickstand_tools.simulation.ride import Ride, ride
 
 
-def cells_of(log: Log, accel=None, gyro=None, speed=True, block=1_000_000) -> LogCells:
+def cells_of(log: Log, accel=None, gyro=None, speed=True) -> LogCells:
     """accel, gyro (3, 3): by which the sensors' axes are exchanged and reversed; a number makes the readings larger."""
     force = log.accel_g if accel is None else log.accel_g @ np.transpose(accel)
     rate = log.gyro_dps if gyro is None else log.gyro_dps @ np.transpose(gyro)
     mps = log.speed_mps if speed else np.full(len(log.t_s), np.nan)
     table = CellTable()
-    for k in range(0, len(log.t_s), block):
-        part = slice(k, k + block)
-        table.add(log.t_s[part], force[part], rate[part], mps[part], log.lat_deg[part], log.lon_deg[part])
+    table.add(log.t_s, force, rate, mps, log.lat_deg, log.lon_deg)
     cells = table.cells()
     assert cells is not None
     return cells

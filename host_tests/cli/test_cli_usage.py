@@ -9,7 +9,6 @@ import command
 import pytest
 from kickstand_tools.cli.common import TIME
 from kickstand_tools.logs import reader
-from kickstand_tools.simulation.profiles import PROFILES
 
 MISTAKES = {
     "fly": "No such command 'fly'",
@@ -32,18 +31,6 @@ def test_a_mistake_is_said_in_one_line(tmp_path, monkeypatch, line):
     assert MISTAKES[line] in result.err
     assert re.search(r"[^.][.?] See kickstand.* --help\.\n$", result.err)
     assert not list(tmp_path.iterdir())
-
-
-def test_alone_it_shows_its_commands():
-    result = command.works()
-    for name in "flash", "status", "calibrate", "replay", "demo":
-        assert f"\n  {name} " in result.out
-
-
-@pytest.mark.parametrize("name", ["simulate", "evaluate"])
-def test_the_profiles_are_in_the_help(name):
-    words = " ".join(command.works(name, "--help").out.split())
-    assert ", ".join(PROFILES) in words.replace("; hard ones:", ",")
 
 
 def test_a_fault_of_its_own_is_one_line_too(tmp_path, monkeypatch):

@@ -41,17 +41,6 @@ def test_judging_is_seen_from_the_start(monkeypatch):
     assert lines == ["riding: 50 %", "riding: 100 %"]
 
 
-def test_broken_off_an_evaluation_leaves_no_empty_directory(tmp_path, monkeypatch):
-    def ctrl_c(*_):
-        assert (tmp_path / "a" / "b").is_dir()
-        raise KeyboardInterrupt
-
-    pytest.importorskip("matplotlib")
-    monkeypatch.setattr(runs, "run_all", ctrl_c)
-    assert command.run("evaluate", "--profiles", "parked", "--out", tmp_path / "a" / "b").status == 130
-    assert not list(tmp_path.iterdir())
-
-
 def test_a_directory_that_was_there_or_has_something_in_it_stays(tmp_path):
     (tmp_path / "old").mkdir()
     for path in (tmp_path / "old", tmp_path / "new"):

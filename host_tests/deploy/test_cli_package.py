@@ -9,7 +9,6 @@ import sys
 import zipfile
 from pathlib import Path
 
-import command
 import pytest
 from kickstand_tools import firmware_path
 from kickstand_tools.deploy import firmware_files
@@ -56,11 +55,6 @@ def test_the_wheel_carries_the_firmware(tmp_path):
     assert {f"kickstand_tools/web/{path.relative_to(web).as_posix()}" for path in pages} <= names
     assert {name.split("/")[0] for name in names} == {"kickstand", "kickstand_tools", "kickstand-0.4.0.dist-info"}
     assert not [name for name in names if "__pycache__" in name or name.endswith(".cal")]
-
-
-def test_what_is_shipped_knows_nothing_of_the_workshop():
-    assert not [path for path in firmware_path.TOOLS.glob("kickstand_tools/**/*.py") if "workshop" in path.read_text()]
-    assert "bench" in command.works("--help").out  # which the workshop adds in a checkout
 
 
 def test_an_installation_stays_that_of_the_checkout():

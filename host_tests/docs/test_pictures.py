@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kickstand_tools.pictures import lcd
 from kickstand_workshop.pictures import drawn, page, ride
 from PIL import Image, ImageSequence
 
@@ -54,22 +53,6 @@ def test_they_are_small_and_fetch_nothing(pictures):
         assert len(svg) < 30_000, name
         assert "@font-face" not in svg, name
         assert set(re.findall(r"https?://[^\"' ]+", svg)) == {"http://www.w3.org/2000/svg"}, name
-
-
-def test_the_display_is_drawn_dot_by_dot():
-    """A "1" of the ROM has 10 dots, a full block 40, and an own character those of its rows."""
-    codes = [[0x20] * 16, [0x20] * 16]
-
-    def dots():
-        return lcd.draw(codes, bytes([0x1F, 0x01] + [0] * 62)).count("M") - 40  # those of the empty cell
-
-    assert dots() == 0
-    codes[1][15] = ord("1")
-    assert dots() == 10
-    codes[0][0] = 0xFF
-    assert dots() == 50
-    codes[0][1] = 0
-    assert dots() == 56
 
 
 def test_the_wires_go_to_the_pins_of_the_settings(pictures):

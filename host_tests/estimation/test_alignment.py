@@ -6,6 +6,7 @@ Simulated rides have a sensor mounted at random, with errors as the data sheet a
 import functools
 import itertools
 import json
+from dataclasses import replace
 
 import command
 import numpy as np
@@ -33,19 +34,9 @@ def log_of(made, speed=True):
     return log
 
 
-def changed(log, accel=None, gyro=None, speed=None):
-    return Log(
-        log.t_s,
-        log.accel_g if accel is None else accel,
-        log.gyro_dps if gyro is None else gyro,
-        log.speed_mps if speed is None else speed,
-        name=log.name,
-    )
-
-
 def mounted(log, rotation):
     """The same ride with the sensor turned: its axes see everything rotated."""
-    return changed(log, log.accel_g @ rotation.T, log.gyro_dps @ rotation.T)
+    return replace(log, accel_g=log.accel_g @ rotation.T, gyro_dps=log.gyro_dps @ rotation.T)
 
 
 def errors_deg(found, true):
@@ -97,7 +88,7 @@ def test_the_offset_across_the_bike_is_found():
     log = log_of(made)
     across = made.vehicle_from_sensor[0]
     for extra in (-0.05, 0.05):
-        found = api.fit_ride(changed(log, log.accel_g + extra * across))
+        found = api.fit_ride(replace(log, accel_g=log.accel_g + extra * across))
         check(found, made.vehicle_from_sensor)
         upright = made.chip.accel_matrix @ made.vehicle_from_sensor[1] + made.chip.accel_offset + extra * across
         calibrated = found.calibration.vehicle_from_sensor @ (upright + found.calibration.accel_offset_g)
@@ -123,7 +114,7 @@ def test_axes_of_the_wrong_hand_are_refused():
 def test_only_a_phones_mounting_shows_an_accelerometer_of_the_opposite_sign():
     made = simulated()
     log = mounted(log_of(made), PHONES["portrait"][0].T @ made.vehicle_from_sensor)
-    mirrored = changed(log, accel=-log.accel_g)
+    mirrored = replace(log, accel_g=-log.accel_g)
     assert (api.fit_ride(log, phone="portrait").phone_deg or 99.0) < 3.0
     api.fit_ride(mirrored)
     with pytest.raises(api.RefusedInput, match=r"opposite sign: at rest .* \+1 g"):
@@ -204,7 +195,7 @@ def car(seconds=300.0):
 def moved(log, degrees):
     half = len(log.t_s) // 2
     rotation = rotation_matrix(np.radians(degrees) * np.array([0.6, 0.0, 0.8]))
-    log = changed(log, log.accel_g.copy(), log.gyro_dps.copy())
+    log = replace(log, accel_g=log.accel_g.copy(), gyro_dps=log.gyro_dps.copy())
     log.accel_g[half:], log.gyro_dps[half:] = log.accel_g[half:] @ rotation.T, log.gyro_dps[half:] @ rotation.T
     return log
 
@@ -214,14 +205,14 @@ WRONG = {
     "short": (lambda log: log.part(slice(6000)), ("ride-short",)),
     "parked": (lambda log: log_of(simulated("parked", 1, 60.0)), ("ride-short",)),
     "straight": (lambda log: log_of(simulated("city", 5, 60.0)), ("no-bends",)),
-    "rad/s": (lambda log: changed(log, gyro=np.radians(log.gyro_dps)), ("rates-in-radians",)),
-    "speed stuck": (lambda log: changed(log, speed=log.speed_mps * 0.0), ("speed-stuck",)),
-    "half the speed": (lambda log: changed(log, speed=log.speed_mps * 0.5), ("speed-unit",)),
+    "rad/s": (lambda log: replace(log, gyro_dps=np.radians(log.gyro_dps)), ("rates-in-radians",)),
+    "speed stuck": (lambda log: replace(log, speed_mps=log.speed_mps * 0.0), ("speed-stuck",)),
+    "half the speed": (lambda log: replace(log, speed_mps=log.speed_mps * 0.5), ("speed-unit",)),
     "moved a little": (lambda log: moved(log, 12.0), ("ride-contradicts", "ride-halves", "ride-uncertain")),
-    "gyro of the opposite sign": (lambda log: changed(log, gyro=-log.gyro_dps), ("left-handed",)),
-    "nothing but absurd readings": (lambda log: changed(log, log.accel_g * 1e4), ("ride-short",)),
-    "axes exchanged": (lambda log: changed(log, gyro=log.gyro_dps[:, [1, 2, 0]]), None),
-    "accelerations exchanged": (lambda log: changed(log, log.accel_g[:, [0, 2, 1]]), ("rates-misfit",)),
+    "gyro of the opposite sign": (lambda log: replace(log, gyro_dps=-log.gyro_dps), ("left-handed",)),
+    "nothing but absurd readings": (lambda log: replace(log, accel_g=log.accel_g * 1e4), ("ride-short",)),
+    "axes exchanged": (lambda log: replace(log, gyro_dps=log.gyro_dps[:, [1, 2, 0]]), None),
+    "accelerations exchanged": (lambda log: replace(log, accel_g=log.accel_g[:, [0, 2, 1]]), ("rates-misfit",)),
 }
 
 
@@ -249,7 +240,7 @@ def test_a_recorded_car_is_refused(shared_data):
     assert len(drives) == 4
     for path in drives:
         log = mounted(api.read_log(path), rotation)
-        for each in (log, changed(log, speed=np.full(len(log.t_s), np.nan))):
+        for each in (log, replace(log, speed_mps=np.full(len(log.t_s), np.nan))):
             with pytest.raises(api.RefusedInput) as raised:
                 api.fit_ride(each)
             assert raised.value.code == "not-leaning"
@@ -259,7 +250,7 @@ def test_a_recorded_motorcycle(shared_data):
     """Its forward, by braking between the same two lights, and the up of its first second are known to some degrees."""
     log = api.read_log(shared_data / "motorcycle-ride.csv.gz")
     rough = np.array([[0.9869, 0.1612, 0.0060], [-0.0137, 0.0466, 0.9988], [0.1608, -0.9858, 0.0482]])
-    found, without = api.fit_ride(log), api.fit_ride(changed(log, speed=np.full(len(log.t_s), np.nan)))
+    found, without = api.fit_ride(log), api.fit_ride(replace(log, speed_mps=np.full(len(log.t_s), np.nan)))
     for each in (found, without):
         pitch, yaw, roll = errors_deg(each, rough)
         assert max(pitch, roll) < 3.0

@@ -1,17 +1,12 @@
 """The scores of an evaluation on errors that are known."""
 
-import io
 import math
 
 import numpy as np
 import pytest
-from kickstand_workshop.evaluation.estimators import trailing_mean
 from kickstand_workshop.evaluation.metrics import Score, lag_ms, score, slope, straights
 from kickstand_workshop.evaluation.picture import ZOOM_S, zoom_start
-from kickstand_workshop.evaluation.real_ride import RealScore
-from kickstand_workshop.evaluation.report import document, pooled, real_table, table
-from kickstand_workshop.evaluation.runs import Evaluation, Job, Result
-from rich.console import Console
+from kickstand_workshop.evaluation.report import pooled
 
 RATE = 200.0
 N = 40000
@@ -80,10 +75,6 @@ def test_the_bias_is_of_the_last_straights_alone():
     assert math.isnan(score(shown, true, RATE).straight_bias_deg)
 
 
-def test_a_trailing_mean_starts_short():
-    assert trailing_mean(np.array([2.0, 4.0, 6.0, 8.0, 10.0]), 3.0, 1.0) == pytest.approx([2, 3, 4, 6, 8])
-
-
 def test_pooling_keeps_the_worst():
     one = Score(1.0, 2.0, 3.0, 0.9, 5.0, 0.1)
     two = Score(3.0, 4.0, 9.0, 1.1, float("nan"), -0.6)
@@ -103,28 +94,6 @@ def test_a_ride_without_a_corner_does_not_hide_the_others():
         found = pooled(scores)
         assert [found[name] for name in ("slope", "slope_low", "slope_high")] == [0.9] * 3
         assert (found["lag_ms"], found["straight_bias"]) == (5.0, 0.1)
-
-
-def test_what_is_not_observable_is_two_dashes():
-    nothing = float("nan")
-    printed = io.StringIO()
-    console = Console(width=80, file=printed)
-    result = Result(Job("street", 0), {"kickstand": Score(1.0, 2.0, 3.0, nothing, nothing, nothing)})
-    console.print(table([result]))
-    console.print(real_table({"kickstand": RealScore(1.0, nothing)}, "ride.csv"))
-    said = printed.getvalue()
-    assert "nan" not in said
-    simulated, recorded = (line.split()[1:] for line in said.split("\n") if "kickstand" in line)
-    assert simulated == ["1.00", "1.00", "2.00", "3.0", "--", "--", "--", "--"]
-    assert recorded == ["1.00", "--"]
-    assert "--: not observable in these rides" in " ".join(said.split())
-
-
-def test_the_document_has_no_nan():
-    results = [Result(Job("street", 0), {"kickstand": Score(1.0, 1.0, 1.0, float("nan"), 1.0, float("nan"))})]
-    made = document(Evaluation(results, None))
-    assert made["profiles"]["street"]["kickstand"]["slope"] is None
-    assert made["rides"][0]["scores"]["kickstand"]["rms"] == 1.0
 
 
 def test_the_zoom_is_where_it_leans():

@@ -105,10 +105,3 @@ def test_it_can_be_read_by_a_beginner(path):
     assert len(source.split("\n")) <= 40
     command = "cp firmware/examples/{} :user.py" if path.name.startswith("user_") else "run firmware/examples/{}"
     assert "mpremote " + command.format(path.name) in source
-
-
-def test_each_has_its_test():
-    source = Path(__file__).read_text(encoding="utf-8")
-    names = {path.name for path in EXAMPLES.glob("*.py")}
-    assert len(names) == 7
-    assert all(f'"{name}"' in source for name in names)

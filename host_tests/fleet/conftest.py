@@ -2,9 +2,16 @@
 
 import made_fleet
 import pytest
+from kickstand_tools.fleet import run
 
 
 @pytest.fixture(scope="session")
 def fleet(tmp_path_factory):
     """A MadeFleet of nine vehicles, of which several have something wrong."""
     return made_fleet.make(tmp_path_factory.mktemp("fleet"))
+
+
+@pytest.fixture
+def alone(monkeypatch):
+    """Vehicles are worked on in this process."""
+    monkeypatch.setattr(run, "run_tasks", made_fleet.in_this_process)

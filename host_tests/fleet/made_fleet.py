@@ -5,6 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from kickstand_tools.fleet.manifest import Period
+from kickstand_tools.fleet.period import work_on_period
+from kickstand_tools.logs.csv_lines import write_log
+from kickstand_tools.signals import rotation_matrix
 from kickstand_tools.simulation.fleet import fleet as made_up
 from kickstand_tools.simulation.fleet.route import random_route
 from kickstand_tools.simulation.fleet.vehicle import HANDLING, Receiver, drive_log, random_sensor
@@ -46,15 +50,20 @@ def drive(seed, kind="car", seconds=200.0, sensor=None, moved=None, straight=Tru
 
 def turn_of(degrees, axis):
     """(3, 3): a turn about an axis (3)."""
-    x, y, z = np.asarray(axis, float) / np.linalg.norm(axis)
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    angle = np.radians(degrees)
-    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    return rotation_matrix(np.radians(degrees) * np.asarray(axis) / np.linalg.norm(axis))
 
 
 def yaw_deg(found, true):
     between = np.asarray(found).reshape(3, 3) @ np.asarray(true).reshape(3, 3).T
     return float(np.degrees(np.arctan2(between[2, 0] - between[0, 2], between[0, 0] + between[2, 2])))
+
+
+def worked_on(directory, *logs):
+    """What is found in these logs of one car."""
+    paths = tuple(str(directory / f"{k}.csv") for k in range(1, 1 + len(logs)))
+    for path, log in zip(paths, logs):
+        write_log(path, log)
+    return work_on_period(Period("v", "", "car", paths))
 
 
 def in_this_process(function, items, *_):

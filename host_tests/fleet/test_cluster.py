@@ -127,14 +127,6 @@ def test_a_run_that_is_stopped_keeps_what_it_has(tmp_path, monkeypatch):
         assert [key in journal for key in keys] == [True, True, True, False, False]
 
 
-def test_a_vehicle_that_crashed_is_tried_again_by_the_next_run(tmp_path, monkeypatch):
-    periods = [Period("v", "", "car", ("none.csv",))]
-    monkeypatch.setattr(run, "run_tasks", lambda *_: iter([(0, None, CRASHED, "its worker died")]))
-    first = run_fleet(periods, tmp_path)
-    assert first.seen.reasons[("error", CRASHED)] == 1
-    assert run_fleet(periods, tmp_path).new == 1
-
-
 def test_a_journal_whose_end_was_cut_or_whose_disk_is_full_loses_no_line(tmp_path, monkeypatch):
     path = tmp_path / "journal.jsonl"
     result = failed(Period("v", "", "car", ()), "unreadable", "x")

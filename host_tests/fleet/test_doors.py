@@ -20,21 +20,13 @@ from kickstand_tools.fleet.manifest import Period, by_pattern, read_manifest
 from kickstand_tools.fleet.period import failed, work_on_period
 from kickstand_tools.fleet.run import run_fleet
 from kickstand_tools.fleet.show import plot
-from kickstand_tools.output import whole_file
 from kickstand_tools.refusals import sentence
-from made_fleet import in_this_process
 
 
 @pytest.fixture
 def drive(fleet):
     """A log of a car that can be aligned."""
     return Path(read_manifest(str(fleet.manifest))[0].paths[0])
-
-
-@pytest.fixture
-def alone(monkeypatch):
-    """Vehicles are worked on in this process."""
-    monkeypatch.setattr(run, "run_tasks", in_this_process)
 
 
 def copied(source, *targets):
@@ -119,17 +111,6 @@ def test_no_memory_and_no_disk_are_no_fault_of_kickstands(monkeypatch):
         found = work_on_period(Period("v", "", "car", ("x.csv",)))
         assert found.errors[0]["reason"] == reason
         assert "Error" not in found.errors[0]["message"]
-
-
-def test_a_file_that_cannot_be_written_says_why(tmp_path, monkeypatch):
-    """On a read-only file system the temporary file cannot be removed either."""
-
-    def read_only(*_, **__):
-        raise OSError(30, "Read-only file system")
-
-    monkeypatch.setattr(Path, "unlink", read_only)
-    with pytest.raises(InputError, match="Read-only file system"), whole_file(tmp_path / "x"):
-        read_only()
 
 
 PROGRAM = """

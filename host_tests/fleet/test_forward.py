@@ -8,12 +8,10 @@ from kickstand.errors import AlignmentError
 from kickstand_tools.calibration.drive import fit_logs, usable
 from kickstand_tools.fleet import evidence, forward, period
 from kickstand_tools.fleet.forward import find_forward
-from kickstand_tools.fleet.manifest import Period
-from kickstand_tools.logs.csv_lines import write_log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.refusals import RefusedInput
 from kickstand_tools.signals import rotation_vector
-from made_fleet import drive, turn_of, yaw_deg
+from made_fleet import drive, turn_of, worked_on, yaw_deg
 
 SEEDS = (101, 102, 106, 109)  # on which the device is off by about a degree
 
@@ -47,12 +45,6 @@ def test_up_stays_the_device_s(buses):
     for fit, known, _ in buses:
         assert known.frame[1] == pytest.approx(fit.calibration.vehicle_from_sensor[1], abs=1e-6)
         assert known.frame @ known.frame.T == pytest.approx(np.eye(3), abs=1e-6)
-
-
-def worked_on(tmp_path, log):
-    path = tmp_path / "1.csv"
-    write_log(path, log)
-    return period.work_on_period(Period("v", "", "car", (str(path),)))
 
 
 @pytest.mark.parametrize(("seed", "doubt"), [(138, "uncertain"), (114, "parts-differ")])

@@ -14,7 +14,6 @@ from kickstand_tools.fleet.journal import Journal
 from kickstand_tools.fleet.manifest import read_manifest
 from kickstand_tools.fleet.period import DISK_FULL, work_on_period
 from kickstand_tools.fleet.run import run_fleet
-from made_fleet import in_this_process
 
 FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
@@ -54,9 +53,8 @@ def finished(directory, keys):
 
 # From a disk that has no room for a picture to one that has none for the last table beside all rows
 @pytest.mark.parametrize("kb", [8, 48, 80])
-def test_a_disk_of_any_size_loses_no_finished_row(disk, results, monkeypatch, kb):
+def test_a_disk_of_any_size_loses_no_finished_row(disk, results, alone, monkeypatch, kb):
     known, periods = results
-    monkeypatch.setattr(run, "run_tasks", in_this_process)
     monkeypatch.setattr(run, "work_on_period", lambda period, _: copy.deepcopy(known[period.vehicle]))
     resize(disk, kb)
     out = disk / "results"
@@ -74,9 +72,8 @@ def test_a_disk_of_any_size_loses_no_finished_row(disk, results, monkeypatch, kb
     assert run_fleet(periods, out).new == 0
 
 
-def test_a_picture_that_cannot_be_written_costs_no_row(results, tmp_path, monkeypatch):
+def test_a_picture_that_cannot_be_written_costs_no_row(results, alone, tmp_path, monkeypatch):
     known, periods = results
-    monkeypatch.setattr(run, "run_tasks", in_this_process)
     monkeypatch.setattr(run, "work_on_period", lambda period, _: copy.deepcopy(known[period.vehicle]))
 
     def full(*_):
@@ -90,9 +87,8 @@ def test_a_picture_that_cannot_be_written_costs_no_row(results, tmp_path, monkey
     assert run_fleet(periods, tmp_path).new == len(periods)  # the first one for its picture
 
 
-def test_signals_that_do_not_fit_stop_the_run_and_are_written_by_the_next(results, tmp_path, monkeypatch):
+def test_signals_that_do_not_fit_stop_the_run_and_are_written_by_the_next(results, alone, tmp_path, monkeypatch):
     _, periods = results
-    monkeypatch.setattr(run, "run_tasks", in_this_process)
 
     def full(path, _):
         raise InputError(f"{path} cannot be written: {FULL.strerror}") from FULL

@@ -7,8 +7,7 @@ from kickstand_tools.analysis.stops.brake_test import find_stops
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.fleet.manifest import Period, read_manifest
 from kickstand_tools.fleet.period import brake_tests, work_on_period
-from kickstand_tools.logs.csv_lines import write_log
-from made_fleet import drive, turn_of, yaw_deg
+from made_fleet import drive, turn_of, worked_on, yaw_deg
 
 
 @pytest.fixture(scope="module")
@@ -74,9 +73,7 @@ def test_a_fault_of_ours_is_a_row_too(monkeypatch, fleet):
 def test_mirrored_axes_are_not_aligned(tmp_path):
     log, _ = drive(12)
     log.gyro_dps = -log.gyro_dps
-    path = tmp_path / "mirrored.csv"
-    write_log(path, log)
-    found = work_on_period(Period("v", "", "car", (str(path),)))
+    found = worked_on(tmp_path, log)
     assert (found.alignment["status"], found.alignment["reason"]) == ("refused", "left-handed")
 
 
@@ -102,9 +99,7 @@ def test_a_small_turn_between_two_logs(tmp_path, degrees, axis):
     first, sensor = drive(21)
     sensor.mount = turn_of(degrees, axis) @ sensor.mount
     second, _ = drive(22, sensor=sensor)
-    for name, log in (("1.csv", first), ("2.csv", second)):
-        write_log(tmp_path / name, log)
-    found = work_on_period(Period("v", "", "car", (str(tmp_path / "1.csv"), str(tmp_path / "2.csv"))))
+    found = worked_on(tmp_path, first, second)
     assert found.alignment["reason"] == "mount-moved"
     row = found.moved[0]
     turned = [row["about_left_deg"], row["about_up_deg"], row["about_forward_deg"]]

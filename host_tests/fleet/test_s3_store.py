@@ -10,14 +10,13 @@ from kickstand_tools.fleet.manifest import read_manifest
 from kickstand_tools.fleet.period import failed
 from kickstand_tools.fleet.run import run_fleet
 from kickstand_tools.fleet.tables import TABLES
-from made_fleet import in_this_process
 
 WANTED = (0, 4)  # a car, and a bus with a log that is no text
 TABLE_FILES = [f"{name}.parquet" for name in TABLES]
 
 
 @pytest.fixture
-def s3(monkeypatch):
+def s3(alone, monkeypatch):
     """A file system on a made-up S3 that has a bucket `fleet`."""
     moto = pytest.importorskip("moto.server")
     s3fs = pytest.importorskip("s3fs")
@@ -34,7 +33,6 @@ def s3(monkeypatch):
     s3fs.S3FileSystem.clear_instance_cache()
     system = s3fs.S3FileSystem()
     system.mkdir("fleet")
-    monkeypatch.setattr(run, "run_tasks", in_this_process)
     yield system
     system.rm("fleet", recursive=True)
     server.stop()

@@ -91,25 +91,6 @@ def test_every_command_says_it(tmp_path):
         assert said.startswith(f"warning: {ride}: line 3401, the last one, was cut")
 
 
-def test_rounded_times_are_spread_in_every_command(tmp_path):
-    """104 samples a second with times in hundredths, as some apps write them, give the lean of the exact times."""
-    ride = analysis_rides.short(tmp_path, rate_hz=104)
-    out = tmp_path / "LEAN.csv"
-    command.works("replay", ride, "--out", out)
-    exact = analysis_rides.table(out)
-    header, *rows = ride.read_text().splitlines()
-    rounded = [f"{float(row.partition(',')[0]):.2f},{row.partition(',')[2]}" for row in rows]
-    ride.write_text("\n".join([header, *rounded]) + "\n")
-    said = command.works("replay", ride, "--out", out).err
-    assert "the times are rounded (" in said
-    assert "repeat the one before): they are spread evenly, by up to 0.00" in said
-    found = analysis_rides.table(out)
-    assert len(found) == len(exact)
-    assert np.all(np.diff(found["t_s"]) > 0.009)
-    assert found["t_s"] == pytest.approx(exact["t_s"], abs=0.004)
-    assert found["lean_deg"] == pytest.approx(exact["lean_deg"], abs=0.15)
-
-
 @pytest.mark.parametrize("block_bytes", [300, 50_000, 1 << 22])
 def test_times_are_spread_alike_however_the_log_is_read(tmp_path, monkeypatch, block_bytes):
     true = np.arange(12_000) / 104

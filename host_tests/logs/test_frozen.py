@@ -77,13 +77,6 @@ def test_a_vehicle_at_rest_is_not_frozen(digits, noise):
         assert np.all(same)
 
 
-@pytest.mark.parametrize("digits", [5, 1])
-def test_a_phone_that_freezes_in_a_ride_is_not(digits):
-    readings = riding(30, 4, digits)
-    readings[1000:2000] = readings[1000]
-    assert np.count_nonzero(frozen(log_of(readings))) == 999
-
-
 def test_what_never_changes_is_not_judged():
     """There is nothing to compare it with. A pose of it is refused where it is used, see test_still_pose."""
     assert not np.any(frozen(log_of(np.tile(REST, (500, 1)))))

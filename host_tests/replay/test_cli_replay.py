@@ -5,7 +5,6 @@ import json
 
 import analysis_rides
 import command
-import engines
 import numpy as np
 import pytest
 from kickstand.calibration.two_position import two_position
@@ -37,10 +36,9 @@ def ride(path, seconds=20.0, rate_hz=100, seed=0):
     return command.write(path, np.column_stack((t, force, rate)))
 
 
-@pytest.mark.parametrize("engine", engines.ENGINES)
-def test_forces_and_rates_are_the_calibrated_and_turned_readings(tmp_path, engine):
+def test_forces_and_rates_are_the_calibrated_and_turned_readings(tmp_path):
     log, cal = ride(tmp_path / "log.csv"), command.write_cal(tmp_path / "CAL.json")
-    got, said = replayed(log, cal, engine)
+    got, said = replayed(log, cal)
     assert said == ""
     assert (got.dtype.names or ())[:6] == ("t_s", "lean_deg", "lean_formula_deg", "left_g", "up_g", "forward_g")
 
@@ -68,7 +66,7 @@ def with_speed(log, speed):
 @pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
 def test_the_engines_agree(tmp_path):
     """With a speed once a second, a 0 too, that has a say, and a lean that is not always shown."""
-    plain, cal = ride(tmp_path / "log.csv", seconds=60), command.write_cal(tmp_path / "CAL.json")
+    plain, cal = ride(tmp_path / "log.csv", seconds=60), command.write_cal(tmp_path / "CAL.json", trim_deg=1.0)
     log = with_speed(plain, [("0" if k % 1000 else "14.0") if k % 100 == 0 else "" for k in range(6000)])
     results = [replayed(log, cal, engine)[0] for engine in ("cpython", "micropython")]
     for name in replay_engine.COLUMNS:
@@ -117,14 +115,13 @@ def test_no_lean_of_a_car_is_one_that_the_display_showed(tmp_path):
     assert not np.any(np.isnan(lean["forward_g"]))
 
 
-@pytest.mark.parametrize("engine", engines.ENGINES)
-def test_the_trim_that_riding_found_is_used(tmp_path, engine):
+def test_the_trim_that_riding_found_is_used(tmp_path):
     """Standing still, the lean is what the accelerometer says less what upright was off; without one it is 0."""
     log = command.still(tmp_path / "log.csv", (0.0, 0.0, 1.0), seconds=8.0)
     leans = []
     for changed in ({}, {"trim_deg": 2.0}):
         cal = command.write_cal(tmp_path / "CAL.json", accel_offset_g=[0, 0, 0], gyro_bias_dps=[0, 0, 0], **changed)
-        leans.append(replayed(log, cal, engine)[0]["lean_deg"][-100:].mean())
+        leans.append(replayed(log, cal)[0]["lean_deg"][-100:].mean())
     assert abs(leans[0]) < 0.2
     assert abs(leans[1] - leans[0]) == pytest.approx(2.0, abs=0.3)
 

@@ -47,16 +47,6 @@ def test_forces_and_rates_are_those_of_the_kinematics_that_judge_long_rides():
     assert np.abs(np.degrees(body_rates(same)) - motion[:, 3:])[1:-1].max() < 0.01
 
 
-def test_distance_is_the_integral_of_speed():
-    ride = Ride(HILLY)
-    t = np.linspace(0.0, ride.seconds, 20001)
-    speed = np.array([ride.state(x)[3] for x in t])
-    distance = np.array([ride.state(x)[8] for x in t])
-    assert distance[-1] > 300
-    travelled = np.concatenate([[0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(t))])
-    assert np.abs(travelled - distance).max() < 0.01
-
-
 def test_in_balance_no_force_to_the_side_and_the_yaw_rate_of_the_lean():
     ride = Ride(HILLY, vibration_g=0.0)
     seen = set()

@@ -42,11 +42,6 @@ def test_it_shakes_with_the_square_root_of_roughness_and_more_at_speed():
     assert np.std(over(25.0, road.CLASS_B).heave) > 1.5 * np.std(over(6.0, road.CLASS_B).heave)
 
 
-def test_a_slow_rise_lifts_the_chassis_with_it_and_fast_ripples_do_not():
-    assert abs(road.transmitted(np.array([0.05]))[0]) == pytest.approx(1.0, abs=0.01)
-    assert abs(road.transmitted(np.array([60.0]))[0]) < 0.05
-
-
 def test_bumps_are_as_high_as_asked():
     slope = np.zeros(2000)
     road.add_bumps(slope, [10.0], height_m=0.04, length_m=0.8)
@@ -65,30 +60,11 @@ def test_the_front_wheel_meets_a_bump_first():
     assert 0.05 < (lifted - nose_up) / RATE < 0.25  # 1.43 m of wheelbase at 10 m/s
 
 
-def test_vibration_has_its_size_and_stops_with_the_engine():
-    speed = np.full(20000, 6000.0 / 135.0)
-    running = np.repeat([1.0, 0.0], 10000)
-    force, rates = Engine(rms_g=0.2, shift_rpm=6500.0).vibration(np.random.default_rng(2), speed, running, RATE)
-    assert force[:10000].std(axis=0) / STANDARD_GRAVITY == pytest.approx([0.2] * 3, rel=0.15)
-    assert not force[10000:].any()
-    assert not rates[10000:].any()
-
-
-@pytest.mark.parametrize(
-    ("mps", "rpm"),
-    [
-        (0.0, 1250.0),  # the clutch slips
-        (3.0, 1250.0),
-        (10.0, 3700.0),  # 370 /min per m/s in first gear
-        (15.0, 3900.0),  # 260 in second: in first it would be over 5000
-        (24.0, 4920.0),  # 205
-        (29.0, 4930.0),  # 170
-        (33.0, 4950.0),  # 150
-        (40.0, 5400.0),  # 135 in the last, whatever comes of it
-    ],
-)
-def test_the_lowest_gear_that_keeps_the_engine_under_where_it_is_shifted_up(mps, rpm):
-    assert Engine().rpm(np.full(2000, mps), RATE)[1000] == pytest.approx(rpm)
+def test_the_lowest_gear_that_keeps_the_engine_under_where_it_is_shifted_up():
+    """370, 260, 205, 170, 150 and 135 /min per m/s; the clutch slips at first, and the last gear has no limit."""
+    rpm = {0.0: 1250.0, 3.0: 1250.0, 10.0: 3700.0, 15.0: 3900.0, 24.0: 4920.0, 29.0: 4930.0, 33.0: 4950.0, 40.0: 5400.0}
+    for mps, wanted in rpm.items():
+        assert Engine().rpm(np.full(2000, mps), RATE)[1000] == pytest.approx(wanted), mps
 
 
 def test_it_shakes_at_half_once_and_twice_the_crankshafts_speed():
@@ -109,6 +85,8 @@ def test_it_shakes_with_the_square_of_its_speed_up_to_half_a_g():
         force, _ = Engine(rms_g).vibration(np.random.default_rng(2), np.full(4000, mps), np.ones(4000), RATE)
         return float(np.sqrt(np.mean(force**2)) / STANDARD_GRAVITY)
 
+    force, rates = Engine().vibration(np.random.default_rng(2), np.full(200, 15.0), np.zeros(200), RATE)
+    assert not force.any() and not rates.any(), "it is off"
     full = 6000.0 / 135.0
     assert size(full, 0.1) == pytest.approx(0.1, rel=0.02)
     assert size(15.0, 0.1) == pytest.approx(0.1 * (0.25 + 0.75 * (3900.0 / 6000.0) ** 2), rel=0.02)

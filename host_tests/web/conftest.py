@@ -28,21 +28,21 @@ def address(files):
         server.shutdown()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def ride(tmp_path_factory):
     """Half a minute, with a speed."""
-    return analysis_rides.short(tmp_path_factory.mktemp("ride"), speed_hz=5)
+    return analysis_rides.short(tmp_path_factory.mktemp("ride"), rate_hz=50, speed_hz=5)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def calibration(ride):
     return ride.with_name("RIDE.cal.json")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def page(chromium, address):
-    """One for all tests: Python is loaded once."""
-    rider = Rider(chromium, address + "rides.html", **LAPTOP)
+    """One for all tests: Python is loaded once. Its content security policy stops nothing that is needed."""
+    rider = Rider(chromium, address + "rides.html", policy=True, **LAPTOP)
     yield Rides(rider)
     away = [url for url in rider.asked if not url.startswith((address, "blob:" + address, "data:"))]
     rider.context.close()

@@ -2,20 +2,16 @@
 steered as a person would, and what was to be seen is shown to the page's own guide, step by step."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from kickstand.errors import Refusal
 from kickstand.ui import messages, pages
-from kickstand_tools import firmware_path
+from mpy import run_mpy
 
 # Waits and presses of a rider, each a generator of (s, name, value); the names are those of Device.act()
 DRIVE = """
 import json, sys
-from kickstand_tools.simulated_board.fakes import cpython
-cpython.supplement()
 from kickstand_tools.web.device import PageDevice
 
 device, now, said = PageDevice(), 0.0, []
@@ -76,16 +72,8 @@ def drive(guide, tmp_path):
     """By stage of a drive: what was last said in it (words beside the true lean, number, text, action)."""
 
     def drive(orders):
-        done = subprocess.run(
-            [sys.executable, "-c", DRIVE],
-            input=json.dumps(orders),
-            capture_output=True,
-            text=True,
-            env={"PYTHONPATH": firmware_path.search_path()},
-            cwd=tmp_path,
-            check=True,
-        )
-        return {stage: said for stage, *said in guide(json.loads(done.stdout.splitlines()[-1]))}
+        done = run_mpy(DRIVE, stdin=json.dumps(orders), directory=tmp_path)
+        return {stage: said for stage, *said in guide(json.loads(done.splitlines()[-1]))}
 
     return drive
 

@@ -1,13 +1,11 @@
 """An emulated Pico at the pages Install and Live, one after the other."""
 
 import pytest
-import serial_line
 from emulated import calibrated, firmware, leaning, pico, shows
 from kept import recorded, saved, streamed
 from kickstand_tools.simulated_board.lcd import shown_lean
 from kickstand_tools.simulation.scripted.script import Ride, kickstand, upright
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
-from rider import Rider
 from serial_line import SerialLine
 
 LEAN_DEG = 20.0
@@ -18,10 +16,8 @@ LEAN_DEG = 20.0
 def test_a_board_is_brought_up_to_date_and_watched(chromium, address, tmp_path):
     """Its calibration stays. Its lean on the page is the one on its own display, and the log is the one that `kickstand
     record` writes."""
-    rider = Rider(chromium, address + "install.html", accept_downloads=True)
-    rider.page.add_init_script(serial_line.FAKE)
-    rider.page.reload()
-    line = SerialLine(rider)
+    line = SerialLine(chromium, address + "install.html")
+    rider = line.rider
     old = {path: b"old" if path == "/kickstand/lean/meter.mpy" else data for path, data in firmware().items()}
     with pico(leaning(LEAN_DEG), {**old, **calibrated(), "/kickstand/gone.mpy": b""}) as device:
         device.run(0.5)
@@ -56,10 +52,7 @@ def test_a_board_is_brought_up_to_date_and_watched(chromium, address, tmp_path):
 def test_from_a_broken_off_installation_to_the_lean(chromium, address):
     """All that a rider does: install, unplug, press on the stand and upright. The display shows the lean. Most files
     are there already, because the emulated board takes a minute for all of them."""
-    rider = Rider(chromium, address + "install.html")
-    rider.page.add_init_script(serial_line.FAKE)
-    rider.page.reload()
-    line = SerialLine(rider)
+    line = SerialLine(chromium, address + "install.html")
     poses = Ride([kickstand(5.5), upright(5.5), upright(1e6, lean_deg=LEAN_DEG)])
     part = Sensor(seed=1, share=0.1)  # its accelerometer is not calibrated here: that shall cost no degrees
     feels, started_s = part.world(poses.motion), 0.0
@@ -84,5 +77,5 @@ def test_from_a_broken_off_installation_to_the_lean(chromium, address):
         device.power_cycle()
         device.run_until(lambda: shown_lean(device.lcd()) is not None, 4.0)
         assert shown_lean(device.lcd()) == pytest.approx(LEAN_DEG, abs=2.0)
-    assert rider.errors == []
-    rider.context.close()
+    assert line.rider.errors == []
+    line.rider.context.close()

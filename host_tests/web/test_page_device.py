@@ -1,11 +1,10 @@
 """The loop that the page turns is the firmware's own: what the display shows is the same, at the same instants."""
 
 import json
-import subprocess
-import sys
+from pathlib import Path
 
 import repeat
-from kickstand_tools import firmware_path
+from mpy import run_mpy
 
 # Safe mode too: the button is held while the power comes on
 ORDERS = [
@@ -19,16 +18,8 @@ UNTIL_S = 14.0
 
 def run(kind, orders, flash):
     flash.mkdir()
-    done = subprocess.run(
-        [sys.executable, repeat.__file__, kind],
-        input=json.dumps({"orders": orders, "until_s": UNTIL_S}),
-        capture_output=True,
-        text=True,
-        env={"PYTHONPATH": firmware_path.search_path()},
-        cwd=flash,
-        check=True,
-    )
-    return json.loads(done.stdout.splitlines()[-1])
+    given = json.dumps({"orders": orders, "until_s": UNTIL_S})
+    return json.loads(run_mpy(Path(repeat.__file__), kind, stdin=given, directory=flash).splitlines()[-1])
 
 
 def test_the_page_turns_the_loop_as_the_firmware_does(tmp_path):

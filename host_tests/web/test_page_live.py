@@ -7,7 +7,6 @@ import types
 
 import pytest
 import ride_writer
-import serial_line
 from fake_board import FakeBoard
 from kept import recorded, saved
 from kickstand.rides import ride_paths
@@ -30,12 +29,10 @@ half_seconds = functools.partial(ride_writer.blocks, length=lambda _: 512)  # bl
 @pytest.fixture(scope="module")
 def line(chromium, address):
     """One page for all tests, whose Python is loaded once."""
-    rider = Rider(chromium, address + "live.html", accept_downloads=True)
-    rider.page.add_init_script(serial_line.FAKE)
-    rider.page.reload()
-    yield SerialLine(rider)
-    assert rider.errors == [] and rider.strangers() == []
-    rider.context.close()
+    line = SerialLine(chromium, address + "live.html")
+    yield line
+    assert line.rider.errors == [] and line.rider.strangers() == []
+    line.rider.context.close()
 
 
 @pytest.fixture
@@ -97,10 +94,8 @@ def test_a_lean_ends_soon_after_the_last_block(rider):
 
 def test_tools_that_cannot_be_loaded_can_be_asked_for_again(chromium, address, board):
     """And a browser without a store for other pages says how its files get there."""
-    rider = Rider(chromium, address + "live.html", service_workers="block")
-    rider.page.add_init_script(serial_line.FAKE)
-    rider.page.reload()
-    line = SerialLine(rider)
+    line = SerialLine(chromium, address + "live.html", service_workers="block")
+    rider = line.rider
     line.plug_in(RawPrompt(board, half_seconds(3)[0]))
     for name in ("python.mjs", "pyodide.asm.wasm"):  # that the second is missing Pyodide itself does not say
         rider.page.route(f"**/{name}", lambda route: route.abort())
@@ -108,7 +103,7 @@ def test_tools_that_cannot_be_loaded_can_be_asked_for_again(chromium, address, b
         rider.page.wait_for_selector("#live-said:has-text('Is there a network? Press the button again')")
         rider.page.unroute(f"**/{name}")
         rider.page.evaluate("document.querySelector('#live-said').textContent = ''")
-    rider.page.evaluate(MISSING, "install.zip")
+    rider.page.evaluate(MISSING, ["install.zip", 404])
     for press, says in (("#start", "#live-said"), ("#pull", "#pull-said")):
         rider.page.click(press)
         rider.page.wait_for_selector(f"{says}:has-text('install.zip cannot be loaded (HTTP 404)')", timeout=60_000)
@@ -166,7 +161,7 @@ def test_the_rides_of_a_board_are_what_the_command_pulls(line, rider, board, tmp
         rider.page.click("#files li:first-child button")
     rides = opened.value
     assert "/rides.html" in rides.url  # the page itself takes the #pulled away
-    rides.wait_for_selector("#report-title:has-text('ride-00004-')", timeout=60_000)
+    rides.wait_for_selector("#held li:has-text('ride-00004-')", timeout=60_000)
     opened.value.close()
 
 
@@ -238,12 +233,11 @@ def test_after_a_disturbed_byte_the_line_goes_on(line):
     assert line.rider.page.evaluate(script) == [[1, 2], True]
 
 
-@pytest.mark.parametrize(("press", "says"), [("#start", "#live-said"), ("#pull", "#pull-said")])
-def test_a_board_without_the_firmware_is_told_of_the_page_install(line, rider, board, press, says):
+def test_a_board_without_the_firmware_is_told_of_the_page_install(line, rider, board):
     line.plug_in(RawPrompt(board))
-    rider.page.click(press)
-    rider.page.wait_for_selector(f"{press}:enabled:visible")
-    assert rider.text(says) == "Kickstand is not on the board at this port: the page Install puts it there."
+    rider.page.click("#pull")
+    rider.page.wait_for_selector("#pull:enabled:visible")
+    assert rider.text("#pull-said") == "Kickstand is not on the board at this port: the page Install puts it there."
     assert board.resets == 1
 
 
@@ -257,9 +251,9 @@ def test_without_a_board_a_simulated_one_is_watched(chromium, address):
         assert rider.page.is_visible("#gauge") and not rider.page.is_visible("#start")
     assert rider.text("#pretend-said").startswith("A simulated ride, which nobody has ridden: 0:")
     assert rider.text("#max-right") != "--"
+    assert rider.axe() == []
     for kind in PHONE, LAPTOP:
         rider.page.set_viewport_size(kind["viewport"])
-        assert rider.axe() == []
         assert rider.fits()
     rider.page.click("#simulated-stop")
     assert rider.text("#pretend-said") == "Stopped."

@@ -7,14 +7,16 @@ PAGES = {"": "Try", "install.html": "Install", "live.html": "Live"}
 
 
 @pytest.mark.parametrize("name", PAGES)
-@pytest.mark.parametrize("kind", [PHONE, LAPTOP], ids=["phone", "laptop"])
-def test_axe_finds_nothing(chromium, address, kind, name):
-    rider = Rider(chromium, address + name, **kind)
+def test_axe_finds_nothing(chromium, address, name):
+    """Colours and names are the same on a laptop: its own arrangement is looked at on the page with most in it."""
+    rider = Rider(chromium, address + name, **PHONE)
     assert rider.text("nav [aria-current]") == PAGES[name]
     if not name:
         rider.reads("Raw")
-    assert rider.axe() == []
+    assert rider.fits() and rider.axe() == []
+    rider.page.set_viewport_size(LAPTOP["viewport"])
     assert rider.fits()
+    assert name or rider.axe() == []
     rider.context.close()
 
 
@@ -40,9 +42,18 @@ def test_on_a_phone_everything_for_the_first_minute_is_on_its_first_screen(chrom
     rider.context.close()
 
 
-def test_a_phone_leans_the_motorcycle(chromium, address):
+def test_a_phone_leans_the_motorcycle_and_a_tablet_without_motion_data_says_so(chromium, address):
+    """And what the page is. A screen reader, whose click no pointer has made, presses the button too."""
     rider = Rider(chromium, address, **PHONE)
+    rider.page.set_viewport_size({"width": 820, "height": 1180})
     rider.reads("Raw")
+    assert rider.page.is_visible("header p")
+    rider.page.eval_on_selector("#press", "button => button.click()")
+    rider.reads("Stand: hold")
+    rider.page.tap("#tilt")
+    rider.page.wait_for_selector("#tilt-said:has-text('does not say how it is held')")
+    assert rider.page.get_attribute("#tilt", "aria-pressed") == "false"
+    rider.page.set_viewport_size(PHONE["viewport"])
     phone = rider.context.new_cdp_session(rider.page)
 
     def tilt(gamma):
@@ -56,24 +67,4 @@ def test_a_phone_leans_the_motorcycle(chromium, address):
     tilt(23)
     rider.page.wait_for_function("document.querySelector('#lean-out').value === '20° right'")
     rider.page.wait_for_function("seen.last.lean_deg > 15")
-    rider.context.close()
-
-
-def test_a_tablet_without_motion_data_says_so_and_what_the_page_is(chromium, address):
-    rider = Rider(chromium, address, **PHONE)
-    rider.page.set_viewport_size({"width": 820, "height": 1180})
-    rider.reads("Raw")
-    assert rider.page.is_visible("header p")
-    rider.page.tap("#tilt")
-    rider.page.wait_for_selector("#tilt-said:has-text('does not say how it is held')")
-    assert rider.page.get_attribute("#tilt", "aria-pressed") == "false"
-    rider.context.close()
-
-
-def test_a_screen_reader_presses_the_button_too(chromium, address):
-    """It sends a click that no pointer has made."""
-    rider = Rider(chromium, address, **LAPTOP)
-    rider.reads("Raw")
-    rider.page.eval_on_selector("#press", "button => button.click()")
-    rider.reads("Stand: hold")
     rider.context.close()

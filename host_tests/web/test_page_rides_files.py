@@ -3,7 +3,6 @@
 import base64
 import gzip
 import json
-import zipfile
 from pathlib import Path
 
 import analysis_rides
@@ -60,10 +59,6 @@ def test_the_export_of_a_phone_becomes_a_log(page, tmp_path):
     reported = json.loads(works("report", was, "--calibration", tmp_path / "phone.cal.json", "--json").out)
     shown = json.loads(page.saved("#save-json"))
     assert_near({**shown, "ride": ""}, {**reported, "ride": ""})
-    with zipfile.ZipFile(path) as archive:
-        archive.extractall(tmp_path / "unpacked")
-    assert page.give(*(tmp_path / "unpacked").glob("*.csv"), tmp_path / "phone.cal.json") == ""
-    assert json.loads(page.saved("#save-json"))["samples"] == shown["samples"]
 
 
 def test_one_of_several_rides_is_chosen(page, ride, calibration, tmp_path):
@@ -88,13 +83,8 @@ def test_one_of_several_rides_is_chosen(page, ride, calibration, tmp_path):
     ("name", "content", "words"),
     [
         ("picture.png", b"\x89PNG\r\n\x1a\n" + bytes(8), "not text: give what an app has exported"),
-        ("table.csv", b"lat,lon\n1,2\n", "not a file of an app that is known, and no table of sensors"),
         ("made", b"as what was made is called", "not a file of an app that is known"),
-        ("note.txt", b"Time flies, so speed,\nand more of it\n", "not a file of an app that is known"),
-        ("track.gpx", b"<gpx><trk><trkpt lat='1' lon='2'></trk>", "is no GPX file, or its copy is not whole"),
-        ("empty.csv", b"", "holds no recording: give the file, the folder or the zip"),
         ("slow.csv", b"t_s,ax_g,ay_g,az_g\n0,0,1,0\n", "and no gyro found in it: needed are a time, the acceleration"),
-        ("damaged.zip", b"PK\x03\x04\xff" + bytes(40), "is damaged or cut short: copy it again"),
         ("ride.parquet", b"PAR1" + bytes(40), "is Parquet, which this page cannot read: give the ride as"),
         ("report.json", b'{"ride": "A"}', "is no calibration: version is missing: give the"),
     ],
@@ -108,13 +98,7 @@ def test_what_is_no_ride_is_told_in_one_line_and_does_not_spoil_the_next(
     assert page.page.is_hidden("#report") and page.page.is_hidden("#charts")
     said = page.held()[name]
     assert said.startswith(words) or words in said
-    assert (
-        "\n" not in said
-        and not said.startswith(name)
-        and "kickstand" not in said
-        and "--" not in said
-        and "<" not in said
-    )
+    assert not said.startswith(name) and not any(part in said for part in ("\n", "kickstand", "--", "<"))
     if name == "ride.parquet":
         assert page.add(ride, calibration) == ""
         assert page.page.inner_text("#report-title") == "RIDE.csv"
@@ -187,16 +171,16 @@ def test_the_columns_of_a_table_can_be_named(page, tmp_path):
 def test_a_track_joins_a_ride_without_gps(page, tmp_path, write):
     """As `join` does it: the page then has a map, and the log with positions can be saved. Another ride's not."""
     made = simulate_ride("hills", seed=1, seconds=120.0)
-    log = Log.from_readings(made.readings, made.rate_hz)
+    log = Log.from_readings(made.readings[::4], made.rate_hz / 4)
     write_log(tmp_path / "bare.csv", log)
     calibration = CalibrationFile(vehicle_from_sensor=made.vehicle_from_sensor, aligned=True)
     write_calibration(tmp_path / "bare.cal.json", calibration)
     lat, lon, utc_s = (values[::200] for values in positions(made))
     speed_mps = made.truth["speed_mps"][::200]
     track = write(tmp_path / f"ride.{write.__name__[-3:]}", Track(utc_s, lat, lon, speed_mps, "track"))
-    page.give(tmp_path / "bare.csv", tmp_path / "bare.cal.json")
-    assert page.page.frame_locator("#plot").locator("#map").count() == 0
-    assert f"{track.name} is joined: correlation " in page.add(track)
+    assert f"{track.name} is joined: correlation " in page.give(
+        tmp_path / "bare.csv", tmp_path / "bare.cal.json", track
+    )
     page.page.frame_locator("#plot").locator("#map .main-svg").first.wait_for()
     works("join", tmp_path / "bare.csv", track, "--out", tmp_path / "joined.csv")
     assert page.saved("#save-log") == (tmp_path / "joined.csv").read_bytes()

@@ -91,10 +91,8 @@ def test_every_step_has_its_room(chromium, address, files):
 
 
 MISSING_FILES = {
-    "font.json": "./font.json cannot be loaded (HTTP 404)",
     "python.json": "./python.json cannot be loaded (HTTP 404)",
     "micropython/micropython.wasm": "./micropython/micropython.wasm cannot be loaded (HTTP 404)",
-    "micropython/micropython.mjs": "file of this page cannot be loaded",
     "bike.mjs": "file of this page cannot be loaded",
 }
 

@@ -8,6 +8,7 @@ rider who moves; the vibration is white. World axes: x, y level, z up. Vehicle a
 import numpy as np
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
+from kickstand_tools.signals.rotations import rotation_matrix
 
 G = 9.80665
 FINE_HZ, RATE_HZ = 800, 200
@@ -138,11 +139,7 @@ def _readings(v, yaw_rate, slope, lean, pitch, height_m, slip=0.0, heave_m=0.0, 
 
 
 def _about(axis, angle):
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    turned = np.eye(3)
-    turned[i, i] = turned[j, j] = np.cos(angle)
-    turned[i, j], turned[j, i] = np.sin(angle), -np.sin(angle)
-    return turned
+    return rotation_matrix(-angle * np.eye(3)[axis])
 
 
 def _smooth(values, seconds):

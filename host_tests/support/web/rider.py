@@ -10,22 +10,25 @@ PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "is_mobile":
 LAPTOP: dict[str, Any] = {"viewport": {"width": 1440, "height": 900}}
 READ_S = 120  # at most, until the page shows what is waited for: a busy machine is late with all of it
 
-# Keeps what the board's worker sends, for tests to look at and to repeat
+# Keeps what the board's worker sends, for tests to look at and to repeat; and lets the page draw less often
 KEEP = Path(__file__).with_name("keep.js").read_text()
 
-# The site has no file whose address ends so; window.given() again fetches all. The service worker is passed by.
+# Of a file whose address ends so the site gives nothing but this status; window.given() again fetches all. The service
+# worker is passed by.
 MISSING = Path(__file__).with_name("missing.js").read_text()
 
 
 class Rider:
     """browser: of playwright. asked: the addresses that the page has fetched; errors: what went wrong in it. policy:
-    whether the page's content security policy holds, which playwright's wait_for_function() breaks."""
+    whether the page's content security policy holds, which forbids playwright's wait_for_function() but on the page
+    Rides. script: runs before those of each page."""
 
-    def __init__(self, browser, address, policy=False, **kind):
+    def __init__(self, browser, address, policy=False, script="", **kind):
         self._browser = browser
         self.context = browser.new_context(bypass_csp=not policy, **kind)
         self.context.set_default_timeout(1000 * READ_S)
         self.context.add_init_script(KEEP)
+        self.context.add_init_script(script)
         self.asked, self.errors = [], []
         self.context.on("request", lambda request: self.asked.append(request.url))
         self.page = self.context.new_page()
@@ -33,19 +36,16 @@ class Rider:
         self.page.on("console", lambda said: "Security Policy" in said.text and self.errors.append(said.text))
         self.page.goto(address)
 
-    def reads(self, text, within_s=READ_S):
+    def reads(self, text):
         """Wait until the display says this in its first line."""
         self.page.wait_for_function(
             "text => seen.last && document.querySelector('#display').ariaLabel.startsWith(`Display: ${text}`)",
             arg=text,
-            timeout=1000 * within_s,
         )
 
-    def guide_says(self, text, within_s=READ_S):
+    def guide_says(self, text):
         """Wait until the guide says this."""
-        self.page.wait_for_function(
-            "text => document.querySelector('#todo').textContent.includes(text)", arg=text, timeout=1000 * within_s
-        )
+        self.page.wait_for_function("text => document.querySelector('#todo').textContent.includes(text)", arg=text)
 
     def wait(self, seconds):
         """Until so much of the board's time has passed."""

@@ -8,19 +8,20 @@ import json
 from pathlib import Path
 
 from raw_prompt import RawPrompt
+from rider import Rider
 
 # Takes the place of navigator.serial. boardSays() and boardHears() are Python's.
 FAKE = Path(__file__).with_name("fake_serial.js").read_text()
 
 
 class SerialLine:
-    """rider: at a page that was given FAKE.  said: all that the board has said.  cut_after: so many bytes to the board
-    the cable is pulled; None for never."""
+    """rider: at a page with this port.  said: all that the board has said.  cut_after: so many bytes to the board the
+    cable is pulled; None for never."""
 
     STEP_S = 0.04  # of emulated time at most, until the page may speak again
 
-    def __init__(self, rider):
-        self.rider = rider
+    def __init__(self, browser, address, **kind):
+        self.rider = rider = Rider(browser, address, script=FAKE, **kind)
         rider.page.expose_function("boardSays", self._says)
         rider.page.expose_function("boardHears", self._hears)
 
