@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from kickstand.lean import bike_model, kalman, lean_filter, measurements, rest, upright_trim
+from kickstand.lean import lean_filter
 from kickstand.units import STANDARD_GRAVITY
 
 HZ, GRAVITY_MPS2 = 100, STANDARD_GRAVITY
@@ -133,25 +133,6 @@ def test_a_smooth_straight_is_no_standstill():
     force, rate = balanced(200.0, lean, speed)
     shown = leans(force.tolist(), rate.tolist())
     assert np.abs(shown - np.degrees(lean))[40 * HZ :].max() < 2.0
-
-
-def single(function):
-    """function with its result as a 32-bit float."""
-    return lambda *x: np.float32(function(*x))
-
-
-def test_five_minutes_in_float32_and_in_float64_are_the_same(monkeypatch):
-    lean, speed = weaving(300.0)
-    force, rate = shaken(*balanced(300.0, lean, speed))
-    rate += [0.002, -0.003, 0.004]
-    exact = leans(force.tolist(), rate.tolist())
-    for module in (lean_filter, bike_model, measurements, kalman, rest, upright_trim):
-        for name in ("sin", "cos", "sqrt", "atan2", "degrees"):
-            if hasattr(module, name):
-                monkeypatch.setattr(module, name, single(getattr(math, name)))
-    rounded = leans([list(row) for row in force.astype(np.float32)], [list(row) for row in rate.astype(np.float32)])
-    assert np.abs(exact).max() > 30.0
-    assert np.abs(rounded - exact).max() < 0.1
 
 
 @pytest.mark.parametrize("seed", range(3))
