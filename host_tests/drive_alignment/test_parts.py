@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from engines import ENGINES, run
 from kickstand.drive_alignment import parts, vertical
-from kickstand.drive_alignment.alignment import DriveAlignment
-from kickstand.drive_alignment.events import LastEvent
 from kickstand.drive_alignment.history import BIN_US, MASK, SIZE, ForceHistory
 from kickstand.drive_alignment.regression import Fit, ForwardRegression
 from kickstand.drive_alignment.speed_check import SpeedCheck
@@ -165,18 +163,6 @@ def test_the_vertical_is_the_mean_direction_of_stops_whatever_their_lengths():
     assert not standing.moved
 
 
-@pytest.mark.parametrize(
-    ("seconds", "speed", "shake_g", "stops"),
-    [(2.0, 0.0, 0.02, 0), (4.0, 0.0, 0.02, 1), (9.0, 1.0, 0.0, 0), (9.0, 0.0, 0.2, 0)],
-)
-def test_what_a_stop_is(seconds, speed, shake_g, stops):
-    """Standing for three seconds, with no more than an engine's shaking."""
-    standing = StandingVertical()
-    for k in range(round(seconds * 10)):
-        standing.update([0.0, 1.0, shake_g * (-1) ** k], (0.0, 0.0, 0.0), speed, 0.1)
-    assert standing.stops == stops
-
-
 def test_a_late_speed_is_not_taken_for_a_sensor_turned_while_standing():
     """A vehicle may speed up evenly for some seconds while a late speed still says zero. A sensor that was turned stays
     so for longer."""
@@ -212,18 +198,6 @@ def test_a_speed_that_stays_the_same_in_a_lively_ride_is_stuck(speeds, yaw_dps, 
     assert (check.problem is not None) is stuck
 
 
-def test_the_last_event_shows_forward():
-    """Braking by 0.3 and 0.5 g for half a second each: force is the vertical and so much to the back."""
-    last = LastEvent()
-    last.add(0.5, 99.0, [1.0, 1.0, 1.0])
-    last.clear()
-    for a in (-0.3, -0.5):
-        last.add(0.5, 0.5 * a, [0.5 * 0.8 * a, 0.5, 0.5 * 0.6 * a])
-    out = [0.0] * 3
-    assert last.forward(out, UP) == pytest.approx(0.5 * (0.3**2 + 0.5**2))
-    assert out == pytest.approx([0.8, 0.0, 0.6])
-
-
 def test_where_the_vertical_comes_from():
     """A car's: its stops, and with a fit the mean of both. A motorcycle's: the upright pose; else straight riding."""
     standing = types.SimpleNamespace(stops=0, up=level(10.0))
@@ -245,24 +219,3 @@ def test_where_the_vertical_comes_from():
     assert bike.turn_axis == pytest.approx(level(8.0), abs=0.01)
     assert posed.turn_axis == pytest.approx(UP)
     assert car.turn_axis is standing.up
-
-
-def test_what_is_missing_is_said_in_the_order_in_which_it_can_be_done():
-    drive, codes = DriveAlignment("car"), []
-
-    def missing(*counts):
-        codes.append(drive.missing(*counts).code)
-
-    missing(0, 5, 0)
-    drive.measure_speed(1.0)
-    missing(0, 5, 0)
-    drive.measure_speed(3.0)
-    missing(0, 5, 0)
-    drive.standing.stops = 1
-    missing(4, 5, 1)
-    missing(5, 5, 1)
-    drive.quality.quality_deg = 3.0
-    missing(5, 5, 1)
-    drive.quality.agree = True
-    missing(5, 5, 1)
-    assert codes == ["no-speed", "not-driven", "not-stopped", "few-events", "uncertain", "parts-differ", "uncertain"]
