@@ -229,14 +229,10 @@ def test_a_speed_that_fails_for_a_while_is_reported_and_does_no_harm(tmp_path):
 @pytest.mark.parametrize(
     ("config", "named"),
     [
-        ({"SAMPLE_HZ": 300}, "SAMPLE_HZ"),
-        ({"ACCEL_RANGE_G": 3}, "ACCEL_RANGE_G"),
         ({"LCD_I2C": 0}, "LCD_I2C"),
         ({"VEHICLE": "car"}, "car needs SPEED"),
         ({"VEHICLE": "bus", "SPEED": "gps"}, "VEHICLE"),
-        ({"SPEED": "radar"}, "SPEED"),
         ({"SPEED": "gps", "GPS_RX": 5}, "pin used twice"),
-        ({"SPEED": "wheel", "WHEEL_PIN": 7}, "pin used twice"),
         ({"SPEED": "wheel", "PULSES_PER_METRE": 0}, "PULSES_PER_METRE"),
         ({"SPEED": "gps", "GPS_BAUD": "9600"}, "GPS_BAUD"),
         ({"SPEED": "gps", "GPS_RX": 11}, "GPS_TX / GPS_RX"),

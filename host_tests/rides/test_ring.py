@@ -160,17 +160,6 @@ def test_ending_closes_once_and_abandoning_raises_nothing(root, monkeypatch):
         begun(file, monkeypatch).end()
 
 
-def test_a_directory_that_cannot_be_made_ends_in_its_error(root, monkeypatch):
-    def refuse(path):
-        raise OSError(30)
-
-    RideRing(FLASH).begin()  # it is there now
-    assert RideRing(FLASH).begin() == 1  # and empty: the same ride again
-    monkeypatch.setattr("os.mkdir", refuse)
-    with pytest.raises(OSError, match="30"):
-        RideRing(FLASH).begin()
-
-
 def test_free_and_all_bytes_are_blocks_of_the_size_that_counts(monkeypatch):
     """Of statvfs: block size, fragment size (in which blocks are counted), all, free."""
     monkeypatch.setattr("os.statvfs", lambda path: (512, 4096, 300, 200, 190, 0, 0, 0, 0, 255), raising=False)

@@ -45,20 +45,6 @@ def test_a_byte_is_eight_rows_of_a_column():
         assert lit(oled) == [(0, 14), (1, 14), (0, 21)]
 
 
-def test_only_the_ssd1306_has_other_addressing_modes():
-    oled = ready("ssd1306")
-    send(oled, 0x00, 0x20, 0x00, 0x21, 126, 127, 0x22, 0, 1)
-    send(oled, 0x40, 1, 1, 1, 1)
-    assert lit(oled) == [(126, 0), (127, 0), (126, 8), (127, 8)]
-    send(oled, 0x00, 0x20, 0x01, 0x21, 0, 127, 0x22, 3, 4)
-    send(oled, 0x40, 2, 2, 2)
-    assert lit(oled)[4:] == [(0, 25), (1, 25), (0, 33)]
-    assert oled.unknown == 0
-    other = ready("sh1106")
-    send(other, 0x00, 0x8D)
-    assert other.unknown == 1
-
-
 def test_the_fake_framebuf_draws_as_micropython_s_own():
     """Where there is none, what it draws is at least what its name says."""
     module = fake
