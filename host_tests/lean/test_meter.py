@@ -1,6 +1,7 @@
 """The meter: what it shows as certain, which maxima it keeps, what a gap does to it. Runs on MicroPython too."""
 
-from math import pi, radians
+from array import array
+from math import degrees, pi, radians
 
 from bike_motion import DT_US, force_and_rate, meter, near, nose_up, reading, ride, roll, speed_up
 from kickstand.calibration.parameters import Calibration
@@ -217,6 +218,16 @@ def test_another_calibration_or_a_restart_forgets_the_ride_and_keeps_the_maxima(
     shown.use(shown.calibration)
     assert not shown.trusted
     near(shown.max_right_deg, 20.0, 0.5)
+
+
+def test_a_meter_takes_sums_of_counts():
+    calibration = Calibration()
+    calibration.set_scale(4096, 65.5)
+    shown = meter(calibration)
+    shown.update_sum(array("i", [8, 3 * 4096, 4, 100, -2, 6, 131]), 3, 0)
+    assert [round(3 * value, 6) for value in shown.reading] == [8, 12288, 4, 100, -2, 6, 131]
+    near(shown.force[1], 1.0, 0.001)
+    near(degrees(shown.rate[2]), 131 / 3 / 65.5, 0.01)
 
 
 def test_the_formulas_lean_takes_the_yaw_rate():

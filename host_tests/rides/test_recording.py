@@ -128,6 +128,22 @@ def test_a_ride_that_an_alignment_begins_begins_as_its_replay_will(keeper):
     assert keeper.steps == ["begin", "restart", "end", "begin"]
 
 
+def test_the_first_start_makes_the_recorder_and_the_next_takes_the_same(root, clock):
+    """Also where the menu was open for too short a time to prepare it."""
+    from kickstand.rides.recording import Recording
+
+    settings = SimpleNamespace(SD_SPI=None, RECORD=False, SAMPLE_HZ=200)
+    calibration = SimpleNamespace(value=ride_writer.calibration())
+    recording = Recording(settings, ride_writer.CHIP, SimpleNamespace(at_rest=False), calibration)
+    assert not recording.recorder.active
+    assert recording.start() is None
+    made = recording.recorder
+    assert made.active
+    recording.stop()
+    assert recording.start() is None
+    assert recording.recorder is made and made.active
+
+
 def test_a_block_is_written_by_pieces_of_256_bytes_one_a_turn(recorder, keeper):
     keeper.length = 700
     start(recorder)
