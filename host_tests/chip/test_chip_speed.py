@@ -1,6 +1,7 @@
 """A speed's sources on the emulated boards: real pin interrupts and a real UART under the firmware's own drivers."""
 
 import json
+from typing import Any
 
 import pytest
 from emulated import CHIPS, modules
@@ -32,7 +33,8 @@ print(got)
 )
 def test_wheel_and_gps(chip, sources):
     """The wheel's contact bounces."""
-    with CHIPS[chip](files=modules(chip)) as device:
+    board: Any = CHIPS[chip](files=modules(chip))
+    with board as device:
         device.fit_wheel(lambda t_s: 15.0, bounce_us=1000)
         if "gps" in sources:
             device.fit_gps(lambda t_s: 15.0)

@@ -64,12 +64,12 @@ def test_zeros_and_ones_are_no_readings(engine, dead):
 def test_the_same_again_and_again_is_a_frozen_chip(engine):
     """Repetitions are counted from batch to batch. A change of any byte but the temperature's ends them."""
     still = np.repeat(noise(1), 12, axis=0)
-    calls, expected = [(still[:3], still[3:7], still[7:])], [[3, 2, 0]]
+    calls, expected = [[still[:3], still[3:7], still[7:]]], [[3, 2, 0]]
     for column in range(7):
         for bit in 1, 256:
             changed = still.copy()
             changed[4:, column] ^= bit
-            calls.append((changed[:3], changed[3:9]))
+            calls.append([changed[:3], changed[3:9]])
             expected.append([3, 2 if column == 3 else 6])
     answers = engines.run(engine, [("add_up", ([frames(batch) for batch in call], LIMIT)) for call in calls])
     for (chosen, python), counts in zip(answers, expected, strict=True):

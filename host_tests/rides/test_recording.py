@@ -140,6 +140,7 @@ def test_the_first_start_makes_the_recorder_and_the_next_takes_the_same(root, cl
     made = recording.recorder
     assert made.active
     recording.stop()
+    assert not made.active
     assert recording.start() is None
     assert recording.recorder is made and made.active
 
