@@ -1,5 +1,4 @@
-"""The firmware's mathematics in the chip's 32-bit floats and small integers of 31 bits, against numpy and the other
-engines."""
+"""The firmware's mathematics in the chip's 32-bit floats and small integers of 31 bits, against the other engines."""
 
 import io
 import struct

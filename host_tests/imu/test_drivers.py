@@ -1,4 +1,4 @@
-"""Each driver alone: what it sends on the bus, what it takes of the heap, what the button makes of presses."""
+"""Each driver alone: what it sends on the bus, what the button makes of presses."""
 
 import re
 import textwrap

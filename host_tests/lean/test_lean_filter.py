@@ -1,4 +1,4 @@
-"""The lean filter on rides made of its own equations: what vibration, the gyro's errors and 32-bit floats do to it."""
+"""The lean filter on rides made of its own equations: what vibration and the gyro's errors do to it."""
 
 import math
 
