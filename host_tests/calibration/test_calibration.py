@@ -4,7 +4,7 @@ import engines
 import numpy as np
 import pytest
 from kickstand.calibration import six_position
-from kickstand.calibration.parameters import Calibration, six_position_calibration
+from kickstand.calibration.parameters import Calibration
 from kickstand.errors import CalibrationError
 from numpy.testing import assert_allclose
 from numpy.typing import ArrayLike
@@ -141,55 +141,13 @@ def readings(offset=(0.0,) * 3, slope=(1.0,) * 3, forces: ArrayLike = AXES):
     return ((np.asarray(forces) - offset) / slope).tolist()
 
 
-def test_the_fit_has_converged():
-    """The true parameters are found to five digits from poses 15 degrees off, where one step is not enough."""
-    rng = np.random.default_rng(5)
-    for _ in range(20):
-        offset, slope = rng.uniform(-0.3, 0.3, 3), rng.uniform(0.85, 1.15, 3)
-        forces = [tipped(axis, 15, rng) for axis in AXES]
-        found = six_position.fit(readings(offset, slope, forces))
-        assert_allclose(found, [offset, slope], atol=1e-5)
-
-
-def test_six_poses_that_say_the_same_give_no_parameters():
-    """A null vector says nothing, so that the equations have no solution."""
-    assert not six_position._solve([[0.0] * 7 for _ in range(6)])
-    rows = np.eye(6, 7).tolist()
-    rows[5] = list(rows[4])
-    assert not six_position._solve(rows)
+def test_six_poses_of_which_two_are_one_and_the_same_give_no_parameters():
+    """Though each axis changes enough."""
     poses = AXES.copy()
-    poses[0] = poses[2] = [0.9, 0.9, 0.0]  # two that are one and the same, though each axis changes enough
+    poses[0] = poses[2] = [0.9, 0.9, 0.0]
     with pytest.raises(CalibrationError) as refusal:
         six_position.fit(poses.tolist())
     assert refusal.value.code == "unclear"
-
-
-def test_the_equations_are_solved_whatever_their_order():
-    rng = np.random.default_rng(3)
-    for _ in range(50):
-        matrix, solution = rng.normal(size=(6, 6)), rng.normal(size=6)
-        matrix[0, 0] = 0.0  # no pivot where the first one is looked for
-        rows = np.column_stack((matrix, matrix @ solution)).tolist()
-        assert six_position._solve(rows)
-        assert_allclose([row[6] for row in rows], solution, atol=1e-6)
-
-
-def test_the_result_of_the_six_positions():
-    new = six_position_calibration([0.1, 0.2, 0.3], [1.1, 0.9, 1.0], [3.0, -2.0, 1.0])
-    identity = [1, 0, 0, 0, 1, 0, 0, 0, 1]
-    want = [0.1, 0.2, 0.3, 1.1, 0.9, 1.0, 3.0, -2.0, 1.0, *identity, 0.0]
-    assert new.parameters() == pytest.approx(want, abs=1e-6)
-    assert (new.six_done, new.aligned, new.by_drive) == (True, False, False)
-
-
-def test_a_new_calibration_changes_nothing():
-    new = Calibration()
-    force, rate = [0.0] * 3, [0.0] * 3
-    new.apply([0.1, 0.2, 0.3, 99.0, 4.0, 5.0, 6.0], force, rate)
-    assert (force, rate) == (pytest.approx([0.1, 0.2, 0.3]), [4.0, 5.0, 6.0])
-    assert list(new.correct([0.1, 0.2, 0.3])) == pytest.approx([0.1, 0.2, 0.3])
-    assert (new.six_done, new.aligned, new.by_drive, new.trim_deg) == (False, False, False, 0.0)
-    assert new.parameters() == [0, 0, 0, 1, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0]
 
 
 def test_the_19_numbers_come_back_as_they_were():
@@ -201,13 +159,3 @@ def test_the_19_numbers_come_back_as_they_were():
     assert_allclose(new.scales()[0], [1.125 / 4096, 0.875 / 4096, 1 / 4096])
     assert new.scales()[1] == 1 / 65.5
     assert_allclose(new.correct([1.0, -1.0, 0.5]), [1.375, -1.0, 1.0])
-
-
-def test_an_alignment_is_a_new_calibration():
-    before = six_position_calibration([0.1, 0.2, 0.3], [1.1, 0.9, 1.0], [3.0, -2.0, 1.0])
-    new = before.with_alignment(range(9), [7.0, 8.0, 9.0], 1.5, True)
-    assert new.parameters() == pytest.approx([*before.parameters()[:6], 7, 8, 9, *range(9), 1.5])
-    assert (new.six_done, new.aligned, new.by_drive) == (True, True, True)
-    assert before.parameters()[6:9] == [3.0, -2.0, 1.0]
-    plain = Calibration().with_alignment(range(9), [0.0] * 3)
-    assert (plain.six_done, plain.by_drive, plain.trim_deg) == (False, False, 0.0)

@@ -127,14 +127,6 @@ def test_every_damaged_byte_is_noticed(store, tmp_path):
         assert "damaged" in store.message
 
 
-def test_a_file_that_is_a_directory(store, tmp_path):
-    (tmp_path / FILES[0]).mkdir()
-    (tmp_path / FILES[1]).mkdir()
-    assert not store.load().aligned
-    with pytest.raises(StoreError, match="not-written"):
-        store.save(calibration(1))
-
-
 @pytest.mark.parametrize(
     ("field", "value"),
     [(0, 0.6), (3, 1.3), (3, 0.7), (6, 61.0), (9, 1.1), (17, -1.0), (18, 4.0), (9, float("nan")), (0, float("inf"))],

@@ -6,7 +6,7 @@ import sys
 
 import emulated
 import pytest
-from emulated import pico, reset_in_a_read
+from emulated import pico
 
 pytestmark = pytest.mark.chip
 
@@ -131,14 +131,3 @@ def test_the_console_leaves_the_processor_alone(board):
     first, second = int(board.exec(code)), int(board.exec(code))
     assert first < 3500
     assert abs(first - second) < 10
-
-
-def test_a_reset_in_mid_read_leaves_the_wire_held(board):
-    """After a power cycle it is free."""
-    reset_in_a_read(board, board.time_s + 0.01)
-    board.send(b"while True: sensor.readfrom_mem(0x68, 0x3B, 14)\x04")
-    board.run(0.05)
-    assert board.resets == 1
-    assert board.exec("from machine import Pin\nprint(Pin(4, Pin.OPEN_DRAIN, value=1).value())") == "0\n"
-    board.power_cycle()
-    assert board.exec("from machine import Pin\nprint(Pin(4, Pin.OPEN_DRAIN, value=1).value())") == "1\n"

@@ -133,8 +133,7 @@ def test_a_reset_in_mid_read_frees_the_bus(riding):
     ("chip", "display"),
     [
         ("pico", "ssd1306"),
-        pytest.param("pico", "sh1106", marks=pytest.mark.nightly),
-        pytest.param("esp32", "ssd1306", marks=pytest.mark.esp32),
+        pytest.param("esp32", "ssd1306", marks=[pytest.mark.esp32, pytest.mark.nightly]),
     ],
 )
 def test_an_oled_is_found_and_shows_the_lean_in_large_digits(chip, display):

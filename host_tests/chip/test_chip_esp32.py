@@ -2,11 +2,8 @@
 in test_chip_device.py.
 """
 
-import hashlib
-import json
 import math
 import re
-import time
 
 import device_runs
 import pytest
@@ -15,7 +12,6 @@ from kickstand.calibration.store import Store
 from kickstand.rides.block import BLOCK
 from kickstand.rides.flash_ring import PART_BLOCKS
 from kickstand.rides.ride_paths import part_path
-from kickstand_tools.simulated_board.lcd import shown_lean
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, wait
 from test_chip_recorder import FEED, rides
 
@@ -42,25 +38,6 @@ def board(config="", world=None, files=None):
     """A calibrated one that is held at LEAN_DEG, without power yet. config: of config.py."""
     own = FILES | ({"/config.py": config.encode()} if config else {})
     return esp32(world or leaning(LEAN_DEG), (files or firmware("esp32")) | own)
-
-
-def begun(pause_s):
-    """A digest of when the display showed what and the sensor was read. pause_s: the host's, every now and then."""
-    seen = []
-    with board() as device:
-        while device.time_s < 1.8:
-            device.run(0.05, lambda: time.sleep(pause_s))
-            seen.append((device.time_s, device.lcd(), dict(device.board.sensor_bus.transfers), bytes(device.said)))
-        seen.append((device.exec("import time\nprint(time.ticks_us())"), device.file_system))
-    assert shown_lean(device.board.lcd.text()) is None  # it has no supply any more
-    assert any(shown_lean(lines) == LEAN_DEG for _, lines, _, _ in seen[:-1])
-    return hashlib.sha256(repr(seen).encode()).hexdigest()
-
-
-@pytest.mark.nightly
-def test_a_chip_does_the_same_on_every_host():
-    """To the microsecond, also where the host is slow."""
-    assert begun(0.0) == begun(0.002)
 
 
 def test_ctrl_c_unplugged_parts_and_a_soft_reset():
@@ -109,44 +86,6 @@ def test_safe_mode_and_refused_pins():
         device.run(0.1)
         device.power_on()
         device.run_until(lambda: b"safe mode" in device.said, BOOT_S)
-
-
-def test_one_bus_for_sensor_and_display():
-    pins = "LCD_SDA, LCD_SCL = 21, 22\n"
-    device = esp32(leaning(LEAN_DEG), firmware("esp32") | FILES | {"/config.py": pins.encode()}, one_bus=True)
-    with device:
-        shows(device, LEAN, BOOT_S)
-
-
-def test_wheel_and_gps():
-    """Pin interrupts, and the receiver's sentences on UART 2."""
-    with board(files=modules("esp32")) as device:
-        device.fit_wheel(lambda t_s: 15.0)
-        device.fit_gps(lambda t_s: 15.0)
-        wheel, gps = json.loads(device.exec(_LISTEN, 20.0).splitlines()[-1])
-    for speeds in (wheel, gps):
-        assert len(speeds) >= 2
-        assert speeds == pytest.approx([15.0] * len(speeds), abs=0.3)
-
-
-_LISTEN = """
-from time import sleep_ms, ticks_add, ticks_diff, ticks_ms
-from kickstand.settings import Settings
-from kickstand.speed.source import open_speed
-def opened(source):
-    class Config:
-        SPEED = source
-    return open_speed(Settings(Config))
-speeds = opened("wheel"), opened("gps")
-got, end = [[], []], ticks_add(ticks_ms(), 1800)
-while ticks_diff(end, ticks_ms()) > 0:
-    for i in range(2):
-        new = speeds[i].poll(ticks_ms())
-        if new is not None:
-            got[i].append(new)
-    sleep_ms(10)
-print(got)
-"""
 
 
 def states_of_flash(device, code):

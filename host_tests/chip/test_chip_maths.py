@@ -1,8 +1,6 @@
-"""The firmware's mathematics in the chip's 32-bit floats and small integers of 31 bits, against numpy and the other
-engines."""
+"""The firmware's mathematics in the chip's 32-bit floats and small integers of 31 bits, against the other engines."""
 
 import io
-import json
 import struct
 import subprocess
 from pathlib import Path
@@ -16,35 +14,8 @@ from kickstand_tools.replay import replay_engine
 from kickstand_tools.rides import block_reader
 from kickstand_tools.simulated_board.gps import sentence
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn
-from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 
 pytestmark = pytest.mark.chip
-
-_COMPOSED = """
-import json
-from array import array
-from kickstand.rotation import rotate, vector
-turned = []
-for a in ((1, 0, 0), (0, 1, 0), (0, 0, 1), v):
-    a, other = array("f", a), vector()
-    for m in matrices:
-        rotate(other, array("f", m), a)
-        a, other = other, a
-    turned.append(list(a))
-print(json.dumps([turned[0:3], turned[3]]))
-"""
-
-
-def test_composed_rotations_agree_with_numpy(at_prompt):
-    """Six rotations one after the other, of the three axes and of a vector: to 1e-6, a few units of the last place."""
-    matrices = [random_mounting(seed) for seed in range(6)]
-    v = (0.3, -0.5, 0.81)
-    axes, out = json.loads(at_prompt.exec(f"matrices = {matrices!r}\nv = {v!r}\n{_COMPOSED}"))
-    expected = np.eye(3)
-    for m in matrices:
-        expected = np.reshape(m, (3, 3)) @ expected
-    assert np.abs(np.transpose(axes) - expected).max() < 1e-6
-    assert np.abs(np.array(out) - expected @ v).max() < 1e-6
 
 
 def records():

@@ -91,7 +91,7 @@ def rides(files):
     return found
 
 
-@pytest.mark.long
+@pytest.mark.nightly  # on the simulated board: host_tests/rides/test_recorder.py, with slow flash test_slow_flash.py
 def test_a_recorded_ride_replays_as_it_was_shown(at_prompt, tmp_path):
     """While it is recorded no sample is lost, and the display goes on."""
     begun_s, world = at_prompt.time_s, PART.world(RIDE.motion)

@@ -99,7 +99,8 @@ class Emulating(threading.Thread):
             time.sleep(0.001)
 
 
-@pytest.mark.parametrize("chip", ["rp2040", pytest.param("esp32", marks=[pytest.mark.esp32, pytest.mark.nightly])])
+@pytest.mark.nightly  # like the page Install at an emulated Pico; with a made-up board: host_tests/deploy
+@pytest.mark.parametrize("chip", ["rp2040", pytest.param("esp32", marks=pytest.mark.esp32)])
 def test_flash_and_status_on_the_emulated_board(monkeypatch, chip):
     """Onto an older version with an edited config; then the bike's ride begins, and the display says what is to be
     done."""

@@ -1,7 +1,6 @@
 """kickstand demo as a user meets it: printed, in a terminal, by hand."""
 
 import functools
-import itertools
 import os
 import re
 import subprocess
@@ -10,7 +9,6 @@ import time
 
 import pytest
 from command import run
-from engines import ENGINES
 from kickstand_tools import unix_port
 from kickstand_tools.demo.demo import DeviceStopped, demo
 from kickstand_tools.demo.device_process import Device
@@ -76,12 +74,6 @@ def test_printed_the_lcd_follows_the_true_lean(printed):
         assert shown == pytest.approx(true, abs=4.0)
 
 
-def test_printed_every_frame_is_a_change(printed):
-    shown = [frame[3:] for frame in frames(printed)]
-    assert len(shown) > 80
-    assert all(a != b for a, b in itertools.pairwise(shown))
-
-
 def test_printed_it_ends_with_shown_against_true(printed):
     table = printed.split("shown on the LCD against true")[1]
     rows = re.findall(r"│ held turn \d +│ +(\d+) │ +(-?[\d.]+) │ +(-?[\d.]+) │ +([\d.]+) │ +([-+][\d.]+) │", table)
@@ -106,8 +98,7 @@ def test_by_hand_needs_a_terminal():
     assert done.returncode != 0 and b"InputError" in done.stderr and b"in a terminal" in done.stderr
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("how", ["quit", "closed"])
+@pytest.mark.parametrize(("engine", "how"), [("cpython", "quit"), ("micropython", "closed")])
 def test_the_device_ends_when_it_is_sent_quit_or_left_alone(engine, how):
     with Device(engine, "hand", 1.0) as device:
         if how == "quit":

@@ -5,7 +5,7 @@ import os
 import pytest
 from kickstand_tools.demo.keyboard import split
 from kickstand_tools.demo.score import Score, State, table
-from kickstand_tools.demo.screen import bike, lcd_lines, lean_text, screen
+from kickstand_tools.demo.screen import bike, screen
 from kickstand_tools.simulated_board.lcd import shown_lean
 from rich.console import Console
 
@@ -48,16 +48,6 @@ def test_lean_is_read_off_the_lcd():
     assert shown_lean(["Lean   3° right ", ""]) == 3.0
     assert shown_lean(["Lean   0°       ", ""]) == 0.0
     assert shown_lean(["Max left   27°  ", ""]) is None
-
-
-def test_lean_in_words():
-    assert [lean_text(x) for x in (-12.34, 0.04, -0.04, 5.0)] == ["12.3° left", "0.0°", "0.0°", "5.0° right"]
-    assert lean_text(-0.4, digits=0) == "0°"
-
-
-def test_the_frame_of_the_lcd():
-    edge, empty = "+----------------+", "|                |"
-    assert lcd_lines(["Lean", ""]) == [edge, "|Lean            |", empty, edge]
 
 
 def test_keys():

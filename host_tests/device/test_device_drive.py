@@ -159,17 +159,6 @@ def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
     assert record.at(shown_s + 2.0) == record.at(shown_s)  # until it is answered, or the ride goes on
 
 
-def test_a_press_for_another_page_does_not_answer_a_hidden_question(asked, tmp_path):
-    """The information page is in front of the question."""
-    plan = bike("gps", 3, kickstand=(12.0,))
-    to_info = [[asked - 14.0, LONG], *([asked - 12.0 + t, SHORT] for t in range(3)), [asked - 9.0, LONG]]
-    presses = [*POSES, *to_info, [asked + 2.0, LONG]]
-    record = devices.run("cpython", tmp_path, {**plan, "presses": presses, "until": asked + 4.0})
-    assert record.at(asked + 1.0)[0].startswith("MPU6050")
-    assert record.at(asked + 3.5)[1].startswith("next")  # the menu
-    assert not stored(tmp_path).by_drive
-
-
 def test_what_was_wrong_with_both_poses_is_found_while_riding(tmp_path):
     """Two degrees of pitch on the kickstand give a yaw error of almost ten: forward is refined at a stop, and at most
     1.5 are left. The upright pose was 2 degrees off: that trim outlives the new alignment. The maxima are kept."""
@@ -237,23 +226,13 @@ def test_a_speed_that_fails_for_a_while_is_reported_and_does_no_harm(tmp_path):
     assert forward_error_deg(stored(tmp_path), 3) < 1.5
 
 
-def test_without_a_speed_source_the_menu_has_no_alignment_by_driving(tmp_path):
-    presses = [*POSES, [20, LONG]]
-    record = devices.run("cpython", tmp_path, bike("gps", 1, config={"SPEED": None}, presses=presses, until=22.0))
-    assert record.at(21.5)[1] == "next 1/6 hold=ok"
-
-
 @pytest.mark.parametrize(
     ("config", "named"),
     [
-        ({"SAMPLE_HZ": 300}, "SAMPLE_HZ"),
-        ({"ACCEL_RANGE_G": 3}, "ACCEL_RANGE_G"),
         ({"LCD_I2C": 0}, "LCD_I2C"),
         ({"VEHICLE": "car"}, "car needs SPEED"),
         ({"VEHICLE": "bus", "SPEED": "gps"}, "VEHICLE"),
-        ({"SPEED": "radar"}, "SPEED"),
         ({"SPEED": "gps", "GPS_RX": 5}, "pin used twice"),
-        ({"SPEED": "wheel", "WHEEL_PIN": 7}, "pin used twice"),
         ({"SPEED": "wheel", "PULSES_PER_METRE": 0}, "PULSES_PER_METRE"),
         ({"SPEED": "gps", "GPS_BAUD": "9600"}, "GPS_BAUD"),
         ({"SPEED": "gps", "GPS_RX": 11}, "GPS_TX / GPS_RX"),
@@ -269,11 +248,6 @@ def test_a_wrong_setting_is_named(config, named):
         with pytest.raises(SettingsError) as refusal:
             open_speed(Settings(type("Config", (), config)))
         assert named in (refusal.value.values[0], messages.lines(refusal.value)[1])
-
-
-def test_pins_of_a_speed_source_that_is_not_used_are_free_for_others(tmp_path):
-    record = devices.run("cpython", tmp_path, {"lean": [[0, 0]], "config": {"BUTTON_PIN": 14}, "until": 2})
-    assert record.last[0].startswith("Raw")
 
 
 @pytest.mark.parametrize(

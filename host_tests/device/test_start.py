@@ -11,7 +11,6 @@ import pytest
 from kickstand import errors
 from kickstand_tools import firmware_path
 from kickstand_tools.simulated_board.simulator import Board
-from kickstand_workshop.bench.boot import in_order
 
 
 @pytest.fixture
@@ -107,7 +106,7 @@ def choose(board, at_s, place):
 
 @pytest.mark.parametrize(
     ("module", "place"),
-    [("align_wizard", ALIGN), ("six_wizard", SIX), ("pose_taker", SIX), ("flash_ring", RECORD), ("recorder", RECORD)],
+    [("align_wizard", ALIGN), ("pose_taker", SIX), ("recorder", RECORD)],
 )
 def test_what_a_menu_entry_cannot_import_is_reported_and_the_meter_goes_on(module, place, without, board, capsys):
     """Each time that it is chosen, and never before."""
@@ -128,17 +127,7 @@ def test_what_a_menu_entry_cannot_import_is_reported_and_the_meter_goes_on(modul
     assert ("run kickstand flash" if said is INCOMPLETE else "no memory for that") in capsys.readouterr().out
 
 
-def test_a_menu_that_cannot_be_imported_is_reported_and_the_meter_goes_on(without, board):
-    from kickstand import start
-
-    said, seen = without("menu"), watch(board)
-    board.press(3.0, 1.2)
-    assert board.run(start.main, 8.0) == "off"
-    assert [t_s for t_s, lines in seen if lines == said] == [pytest.approx(4.0, abs=0.3)]
-    assert seen[-1][1][0].startswith("Raw")
-
-
-@pytest.mark.parametrize("module", ["block", "flash_ring", "recorder", "card_trial"])
+@pytest.mark.parametrize("module", ["recorder", "card_trial"])
 def test_a_board_that_is_to_record_from_power_on_and_cannot_shows_the_lean(module, without, board, monkeypatch):
     from kickstand import settings, start
 
@@ -231,21 +220,3 @@ def test_a_report_that_cannot_be_worded_gives_its_code(board, monkeypatch, capsy
     monkeypatch.setitem(sys.modules, "kickstand.console", None)
     errors.report(errors.StoreError("not-written", "EIO"))
     assert capsys.readouterr().out == "calibration not saved: EIO; the old one is kept\nnot-written\n"
-
-
-def test_the_imports_of_the_app_are_in_small_steps(board):
-    """Between two of them display and chip are set up. No step may import much more than its own module."""
-    from kickstand import start
-
-    loaded = set(in_order("kickstand.start", []))
-    for step in [*start.STEPS, "app"]:
-        found = set(in_order("kickstand." + step, []))
-        assert f"kickstand.{step}" not in loaded, step
-        assert len(found - loaded) <= 3, (step, found - loaded)
-        loaded |= found
-
-
-def test_what_the_first_lean_does_not_need_is_imported_later():
-    early = {name.split(".", 1)[1] for name in in_order("kickstand.app", [])[1:] if "." in name}
-    late = {"rides.recorder", "ui.menu", "ui.align_wizard", "lean.formula", "drive_alignment.background", "console"}
-    assert not early & late

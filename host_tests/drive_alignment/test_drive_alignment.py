@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from driving_runs import STAND, around
 from engines import ENGINES, run
-from kickstand.drive_alignment import alignment, events, quality, speed_check, verdict, vertical
+from kickstand.drive_alignment import alignment, quality, speed_check, verdict
 from kickstand_tools.signals import rotation_vector
 
 MOUNT = [0.48, 0.36, 0.8, -0.6, 0.8, 0.0, -0.64, -0.48, 0.6]  # no axis of the sensor near one of the vehicle
@@ -65,13 +65,9 @@ def test_the_result_turns_with_the_sensor(method):
     plain = np.reshape(drive(legs, PLAIN, method=method)["matrix"], (3, 3))
     for order, signs in (
         ((0, 1, 2), (1, -1, -1)),
-        ((0, 1, 2), (-1, 1, -1)),
         ((0, 1, 2), (-1, -1, 1)),
         ((1, 2, 0), (1, 1, 1)),
-        ((2, 0, 1), (-1, -1, 1)),
         ((1, 0, 2), (1, 1, -1)),
-        ((2, 1, 0), (-1, -1, -1)),
-        ((0, 2, 1), (1, -1, 1)),
     ):
         q = np.zeros((3, 3))
         q[range(3), order] = signs
@@ -87,23 +83,6 @@ def test_camber_at_the_stops_does_not_reach_forward(method, yaw_deg):
     yaw, total = errors(drive(around(8), samples={"tilt_deg": 2.0}, method=method), MOUNT)
     assert abs(yaw) == pytest.approx(yaw_deg, abs=1.0)
     assert total < max(2.3, 1.1 * abs(yaw))
-
-
-@pytest.mark.parametrize(
-    ("braking", "seconds", "yaw_dps", "counted"),
-    [
-        (0.9 * 0.8, 6.0, 0.0, False),
-        (1.1 * 0.8, 6.0, 0.0, True),
-        (2.0, 3.0, 0.9 * events.STRAIGHT_DPS, True),
-        (2.0, 3.0, 1.1 * events.STRAIGHT_DPS, False),
-    ],
-)
-def test_which_braking_events_count(braking, seconds, yaw_dps, counted):
-    result = drive(around(6, -braking, seconds, yaw_dps))
-    assert (result["counted"] >= quality.MIN_EVENTS) is counted, result
-    if not counted:
-        assert "braking events in a straight line" in engines.words(result)
-        assert result["lcd"][0] == "Brake straight"
 
 
 def test_it_says_what_it_waits_for():
@@ -146,13 +125,9 @@ def test_refusals_name_the_reason(engine):
     ("source", "fine"),
     [
         ({"every_s": 1.0, "step": 1 / 3.6}, True),
-        ({"every_s": 0.1}, True),
-        ({"every_s": 1.0, "late_s": 1.0}, True),
         ({"late_s": 0.9 * speed_check.MAX_LAG_S}, True),
         ({"late_s": 1.1 * speed_check.MAX_LAG_S}, False),
-        ({"scale": 0.9 / speed_check.MIN_FORCE_RATIO}, True),
         ({"scale": 1.1 / speed_check.MIN_FORCE_RATIO}, False),
-        ({"scale": 1.1 / speed_check.MAX_FORCE_RATIO}, True),
         ({"scale": 0.9 / speed_check.MAX_FORCE_RATIO}, False),
     ],
 )
@@ -164,25 +139,10 @@ def test_what_a_speed_may_be_like(source, fine):
         assert result["lag"] == pytest.approx(source.get("late_s", 0.0), abs=0.3)
 
 
-@pytest.mark.parametrize(("brakings", "ready"), [(3, False), (5, True)])
-def test_how_many_braking_events_it_takes(brakings, ready):
-    """Five events must count. Two of them may be for acceleration, but here these are in turns."""
-    assert drive(around(brakings))["ready"] is ready
-
-
-@pytest.mark.parametrize(("share", "fine"), [(0.9, True), (1.1, False)])
-def test_standing_and_driving_have_to_agree(share, fine):
-    result = drive(around(8), moved=[5.8, turned(MOUNT, 0, share * vertical.MAX_CHANGE_DEG)])
-    assert result["ready"] is fine
-    assert fine or "standing and driving differ" in engines.words(result)
-
-
 @pytest.mark.parametrize(
     ("axis", "degrees", "from_s", "words"),
     [
         (1, 180.0, 130.0, "no longer where it was"),  # one braking event is left
-        (1, -100.0, 130.0, "no longer where it was"),
-        (1, 45.0, 100.0, "no longer where it was"),
         (1, 12.0, 100.0, "two parts of the drive"),
         (0, 1.3 * quality.PITCH_DEG, 82.0, "vertical"),
         (2, 1.3 * quality.ROLL_DEG, 82.0, "vertical"),
@@ -196,14 +156,6 @@ def test_a_mount_that_moved(axis, degrees, from_s, words):
     result = drive(legs, moved=[from_s, turned(MOUNT, axis, degrees)])
     assert result["ready"] is (words is None), result
     assert words is None or words in engines.words(result)
-
-
-@pytest.mark.parametrize(("share", "fine"), [(0.3, True), (0.9, True), (1.1, False)])
-def test_halves_have_to_agree(share, fine):
-    """Within 6 degrees once it is ready, because of the hysteresis."""
-    result = drive(around(8), moved=[73.0, turned(MOUNT, 1, share * quality.STAY_AGREE_DEG)])
-    assert result["ready"] is fine
-    assert fine or "two parts" in engines.words(result)
 
 
 @pytest.mark.parametrize("silent_s", [200.0, 500.0])
@@ -262,8 +214,6 @@ def test_nothing_is_joined_across_missing_samples():
     [
         (PLAIN, 6, verdict.SAME),
         (turned(PLAIN, 1, 11.4), 6, verdict.REFINED),
-        (turned(PLAIN, 1, -11.4), 6, verdict.REFINED),
-        (turned(PLAIN, 1, 180.0), 2, verdict.REVERSED),
         (turned(PLAIN, 1, 168.0), 6, verdict.REVERSED),
         (turned(PLAIN, 1, 60.0), 6, verdict.MOVED),
         (turned(PLAIN, 2, 10.0), 6, verdict.MOVED),
@@ -276,9 +226,3 @@ def test_an_alignment_is_compared_with_driving(against, brakings, verdict):
     up = against[3:6] if against[3:6] == PLAIN[3:6] else PLAIN[3:6]
     options = {"vehicle": "motorcycle", "up": up, "bias": [0.0, 0.0, 0.0], "against": against}
     assert drive(around(brakings), PLAIN, **options)["compare"] == verdict
-
-
-def test_turning_round_an_alignment():
-    m = turned(MOUNT, 1, 180.0)
-    verdict.turn_round(m)
-    assert m == pytest.approx(MOUNT)

@@ -1,38 +1,10 @@
-"""Each driver alone: what it sends on the bus, what it takes of the heap, what the button makes of presses."""
+"""Each driver alone: what it sends on the bus, what the button makes of presses."""
 
 import re
-import struct
 import textwrap
 
 import pytest
 from kickstand_tools.simulated_board.simulator import Board
-from mpy import run_mpy
-
-NO_HEAP = """
-from kickstand_tools.simulated_board.simulator import Board
-
-Board(lambda t: (0, 0, 1, 0, 0, 0, 25)).install()  # for machine and time
-import micropython
-from kickstand.imu.mpu6050 import Mpu6050
-
-class Wire:
-    "An I2C that allocates nothing itself."
-    def readfrom_mem_into(self, address, register, buffer):
-        for i in range(len(buffer)):
-            buffer[i] = 0x9F - 13 * i
-
-chip = Mpu6050(Wire())
-chip.read()
-micropython.heap_lock()
-chip.read()
-micropython.heap_unlock()
-print(list(chip.counts))
-"""
-
-
-def test_a_sample_takes_no_heap():
-    burst = bytes((0x9F - 13 * i) % 256 for i in range(14))
-    assert run_mpy(NO_HEAP).split("\n")[-2] == str(list(struct.unpack(">7h", burst)))
 
 
 @pytest.fixture

@@ -130,22 +130,6 @@ def test_a_set_up_that_fails_is_tried_again_50_ms_later(board):
     assert code(sensor) is None
 
 
-def test_a_fifo_that_does_not_start_is_tried_again_with_the_bus(board):
-    sensor, chip = made(board)
-    broken = [OSError(5)]
-
-    def start():
-        if broken:
-            raise broken.pop()
-
-    chip.start = start
-    for now_ms in (0, 100, 160, 180):
-        assert sensor.fetch(now_ms) == 0
-    assert (code(sensor), sensor.restarts) == ("no-sensor", 0)
-    sensor.fetch(230)
-    assert chip.calls == [("connect", "bus"), "configure"] * 2
-
-
 def test_silence_is_a_fault_after_100_ms(board):
     sensor, chip, now_ms = running(board)
     chip.waiting = [0, 0, 3, 0, 0, 0]

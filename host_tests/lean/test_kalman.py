@@ -66,36 +66,9 @@ def test_beyond_five_sigma_an_innovation_counts_for_less(innovation, variance):
     assert p.rows[0][0] == pytest.approx(0.5 - 0.25 / variance)
 
 
-def test_a_variance_never_reaches_zero():
-    p = Covariance([1.0, 1.0])
-    for _ in range(3):
-        list(p.update(((1, 1.0),), 0.0, 0.0))
-    assert p.rows[1][1] == 1e-10
-    assert p.rows[0][0] == 1.0
-
-
 def test_a_state_that_is_set_has_no_correlation_left():
     p, matrix = some()
     p.set_variance(4, 0.25)
     matrix[4] = matrix[:, 4] = 0.0
     matrix[4, 4] = 0.25
     np.testing.assert_allclose(p.rows, matrix, rtol=0, atol=1e-12)
-
-
-def test_noise_is_added_to_one_state():
-    p, matrix = some()
-    p.add_noise(3, 0.25)
-    matrix[3, 3] += 0.25
-    np.testing.assert_allclose(p.rows, matrix, rtol=0, atol=1e-12)
-
-
-def test_long_work_is_done_in_short_pieces():
-    """Three terms of a row, or eight rows of the covariance, are as much as the time of one sample allows."""
-    p, _ = some()
-    assert [len(list(p.propagate_row(5, tuple(RATES[:k]), 0.2, 0.0))) for k in (1, 3, 4, 5)] == [1, 1, 2, 2]
-    assert [len(list(p.update(tuple(H[:k]), 0.0, 1.0))) for k in (1, 3, 4, 5)] == [3, 3, 4, 4]
-    work, before = p.update(tuple(H[:2]), 0.0, 1.0), [p.rows[i][i] for i in range(N)]
-    changed = []
-    for _ in work:
-        changed.append(sum(p.rows[i][i] != before[i] for i in range(N)))
-    assert changed == [0, 8, 12]

@@ -17,12 +17,6 @@ def rested_after(detector, seconds, rates=NONE, force=(0.0, 1.0, 0.0), bias=NONE
     return found
 
 
-def test_rest_is_a_second_and_a_half_of_stillness():
-    detector = RestDetector()
-    assert not detector.resting
-    assert rested_after(detector, 3.0) == 1.5
-
-
 def test_where_it_seems_to_roll_rest_takes_ten_seconds():
     assert rested_after(RestDetector(), 12.0, rolling=True) == 10.0
     detector = RestDetector()

@@ -4,13 +4,11 @@ published texts only."""
 import asyncio
 import collections
 import functools
-import itertools
-import random
 
 import devices
 import pytest
 from device_runs import Device, _world
-from published import SERVICE, channels, own
+from published import SERVICE, channels
 
 bumble_air = pytest.importorskip("bumble_air", reason="no bumble", exc_type=ImportError)
 
@@ -68,32 +66,6 @@ def test_racechrono_finds_it_filters_and_decodes(on_air):
     assert record.ends == ["off"]
 
 
-async def ask_for_all(central):
-    """As our page, at the fastest."""
-    await central.connect(await central.find(SERVICE))
-    board = bytes(await central.read(SERVICE, BOARD))
-    await central.subscribe(SERVICE, NOW, "now")
-    await central.subscribe(SERVICE, RIDE, "ride")
-    await central.write(SERVICE, RATE, [40, 0])
-    await asyncio.sleep(20)
-    await central.leave()
-    return board
-
-
-def test_our_service_loses_no_sample_while_a_ride_is_recorded(on_air):
-    (central,), record = on_air(46, [(20, ask_for_all, None)], RECORD=True)
-    assert central.done.result()[0] == 1
-    now = [(t_s, own("now", data)) for t_s, name, data in central.heard if name == "now"]
-    assert 495 <= len(now) <= 502
-    steps = [(b["time of the board"] - a["time of the board"]) % 65536 for (_, a), (_, b) in itertools.pairwise(now)]
-    assert sum(steps) == pytest.approx(20_000, abs=200) and max(steps) <= 130
-    for t_s in (devices.LEFT_S, devices.RIGHT_S):
-        seen = [one for sent_s, one in now if sent_s <= t_s][-1]
-        assert abs(seen["lean"] / 100 - record.lean_at(t_s)) <= 1
-    rides = [own("ride", data) for _, name, data in central.heard if name == "ride"]
-    assert len(rides) in (19, 20, 21) and {one["samples lost"] for one in rides} == {0}
-
-
 async def press_in(central, pair=True):
     await central.connect(await central.find(CHRONO))
     await central.subscribe(CHRONO, 0x0001, "chrono")
@@ -117,25 +89,3 @@ def test_a_pin_is_asked_for(on_air):
     assert wrong.done.exception() and not silent.heard and not wrong.heard
     assert right.done.exception() is None
     assert 15 <= len([data for _, _, data in right.heard if data[0] == 1]) <= 25
-
-
-async def annoy(central):
-    """Ten visits: nonsense, some of it without an answer, and gone again."""
-    dice = random.Random(5)
-    for _ in range(10):
-        await central.connect(await central.find(CHRONO, 10))
-        for _ in range(dice.randrange(6)):
-            kind = dice.choice(((CHRONO, 2), (SERVICE, RATE)))
-            data = bytes(dice.randrange(256) for _ in range(dice.randrange(30)))
-            await central.write(*kind, data, response=bool(dice.randrange(2)) and len(data) <= 20)
-        await central.leave()
-        await asyncio.sleep(0.05)
-    return "still there"
-
-
-def test_ten_rude_visits_over_the_air(on_air):
-    (central, after), record = on_air(65, [(20, annoy, None), (55, just_write, None)])
-    assert central.done.result() == "still there"
-    assert after.done.exception() is None and len(after.heard) > 30
-    assert record.ends == ["off"]
-    assert [line for line in record.at(64) if "Lean" in line]

@@ -31,10 +31,6 @@ def run(request, tmp_path, capsys):
     return lambda plan: devices.run(getattr(request, "param", "cpython"), tmp_path, plan, capsys)
 
 
-on_both = pytest.mark.parametrize("run", ENGINES, indirect=True)
-
-
-@on_both
 def test_racechrono_gets_what_it_asks_for(run):
     """Deny all, then two packets at two paces; the numbers are those of the display. Then nothing, then everything."""
     acts = [[20.0, "connect"], [20.1, "write", "filter", [0]], [20.1, "write", "filter", [2, 0, 100, 0, 0, 0, 1]]]
@@ -63,7 +59,7 @@ def test_racechrono_gets_what_it_asks_for(run):
     assert abs(right["roll rate"]) < 8 and abs(right["longitudinal acceleration"]) < 0.2
 
 
-@on_both
+@pytest.mark.parametrize("run", ENGINES, indirect=True)
 def test_our_page_gets_it_all_and_nothing_else_suffers(run):
     record = run({**devices.ALIGNED, **LIVE, "phones": [ASK + [[21.5, "read", "board"], [21.5, "read", "ride"]]]})
     (phone,) = record.phones
@@ -186,7 +182,6 @@ def test_a_board_that_cannot_says_so_and_the_lean_goes_on(run, machine, config, 
     assert abs(record.lean_at(devices.LEFT_S) + 30) <= 1
 
 
-@on_both
 def test_a_pin_keeps_strangers_out_and_is_asked_for_once(run):
     """Also after power-off; another PIN makes the same phone a stranger."""
     stranger = [[20.0, "connect", 1], [20.1, "write", "rate", [40, 0]], [20.2, "read", "ride"], [20.3, "read", "board"]]

@@ -69,25 +69,6 @@ def test_however_full_a_block_is_the_worst_turn_and_a_position_fit(length):
     assert len(read.turns) == count - 1 > 90
 
 
-def test_the_first_position_of_all_is_left_out_where_no_room_was_kept_for_it():
-    """From then on there is room in each block, however full it is."""
-    block = RideBlock(5000)
-    for sequence in range(3):
-        ride_writer.begun(512, sequence, block)
-        sign = 1
-        while not block.full():
-            sign = -sign
-            block.add_speed((1 << 24) * (sign > 0))
-            if sequence:
-                block.add_place(ride_writer.place(sequence))
-            block.add([sign * 8 * 32767] * 7, 8, (1 << 29) if sign > 0 else 0)
-            if block.full() and not sequence:
-                block.add_place(ride_writer.place(0))
-        read = ride_writer.ended(block)
-        assert places(read) == (len(read.turns) if sequence else 0)
-        assert read.turns[-1].sums == (sign * 8 * 32767,) * 6
-
-
 def test_a_block_begins_without_anything_of_the_one_before():
     """Each can be read without the others. What is left of a longer one is overwritten with zeros."""
     first, again = ride_writer.begun(4096), RideBlock(5000)

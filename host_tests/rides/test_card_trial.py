@@ -3,13 +3,11 @@
 import contextlib
 import io
 import os
-import sys
 import types
 
 from kickstand.errors import CardError
 from kickstand.rides import flash_ring, ride_paths
-from kickstand_tools.simulated_board.fakes import fake_machine
-from rings import CARD, FLASH
+from rings import CARD
 
 
 def tried(root, monkeypatch, **failing):
@@ -60,12 +58,3 @@ def test_a_card_that_reads_other_than_it_was_written_is_refused(root, monkeypatc
 
     monkeypatch.setattr(card_trial, "open", lambda path, mode: Wrong(), raising=False)
     assert tried(root, monkeypatch).code == "no-card"
-
-
-def test_rides_are_in_flash_without_a_card_and_else_on_it(clock, monkeypatch):
-    monkeypatch.setitem(sys.modules, "machine", fake_machine)
-    from kickstand.board import sd_card
-
-    monkeypatch.setattr(sd_card, "mount", lambda settings: "/sd")
-    assert ride_paths.directory(FLASH) == "rides"
-    assert ride_paths.directory(CARD) == "/sd/rides"

@@ -140,6 +140,7 @@ def test_the_first_start_makes_the_recorder_and_the_next_takes_the_same(root, cl
     made = recording.recorder
     assert made.active
     recording.stop()
+    assert not made.active
     assert recording.start() is None
     assert recording.recorder is made and made.active
 
@@ -163,19 +164,6 @@ def test_a_block_is_written_by_pieces_of_256_bytes_one_a_turn(recorder, keeper):
     assert len(keeper.steps) == before  # nothing is waiting
 
 
-def test_what_is_not_ready_is_asked_again_in_the_next_turn(recorder, keeper):
-    start(recorder)
-    keeper.is_ready = False
-    while "ready" not in keeper.steps:
-        add(recorder, 1)
-    add(recorder, 5)
-    assert keeper.steps.count("ready") == 6
-    assert "write" not in keeper.steps
-    keeper.is_ready = True
-    add(recorder, 5)
-    assert len(keeper.taken) == 1
-
-
 def test_all_blocks_follow_one_another_and_say_what_they_belong_to(recorder, keeper, clock):
     start(recorder)
     add(recorder, 1500, clock)
@@ -189,15 +177,6 @@ def test_all_blocks_follow_one_another_and_say_what_they_belong_to(recorder, kee
     assert times(keeper) == [found[0].time_us + TURN_US * (i + 1) for i in range(1500)]
     assert [block.time_us for block in found[1:]] == [block.turns[-1].time_us for block in found[:-1]]
     assert found[0].calibration().aligned
-
-
-def test_a_new_ride_ends_the_one_before(recorder, keeper):
-    start(recorder)
-    add(recorder, 3)
-    start(recorder)
-    assert keeper.steps[-2:] == ["end", "begin"]
-    assert len(keeper.taken) == 1
-    assert recorder.seconds() == 0
 
 
 def test_a_turn_that_fills_a_block_waits_for_the_one_before(recorder, keeper):

@@ -1,7 +1,5 @@
 """Positions in recorded rides: exact in each block, with the turn they came with, and nothing lost by them."""
 
-import struct
-
 import devices
 import engines
 import numpy as np
@@ -45,20 +43,6 @@ def test_every_position_is_with_its_own_turn_and_every_turn_is_there(every, leng
     for block, content in zip(blocks, data):
         free = content[: -6 - 16 * sum(bool(turn.place) for turn in block.turns)]
         assert len(free) - len(free.rstrip(b"\0")) < 16 + 60  # no more room is left than for the worst turn
-
-
-def test_an_older_reader_finds_all_but_the_positions():
-    """It takes the number of positions for a byte of the version's name, and their bytes for zeros."""
-    data, _ = ride_writer.blocks(3, places_every=10)
-    for content in data:
-        fields = struct.unpack_from("<4sHHIIqhHHH11sB", content)
-        assert fields[:3] == (b"KRID", 1, len(content))
-        assert fields[10].startswith(block_format.__version__.encode() + b"\0")
-        count, _ = struct.unpack_from("<HI", content, len(content) - 6)
-        block = block_reader.parse(content)
-        start = len(content) - 6
-        old = list(block_reader._turns(block, content[block_reader._START : start], count, {}))
-        assert [(t.time_us, t.sums, t.n) for t in old] == [(t.time_us, t.sums, t.n) for t in block.turns]
 
 
 def said(*values: int) -> list:

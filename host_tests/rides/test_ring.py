@@ -1,6 +1,5 @@
 """The ring of rides at its limits: room, the oldest ride, places of files."""
 
-import os
 import shutil
 from pathlib import Path
 
@@ -161,40 +160,11 @@ def test_ending_closes_once_and_abandoning_raises_nothing(root, monkeypatch):
         begun(file, monkeypatch).end()
 
 
-def test_a_directory_that_cannot_be_made_ends_in_its_error(root, monkeypatch):
-    def refuse(path):
-        raise OSError(30)
-
-    RideRing(FLASH).begin()  # it is there now
-    assert RideRing(FLASH).begin() == 1  # and empty: the same ride again
-    monkeypatch.setattr("os.mkdir", refuse)
-    with pytest.raises(OSError, match="30"):
-        RideRing(FLASH).begin()
-
-
 def test_free_and_all_bytes_are_blocks_of_the_size_that_counts(monkeypatch):
     """Of statvfs: block size, fragment size (in which blocks are counted), all, free."""
     monkeypatch.setattr("os.statvfs", lambda path: (512, 4096, 300, 200, 190, 0, 0, 0, 0, 255), raising=False)
     assert flash_ring.free_bytes("") == 200 * 4096
     assert flash_ring.all_bytes("") == 300 * 4096
-
-
-def test_only_what_is_named_as_a_part_is_one(root):
-    old_ride(root, 345, parts=3)
-    old_ride(root, 307)
-    (root.path / "rides/003/45/00003.rid").mkdir()
-    for name in ("00004.txt", "0005.rid", "000006.rid", "0000x.rid"):
-        (root.path / "rides/003/45" / name).write_bytes(b"x")
-    (root.path / "rides/003/46").write_bytes(b"x")
-    (root.path / "rides/003/1").mkdir()
-    (root.path / "rides/03").mkdir()
-    assert sorted(ride_paths.parts("rides")) == [(307, 0, KB_4)] + [(345, i, KB_4) for i in range(3)]
-    assert sorted(ride_paths.rides("rides", 3)) == [307, 345]
-    assert list(ride_paths.groups("rides")) == [3]
-    assert ride_paths.first_part("rides/003/45") == (0, KB_4)
-    os.remove("rides/003/45/00000.rid")
-    assert ride_paths.first_part("rides/003/45") == (1, KB_4)
-    assert ride_paths.newest_ride("rides") == 345
 
 
 def test_numbers_of_rides_go_on(root):

@@ -1,4 +1,4 @@
-"""The virtual clock and the `time` built on it. Also run under MicroPython."""
+"""The virtual clock and the `time` built on it."""
 
 import kickstand_tools.simulated_board.clock as clock_module
 from board_access import level, raised

@@ -230,26 +230,6 @@ def test_another_display_in_its_place_is_taken(board, display):
         assert board.lcd.text() == as_text(NEW), kind
 
 
-def test_after_a_driver_that_cannot_be_loaded_another_display_is_found_at_once():
-    def run(board):
-        display = open_display(board)
-        begin, display._begin = display._begin, memory_error
-        turns(board, display, 500)
-        display._begin = begin
-        board.remove_lcd()
-        turns(board, display, 700)
-        board.change_display("lcd")
-        display.show(*NEW)
-        turns(board, display, 100)
-        assert board.lcd.text() == as_text(NEW)
-
-    assert on_board(run, 1e6, display="ssd1306")[0] == "returned"
-
-
-def memory_error(address):
-    raise MemoryError
-
-
 @on_each((None,), ("ssd1306",))
 def test_a_status_that_never_says_on_keeps_no_oled_dark(board, display):
     board.lcd.read_byte = lambda: 0xFF

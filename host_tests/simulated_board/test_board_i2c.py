@@ -1,4 +1,4 @@
-"""The wires, and machine.I2C and Pin on them. Also run under MicroPython."""
+"""The wires, and machine.I2C and Pin on them."""
 
 import errno
 
@@ -16,23 +16,6 @@ def check(firmware, **fitted):
     outcome, board = on_board(firmware, **fitted)
     assert outcome == "returned"
     return board
-
-
-@firmware()
-def test_a_burst_takes_its_time_on_the_wire(board):
-    for freq, expected_us in ((400_000, 390), (100_000, 1560)):
-        i2c = open_sensor(freq)
-        start = board.clock.now_us
-        i2c.readfrom_mem_into(0x68, 0x3B, bytearray(14))
-        # 17 bytes of nine clocks, START, repeated START, STOP
-        assert board.clock.now_us - start == expected_us, board.clock.now_us - start
-
-
-def test_one_bus():
-    def firmware(board):
-        assert open_sensor().scan() == [0x27, 0x69]
-
-    assert len(check(firmware, one_bus=True, sensor_address=0x69).buses) == 1
 
 
 def test_nobody_home():
@@ -114,25 +97,6 @@ def test_interrupts_of_an_esp32_wait_for_the_end_of_a_transfer():
     assert during == 0 and len(after) in (5, 6, 7) and len(set(after)) == 1
     during, after = edges_in_a_transfer("esp32", 1000)
     assert during == 0 and len(after) in (8, 9)  # one more may have come since
-
-
-def test_boards_have_their_pins_and_controllers():
-    def firmware(machine, missing, controllers):
-        for number in missing:
-            assert isinstance(raised(Pin, number), ValueError), number
-        for number in range(3):
-            error = raised(I2C, number, Pin(5), Pin(4))
-            assert (error is None) == (number < controllers), number
-
-    for machine, missing, controllers in (
-        ("esp32", (24, 31, 40), 2),
-        ("esp32 spiram", (16, 17, 24), 2),
-        ("s3", (22, 25, 26, 49), 2),
-        ("c3", (12, 17, 22), 1),
-        ("c6", (24,), 1),
-        ("h2", (6, 15, 28), 2),
-    ):
-        check(lambda board: firmware(machine, missing, controllers), machine=machine)  # noqa: B023 called at once
 
 
 def test_a_classic_esp32_crashes_where_a_pin_of_its_flash_is_driven_and_some_pins_are_inputs_only():

@@ -35,16 +35,6 @@ def lit(oled):
     return [(i % 128, i // 128) for i in range(8192) if pixels[i >> 3] & 0x80 >> (i & 7)]
 
 
-def test_it_comes_up_dark_with_anything_in_its_ram():
-    for kind in KINDS:
-        oled = Oled(Clock(), kind=kind)
-        assert not oled.backlight and not lit(oled) and len(set(oled.ram)) > 100
-        assert oled.read_byte() & 0x40
-        send(oled, 0x00, 0xAF)
-        assert not oled.read_byte() & 0x40
-        assert not oled.backlight  # without its charge pump
-
-
 def test_a_byte_is_eight_rows_of_a_column():
     for kind in KINDS:
         oled = ready(kind)
@@ -53,36 +43,6 @@ def test_a_byte_is_eight_rows_of_a_column():
         assert lit(oled) == [(0, 16), (1, 16), (0, 23)], (kind, lit(oled))
         send(oled, 0x00, 0x42)
         assert lit(oled) == [(0, 14), (1, 14), (0, 21)]
-
-
-def test_a_control_byte_before_each_command_and_then_data():
-    for kind in KINDS:
-        oled = ready(kind)
-        send(oled, 0x80, 0xB7, 0x80, 0x0F, 0x80, 0x17, 0x40, 0x80, 0x80)
-        x = 0x7F - FIRST[kind]
-        after = [] if kind == "ssd1306" else [(x + 1, 63)]
-        assert lit(oled)[-2:] == ([(x, 63)] + after if after else [(0, 63), (x, 63)]), (kind, lit(oled))
-
-
-def test_only_the_ssd1306_has_other_addressing_modes():
-    oled = ready("ssd1306")
-    send(oled, 0x00, 0x20, 0x00, 0x21, 126, 127, 0x22, 0, 1)
-    send(oled, 0x40, 1, 1, 1, 1)
-    assert lit(oled) == [(126, 0), (127, 0), (126, 8), (127, 8)]
-    send(oled, 0x00, 0x20, 0x01, 0x21, 0, 127, 0x22, 3, 4)
-    send(oled, 0x40, 2, 2, 2)
-    assert lit(oled)[4:] == [(0, 25), (1, 25), (0, 33)]
-    assert oled.unknown == 0
-    other = ready("sh1106")
-    send(other, 0x00, 0x8D)
-    assert other.unknown == 1
-
-
-def test_an_argument_is_no_command_even_in_a_transfer_of_its_own():
-    oled = ready("ssd1306")
-    send(oled, 0x80, 0x81)
-    send(oled, 0x80, 0xAE)
-    assert oled.on and oled.contrast == 0xAE
 
 
 def test_the_fake_framebuf_draws_as_micropython_s_own():

@@ -1,4 +1,4 @@
-"""The board as a whole: power, resets, watchdog, button, and being installed. Also run under MicroPython."""
+"""The board as a whole: power, resets, watchdog, button, and being installed."""
 
 import sys
 
@@ -78,39 +78,6 @@ def test_a_press_bounces_and_then_holds(board):
     assert 300_000 <= up[0] < 300_100 and up[-1] < 305_000
     board.press()
     assert levels(board, 510_000)[0][1] == 0
-
-
-def test_installed_and_gone_again():
-    machine_was = sys.modules.pop("machine", None)
-
-    def firmware(board):
-        assert __import__("machine").Pin is Pin
-        start = board.clock.now_us
-        __import__("time").sleep_ms(5)
-        assert board.clock.now_us - start == 5000
-
-    assert on_board(firmware)[0] == "returned"
-    assert "machine" not in sys.modules
-    if machine_was is not None:
-        sys.modules["machine"] = machine_was
-    after = __import__("time")
-    assert after.time() > 1_000_000_000, "the host's own time is back"
-    assert sys.implementation.name == "micropython" or not hasattr(after, "ticks_us")
-
-
-def test_a_press_during_a_long_press_comes_after_it():
-    """Else its end would end the long one."""
-    seen = []
-
-    def firmware(board):
-        board.press(for_s=1.2)
-        board.press()
-        for _ in range(160):
-            fake_time.sleep_ms(10)  # longer than the contacts bounce
-            seen.append(board.button.closed)
-
-    on_board(firmware, 3.0)
-    assert all(seen[:118]) and not any(seen[121:134]) and all(seen[136:148]) and not any(seen[151:])
 
 
 def test_cpython_has_no_machine_code():

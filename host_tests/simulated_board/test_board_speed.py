@@ -89,10 +89,6 @@ def drive(config, fit, until_s, port="rp2"):
     return got, faults
 
 
-def rising(t_s):
-    return 2.0 * t_s
-
-
 def constant(t_s):
     return 15.0
 
@@ -199,16 +195,6 @@ def test_a_receiver_whose_clock_jumps_is_late_for_seconds_only():
                     assert 0 <= gps.age_ms <= 40, (jump, i, gps.age_ms)
 
 
-def test_gps_on_its_pins_at_1_and_10_hz():
-    for hz, baud in ((1, 9600), (10, 38400)):
-        config = {"SPEED": "gps", "GPS_BAUD": baud}
-        got, faults = drive(config, lambda b, hz=hz, baud=baud: b.fit_gps(rising, hz=hz, baud=baud), 12.0)
-        assert 10 * hz <= len(got) <= 12 * hz
-        for t_s, speed, _ in got:
-            assert abs(speed - rising(t_s - 0.3)) < 0.4
-        assert set(faults.values()) == {None}
-
-
 def gps_faults(kind, from_s, until_s):
     faults = [[kind, from_s, until_s]]
     return drive({"SPEED": "gps"}, lambda b: b.fit_gps(constant, faults=faults), 30.0)
@@ -264,7 +250,7 @@ def test_a_contact_that_bounces_is_counted_once():
 
 def test_a_storm_of_pulses_is_named_and_the_speed_returns():
     """Twice as long as the pause, so that the interrupt is tried in the middle of it."""
-    for port, pulses_per_s in (("rp2", 5_000), ("rp2", 50_000), ("esp32", 6_000), ("esp32", 50_000)):
+    for port, pulses_per_s in (("rp2", 50_000), ("esp32", 6_000)):
 
         def fit(board, pulses_per_s=pulses_per_s):
             board.fit_wheel(constant)
@@ -319,15 +305,15 @@ def test_a_wheel_that_is_too_quick_for_an_esp32_is_named_and_gives_no_speed():
     """A part of its pulses is lost, which would read as a speed that is too low."""
 
     def speed_of(t_s):
-        return 20.0 if 8.0 < t_s < 14.0 else 5.0
+        return 20.0 if 4.0 < t_s < 7.0 else 5.0
 
     for pulses in (20, 100):
         config = {"SPEED": "wheel", "PULSES_PER_METRE": pulses}
-        got, faults = drive(config, lambda b, p=pulses: b.fit_wheel(speed_of, pulses_per_metre=p), 20.0, "esp32")
-        assert faults[12] == ("Wheel: too quick", "fewer pulses/m"), pulses
-        assert not [1 for t_s, _, _ in got if 8.4 < t_s < 14.0]
-        slow = [speed for t_s, speed, _ in got if 1.0 < t_s < 8.0 or t_s > 15.0]
-        assert (len(slow) > 50 and faults[6] is faults[18] is None) == (pulses < 60)
+        got, faults = drive(config, lambda b, p=pulses: b.fit_wheel(speed_of, pulses_per_metre=p), 12.0, "esp32")
+        assert faults[6] == ("Wheel: too quick", "fewer pulses/m"), pulses
+        assert not [1 for t_s, _, _ in got if 4.4 < t_s < 7.0]
+        slow = [speed for t_s, speed, _ in got if 1.0 < t_s < 4.0 or t_s > 8.0]
+        assert (len(slow) > 50 and faults[3] is faults[10] is None) == (pulses < 60)
         assert all(abs(speed - 5.0) < 0.7 for speed in slow)
 
 

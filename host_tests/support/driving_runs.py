@@ -62,13 +62,13 @@ def mounted(m, vector):
 
 
 class SpeedSource:
-    """A GPS that gives a speed every_s, late_s late, times scale, plus add (m/s), rounded to multiples of step (m/s),
-    always the same from stuck_from_s on, and none within silent (from, to; s)."""
+    """A GPS that gives a speed every_s, late_s late, times scale, rounded to multiples of step (m/s), always the same
+    from stuck_from_s on, and none within silent (from, to; s)."""
 
-    def __init__(self, every_s=0.5, late_s=0.0, scale=1.0, step=0.0, stuck_from_s=1e9, silent=(1e9, 1e9), add=0.0):
+    def __init__(self, every_s=0.5, late_s=0.0, scale=1.0, step=0.0, stuck_from_s=1e9, silent=(1e9, 1e9)):
         self.every = round(every_s * RATE_HZ)
         self.late = round(late_s * RATE_HZ)
-        self.scale, self.step, self.add = scale, step, add
+        self.scale, self.step = scale, step
         self.stuck_from, self.silent = stuck_from_s * RATE_HZ, [s * RATE_HZ for s in silent]
         self.past = []
         self.count = 0
@@ -83,7 +83,7 @@ class SpeedSource:
         if (self.count - 1) % self.every or self.silent[0] < self.count <= self.silent[1]:
             return None
         if self.count < self.stuck_from:
-            self.last = self.past[0] * self.scale + self.add
+            self.last = self.past[0] * self.scale
             if self.step:
                 self.last = round(self.last / self.step) * self.step
         return self.last
