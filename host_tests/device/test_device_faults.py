@@ -157,7 +157,7 @@ def test_a_fifo_out_of_step_is_noticed(byte, aligned, monkeypatch):
     install = simulator.Board.install
 
     def with_stray_bytes(board):
-        board.at(FAULT_S, lambda: [board.sensor.fifo.push(0x55) for _ in range(byte)])
+        board.at(FAULT_S, lambda: board.sensor.fifo.push(b"\x55" * byte))
         install(board)
 
     monkeypatch.setattr(simulator.Board, "install", with_stray_bytes)

@@ -1,7 +1,7 @@
 """The MPU6050's FIFO. Also run under MicroPython."""
 
 from board_access import read, write
-from kickstand_tools.simulated_board.fifo import Fifo
+from kickstand_tools.simulated_board.mpu6050 import Fifo
 from test_board_sensor import awake
 
 FRAME = 12
@@ -90,21 +90,10 @@ def test_fifo_reset_acts_only_while_disabled():
     assert waiting(chip) == 0
 
 
-def test_many_bytes_at_once_are_the_same_as_one_by_one():
-    values, places = bytes(range(100, 228)), (3, 4, 5, 60, 61, 7, 127)
-    for keep_old in (False, True):
-        quick, slow = Fifo(40), Fifo(40)
-        for step in range(200):
-            if step * 7 % 11 < 6:
-                full = False
-                for place in places[: step % 8]:
-                    full = slow.push(values[place], keep_old) or full
-                assert quick.push_all(values, places[: step % 8], keep_old) == full
-            else:
-                got = bytearray(step % 9)
-                quick.pop_into(got)
-                assert got == bytes([slow.pop() for _ in range(step % 9)])
-            assert quick.count == slow.count
-        got = bytearray(45)
-        quick.pop_into(got)  # more than there is: the last one is repeated
-        assert got == bytes([slow.pop() for _ in range(45)])
+def test_a_full_fifo_loses_the_oldest_bytes_or_the_new_ones():
+    for keep_old, kept in ((False, b"cdef"), (True, b"abcd")):
+        fifo = Fifo(4)
+        assert not fifo.push(b"abc", keep_old)
+        assert fifo.push(b"def", keep_old)
+        assert fifo.count == 4
+        assert fifo.pop() + fifo.pop(5) == kept + 2 * kept[-1:], "the last one is repeated"

@@ -14,6 +14,7 @@ import sys
 import time
 
 from kickstand_tools.demo.hand_bike import HandBike
+from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.oled import Oled
 from kickstand_tools.simulated_board.simulator import Board, PowerOff
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, brake, kickstand, straight, turn, upright, wait
@@ -100,7 +101,7 @@ class Demo:
             self.bike = Ride(SCRIPT)
             self.of_s = self.seconds = self.bike.seconds
         sensor = Sensor(seed=PART_SEED, share=PART_SHARE)
-        self.board = Board(sensor.world(self.bike.motion), pace=speed, display=display)
+        self.board = Board(sensor.world(self.bike.motion), clock=Clock(speed), display=display)
         self.board.volts[26] = BATTERY_V
         self._pixels, self._seen = "", -1  # of an OLED, and its count of changes then
         if not by_hand:

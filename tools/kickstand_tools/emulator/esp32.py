@@ -11,15 +11,14 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ..deploy import bytecode
 from ..simulated_board.clock import Clock, to_us
 from ..simulated_board.i2c import Bus
+from ..simulated_board.simulator import Board
 from . import esp32_library, flash_image
-from .board import EmulatedBoard
 from .device import LEVEL, Device
 from .esp32_machine import (
     COMMAND,
@@ -64,7 +63,7 @@ class Esp32(Device):
     ) -> None:
         self._folder = esp32_library.find()
         self.clock = Clock()
-        super().__init__(EmulatedBoard(self.clock, world or (lambda t_s: LEVEL), port="esp32", **fitted))
+        super().__init__(Board(world or (lambda t_s: LEVEL), port="esp32", clock=self.clock, **fitted))
         self._directory = tempfile.TemporaryDirectory(dir=_MEMORY if _MEMORY.is_dir() else None)
         self._flash = Path(self._directory.name, "flash")
         self._process: subprocess.Popen | None = None
@@ -76,7 +75,6 @@ class Esp32(Device):
         self._booted = self._reads = False  # its ROM has begun; its console is read
         self._sends = [False] * len(self.board.buses)  # by bus: is the device to send?
         self._levels = {self.board.button_pin: 1}
-        self.board.button.changed = lambda closed: self._set_pin(self.board.button_pin, 0 if closed else 1)
         for number, bus in enumerate(self.board.buses):
             self._have_wires(number, bus)
         image = (self._folder / esp32_library.IMAGE).read_bytes()
@@ -233,11 +231,6 @@ class Esp32(Device):
 
     # Parts that can be added
 
-    def fit_wheel(self, speed: Callable[[float], float], **kind: Any) -> None:
-        """Connect a wheel contact, as simulator.Board.fit_wheel() does."""
-        self.board.fit_wheel(speed, **kind)
-        self.board.watch_pin(self.board.wheel_pin, partial(self._set_pin, self.board.wheel_pin))
-
     def fit_gps(self, speed: Callable[[float], float], **kind: Any) -> None:
         """Connect a GPS receiver, as simulator.Board.fit_gps() does."""
         self.board.fit_gps(speed, **kind)
@@ -249,10 +242,10 @@ class Esp32(Device):
             self._command(UART, _GPS, len(data))
             self._link.sendall(bytes(data))
 
-    def _set_pin(self, pin: int, level: int) -> None:
-        self._levels[pin] = level
+    def _set_pin(self, number: int, level: int) -> None:
+        self._levels[number] = level
         if self.powered:
-            self._command(PIN, pin, level)
+            self._command(PIN, number, level)
 
     def _have_wires(self, number: int, bus: Any) -> None:
         """Whether a device holds SDA is known where the wires are."""
