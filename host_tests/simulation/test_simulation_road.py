@@ -5,7 +5,7 @@ import pytest
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.simulation.physics import road
 from kickstand_tools.simulation.physics.bike import Bike
-from kickstand_tools.simulation.physics.engine import Engine
+from kickstand_tools.simulation.physics.engine import crank_rpm, vibration
 
 RATE = 1000.0
 
@@ -68,7 +68,7 @@ def test_the_front_wheel_meets_a_bump_first():
 def test_vibration_has_its_size_and_stops_with_the_engine():
     speed = np.full(20000, 6000.0 / 135.0)
     running = np.repeat([1.0, 0.0], 10000)
-    force, rates = Engine(rms_g=0.2, shift_rpm=6500.0).vibration(np.random.default_rng(2), speed, running, RATE)
+    force, rates = vibration(np.random.default_rng(2), speed, running, 0.2, 6500.0, RATE)
     assert force[:10000].std(axis=0) / STANDARD_GRAVITY == pytest.approx([0.2] * 3, rel=0.15)
     assert not force[10000:].any()
     assert not rates[10000:].any()
@@ -88,13 +88,13 @@ def test_vibration_has_its_size_and_stops_with_the_engine():
     ],
 )
 def test_the_lowest_gear_that_keeps_the_engine_under_where_it_is_shifted_up(mps, rpm):
-    assert Engine().rpm(np.full(2000, mps), RATE)[1000] == pytest.approx(rpm)
+    assert crank_rpm(np.full(2000, mps), 5000.0, RATE)[1000] == pytest.approx(rpm)
 
 
 def test_it_shakes_at_half_once_and_twice_the_crankshafts_speed():
     """A four-stroke engine fires every other turn; 3900 /min are 65 Hz."""
     n = 20000
-    force, rates = Engine().vibration(np.random.default_rng(2), np.full(n, 15.0), np.ones(n), RATE)
+    force, rates = vibration(np.random.default_rng(2), np.full(n, 15.0), np.ones(n), 0.1, 5000.0, RATE)
     for shaken in np.column_stack((force, rates)).T:
         power = np.abs(np.fft.rfft(shaken)) ** 2
         waves = np.fft.rfftfreq(n, 1.0 / RATE)
@@ -106,7 +106,7 @@ def test_it_shakes_at_half_once_and_twice_the_crankshafts_speed():
 
 def test_it_shakes_with_the_square_of_its_speed_up_to_half_a_g():
     def size(mps: float, rms_g: float) -> float:
-        force, _ = Engine(rms_g).vibration(np.random.default_rng(2), np.full(4000, mps), np.ones(4000), RATE)
+        force, _ = vibration(np.random.default_rng(2), np.full(4000, mps), np.ones(4000), rms_g, 5000.0, RATE)
         return float(np.sqrt(np.mean(force**2)) / STANDARD_GRAVITY)
 
     full = 6000.0 / 135.0

@@ -86,6 +86,21 @@ class Commands:
         return self._waiting.pop(0) if self._waiting else None
 
 
+def seen(board, bike, of_s=None):
+    """What score.State has, but for an OLED's pixels."""
+    t_s = board.clock.now_us / 1e6
+    lean_deg, speed_mps, _, phase = bike.truth(t_s)
+    return {
+        "t_s": round(t_s, 3),
+        "of_s": of_s,
+        "lcd": board.lcd.text(),
+        "lean_deg": round(lean_deg, 2),
+        "speed_mps": round(speed_mps, 2),
+        "phase": phase,
+        "pressed": board.button.closed,
+    }
+
+
 class Demo:
     """Bike and board, and the communication with the process that draws."""
 
@@ -126,17 +141,7 @@ class Demo:
         self._say({"ended": ended})
 
     def _tick(self):
-        t_s = self.board.clock.now_us / 1e6
-        lean_deg, speed_mps, _, phase = self.bike.truth(t_s)
-        state = {
-            "t_s": round(t_s, 3),
-            "of_s": self.of_s,
-            "lcd": self.board.lcd.text(),
-            "lean_deg": round(lean_deg, 2),
-            "speed_mps": round(speed_mps, 2),
-            "phase": phase,
-            "pressed": self.board.button.closed,
-        }
+        state = seen(self.board, self.bike, self.of_s)
         if isinstance(self.board.lcd, Oled):
             state["pixels"] = self._drawn(self.board.lcd)
         self._say(state)
