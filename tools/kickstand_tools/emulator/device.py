@@ -28,12 +28,14 @@ class Device(ABC):
     Made with world: as for simulator.Board, level and at rest if None.  files: what its flash holds, see
     flash_image.py.  fitted: other arguments of Board.
 
-    NAME: of the board.  FLASH: where its file system is.  MPY: the bytecode it takes, see bytecode.py.
+    NAME: of the board.  FLASH: where its file system is.  MPY: the bytecode it takes, see bytecode.py.  SINK: code for
+    the board, a class Sink whose write() gives bytes to what listens here.
     """
 
     NAME: str
     FLASH: FileSystem
     MPY: int
+    SINK: str
 
     def __init__(self, board: Board) -> None:
         self.board = board
@@ -142,6 +144,10 @@ class Device(ABC):
         return self.FLASH.read(self.file_system)
 
     # The console
+
+    @abstractmethod
+    def listen(self, sink: Callable[[bytes], Any]) -> None:
+        """Call sink() with what Sink.write() on the board is given."""
 
     @abstractmethod
     def send(self, data: bytes) -> None:

@@ -46,6 +46,7 @@ _BOOT_S = 5.0
 _CHUNK = 64  # bytes that are sent to the console at once: half of what the chip's FIFO takes
 _CHUNK_US = 10 * _CHUNK * 1_000_000 // 115_200
 _CONSOLE, _GPS = 0, 2  # UARTs
+_WRITES, _WRITTEN = b"\x01", b"\x02"  # around what Sink.write() prints
 _MEMORY = Path("/dev/shm")
 
 
@@ -57,6 +58,16 @@ class Esp32(Device):
     """See Device."""
 
     NAME, FLASH, MPY = "ESP32", flash_image.ESP32, bytecode.ESP32
+    # Over the console, because registers cannot be added to it as host_link.py does
+    SINK = """
+from binascii import hexlify
+class Sink:
+    def write(self, data):
+        print("\\x01", end="")
+        for i in range(0, len(data), 64):
+            print(hexlify(data[i : i + 64]).decode(), end="")
+        print("\\x02", end="")
+"""
 
     def __init__(
         self, world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any
@@ -200,6 +211,17 @@ class Esp32(Device):
         self._link.recv(1)
 
     # The console
+
+    def listen(self, sink: Callable[[bytes], Any]) -> None:
+        text = bytearray()
+
+        def hear(data: bytes) -> None:
+            text.extend(data)
+            while _WRITTEN in text:
+                written, _, text[:] = bytes(text).partition(_WRITTEN)
+                sink(bytes.fromhex(written.rpartition(_WRITES)[2].decode()))
+
+        self.heard = hear
 
     def send(self, data: bytes) -> None:
         """Send data to the board's console at 115200 baud."""

@@ -13,13 +13,14 @@ from .chip import Chip, EmulatedClock
 from .console import QuietConsole
 from .device import LEVEL, Device
 from .flash_memory import PowerCut
+from .host_link import GUEST, HostLink
 from .i2c_wires import Wires
 
 
 class Pico(Device):
     """See Device."""
 
-    NAME, FLASH, MPY = "Pico", flash_image.PICO, bytecode.PICO
+    NAME, FLASH, MPY, SINK = "Pico", flash_image.PICO, bytecode.PICO, GUEST
 
     def __init__(
         self, world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any
@@ -104,6 +105,9 @@ class Pico(Device):
         self.chip.rp2040.flash[self.FLASH.start : self.FLASH.start + self.FLASH.size] = system
 
     # The console
+
+    def listen(self, sink: Callable[[bytes], Any]) -> None:
+        HostLink(self.chip, b"", sink)
 
     def send(self, data: bytes) -> None:
         """Send data to the board's console as fast as it takes them."""
