@@ -100,8 +100,7 @@ class Board:
 
     def uninstall(self):
         """Undo install()."""
-        self.faults.restore_files()
-        self.faults.restore_print()
+        self.faults.restore("open", "print")
         self._fakes.uninstall()
 
     def __enter__(self):
