@@ -11,6 +11,7 @@ from kickstand.rides import flash_ring
 from kickstand_tools.deploy import bytecode, firmware_files, flash, update
 from kickstand_tools.deploy.board_files import BoardFiles, fingerprint, survey
 from kickstand_tools.deploy.update import needed_blocks, plan, refuse_without_room
+from kickstand_tools.errors import InputError
 from littlefs_board import BLOCK, PORTS, LittlefsBoard
 
 # The modules of version 0.2.0, all in one folder.
@@ -200,7 +201,7 @@ def test_a_board_full_of_rides_has_room_for_an_update(which):
 def test_sources_in_place_of_compiled_firmware_may_have_to_wait_for_the_rides():
     """They take twice the room, and are for computers without mpy-cross: the message says what to do."""
     board = on_board(before("nested .mpy"), flash_ring.RESERVE // BLOCK)
-    with pytest.raises(update.NoRoom, match="kickstand pull --delete, then flash again"):
+    with pytest.raises(InputError, match="kickstand pull --delete, then flash again"):
         refuse_without_room(plan(wanted(".py"), board, True), board)
 
 

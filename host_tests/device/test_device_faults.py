@@ -154,7 +154,7 @@ def test_a_fifo_out_of_step_is_noticed(aligned, monkeypatch):
     install = simulator.Board.install
 
     def with_stray_bytes(board):
-        board.at(FAULT_S, lambda: [board.sensor.fifo.push(0x55) for _ in range(5)])
+        board.at(FAULT_S, lambda: board.sensor.fifo.push(b"\x55" * 5))
         install(board)
 
     monkeypatch.setattr(simulator.Board, "install", with_stray_bytes)

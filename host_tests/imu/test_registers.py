@@ -5,7 +5,7 @@ The values are those of the register map, RM-MPU-6000A rev 4.2, and of the other
 
 import pytest
 from kickstand.lean import lean_filter
-from kickstand_tools.simulated_board.mpu6050_registers import DLPF_DELAY_US, VARIANTS
+from kickstand_tools.simulated_board.mpu6050 import DLPF_DELAY_US, VARIANTS
 from kickstand_tools.simulated_board.simulator import Board
 
 SMPLRT_DIV, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, ACCEL_CONFIG2, FIFO_EN = 0x19, 0x1A, 0x1B, 0x1C, 0x1D, 0x23

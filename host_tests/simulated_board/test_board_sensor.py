@@ -2,8 +2,7 @@
 
 from board_access import counts, level, read, write
 from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.mpu6050 import Mpu6050
-from kickstand_tools.simulated_board.mpu6050_registers import START_UP_US, WAKE_US
+from kickstand_tools.simulated_board.mpu6050 import START_UP_US, WAKE_US, Mpu6050
 
 
 def ramp(t_s):

@@ -58,15 +58,13 @@ def snapshot(directory: Path) -> dict[str, bytes]:
     return {str(p): p.read_bytes() for p in directory.rglob("*") if p.is_file()}
 
 
-def still(
-    path: Path, force, bias=(0.0, 0.0, 0.0), seconds: float = 3.0, rate_hz: int = 100, noise: float = 1.0, seed=0
-) -> Path:
+def still(path: Path, force, bias=(0.0, 0.0, 0.0), seconds: float = 3.0, seed=0) -> Path:
     """Write a log of a sensor at rest that reads force (3, g) and bias (3, deg/s) with an MPU6050's noise."""
     rng = np.random.default_rng(seed)
-    n = round(seconds * rate_hz)
-    accel = np.asarray(force) + noise * rng.normal(scale=0.003, size=(n, 3))
-    gyro = np.asarray(bias) + noise * rng.normal(scale=0.04, size=(n, 3))
-    return write(path, np.column_stack((np.arange(n) / rate_hz, accel, gyro)))
+    n = round(seconds * 100)
+    accel = np.asarray(force) + rng.normal(scale=0.003, size=(n, 3))
+    gyro = np.asarray(bias) + rng.normal(scale=0.04, size=(n, 3))
+    return write(path, np.column_stack((np.arange(n) / 100, accel, gyro)))
 
 
 def write(path: Path, rows) -> Path:

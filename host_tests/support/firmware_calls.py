@@ -27,8 +27,8 @@ def matrix_of(values):
     return m
 
 
-def _into(size, function, *arguments):
-    out = rotation.matrix() if size == 9 else rotation.vector()
+def _vector(function, *arguments):
+    out = rotation.vector()
     function(out, *arguments)
     return list(out)
 
@@ -114,8 +114,8 @@ CALLS = {
     "drive": driving_runs.drive,
     "parts": driving_runs.parts,
     "regression": driving_runs.regression,
-    "cross": lambda a, b: _into(3, rotation.cross, a, b),
-    "rotate": lambda m, a: _into(3, rotation.rotate, matrix_of(m), a),
+    "cross": lambda a, b: _vector(rotation.cross, a, b),
+    "rotate": lambda m, a: _vector(rotation.rotate, matrix_of(m), a),
     "angle": rotation.angle_deg,
     "is_rotation": rotation.is_rotation,
     "two_position": align_two_position,

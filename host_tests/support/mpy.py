@@ -29,7 +29,6 @@ def run_tests(module: Path, heap: str = "64M") -> None:
 def run_mpy(
     script: str | Path,
     *args: str,
-    timeout_s: float = 300,
     heap: str = "64M",
     stdin: str = "",
     directory: Path | None = None,
@@ -53,7 +52,7 @@ def run_mpy(
             input=stdin,
             capture_output=True,
             text=True,
-            timeout=timeout_s,
+            timeout=300,
         )
     said = done.stdout + done.stderr
     # The package's main() does not pass every exit status on. What takes data answers with JSON at its end, and a

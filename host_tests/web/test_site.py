@@ -15,12 +15,12 @@ from pathlib import Path
 import pytest
 from command import refused, works
 from kickstand_tools.deploy.firmware_files import firmware_files
-from kickstand_tools.web import install_archive, npm_packages, serve, site
+from kickstand_tools.web import archives, npm_packages, serve, site
 from kickstand_workshop.bench import pages
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = [path.lstrip("/") for path in firmware_files()]
-ARCHITECTURES = install_archive.ARCHITECTURES
+ARCHITECTURES = archives.ARCHITECTURES
 OURS = (".html", ".mjs", ".js", ".css", ".webmanifest")
 
 
@@ -136,7 +136,7 @@ def test_each_board_gets_its_own_machine_code(files):
     assert {f"kickstand/{name[:-3]}py" for name in made[first]} == {name for name in FIRMWARE if "/" in name}
     viper = {name for name in made[first] if name.endswith("_viper.mpy")}
     assert len(viper) == 3 and all(made[other] == viper for other in others)
-    assert install_archive.archive() == files["install.zip"]
+    assert archives.install_archive() == files["install.zip"]
 
 
 def test_every_file_has_its_type(files):

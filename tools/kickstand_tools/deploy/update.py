@@ -18,10 +18,6 @@ SPARE_BLOCKS = 4  # a folder may outgrow its two, and littlefs writes a new bloc
 _POINTER = 4
 
 
-class NoRoom(InputError):
-    """An update does not fit, even after removing everything that it replaces."""
-
-
 def most_blocks(size: int, block: int) -> int:
     """Most flash blocks that a file of this many bytes may take."""
     count = 1
@@ -95,7 +91,7 @@ def needed_blocks(update: Update, board: BoardFiles) -> int:
 
 
 def refuse_without_room(update: Update, board: BoardFiles) -> None:
-    """Raise NoRoom for an update that would fill the flash."""
+    """Raise InputError for an update that would fill the flash."""
     blocks = needed_blocks(update, board)
     if blocks <= board.free_blocks:
         return
@@ -103,7 +99,7 @@ def refuse_without_room(update: Update, board: BoardFiles) -> None:
     if board.has_rides and f"{PACKAGE}/rides" in board.folders:  # firmware up to 0.4 has to be updated before that
         remedy = "pull the rides with kickstand pull --delete, then flash again"
     needed_kb, free_kb = (count * board.block // 1000 for count in (blocks, board.free_blocks))
-    raise NoRoom(f"not enough room on the board: {needed_kb} kB needed, {free_kb} kB free: {remedy}")
+    raise InputError(f"not enough room on the board: {needed_kb} kB needed, {free_kb} kB free: {remedy}")
 
 
 def _is_module(path: str) -> bool:

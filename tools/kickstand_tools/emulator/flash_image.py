@@ -78,8 +78,8 @@ def firmware(compiled: bool = False, mpy: int = bytecode.PICO) -> dict[str, byte
     return firmware_files.contents(mpy if compiled else None)
 
 
-def stored(calibration: Calibration, who_am_i: int = 0x68, accel_range_g: int = 8) -> dict[str, bytes]:
-    """The files in which a board keeps this calibration."""
+def stored(calibration: Calibration, who_am_i: int = 0x68) -> dict[str, bytes]:
+    """The files in which a board with this sensor, in its range of 8 g, keeps this calibration."""
     with tempfile.TemporaryDirectory() as directory:
-        Store(who_am_i, accel_range_g, directory).save(calibration)
+        Store(who_am_i, 8, directory).save(calibration)
         return {path.name: path.read_bytes() for path in Path(directory).iterdir()}

@@ -7,30 +7,29 @@ from rp2040py.gpio_pin import GPIOPinState
 
 from ..deploy import bytecode
 from ..simulated_board.i2c import Bus
+from ..simulated_board.simulator import Board
 from . import flash_image, image
-from .board import EmulatedBoard, EmulatedClock
-from .chip import Chip
+from .chip import Chip, EmulatedClock
 from .console import QuietConsole
 from .device import LEVEL, Device
 from .flash_memory import PowerCut
+from .host_link import GUEST, HostLink
 from .i2c_wires import Wires
 
 
 class Pico(Device):
     """See Device."""
 
-    NAME, FLASH, MPY = "Pico", flash_image.PICO, bytecode.PICO
+    NAME, FLASH, MPY, SINK = "Pico", flash_image.PICO, bytecode.PICO, GUEST
 
     def __init__(
         self, world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any
     ) -> None:
         self.chip = Chip(image.find())
-        super().__init__(EmulatedBoard(EmulatedClock(self.chip.clock), world or (lambda t_s: LEVEL), **fitted))
+        super().__init__(Board(world or (lambda t_s: LEVEL), clock=EmulatedClock(self.chip.clock), **fitted))
         self._wires = [self._wired(bus) for bus in self.board.buses]
         for bus in self.board.buses:
             self.chip.connect(bus.sda // 2 % 2, bus)
-        self._button = self.chip.rp2040.gpio[self.board.button_pin]
-        self.board.button.changed = self._button_changed
         self.console = QuietConsole(self.chip.rp2040.usb_ctrl, self._received)
         self.chip.on_reset = self._chip_reset
         self.put_files(files or {})
@@ -94,13 +93,6 @@ class Pico(Device):
     def _transferring(self) -> bool:
         return any(bus.open for bus in self.board.buses)
 
-    # Parts that can be added
-
-    def fit_wheel(self, speed: Callable[[float], float], **kind: Any) -> None:
-        """Connect a wheel contact, as simulator.Board.fit_wheel() does."""
-        self.board.fit_wheel(speed, **kind)
-        self.board.watch_pin(self.board.wheel_pin, self._wheel_changed)
-
     # The flash
 
     @property
@@ -113,6 +105,9 @@ class Pico(Device):
         self.chip.rp2040.flash[self.FLASH.start : self.FLASH.start + self.FLASH.size] = system
 
     # The console
+
+    def listen(self, sink: Callable[[bytes], Any]) -> None:
+        HostLink(self.chip, b"", sink)
 
     def send(self, data: bytes) -> None:
         """Send data to the board's console as fast as it takes them."""
@@ -131,14 +126,8 @@ class Pico(Device):
         scl.add_listener(changed)
         return wires
 
-    def _button_changed(self, closed: bool) -> None:
-        if closed:
-            self._button.set_input_value(False)
-        else:
-            self._button.release_input()
-
-    def _wheel_changed(self, level: int) -> None:
-        pin = self.chip.rp2040.gpio[self.board.wheel_pin]
+    def _set_pin(self, number: int, level: int) -> None:
+        pin = self.chip.rp2040.gpio[number]
         if level:
             pin.release_input()
         else:

@@ -91,7 +91,7 @@ def pull(
     """Write every ride on the board to a log in the directory out, then restart the board.
 
     delete: remove from the board each ride that was copied completely.
-    pulled: called with each ride once it is done.  Raises InputError, NoFirmware, OutdatedFirmware.
+    pulled: called with each ride once it is done.  Raises InputError.
     """
     check_directory(out)
     if not out.parent.is_dir():

@@ -42,7 +42,7 @@ def record(
 
     Existing files are not overwritten: an earlier ride cannot be repeated. port: None for the only board that is
     plugged in.  begin: called with the port's name when readings are about to come.  live: called every half second.
-    Raises InputError, NoFirmware, OutdatedFirmware.
+    Raises InputError.
     """
     if not out.name.endswith((".csv", ".csv.gz")):
         raise InputError(f"{out}: give --out a name that ends in .csv or .csv.gz")

@@ -131,7 +131,7 @@ class Recording:
 
 def blocks(transport: Board, name: str, notes: list[str], stopped: threading.Event) -> Iterator[Block]:
     """Yield the whole blocks that the board sends, until `stopped` is set or the connection is lost. name: the port's.
-    notes: gets a line with the reason for the end. Raises NoFirmware, OutdatedFirmware."""
+    notes: gets a line with the reason for the end. Raises InputError."""
     parts: list[bytes] = []
     vehicle = ""
     for line in _lines(transport, name, notes, stopped):

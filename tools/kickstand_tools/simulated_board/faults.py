@@ -20,9 +20,8 @@ class Faults:
 
     def __init__(self, board):
         self._board = board
-        self._real_open = None
+        self._real = {}  # by name: the builtin functions that are replaced
         self.files_cut = 0
-        self._real_print = None
 
     # On the wires
 
@@ -114,7 +113,7 @@ class Faults:
         """Nothing can be written to a file."""
 
         full = self._writing(lambda file, path: _FailingFile(file, 0, OSError(errno.ENOSPC)))
-        self._between(at_s, for_s, lambda: self._replace_open(full), self.restore_files)
+        self._replaced("open", full, at_s, for_s)
 
     def cut_file(self, ending, length):
         """The supply is cut when `length` bytes of the next file with this ending are written. Then files_cut is 1."""
@@ -125,7 +124,7 @@ class Faults:
             self.files_cut += 1
             return _FailingFile(file, length, PowerOff())
 
-        self._replace_open(self._writing(wrap))
+        self._replace("open", self._writing(wrap))
 
     def file_error(self, ending, at_s, for_s):
         """Files whose name has this ending cannot be opened for reading."""
@@ -142,22 +141,26 @@ class Faults:
             self._board.clock.advance(to_us(erase_s))
 
         slow = self._writing(lambda file, path: _ErasedFile(file, erase))
-        self._between(at_s, for_s, lambda: self._replace_open(slow), self.restore_files)
+        self._replaced("open", slow, at_s, for_s)
 
-    def restore_files(self):
-        """End the faults of the file system."""
-        if self._real_open is not None:
-            builtins.open = self._real_open
-            self._real_open = None
+    def restore(self, *names):
+        """End the faults that replace these builtin functions: open, the file system's; print, USB's."""
+        for name in names:
+            if name in self._real:
+                setattr(builtins, name, self._real.pop(name))
 
-    def _replace_open(self, opened):
-        """Open files by opened(the real open(), its arguments) from now on."""
-        self.restore_files()
-        self._real_open = real = builtins.open
-        builtins.open = lambda *arguments, **named: opened(real, *arguments, **named)
+    def _replace(self, name, function):
+        """From now on function(the real one, its arguments) is called in its place."""
+        self.restore(name)
+        self._real[name] = real = getattr(builtins, name)
+        setattr(builtins, name, lambda *arguments, **named: function(real, *arguments, **named))
+
+    def _replaced(self, name, function, at_s, for_s):
+        """_replace() it for for_s."""
+        self._between(at_s, for_s, lambda: self._replace(name, function), lambda: self.restore(name))
 
     def _writing(self, wrap):
-        """For _replace_open(): files opened for writing become wrap(file, path)."""
+        """For _replace("open"): files opened for writing become wrap(file, path)."""
 
         def opened(real, path, mode="r", *more, **named):
             file = real(path, mode, *more, **named)
@@ -169,18 +172,7 @@ class Faults:
 
     def usb_asleep(self, at_s, for_s):
         """The host reads nothing: each print waits, and its text is lost."""
-
-        def begin():
-            self._real_print = builtins.print
-            builtins.print = lambda *_, **__: self._board.clock.advance(to_us(_STALL_S))
-
-        self._between(at_s, for_s, begin, self.restore_print)
-
-    def restore_print(self):
-        """End usb_asleep()."""
-        if self._real_print is not None:
-            builtins.print = self._real_print
-            self._real_print = None
+        self._replaced("print", lambda *_, **__: self._board.clock.advance(to_us(_STALL_S)), at_s, for_s)
 
     def _transfers(self, kind, address, nth, count, byte=0, mask=0):
         for bus in self._board.buses:
@@ -210,7 +202,7 @@ class Faults:
                 raise OSError(errno.EIO)
             return io.BytesIO() if "b" in mode else io.StringIO()
 
-        self._between(at_s, for_s, lambda: self._replace_open(failing), self.restore_files)
+        self._replaced("open", failing, at_s, for_s)
 
 
 class _Wrapped:

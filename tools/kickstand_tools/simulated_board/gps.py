@@ -50,12 +50,8 @@ class Gps:
         clock.every(1_000_000 // hz, self._fix)
 
     def connect(self, receive):
-        """Call receive(bytes) with the bytes that are sent from now on."""
+        """Call receive(bytes) with the bytes that are sent from now on. None: they are lost."""
         self._receive = receive
-
-    def disconnect(self):
-        """Stop calling receive(): fixes go on, and their bytes are lost."""
-        self._receive = None
 
     def _has(self, kind):
         t_s = self._clock.now_us / 1e6

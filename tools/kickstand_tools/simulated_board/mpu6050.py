@@ -1,13 +1,79 @@
-"""Register-level model of the InvenSense MPU6050 and of the chips sold under its name.
+"""Register-level model of the InvenSense MPU6050 and of the chips sold under its name: RM-MPU-6000A rev 4.2,
+PS-MPU-6000A rev 3.4; MPU-6500 RM rev 2.1; ICM-20689 and MPU-6886 data sheets.
 
-Where the documents (see mpu6050_registers.py) leave room the model is strict: a status bit appears only if INT_ENABLE
-asks for it, and what is written during start-up is lost. Of the low-pass only the delay is modelled: world() gives
-values that are filtered already. Not modelled: self-test, DMP, auxiliary I2C.
+Where these leave room the model is strict: a status bit appears only if INT_ENABLE asks for it, and what is written
+during start-up is lost. Of the low-pass only the delay is modelled: world() gives values that are filtered already. Not
+modelled: self-test, DMP, auxiliary I2C.
 """
 
-from . import mpu6050_registers as reg
+from collections import namedtuple
+
 from .clock import NEVER_US
-from .fifo import Fifo
+
+SMPLRT_DIV, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, ACCEL_CONFIG2 = 0x19, 0x1A, 0x1B, 0x1C, 0x1D
+FIFO_EN, INT_ENABLE, INT_STATUS = 0x23, 0x38, 0x3A
+ACCEL_XOUT_H, GYRO_ZOUT_L = 0x3B, 0x48
+SIGNAL_PATH_RESET, USER_CTRL, PWR_MGMT_1 = 0x68, 0x6A, 0x6B
+FIFO_COUNTH, FIFO_COUNTL, FIFO_R_W, WHO_AM_I = 0x72, 0x73, 0x74, 0x75
+READ_ONLY = (INT_STATUS, FIFO_COUNTH, FIFO_COUNTL, FIFO_R_W, WHO_AM_I)  # and the data registers
+
+RESET, SLEEP = 0x80, 0x40  # PWR_MGMT_1
+FIFO_ENABLED, FIFO_RESET, SIG_COND_RESET = 0x40, 0x04, 0x01  # USER_CTRL
+DATA_RDY, FIFO_OFLOW = 0x01, 0x10  # INT_STATUS
+
+START_UP_US = 90_000  # after power-on and reset: the sheet's worst case is 100 ms
+WAKE_US = 30_000  # from sleep to the first sample: gyro start-up time, PS 6.1
+GYRO_LSB_PER_DPS = (131.0, 65.5, 32.8, 16.4)  # by range, GYRO_CONFIG bits 4 and 3
+DLPF_DELAY_US = (980, 1900, 2800, 4800, 8300, 13400, 18600, 980)  # delay of the gyro's low-pass, by DLPF_CFG
+
+# temperature in degrees C = counts / counts_per_c + zero_c.
+# temperature_in_fifo: it goes into the FIFO with accelerometer and with gyro, whatever FIFO_EN says.
+Variant = namedtuple(
+    "Variant",
+    ("power_after_reset", "counts_per_c", "zero_c", "has_accel_config2", "fifo_bytes", "temperature_in_fifo"),
+)
+VARIANTS = {  # by WHO_AM_I, the same ones as in CHIPS of firmware/kickstand/imu/mpu6050.py
+    0x68: Variant(0x40, 340.0, 36.53, False, 1024, False),  # MPU6050
+    0x70: Variant(0x01, 333.87, 21.0, True, 512, False),  # MPU6500
+    0x71: Variant(0x01, 333.87, 21.0, True, 512, False),  # MPU9250
+    0x72: Variant(0x01, 333.87, 21.0, True, 512, False),  # MPU6500 clone
+    0x73: Variant(0x01, 333.87, 21.0, True, 512, False),  # MPU9255
+    0x74: Variant(0x01, 333.87, 21.0, True, 512, False),  # MPU6515
+    0x78: Variant(0x40, 333.87, 21.0, True, 512, False),  # MPU6500 clone
+    0x98: Variant(0x40, 326.8, 25.0, True, 512, False),  # ICM20689
+    0x19: Variant(0x40, 326.8, 25.0, True, 1024, True),  # MPU6886
+}
+
+
+class Fifo:
+    """The chip's FIFO: it does not know where frames begin. size: its capacity in bytes."""
+
+    def __init__(self, size):
+        self.size = size
+        self._last = bytes(1)
+        self.clear()
+
+    @property
+    def count(self):
+        """Number of bytes that wait to be read."""
+        return len(self._waiting)
+
+    def clear(self):
+        """Make it empty."""
+        self._waiting = b""
+
+    def push(self, data, keep_old=False):
+        """Add bytes. True if there was no room for all: then the oldest are lost, or with keep_old the new ones."""
+        waiting = self._waiting + data
+        self._waiting = waiting[: self.size] if keep_old else waiting[-self.size :]
+        return len(waiting) > self.size
+
+    def pop(self, count=1):
+        """Remove and return the oldest bytes. An empty FIFO repeats the byte read last (register map 4.31)."""
+        data, self._waiting = self._waiting[:count], self._waiting[count:]
+        if data:
+            self._last = data[-1:]
+        return data + self._last * (count - len(data))
 
 
 class Mpu6050:
@@ -26,7 +92,7 @@ class Mpu6050:
         self.clock_error = 0.0
         self._override = None
         self.who_am_i = who_am_i
-        self._variant = reg.VARIANTS.get(who_am_i, reg.VARIANTS[0x68])  # a chip unknown to the driver too
+        self._variant = VARIANTS.get(who_am_i, VARIANTS[0x68])  # a chip unknown to the driver too
         self.fifo = Fifo(self._variant.fifo_bytes)
         self._regs = bytearray(128)
         self._pointer = 0
@@ -37,31 +103,31 @@ class Mpu6050:
         """Set every register as after power-on and after a reset; writes are lost for START_UP_US."""
         regs = self._regs
         regs[:] = bytes(128)
-        regs[reg.PWR_MGMT_1] = self._variant.power_after_reset
-        regs[reg.WHO_AM_I] = self.who_am_i
+        regs[PWR_MGMT_1] = self._variant.power_after_reset
+        regs[WHO_AM_I] = self.who_am_i
         self.fifo.clear()
         self._fifo_registers = ()
         self._accel_lsb, self._gyro_lsb = 16384, 131.0
-        self._busy_us = self.clock.now_us + reg.START_UP_US
+        self._busy_us = self.clock.now_us + START_UP_US
         self._reset_us = self._busy_us
         self._period_ns = 0
         self._due_us = NEVER_US
-        if not regs[reg.PWR_MGMT_1] & reg.SLEEP:
-            self._start_sampling(self._busy_us + reg.WAKE_US)
+        if not regs[PWR_MGMT_1] & SLEEP:
+            self._start_sampling(self._busy_us + WAKE_US)
 
     def supply_dip(self, leaves="asleep"):
         """A short loss of supply. It leaves the chip "asleep" (data 0), "frozen" (asleep, the last data), awake with
         "default_ranges", or asleep and the frame "torn" that was being read: its rates are garbage."""
         self._update()
-        data = bytes(self._regs[reg.ACCEL_XOUT_H : reg.GYRO_ZOUT_L + 1])
+        data = bytes(self._regs[ACCEL_XOUT_H : GYRO_ZOUT_L + 1])
         self.power_on()
         if leaves == "frozen":
-            self._regs[reg.ACCEL_XOUT_H : reg.GYRO_ZOUT_L + 1] = data
+            self._regs[ACCEL_XOUT_H : GYRO_ZOUT_L + 1] = data
         elif leaves == "torn":
-            self.fifo.push_all(data[:8] + b"\x18" * 6, range(14))
+            self.fifo.push(data[:8] + b"\x18" * 6)
         elif leaves == "default_ranges":
             self._busy_us = self.clock.now_us
-            self._regs[reg.PWR_MGMT_1] = 0x01
+            self._regs[PWR_MGMT_1] = 0x01
             self._start_sampling(self._busy_us)
 
     def override(self, value):
@@ -89,30 +155,30 @@ class Mpu6050:
             self._expect_pointer = False
         else:
             self._write(self._pointer, value)
-            if self._pointer != reg.FIFO_R_W:
+            if self._pointer != FIFO_R_W:
                 self._pointer = (self._pointer + 1) & 0x7F
         return True
 
     def read_byte(self):
         """The content of the register that the pointer is at. The pointer then advances, except at FIFO_R_W."""
         register = self._pointer
-        if register == reg.FIFO_R_W:
-            return self.fifo.pop()
+        if register == FIFO_R_W:
+            return self.fifo.pop()[0]
         self._pointer = (register + 1) & 0x7F
         value = self._regs[register]
-        if register == reg.INT_STATUS:
-            self._regs[reg.INT_STATUS] = 0
-        elif register == reg.FIFO_COUNTH:  # reading the high byte latches both
+        if register == INT_STATUS:
+            self._regs[INT_STATUS] = 0
+        elif register == FIFO_COUNTH:  # reading the high byte latches both
             value = self.fifo.count >> 8
-            self._regs[reg.FIFO_COUNTL] = self.fifo.count & 0xFF
-        elif register == reg.PWR_MGMT_1 and self.clock.now_us < self._reset_us:
-            value |= reg.RESET
+            self._regs[FIFO_COUNTL] = self.fifo.count & 0xFF
+        elif register == PWR_MGMT_1 and self.clock.now_us < self._reset_us:
+            value |= RESET
         return value
 
     def read_into(self, buf):
         """Fill buf with what read_byte() returns, quickly."""
-        if self._pointer == reg.FIFO_R_W:
-            self.fifo.pop_into(buf)
+        if self._pointer == FIFO_R_W:
+            buf[:] = self.fifo.pop(len(buf))
             return
         for i in range(len(buf)):
             buf[i] = self.read_byte()
@@ -121,42 +187,42 @@ class Mpu6050:
 
     def _write(self, register, value):
         now = self.clock.now_us
-        if now < self._busy_us or register in reg.READ_ONLY or reg.ACCEL_XOUT_H <= register <= reg.GYRO_ZOUT_L:
+        if now < self._busy_us or register in READ_ONLY or ACCEL_XOUT_H <= register <= GYRO_ZOUT_L:
             return
-        if register == reg.ACCEL_CONFIG2 and not self._variant.has_accel_config2:
+        if register == ACCEL_CONFIG2 and not self._variant.has_accel_config2:
             return
-        if register == reg.PWR_MGMT_1 and value & reg.RESET:
+        if register == PWR_MGMT_1 and value & RESET:
             self.power_on()
             return
         old = self._regs[register]
         self._regs[register] = value
-        if register == reg.PWR_MGMT_1:
-            if value & reg.SLEEP:
+        if register == PWR_MGMT_1:
+            if value & SLEEP:
                 self._due_us = NEVER_US  # the data registers keep their content
-            elif old & reg.SLEEP:
-                self._busy_us = now + reg.WAKE_US
+            elif old & SLEEP:
+                self._busy_us = now + WAKE_US
                 self._start_sampling(self._busy_us)
-        elif register in (reg.SMPLRT_DIV, reg.CONFIG):
+        elif register in (SMPLRT_DIV, CONFIG):
             if self._due_us != NEVER_US and self._rate_ns() != self._period_ns:
                 self._start_sampling(now)
-        elif register == reg.GYRO_CONFIG:
-            self._gyro_lsb = reg.GYRO_LSB_PER_DPS[value >> 3 & 3]
-        elif register == reg.ACCEL_CONFIG:
+        elif register == GYRO_CONFIG:
+            self._gyro_lsb = GYRO_LSB_PER_DPS[value >> 3 & 3]
+        elif register == ACCEL_CONFIG:
             self._accel_lsb = 16384 >> (value >> 3 & 3)
-        elif register == reg.FIFO_EN:
+        elif register == FIFO_EN:
             self._fifo_registers = self._chosen(value)
-        elif register == reg.USER_CTRL:
-            if value & reg.FIFO_RESET and not value & reg.FIFO_ENABLED:
+        elif register == USER_CTRL:
+            if value & FIFO_RESET and not value & FIFO_ENABLED:
                 self.fifo.clear()
-            if value & reg.SIG_COND_RESET:
+            if value & SIG_COND_RESET:
                 self._fill_data(0)
-            self._regs[reg.USER_CTRL] = value & 0xF8  # the reset bits clear themselves
-        elif register == reg.SIGNAL_PATH_RESET:
+            self._regs[USER_CTRL] = value & 0xF8  # the reset bits clear themselves
+        elif register == SIGNAL_PATH_RESET:
             self._fill_data(0)
-            self._regs[reg.SIGNAL_PATH_RESET] = 0
+            self._regs[SIGNAL_PATH_RESET] = 0
 
     def _fill_data(self, value):
-        self._regs[reg.ACCEL_XOUT_H : reg.GYRO_ZOUT_L + 1] = bytes([value] * 14)
+        self._regs[ACCEL_XOUT_H : GYRO_ZOUT_L + 1] = bytes([value] * 14)
 
     def _chosen(self, enabled):
         """The data registers that FIFO_EN sends to the FIFO, in order."""
@@ -171,11 +237,11 @@ class Mpu6050:
     # Sampling
 
     def _fast(self):
-        return self._regs[reg.CONFIG] & 7 in (0, 7)  # no low-pass: the gyro runs at 8 kHz
+        return self._regs[CONFIG] & 7 in (0, 7)  # no low-pass: the gyro runs at 8 kHz
 
     def _rate_ns(self):
         base = 125_000 if self._fast() else 1_000_000
-        return int(base * (1 + self._regs[reg.SMPLRT_DIV]) / (1.0 + self.clock_error))
+        return int(base * (1 + self._regs[SMPLRT_DIV]) / (1.0 + self.clock_error))
 
     def _start_sampling(self, first_us):
         self._period_ns = self._rate_ns()
@@ -192,7 +258,7 @@ class Mpu6050:
         if now < self._due_us:
             return
         last = (now - self._first_us) * 1000 // self._period_ns
-        if self._fifo_registers and self._regs[reg.USER_CTRL] & reg.FIFO_ENABLED:
+        if self._fifo_registers and self._regs[USER_CTRL] & FIFO_ENABLED:
             # Samples that later ones would push out of the FIFO are skipped: its content ends up the same
             kept = self.fifo.size // len(self._fifo_registers) + 2
             for number in range(max(self._next, last + 1 - kept), last + 1):
@@ -208,10 +274,10 @@ class Mpu6050:
             return
         regs = self._regs
         if self._override is None:
-            self._measure(max(0, self._sample_us(number) - reg.DLPF_DELAY_US[regs[reg.CONFIG] & 7]))
+            self._measure(max(0, self._sample_us(number) - DLPF_DELAY_US[regs[CONFIG] & 7]))
         else:
             self._fill_data(self._override)
-        regs[reg.INT_STATUS] |= reg.DATA_RDY & regs[reg.INT_ENABLE]
+        regs[INT_STATUS] |= DATA_RDY & regs[INT_ENABLE]
 
     def _measure(self, t_us):
         values = force = self.world(t_us / 1e6)
@@ -235,6 +301,7 @@ class Mpu6050:
         if self._override == "freeze":
             return
         # FIFO_MODE, which the MPU6500 family has
-        keep_old = self._variant.has_accel_config2 and bool(self._regs[reg.CONFIG] & 0x40)
-        if self.fifo.push_all(self._regs, self._fifo_registers, keep_old):
-            self._regs[reg.INT_STATUS] |= reg.FIFO_OFLOW & self._regs[reg.INT_ENABLE]
+        keep_old = self._variant.has_accel_config2 and bool(self._regs[CONFIG] & 0x40)
+        frame = bytes([self._regs[register] for register in self._fifo_registers])
+        if self.fifo.push(frame, keep_old):
+            self._regs[INT_STATUS] |= FIFO_OFLOW & self._regs[INT_ENABLE]

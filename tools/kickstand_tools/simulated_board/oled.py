@@ -18,6 +18,7 @@ _OWN_ARGUMENTS = {
     "ssd1306": {0x20: 1, 0x21: 2, 0x22: 2, 0x8D: 1, 0x26: 6, 0x27: 6, 0x29: 5, 0x2A: 5, 0xA3: 2},
     "sh1106": {0xAD: 1},
 }
+_SWITCHES = {0xA0: "_flipped_columns", 0xA4: "_all_on", 0xA6: "inverted", 0xAE: "on"}  # bit 0 switches them on
 _OFF = 0x40  # bit of the status
 
 
@@ -161,14 +162,8 @@ class Oled:
             self.start_line = code & 0x3F
         elif 0xB0 <= code < 0xB8:
             self._page = code & 7
-        elif code in (0xA0, 0xA1):
-            self._flipped_columns = code == 0xA1
-        elif code in (0xA4, 0xA5):
-            self._all_on = code == 0xA5
-        elif code in (0xA6, 0xA7):
-            self.inverted = code == 0xA7
-        elif code in (0xAE, 0xAF):
-            self.on = code == 0xAF
+        elif code & 0xFE in _SWITCHES:
+            setattr(self, _SWITCHES[code & 0xFE], bool(code & 1))
         elif code in (0xC0, 0xC8):
             self._flipped_rows = code == 0xC8
         elif code == 0x81:

@@ -8,8 +8,8 @@
 Within the `with` statement `machine` is the board's, and `time` and `os` too. Import the firmware there.
 """
 
-from .button import Button
 from .clock import Clock, PowerOff, Reset, Watchdog, to_us
+from .contacts import Button, Wheel
 from .fakes import chips, fake_machine, fake_time
 from .fakes.installer import Installer
 from .faults import Faults
@@ -20,7 +20,6 @@ from .mpu6050 import Mpu6050
 from .oled import Oled
 from .radio import Radio
 from .sd_card import SdCard
-from .wheel import Wheel
 
 __all__ = ["Board", "PowerOff", "Reset"]
 
@@ -34,7 +33,8 @@ class Board:
     world(t_s): (fx, fy, fz, wx, wy, wz[, temp_c]) in g and deg/s along the chip's own axes, with the chip's errors.
     who_am_i: which chip is fitted.  display: "lcd", "ssd1306" or "sh1106".  sensor_address, lcd_address: None if it is
     not fitted; 0 for the display's usual one.
-    one_bus: the display is on the sensor's wires.  port: "rp2" or "esp32".  pace: see Clock.
+    one_bus: the display is on the sensor's wires.  port: "rp2" or "esp32".  clock: None for one of its own, which goes
+    as fast as the host can.
     machine: a name in chips.MACHINES, which gives the port. Firmware that is imported first after install() takes it
     for the board it runs on; without one the firmware runs on what it was imported for, a Pico as a rule.
     i2c_driver: of MicroPython on an ESP32, "new" or (up to 1.28) "legacy".  sensor_pins, lcd_pins: (SDA, SCL), if not
@@ -52,13 +52,13 @@ class Board:
         one_bus=False,
         port="rp2",
         seed=1,
-        pace=0.0,
         machine=None,
         i2c_driver="new",
         sensor_pins=None,
         lcd_pins=None,
         button_pin=None,
         display="lcd",
+        clock=None,
     ):
         self.poses = machine is not None
         self.machine = chips.MACHINES[machine or ("pico" if port == "rp2" else "esp32")]
@@ -69,13 +69,13 @@ class Board:
         self.volts = {}
         self.sent = b""
         self.seed = seed
-        self.clock = Clock(pace)
+        self.clock = clock or Clock()
         self.sensor = Mpu6050(self.clock, world, who_am_i, sensor_address or 0x68)
         self.lcd = self._display(display, lcd_address)
         self.button = Button(self.clock, seed)
         self.watchdog = Watchdog(self.clock)
         usual_sensor, usual_lcd, usual_button, self._gps_pin, self.wheel_pin = WIRING[port]
-        self._button_pin = usual_button if button_pin is None else button_pin
+        self.button_pin = usual_button if button_pin is None else button_pin
         self.radio = Radio(self.clock, port == "esp32") if chips.has_bluetooth(self.machine) else None
         self.gps = self.wheel = self.card = None  # a Gps, a Wheel, an SdCard, if fitted
         self.sensor_bus = Bus(self.clock, *(sensor_pins or usual_sensor))
@@ -100,8 +100,7 @@ class Board:
 
     def uninstall(self):
         """Undo install()."""
-        self.faults.restore_files()
-        self.faults.restore_print()
+        self.faults.restore("open", "print")
         self._fakes.uninstall()
 
     def __enter__(self):
@@ -117,10 +116,8 @@ class Board:
         After "off" the next run() starts everything from power-on; after "reset" only the microcontroller.
         """
         if self._off:
-            self._off = False
             self.reset_cause = fake_machine.PWRON_RESET
-            self.sensor.power_on()
-            self.lcd.power_on()
+            self.power_on()
         self.boots += 1
         self._pins = {}
         for bus in self.buses:
@@ -132,12 +129,7 @@ class Board:
             function()
             return "returned"
         except PowerOff:
-            self._off = True
-            if self.radio:
-                self.radio.off()
-            for bus in self.buses:
-                bus.power_off()
-            self.lcd.power_off()
+            self.power_off()
             return "off"
         except Reset:
             self.reset_cause = fake_machine.WDT_RESET
@@ -145,10 +137,24 @@ class Board:
         finally:
             self.clock.set_deadline(None)
             self.watchdog.stop()
-            if self.gps:
-                self.gps.disconnect()
-            if self.wheel:
-                self.wheel.disconnect()
+            for part in (self.button, self.gps, self.wheel):
+                if part:
+                    part.connect(None)
+
+    def power_on(self):
+        """The supply of everything but the processor comes up."""
+        self._off = False
+        self.sensor.power_on()
+        self.lcd.power_on()
+
+    def power_off(self):
+        """The supply of everything but the processor goes down."""
+        self._off = True
+        if self.radio:
+            self.radio.off()
+        for bus in self.buses:
+            bus.power_off()
+        self.lcd.power_off()
 
     def at(self, t_s, function):
         """Call function() when the clock reaches t_s."""
@@ -216,6 +222,8 @@ class Board:
 
     def watch_pin(self, number, edge):
         """Call edge(level) when the part that is wired to this pin changes its level. None: no more calls."""
+        if number == self.button_pin:
+            self.button.connect(edge)
         if self.wheel and number == self.wheel_pin:
             self.wheel.connect(edge)
 
@@ -252,7 +260,7 @@ class Board:
             if number == bus.scl:
                 return bus.scl_level()
         mode, pull, level, since_us = self._pins.get(number, (fake_machine.Pin.IN, -1, 0, 0))
-        if number == self._button_pin and self.button.low(since_us):
+        if number == self.button_pin and self.button.low(since_us):
             return 0
         if number == self.wheel_pin and self.wheel and self.wheel.closed:
             return 0

@@ -1,5 +1,6 @@
 """Simulates a ride and writes it as logs."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from ..output import check_directory
 from .profiles import check_profile
 from .ride import Ride, ride
 
-_LOG = ",".join((*COLUMNS, "temp_c"))
+_LOG = (*COLUMNS, "temp_c")
 _FORMATS = ["%.3f", *["%.6f"] * 6, "%.2f"]
 START = 47.6, 8.0  # degrees north and east, heading east
 START_UTC_S = 1_779_008_400.0  # 09:00 on 17 May 2026
@@ -64,7 +65,7 @@ def write_poses(directory: Path, made: Ride) -> tuple[list[Path], Path, Path]:
     seven = [directory / f"POSE_{k}.csv" for k in range(1, 8)]
     pair = directory / "KICKSTAND.csv", directory / "UPRIGHT.csv"
     for path, readings in zip([*seven, *pair], [*made.poses, made.kickstand, made.upright]):
-        _save(path, _log(np.arange(len(readings)) / made.rate_hz, readings), _LOG, _FORMATS)
+        _write(path, _LOG, _FORMATS, _log(np.arange(len(readings)) / made.rate_hz, readings))
     return seven, *pair
 
 
@@ -82,28 +83,26 @@ def _log(time: NDArray, readings: NDArray) -> NDArray:
     return np.column_stack((time, readings[:, :3], readings[:, 4:], readings[:, 3]))
 
 
-def _save(path: Path, table: NDArray, header: str, formats: list[str]) -> None:
-    np.savetxt(path, table, formats, ",", header=header, comments="")
+def _write(path: Path, names: Iterable[str], formats: list[str], table: NDArray, *texts: list[str]) -> None:
+    """A CSV file of the table's columns, and of one of each of the texts."""
+    form = ",".join(formats)
+    with path.open("w", encoding="ascii") as file:
+        print(*names, sep=",", file=file)
+        for row, *more in zip(table, *texts):
+            print(form % tuple(row), *more, sep=",", file=file)
 
 
 def write_ride(path: Path, made: Ride, speed: bool) -> None:
     """Write its log. speed: with a speed and a position once a second."""
+    log = _log(made.time, made.readings)
     if not speed:
-        _save(path, _log(made.time, made.readings), _LOG, _FORMATS)
+        _write(path, _LOG, _FORMATS, log)
         return
-    form, every = ",".join(_FORMATS), round(_TRACK_S * made.rate_hz)
-    lines = [",".join((_LOG, *TRACK))]
-    track = np.column_stack((made.truth["speed_mps"], *positions(made)))
-    for k, row in enumerate(_log(made.time, made.readings).tolist()):
-        cells = "{:.2f},{:.7f},{:.7f},{:.3f}".format(*track[k]) if k % every == 0 else ",,,"
-        lines.append(f"{form % tuple(row)},{cells}")
-    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+    track, every = np.column_stack((made.truth["speed_mps"], *positions(made))), round(_TRACK_S * made.rate_hz)
+    cells = ["{:.2f},{:.7f},{:.7f},{:.3f}".format(*row) if k % every == 0 else ",,," for k, row in enumerate(track)]
+    _write(path, (*_LOG, *TRACK), _FORMATS, log, cells)
 
 
 def _write_truth(path: Path, made: Ride) -> None:
-    names = list(made.truth)
-    form = ",".join(["%.3f", *["%.4f"] * len(names)])
-    table = np.column_stack((made.time, *made.truth.values())).tolist()
-    lines = [f"t_s,{','.join(names)},phase"]
-    lines += [f"{form % tuple(row)},{phase}" for row, phase in zip(table, made.phase.tolist())]
-    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+    table = np.column_stack((made.time, *made.truth.values()))
+    _write(path, ("t_s", *made.truth, "phase"), ["%.3f", *["%.4f"] * len(made.truth)], table, made.phase.tolist())

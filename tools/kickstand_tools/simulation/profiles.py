@@ -26,7 +26,7 @@ def street(plan: Plan) -> Conditions:
             plan.turn(-side * lean, plan.speed, seconds=0.1, roll_s=1.2)
             plan.straight(plan.uniform(2.0, 6.0))
         else:
-            _bends(plan, plan.uniform(10.0, 38.0), (11.0, 22.0), 0.35, (1.0, 2.0))
+            _bends(plan, plan.uniform(10.0, 38.0), (11.0, 22.0), 0.35)
         if plan.likely(0.7):
             plan.straight(plan.uniform(2.0, 10.0), plan.uniform(14.0, 27.0))
     plan.finish(plan.uniform(15.0, 22.0), 3.0)
@@ -127,7 +127,7 @@ def hills(plan: Plan) -> Conditions:
             plan.turn(lean, speed, heading / 2, roll_s=0.5, phase="hairpin", slope_percent=after)
             plan.out_of_turn(plan.uniform(10.0, 17.0), plan.uniform(2.0, 4.0))
         else:
-            _bends(plan, plan.uniform(12.0, 40.0), (9.0, 18.0), 0.4, (1.0, 2.0))
+            _bends(plan, plan.uniform(12.0, 40.0), (9.0, 18.0), 0.4)
         if plan.likely(0.6):
             plan.add(
                 "straight",
@@ -140,18 +140,18 @@ def hills(plan: Plan) -> Conditions:
     return Conditions(CLASS_B * plan.uniform(0.6, 2.0), plan.uniform(0.05, 0.2))
 
 
-def _bends(plan: Plan, lean_deg: float, speeds: tuple[float, float], linked: float, rolls: tuple[float, float]) -> None:
+def _bends(plan: Plan, lean_deg: float, speeds: tuple[float, float], linked: float) -> None:
     """Add a bend, and with the probability `linked` another one to the other side, and so on."""
     lean, speed = plan.side() * lean_deg, plan.uniform(*speeds)
     if plan.speed > speed + 2.0:
         plan.into_turn(lean, speed, plan.uniform(2.0, 5.0))
-    plan.turn(lean, speed, heading_deg=plan.uniform(20.0, 110.0), roll_s=plan.uniform(*rolls))
+    plan.turn(lean, speed, heading_deg=plan.uniform(20.0, 110.0), roll_s=plan.uniform(1.0, 2.0))
     while plan.likely(linked):
         lean = -lean * plan.uniform(0.7, 1.1)
         lean = max(-42.0, min(42.0, lean))
-        roll_s = plan.uniform(*rolls)
+        roll_s = plan.uniform(1.0, 2.0)
         plan.turn(lean, plan.speed * plan.uniform(0.9, 1.1), heading_deg=plan.uniform(20.0, 80.0), roll_s=roll_s)
-    plan.out_of_turn(plan.uniform(*speeds) + 2.0, plan.uniform(1.5, 3.5), roll_s=plan.uniform(*rolls))
+    plan.out_of_turn(plan.uniform(*speeds) + 2.0, plan.uniform(1.5, 3.5), roll_s=plan.uniform(1.0, 2.0))
 
 
 def banked(plan: Plan) -> Conditions:

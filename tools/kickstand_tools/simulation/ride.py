@@ -10,7 +10,7 @@ from . import poses
 from .commands import Commands, commands
 from .physics.bike import Bike, roll, weave
 from .physics.chip import DIVIDER, RATE_HZ, Chip
-from .physics.engine import Engine
+from .physics.engine import vibration
 from .physics.kinematics import Motion, body_rates, specific_force
 from .physics.mount import MOUNTS, Mount
 from .physics.road import CLASSES, Shaking, add_bumps, profile_slope, shaking
@@ -172,8 +172,7 @@ def _motion(
         command.slope + dive + shaken.pitch + command.lift,
         shaken.heave,
     )
-    engine = Engine(conditions.engine_rms_g, shift_rpm=conditions.shift_rpm)
-    force, rates = engine.vibration(chance, command.speed, command.engine, rate)
+    force, rates = vibration(chance, command.speed, command.engine, conditions.engine_rms_g, conditions.shift_rpm, rate)
     shaken.force += force + _impact(chance, command)
     shaken.rates += rates
     return motion, shaken

@@ -68,9 +68,8 @@ class Live:
 def pull(line, name, progress):
     """Fetch the rides from the board at a SerialLine. name: of its port.  progress(what, done, total): in bytes.
 
-    Returns (JSON, files): {"refused": why it ended early, or null, "rides": [{"number", "log": its name or null,
-    "seconds", "readings", "problems"}]} and [(name, content)], the logs with their calibrations as `kickstand pull`
-    writes them.
+    Returns (JSON, files): {"refused": why it ended early, or null, "rides": [a PulledRide's fields, "log" its name or
+    null]} and [(name, content)], the logs with their calibrations as `kickstand pull` writes them.
     """
     refused, rides = None, []
     with tempfile.TemporaryDirectory() as directory:
@@ -80,14 +79,5 @@ def pull(line, name, progress):
             refused = str(error)
         written = [path for ride in rides if ride.log for path in (ride.log, calibration_path(ride.log))]
         files = [(path.name, path.read_bytes()) for path in written]
-    found = [
-        {
-            "number": ride.number,
-            "log": ride.log and ride.log.name,
-            "seconds": ride.seconds,
-            "readings": ride.readings,
-            "problems": ride.problems,
-        }
-        for ride in rides
-    ]
+    found = [vars(ride) | {"log": ride.log and ride.log.name} for ride in rides]
     return json.dumps({"refused": refused, "rides": found}), files

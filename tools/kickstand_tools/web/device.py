@@ -81,9 +81,9 @@ class Device:
             if value:
                 board.faults.cut_file(".cal", CUT_AFTER_BYTES)
             else:
-                board.faults.restore_files()
+                board.faults.restore("open")
         elif value:
-            board.faults.restore_files()  # a save is cut once
+            board.faults.restore("open")  # a save is cut once
             self.powered = True
         elif self.powered:
             raise PowerOff

@@ -15,8 +15,8 @@ from .serial_guest import BrowserBoard
 
 OLDEST = (1, 23)  # MicroPython
 PLATFORMS = ("rp2", "esp32")
-ROOT = Path("/packages")  # where page/python.mjs unpacks install_archive.archive()
-COMMON = "armv6m"  # the first of install_archive.ARCHITECTURES
+ROOT = Path("/packages")  # where page/python.mjs unpacks archives.install_archive()
+COMMON = "armv6m"  # the first of archives.ARCHITECTURES
 _VERSION = "(lambda s: (tuple(s.implementation.version[:2]), s.platform))(__import__('sys'))"
 _POSE = "(lambda s: (s.platform, getattr(s.implementation, '_machine', '')))(__import__('sys'))"
 

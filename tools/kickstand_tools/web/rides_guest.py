@@ -70,9 +70,7 @@ def rides(given, names):
         Path(name).symlink_to(Path(given, name))
     found = sorted_out(names)
     rides = [
-        {"log": one.log, "isLog": found.kinds.get(one.log) == "log"}
-        | {"calibration": one.calibration, "track": one.track, "files": one.files}
-        | {"table": one.table and asked_for(one.table)}
+        vars(one) | {"isLog": found.kinds.get(one.log) == "log", "table": one.table and asked_for(one.table)}
         for one in found.rides
     ]
     refused = {name: _one_line(error.said(PAGE)) for name, error in found.refused.items()}

@@ -9,14 +9,17 @@ from typing import Any
 from .. import firmware_path
 from ..analysis.plot import page
 from ..output import check_directory, new_directory, whole_file
+from ..pictures import building, lcd, wiring
 from ..pictures.lcd_font import ROM
 from ..templates import filled, source_hash
-from . import install_archive, npm_packages, rides_archive, sample_ride, wiring_files
-from .zipped import tools
+from . import archives, npm_packages, sample_ride
 
 PAGE = Path(__file__).resolve().parent / "page"
 # Large, and only for those who have a board or a ride: fetched when they ask for it
 LATER = ("esptool/", "firmware.zip", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip", "sample/")
+_BOARDS = {"pico": wiring.PICO, "esp32": wiring.ESP32}
+_NARROW = 4  # of the seven poses stand beside each other on a phone
+_SHOWN = ("Kickstand", "starting")  # on the drawn display
 _NOT_KEPT = ("service_worker.js", "index.html")  # the browser keeps the first by itself, the second as "./"
 
 
@@ -24,7 +27,7 @@ def python_files() -> dict[str, str]:
     """{path as imported: source} of the firmware's package, and of the tools' modules that the page runs."""
     package = firmware_path.PACKAGE
     found = {path.relative_to(package.parent).as_posix(): path for path in sorted(package.rglob("*.py"))}
-    return {name: path.read_text(encoding="utf-8") for name, path in (found | tools("web/device.py")).items()}
+    return {name: path.read_text(encoding="utf-8") for name, path in (found | archives.tools("web/device.py")).items()}
 
 
 def site_files() -> dict[str, bytes]:
@@ -36,18 +39,18 @@ def site_files() -> dict[str, bytes]:
     files = npm_packages.find()
     files |= {path.relative_to(PAGE).as_posix(): path.read_bytes() for path in sorted(PAGE.rglob("*.*"))}
     files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # as a text a browser shows
-    files |= wiring_files.wiring_files()
-    values = {"home": home(), "boards": wiring_files.tables()}
+    files |= wiring_files()
+    values = {"home": home(), "boards": wiring_tables()}
     library = files["plotly/plotly.min.js"].decode()
     values["charts"] = " ".join(map(source_hash, (library, *page.SCRIPTS)))  # as a policy names them
     files |= {name: _filled(name, **values) for name in files if name.endswith(".html")}
     files |= {f"sample/{name}": data for name, data in sample_ride.sample_ride().items()}
     files["python.json"] = json.dumps(python_files()).encode()
-    files["install.zip"] = install_archive.archive()
-    files["firmware.zip"] = install_archive.firmware()
-    files["rides.zip"] = rides_archive.archive()
+    files["install.zip"] = archives.install_archive()
+    files["firmware.zip"] = archives.firmware()
+    files["rides.zip"] = archives.rides_archive()
     (package,) = (name for name in files if name.startswith("numpy/"))
-    files["numpy/numpy.zip"], files["numpy/licence.txt"] = rides_archive.numpy_archive(files.pop(package))
+    files["numpy/numpy.zip"], files["numpy/licence.txt"] = archives.numpy_archive(files.pop(package))
     files["font.json"] = json.dumps({code: list(rows) for code, rows in ROM.items()}).encode()
     files["sizes.json"] = json.dumps(
         {name: len(data) for name, data in files.items() if name.startswith(LATER)}
@@ -56,6 +59,21 @@ def site_files() -> dict[str, bytes]:
     kept = sorted(["./", *(name for name in files if name not in _NOT_KEPT and not name.startswith(LATER))])
     files["service_worker.js"] = _filled("service_worker.js", files=kept, version=version)
     return files
+
+
+def wiring_files() -> dict[str, bytes]:
+    """{name in the site: SVG}: wiring_pico.svg, wiring_esp32.svg, and what is built."""
+    display = lcd.draw([list(line.ljust(16).encode("ascii")) for line in _SHOWN], bytes(64))
+    drawn = building.drawings(display, display) | {"six_positions_narrow.svg": building.six_positions(_NARROW)}
+    return {name: svg.encode() for name, svg in drawn.items()}
+
+
+def wiring_tables() -> dict[str, tuple[str, list[tuple[str, str, str]]]]:
+    """{board: (its title, rows of part, its pin and the board's)} of what is drawn."""
+    return {
+        name: (board.title, [(part, *both) for part, pins in wiring.connections(board) for both in pins.items()])
+        for name, board in _BOARDS.items()
+    }
 
 
 def home() -> str:

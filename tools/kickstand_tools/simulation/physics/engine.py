@@ -1,7 +1,5 @@
 """Engine vibration: harmonics of the crankshaft's speed, which follows from the road speed and the gear."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
@@ -11,48 +9,43 @@ from .signals import Signal, integral, smoothed
 _RPM_PER_MPS = (370.0, 260.0, 205.0, 170.0, 150.0, 135.0)  # by gear
 _ORDERS = (0.5, 1.0, 2.0)  # a four-stroke twin's multiples of the crankshaft's speed: firing, primary, secondary
 _IDLE_SHARE = 0.25  # vibration at idle over that at _FULL_RPM
-_FULL_RPM = 6000.0
+_IDLE_RPM, _FULL_RPM = 1250.0, 6000.0
 _MAX_G = 0.5
 _BLOCK = 100_000  # rows computed at a time, to limit memory
 _DPS_PER_G = 15.0  # rates (rms) per force (rms) of the vibration
 
 
-@dataclass(frozen=True)
-class Engine:
-    """rms_g: vibration along each axis at 6000/min, before the chip's filter. shift_rpm: speed at which the rider
-    changes up."""
+def crank_rpm(speed: Signal, shift_rpm: float, rate_hz: float) -> Signal:
+    """Speed of the crankshaft in the lowest gear that keeps it under shift_rpm. Below idle the clutch slips."""
+    rpm = speed * _RPM_PER_MPS[-1]
+    for ratio in reversed(_RPM_PER_MPS[:-1]):
+        rpm = np.where(speed * ratio < shift_rpm, speed * ratio, rpm)
+    return smoothed(np.maximum(rpm, _IDLE_RPM), 0.15, rate_hz)
 
-    rms_g: float = 0.1
-    idle_rpm: float = 1250.0
-    shift_rpm: float = 5000.0
 
-    def rpm(self, speed: Signal, rate_hz: float) -> Signal:
-        """Speed of the crankshaft in the lowest gear that keeps it under shift_rpm. Below idle the clutch slips."""
-        rpm = speed * _RPM_PER_MPS[-1]
-        for ratio in reversed(_RPM_PER_MPS[:-1]):
-            rpm = np.where(speed * ratio < self.shift_rpm, speed * ratio, rpm)
-        return smoothed(np.maximum(rpm, self.idle_rpm), 0.15, rate_hz)
+def vibration(
+    chance: np.random.Generator, speed: Signal, running: Signal, rms_g: float, shift_rpm: float, rate_hz: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The vibration: specific force (n, 3) in m/s2 and rates (n, 3) in rad/s along left, up, forward.
 
-    def vibration(
-        self, chance: np.random.Generator, speed: Signal, running: Signal, rate_hz: float
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The vibration: specific force (n, 3) in m/s2 and rates (n, 3) in rad/s along left, up, forward."""
-        rpm = self.rpm(speed, rate_hz)
-        turns = integral(rpm / 60.0, rate_hz)
-        growth = _IDLE_SHARE + (1.0 - _IDLE_SHARE) * (rpm / _FULL_RPM) ** 2
-        size = np.minimum(self.rms_g * growth, _MAX_G) * running
-        weights = chance.dirichlet(np.full(len(_ORDERS), 2.0), size=6) ** 0.5
-        phases = chance.uniform(0.0, 2.0 * np.pi, size=(6, len(_ORDERS)))
-        shaken = np.zeros((len(speed), 6))
-        for start in range(0, len(speed), _BLOCK):
-            part = slice(start, start + _BLOCK)
-            for k, order in enumerate(_ORDERS):
-                angle = 2.0 * np.pi * order * turns[part]
-                sine, cosine = np.sin(angle), np.cos(angle)
-                for axis in range(6):
-                    phase = phases[axis, k]
-                    shaken[part, axis] += weights[axis, k] * (sine * np.cos(phase) + cosine * np.sin(phase))
-        shaken *= np.sqrt(2.0) * size[:, None]
-        shaken[:, :3] *= STANDARD_GRAVITY
-        shaken[:, 3:] *= np.radians(_DPS_PER_G)
-        return shaken[:, :3], shaken[:, 3:]
+    rms_g: along each axis at 6000/min, before the chip's filter. shift_rpm: speed at which the rider changes up.
+    """
+    rpm = crank_rpm(speed, shift_rpm, rate_hz)
+    turns = integral(rpm / 60.0, rate_hz)
+    growth = _IDLE_SHARE + (1.0 - _IDLE_SHARE) * (rpm / _FULL_RPM) ** 2
+    size = np.minimum(rms_g * growth, _MAX_G) * running
+    weights = chance.dirichlet(np.full(len(_ORDERS), 2.0), size=6) ** 0.5
+    phases = chance.uniform(0.0, 2.0 * np.pi, size=(6, len(_ORDERS)))
+    shaken = np.zeros((len(speed), 6))
+    for start in range(0, len(speed), _BLOCK):
+        part = slice(start, start + _BLOCK)
+        for k, order in enumerate(_ORDERS):
+            angle = 2.0 * np.pi * order * turns[part]
+            sine, cosine = np.sin(angle), np.cos(angle)
+            for axis in range(6):
+                phase = phases[axis, k]
+                shaken[part, axis] += weights[axis, k] * (sine * np.cos(phase) + cosine * np.sin(phase))
+    shaken *= np.sqrt(2.0) * size[:, None]
+    shaken[:, :3] *= STANDARD_GRAVITY
+    shaken[:, 3:] *= np.radians(_DPS_PER_G)
+    return shaken[:, :3], shaken[:, 3:]

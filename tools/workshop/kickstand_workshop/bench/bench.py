@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 from kickstand.calibration.parameters import Calibration
 from kickstand_tools.deploy.bytecode import architecture, cross_compiled
-from kickstand_tools.emulator import console_link, flash_image, host_link
+from kickstand_tools.emulator import flash_image
 from kickstand_tools.emulator.emulate import CHIPS
-from kickstand_tools.emulator.pico import Pico
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, upright
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 from rich.console import Group
@@ -146,17 +145,12 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
             else:
                 arrays.append(np.frombuffer(data, np.uint16))
 
-        guest = console_link.GUEST
-        if isinstance(device, Pico):
-            host_link.HostLink(device.chip, b"", take)
-            guest = host_link.GUEST
-        else:
-            console_link.ConsoleLink(device, take)
+        device.listen(take)
         if chosen.get("SPEED") == "wheel":
             device.fit_wheel(lambda t_s: _SPEED_MPS)
-        code = f"{guest}import bench_guest\nbench_guest.run({detail}, {seconds}, Sink(), {chosen})\n"
-        said = console_link.plain(device.exec(code, limit_s=2.0 * seconds + 30.0))
-        result["figures"] = ast.literal_eval(said.strip())
+        code = f"{device.SINK}import bench_guest\nbench_guest.run({detail}, {seconds}, Sink(), {chosen})\n"
+        said = device.exec(code, limit_s=2.0 * seconds + 30.0)
+        result["figures"] = ast.literal_eval(said.rpartition("\x02")[2].strip())  # after what a Sink has printed
     turns = result["figures"]["turns"]
     result["took"] = arrays[0][:turns]
     asked_for = arrays[1][: result["figures"]["collections_by_app"]]

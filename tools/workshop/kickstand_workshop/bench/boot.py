@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from kickstand_tools import firmware_path
-from kickstand_tools.emulator import console_link, flash_image
+from kickstand_tools.emulator import flash_image
 from kickstand_tools.emulator.esp32 import Esp32
-from kickstand_tools.emulator.host_link import GUEST, HostLink
 from kickstand_tools.emulator.pico import Pico
 from rich.table import Table
 
@@ -77,12 +76,8 @@ def table(result: dict[str, Any]) -> Table:
 def _micropython_s(kind: Kind, files: dict[str, bytes]) -> float:
     """Until MicroPython runs main.py."""
     begun: list[bytes] = []
-    guest = GUEST if issubclass(kind, Pico) else console_link.GUEST  # a Pico's USB begins later than its main.py
-    with kind(files={**files, "/main.py": f"{guest}Sink().write(b'main')\n".encode()}) as device:
-        if isinstance(device, Pico):
-            HostLink(device.chip, b"", begun.append)
-        else:
-            console_link.ConsoleLink(device, begun.append)
+    with kind(files={**files, "/main.py": f"{kind.SINK}Sink().write(b'main')\n".encode()}) as device:
+        device.listen(begun.append)  # on a Pico not by USB, which begins later than its main.py
         device.run_until(lambda: begun, _LIMIT_S, 0.001)
         return device.time_s
 

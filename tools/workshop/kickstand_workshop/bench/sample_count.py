@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from kickstand_tools.simulated_board.mpu6050 import Mpu6050
-from kickstand_tools.simulated_board.mpu6050_registers import ACCEL_XOUT_H
+from kickstand_tools.simulated_board.mpu6050 import ACCEL_XOUT_H, Mpu6050
 
 
 class SampleCount:
@@ -48,6 +47,6 @@ class SampleCount:
             self._read.add(self._sensor._next)
         return acknowledged
 
-    def _on_pop(self) -> int:
-        self._popped += self._sensor.fifo.count > 0
-        return self._pop()
+    def _on_pop(self, count: int = 1) -> bytes:
+        self._popped += min(count, self._sensor.fifo.count)
+        return self._pop(count)

@@ -7,6 +7,7 @@ Each takes Samples and returns the lean in degrees of every sample, > 0 to the r
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib.util import find_spec
 
 import numpy as np
@@ -65,18 +66,11 @@ def complementary(samples: Samples) -> NDArray[np.float64]:
     return result
 
 
-def mahony(samples: Samples) -> NDArray[np.float64]:
-    from ahrs.filters import Mahony
+def of_ahrs(name: str, samples: Samples) -> NDArray[np.float64]:
+    from ahrs import filters
 
     gyro, accel = _xyz(samples)
-    return _roll(Mahony(gyr=gyro, acc=accel, frequency=samples.rate_hz).Q)
-
-
-def madgwick(samples: Samples) -> NDArray[np.float64]:
-    from ahrs.filters import Madgwick
-
-    gyro, accel = _xyz(samples)
-    return _roll(Madgwick(gyr=gyro, acc=accel, frequency=samples.rate_hz).Q)
+    return _roll(getattr(filters, name)(gyr=gyro, acc=accel, frequency=samples.rate_hz).Q)
 
 
 def vqf(samples: Samples) -> NDArray[np.float64]:
@@ -88,8 +82,8 @@ def vqf(samples: Samples) -> NDArray[np.float64]:
 
 OTHERS: dict[str, Callable[[Samples], NDArray[np.float64]]] = {
     "complementary": complementary,
-    "mahony": mahony,
-    "madgwick": madgwick,
+    "mahony": partial(of_ahrs, "Mahony"),
+    "madgwick": partial(of_ahrs, "Madgwick"),
     "vqf": vqf,
 }
 

@@ -87,9 +87,8 @@ class Bike:
         self.store().save(calibration)
 
 
-def soak(hours: float, seed: int = 1, enough: int = 10**6, say: Callable[[str], None] = lambda line: None) -> Figures:
-    """Run trips until they add up to so many hours of the board's time, or until so much was found that is enough.
-    say: called with its progress, each hour of the board's time.
+def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: None) -> Figures:
+    """Run trips until they add up to so many hours of the board's time. say: called with its progress, each hour of it.
 
     The same seed gives the same trips. It works in a directory of its own, which is gone afterwards."""
     figures = Figures(seed)
@@ -99,7 +98,7 @@ def soak(hours: float, seed: int = 1, enough: int = 10**6, say: Callable[[str], 
     before = os.getcwd()
     with tempfile.TemporaryDirectory() as folder:
         try:
-            while figures.hours < hours and len(figures.found) < enough:
+            while figures.hours < hours:
                 if figures.trips % TRIPS_WITH_A_BIKE == 0:
                     flash = Path(folder, str(figures.trips))
                     flash.mkdir()

@@ -1,0 +1,114 @@
+"""Models of the contacts between a pin and ground: a push button, and a reed contact at a wheel. Both bounce."""
+
+from .clock import NEVER_US
+
+BOUNCE_US = 4000  # of the button
+RELEASED_US = 150_000  # least time between two presses
+_BOUNCES = 3  # short openings (or closings) after each edge of the button
+
+_CLOSED_SHARE = 0.1  # of the way between two pulses: the magnet is near
+_LOOK_US = 20_000  # the model of the wheel reads the speed at least this often
+_CREEP_MPS = 0.02  # slower counts as standing
+
+
+class Contact:
+    """closed: True while it connects the pin to ground.  broken_us: time at which its wire breaks."""
+
+    def __init__(self, clock, broken_us=NEVER_US):
+        self.closed = False
+        self._clock = clock
+        self._broken_us = broken_us
+        self._edge = None
+
+    def connect(self, edge):
+        """Call edge(level of the pin) at each change from now on. None: call nothing."""
+        self._edge = edge
+
+    def _set_at(self, at_us, closed):
+        def act():
+            now = closed and self._clock.now_us < self._broken_us
+            if now != self.closed:
+                self.closed = now
+                if self._edge:
+                    self._edge(0 if now else 1)
+
+        self._clock.at(at_us, act)
+
+
+class Button(Contact):
+    """seed: determines the random moments at which it bounces.
+
+    charge_us: time in which the pin's pull-up charges a capacitor that is soldered to the contacts, 0 for none.
+    """
+
+    def __init__(self, clock, seed=1):
+        super().__init__(clock)
+        self.charge_us = 0
+        self._free_us = 0  # when a press that is asked for now can begin
+        self._random = seed & 0x7FFFFFFF or 1
+
+    def low(self, pulled_us):
+        """True if its pin is low. pulled_us: the time at which the pin got a pull-up."""
+        return self.closed or self._clock.now_us < pulled_us + self.charge_us
+
+    def press(self, at_us, for_us):
+        """Press it from at_us for for_us. at_us: None for now, or once the last such press is over, because a finger
+        cannot press what it holds."""
+        if at_us is None:
+            at_us = max(self._clock.now_us, self._free_us)
+            self._free_us = at_us + for_us + RELEASED_US
+        self.turn(True, at_us)
+        self.turn(False, at_us + for_us)
+
+    def turn(self, closed, at_us):
+        """Press (True) or release it (False) at at_us; it bounces for BOUNCE_US."""
+        self._set_at(at_us, closed)
+        step = BOUNCE_US // (2 * _BOUNCES)
+        for i in range(1, 2 * _BOUNCES + 1):
+            self._set_at(at_us + i * step - self._below(step // 2), closed if i % 2 == 0 else not closed)
+
+    def _below(self, limit):
+        self._random = (self._random * 1103515245 + 12345) & 0x7FFFFFFF
+        return (self._random >> 8) % limit
+
+
+class Wheel(Contact):
+    """It closes at each magnet that passes.
+
+    speed(t_s): speed of the vehicle, m/s.  bounce_us: time for which the contact bounces at each edge, 0 for none.
+    until_s: time at which its wire breaks.
+
+    noise_hz: pulses per second that a cable beside its own induces, in place of the wheel's; 0 for none.
+    """
+
+    def __init__(self, clock, speed, pulses_per_metre=0.5, bounce_us=0, until_s=1e9):
+        super().__init__(clock, int(until_s * 1e6))
+        self.noise_hz = 0
+        self._speed = speed
+        self._pulses_per_metre = pulses_per_metre
+        self._bounce_us = bounce_us
+        self._turned = 0.5  # share of the way to the next pulse
+        self._look_us = clock.now_us
+        clock.at(clock.now_us, self._look)
+
+    def _look(self):
+        """Add the way since the last call; at a pulse schedule closing and opening; schedule the next call."""
+        now_us = self._clock.now_us
+        speed = self._speed(now_us / 1e6)
+        rate = speed * self._pulses_per_metre / 1e6 if speed > _CREEP_MPS else 0.0  # pulses per us
+        if self.noise_hz:
+            rate = self.noise_hz / 1e6 if self._edge else 0.0  # nobody listens: spare the time
+        self._turned += rate * (now_us - self._look_us)
+        self._look_us = now_us
+        if self._turned >= 0.999:
+            self._turned -= 1.0
+            self._turn(True, now_us)
+            self._turn(False, now_us + int(_CLOSED_SHARE / rate))
+        left_us = int((1.0 - self._turned) / rate) + 1 if rate else _LOOK_US
+        self._clock.at(now_us + min(_LOOK_US, left_us), self._look)
+
+    def _turn(self, closed, at_us):
+        self._set_at(at_us, closed)
+        if self._bounce_us:
+            for i in range(1, 5):
+                self._set_at(at_us + i * self._bounce_us // 4, closed if i % 2 == 0 else not closed)

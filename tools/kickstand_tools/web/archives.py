@@ -1,0 +1,128 @@
+"""What the pages get of the tools, in ZIP files that are the same whenever the files in them are.
+
+install_archive() has what install_guest.py and cable_guest.py need to talk to a board, rides_archive() what
+rides_guest.py needs to look at a ride.
+"""
+
+import io
+import tarfile
+import zipfile
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from modulefinder import ModuleFinder
+from pathlib import Path
+
+import jinja2
+import markupsafe
+import mpremote
+
+from .. import firmware_path
+from ..deploy import bytecode
+from ..deploy.firmware_files import firmware_files
+from ..errors import InputError, extra
+
+_DATE = (1980, 1, 1, 0, 0, 0)
+# Of Pico; of Pico 2; of ESP32-C3, C6 and H2 and of a Pico 2's other processor; of all other ESP32
+ARCHITECTURES = ("armv6m", "armv7emsp", "rv32imc", "xtensawin")
+# In place of pyserial, and of a module for terminals: what mpremote asks of them as it is imported
+_STANDS_IN = {
+    "serial/__init__.py": b"SerialException = OSError\n",
+    "serial/tools/__init__.py": b"",
+    "serial/tools/list_ports.py": b"",
+    "mpremote/console.py": b"VT_ENABLED = False\n",
+}
+_MPREMOTE = ("__init__.py", "mp_errno.py", "transport.py", "transport_serial.py")
+_NUMPY = "lib/python3.12/site-packages/"  # in the package of conda
+# A third of numpy, which is for its developers, for other compilers, and for random numbers
+_LEFT_OUT = ("/tests/", "/f2py/", "/random/", "/distutils/", "/testing/", "/include/", "/_pyinstaller/")
+_LICENCES = "info/licenses/"
+
+
+def tools(*modules: str) -> dict[str, Path]:
+    """{path below the tools: file} of these modules of kickstand_tools, as "web/device.py", and of all that they
+    import of it, also within functions; with the templates and scripts beside them."""
+    finder = ModuleFinder([str(firmware_path.TOOLS)])  # what is not ours it does not find
+    for name in modules:
+        finder.import_hook("kickstand_tools." + name.removesuffix(".py").replace("/", "."))
+    found = {Path(path) for module in finder.modules.values() if (path := vars(module)["__file__"])}
+    beside = {file for path in found for file in path.parent.iterdir() if file.suffix in (".html", ".js")}
+    return {path.relative_to(firmware_path.TOOLS).as_posix(): path for path in sorted(found | beside)}
+
+
+def zipped(contents: Mapping[str, bytes]) -> bytes:
+    """A ZIP file of {name: content}."""
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in sorted(contents.items()):
+            entry = zipfile.ZipInfo(name, _DATE)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, data)
+    return made.getvalue()
+
+
+def install_archive() -> bytes:
+    """The tools that `kickstand flash`, `record` and `pull` consist of, mpremote, and the firmware, as sources and
+    compiled for every machine code of a board: tools/ and firmware/ as in a checkout, mpremote/, serial/, compiled/."""
+    files = {f"mpremote/{name}": Path(mpremote.__file__).parent / name for name in _MPREMOTE}
+    files |= {f"tools/{name}": path for name, path in tools("web/cable_guest.py", "web/install_guest.py").items()}
+    files |= {f"firmware{path}": source for path, source in firmware_files().items()}
+    return zipped({name: path.read_bytes() for name, path in files.items()} | _STANDS_IN | _compiled())
+
+
+def firmware() -> bytes:
+    """The firmware as a ZIP file, for a browser that cannot connect to a board: its rider takes mpremote."""
+    return zipped({f"kickstand-firmware{path}": source.read_bytes() for path, source in firmware_files().items()})
+
+
+def _compiled() -> dict[str, bytes]:
+    """compiled/ARCHITECTURE/... .mpy: of all but the first only what contains machine code. Nothing where there is no
+    compiler: then the sources are copied."""
+    sources = sorted(firmware_path.PACKAGE.rglob("*.py"))
+    first, *others = ARCHITECTURES
+    try:
+        with ThreadPoolExecutor() as pool:
+            made = dict(zip(sources, pool.map(lambda source: bytecode.cross_compiled(source, first), sources)))
+            found = {(first, source): data for source, data in made.items()}
+            for source in [source for source, data in made.items() if data[2]]:
+                found |= {(other, source): bytecode.cross_compiled(source, other) for other in others}
+    except bytecode.CannotCompile:
+        return {}
+    package = firmware_path.PACKAGE
+    return {
+        f"compiled/{architecture}/{source.relative_to(package).with_suffix('.mpy').as_posix()}": data
+        for (architecture, source), data in found.items()
+    }
+
+
+def rides_archive() -> bytes:
+    """The tools that `kickstand report` and `plot` consist of, the firmware's mathematics, what reads GPX and FIT
+    files, Jinja, and markupsafe without its compiled module, which it also has in Python: packages to import. Raises
+    InputError without fitdecode or gpxpy."""
+    try:
+        import fitdecode
+        import gpxpy
+    except ImportError as error:
+        raise InputError("the page Rides needs fitdecode and gpxpy: " + extra("web")) from error
+    found = tools("web/rides_guest.py")
+    for package in (firmware_path.PACKAGE, *(Path(one.__path__[0]) for one in (fitdecode, gpxpy, jinja2, markupsafe))):
+        found |= {path.relative_to(package.parent).as_posix(): path for path in package.rglob("*.py")}
+    return zipped({name: path.read_bytes() for name, path in found.items()})
+
+
+def numpy_archive(conda: bytes) -> tuple[bytes, bytes]:
+    """A ZIP file of numpy to import, and the text of its licences. conda: the package of emscripten-forge."""
+    kept, licences = {}, b""
+    with tarfile.open(fileobj=io.BytesIO(conda)) as package:
+        for entry in package:
+            file = package.extractfile(entry) if entry.isfile() else None
+            if file is None:
+                continue
+            if entry.name.startswith(_LICENCES):
+                licences += file.read()
+            elif entry.name.startswith(f"{_NUMPY}numpy/") and _wanted(entry.name):
+                kept[entry.name.removeprefix(_NUMPY)] = file.read()
+    return zipped(kept), licences
+
+
+def _wanted(name: str) -> bool:
+    return name.endswith((".py", ".so")) and not any(part in name for part in _LEFT_OUT)
