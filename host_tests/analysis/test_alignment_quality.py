@@ -14,7 +14,7 @@ from kickstand_tools.analysis import report
 from kickstand_tools.analysis.alignment_quality import Quality, lean_cost, yaw_cost_deg
 from kickstand_tools.analysis.report import angles
 from kickstand_tools.api import Log, fit_drive, fit_two_positions, open_ride, overview, simulate_ride, vehicle_channels
-from kickstand_tools.signals.rotations import rotation_matrix
+from kickstand_tools.signals import rotation_matrix
 from kickstand_tools.simulation.scripted import script
 
 NONE = np.zeros(1)

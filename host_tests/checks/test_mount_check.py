@@ -17,7 +17,7 @@ from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.refusals import sentence
-from kickstand_tools.signals.rotations import rotation_matrix
+from kickstand_tools.signals import rotation_matrix
 from kickstand_tools.simulation.profiles import PROFILES
 from kickstand_tools.simulation.scripted import script
 from kickstand_workshop.evaluation.runs import calibrated_by_poses

@@ -8,7 +8,7 @@ rider who moves; the vibration is white. World axes: x, y level, z up. Vehicle a
 import numpy as np
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
-from kickstand_tools.signals.rotations import rotation_matrix
+from kickstand_tools.signals import rotation_matrix
 
 G = 9.80665
 FINE_HZ, RATE_HZ = 800, 200
