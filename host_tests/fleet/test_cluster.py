@@ -31,8 +31,15 @@ def cluster():
         yield running
 
 
+class Overdue(dict):
+    """When tasks began: task 5 long ago, so that it is ended at once, and no other one on a busy machine."""
+
+    def __setitem__(self, key, began):
+        super().__setitem__(key, (began[0] - 1000.0 * key.startswith("fleet-5-"), began[1]))
+
+
 def test_a_task_that_kills_its_worker_or_hangs_costs_itself_alone(cluster, tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster, "_timeout_s", 6.0)
+    monkeypatch.setattr(cluster, "_started", Overdue())
     note = tmp_path / "began"
     behaviours = {2: "die", 4: "raise", 5: "hang"}
     items = [(k, behaviours.get(k, ""), str(note)) for k in range(14)]
@@ -231,3 +238,11 @@ def test_ctrl_c_while_this_process_connects_is_heard_when_it_has(tmp_path):
     trouble = subprocess.run([sys.executable, str(program)], capture_output=True, text=True, timeout=120).stderr
     assert trouble.count("Traceback") == 1
     assert trouble.endswith("KeyboardInterrupt\n")
+
+
+def test_a_vehicle_that_crashed_is_tried_again_by_the_next_run(tmp_path, monkeypatch):
+    periods = [Period("v", "", "car", ("none.csv",))]
+    monkeypatch.setattr(run, "run_tasks", lambda *_: iter([(0, None, CRASHED, "its worker died")]))
+    first = run_fleet(periods, tmp_path)
+    assert first.seen.reasons[("error", CRASHED)] == 1
+    assert run_fleet(periods, tmp_path).new == 1

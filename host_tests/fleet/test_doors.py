@@ -20,6 +20,7 @@ from kickstand_tools.fleet.manifest import Period, by_pattern, read_manifest
 from kickstand_tools.fleet.period import failed, work_on_period
 from kickstand_tools.fleet.run import run_fleet
 from kickstand_tools.fleet.show import plot
+from kickstand_tools.output import whole_file
 from kickstand_tools.refusals import sentence
 
 
@@ -219,3 +220,14 @@ def test_a_pipe_is_no_manifest_and_no_log(tmp_path, alone):
     command.refused(tmp_path, "fleet", tmp_path / "pipe.csv", "--out", tmp_path / "out", words="not an ordinary file")
     found = work_on_period(Period("v", "", "car", (str(tmp_path / "pipe.csv"),)))
     assert "not an ordinary file" in found.errors[0]["message"]
+
+
+def test_a_file_that_cannot_be_written_says_why(tmp_path, monkeypatch):
+    """On a read-only file system the temporary file cannot be removed either."""
+
+    def read_only(*_, **__):
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr(Path, "unlink", read_only)
+    with pytest.raises(InputError, match="Read-only file system"), whole_file(tmp_path / "x"):
+        read_only()

@@ -69,6 +69,14 @@ def test_a_sensor_ahead_of_the_rear_axle_is_swung_and_not_turned(bus):
     assert halves(swung)[0] == pytest.approx(halves(log)[0], abs=0.5)
 
 
+def test_a_move_between_logs_is_not_taken_for_one_during_them():
+    first, sensor = drive(31)
+    sensor.mount = turn_of(25.0, (1.0, 0.3, 0.2)) @ sensor.mount
+    second, _ = drive(32, sensor=sensor)
+    (move,) = find_moves([driven(first), driven(second)])
+    assert (move.log, move.at_s) == (1, None) and move.angle_deg == pytest.approx(25.0, abs=2.0)
+
+
 def test_a_road_counts_once_however_many_intervals_are_on_it():
     """Innovations: of a force that is the same error all along, only the first interval of a standstill counts."""
     count = 50

@@ -5,7 +5,7 @@ import pytest
 from kickstand_tools.simulation.physics.mount import MOUNTS, Holder
 from kickstand_tools.simulation.physics.road import CLASSES
 from kickstand_tools.simulation.ride import ride
-from kickstand_workshop.evaluation.bands import QUANTITIES, bands_of
+from kickstand_workshop.evaluation.bands import BANDS_HZ, QUANTITIES, bands_of, of_simulated
 
 
 @pytest.fixture(scope="module")
@@ -81,3 +81,10 @@ def test_bands_are_those_of_a_sine():
     found = bands_of(force, rates, 100.0)
     assert found[QUANTITIES[0]] == pytest.approx([0.0, 0.0, 0.0, 0.2 / np.sqrt(2.0), 0.0], abs=0.003)
     assert found[QUANTITIES[4]] == pytest.approx([0.0, 3.0 / np.sqrt(2.0), 0.0, 0.0, 0.0], abs=0.05)
+
+
+def test_simulated_roads_reach_what_a_real_motorcycle_meets():
+    """Through town (see the README): vertical 0.078 g from 1 to 3 Hz and 0.151 g from 3 to 10, between C and D."""
+    calm, rough = (of_simulated("street", 0, 100.0, road, None)[QUANTITIES[0]] for road in "CD")
+    assert len(calm) == len(BANDS_HZ)
+    assert calm[3] < 0.151 and rough[3] > 0.078
