@@ -5,7 +5,7 @@ The figures that the variances come to are those of test_known_ride.py.
 
 from math import degrees, radians, sin
 
-from bike_motion import GRAVITY_MPS2, near
+from bike_motion import near
 from kickstand.lean import measurements
 from kickstand.lean.bike_model import BIAS_LEFT, LEAN, PITCH, SPEED, STATES, YAW_ERROR, Linearisation
 
@@ -16,7 +16,7 @@ STILL = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]  # the means of a window, 
 def model(forward=0.0, rates=(0.0, 0.0, 0.0), lean_deg=0.0, pitch_deg=0.0, speed_mps=0.0, yaw_error_deg=0.0):
     """The state and the model at it."""
     x = [0.0] * STATES
-    x[LEAN], x[PITCH], x[SPEED] = radians(lean_deg), radians(pitch_deg), speed_mps / GRAVITY_MPS2
+    x[LEAN], x[PITCH], x[SPEED] = radians(lean_deg), radians(pitch_deg), speed_mps
     x[YAW_ERROR] = radians(yaw_error_deg)
     return x, Linearisation(x, list(rates), forward)
 
@@ -38,7 +38,7 @@ def test_the_forces_are_the_differences_from_what_was_expected():
 def test_vibration_rolling_and_pitching_make_the_forces_less_certain():
     for at, changed in (
         ({}, {"mean8": 0.2**2}),
-        ({"lean_deg": 30.0}, {"roll_acceleration": radians(100.0) / GRAVITY_MPS2}),
+        ({"lean_deg": 30.0}, {"roll_acceleration": radians(100.0)}),
         ({}, {"mean4": radians(100.0)}),
         ({}, {"mean4": radians(-100.0)}),
         ({"speed_mps": 15.0, "rates": (radians(5.0), 0.0, 0.0)}, {}),
@@ -51,7 +51,7 @@ def test_vibration_rolling_and_pitching_make_the_forces_less_certain():
 
 def test_a_sensor_above_the_roll_axis_has_the_roll_taken_off_its_forces():
     for sign in (1.0, -1.0):
-        left, _ = forces(roll_acceleration=sign * radians(100.0) / GRAVITY_MPS2)
+        left, _ = forces(roll_acceleration=sign * radians(100.0))
         assert 0.05 < sign * left[1] < 0.1
         assert 0.1 < forces(mean4=sign * radians(100.0))[1][1] < 0.15  # centripetal, to whichever side it rolls
 
@@ -86,17 +86,17 @@ def test_on_a_straight_the_bike_is_upright_and_elsewhere_its_speed_is_the_usual_
         (0.0, 2.0, 0.0, False),
     ):
         ((state, factor),), innovation, _ = measurements.straight_or_prior_speed(
-            radians(lean_deg), mps / GRAVITY_MPS2, radians(yaw_dps), WINDOW_S
+            radians(lean_deg), mps, radians(yaw_dps), WINDOW_S
         )
         assert (state, factor) == (LEAN if straight else SPEED, 1.0)
-        near(innovation, radians(-lean_deg) if straight else (15.0 - mps) / GRAVITY_MPS2, 1e-6)
+        near(innovation, radians(-lean_deg) if straight else 15.0 - mps, 1e-6)
 
 
 def test_a_measured_speed_is_less_certain_while_it_changes():
-    row, innovation, steady = measurements.measured_speed(12.0 / GRAVITY_MPS2, 10.0 / GRAVITY_MPS2, 0.0)
+    row, innovation, steady = measurements.measured_speed(12.0, 10.0, 0.0)
     assert row == ((SPEED, 1.0),)
-    near(innovation * GRAVITY_MPS2, 2.0, 1e-6)
-    for change in (0.6, -0.6):
+    near(innovation, 2.0, 1e-6)
+    for change in (6.0, -6.0):
         assert measurements.measured_speed(1.0, 1.0, change)[2] > 2.0 * steady
 
 
