@@ -8,7 +8,7 @@ one boundary between two blocks; parts.py tries every boundary.
 from math import atan2, degrees, sqrt
 
 from ..errors import AlignmentError
-from ..rotation import angle_deg, cross, dot, norm, normalize, vector
+from ..rotation import angle_deg, dot, frame, matrix, norm, vector
 from .parts import DriveParts, angle_between, blend_prior
 from .regression import Fit
 from .speed_check import fit_problem
@@ -60,11 +60,9 @@ class DrivingQuality:
         yield
         if not self._vertical.known(up, self.fit):
             return
-        left, forward = vector(), vector()
-        cross(left, up, self.fit.forward)
-        cross(forward, left, up)
-        normalize(left)
-        normalize(forward)
+        axes = matrix()
+        frame(axes, up, self.fit.forward)
+        left, forward = axes[0:3], axes[6:9]
         yield
         blocks = regression.filled
         squares = ratios = weights = 0.0
