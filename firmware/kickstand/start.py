@@ -74,7 +74,10 @@ def main():
 
 def _live(function, *arguments):
     """Do a step of LIVE. Return None, or what is reported of it: the lean goes on, and without a restart."""
-    problem = tried(function, *arguments)
+    try:
+        problem = tried(function, *arguments)
+    except LiveError as error:
+        problem = error
     if problem:
         if problem.code == "no-memory":
             problem = LiveError("live-memory", *problem.values)
@@ -83,20 +86,18 @@ def _live(function, *arguments):
 
 
 def _open_radio(opened, pin):
-    from .live.radio import open_radio
+    from .live.radio import Radio
 
-    opened.append(open_radio(pin))
+    opened.append(Radio(pin))
 
 
 def _attach(opened, app):
-    radio = opened[0]
     try:
         from .live.live import attach
 
-        attach(radio, app)
+        attach(opened[0], app)
     except (ImportError, MemoryError):
-        if not isinstance(radio, LiveError):
-            radio.stop()
+        opened[0].stop()
         raise
 
 

@@ -109,7 +109,6 @@ class DrivingEvents:
         self.last = LastEvent()
         self._history = history
         self._finder = EventFinder(LAGS)
-        self._fit = Fit()
         # for each lag: the history's integrals at the end of the last interval, whether they were known, and whether
         # that interval was straight
         self._ends = [[0] * COLUMNS for _ in range(LAGS)]
@@ -118,11 +117,6 @@ class DrivingEvents:
         self._end = [0] * COLUMNS
         self._before = (0.0, 0)  # speed and time at the end of the last interval
         self._waiting = []  # speed and time at the ends of the intervals to be processed
-
-    @property
-    def straight_count(self):
-        """Number of all straight events."""
-        return self.braking_count + self.acceleration_count
 
     @property
     def counted(self):
@@ -205,7 +199,7 @@ class DrivingEvents:
 
     def _end_event(self):
         """Find the lag that fits best after the event that has ended, and count the event if it was straight."""
-        fit = self._fit
+        fit = Fit()
         explained = [0.0] * LAGS
         for lag in range(LAGS):
             if (yield from self.regression.fitting(fit, lag)):

@@ -49,11 +49,10 @@ class DrivingQuality:
         self._events = events
         self._vertical = vertical
         self._precise = self._event_off = False
-        self._scratch_fit = Fit()
 
     def judge(self):
         """Update all attributes after another event or stop. A generator of short steps."""
-        regression, lag, part = self._events.regression, self._events.lag, self._scratch_fit
+        regression, lag, part = self._events.regression, self._events.lag, Fit()
         up = vector()
         if not (yield from regression.fitting(self.fit, lag)):
             return

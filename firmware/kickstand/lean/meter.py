@@ -22,7 +22,8 @@ class LeanMeter:
 
     After update() or update_sum(): force (left, up, forward in g), rate (about them in rad/s), lean_deg (the
     filter's, > 0 right), smooth_force (g, for display; of an aligned motorcycle left and up are NaN), fallen, and the
-    maxima since reset_maxima(). suppressed_reason: why the lean is not shown, as given to distrust(), or None.
+    maxima since reset_maxima(). suppressed_reason: why the lean is not shown, or None; set by who knows, and cleared by
+    another calibration.
     """
 
     def __init__(self, calibration, leans=True, delay_s=DELAY_S):
@@ -65,14 +66,6 @@ class LeanMeter:
         self.max_accel_g = 0.0
         self.max_brake_g = 0.0
         self._hold_again()
-
-    def distrust(self, reason):
-        """Set suppressed_reason: the lean is not shown until trust() or another calibration."""
-        self.suppressed_reason = reason
-
-    def trust(self):
-        """Clear suppressed_reason."""
-        self.suppressed_reason = None
 
     @property
     def at_rest(self):

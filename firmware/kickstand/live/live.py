@@ -5,7 +5,6 @@ from math import degrees, sqrt
 from time import ticks_add, ticks_diff, ticks_ms
 
 from ..calibration.transform import Transform
-from ..errors import LiveError
 from ..lean.meter import FALLEN_DEG
 from . import packets
 from .packets import LEAN, MOTION, OWN, SPEED
@@ -16,11 +15,8 @@ _SAMPLES = 8  # as many as Transform takes at most
 
 
 def attach(radio, app):
-    """Let an App send to phones. radio: of open_radio()."""
-    if isinstance(radio, LiveError):
-        app.screen.notify(radio, ticks_ms())
-    else:
-        app.live = app.screen.pages.live = Live(radio, app, app.settings.leans)
+    """Let an App send to phones. radio: a Radio."""
+    app.live = app.screen.pages.live = Live(radio, app, app.settings.leans)
 
 
 class Live:
