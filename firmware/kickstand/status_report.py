@@ -109,7 +109,7 @@ def _speed(settings):
         new = speed.poll(ticks_ms())
         heard = heard if new is None else new
         sleep_ms(10)
-    fault = speed.fault(ticks_ms())
+    fault = speed.source.fault(ticks_ms())
     if fault:
         print("  " + ", ".join(messages.lines(fault)))
     else:

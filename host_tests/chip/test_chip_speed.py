@@ -23,7 +23,7 @@ while ticks_diff(end, ticks_ms()) > 0:
     if new is not None:
         got.append(new)
     sleep_ms(10)
-print(json.dumps([got, speed.fault(ticks_ms())]))
+print(json.dumps([got, speed.source.fault(ticks_ms())]))
 """
 
 

@@ -29,16 +29,12 @@ def blend_prior(variance, weight, freedom):
 
 
 class DriveParts:
-    """clear(), add() each block in the order of time, run compare() to its end. Then, for the split with the most
+    """add() each block in the order of time, run compare() to its end. Then, for the split with the most
     significant difference of forward: forward_deg, that difference; sigmas, the same in standard deviations. And over
     all splits: roll_deg, pitch_deg, the largest differences of the vertical.
     """
 
     def __init__(self):
-        self.clear()
-
-    def clear(self):
-        """Drop all blocks. To be called before the first add()."""
         self._blocks = []
         self.forward_deg = self.sigmas = self.roll_deg = self.pitch_deg = 0.0
 

@@ -65,7 +65,7 @@ class DrivingQuality:
         yield
         blocks = regression.filled
         squares = ratios = weights = 0.0
-        self.parts.clear()
+        self.parts = DriveParts()
         for block in range(blocks):
             if not (yield from regression.fitting(part, lag, block, block + 1)):
                 continue

@@ -28,8 +28,7 @@ class PageRing:
         self._pages = MOTORCYCLE if leans else CAR
         self._at = 0
         self.late = self.draws = False
-        self._glance = None  # the module, once a display draws
-        self._glance_tried = False
+        self._glance = None  # the module, once a display draws; False where it cannot be loaded
         self.live = None
         self.own = []
         self._own_at = None  # index of the owner's page that is shown
@@ -119,10 +118,10 @@ class PageRing:
     @property
     def _pictures(self):
         """The module glance, only for a display that draws. Where it cannot be loaded, lines are shown."""
-        if self.draws and not self._glance_tried:
-            self._glance_tried = True
+        if self.draws and self._glance is None:
+            self._glance = False
             attempt(self._load)
-        return self._glance if self.draws else None
+        return self.draws and self._glance
 
     def _load(self):
         from . import glance

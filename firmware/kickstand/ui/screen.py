@@ -37,18 +37,16 @@ class NoticeView:
         return False
 
 
-class FaultView:
-    """Shows why there are no readings."""
+class MessageView:
+    """Shows a refusal or a notice while there is one. message: returns it, or None. press: see above."""
 
-    def __init__(self, sensor):
-        self._sensor = sensor
+    def __init__(self, message, press):
+        self._message = message
+        self.press = press
 
     def lines(self, now_ms):
-        fault = self._sensor.fault
-        return None if fault is None else messages.lines(fault)
-
-    def press(self, event, now_ms):
-        return False
+        message = self._message()
+        return messages.lines(message) if message else None
 
 
 class InfoView:
@@ -75,22 +73,6 @@ class InfoView:
         return event == SHORT
 
 
-class QuestionView:
-    """Shows a report or a question of alignment by driving. drive: a BackgroundAlignment, or None."""
-
-    def __init__(self, drive):
-        self._drive = drive
-
-    def lines(self, now_ms):
-        if self._drive is None or self._drive.message is None:
-            return None
-        return messages.lines(self._drive.message)
-
-    def press(self, event, now_ms):
-        self._drive.answer(event == LONG)
-        return True
-
-
 class Screen:
     """settings: a Settings. sensor, clock, meter: the Sensor, its SampleClock and the LeanMeter, which it shows.
     calibration, drive, rides: the ActiveCalibration, the BackgroundAlignment or None, and the Recording, which the menu
@@ -110,9 +92,10 @@ class Screen:
         self.wizard = None
         self.menu = None
         self._notice = NoticeView()
-        self._fault = FaultView(sensor)
+        self._fault = MessageView(lambda: sensor.fault, lambda event, now_ms: False)  # why there are no readings
         self._info = InfoView(sensor, clock, meter)
-        self._question = QuestionView(drive)
+        # a report or a question of alignment by driving
+        self._question = MessageView(lambda: drive and drive.message, self._answer)
         self.pages = PageRing(settings.leans, meter, calibration, drive, rides, self._align_now)
 
     def lines(self, now_ms):
@@ -140,6 +123,10 @@ class Screen:
         if not view.press(event, now_ms) and event == LONG:
             self._open_menu(now_ms)
         self._drop_ended()
+
+    def _answer(self, event, now_ms):
+        self._drive.answer(event == LONG)
+        return True
 
     def interrupt(self, now_ms):
         """Cancel a calibration under way, because the sensor has failed."""
