@@ -154,7 +154,7 @@ class App:
         if self.sensor.fault is not None:
             self.clock.restart()
             self.screen.interrupt(now_ms)
-        elif self.sensor.emptied:
+        elif not self.sensor.chip.frames_left:
             self.clock.emptied(now_us)
         event = self.button.poll(now_ms)
         if event:

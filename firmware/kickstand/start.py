@@ -19,16 +19,11 @@ CHARGE_MS = 100
 
 # The modules that the app imports, in this order: between two of them, display and chip are set up a step further. The
 # list repeats the import statements, because MicroPython has no hook between imports; a test compares both.
-STEPS = [
-    folder + "." + name
-    for folder, names in (
-        ("calibration", "parameters store active transform"),
-        ("lean", "bike_model kalman measurements rest upright_trim lean_filter meter"),
-        ("ui", "messages pages page_ring screen"),
-        ("rides", "recording"),
-    )
-    for name in names.split()
-]
+STEPS = (
+    "calibration.parameters calibration.store calibration.active calibration.transform lean.bike_model lean.kalman "
+    "lean.measurements lean.rest lean.upright_trim lean.lean_filter lean.meter ui.messages ui.pages ui.page_ring "
+    "ui.screen rides.recording"
+).split()
 
 
 def _show(lcd, line1, line2=""):

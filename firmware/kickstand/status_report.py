@@ -84,12 +84,10 @@ def _sensor(sensor, settings):
 def _display(lcd):
     lcd.show("Kickstand", "status: console")
     lcd.flush()
-    found = (
-        "%s at %s" % ("OLED" if lcd.draws else "LCD", hex(lcd.address))
-        if lcd.address
-        else "none answers: check wiring and LCD_ADDRESSES"
-    )
-    _print("Display", "%s", found)
+    if lcd.address:
+        _print("Display", "%s at %s", "OLED" if lcd.draws else "LCD", hex(lcd.address))
+    else:
+        _print("Display", "none answers: check wiring and LCD_ADDRESSES")
 
 
 def _speed(settings):

@@ -215,8 +215,6 @@ def test_a_speed_that_stays_the_same_in_a_lively_ride_is_stuck(speeds, yaw_dps, 
 def test_the_last_event_shows_forward():
     """Braking by 0.3 and 0.5 g for half a second each: force is the vertical and so much to the back."""
     last = LastEvent()
-    last.add(0.5, 99.0, [1.0, 1.0, 1.0])
-    last.clear()
     for a in (-0.3, -0.5):
         last.add(0.5, 0.5 * a, [0.5 * 0.8 * a, 0.5, 0.5 * 0.6 * a])
     out = [0.0] * 3
@@ -226,7 +224,7 @@ def test_the_last_event_shows_forward():
 
 def test_where_the_vertical_comes_from():
     """A car's: its stops, and with a fit the mean of both. A motorcycle's: the upright pose; else straight riding."""
-    standing = types.SimpleNamespace(stops=0, up=level(10.0))
+    standing = types.SimpleNamespace(up=None)
     fit = types.SimpleNamespace(level=[2.0 * part for part in level(4.0)])
 
     def pitch(vertical, fit=None):
@@ -236,7 +234,7 @@ def test_where_the_vertical_comes_from():
     car, bike, posed = Vertical(True, None, standing), Vertical(False, None, standing), Vertical(False, UP, standing)
     assert (pitch(car), pitch(bike), pitch(posed), pitch(car, fit)) == (None, None, 0.0, None)
     assert (pitch(bike, fit), pitch(posed, fit)) == (pytest.approx(4.0), 0.0)
-    standing.stops = 1
+    standing.up = level(10.0)
     assert (pitch(car), pitch(car, fit)) == (pytest.approx(10.0), pytest.approx(7.0))
     for pitch_deg, times, mean in ((0.0, 1, 0.0), (8.0, 1, 4.0), (8.0, 60, 8.0)):  # of the last minute
         for _ in range(times):

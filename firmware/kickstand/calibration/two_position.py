@@ -63,11 +63,7 @@ def align(calibration, kickstand, upright, side):
     bias is that of the kickstand pose: a stand holds the bike stiller than a rider does. Raises AlignmentError.
     """
     vehicle_from_sensor = matrix()
-    tilt = two_position(
-        vehicle_from_sensor,
-        calibration.correct(kickstand.accel),
-        calibration.correct(upright.accel),
-        side,
-        CALIBRATED_TOLERANCE_G if calibration.six_done else UNCALIBRATED_TOLERANCE_G,
-    )
+    poses = calibration.correct(kickstand.accel), calibration.correct(upright.accel)
+    tolerance_g = CALIBRATED_TOLERANCE_G if calibration.six_done else UNCALIBRATED_TOLERANCE_G
+    tilt = two_position(vehicle_from_sensor, *poses, side, tolerance_g)
     return calibration.with_alignment(vehicle_from_sensor, kickstand.gyro), tilt

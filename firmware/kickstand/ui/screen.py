@@ -37,40 +37,12 @@ class NoticeView:
         return False
 
 
-class MessageView:
-    """Shows a refusal or a notice while there is one. message: returns it, or None. press: see above."""
+class View:
+    """Made of two functions, lines and press."""
 
-    def __init__(self, message, press):
-        self._message = message
+    def __init__(self, lines, press):
+        self.lines = lines
         self.press = press
-
-    def lines(self, now_ms):
-        message = self._message()
-        return messages.lines(message) if message else None
-
-
-class InfoView:
-    """Shows the chip's name, its temperature and what is calibrated, until a short press."""
-
-    def __init__(self, sensor, clock, meter):
-        self._sensor = sensor
-        self._clock = clock
-        self._meter = meter
-        self.open = False
-
-    def show(self, now_ms):
-        """Show this view from now on."""
-        self.open = True
-
-    def lines(self, now_ms):
-        if not self.open:
-            return None
-        return pages.sensor_info(self._sensor, self._clock.lost, self._meter, now_ms // 1000)
-
-    def press(self, event, now_ms):
-        if event == SHORT:
-            self.open = False
-        return event == SHORT
 
 
 class Screen:
@@ -92,10 +64,15 @@ class Screen:
         self.wizard = None
         self.menu = None
         self._notice = NoticeView()
-        self._fault = MessageView(lambda: sensor.fault, lambda event, now_ms: False)  # why there are no readings
-        self._info = InfoView(sensor, clock, meter)
+        # why there are no readings
+        self._fault = View(lambda now_ms: sensor.fault and messages.lines(sensor.fault), lambda event, now_ms: False)
+        self._clock = clock
+        self._info_open = False
+        self._info = View(self._info_lines, self._press_info)
         # a report or a question of alignment by driving
-        self._question = MessageView(lambda: drive and drive.message, self._answer)
+        self._question = View(
+            lambda now_ms: drive and drive.message and messages.lines(drive.message), self._press_question
+        )
         self.pages = PageRing(settings.leans, meter, calibration, drive, rides, self._align_now)
 
     def lines(self, now_ms):
@@ -124,7 +101,20 @@ class Screen:
             self._open_menu(now_ms)
         self._drop_ended()
 
-    def _answer(self, event, now_ms):
+    def _info_lines(self, now_ms):
+        """The chip's name, its temperature and what is calibrated, until a short press."""
+        if not self._info_open:
+            return None
+        return pages.sensor_info(self._sensor, self._clock.lost, self._meter, now_ms // 1000)
+
+    def _show_info(self, now_ms):
+        self._info_open = True
+
+    def _press_info(self, event, now_ms):
+        self._info_open = event != SHORT
+        return event == SHORT
+
+    def _press_question(self, event, now_ms):
         self._drive.answer(event == LONG)
         return True
 
@@ -162,7 +152,7 @@ class Screen:
         """The entries of the menu: (name, what to call with now_ms)."""
         align = (("Align the bike", self._align),)
         drive = (("Align by drive", self._align_by_drive),) if self._drive else ()
-        rest = (("Six positions", self._six), ("Reset maxima", self._reset), ("Sensor info", self._info.show))
+        rest = (("Six positions", self._six), ("Reset maxima", self._reset), ("Sensor info", self._show_info))
         record = ("Stop recording", self._stop) if self._rides.recorder.active else ("Record ride", self._record)
         last = (record,) + ((("Own pages", self.pages.show_own),) if self.pages.own else ())
         last += (("Stop Bluetooth", self.pages.live.stop),) if self.pages.live else ()

@@ -19,12 +19,12 @@ ENDED = 5
 class Wizard:
     """A view (see screen.py) that also takes each sample, until it has ended.
 
-    chip, rate_hz, seconds: as for PoseTaker. calibration: the ActiveCalibration. A subclass says which poses it asks
-    for, and what it does with each.
+    chip, rate_hz: as for PoseTaker. calibration: the ActiveCalibration. A subclass says which poses it asks for, for
+    how long (POSE_SECONDS), and what it does with each.
     """
 
-    def __init__(self, chip, rate_hz, seconds, calibration):
-        self._taker = PoseTaker(chip, rate_hz, seconds)
+    def __init__(self, chip, rate_hz, calibration):
+        self._taker = PoseTaker(chip, rate_hz, self.POSE_SECONDS)
         self._calibration = calibration
         self._start()
 
