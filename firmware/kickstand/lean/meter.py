@@ -61,10 +61,8 @@ class LeanMeter:
 
     def reset_maxima(self):
         """Set the maxima of lean, acceleration and braking to 0."""
-        self.max_left_deg = 0.0
-        self.max_right_deg = 0.0
-        self.max_accel_g = 0.0
-        self.max_brake_g = 0.0
+        self.max_left_deg = self.max_right_deg = 0.0
+        self.max_accel_g = self.max_brake_g = 0.0
         self._hold_again()
 
     @property
