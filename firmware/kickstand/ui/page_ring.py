@@ -28,7 +28,8 @@ class PageRing:
         self._pages = MOTORCYCLE if leans else CAR
         self.first()
         self.late = self.draws = False
-        self._glance = None  # the module, once a display draws; False where it cannot be loaded
+        self._glance = None  # the module, once a display draws
+        self._glance_tried = False
         self.live = None
         self.own = []
 
@@ -117,10 +118,10 @@ class PageRing:
     @property
     def _pictures(self):
         """The module glance, only for a display that draws. Where it cannot be loaded, lines are shown."""
-        if self.draws and self._glance is None:
-            self._glance = False
+        if self.draws and not self._glance_tried:
+            self._glance_tried = True
             attempt(self._load)
-        return self.draws and self._glance
+        return self._glance if self.draws else None
 
     def _load(self):
         from . import glance

@@ -13,8 +13,6 @@ ROUGH_TILT_DEG = 30.0  # largest tilt of a side in uncalibrated readings; the fi
 class SixWizard(Wizard):
     """See Wizard."""
 
-    POSE_SECONDS = 2
-
     def _start(self):
         self._poses = [None] * 6
         self._gyro = [0.0] * 3

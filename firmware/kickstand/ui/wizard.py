@@ -19,9 +19,11 @@ ENDED = 5
 class Wizard:
     """A view (see screen.py) that also takes each sample, until it has ended.
 
-    chip, rate_hz: as for PoseTaker. calibration: the ActiveCalibration. A subclass says which poses it asks for, for
-    how long (POSE_SECONDS), and what it does with each.
+    chip, rate_hz: as for PoseTaker. calibration: the ActiveCalibration. A subclass says which poses it asks for, for,
+    what it does with each, and how long each takes if it is not POSE_SECONDS.
     """
+
+    POSE_SECONDS = 2
 
     def __init__(self, chip, rate_hz, calibration):
         self._taker = PoseTaker(chip, rate_hz, self.POSE_SECONDS)
