@@ -95,7 +95,7 @@ def test_a_bike_that_moves_right_after_the_poses_is_not_taken_to_stand():
 def test_a_car_shows_its_g_however_it_stands():
     shown = nose_up(ride(meter(leans=False), 1.0), 0.0, 25.0)
     assert shown.trusted
-    shown.suppressed_reason = "mount-moved"
+    shown.distrust("mount-moved")
     assert shown.trusted
     assert shown.lean_deg == 0.0
 
@@ -145,13 +145,13 @@ def test_maxima_are_the_largest_of_each_side_until_they_are_reset():
 
 def test_the_lean_is_distrusted_for_a_reason_and_is_no_maximum_until_it_is_trusted_again():
     shown = ride(meter(), 3.0)
-    shown.suppressed_reason = "mount has moved"
+    shown.distrust("mount has moved")
     assert shown.suppressed_reason == "mount has moved"
     roll(shown, 0.0, 30.0)
     assert not shown.trusted
     near(shown.lean_deg, 30.0, 0.5)
     assert shown.max_right_deg < 0.1
-    shown.suppressed_reason = None
+    shown.distrust(None)
     assert shown.suppressed_reason is None
     assert ride(shown, 0.2, lean_deg=30.0).trusted
     near(shown.max_right_deg, 30.0, 0.2)
@@ -159,7 +159,7 @@ def test_the_lean_is_distrusted_for_a_reason_and_is_no_maximum_until_it_is_trust
 
 def test_a_reason_for_distrust_belongs_to_one_calibration():
     shown = ride(meter(), 3.0)
-    shown.suppressed_reason = "side was wrong?"
+    shown.distrust("side was wrong?")
     shown.use(shown.calibration)
     assert shown.suppressed_reason == "side was wrong?"
     shown.use(Calibration())

@@ -157,7 +157,7 @@ class BackgroundAlignment:
             elif verdict == REFINED and drive.ready:
                 self._adopt(False)
             elif verdict == SAME:
-                self._meter.suppressed_reason = None
+                self._meter.distrust(None)
 
     def _away(self):
         """True while the vehicle drives. A faulty speed source may say zero for ever: then the lean filter's own
@@ -177,14 +177,14 @@ class BackgroundAlignment:
         if message.code not in self._answered:
             self.message = message
             if self._leans and message.code in _QUESTIONS:
-                self._meter.suppressed_reason = message.code
+                self._meter.distrust(message.code)
 
     def answer(self, agreed):
         """Clear the message, which the rider has read. agreed: do what it offers, for STAND_SIDE reverse forward."""
         code, self.message = self.message.code, None
         self._answered.append(code)
         if code in _QUESTIONS:
-            self._meter.suppressed_reason = None
+            self._meter.distrust(None)
         if agreed and code == STAND_SIDE:
             old = self._meter.calibration
             turned = matrix(old.vehicle_from_sensor)

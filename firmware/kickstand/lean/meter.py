@@ -22,8 +22,7 @@ class LeanMeter:
 
     After update() or update_sum(): force (left, up, forward in g), rate (about them in rad/s), lean_deg (the
     filter's, > 0 right), smooth_force (g, for display; of an aligned motorcycle left and up are NaN), fallen, and the
-    maxima since reset_maxima(). suppressed_reason: why the lean is not shown, or None; set by who knows, and cleared by
-    another calibration.
+    maxima since reset_maxima(). suppressed_reason: why the lean is not shown, as given to distrust(), or None.
     """
 
     def __init__(self, calibration, leans=True, delay_s=DELAY_S):
@@ -64,6 +63,10 @@ class LeanMeter:
         self.max_left_deg = self.max_right_deg = 0.0
         self.max_accel_g = self.max_brake_g = 0.0
         self._hold_again()
+
+    def distrust(self, reason):
+        """Set suppressed_reason: the lean is not shown until this is called with None, or with another calibration."""
+        self.suppressed_reason = reason
 
     @property
     def at_rest(self):

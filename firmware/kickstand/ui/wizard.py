@@ -19,7 +19,7 @@ ENDED = 5
 class Wizard:
     """A view (see screen.py) that also takes each sample, until it has ended.
 
-    chip, rate_hz: as for PoseTaker. calibration: the ActiveCalibration. A subclass says which poses it asks for, for,
+    chip, rate_hz: as for PoseTaker. calibration: the ActiveCalibration. A subclass says which poses it asks for,
     what it does with each, and how long each takes if it is not POSE_SECONDS.
     """
 
