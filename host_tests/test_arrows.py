@@ -24,7 +24,7 @@ ARROWS = {
     "drive_alignment": set(),  # it works on the calibrations that the app hands to it
     "speed": {"board"},
     "rides": {"board", "calibration", "console"},  # each block of a ride holds its calibration's record
-    "live": {"calibration.transform", "lean.meter"},  # the radio stands in live.radio, what is sent does not know it
+    "live": {"calibration.transform"},  # the radio stands in live.radio, what is sent does not know it
     "ui": {"board.button", "lean", "calibration", "drive_alignment"},
     "settings": {"board", "imu.mpu6050"},  # ranges and pins that can be chosen
     "devices": {"board", "imu"},

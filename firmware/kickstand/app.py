@@ -154,7 +154,7 @@ class App:
         if self.sensor.fault is not None:
             self.clock.restart()
             self.screen.interrupt(now_ms)
-        elif self.sensor.emptied:
+        elif not self.sensor.chip.frames_left:
             self.clock.emptied(now_us)
         event = self.button.poll(now_ms)
         if event:
@@ -181,10 +181,10 @@ class App:
         recorder = self.rides.recorder
         if recorder.stalled:  # by a write, or by the begin or end of a ride
             recorder.stalled = False
-            self.drive.speed.after_stall(now_ms)
+            self.drive.speed.source.after_stall(now_ms)
         speed = self.drive.poll(now_ms)
         if recorder.active:
-            recorder.add_fix(speed, self.drive.speed.place(now_ms))
+            recorder.add_fix(speed, self.drive.speed.source.place(now_ms))
 
     def _show(self, now_ms):
         """Put the page onto the display, or a notice from recording or speed source. Also do what is due as often: a

@@ -12,14 +12,8 @@ from .imu.sensor import Sensor
 
 def open_lcd(settings):
     """The Display. Its tick() raises SettingsError for pins that the I2C controller cannot use."""
-    return Display(
-        lambda hz: _open_bus(settings, "LCD", hz),
-        settings.LCD_BUS_HZ,
-        settings.DISPLAY,
-        settings.LCD_ADDRESSES,
-        settings.OLED_CONTRAST,
-        settings.OLED_INVERTED,
-    )
+    kind = settings.DISPLAY, settings.LCD_ADDRESSES, settings.OLED_CONTRAST, settings.OLED_INVERTED
+    return Display(lambda hz: _open_bus(settings, "LCD", hz), settings.LCD_BUS_HZ, *kind)
 
 
 def open_sensor(settings):

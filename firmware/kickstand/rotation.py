@@ -54,6 +54,17 @@ def rotate(out, m, a):
     out[2] = m[6] * x + m[7] * y + m[8] * z
 
 
+def frame(out, up, forward):
+    """Fill out, a matrix, with the rows left, up, forward of the axes with this up (length 1), whose forward is the
+    part of `forward` at a right angle to it. Raises ValueError if there is none."""
+    left, ahead = vector(), vector()
+    cross(left, up, forward)
+    normalize(left)
+    cross(ahead, left, up)
+    for i in range(3):
+        out[i], out[3 + i], out[6 + i] = left[i], up[i], ahead[i]
+
+
 def angle_deg(a, b):
     """The angle between two vectors, 0 to 180 degrees. By atan2, because acos of a 32-bit float is useless near 0 and
     180."""

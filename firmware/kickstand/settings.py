@@ -21,10 +21,6 @@ def _whole(low, high):
     return lambda value: isinstance(value, int) and low <= value <= high, words
 
 
-def _sample_rate(value):
-    return isinstance(value, int) and value in MIN_DLPF
-
-
 def _addresses(value):
     return isinstance(value, tuple) and bool(value) and all(isinstance(a, int) and 8 <= a <= 0x77 for a in value)
 
@@ -41,12 +37,9 @@ def _pin(value):
     return isinstance(value, int) and 0 <= value <= 48 and value not in port.TAKEN_PINS
 
 
-def _whole_pin(value):
-    return _pin(value) and value not in port.INPUT_PINS
-
-
 _INPUT = _pin, "a number from 0 to 48, no pin of the chip's own USB, flash or console"
-_PIN = _whole_pin, _INPUT[1] + ", and none that is an input only"  # a button needs a pull-up, which these have not
+# a button needs a pull-up, which pins that are inputs only have not
+_PIN = (lambda v: _pin(v) and v not in port.INPUT_PINS), _INPUT[1] + ", and none that is an input only"
 SD_PINS = ("SD_SCK", "SD_MOSI", "SD_MISO", "SD_CS")
 # The settings that name pins, for each speed source
 _SPEED_PINS = {None: (), "gps": ("GPS_TX", "GPS_RX"), "wheel": ("WHEEL_PIN",)}
@@ -54,7 +47,7 @@ _SPEED_PINS = {None: (), "gps": ("GPS_TX", "GPS_RX"), "wheel": ("WHEEL_PIN",)}
 # name: default, (check, what is allowed in words)
 _TABLE = {
     "SIDE": ("left", _one_of("left", "right")),
-    "SAMPLE_HZ": (200, (_sample_rate, "50, 100, 125 or 200")),
+    "SAMPLE_HZ": (200, (lambda v: isinstance(v, int) and v in MIN_DLPF, "50, 100, 125 or 200")),
     "ACCEL_RANGE_G": (8, _one_of(*sorted(ACCEL_LSB_PER_G))),
     "GYRO_RANGE_DPS": (500, _one_of(*sorted(GYRO_LSB_PER_DPS))),
     "DLPF": (3, _whole(1, 6)),

@@ -19,16 +19,11 @@ CHARGE_MS = 100
 
 # The modules that the app imports, in this order: between two of them, display and chip are set up a step further. The
 # list repeats the import statements, because MicroPython has no hook between imports; a test compares both.
-STEPS = [
-    folder + "." + name
-    for folder, names in (
-        ("calibration", "parameters store active transform"),
-        ("lean", "bike_model kalman measurements rest upright_trim lean_filter meter"),
-        ("ui", "messages pages page_ring screen"),
-        ("rides", "recording"),
-    )
-    for name in names.split()
-]
+STEPS = (
+    "calibration.parameters calibration.store calibration.active calibration.transform lean.bike_model lean.kalman "
+    "lean.measurements lean.rest lean.upright_trim lean.lean_filter lean.meter ui.messages ui.pages ui.page_ring "
+    "ui.screen rides.recording"
+).split()
 
 
 def _show(lcd, line1, line2=""):
@@ -74,7 +69,10 @@ def main():
 
 def _live(function, *arguments):
     """Do a step of LIVE. Return None, or what is reported of it: the lean goes on, and without a restart."""
-    problem = tried(function, *arguments)
+    try:
+        problem = tried(function, *arguments)
+    except LiveError as error:
+        problem = error
     if problem:
         if problem.code == "no-memory":
             problem = LiveError("live-memory", *problem.values)
@@ -83,20 +81,18 @@ def _live(function, *arguments):
 
 
 def _open_radio(opened, pin):
-    from .live.radio import open_radio
+    from .live.radio import Radio
 
-    opened.append(open_radio(pin))
+    opened.append(Radio(pin))
 
 
 def _attach(opened, app):
-    radio = opened[0]
     try:
         from .live.live import attach
 
-        attach(radio, app)
+        attach(opened[0], app)
     except (ImportError, MemoryError):
-        if not isinstance(radio, LiveError):
-            radio.stop()
+        opened[0].stop()
         raise
 
 

@@ -84,12 +84,10 @@ def _sensor(sensor, settings):
 def _display(lcd):
     lcd.show("Kickstand", "status: console")
     lcd.flush()
-    found = (
-        "%s at %s" % ("OLED" if lcd.draws else "LCD", hex(lcd.address))
-        if lcd.address
-        else "none answers: check wiring and LCD_ADDRESSES"
-    )
-    _print("Display", "%s", found)
+    if lcd.address:
+        _print("Display", "%s at %s", "OLED" if lcd.draws else "LCD", hex(lcd.address))
+    else:
+        _print("Display", "none answers: check wiring and LCD_ADDRESSES")
 
 
 def _speed(settings):
@@ -109,7 +107,7 @@ def _speed(settings):
         new = speed.poll(ticks_ms())
         heard = heard if new is None else new
         sleep_ms(10)
-    fault = speed.fault(ticks_ms())
+    fault = speed.source.fault(ticks_ms())
     if fault:
         print("  " + ", ".join(messages.lines(fault)))
     else:

@@ -18,6 +18,7 @@ from kickstand.lean.bike_model import (
     Linearisation,
     predict,
 )
+from kickstand.units import STANDARD_GRAVITY
 
 STEP_S = 0.01
 DISTANCE = 1e-4  # of a state, for the difference quotient
@@ -29,7 +30,7 @@ FORCES = ("left_row", "up_row")
 def random_state(chance):
     """A state without errors of the gyro's scale and axes, at a speed that no step brings to zero; force; rate."""
     x = np.zeros(STATES)
-    x[[LEAN, PITCH, SPEED, YAW_ERROR]] = chance.uniform([-1.0, -0.3, 0.5, -0.2], [1.0, 0.3, 4.0, 0.2])
+    x[[LEAN, PITCH, SPEED, YAW_ERROR]] = chance.uniform([-1.0, -0.3, 5.0, -0.2], [1.0, 0.3, 40.0, 0.2])
     x[BIAS_LEFT : BIAS_LEFT + 3] = chance.uniform(-0.05, 0.05, 3)
     return x, chance.uniform([-0.5, 0.5, -0.8], [0.5, 1.5, 0.8]), chance.uniform(-1.0, 1.0, 3)
 
@@ -77,6 +78,7 @@ def left_out(x, rates):
     out[0, SCALE_LEFT], out[0, CROSS_LEFT_UP] = tan * s * wx, tan * s * wy
     out[2, SPEED], out[2, BIAS_UP] = wy * y, -v * y
     out[3, SPEED], out[3, BIAS_UP], out[3, YAW_ERROR] = wy * y * y, -v * y * y, v * wy * y
+    out[3] /= STANDARD_GRAVITY
     return out
 
 
@@ -94,8 +96,8 @@ def rates_at(lean, speed, left=0.0, up=0.0):
 
 @pytest.mark.parametrize("lean", [-0.8, -0.3, 0.4, 0.9])
 def test_near_balance_the_turn_rates_are_those_at_which_no_force_goes_to_the_side(lean):
-    speed = 2.0  # 20 m/s
-    balanced = -math.sin(lean) / speed
+    speed = 20.0
+    balanced = -STANDARD_GRAVITY * math.sin(lean) / speed
     left, up = rates_at(lean, speed, 0.0, balanced + 0.05)
     x, sums = [0.0] * STATES, [0.0] * 9
     x[LEAN], x[SPEED] = lean, speed
@@ -105,8 +107,8 @@ def test_near_balance_the_turn_rates_are_those_at_which_no_force_goes_to_the_sid
 
 
 def test_far_from_balance_and_when_slow_the_turn_rates_are_the_measured_ones():
-    assert rates_at(0.5, 2.0, 0.1, 0.4) == (0.1, 0.4)  # a turn to the other side
-    assert rates_at(0.5, 0.3, 0.1, -1.6) == (0.1, -1.6)
+    assert rates_at(0.5, 20.0, 0.1, 0.4) == (0.1, 0.4)  # a turn to the other side
+    assert rates_at(0.5, 3.0, 0.1, -1.6) == (0.1, -1.6)
 
 
 def test_the_state_stays_within_its_bounds():

@@ -55,7 +55,7 @@ def speed_sigma_mps(forward_g, before_mps, now_mps):
         estimator.measure_speed(speed_mps)
     hold(estimator, 0.5, force)
     assert estimator._p
-    return sqrt(estimator._p.rows[SPEED][SPEED]) * GRAVITY_MPS2
+    return sqrt(estimator._p.rows[SPEED][SPEED])
 
 
 def test_a_measured_speed_may_be_late_while_the_measured_ones_change_whatever_the_force_is():

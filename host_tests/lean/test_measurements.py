@@ -5,7 +5,7 @@ The figures that the variances come to are those of test_known_ride.py.
 
 from math import radians, sin
 
-from bike_motion import GRAVITY_MPS2, near
+from bike_motion import near
 from kickstand.lean import measurements
 from kickstand.lean.bike_model import BIAS_LEFT, LEAN, PITCH, SPEED, STATES, YAW_ERROR, Linearisation
 
@@ -15,7 +15,7 @@ WINDOW_S = 0.2
 def model(forward=0.0, rates=(0.0, 0.0, 0.0), lean_deg=0.0, pitch_deg=0.0, speed_mps=0.0, yaw_error_deg=0.0):
     """The state and the model at it."""
     x = [0.0] * STATES
-    x[LEAN], x[PITCH], x[SPEED] = radians(lean_deg), radians(pitch_deg), speed_mps / GRAVITY_MPS2
+    x[LEAN], x[PITCH], x[SPEED] = radians(lean_deg), radians(pitch_deg), speed_mps
     x[YAW_ERROR] = radians(yaw_error_deg)
     return x, Linearisation(x, list(rates), forward)
 
@@ -39,10 +39,10 @@ def test_on_a_straight_the_bike_is_upright_and_elsewhere_its_speed_is_the_usual_
         (0.0, 2.0, 0.0, False),
     ):
         ((state, factor),), innovation, _ = measurements.straight_or_prior_speed(
-            radians(lean_deg), mps / GRAVITY_MPS2, radians(yaw_dps), WINDOW_S
+            radians(lean_deg), mps, radians(yaw_dps), WINDOW_S
         )
         assert (state, factor) == (LEAN if straight else SPEED, 1.0)
-        near(innovation, radians(-lean_deg) if straight else (15.0 - mps) / GRAVITY_MPS2, 1e-6)
+        near(innovation, radians(-lean_deg) if straight else 15.0 - mps, 1e-6)
 
 
 def test_at_rest_there_is_no_speed_the_rates_are_bias_and_the_force_is_the_vertical():

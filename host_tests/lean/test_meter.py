@@ -115,7 +115,7 @@ def test_the_lean_is_distrusted_for_a_reason_and_is_no_maximum_until_it_is_trust
     assert not shown.trusted
     near(shown.lean_deg, 30.0, 0.5)
     assert shown.max_right_deg < 0.1
-    shown.trust()
+    shown.distrust(None)
     assert shown.suppressed_reason is None
     assert ride(shown, 0.2, lean_deg=30.0).trusted
     near(shown.max_right_deg, 30.0, 0.2)

@@ -85,7 +85,7 @@ def run(board, radio):
     def go():
         chosen = Settings(type("Config", (), {"LIVE": True}))
         app = App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen))
-        live.attach(live_radio.open_radio(None), app)
+        live.attach(live_radio.Radio(None), app)
         phone = Forgetful(board)
         for count in range(WARM + ACTS):
             if count == WARM:

@@ -79,7 +79,7 @@ def drive(config, fit, until_s, port="rp2"):
             if new is not None:
                 got.append((board.clock.now_us / 1e6, new, speed.age_us))
             if turn % 100 == 0:
-                fault = speed.fault(ticks_ms())
+                fault = speed.source.fault(ticks_ms())
                 faults[turn // 100] = None if fault is None else lines(fault)
             turn += 1
             sleep_us(STEP_US - board.clock.now_us % STEP_US)

@@ -26,10 +26,8 @@ SHIFT_REFRESHES = 6
 # Control byte of a stream of commands, then: clock, 64 rows, no offset, columns and rows from the side opposite to the
 # cable, alternate COM pins, pre-charge, VCOMH, show the RAM
 _SET_UP = b"\x00\xd5\x80\xa8\x3f\xd3\x00\xa1\xc8\xda\x12\xd9\xf1\xdb\x40\xa4"
-_SUPPLY = (
-    b"\x8d\x14\x20\x02\x2e",
-    b"\xad\x8b",
-)  # charge pump, page addressing, no scrolling; an SH1106's DC-DC converter
+# charge pump, page addressing, no scrolling; an SH1106's DC-DC converter
+_SUPPLY = (b"\x8d\x14\x20\x02\x2e", b"\xad\x8b")
 _SPREAD = bytes((i & 1) * 3 | (i & 2) * 6 | (i & 4) * 12 | (i & 8) * 24 for i in range(16))  # each bit twice
 
 

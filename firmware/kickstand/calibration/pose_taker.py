@@ -11,8 +11,7 @@ SETTLING = 0  # waiting for stillness
 SETTLED = 1  # for one sample: it has been still for SETTLE_MS, and averaging begins
 AVERAGING = 2
 DONE = 3  # for one sample: the pose is complete
-SPOILT = 4  # for one sample: see problem
-_ENDED = 5
+_ENDED = 4
 
 
 class PoseTaker:
@@ -20,7 +19,7 @@ class PoseTaker:
 
     chip: an Mpu6050, for its scale and range. rate_hz: samples a second. seconds: how long to average.
     settled: the mean reading (3, g) of the half second before averaging, once SETTLED. pose: the StillPose, finished
-    once DONE. problem: the CaptureError, once SPOILT.
+    once DONE.
     """
 
     def __init__(self, chip, rate_hz, seconds):
@@ -35,11 +34,11 @@ class PoseTaker:
         self._state = SETTLING
         self._waited = 0
         self.settled = None
-        self.problem = None
         self.pose = self._new(self._settle_count)
 
     def step(self, counts):
-        """Take one sample (7 counts, the chip's order); return one of the states above."""
+        """Take one sample (7 counts, the chip's order); return one of the states above. Raises CaptureError, which
+        ends it."""
         if self._state == SETTLING:
             return self._settle(counts)
         if self._state == AVERAGING:
@@ -61,32 +60,27 @@ class PoseTaker:
 
     def _settle(self, counts):
         self._waited += 1
-        still = self.pose.add(counts)
-        if still and self.pose.count < self._settle_count:
-            return SETTLING
         try:
-            self.pose.finish()
-        except CaptureError as problem:
-            if self._waited < self._give_up_count:
-                self.pose = self._new(self._settle_count)
+            self.pose.add(counts)
+            if self.pose.count < self._settle_count:
                 return SETTLING
-            return self._spoil(problem)
+            self.pose.finish()
+        except CaptureError:
+            if self._waited >= self._give_up_count:
+                self._state = _ENDED
+                raise
+            self.pose = self._new(self._settle_count)
+            return SETTLING
         self.settled = self.pose.accel
         self._state = AVERAGING
         self.pose = self._new(self._take_count)
         return SETTLED
 
     def _average(self, counts):
-        if self.pose.add(counts) and self.pose.count < self._take_count:
-            return AVERAGING
-        try:
+        self._state = _ENDED  # of a complete pose, and of one that is refused
+        self.pose.add(counts)
+        if self.pose.count == self._take_count:
             self.pose.finish()
-        except CaptureError as problem:
-            return self._spoil(problem)
-        self._state = _ENDED
-        return DONE
-
-    def _spoil(self, problem):
-        self.problem = problem
-        self._state = _ENDED
-        return SPOILT
+            return DONE
+        self._state = AVERAGING
+        return AVERAGING

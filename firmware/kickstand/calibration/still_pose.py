@@ -21,7 +21,7 @@ class StillPose:
 
     accel_lsb_per_g, gyro_lsb_per_dps: counts per unit. accel_limit: |counts| from which on an axis is saturated.
     expected: number of samples to come; the check for drift compares their halves.
-    count: samples taken. problem: a CaptureError once the pose is spoilt, or None.
+    count: samples taken. A pose that a CaptureError has spoilt is not to be used any more.
     After finish(): accel (3, g, sensor's axes, uncalibrated), gyro (3, deg/s).
     """
 
@@ -38,59 +38,45 @@ class StillPose:
         self._early = [0] * 7  # the sums at half time
         self._squares = [0] * 7
         self.count = 0
-        self.problem = None
         self.accel = None
         self.gyro = None
 
     def add(self, counts):
-        """Take one sample (7 integers, the chip's order). False once the pose is spoilt."""
-        if self.problem is not None:
-            return False
+        """Take one sample (7 integers, the chip's order). Raises CaptureError."""
         if self.count == 0:
             for i in range(7):
                 self._first[i] = counts[i]
         for i in _AXES:
             deviation = counts[i] - self._first[i]
             if not -self._peaks[i] <= deviation <= self._peaks[i]:
-                self.problem = CaptureError("moved")
-                return False
+                raise CaptureError("moved")
             if i < 3 and not -self._limit < counts[i] < self._limit:
-                self.problem = CaptureError("saturated")
-                return False
+                raise CaptureError("saturated")
             self._sums[i] += deviation
             self._squares[i] += deviation * deviation
         self.count += 1
         if self.count == self._half:
             for i in range(7):
                 self._early[i] = self._sums[i]
-        return True
 
     def finish(self):
         """Check the whole pose, and set accel and gyro. Raises CaptureError."""
-        if self.problem is None:
-            self.problem = self._judge()
-        if self.problem is not None:
-            raise self.problem
-        n = self.count
-        mean = [self._first[i] + self._sums[i] / n for i in range(7)]
-        self.accel = [mean[i] / self._accel_lsb for i in range(3)]
-        self.gyro = [mean[i] / self._gyro_lsb for i in range(4, 7)]
-
-    def _judge(self):
         n = self.count
         if n < MIN_SAMPLES:
-            return CaptureError("too-few", n, MIN_SAMPLES)
+            raise CaptureError("too-few", n, MIN_SAMPLES)
         if not any(self._squares):
-            return CaptureError("frozen-pose")
+            raise CaptureError("frozen-pose")
         late = n - self._half
         for i in range(3):
-            mean = self._sums[i] / n
-            if self._squares[i] / n - mean * mean > (SPREAD_G * self._accel_lsb) ** 2:
-                return CaptureError("vibration")
+            off = self._sums[i] / n
+            if self._squares[i] / n - off * off > (SPREAD_G * self._accel_lsb) ** 2:
+                raise CaptureError("vibration")
             drift = (self._sums[i] - self._early[i]) / late - self._early[i] / self._half
             if abs(drift) > DRIFT_G * self._accel_lsb:
-                return CaptureError("tilting")
-        for i in range(4, 7):
-            if abs(self._first[i] + self._sums[i] / n) > MAX_REST_RATE_DPS * self._gyro_lsb:
-                return CaptureError("gyro-offset", MAX_REST_RATE_DPS)
-        return None
+                raise CaptureError("tilting")
+        mean = [self._first[i] + self._sums[i] / n for i in range(7)]
+        accel = [mean[i] / self._accel_lsb for i in range(3)]
+        gyro = [mean[i] / self._gyro_lsb for i in range(4, 7)]
+        if max(abs(rate) for rate in gyro) > MAX_REST_RATE_DPS:
+            raise CaptureError("gyro-offset", MAX_REST_RATE_DPS)
+        self.accel, self.gyro = accel, gyro

@@ -8,7 +8,7 @@ and z come out pointing right and backward, and both signs are changed.
 from math import atan2, degrees
 
 from ..errors import AlignmentError
-from ..rotation import cross, dot, matrix, norm, normalize, vector
+from ..rotation import cross, dot, frame, matrix, norm, normalize, vector
 
 # Least tilt between the poses. At 5 degrees, one degree of pitch between them makes a yaw error of 11 degrees; at 8, 7.
 MIN_TILT_DEG = 5.0
@@ -50,16 +50,9 @@ def two_position(out, kickstand, upright, side="left", tolerance_g=UNCALIBRATED_
         raise AlignmentError("tilt-small", tilt, MIN_TILT_DEG)
     if tilt > MAX_TILT_DEG:
         raise AlignmentError("tilt-large", tilt, MAX_TILT_DEG)
-    normalize(z)
     if side == "right":
         z[0], z[1], z[2] = -z[0], -z[1], -z[2]
-    x = vector()
-    cross(x, y, z)
-    normalize(x)
-    for i in range(3):
-        out[i] = x[i]
-        out[3 + i] = y[i]
-        out[6 + i] = z[i]
+    frame(out, y, z)
     return tilt
 
 
@@ -70,11 +63,7 @@ def align(calibration, kickstand, upright, side):
     bias is that of the kickstand pose: a stand holds the bike stiller than a rider does. Raises AlignmentError.
     """
     vehicle_from_sensor = matrix()
-    tilt = two_position(
-        vehicle_from_sensor,
-        calibration.correct(kickstand.accel),
-        calibration.correct(upright.accel),
-        side,
-        CALIBRATED_TOLERANCE_G if calibration.six_done else UNCALIBRATED_TOLERANCE_G,
-    )
+    poses = calibration.correct(kickstand.accel), calibration.correct(upright.accel)
+    tolerance_g = CALIBRATED_TOLERANCE_G if calibration.six_done else UNCALIBRATED_TOLERANCE_G
+    tilt = two_position(vehicle_from_sensor, *poses, side, tolerance_g)
     return calibration.with_alignment(vehicle_from_sensor, kickstand.gyro), tilt

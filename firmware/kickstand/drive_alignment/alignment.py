@@ -16,7 +16,7 @@ each call does a short step of the work.
 """
 
 from ..errors import AlignmentError
-from ..rotation import cross, normalize, vector
+from ..rotation import frame, vector
 from ..units import GAP_US
 from .events import DrivingEvents
 from .history import BIN_US, ForceHistory
@@ -182,14 +182,9 @@ class DriveAlignment:
         """Fill out (9, rows left, up, forward) with vehicle-from-sensor. Raises AlignmentError while not ready."""
         if not self.ready:
             raise self.reason
-        up, left, forward = vector(), vector(), vector()
+        up = vector()
         self.vertical.known(up, self.quality.fit)
-        cross(left, up, self.quality.fit.forward)
-        normalize(left)
-        cross(forward, left, up)
-        for row, axis in enumerate((left, up, forward)):
-            for i in range(3):
-                out[3 * row + i] = axis[i]
+        frame(out, up, self.quality.fit.forward)
 
     def _do_step(self):
         """One short step of work, if there is any."""
@@ -226,7 +221,7 @@ class DriveAlignment:
     def _follow(self):
         """Process the last interval between two speeds; a generator of short steps."""
         yield from self.events.follow(self._bias_given or self.standing.stops)
-        judged = (self.events.straight_count, self.standing.stops)
+        judged = (self.events.braking_count + self.events.acceleration_count, self.standing.stops)
         if judged != self._judged:
             self._judged = judged
             yield from self.quality.judge()

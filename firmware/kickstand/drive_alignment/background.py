@@ -157,7 +157,7 @@ class BackgroundAlignment:
             elif verdict == REFINED and drive.ready:
                 self._adopt(False)
             elif verdict == SAME:
-                self._meter.trust()
+                self._meter.distrust(None)
 
     def _away(self):
         """True while the vehicle drives. A faulty speed source may say zero for ever: then the lean filter's own
@@ -184,7 +184,7 @@ class BackgroundAlignment:
         code, self.message = self.message.code, None
         self._answered.append(code)
         if code in _QUESTIONS:
-            self._meter.trust()
+            self._meter.distrust(None)
         if agreed and code == STAND_SIDE:
             old = self._meter.calibration
             turned = matrix(old.vehicle_from_sensor)

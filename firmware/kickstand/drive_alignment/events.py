@@ -31,16 +31,14 @@ class EventFinder:
     braking). Whether an event was straight depends on the lag of the speed, so that is kept for each lag.
     """
 
-    def __init__(self, lags):
-        self._straight_change = [0.0] * lags  # the part of change that was straight
+    def __init__(self):
         self.interrupt()
 
     def interrupt(self):
         """Speeds are missing: drop the event under way."""
         self.going_on = False
         self.change = 0.0
-        for lag in range(len(self._straight_change)):
-            self._straight_change[lag] = 0.0
+        self._straight_change = [0.0] * LAGS  # the part of change that was straight
 
     def update(self, change_mps, seconds, straight):
         """Take one change of speed. straight: for each lag, True if the vehicle drove straight meanwhile. Returns True
@@ -55,7 +53,7 @@ class EventFinder:
             self.going_on = True
         if self.going_on:
             self.change += change_mps
-            for lag in range(len(straight)):
+            for lag in range(LAGS):
                 if straight[lag]:
                     self._straight_change[lag] += change_mps
         return False
@@ -69,14 +67,8 @@ class LastEvent:
     """Forward from the latest event alone, given the vertical: good to some 10 degrees, but known at once."""
 
     def __init__(self):
-        self._force = [0.0] * 3
-        self.clear()
-
-    def clear(self):
-        """Drop the sums, because a new event begins."""
         self._weight = self._change = 0.0
-        for i in range(3):
-            self._force[i] = 0.0
+        self._force = [0.0] * 3
 
     def add(self, seconds, change_g, force):
         """Add a straight interval of the event; arguments as for ForwardRegression.add()."""
@@ -108,8 +100,7 @@ class DrivingEvents:
         self.regression = ForwardRegression()
         self.last = LastEvent()
         self._history = history
-        self._finder = EventFinder(LAGS)
-        self._fit = Fit()
+        self._finder = EventFinder()
         # for each lag: the history's integrals at the end of the last interval, whether they were known, and whether
         # that interval was straight
         self._ends = [[0] * COLUMNS for _ in range(LAGS)]
@@ -118,11 +109,6 @@ class DrivingEvents:
         self._end = [0] * COLUMNS
         self._before = (0.0, 0)  # speed and time at the end of the last interval
         self._waiting = []  # speed and time at the ends of the intervals to be processed
-
-    @property
-    def straight_count(self):
-        """Number of all straight events."""
-        return self.braking_count + self.acceleration_count
 
     @property
     def counted(self):
@@ -146,8 +132,7 @@ class DrivingEvents:
         self._forget_interval()
 
     def _forget_interval(self):
-        for lag in range(LAGS):
-            self._known[lag] = False
+        self._known = [False] * LAGS
         self._finder.interrupt()
 
     def measure_speed(self, speed_mps, time_us):
@@ -199,13 +184,13 @@ class DrivingEvents:
             yield from self._end_event()
         elif self._finder.going_on:
             if self._finder.change == change:  # its first interval
-                self.last.clear()
+                self.last = LastEvent()
             if straight[self.lag]:
                 self.last.add(seconds, change_g, best_force)
 
     def _end_event(self):
         """Find the lag that fits best after the event that has ended, and count the event if it was straight."""
-        fit = self._fit
+        fit = Fit()
         explained = [0.0] * LAGS
         for lag in range(LAGS):
             if (yield from self.regression.fitting(fit, lag)):

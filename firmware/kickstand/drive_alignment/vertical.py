@@ -32,14 +32,14 @@ MAX_CHANGE_DEG = 8.0  # largest difference of two verticals by slopes of the roa
 class StandingVertical:
     """update() with each mean over about 0.1 s.
 
-    stops: their number; up: the vertical in the sensor's axes (unit vector) once there was a stop; bias: the gyro's (3,
-    deg/s) at the last stop; standing: True during a stop; moved: True if the verticals of two stops differ so much that
-    the mount must have moved.
+    stops: their number; up: the vertical in the sensor's axes (unit vector), None before the first one; bias: the
+    gyro's (3, deg/s) at the last stop; standing: True during a stop; moved: True if the verticals of two stops differ
+    so much that the mount must have moved.
     """
 
     def __init__(self, bias=(0.0, 0.0, 0.0)):
         self.stops = 0
-        self.up = vector()
+        self.up = None
         self.bias = list(bias)
         self.standing = False
         self.moved = False
@@ -109,9 +109,8 @@ class StandingVertical:
             self.stops += 1
         size = norm(self._stop_force)
         self._direction = [component / size for component in self._stop_force]
-        for i in range(3):
-            self.bias[i] = self._stop_bias[i]
-            self.up[i] = self._sum[i] + self._direction[i]
+        self.bias[:] = self._stop_bias
+        self.up = [self._sum[i] + self._direction[i] for i in range(3)]
         normalize(self.up)
         if self.stops > 1 and angle_deg(self._direction, self._sum) > MAX_CHANGE_DEG:
             self.moved = True
@@ -140,7 +139,7 @@ class Vertical:
     @property
     def turn_axis(self):
         """The axis of the yaw rate (3, length about 1), known from the first update() on."""
-        return self._standing.up if self.is_car and self._standing.stops else self._from_pose or self._mean
+        return (self.is_car and self._standing.up) or self._from_pose or self._mean
 
     def known(self, out, fit=None):
         """Fill out (unit vector) with the vertical. Returns False if it is not known yet (a car's before its first
@@ -148,17 +147,13 @@ class Vertical:
 
         fit: the Fit of all straight driving, None if there is none yet.
         """
-        if self._from_pose is not None:
-            best = self._from_pose
-        elif self.is_car and not self._standing.stops:
-            return False
-        elif fit is None:
-            best = self._standing.up if self.is_car else self._mean
-        elif self.is_car:
-            best = [self._standing.up[i] + fit.level[i] / norm(fit.level) for i in range(3)]
+        if self.is_car:
+            best = self._standing.up
+            if best and fit:
+                best = [best[i] + fit.level[i] / norm(fit.level) for i in range(3)]
         else:
-            best = fit.level
-        if best is None:
+            best = self._from_pose or (fit.level if fit else self._mean)
+        if not best:
             return False
         for i in range(3):
             out[i] = best[i]

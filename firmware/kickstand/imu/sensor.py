@@ -36,11 +36,6 @@ class Sensor:
         self.fault = Notice("starting")
         self._running = False
 
-    @property
-    def emptied(self):
-        """True if the last fetch() left no sample in the chip's FIFO."""
-        return not self.chip.frames_left
-
     def set_up(self):
         """Free the bus and set the chip up, in 0.2 s. Raises UnknownChip, OSError, or SettingsError for wrong pins."""
         self.chip.connect(self.reopen())

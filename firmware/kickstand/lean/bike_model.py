@@ -1,6 +1,6 @@
 """A motorcycle's states, its equations of motion and of what a sensor on it measures, and their partial derivatives.
 
-Axes: left (x), up (y), forward (z). Units: rad, rad/s and s; forces in g, so speeds in g s (m/s divided by 9.80665).
+Axes: left (x), up (y), forward (z). Units: rad, rad/s, m/s, m and s; forces in g, which is 9.80665 m/s^2.
 
 State                                       Measured (a vector with [3] has the components left, up, forward)
     t  LEAN   roll, > 0 to the right            f    specific force [3]
@@ -17,18 +17,18 @@ the speed are not separately observable.
 
 Equations, with ' for the derivative by time
     rates, corrected         w = w_m - b,  then  w_z -= c_zx w_x + c_zy w_y + s_z w_z,  w_x -= s_x w_x + c_xy w_y
-    rotation, exact          t' = w_z - tan q (w_x sin t + w_y cos t)            (1)
-                             q' = w_y sin t - w_x cos t                          (2)
-    wheels do not slide      v' = f_z - sin q + v w_y psi                        (3)
-                             f_x = cos q sin t + v w_y + psi v' - h cos t w_z'   (4)
-                             f_y = cos q cos t - v w_x - h w_z^2                 (5)
-    roads are level          0 = q + psi sin t  on average                       (6)
-    lean of the bike itself  t - psi cos t (q + psi sin t)                       (7)
+    rotation, exact          t' = w_z - tan q (w_x sin t + w_y cos t)                  (1)
+                             q' = w_y sin t - w_x cos t                                (2)
+    wheels do not slide      v' = g (f_z - sin q) + v w_y psi                          (3)
+                             f_x = cos q sin t + (v w_y + psi v' - h cos t w_z') / g   (4)
+                             f_y = cos q cos t - (v w_x + h w_z^2) / g                 (5)
+    roads are level          0 = q + psi sin t  on average                             (6)
+    lean of the bike itself  t - psi cos t (q + psi sin t)                             (7)
 
 t and q are those of the sensor's axes, which psi has turned: they share in the bike's own pitch, q + psi sin t. On a
 slope of 10 % a yaw error of 5 degrees makes half a degree of lean.
 
-h is the height of the sensor above the roll axis. (4) and (5) are A. Nicolae's (22) and (23) with s = v w. In a
+h is the height of the sensor above the roll axis. (4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a
 steady turn (4) and (5) cannot separate lean from speed, because their derivatives by lean and by speed are in the same
 proportion. There the ratio of two rates gives the lean: pitch does not change, by (6), so that by (2) w_x / w_y is
 tan t. Just after the bike has entered a turn its speed is still known from before, and (4) with this speed gives the
@@ -47,9 +47,10 @@ SCALE_LEFT, CROSS_LEFT_UP = 7, 8
 CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD = 9, 10, 11
 
 MAX_PITCH = 1.2  # rad. No motorcycle reaches it, a sensor in the hand may; at 90 degrees lean has no meaning.
+MIN_PITCH = -MAX_PITCH  # once: in each sample a negation would take heap and time
 
 # Where the yaw rate of a bike in balance replaces the measured one. Comments in the form of measurements.py.
-BALANCE_MIN_SPEED = 4.0 / STANDARD_GRAVITY  # g s. Larger: the balanced rate is not used in slow turns.
+BALANCE_MIN_SPEED = 4.0  # m/s. Larger: the balanced rate is not used in slow turns.
 # The balanced rate is used where the measured one is within BALANCE_RATE + BALANCE_SHARE x |balanced rate| of it.
 BALANCE_RATE = 0.1  # rad/s: constant part of that tolerance. Larger: used too where lean or speed are wrong.
 BALANCE_SHARE = 0.5  # ratio: part of that tolerance that grows with the rate. Larger: as above.
@@ -81,20 +82,21 @@ def predict(x, force, rate, seconds, sums):
     st, ct = sin(t), cos(t)
     sq = sin(q)
     cq = sqrt(1.0 - sq * sq)
-    sideways = v * wy
+    per_rate = v / STANDARD_GRAVITY  # g in a turn of 1 rad/s
+    sideways = per_rate * wy
     acceleration = fz - sq + sideways * yaw_error
     x[LEAN] = t + (wz - sq / cq * (wx * st + wy * ct)) * seconds
     q += (wy * st - wx * ct) * seconds
     if q > MAX_PITCH:
         q = MAX_PITCH
-    elif q < -MAX_PITCH:
-        q = -MAX_PITCH
+    elif q < MIN_PITCH:
+        q = MIN_PITCH
     x[PITCH] = q
-    speed = v + acceleration * seconds
+    speed = v + acceleration * seconds * STANDARD_GRAVITY
     x[SPEED] = speed if speed > 0.0 else 0.0
     left = fx - cq * st - sideways - acceleration * yaw_error
     sums[0] += left
-    sums[1] += fy - cq * ct + v * wx
+    sums[1] += fy - cq * ct + per_rate * wx
     sums[2] += wx
     sums[3] += wy
     sums[4] += wz
@@ -105,16 +107,21 @@ def predict(x, force, rate, seconds, sums):
     return wz
 
 
+def possible_pitch(pitch):
+    """pitch within +-MAX_PITCH: at a right angle predict() would divide by zero, as with a board that lies flat."""
+    return max(MIN_PITCH, min(MAX_PITCH, pitch))
+
+
 def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
     """Rates about left and up, for products of a state and a rate: those of a bike in balance at this lean and speed
-    (v w_y = -cos q sin t) if the measured rate about up is close to them, else the measured ones. speed: 0 for the
+    (v w_y / g = -cos q sin t) if the measured rate about up is close to them, else the measured ones. speed: 0 for the
     measured ones in any case.
 
     Noise of a measured rate would be squared in such products, and speed and lean would be estimated too small (the
     problem of errors in variables).
     """
     if speed > BALANCE_MIN_SPEED:
-        balanced = -cos_pitch * sin_lean / speed
+        balanced = -STANDARD_GRAVITY * cos_pitch * sin_lean / speed
         if abs(rate_up - balanced) < BALANCE_SHARE * abs(balanced) + BALANCE_RATE:
             return balanced * sin_lean / max(cos_lean, BALANCE_MIN_COS), balanced
     return rate_left, rate_up
@@ -135,7 +142,8 @@ class Linearisation:
         st, ct, sq = sin(x[LEAN]), cos(x[LEAN]), sin(x[PITCH])
         cq = sqrt(1.0 - sq * sq)
         yaw_rate = wx * st + wy * ct  # about the vertical, where there is no pitch
-        sideways = speed * wy
+        per_rate = speed / STANDARD_GRAVITY  # g in a turn of 1 rad/s
+        sideways = per_rate * wy
         acceleration = forward - sq + sideways * yaw_error
         turn_x, turn_y = turn_rates(speed if lean_variance < BALANCE_SIGMA**2 else 0.0, st, ct, cq, wx, wy)
         self.lean_row = (
@@ -153,23 +161,23 @@ class Linearisation:
             (CROSS_LEFT_UP, ct * turn_y),  # d pitch' / d c_xy
         )
         self.speed_row = (
-            (PITCH, -cq),  # d speed' / d q
-            (YAW_ERROR, sideways),  # d speed' / d psi
+            (PITCH, -cq * STANDARD_GRAVITY),  # d speed' / d q
+            (YAW_ERROR, speed * wy),  # d speed' / d psi
         )
         self.left_row = (
             (LEAN, cq * ct),  # d left / d t
             (PITCH, -sq * st - cq * yaw_error),  # d left / d q
-            (SPEED, turn_y),  # d left / d v
-            (BIAS_UP, -speed),  # d left / d b_y
+            (SPEED, turn_y / STANDARD_GRAVITY),  # d left / d v
+            (BIAS_UP, -per_rate),  # d left / d b_y
             (YAW_ERROR, acceleration),  # d left / d psi
         )
         self.up_row = (
             (LEAN, -cq * st),  # d up / d t
             (PITCH, -sq * ct),  # d up / d q
-            (SPEED, -turn_x),  # d up / d v
-            (BIAS_LEFT, speed),  # d up / d b_x
-            (SCALE_LEFT, speed * turn_x),  # d up / d s_x
-            (CROSS_LEFT_UP, speed * turn_y),  # d up / d c_xy
+            (SPEED, -turn_x / STANDARD_GRAVITY),  # d up / d v
+            (BIAS_LEFT, per_rate),  # d up / d b_x
+            (SCALE_LEFT, per_rate * turn_x),  # d up / d s_x
+            (CROSS_LEFT_UP, per_rate * turn_y),  # d up / d c_xy
         )
         self.level_row = (
             (PITCH, 1.0),  # d level / d q
@@ -177,8 +185,8 @@ class Linearisation:
             (YAW_ERROR, st),  # d level / d psi
         )
         self.sin_lean, self.cos_lean, self.sin_pitch, self.cos_pitch = st, ct, sq, cq
-        self.speed, self.yaw_rate, self.sideways, self.acceleration = speed, yaw_rate, sideways, acceleration
-        self.pitch_rate = wy * st - wx * ct
+        self.speed, self.yaw_rate, self.sideways = speed, yaw_rate, sideways
+        self.pitching = per_rate * (wy * st - wx * ct)  # speed x pitch rate, in g
 
     def lean_by_pitch(self, x):
         """(7): the part of the state's lean, rad, that is the bike's own pitch, which the yaw error shows as lean."""

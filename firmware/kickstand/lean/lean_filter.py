@@ -7,14 +7,14 @@ update      with them the covariance is propagated over the window and corrected
 inject      the corrections that were found go into the state
 
 Linearise to inject take longer than a sample lasts. They are a generator, which is spread over the samples of the next
-window: each of them runs it as far as its next yield. Forces are in g, speeds in g s, angles in rad.
+window: each of them runs it as far as its next yield. Forces are in g, speeds in m/s, angles in rad.
 """
 
 from math import atan2, degrees, pi, sin, sqrt
 
 from ..units import STANDARD_GRAVITY
 from . import measurements
-from .bike_model import BIAS_LEFT, LEAN, MAX_PITCH, PITCH, SPEED, STATES, YAW_ERROR, Linearisation, predict
+from .bike_model import BIAS_LEFT, LEAN, PITCH, SPEED, STATES, YAW_ERROR, Linearisation, possible_pitch, predict
 from .kalman import Covariance
 from .rest import MAX_BIAS_RADPS, RestDetector
 from .upright_trim import UprightTrim
@@ -24,9 +24,9 @@ FIRST_WINDOW_US = 50_000
 WORK_STEPS = 21  # steps of the work on a window; a test counts them
 SLOW_STEP_US = 12_000  # samples that are further apart leave time for all steps at once
 DELAY_S = 0.0048  # delay of the MPU6050's gyro at DLPF 3
-# g s: the filter restarts above it. A board that lies on its nose seems to accelerate, but its standstill is detected
+# m/s: the filter restarts above it. A board that lies on its nose seems to accelerate, but its standstill is detected
 # before it gets there.
-MAX_SPEED = 250.0 / STANDARD_GRAVITY
+MAX_SPEED = 250.0
 
 
 class LeanFilter:
@@ -79,12 +79,12 @@ class LeanFilter:
         self._work = None
         p.add_noise(LEAN, (measurements.SIGMA_LOST_RATE * seconds) ** 2)
         p.add_noise(PITCH, (measurements.SIGMA_LOST_RATE * seconds) ** 2 / 16)
-        p.add_noise(SPEED, (measurements.SIGMA_LOST_FORCE * seconds) ** 2)
+        p.add_noise(SPEED, (measurements.SIGMA_LOST_FORCE * STANDARD_GRAVITY * seconds) ** 2)
 
     @property
     def speed_mps(self):
         """Estimated speed."""
-        return self._x[SPEED] * STANDARD_GRAVITY
+        return self._x[SPEED]
 
     @property
     def pitch_deg(self):
@@ -93,7 +93,7 @@ class LeanFilter:
 
     def measure_speed(self, speed_mps):
         """Keep a measured speed for the next window. Optional."""
-        self._speed = speed_mps / STANDARD_GRAVITY
+        self._speed = speed_mps
 
     @property
     def variance(self):
@@ -147,8 +147,7 @@ class LeanFilter:
             self._p, self._force_error = None, 0.0  # nothing is kept: the sensor's errors may be no numbers either
             self.restart()
             return
-        # see forces(): divided by standard gravity, so that metres times this are g
-        roll_acceleration = (self._roll_rate - self._last_roll_rate) / seconds / STANDARD_GRAVITY
+        roll_acceleration = (self._roll_rate - self._last_roll_rate) / seconds
         self._last_roll_rate = self._roll_rate
         rested = self._rest.resting
         pushed = abs(means[7] - sin(x[PITCH])) > measurements.MAX_REST_PUSH
@@ -187,7 +186,7 @@ class LeanFilter:
         fx, fy, fz = means[5:8]
         x, p = self._x, self._p
         x[LEAN] = atan2(fx, fy)
-        x[PITCH] = _possible_pitch(atan2(fz, sqrt(fx * fx + fy * fy)))
+        x[PITCH] = possible_pitch(atan2(fz, sqrt(fx * fx + fy * fy)))
         x[SPEED] = 0.0
         self._upright = self.trim.angle
         p.set_variance(LEAN, measurements.SIGMA_STAND**2)
@@ -251,7 +250,7 @@ class LeanFilter:
         for i in range(STATES):
             x[i] += p.take_correction(i)
         x[SPEED] = max(0.0, x[SPEED])
-        x[PITCH] = _possible_pitch(x[PITCH])
+        x[PITCH] = possible_pitch(x[PITCH])
         # At rest the force shows the lean, and the estimated yaw error of a sensor in the hand may be anything
         if not self._rest.resting:
             self._upright = self.trim.angle + model.lean_by_pitch(x)
@@ -259,8 +258,3 @@ class LeanFilter:
             x[LEAN] -= 2 * pi
         elif x[LEAN] < -pi:
             x[LEAN] += 2 * pi
-
-
-def _possible_pitch(pitch):
-    """pitch within +-MAX_PITCH: at a right angle predict() would divide by zero, as with a board that lies flat."""
-    return max(-MAX_PITCH, min(MAX_PITCH, pitch))

@@ -5,8 +5,7 @@ expected) and the variance of its noise. model: a Linearisation. x: the state. m
 
 SIGMA_... are standard deviations (1 sigma). A disturbance that lasts tau seconds, measured once in each window of T
 seconds, gets the variance sigma^2 2 tau / T, because measurements that share an error must not count as independent.
-Speeds are written in m/s and divided by standard gravity, as the model has them (g s). Standing still and the
-trim have their own parameters in rest.py and upright_trim.py, in the same form.
+Standing still and the trim have their own parameters in rest.py and upright_trim.py, in the same form.
 """
 
 from math import radians
@@ -23,7 +22,7 @@ START_MAX_FORCE = 0.05  # g: largest deviation from 1 g that counts as standing.
 SIGMA_START = (
     radians(1.5),  # rad: lean of a bike that stands, by the force
     radians(5.0),  # rad: pitch
-    15.0 / STANDARD_GRAVITY,  # g s: speed
+    15.0,  # m/s: speed
     radians(1.0),  # rad/s: drift of the gyro's bias since the calibration, left
     radians(1.0),  # rad/s: up
     radians(1.0),  # rad/s: forward
@@ -38,12 +37,12 @@ SIGMA_START = (
 SIGMA_FRESH_BIAS = radians(0.2)
 # rad: the first lean's standard deviation where the bike moves. Larger: lean is shown later, and follows forces more.
 SIGMA_START_LEAN_MOVING = radians(30.0)
-# g s: mean of the speed's prior while nothing measures it. Larger: leans that began before power-on come out larger.
-PRIOR_SPEED = 15.0 / STANDARD_GRAVITY
+# m/s: mean of the speed's prior while nothing measures it. Larger: leans that began before power-on come out larger.
+PRIOR_SPEED = 15.0
 
 # Process noise, per square root of a second
 NOISE_ANGLE = radians(0.24)  # rad: vibration of the gyro. Larger: lean follows the forces more and the gyro less.
-NOISE_SPEED = 0.35 / STANDARD_GRAVITY  # g s. Larger: speed follows turns sooner, and is less steady on straights.
+NOISE_SPEED = 0.35  # m/s. Larger: speed follows turns sooner, and is less steady on straights.
 NOISE_BIAS = radians(0.01)  # rad/s: 0.6 deg/s in five minutes of warming up. Larger: long turns are mistaken for bias.
 # Where readings are lost
 # rad/s: process noise over lost readings: how far the roll rate may have been from the one measured after the gap; a
@@ -62,7 +61,7 @@ PITCHING_SHARE = 2.0
 SHAKEN_SHARE = 0.1
 ROLL_HEIGHT_M = 0.4  # m: h, the sensor's height above the roll axis. Larger: rolling explains more of the force.
 SIGMA_ROLL_HEIGHT_M = 0.4  # m: standard deviation of h. Larger: forces count less while the bike rolls quickly.
-SIGMA_MEASURED_SPEED = 1.0 / STANDARD_GRAVITY  # g s: speed by a receiver or a wheel sensor. Larger: it counts for less.
+SIGMA_MEASURED_SPEED = 1.0  # m/s: speed by a receiver or a wheel sensor. Larger: it counts for less.
 MEASURED_SPEED_LATE_S = 1.0  # s: delay that speed may have. Larger: it counts for less while speeding up and braking.
 
 # Assumptions that take the place of measurements
@@ -74,10 +73,10 @@ STEEP = radians(6.0)
 # The bike rides straight where lean and yaw rate are under the first two of these and the speed is over the third.
 STRAIGHT_MAX_LEAN = radians(8.0)  # rad. Larger: the lean of wide turns is drawn towards upright.
 STRAIGHT_MAX_RATE = radians(2.5)  # rad/s, about the vertical. Larger: the lean of slow turns is drawn towards upright.
-STRAIGHT_MIN_SPEED = 4.0 / STANDARD_GRAVITY  # g s. Larger: drift on slow straights is not taken off.
+STRAIGHT_MIN_SPEED = 4.0  # m/s. Larger: drift on slow straights is not taken off.
 SIGMA_STRAIGHT = radians(0.8)  # rad: lean on straights, by wind and camber. Larger: drift is taken off later.
 STRAIGHT_S = 3.0  # s: how long such a lean lasts. Larger: drift is taken off later.
-SIGMA_PRIOR_SPEED = 20.0 / STANDARD_GRAVITY  # g s: speed less PRIOR_SPEED. Larger: less pull towards PRIOR_SPEED.
+SIGMA_PRIOR_SPEED = 20.0  # m/s: speed less PRIOR_SPEED. Larger: less pull towards PRIOR_SPEED.
 PRIOR_SPEED_S = 60.0  # s: how long a speed lasts. Larger: less pull towards PRIOR_SPEED.
 
 # Standing still
@@ -86,34 +85,35 @@ SIGMA_REST_RATE = radians(0.1)  # rad/s: rates of a bike that feet hold. Larger:
 SIGMA_REST_FORCE = 0.02  # g: force at rest, with the engine idling. Larger: lean settles later.
 # ratio: weight of a window in the mean magnitude of the force at rest. Larger: it is found sooner, and less steady.
 REST_FORCE_SHARE = 0.1
-SIGMA_REST_SPEED = 0.02 / STANDARD_GRAVITY  # g s: speed at rest, measured as 0. Larger: speed is drawn to 0 less.
+SIGMA_REST_SPEED = 0.02  # m/s: speed at rest, measured as 0. Larger: speed is drawn to 0 less.
 # g: limit of the forward force that pitch does not explain; more is braking. Larger: steady braking is mistaken for
 # rest.
 MAX_REST_PUSH = 0.08
 # The bike surely rolls where the estimated speed is above both: this one, and that times its standard deviation.
 # Larger: a smooth road is mistaken for rest.
-ROLLING_SPEED = 3.0 / STANDARD_GRAVITY  # g s
+ROLLING_SPEED = 3.0  # m/s
 ROLLING_SIGMAS = 3.0  # standard deviations
 # The trim is measured while speed and lean have smaller standard deviations than these. Larger: it is found sooner,
 # and less exact.
-SIGMA_TRIM_SPEED = 8.0 / STANDARD_GRAVITY  # g s
+SIGMA_TRIM_SPEED = 8.0  # m/s
 SIGMA_TRIM_LEAN = radians(1.4)  # rad
 
 
 def forces(model, means, roll_acceleration, force_error):
-    """Two measurements: the force to the left, (4), and up, (5). roll_acceleration: rad/s^2 divided by standard
-    gravity. force_error: relative error of the accelerometer's magnitude, as found at rest."""
-    uncertain = SIGMA_ROLL_HEIGHT_M * roll_acceleration
+    """Two measurements: the force to the left, (4), and up, (5). roll_acceleration: rad/s^2. force_error:
+    relative error of the accelerometer's magnitude, as found at rest."""
+    rolling = roll_acceleration / STANDARD_GRAVITY  # g in a metre of height, as is square below
+    uncertain = SIGMA_ROLL_HEIGHT_M * rolling
     left = means[0]
     shaken = max(0.0, means[8] - left * left)
     left_variance = SIGMA_LEFT**2 + SHAKEN_SHARE * shaken + uncertain**2
-    left += ROLL_HEIGHT_M * roll_acceleration * model.cos_lean
+    left += ROLL_HEIGHT_M * rolling * model.cos_lean
     # In a held turn the upward force, 1 / cos(lean), makes the lean observable whatever the gyro's scale factor. One
     # window tells little, a minute tells much, as long as no error of this force keeps its sign.
     square = means[4] * means[4] / STANDARD_GRAVITY
     up = means[1] + ROLL_HEIGHT_M * square - force_error * means[6]
     # Where the springs pitch the bike its wheels do not rise: v w_x is no acceleration then.
-    pitching = PITCHING_SHARE * model.speed * model.pitch_rate
+    pitching = PITCHING_SHARE * model.pitching
     up_variance = (
         SIGMA_UP**2 + pitching * pitching + SIGMA_ROLL_HEIGHT_M**2 * square * square + (uncertain * model.sin_lean) ** 2
     )
@@ -135,7 +135,7 @@ def straight_or_prior_speed(lean, speed, yaw_rate, seconds):
 
 
 def measured_speed(measured, speed, acceleration):
-    """The measurement of speed by a receiver or a wheel sensor. acceleration: g; with the delay it makes the noise."""
+    """The measurement of speed by a receiver or a wheel sensor. acceleration: m/s^2; with the delay it makes noise."""
     late = MEASURED_SPEED_LATE_S * acceleration
     return ((SPEED, 1.0),), measured - speed, SIGMA_MEASURED_SPEED**2 + late * late
 

@@ -60,19 +60,13 @@ class LeanMeter:
 
     def reset_maxima(self):
         """Set the maxima of lean, acceleration and braking to 0."""
-        self.max_left_deg = 0.0
-        self.max_right_deg = 0.0
-        self.max_accel_g = 0.0
-        self.max_brake_g = 0.0
+        self.max_left_deg = self.max_right_deg = 0.0
+        self.max_accel_g = self.max_brake_g = 0.0
         self._hold_again()
 
     def distrust(self, reason):
-        """Set suppressed_reason: the lean is not shown until trust() or another calibration."""
+        """Set suppressed_reason: the lean is not shown until this is called with None, or with another calibration."""
         self.suppressed_reason = reason
-
-    def trust(self):
-        """Clear suppressed_reason."""
-        self.suppressed_reason = None
 
     @property
     def at_rest(self):

@@ -5,8 +5,6 @@ from math import degrees, sqrt
 from time import ticks_add, ticks_diff, ticks_ms
 
 from ..calibration.transform import Transform
-from ..errors import LiveError
-from ..lean.meter import FALLEN_DEG
 from . import packets
 from .packets import LEAN, MOTION, OWN, SPEED
 
@@ -16,11 +14,8 @@ _SAMPLES = 8  # as many as Transform takes at most
 
 
 def attach(radio, app):
-    """Let an App send to phones. radio: of open_radio()."""
-    if isinstance(radio, LiveError):
-        app.screen.notify(radio, ticks_ms())
-    else:
-        app.live = app.screen.pages.live = Live(radio, app, app.settings.leans)
+    """Let an App send to phones. radio: a Radio."""
+    app.live = app.screen.pages.live = Live(radio, app, app.settings.leans)
 
 
 class Live:
@@ -118,11 +113,8 @@ class Live:
     def _lean(self):
         """The lean in degrees, or None where the display shows none either."""
         app = self._app
-        meter = app.meter
-        shown = self._leans and meter.calibration.aligned and meter.trusted and app.sensor.fault is None
-        if not shown or app.screen.pages.late or meter.fallen or abs(meter.lean_deg) > FALLEN_DEG:
-            return None
-        return meter.lean_deg
+        shown = self._leans and app.sensor.fault is None and app.screen.pages.trusted
+        return app.meter.lean_deg if shown else None
 
     def _state(self, lean):
         meter = self._app.meter

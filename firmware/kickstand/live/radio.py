@@ -3,7 +3,7 @@ on it."""
 
 from binascii import unhexlify
 
-from ..errors import LiveError, report
+from ..errors import LiveError
 from ..units import __version__
 from . import packets
 
@@ -15,15 +15,6 @@ _CONNECTED, _DISCONNECTED, _WRITTEN, _GET_SECRET, _SET_SECRET, _PASSKEY = 1, 2, 
 _READ, _WRITE, _NOTIFY = 0x02, 0x08, 0x10
 _READ_PAIRED, _WRITE_PAIRED = 0x0600, 0x3000  # only over an encrypted line, to a phone that gave the PIN
 _DISPLAY_ONLY = 0  # this side shows the PIN, as a sticker or config.py does, and the phone asks for it
-
-
-def open_radio(pin):
-    """The Radio, or the LiveError why there is none, which is printed: it does not stop the lean."""
-    try:
-        return Radio(pin)
-    except LiveError as problem:
-        report(problem)
-        return problem
 
 
 class Radio:

@@ -133,11 +133,7 @@ class RideBlock:
         self._state[_PERIOD] = period_us
         self._entry = array("i", [0] * FIELDS)
         self._temperature = 0  # temperature in the last turn, in counts
-        self._places = 0
-        self._end = 0  # where the positions begin
         self._reserved = 0  # bytes kept free for the next position; 0 before the first one
-        self.length = 0
-        self.count = 0
 
     def begin(self, length, ride, sequence, time_us, chip, sample_hz, body):
         """Begin an empty block. length: in bytes, with head and tail.  ride, sequence: the number of the ride, and of
@@ -159,7 +155,7 @@ class RideBlock:
         self._chip = chip
         self.length = length
         self.count = self._places = 0
-        self._end = length - _TAIL_LENGTH
+        self._end = length - _TAIL_LENGTH  # where the positions begin
 
     def add(self, sums, n, dt_us):
         """Append a turn: the sums of n samples' seven counts, and the microseconds since the turn before."""

@@ -59,9 +59,7 @@ class RideRing:
         self.stops_interrupts = settings.SD_SPI is None
         self._part_blocks = PART_BLOCKS if settings.SD_SPI is None else CARD_PART_BLOCKS
         self.needed = RESERVE + (self._part_blocks + 2) * BLOCK  # two blocks, because the directories grow as well
-        self._directory = ""
         self._file = None
-        self._free = 0
         self.refused = None
 
     def begin(self):

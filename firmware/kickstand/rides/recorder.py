@@ -63,9 +63,7 @@ class Recorder:
         self._sequence = 0
         self._bytes = 0
         self._interrupted = False
-        # The last speed since the turn before, in cm/s, and the last position; _has_fix: there is one or the other
-        self._speed = self._place = None
-        self._has_fix = False
+        self._speed = self._place = None  # the last speed since the turn before, in cm/s, and the last position
         self._waiting = None  # the block that is being written; _at: number of its bytes that are written
         self._at = 0
         self.active = True
@@ -107,14 +105,12 @@ class Recorder:
             if self._time_us != self._start_us:
                 dt_us = max(GAP_US + 1, min(MAX_DT_US, ticks_diff(now_ms, self._before_ms) * 1000))
         self._before_ms = now_ms
-        if self._has_fix:
-            self._has_fix = False
-            if self._speed is not None:
-                self._block.add_speed(self._speed)
-                self._speed = None
-            if self._place is not None:
-                self._block.add_place(self._place)
-                self._place = None
+        if self._speed is not None:
+            self._block.add_speed(self._speed)
+            self._speed = None
+        if self._place is not None:
+            self._block.add_place(self._place)
+            self._place = None
         self._block.add(sums, n, dt_us)
         self._time_us += dt_us
         if self._block.full():
@@ -127,10 +123,8 @@ class Recorder:
         They replace those kept since the turn before."""
         if speed_mps is not None:
             self._speed = int(100 * speed_mps + 0.5)
-            self._has_fix = True
         if place is not None:
             self._place = place
-            self._has_fix = True
 
     def tick(self):
         """Take one step of the writing. Call it once in each turn of the loop while active."""

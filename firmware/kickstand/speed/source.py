@@ -19,10 +19,11 @@ RX_BUFFER = 512  # bytes, half a second at 9600 baud: the loop may write flash o
 
 
 class Speed:
-    """Plausible speeds. source: a Gps or a Wheel. After poll() has returned a speed: age_us, how old it is."""
+    """Plausible speeds. source: a Gps or a Wheel, whose place() belongs to the speed that poll() has found, even if it
+    has refused that. After poll() has returned a speed: age_us, how old it is."""
 
     def __init__(self, source):
-        self._source = source
+        self.source = source
         self._last = None  # the last accepted speed in m/s, and when that was
         self._last_ms = 0
         self.age_us = 0
@@ -31,7 +32,7 @@ class Speed:
         """Return a new speed in m/s and set age_us, or return None: none has come, or it is refused. Refused is what is
         not within 0 to MAX_MPS, and what no vehicle could have reached from the last accepted speed, but the latter for
         GIVE_UP_MS only. Call it in each turn of the loop. now_ms: ticks_ms()."""
-        speed = self._source.poll(now_ms)
+        speed = self.source.poll(now_ms)
         if speed is None or not 0.0 <= speed <= MAX_MPS:
             return None
         if self._last is not None:
@@ -41,25 +42,12 @@ class Speed:
                 return None
         self._last = speed
         self._last_ms = now_ms
-        self.age_us = 1000 * self._source.age_ms
+        self.age_us = 1000 * self.source.age_ms
         return speed
-
-    def place(self, now_ms):
-        """The position that belongs to the speed that poll(now_ms) has found, even if it has refused that speed: see
-        Gps.place(); or None."""
-        return self._source.place(now_ms)
-
-    def after_stall(self, now_ms):
-        """Pass on to the source that interrupts were off until now, while flash was erased. now_ms: ticks_ms()."""
-        self._source.after_stall(now_ms)
-
-    def fault(self, now_ms):
-        """None, or a Notice: why no speed comes."""
-        return self._source.fault(now_ms)
 
     def take_problem(self):
         """Return the source's problem, a Notice or None, and clear it."""
-        problem, self._source.problem = self._source.problem, None
+        problem, self.source.problem = self.source.problem, None
         return problem
 
 

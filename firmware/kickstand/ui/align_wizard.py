@@ -6,7 +6,6 @@ from ..calibration.two_position import WARN_TILT_DEG, align
 from . import messages, pages
 from .wizard import ASKING, RESULT, Wizard
 
-POSE_SECONDS = 3
 RESULT_MS = 4000
 # So long the gyro's bias holds that the pose on the kickstand has measured; then it may have drifted
 FRESH_MS = 90_000
@@ -19,9 +18,11 @@ class AlignWizard(Wizard):
     pressed: the rider has already pressed the button for the pose on the kickstand.
     """
 
+    POSE_SECONDS = 3
+
     def __init__(self, chip, rate_hz, calibration, side, pressed=False):
         self._side = side
-        super().__init__(chip, rate_hz, POSE_SECONDS, calibration)
+        super().__init__(chip, rate_hz, calibration)
         if pressed:
             self._next_pose()
 

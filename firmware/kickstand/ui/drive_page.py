@@ -24,7 +24,7 @@ def lines(background, now_ms):
     if state == alignment.READY:
         return "Ready:", "stop to save it"
     if state == alignment.WAITING_FOR_SPEED:
-        fault = background.speed.fault(now_ms)
+        fault = background.speed.source.fault(now_ms)
         return messages.lines(fault) if fault else ("Align by drive", _WAITS[state])
     if drive.counted < drive.needed:
         return "Brakings %3d/%d" % (drive.counted, drive.needed), _WAITS[state]

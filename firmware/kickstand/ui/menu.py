@@ -6,14 +6,13 @@ from ..board.button import SHORT
 from .pages import ARROW
 
 TIMEOUT_MS = 20_000
-_LEAVE = ("Leave menu", None)
 
 
 class Menu:
     """entries: (name of at most 15 characters, what to call with now_ms when it is chosen) each."""
 
     def __init__(self, entries, now_ms):
-        self._entries = entries + (_LEAVE,)
+        self._entries = entries + (("Leave menu", None),)
         self._at = 0
         self._until_ms = ticks_add(now_ms, TIMEOUT_MS)
         self.ended = False

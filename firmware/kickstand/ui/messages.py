@@ -85,16 +85,11 @@ mount-moved|Mount has moved|Align again
 side-fixed|Side corrected|Set SIDE too
 aligned|Aligned by drive|error about {0:.1f}\xdf
 """
-# In place of the lean while the alignment is in question
-_NO_LEAN = {"other-side": "side was wrong?", "mount-moved": "mount has moved"}
+# In place of the lean while the alignment is in question, by LeanMeter.suppressed_reason
+NO_LEAN = {"other-side": "side was wrong?", "mount-moved": "mount has moved"}
 _OTHER_SETTING = "config.py: wrong|{0}"  # {0}: the setting's name; the console says what is wrong with it
 
 
 def lines(refusal):
     """Two lines for a Refusal or a Notice."""
     return tuple(refusal.words(_LINES, _OTHER_SETTING).split("|"))
-
-
-def no_lean(reason):
-    """The line that says why no lean is shown. reason: LeanMeter.suppressed_reason."""
-    return _NO_LEAN.get(reason, "not sure yet")

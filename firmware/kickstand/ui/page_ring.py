@@ -26,13 +26,12 @@ class PageRing:
         self._rides = rides
         self._align = align
         self._pages = MOTORCYCLE if leans else CAR
-        self._at = 0
+        self.first()
         self.late = self.draws = False
         self._glance = None  # the module, once a display draws
         self._glance_tried = False
         self.live = None
         self.own = []
-        self._own_at = None  # index of the owner's page that is shown
 
     def show_own(self, now_ms):
         """To the first of the owner's pages: before there is an alignment the menu is the way there."""
@@ -41,7 +40,7 @@ class PageRing:
     def first(self):
         """Go back to the first page."""
         self._at = 0
-        self._own_at = None
+        self._own_at = None  # index of the owner's page that is shown
 
     def drive(self):
         """Go to the page of alignment by driving."""

@@ -20,7 +20,7 @@ _bar = bytearray(16)
 
 def unsure(reason):
     """The two lines in place of a lean that is not trusted. reason: its code, or None."""
-    return "Lean  --", messages.no_lean(reason)
+    return "Lean  --", messages.NO_LEAN.get(reason, "not sure yet")
 
 
 def lean_bar(lean_deg):

@@ -37,58 +37,12 @@ class NoticeView:
         return False
 
 
-class FaultView:
-    """Shows why there are no readings."""
+class View:
+    """Made of two functions, lines and press."""
 
-    def __init__(self, sensor):
-        self._sensor = sensor
-
-    def lines(self, now_ms):
-        fault = self._sensor.fault
-        return None if fault is None else messages.lines(fault)
-
-    def press(self, event, now_ms):
-        return False
-
-
-class InfoView:
-    """Shows the chip's name, its temperature and what is calibrated, until a short press."""
-
-    def __init__(self, sensor, clock, meter):
-        self._sensor = sensor
-        self._clock = clock
-        self._meter = meter
-        self.open = False
-
-    def show(self, now_ms):
-        """Show this view from now on."""
-        self.open = True
-
-    def lines(self, now_ms):
-        if not self.open:
-            return None
-        return pages.sensor_info(self._sensor, self._clock.lost, self._meter, now_ms // 1000)
-
-    def press(self, event, now_ms):
-        if event == SHORT:
-            self.open = False
-        return event == SHORT
-
-
-class QuestionView:
-    """Shows a report or a question of alignment by driving. drive: a BackgroundAlignment, or None."""
-
-    def __init__(self, drive):
-        self._drive = drive
-
-    def lines(self, now_ms):
-        if self._drive is None or self._drive.message is None:
-            return None
-        return messages.lines(self._drive.message)
-
-    def press(self, event, now_ms):
-        self._drive.answer(event == LONG)
-        return True
+    def __init__(self, lines, press):
+        self.lines = lines
+        self.press = press
 
 
 class Screen:
@@ -110,9 +64,15 @@ class Screen:
         self.wizard = None
         self.menu = None
         self._notice = NoticeView()
-        self._fault = FaultView(sensor)
-        self._info = InfoView(sensor, clock, meter)
-        self._question = QuestionView(drive)
+        # why there are no readings
+        self._fault = View(lambda now_ms: sensor.fault and messages.lines(sensor.fault), lambda event, now_ms: False)
+        self._clock = clock
+        self._info_open = False
+        self._info = View(self._info_lines, self._press_info)
+        # a report or a question of alignment by driving
+        self._question = View(
+            lambda now_ms: drive and drive.message and messages.lines(drive.message), self._press_question
+        )
         self.pages = PageRing(settings.leans, meter, calibration, drive, rides, self._align_now)
 
     def lines(self, now_ms):
@@ -140,6 +100,23 @@ class Screen:
         if not view.press(event, now_ms) and event == LONG:
             self._open_menu(now_ms)
         self._drop_ended()
+
+    def _info_lines(self, now_ms):
+        """The chip's name, its temperature and what is calibrated, until a short press."""
+        if not self._info_open:
+            return None
+        return pages.sensor_info(self._sensor, self._clock.lost, self._meter, now_ms // 1000)
+
+    def _show_info(self, now_ms):
+        self._info_open = True
+
+    def _press_info(self, event, now_ms):
+        self._info_open = event != SHORT
+        return event == SHORT
+
+    def _press_question(self, event, now_ms):
+        self._drive.answer(event == LONG)
+        return True
 
     def interrupt(self, now_ms):
         """Cancel a calibration under way, because the sensor has failed."""
@@ -175,7 +152,7 @@ class Screen:
         """The entries of the menu: (name, what to call with now_ms)."""
         align = (("Align the bike", self._align),)
         drive = (("Align by drive", self._align_by_drive),) if self._drive else ()
-        rest = (("Six positions", self._six), ("Reset maxima", self._reset), ("Sensor info", self._info.show))
+        rest = (("Six positions", self._six), ("Reset maxima", self._reset), ("Sensor info", self._show_info))
         record = ("Stop recording", self._stop) if self._rides.recorder.active else ("Record ride", self._record)
         last = (record,) + ((("Own pages", self.pages.show_own),) if self.pages.own else ())
         last += (("Stop Bluetooth", self.pages.live.stop),) if self.pages.live else ()

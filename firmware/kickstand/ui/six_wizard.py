@@ -5,17 +5,13 @@ from ..calibration.parameters import six_position_calibration
 from . import messages, pages
 from .wizard import NOTICE, RESULT, Wizard
 
-POSE_SECONDS = 2
 NOTICE_MS = 1500
 RESULT_MS = 6000
 ROUGH_TILT_DEG = 30.0  # largest tilt of a side in uncalibrated readings; the fit has a stricter limit
 
 
 class SixWizard(Wizard):
-    """chip, rate_hz, calibration: as for Wizard."""
-
-    def __init__(self, chip, rate_hz, calibration):
-        super().__init__(chip, rate_hz, POSE_SECONDS, calibration)
+    """See Wizard."""
 
     def _start(self):
         self._poses = [None] * 6

@@ -3,8 +3,8 @@
 from time import ticks_add, ticks_diff
 
 from ..board.button import LONG
-from ..calibration.pose_taker import DONE, SETTLED, SPOILT, PoseTaker
-from ..errors import Refusal
+from ..calibration.pose_taker import DONE, SETTLED, PoseTaker
+from ..errors import CaptureError, Refusal
 from . import messages
 
 # The states of a wizard
@@ -19,12 +19,14 @@ ENDED = 5
 class Wizard:
     """A view (see screen.py) that also takes each sample, until it has ended.
 
-    chip, rate_hz, seconds: as for PoseTaker. calibration: the ActiveCalibration. A subclass says which poses it asks
-    for, and what it does with each.
+    chip, rate_hz: as for PoseTaker. calibration: the ActiveCalibration. A subclass says which poses it asks for,
+    what it does with each, and how long each takes if it is not POSE_SECONDS.
     """
 
-    def __init__(self, chip, rate_hz, seconds, calibration):
-        self._taker = PoseTaker(chip, rate_hz, seconds)
+    POSE_SECONDS = 2
+
+    def __init__(self, chip, rate_hz, calibration):
+        self._taker = PoseTaker(chip, rate_hz, self.POSE_SECONDS)
         self._calibration = calibration
         self._start()
 
@@ -37,18 +39,18 @@ class Wizard:
         """Take one sample: 7 counts, the chip's order."""
         if self._state != TAKING:
             return
-        step = self._taker.step(counts)
-        if step == SPOILT:
-            self._spoilt(self._taker.problem, now_ms)
-        elif step == SETTLED:
-            self._settled(self._taker.settled, now_ms)
-        elif step == DONE:
-            try:
+        try:
+            step = self._taker.step(counts)
+            if step == SETTLED:
+                self._settled(self._taker.settled, now_ms)
+            elif step == DONE:
                 self._pose_done(self._taker.pose, now_ms)
-            except Refusal as problem:
-                self._show(REFUSED, messages.lines(problem))
-        else:
-            self._progress(*self._taker.progress())
+            else:
+                self._progress(*self._taker.progress())
+        except CaptureError as problem:
+            self._spoilt(problem, now_ms)
+        except Refusal as problem:
+            self._show(REFUSED, messages.lines(problem))
 
     def _start(self):
         """Ask for the first pose."""

@@ -54,12 +54,12 @@ def read_pose(source: Source) -> Pose:
     where the pose was not still."""
     log = read_log(source)
     still = StillPose(_MICRO, _MICRO, _SATURATED, len(log.t_s))
-    where = f"{log.name}: pose refused"
-    for number, (_, reading, _) in enumerate(log.rows(), 1):
-        if not still.add([round(value * _MICRO) for value in reading]):
-            where = f"{log.name}, sample {number}"
-            break
+    where = log.name
     try:
+        for number, (_, reading, _) in enumerate(log.rows(), 1):
+            where = f"{log.name}, sample {number}"
+            still.add([round(value * _MICRO) for value in reading])
+        where = f"{log.name}: pose refused"
         still.finish()
     except CaptureError as error:
         raise RefusedInput(error, where, ": capture this pose again") from error
