@@ -24,7 +24,10 @@ def run(seconds):
     for tick in json.loads(device.take()):
         cut = state["armed"] and not tick["powered"]
         state["armed"] = state["armed"] and tick["powered"]
-        said.append({**state, **tick, "cut": cut})
+        seen = dict(state)
+        seen.update(tick)
+        seen["cut"] = cut
+        said.append(seen)
 
 def press(seconds):
     device.order("button", True)
