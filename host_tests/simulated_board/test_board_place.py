@@ -100,8 +100,7 @@ def test_an_old_position_is_not_taken_for_new():
 
 def test_a_wheel_has_no_place():
     with Board(level):
-        from kickstand.speed.source import Speed
         from kickstand.speed.wheel import Wheel
         from machine import Pin  # type: ignore[import-not-found]
 
-        assert Speed(Wheel(Pin(14, Pin.IN, Pin.PULL_UP), 0.5, {"hard": True})).place(1000) is None
+        assert Wheel(Pin(14, Pin.IN, Pin.PULL_UP), 0.5, {"hard": True}).place(1000) is None

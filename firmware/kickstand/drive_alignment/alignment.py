@@ -221,7 +221,7 @@ class DriveAlignment:
     def _follow(self):
         """Process the last interval between two speeds; a generator of short steps."""
         yield from self.events.follow(self._bias_given or self.standing.stops)
-        judged = (self.events.braking_count + self.events.acceleration_count, self.standing.stops)
+        judged = (self.events.straight_count, self.standing.stops)
         if judged != self._judged:
             self._judged = judged
             yield from self.quality.judge()

@@ -31,14 +31,16 @@ class EventFinder:
     braking). Whether an event was straight depends on the lag of the speed, so that is kept for each lag.
     """
 
-    def __init__(self):
+    def __init__(self, lags):
+        self._straight_change = [0.0] * lags  # the part of change that was straight
         self.interrupt()
 
     def interrupt(self):
         """Speeds are missing: drop the event under way."""
         self.going_on = False
         self.change = 0.0
-        self._straight_change = [0.0] * LAGS  # the part of change that was straight
+        for lag in range(len(self._straight_change)):
+            self._straight_change[lag] = 0.0
 
     def update(self, change_mps, seconds, straight):
         """Take one change of speed. straight: for each lag, True if the vehicle drove straight meanwhile. Returns True
@@ -53,7 +55,7 @@ class EventFinder:
             self.going_on = True
         if self.going_on:
             self.change += change_mps
-            for lag in range(LAGS):
+            for lag in range(len(straight)):
                 if straight[lag]:
                     self._straight_change[lag] += change_mps
         return False
@@ -67,8 +69,14 @@ class LastEvent:
     """Forward from the latest event alone, given the vertical: good to some 10 degrees, but known at once."""
 
     def __init__(self):
-        self._weight = self._change = 0.0
         self._force = [0.0] * 3
+        self.clear()
+
+    def clear(self):
+        """Drop the sums, because a new event begins."""
+        self._weight = self._change = 0.0
+        for i in range(3):
+            self._force[i] = 0.0
 
     def add(self, seconds, change_g, force):
         """Add a straight interval of the event; arguments as for ForwardRegression.add()."""
@@ -100,7 +108,8 @@ class DrivingEvents:
         self.regression = ForwardRegression()
         self.last = LastEvent()
         self._history = history
-        self._finder = EventFinder()
+        self._finder = EventFinder(LAGS)
+        self._fit = Fit()
         # for each lag: the history's integrals at the end of the last interval, whether they were known, and whether
         # that interval was straight
         self._ends = [[0] * COLUMNS for _ in range(LAGS)]
@@ -109,6 +118,11 @@ class DrivingEvents:
         self._end = [0] * COLUMNS
         self._before = (0.0, 0)  # speed and time at the end of the last interval
         self._waiting = []  # speed and time at the ends of the intervals to be processed
+
+    @property
+    def straight_count(self):
+        """Number of all straight events."""
+        return self.braking_count + self.acceleration_count
 
     @property
     def counted(self):
@@ -132,7 +146,8 @@ class DrivingEvents:
         self._forget_interval()
 
     def _forget_interval(self):
-        self._known = [False] * LAGS
+        for lag in range(LAGS):
+            self._known[lag] = False
         self._finder.interrupt()
 
     def measure_speed(self, speed_mps, time_us):
@@ -184,13 +199,13 @@ class DrivingEvents:
             yield from self._end_event()
         elif self._finder.going_on:
             if self._finder.change == change:  # its first interval
-                self.last = LastEvent()
+                self.last.clear()
             if straight[self.lag]:
                 self.last.add(seconds, change_g, best_force)
 
     def _end_event(self):
         """Find the lag that fits best after the event that has ended, and count the event if it was straight."""
-        fit = Fit()
+        fit = self._fit
         explained = [0.0] * LAGS
         for lag in range(LAGS):
             if (yield from self.regression.fitting(fit, lag)):

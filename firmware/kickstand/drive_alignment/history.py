@@ -36,11 +36,15 @@ class ForceHistory:
     def add(self, force_us, yaw, dt_us):
         """Add a bin of length dt_us: the integrals of force (3, g us) and of the yaw rate (1e-5 degrees) over it."""
         self.now = (self.now + dt_us) & MASK
+        total = self._total
+        total[0] = (total[0] + round(force_us[0])) & MASK
+        total[1] = (total[1] + round(force_us[1])) & MASK
+        total[2] = (total[2] + round(force_us[2])) & MASK
+        total[3] = (total[3] + round(yaw)) & MASK
         self._newest = newest = (self._newest + 1) % SIZE
         self._times[newest] = self.now
         for k in range(COLUMNS):
-            self._total[k] = (self._total[k] + round(force_us[k] if k < 3 else yaw)) & MASK
-            self._columns[k][newest] = self._total[k]
+            self._columns[k][newest] = total[k]
         self._count = min(SIZE, self._count + 1)
 
     def at(self, out, time_us):

@@ -6,7 +6,10 @@ falls with the part's weight, but not below what the road's camber and the wind 
 blocks give a poor sample variance: a prior of PRIOR_FREEDOM degrees of freedom is blended in.
 """
 
+from array import array
 from math import atan2, degrees, pi, sqrt
+
+from .regression import BLOCKS
 
 PRIOR_DEG = 1.0  # prior of the standard deviation of forward, at a weight of 1 g^2 s
 PRIOR_FREEDOM = 4
@@ -29,42 +32,48 @@ def blend_prior(variance, weight, freedom):
 
 
 class DriveParts:
-    """add() each block in the order of time, run compare() to its end. Then, for the split with the most
+    """clear(), add() each block in the order of time, run compare() to its end. Then, for the split with the most
     significant difference of forward: forward_deg, that difference; sigmas, the same in standard deviations. And over
     all splits: roll_deg, pitch_deg, the largest differences of the vertical.
     """
 
     def __init__(self):
-        self._blocks = []
+        self._blocks = [array("f", [0.0] * 6) for _ in range(BLOCKS)]
+        self.clear()
+
+    def clear(self):
+        """Drop all blocks. To be called before the first add()."""
+        self.count = 0
         self.forward_deg = self.sigmas = self.roll_deg = self.pitch_deg = 0.0
 
     def add(self, across, along, roll_g, pitch_g, weight, seconds):
         """Add one block of events. across, along: components of its forward to the left of and along the whole drive's
         forward; roll_g, pitch_g: the same components of its vertical; weight (g^2 s), seconds: see Fit."""
-        forward = weight * across, weight * along
-        vertical = seconds * roll_g, seconds * pitch_g
-        self._blocks.append(forward + vertical + (weight, seconds, weight * weight))
+        block = self._blocks[self.count]
+        self.count += 1
+        block[0], block[1] = weight * across, weight * along
+        block[2], block[3] = seconds * roll_g, seconds * pitch_g
+        block[4], block[5] = weight, seconds
 
     def compare(self):
         """Compare the two parts of each split; a generator of short steps."""
-        count = len(self._blocks)
-        for split in range(1, count):
-            before, after = self._blocks[:split], self._blocks[split:]
-            one = [sum(values) for values in zip(*before)]
+        one, two = [0.0] * 7, [0.0] * 7
+        for split in range(1, self.count):
+            self._sum(one, 0, split)
             yield
-            two = [sum(values) for values in zip(*after)]
+            self._sum(two, split, self.count)
             yield
             if one[5] >= MIN_S and two[5] >= MIN_S:
                 self.roll_deg = max(self.roll_deg, degrees(abs(one[2] / one[5] - two[2] / two[5])))
                 self.pitch_deg = max(self.pitch_deg, degrees(abs(one[3] / one[5] - two[3] / two[5])))
-            if count < MIN_BLOCKS or one[4] < MIN_WEIGHT or two[4] < MIN_WEIGHT:
+            if self.count < MIN_BLOCKS or one[4] < MIN_WEIGHT or two[4] < MIN_WEIGHT:
                 continue
             angle_one, angle_two = atan2(one[0], one[1]), atan2(two[0], two[1])
-            scatter = _scatter(angle_one, before)
+            scatter = self._scatter(angle_one, 0, split)
             yield
-            scatter += _scatter(angle_two, after)
+            scatter += self._scatter(angle_two, split, self.count)
             yield
-            freedom = count - 2  # two means are taken from the blocks
+            freedom = self.count - 2  # two means are taken from the blocks
             variance = STRETCH_DEG * STRETCH_DEG * (one[6] / (one[4] * one[4]) + two[6] / (two[4] * two[4]))
             sampled = blend_prior(scatter / one[4] / freedom, one[4], freedom)
             sampled += blend_prior(scatter / two[4] / freedom, two[4], freedom)
@@ -75,7 +84,21 @@ class DriveParts:
                 self.forward_deg = difference_deg
             yield
 
+    def _sum(self, sums, first, last):
+        """Fill sums (7) with the sums of add()'s values over blocks first to last - 1, and of the squared weights."""
+        for i in range(7):
+            sums[i] = 0.0
+        for k in range(first, last):
+            block = self._blocks[k]
+            for i in range(6):
+                sums[i] += block[i]
+            sums[6] += block[4] * block[4]
 
-def _scatter(angle, blocks):
-    """Sum of weight times squared deviation (deg^2) of forward from angle, over these blocks."""
-    return sum(block[4] * degrees(angle_between(angle, atan2(block[0], block[1]))) ** 2 for block in blocks)
+    def _scatter(self, angle, first, last):
+        """Sum of weight times squared deviation (deg^2) of forward from angle, over blocks first to last - 1."""
+        total = 0.0
+        for k in range(first, last):
+            block = self._blocks[k]
+            off = degrees(angle_between(angle, atan2(block[0], block[1])))
+            total += block[4] * off * off
+        return total

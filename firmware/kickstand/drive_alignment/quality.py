@@ -8,7 +8,7 @@ one boundary between two blocks; parts.py tries every boundary.
 from math import atan2, degrees, sqrt
 
 from ..errors import AlignmentError
-from ..rotation import angle_deg, dot, frame, matrix, norm, vector
+from ..rotation import angle_deg, cross, dot, norm, normalize, vector
 from .parts import DriveParts, angle_between, blend_prior
 from .regression import Fit
 from .speed_check import fit_problem
@@ -49,23 +49,26 @@ class DrivingQuality:
         self._events = events
         self._vertical = vertical
         self._precise = self._event_off = False
+        self._scratch_fit = Fit()
 
     def judge(self):
         """Update all attributes after another event or stop. A generator of short steps."""
-        regression, lag, part = self._events.regression, self._events.lag, Fit()
+        regression, lag, part = self._events.regression, self._events.lag, self._scratch_fit
         up = vector()
         if not (yield from regression.fitting(self.fit, lag)):
             return
         yield
         if not self._vertical.known(up, self.fit):
             return
-        axes = matrix()
-        frame(axes, up, self.fit.forward)
-        left, forward = axes[0:3], axes[6:9]
+        left, forward = vector(), vector()
+        cross(left, up, self.fit.forward)
+        cross(forward, left, up)
+        normalize(left)
+        normalize(forward)
         yield
         blocks = regression.filled
         squares = ratios = weights = 0.0
-        self.parts = DriveParts()
+        self.parts.clear()
         for block in range(blocks):
             if not (yield from regression.fitting(part, lag, block, block + 1)):
                 continue

@@ -34,6 +34,7 @@ class Fit:
         self.level = [0.0] * 3
         self.weight = self.seconds = self.explained = 0.0
         self.found = False
+        self.total = [0.0] * TERMS  # each Fit has its own, so that one can be made while another is half done
 
 
 class ForwardRegression:
@@ -95,8 +96,10 @@ class ForwardRegression:
     def fitting(self, out, lag, first=0, last=BLOCKS, without=-1):
         """Like fit(), but a generator of short steps, which returns True or False. without: index of a block that is
         left out."""
-        sums, total = self._sums[lag], [0.0] * TERMS
+        sums, total = self._sums[lag], out.total
         out.found = False
+        for k in range(TERMS):
+            total[k] = 0.0
         gathered = 0
         for block in range(first, min(last, self.blocks)):
             if block != without:

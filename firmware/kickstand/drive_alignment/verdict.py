@@ -26,7 +26,7 @@ UPRIGHT_DEG = 8.0  # largest difference of up, by an inexact upright pose and th
 def compare(drive, matrix):
     """UNKNOWN, SAME, REFINED, REVERSED or MOVED. drive: a DriveAlignment; matrix: 9, rows left, up, forward."""
     events, quality = drive.events, drive.quality
-    if quality.speed_problem is not None or drive.counted < MIN_EVENTS_TO_REVERSE:
+    if quality.speed_problem is not None or events.straight_count < MIN_EVENTS_TO_REVERSE:
         return UNKNOWN
     yaw = abs(yaw_deg(quality.fit, matrix))
     if yaw > REVERSED_DEG and _all_backward(events, matrix):
