@@ -54,11 +54,12 @@ def test(arguments):
     pyright = subprocess.Popen(
         [PYTHON, "-m", "pyright"], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8"
     )
+    processes = str((os.cpu_count() or 1) + 1)  # one more than processors, because tests of pages wait for a clock
     failed = []
     for tool, command in (
         ("ruff", ("-m", "ruff", "check", ".")),
         ("ruff format", ("-m", "ruff", "format", "--check", ".")),
-        ("pytest", ("-m", "pytest", "-n", "auto", "--dist", "worksteal", "--durations", "10", *arguments)),
+        ("pytest", ("-m", "pytest", "-n", processes, "--dist", "worksteal", "--durations", "10", *arguments)),
     ):
         say(tool)
         if tool == "pytest":
