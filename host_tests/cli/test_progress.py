@@ -22,6 +22,9 @@ def test_lines_come_only_as_often_as_asked_for(capsys):
     with progress.Bar("riding", 4, lines_s=9.0) as bar:
         bar.advance(4)
     assert capsys.readouterr().err == ""
+    with progress.Bar("vehicles", lines_s=0.0) as bar:
+        bar.reach(1, 4)
+    assert capsys.readouterr().err == "vehicles: 25 %\n"
 
 
 def test_making_up_a_ride_is_seen(tmp_path, monkeypatch):

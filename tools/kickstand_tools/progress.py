@@ -15,9 +15,9 @@ PATIENCE_S = 1.0
 
 
 class Bar:
-    """with Bar("replaying", total) as bar: bar.advance(n). It appears after patience_s.
+    """with Bar("replaying", total) as bar: bar.advance(n). The first call after patience_s shows it.
 
-    Without a total: bar.reach is the `progress` callback of a function that knows it.
+    To a function that reports (done, total), pass bar.reach, and no total here.
     lines_s: where standard error is no terminal, time between two lines; None for none.
     """
 
@@ -34,24 +34,28 @@ class Bar:
         self._said_s = self._begin_s
 
     def __enter__(self) -> "Bar":
-        self.advance(0)
+        if not self._patience_s:
+            self._show()
         return self
 
     def advance(self, amount: int) -> None:
         """Count `amount` more of the total as done."""
         self._progress.advance(self._task, amount)
-        if self._wanted and not self._shown and time.monotonic() - self._begin_s >= self._patience_s:
-            self._progress.start()
-            self._shown = True
-        if amount and self._lines_s is not None and time.monotonic() - self._said_s >= self._lines_s:
-            self._said_s = time.monotonic()
-            task = self._progress.tasks[0]
-            print(f"{task.description}: {task.percentage:.0f} %", file=sys.stderr, flush=True)
+        self._show()
 
     def reach(self, done: int, total: int) -> None:
         """done of total is done; total is 0 if it is not known."""
         self._progress.update(self._task, completed=done, total=total or None)
-        self.advance(0)
+        self._show()
+
+    def _show(self) -> None:
+        if self._wanted and not self._shown and time.monotonic() - self._begin_s >= self._patience_s:
+            self._progress.start()
+            self._shown = True
+        if self._lines_s is not None and time.monotonic() - self._said_s >= self._lines_s:
+            self._said_s = time.monotonic()
+            task = self._progress.tasks[0]
+            print(f"{task.description}: {task.percentage:.0f} %", file=sys.stderr, flush=True)
 
     def describe(self, what: str) -> None:
         """Change the text in front of the bar."""

@@ -10,7 +10,7 @@ A driver (hd44780.Lcd, oled.Oled) has these; host_tests/simulated_board/test_boa
 
 begin(i2c, address, hz, fresh)  takes a display that has just answered. fresh: it may just have got its power.
 show(line1, line2, picture)     notes what to show. 16 characters a line, a str of codes below 256 or bytes.
-tick(now_ms)                    one step, which takes the bus for 3 ms at 400 kHz, 7 ms at 100 kHz. Raises OSError if
+tick(now_ms)                    one step, which takes the bus for 3 ms (OLED) or at most 13 ms (LCD). Raises OSError if
                                 the display does not answer.
 busy                            True while something is left to be sent
 draws                           True if it shows pictures. A picture is (draw, values...): draw(canvas, values...) is

@@ -2,8 +2,8 @@
 finds it, and says what its methods do.
 
 Sources: data sheets Hitachi HD44780U (ADE-207-272) and NXP PCF8574. The display is driven in 4-bit mode. The part of a
-line that has changed is sent in one transfer, which takes 6 ms for a whole line at 100 kHz. Wiring of the backpack: P0
-RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7.
+line that has changed is sent in two transfers, dashes and then the text, each of 6 ms for a whole line at 100 kHz.
+Wiring of the backpack: P0 RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7.
 """
 
 from time import ticks_diff, ticks_ms
@@ -74,8 +74,8 @@ class Lcd:
         return self._changed or self._step < _STEPS
 
     def show(self, line1, line2, picture=None):
-        """Each line is padded or cut to 16 characters. Codes 0 to 7 are the patterns of _bar_glyphs(), the others those
-        of the display's ROM."""
+        """Note what tick() sends: two lines, str or bytes, padded or cut to 16 characters. Codes 0 to 7 show the patterns
+        of _bar_glyphs(), the others those of the display's ROM. picture: not used."""
         self._put(0, line1)
         self._put(1, line2)
 

@@ -116,7 +116,7 @@ class Store:
 
 
 def pack(who_am_i, accel_range_g, calibration):
-    """A Calibration and the chip it belongs to, as BODY_LENGTH bytes. accel_range_g: in g."""
+    """A Calibration and the chip it belongs to, as BODY_LENGTH bytes. accel_range_g: a whole number of g."""
     how = (_BY_DRIVE if calibration.by_drive else _BY_POSES) if calibration.aligned else _NOT_ALIGNED
     return struct.pack(_BODY, who_am_i, accel_range_g, calibration.six_done, how, *calibration.parameters())
 

@@ -7,7 +7,7 @@ from . import messages, pages
 from .wizard import ASKING, RESULT, Wizard
 
 RESULT_MS = 4000
-# So long the gyro's bias holds that the pose on the kickstand has measured; then it may have drifted
+# How long the gyro's bias that the pose on the kickstand has measured stays valid; then it may have drifted
 FRESH_MS = 90_000
 _ASK = (("On the stand,", "press button"), ("Now upright:", "hold it, press"))
 _TAKING = ("Stand: hold", "Upright: hold")

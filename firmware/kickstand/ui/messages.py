@@ -91,5 +91,5 @@ _OTHER_SETTING = "config.py: wrong|{0}"  # {0}: the setting's name; the console 
 
 
 def lines(refusal):
-    """Two lines for a Refusal or a Notice."""
+    """Two lines for a Refusal or a Notice, neither padded nor cut. An unknown code is that of a setting."""
     return tuple(refusal.words(_LINES, _OTHER_SETTING).split("|"))

@@ -20,8 +20,8 @@ class Track:
     lon_deg: Array
 
     def at(self, t_s: Array) -> tuple[Array, Array]:
-        """Latitude and longitude (n) at these times (n), along straight lines; NaN before the first position, after the
-        last, and in gaps."""
+        """Latitude and longitude (n) at these times (n), along straight lines, also across 180 degrees; NaN before the
+        first position, after the last, and in gaps of over GAP_S."""
         none = np.full(len(t_s), np.nan)
         if not len(self.t_s):
             return none, none

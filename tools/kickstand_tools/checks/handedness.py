@@ -8,7 +8,7 @@ motion shows them.
 
 A ride's force is hardly gravity's alone: in a balanced bend it keeps its direction along the bike. Therefore each
 window is judged as a whole (see turning.py). The hypotheses are the 48 signed permutations of the gyro's axes ("an
-exchange" below); the one that explains the forces best is reported if it is clearly better than none.
+exchange" below); the one that explains the forces best is reported if it is clearly better than the axes as they are.
 """
 
 import itertools

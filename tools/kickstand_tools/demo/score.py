@@ -37,7 +37,8 @@ class Figures(NamedTuple):
 
 
 class Score:
-    """Collects true and shown lean from the ticks in which the lean page is shown."""
+    """Collects true and shown lean (degrees, > 0 to the right) of the ticks that show the lean page, by part of the
+    ride; figures() sums them up."""
 
     def __init__(self) -> None:
         self._pairs: dict[str, list[tuple[float, float]]] = {}  # part of the ride: (true, shown) in degrees

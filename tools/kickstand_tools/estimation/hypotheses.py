@@ -3,7 +3,7 @@
 On its straights a bike seems to lean when its mount has yielded, and when something pushes it to the side for minutes,
 such as wind. Each of these, alone or together, is a hypothesis. Its posterior weight follows from its prior probability
 and from the likelihood of the readings. Where the readings do not separate two hypotheses, the result lies between
-both, and its standard deviation is as large as the difference.
+both, and its standard deviation grows with their difference.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ PUSHED_S = 120.0
 DRIFT = np.full(PARAMETERS, 1e-4)
 DRIFT[OFFSET] = 0.15, 0.05, 0.05
 # Minus twice the logarithm of the prior probability. A light lasting wind is common, but its readings look like those
-# of a yielding mount, and taking that for wind costs more accuracy: so its prior is low.
+# of a yielding mount, and mistaking that mount for wind costs more than the reverse: so its prior is low.
 YIELDS, WINDY, STORMY = 1.0, 8.0, 5.0
 WEIGHT = 0.25  # exponent of the likelihood: errors that no model has last, so that readings are not independent
 LEAST_SHARE = 0.02  # a hypothesis of less posterior weight is left out
@@ -34,7 +34,7 @@ LEAST_SHARE = 0.02  # a hypothesis of less posterior weight is left out
 class Hypotheses:
     """G hypotheses.
 
-    turning, rolling (G, rad): process noise per block of the mount's rotation about left and up, and about forward.
+    Process noise per block of the mount's rotation: turning (G, rad) about left and up, rolling (G, rad) about forward.
     pushed (G, g): standard deviation of the lasting force to the side. minus_two_log_prior (G): of the prior
     probability. weight (G): posterior weights, whose sum is 1.
     """
@@ -68,7 +68,8 @@ class Hypotheses:
         return self.select(kept, weight[kept] / np.sum(weight[kept]))
 
     def random_walks(self, prior: Prior, parameters: Array) -> RandomWalks:
-        """Prior and process noise of the estimated parameters by each hypothesis. parameters: see weighted()."""
+        """Of the estimated parameters, for the solver: prior by each hypothesis, variances of the random walk from
+        block to block, and the parameters' own differences between blocks. parameters: see weighted()."""
         unknown = prior.unknown
         sigma = np.tile(prior.sigma, (len(self.weight), 1))
         sigma[:, BESIDE] = np.hypot(sigma[:, BESIDE], self.pushed)

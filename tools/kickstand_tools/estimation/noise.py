@@ -1,4 +1,5 @@
-"""Process noise and measurement noise for equations.py, with every parameter that sets them.
+"""Process noise and measurement noise for equations.py, with every parameter that sets them; the random walk of the
+mount and of the sensor's errors is in hypotheses.py.
 
 Symbol = default  # unit: what it is. Standard deviations are 1 sigma. A disturbance that lasts tau seconds, measured in
 each window of T seconds, gets the variance sigma^2 2 tau / T, because measurements that share an error must not count
@@ -53,9 +54,8 @@ ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
 # differ for seconds. The velocities' standard deviation grows with the square of this residual's rms, in means over
 # LASTING_MISFIT_S and times the root of their number of windows, over that of an ordinary ride, USUAL_MISFIT.
 LASTING_MISFIT_S, USUAL_MISFIT, MOST_MISFIT = 2.0, 0.3, 6.0
-MISFIT_ROUGHNESS = (
-    0.14  # times the misfit, the least roughness where there is one: residuals of lasting errors are small
-)
+# Where the misfit is over 1, roughness is at least this times the misfit, because residuals of lasting errors are small
+MISFIT_ROUGHNESS = 0.14
 # How far from balance a ride is, likewise: by the rms of BALANCED in means over some seconds, less its mean over
 # LASTS_S (that is unknowns.BESIDE), over its standard deviation. Longer means average out errors that change sign, such
 # as a rider's corrections: BRIEF_S overestimates the noise to be cautious, LONG_S does not.

@@ -23,9 +23,9 @@ from .join import GAP_NS, join
 from .recording import Recording, Taken
 from .units import ACCELERATIONS, SPEEDS, factor, unit
 
-# Each is a module with NAME, the app's; finds(files): the files of each of its recordings among these; and
-# read(files, name): that Recording (see recording.py), or InputError. Each is asked about the files that none before it
-# has claimed: phyphox, which goes by names of columns, is last.
+# Each is a module with NAME, the app's; finds(files): one list of files for each recording of this app among them; and
+# read(files, name): such a list's Recording (see recording.py), or InputError. Each is asked about the files that none
+# before it has claimed: phyphox, which goes by names of columns, is last.
 _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
 NAMES = [app.NAME for app in reversed(_APPS)]
 

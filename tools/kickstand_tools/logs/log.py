@@ -75,12 +75,12 @@ class Log(Table):
 
     t_s (n): seconds since the first sample, increasing. accel_g (n, 3): specific force, g. gyro_dps (n, 3): angular
     rate, deg/s. speed_mps (n): m/s. temperature_c (n). lat_deg, lon_deg (n): the position, degrees north and east.
-    utc_s (n): Universal Time, s since 1970. These are NaN where there is no new value. start_s: the recorder's own time
-    at the first sample, s. name: what messages call the log. notices: what is remarkable in it
-    (kickstand_tools.refusals.sentence puts a notice into words).
+    utc_s (n): Universal Time, s since 1970. From speed_mps to utc_s each is NaN where there is no new value, and may be
+    left out. start_s: the recorder's own time at the first sample, s. name: what messages call the log. notices: what
+    is remarkable in it (kickstand_tools.refusals.sentence puts a notice into words).
 
-    Made of arrays, those that may be NaN may be left out, and t_s may start anywhere. Raises InputError for shapes that
-    do not fit and for a time that does not increase.
+    t_s may start anywhere: its first value is added to start_s and taken off. Raises InputError for shapes that do not
+    fit and for a time that does not increase.
 
     >>> import numpy as np
     >>> t_s = np.arange(300) / 100.0

@@ -176,7 +176,7 @@ class Mpu6050:
         return value
 
     def read_into(self, buf):
-        """Fill buf with what read_byte() returns, quickly."""
+        """Fill buf with what read_byte() would return, from the FIFO in one step."""
         if self._pointer == FIFO_R_W:
             buf[:] = self.fifo.pop(len(buf))
             return

@@ -2,7 +2,8 @@
 
 Heads and signs as measured on the session tests/test_data/SFJ/*_0101.csv of https://github.com/m3rlin45/libxrk: at rest
 VerticalAcc is -1, LateralAcc and YawRate are positive in a right turn and InlineAcc when speeding up, so the axes are
-forward, right and down. A logger whose VerticalAcc is +1 has its up turned alone.
+forward, right and down. Where VerticalAcc is +1 at rest that channel points up, so its sign is kept; the others are
+treated the same.
 """
 
 import numpy as np
