@@ -123,18 +123,25 @@ def has_pip():
 
 
 def install(extra):
-    """Install the project, editable: by uv, which takes a fifth of pip's time, or by pip where uv fails, which knows
-    the proxies and indexes of its own settings."""
+    """Install the project, editable: by uv, which takes a fifth of pip's time; by pip where pip is set to an index of
+    its own, which uv does not know, or where uv fails."""
     say("installing %sinto .venv: a few minutes at most" % ("with the %s tools " % extra if extra else ""))
     what = ["--editable", ".[%s]" % extra if extra else "."]
     pip = [PYTHON, "-m", "pip", "install", "--no-input", "--disable-pip-version-check"]
     uv = [PYTHON, "-m", "uv", "pip", "install", "--python", PYTHON]
-    if watched(pip + ["--only-binary", "uv", "uv>=0.8,<1"]) == 0 and watched(uv + what) == 0:
+    quick = not own_index() and watched(pip + ["--only-binary", "uv", "uv>=0.8,<1"]) == 0 and watched(uv + what) == 0
+    if quick:
         return
     if watched(pip + what) != 0:
         errors = [line[6:].strip() for line in read(LOG).split("\n") if line.startswith("ERROR:")]
         why = errors[-1] if errors else last_line(read(LOG))
         raise Stop("installing failed: %s (is there a network? all that pip said is in %s)" % (why, LOG))
+
+
+def own_index():
+    """True if pip takes packages from elsewhere than PyPI."""
+    settings = subprocess.run([PYTHON, "-m", "pip", "config", "list"], stdout=subprocess.PIPE).stdout
+    return b".index-url=" in settings
 
 
 def watched(command):

@@ -12,8 +12,14 @@ from .imu.sensor import Sensor
 
 def open_lcd(settings):
     """The Display. Its tick() raises SettingsError for pins that the I2C controller cannot use."""
-    kind = settings.DISPLAY, settings.LCD_ADDRESSES, settings.OLED_CONTRAST, settings.OLED_INVERTED
-    return Display(lambda hz: _open_bus(settings, "LCD", hz), settings.LCD_BUS_HZ, *kind)
+    return Display(
+        lambda hz: _open_bus(settings, "LCD", hz),
+        settings.LCD_BUS_HZ,
+        settings.DISPLAY,
+        settings.LCD_ADDRESSES,
+        settings.OLED_CONTRAST,
+        settings.OLED_INVERTED,
+    )
 
 
 def open_sensor(settings):

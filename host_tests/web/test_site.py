@@ -6,6 +6,7 @@ import http.client
 import io
 import json
 import re
+import shutil
 import socket
 import threading
 import urllib.request
@@ -14,6 +15,7 @@ from pathlib import Path
 
 import pytest
 from command import refused, works
+from kickstand_tools import firmware_path
 from kickstand_tools.deploy.firmware_files import firmware_files
 from kickstand_tools.web import archives, npm_packages, serve, site
 from kickstand_workshop.bench import pages
@@ -254,3 +256,14 @@ def test_connections_that_send_now_and_then_are_ended_for_others(monkeypatch):
         for connection in held:
             connection.close()
         server.shutdown()
+
+
+def test_an_installed_package_gives_no_other_one_to_the_pages(tmp_path, monkeypatch):
+    """numpy and rich are beside it then."""
+    shutil.copytree(firmware_path.TOOLS / "kickstand_tools", tmp_path / "kickstand_tools")
+    for name in "numpy", "rich":
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").touch()
+    wanted = set(archives.tools("web/rides_guest.py"))
+    monkeypatch.setattr(firmware_path, "TOOLS", tmp_path)
+    assert set(archives.tools("web/rides_guest.py")) == wanted

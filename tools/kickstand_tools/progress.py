@@ -34,7 +34,7 @@ class Bar:
         self._said_s = self._begin_s
 
     def __enter__(self) -> "Bar":
-        if not self._patience_s:
+        if self._wanted:
             self._show()
         return self
 

@@ -74,8 +74,8 @@ class Lcd:
         return self._changed or self._step < _STEPS
 
     def show(self, line1, line2, picture=None):
-        """Note what tick() sends: two lines, str or bytes, padded or cut to 16 characters. Codes 0 to 7 show the patterns
-        of _bar_glyphs(), the others those of the display's ROM. picture: not used."""
+        """Note what tick() sends: two lines, str or bytes, padded or cut to 16 characters. Codes 0 to 7 show the
+        patterns of _bar_glyphs(), the others those of the display's ROM. picture: not used."""
         self._put(0, line1)
         self._put(1, line2)
 

@@ -77,10 +77,13 @@ class PoseTaker:
         return SETTLED
 
     def _average(self, counts):
-        self._state = _ENDED  # of a complete pose, and of one that is refused
-        self.pose.add(counts)
-        if self.pose.count == self._take_count:
+        try:
+            self.pose.add(counts)
+            if self.pose.count < self._take_count:
+                return AVERAGING
             self.pose.finish()
-            return DONE
-        self._state = AVERAGING
-        return AVERAGING
+        except CaptureError:
+            self._state = _ENDED
+            raise
+        self._state = _ENDED
+        return DONE

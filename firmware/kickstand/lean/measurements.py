@@ -53,8 +53,8 @@ SIGMA_LOST_FORCE = 0.3  # g: likewise for the forward force. Larger, both: after
 # Measurement noise while riding
 SIGMA_LEFT = 0.04  # g: force to the left. Larger: lean follows it less, and the gyro and level roads more.
 SIGMA_UP = 0.07  # g: upward force, which bumps disturb. Larger: in held turns scale errors are found later.
-# times speed x pitch rate: noise of the upward force (1 sigma), because the springs pitch the bike while its wheels do
-# not rise. Larger: braking disturbs less.
+# times speed x pitch rate / g: noise of the upward force (1 sigma), because the springs pitch the bike while its wheels
+# do not rise. Larger: braking disturbs less.
 PITCHING_SHARE = 2.0
 # ratio: part of the samples' variance by vibration that stays in a window's mean, and is added to the noise of the
 # force to the left. Larger: forces count less on rough roads.
@@ -135,7 +135,7 @@ def straight_or_prior_speed(lean, speed, yaw_rate, seconds):
 
 
 def measured_speed(measured, speed, acceleration):
-    """The measurement of speed by a receiver or a wheel sensor. acceleration: m/s^2; with the delay it makes noise."""
+    """The measurement of speed by a receiver or a wheel sensor. acceleration: m/s^2; by the delay it adds noise."""
     late = MEASURED_SPEED_LATE_S * acceleration
     return ((SPEED, 1.0),), measured - speed, SIGMA_MEASURED_SPEED**2 + late * late
 

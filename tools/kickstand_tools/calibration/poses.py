@@ -54,7 +54,7 @@ def read_pose(source: Source) -> Pose:
     where the pose was not still."""
     log = read_log(source)
     still = StillPose(_MICRO, _MICRO, _SATURATED, len(log.t_s))
-    where = log.name
+    where = f"{log.name}: pose refused"
     try:
         for number, (_, reading, _) in enumerate(log.rows(), 1):
             where = f"{log.name}, sample {number}"

@@ -4,13 +4,14 @@ import contextlib
 import sys
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import cast
 
 from rich.live import Live
 
 from ..demo.device import KICKSTAND_PRESS_S, LONG_PRESS_S, PART_SEED, PART_SHARE, SCRIPT, UPRIGHT_PRESS_S, seen
 from ..demo.hand_bike import HandBike
 from ..demo.keyboard import BIKE_KEYS, keyboard
+from ..demo.score import State
 from ..demo.screen import lcd_lines, screen
 from ..simulated_board.oled import Oled
 from ..simulation.scripted.script import Ride
@@ -87,7 +88,7 @@ def _watch(device: Device, server: ConsoleServer, bike: HandBike, address: str) 
                 elif key in BIKE_KEYS:
                     bike.command(BIKE_KEYS[key])
             _run(device, server)
-            state: Any = seen(device.board, bike)
+            state = cast(State, seen(device.board, bike))
             if isinstance(device.board.lcd, Oled):
                 state["pixels"] = device.board.lcd.pixels().hex()
             title = f"Kickstand on an emulated {device.NAME}, {address}"

@@ -70,7 +70,10 @@ class Windows:
             edges=longer(self.edges, self.edges[-1]),
             speed=longer(self.speed, np.nan),
             gap=np.append(self.gap, np.ones(more, dtype=bool)),
-            **{name: longer(getattr(self, name)) for name in ("rate", "force", "jolt", "warm")},
+            rate=longer(self.rate),
+            force=longer(self.force),
+            jolt=longer(self.jolt),
+            warm=longer(self.warm),
         )
 
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from modulefinder import ModuleFinder
 from pathlib import Path
+from typing import Any
 
 import jinja2
 import markupsafe
@@ -38,10 +39,19 @@ _LEFT_OUT = ("/tests/", "/f2py/", "/random/", "/distutils/", "/testing/", "/incl
 _LICENCES = "info/licenses/"
 
 
+class _Finder(ModuleFinder):
+    """Finds modules of kickstand_tools alone: where it is installed, other packages are beside it."""
+
+    def find_module(self, name: str, path: Any, parent: Any = None) -> Any:
+        if path is None and name != "kickstand_tools":
+            raise ImportError(name)
+        return super().find_module(name, path, parent)
+
+
 def tools(*modules: str) -> dict[str, Path]:
     """{path below the tools: file} of these modules of kickstand_tools, as "web/device.py", and of all that they
     import of it, also within functions; with the templates and scripts beside them."""
-    finder = ModuleFinder([str(firmware_path.TOOLS)])  # what is not ours it does not find
+    finder = _Finder([str(firmware_path.TOOLS)])
     for name in modules:
         finder.import_hook("kickstand_tools." + name.removesuffix(".py").replace("/", "."))
     found = {Path(path) for module in finder.modules.values() if (path := vars(module)["__file__"])}

@@ -101,7 +101,7 @@ def stops_of(ride: Channels, still: NDArray[np.bool_]) -> list[Stop]:
         last = min(int(end), int(np.searchsorted(ride.t_s, ride.t_s[start] + REST_S, side="right")))
         gaps = np.flatnonzero(np.diff(ride.t_s[first:last]) > GAP_S)
         first += int(gaps[-1]) + 1 if len(gaps) else 0
-        if first < start and last - start > FEWEST:
+        if start - first > FEWEST and last - start > FEWEST:
             stop = _stop(ride.part(slice(first, last)), start - first, delay_s, 0 < first == after)
             if stop:
                 found.append(stop)

@@ -37,7 +37,7 @@ def standing(ride: Channels) -> Bools:
 def _quiet(ride: Channels) -> Bools:
     still = np.zeros(len(ride.t_s), dtype=bool)
     second = max(4, round(QUIET_S / spacing_s(ride)))
-    if len(still) < second:
+    if len(still) < 2 * second:
         return still
     quiet = np.ones(len(still) - second + 1, dtype=bool)
     for rate in ride.pitch_rate_dps, ride.yaw_rate_dps:
