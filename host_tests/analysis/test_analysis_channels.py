@@ -129,3 +129,21 @@ def test_parts_are_joined_and_a_column_without_values_takes_no_memory(course):
     for field in fields(Channels):
         parts = np.concatenate([getattr(part, field.name) for part in (first, second, third)])
         assert np.array_equal(getattr(whole, field.name), parts, equal_nan=True), field.name
+
+
+def test_channels_are_those_of_the_meter(ride, course):
+    log = reader.read_log(ride.log)
+    engine = replay_engine.Replay(ride.calibration.to_firmware())
+    rows, shown, rolling, trusted = [], [], [], []
+    for row in log.rows():
+        rows.append(engine.step(*row))
+        shown.append(engine.meter.smooth_force[2])
+        rolling.append(engine.meter.filter.rolling)
+        trusted.append(engine.meter.trusted)
+    for name, column in zip(replay_engine.COLUMNS, np.transpose(rows)):
+        if name not in ("static_lean_deg", "lean_formula_deg", "lean_sigma_deg"):  # test_meter_along.py
+            assert np.max(np.abs(getattr(course, name) - column)) < 1e-5, name
+    assert np.array_equal(course.shown_g, shown)
+    assert np.array_equal(course.rolling, rolling)
+    assert 0.2 < np.mean(rolling) < 0.9  # in its turns it knows
+    assert np.array_equal(course.trusted, trusted)

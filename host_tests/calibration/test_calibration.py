@@ -4,7 +4,7 @@ import engines
 import numpy as np
 import pytest
 from kickstand.calibration import six_position
-from kickstand.calibration.parameters import Calibration
+from kickstand.calibration.parameters import Calibration, six_position_calibration
 from kickstand.errors import CalibrationError
 from numpy.testing import assert_allclose
 from numpy.typing import ArrayLike
@@ -159,3 +159,21 @@ def test_the_19_numbers_come_back_as_they_were():
     assert_allclose(new.scales()[0], [1.125 / 4096, 0.875 / 4096, 1 / 4096])
     assert new.scales()[1] == 1 / 65.5
     assert_allclose(new.correct([1.0, -1.0, 0.5]), [1.375, -1.0, 1.0])
+
+
+def test_the_result_of_the_six_positions():
+    new = six_position_calibration([0.1, 0.2, 0.3], [1.1, 0.9, 1.0], [3.0, -2.0, 1.0])
+    identity = [1, 0, 0, 0, 1, 0, 0, 0, 1]
+    want = [0.1, 0.2, 0.3, 1.1, 0.9, 1.0, 3.0, -2.0, 1.0, *identity, 0.0]
+    assert new.parameters() == pytest.approx(want, abs=1e-6)
+    assert (new.six_done, new.aligned, new.by_drive) == (True, False, False)
+
+
+def test_an_alignment_is_a_new_calibration():
+    before = six_position_calibration([0.1, 0.2, 0.3], [1.1, 0.9, 1.0], [3.0, -2.0, 1.0])
+    new = before.with_alignment(range(9), [7.0, 8.0, 9.0], 1.5, True)
+    assert new.parameters() == pytest.approx([*before.parameters()[:6], 7, 8, 9, *range(9), 1.5])
+    assert (new.six_done, new.aligned, new.by_drive) == (True, True, True)
+    assert before.parameters()[6:9] == [3.0, -2.0, 1.0]
+    plain = Calibration().with_alignment(range(9), [0.0] * 3)
+    assert (plain.six_done, plain.by_drive, plain.trim_deg) == (False, False, 0.0)

@@ -120,3 +120,14 @@ def test_an_alignment_keeps_offset_and_slope_and_takes_the_gyros_bias_from_the_k
     assert not before.aligned
     turned, _ = align(before, kickstand, upright, "right")
     assert_allclose(turned.vehicle_from_sensor, np.diag([-1, 1, -1]).ravel(), atol=1e-6)
+
+
+def test_not_a_number_is_refused():
+    answer = engines.firmware_calls.call("two_position", ([float("nan"), 1, 0], [0, 1, 0], "left"))
+    assert "kickstand reading" in engines.words(answer)
+
+
+def test_the_wrong_side_turns_forward_into_backward():
+    m = random_rotation(np.random.default_rng(4))
+    _, got = engines.run("cpython", [("two_position", (*poses(m, 12, "right"), "left"))])[0]
+    assert_allclose(np.array(got).reshape(3, 3), np.diag([-1, 1, -1]) @ m, atol=1e-6)

@@ -1,6 +1,7 @@
 """kickstand demo as a user meets it: printed, in a terminal, by hand."""
 
 import functools
+import itertools
 import os
 import re
 import subprocess
@@ -151,3 +152,9 @@ def test_in_a_terminal_by_hand():
         at.press("q")
         at.wait_for("against true")
         assert at.end() == 0
+
+
+def test_printed_every_frame_is_a_change(printed):
+    shown = [frame[3:] for frame in frames(printed)]
+    assert len(shown) > 80
+    assert all(a != b for a, b in itertools.pairwise(shown))

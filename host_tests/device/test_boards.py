@@ -170,3 +170,18 @@ def test_a_watchdog_at_rest_lets_the_console_be_open_for_days(machine):
             sleep_ms(3_600_000)
 
     assert on(machine, use_the_console, 1e6)[0] == "returned"
+
+
+def test_status_says_which_pins_are_missing(tmp_path, monkeypatch, capsys):
+    def report(board):
+        from kickstand import status_report
+
+        status_report.report()
+
+    monkeypatch.chdir(tmp_path)
+    outcome, board = on("s3", report, 5.0)
+    assert outcome == "returned"
+    names = "BUTTON_PIN, SENSOR_SDA, SENSOR_SCL, LCD_SDA, LCD_SCL"
+    said = capsys.readouterr().out
+    assert f"Settings     config.py: no usual pins are known for this board ({board.machine}): set {names}" in said
+    assert board.touched == set()

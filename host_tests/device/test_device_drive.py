@@ -301,3 +301,14 @@ def test_ctrl_c_keeps_the_worst_for_the_status(tmp_path, monkeypatch, capsys):
     assert found
     assert 245.0 < float(found[1]) < 275.0
     assert 15 <= int(found[2]) <= 25
+
+
+def test_a_press_for_another_page_does_not_answer_a_hidden_question(asked, tmp_path):
+    """The information page is in front of the question."""
+    plan = bike("gps", 3, kickstand=(12.0,))
+    to_info = [[asked - 14.0, LONG], *([asked - 12.0 + t, SHORT] for t in range(3)), [asked - 9.0, LONG]]
+    presses = [*POSES, *to_info, [asked + 2.0, LONG]]
+    record = devices.run("cpython", tmp_path, {**plan, "presses": presses, "until": asked + 4.0})
+    assert record.at(asked + 1.0)[0].startswith("MPU6050")
+    assert record.at(asked + 3.5)[1].startswith("next")  # the menu
+    assert not stored(tmp_path).by_drive

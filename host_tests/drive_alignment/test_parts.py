@@ -1,12 +1,15 @@
 """The steps of alignment by driving, one by one, against numpy where there is something to compute."""
 
+import types
+
 import numpy as np
 import pytest
 from engines import ENGINES, run
-from kickstand.drive_alignment import parts
+from kickstand.drive_alignment import parts, vertical
 from kickstand.drive_alignment.history import BIN_US, MASK, SIZE, ForceHistory
 from kickstand.drive_alignment.regression import Fit, ForwardRegression
-from kickstand.drive_alignment.vertical import StandingVertical
+from kickstand.drive_alignment.speed_check import SpeedCheck
+from kickstand.drive_alignment.vertical import StandingVertical, Vertical
 from kickstand_tools.calibration import published
 
 UP = [0.0, 1.0, 0.0]
@@ -170,3 +173,61 @@ def test_a_late_speed_is_not_taken_for_a_sensor_turned_while_standing():
     assert standing.up and np.degrees(np.arcsin(standing.up[2])) < 0.2
     stand(standing, level(15.0), 10.0)
     assert standing.moved
+
+
+def test_where_the_vertical_comes_from():
+    """A car's: its stops, and with a fit the mean of both. A motorcycle's: the upright pose; else straight riding."""
+    standing = types.SimpleNamespace(up=None)
+    fit = types.SimpleNamespace(level=[2.0 * part for part in level(4.0)])
+
+    def pitch(vertical, fit=None):
+        out = [0.0] * 3
+        return np.degrees(np.arctan2(out[2], out[1])) if vertical.known(out, fit) else None
+
+    car, bike, posed = Vertical(True, None, standing), Vertical(False, None, standing), Vertical(False, UP, standing)
+    assert (pitch(car), pitch(bike), pitch(posed), pitch(car, fit)) == (None, None, 0.0, None)
+    assert (pitch(bike, fit), pitch(posed, fit)) == (pytest.approx(4.0), 0.0)
+    standing.up = level(10.0)
+    assert (pitch(car), pitch(car, fit)) == (pytest.approx(10.0), pytest.approx(7.0))
+    for pitch_deg, times, mean in ((0.0, 1, 0.0), (8.0, 1, 4.0), (8.0, 60, 8.0)):  # of the last minute
+        for _ in range(times):
+            bike.update(level(pitch_deg), 10.0)
+        assert pitch(bike) == pytest.approx(mean, abs=0.1)
+    assert bike.turn_axis == pytest.approx(level(8.0), abs=0.01)
+    assert posed.turn_axis == pytest.approx(UP)
+    assert car.turn_axis is standing.up
+
+
+@pytest.mark.parametrize(("share", "moved"), [(0.9, True), (1.1, False)])
+def test_a_bend_at_a_stuck_zero_is_no_stop(share, moved):
+    """In a bend the rate is further from the bias of the stop before than warming up can change that bias."""
+    standing = StandingVertical()
+    stand(standing, level(0.0), 5.0, rate=(1.0, -4.0, 2.0))
+    stand(standing, level(0.0), 3.0, speed=10.0)
+    stand(standing, level(15.0), 10.0, rate=(1.0, -4.0 + share * vertical.TURNING_DPS, 2.0))
+    assert standing.moved is moved
+    assert standing.stops == (2 if moved else 1)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "speed", "shake_g", "stops"),
+    [(2.0, 0.0, 0.02, 0), (4.0, 0.0, 0.02, 1), (9.0, 1.0, 0.0, 0), (9.0, 0.0, 0.2, 0)],
+)
+def test_what_a_stop_is(seconds, speed, shake_g, stops):
+    """Standing for three seconds, with no more than an engine's shaking."""
+    standing = StandingVertical()
+    for k in range(round(seconds * 10)):
+        standing.update([0.0, 1.0, shake_g * (-1) ** k], (0.0, 0.0, 0.0), speed, 0.1)
+    assert standing.stops == stops
+
+
+@pytest.mark.parametrize(
+    ("speeds", "yaw_dps", "stuck"), [((7.0, 7.0), 0.0, True), ((7.0, 7.1), 0.0, False), ((7.0, 7.0), 10.0, False)]
+)
+def test_a_speed_that_stays_the_same_in_a_lively_ride_is_stuck(speeds, yaw_dps, stuck):
+    """Not one that changes, nor that of a steady drive through bends."""
+    check = SpeedCheck()
+    for k in range(30):
+        check.measure(speeds[k % 6 // 3])
+        check.update_second([0.0, 1.0, 0.1 * (-1) ** k], yaw_dps)
+    assert (check.problem is not None) is stuck

@@ -282,3 +282,20 @@ def test_readings_that_repeat_for_100_ms_are_frozen(rate_hz, good):
     chip.setup()
     wires.waiting = 14
     assert accepted() == good - 1  # the reading that it knows repeats once more
+
+
+@pytest.mark.parametrize(
+    ("who_am_i", "name", "zero_c", "per_degree"),
+    [
+        (0x68, "MPU6050", 36.53, 340.0),  # RM-MPU-6000A p. 30
+        (MPU6500, "MPU6500", 21.0, 333.87),  # MPU-6500 register map p. 33, with the sheet's sensitivity
+        (0x71, "MPU9250", 21.0, 333.87),
+        (0x98, "ICM20689", 25.0, 326.8),  # data sheet table 3
+        (MPU6886, "MPU6886", 25.0, 326.8),
+    ],
+)
+def test_temperature_by_the_data_sheet(who_am_i, name, zero_c, per_degree):
+    chip = started(Wires(who_am_i))
+    assert chip.name == name
+    assert chip.temperature_c(0) == zero_c
+    assert chip.temperature_c(10 * per_degree) == pytest.approx(zero_c + 10.0)

@@ -76,3 +76,15 @@ def test_ticks_that_begin_again_at_0_are_no_gap():
         now_us = (end + k * PERIOD_US + PERIOD_US // 2) % end
         assert own.step(1, now_us) == PERIOD_US
         own.emptied(now_us)
+
+
+def test_a_sample_is_half_a_period_old_on_average():
+    """The first look comes just when a sample is taken; the later ones at any time, evenly spread over the period."""
+    rng = np.random.default_rng(2)
+    errors = []
+    samples_us = np.arange(1200) * PERIOD_US
+    for _ in range(10):
+        looks_us = [0, *(samples_us[1:-1] + rng.integers(0, PERIOD_US, 1198)).tolist()]
+        total, true = elapsed(clock(), samples_us, looks_us)
+        errors.append(total - true)
+    assert np.mean(errors) == pytest.approx(0, abs=300)

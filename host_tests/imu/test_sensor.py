@@ -220,3 +220,19 @@ def test_a_check_that_is_lost_counts_as_a_lost_transfer(board):
         assert code(sensor) is None
         sensor.check(now_ms + 100 * k)
     assert code(sensor) == "sensor-lost"
+
+
+def test_a_fifo_that_does_not_start_is_tried_again_with_the_bus(board):
+    sensor, chip = made(board)
+    broken = [OSError(5)]
+
+    def start():
+        if broken:
+            raise broken.pop()
+
+    chip.start = start
+    for now_ms in (0, 100, 160, 180):
+        assert sensor.fetch(now_ms) == 0
+    assert (code(sensor), sensor.restarts) == ("no-sensor", 0)
+    sensor.fetch(230)
+    assert chip.calls == [("connect", "bus"), "configure"] * 2

@@ -175,3 +175,21 @@ def test_a_sensor_whose_forward_axis_points_up_or_down_comes_to_rest():
                 rested = rested or estimator.at_rest
                 assert abs(estimator.pitch_deg) < 68.8
             assert rested, (left, up)
+
+
+def test_after_a_restart_a_smooth_turn_is_no_rest():
+    """The bias is known by then: a rate of 2 deg/s that does not change is the bike's."""
+    estimator, _ = biased((0.0, 0.0, 0.0), 5.0)
+    estimator.restart()
+    for _ in range(1500):
+        estimator.update([0.0, 1.02, 0.0], [0.0, radians(2.0), 0.0], DT_US)
+        assert not estimator.at_rest
+
+
+def test_the_first_lean_is_that_of_the_force_of_the_first_twentieth_of_a_second():
+    estimator = LeanFilter()
+    shown = [estimator.update([sin(radians(a)), cos(radians(a)), 0.0], NO_RATE, DT_US) for a in (10, 12, 14, 16)]
+    near(shown[3], 13.0, 0.01)
+    assert estimator.variance == pi * pi
+    near(estimator.update([sin(radians(18)), cos(radians(18)), 0.0], NO_RATE, DT_US), 14.0, 0.01)
+    near(sigma_deg(estimator), 1.5, 1e-6)

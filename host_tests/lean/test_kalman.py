@@ -72,3 +72,18 @@ def test_a_state_that_is_set_has_no_correlation_left():
     matrix[4] = matrix[:, 4] = 0.0
     matrix[4, 4] = 0.25
     np.testing.assert_allclose(p.rows, matrix, rtol=0, atol=1e-12)
+
+
+def test_a_variance_never_reaches_zero():
+    p = Covariance([1.0, 1.0])
+    for _ in range(3):
+        list(p.update(((1, 1.0),), 0.0, 0.0))
+    assert p.rows[1][1] == 1e-10
+    assert p.rows[0][0] == 1.0
+
+
+def test_noise_is_added_to_one_state():
+    p, matrix = some()
+    p.add_noise(3, 0.25)
+    matrix[3, 3] += 0.25
+    np.testing.assert_allclose(p.rows, matrix, rtol=0, atol=1e-12)

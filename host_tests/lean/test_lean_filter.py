@@ -176,3 +176,12 @@ def test_the_work_on_a_window_has_as_many_pieces_as_are_counted_on():
             pieces[estimator.at_rest].add(taken)
     assert pieces[False] == {lean_filter.WORK_STEPS}
     assert max(pieces[True]) < lean_filter.WORK_STEPS
+
+
+def test_a_pose_that_was_not_upright_is_found_in_turns_without_a_straight():
+    lean, speed = held_from_side_to_side(190.0)
+    force, rate = shaken(*balanced(190.0, lean, speed))
+    off = np.radians(1.5)
+    turned = np.array([[np.cos(off), np.sin(off), 0.0], [-np.sin(off), np.cos(off), 0.0], [0.0, 0.0, 1.0]])
+    error = leans((force @ turned.T).tolist(), (rate @ turned.T).tolist()) - np.degrees(lean)
+    assert np.abs(np.mean(error[110 * HZ :])) < 0.3

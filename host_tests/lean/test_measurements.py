@@ -3,13 +3,14 @@
 The figures that the variances come to are those of test_known_ride.py.
 """
 
-from math import radians, sin
+from math import degrees, radians, sin
 
 from bike_motion import near
 from kickstand.lean import measurements
 from kickstand.lean.bike_model import BIAS_LEFT, LEAN, PITCH, SPEED, STATES, YAW_ERROR, Linearisation
 
 WINDOW_S = 0.2
+STILL = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]  # the means of a window, see bike_model.predict()
 
 
 def model(forward=0.0, rates=(0.0, 0.0, 0.0), lean_deg=0.0, pitch_deg=0.0, speed_mps=0.0, yaw_error_deg=0.0):
@@ -20,12 +21,58 @@ def model(forward=0.0, rates=(0.0, 0.0, 0.0), lean_deg=0.0, pitch_deg=0.0, speed
     return x, Linearisation(x, list(rates), forward)
 
 
+def forces(at=None, roll_acceleration=0.0, scale_error=0.0, **changed):
+    """Both measurements of force, of a window whose means are STILL but for those that are changed, by their index."""
+    means = [changed.get("mean%d" % i, STILL[i]) for i in range(9)]  # noqa: UP031 MicroPython
+    return measurements.forces(model(**(at or {}))[1], means, roll_acceleration, scale_error)
+
+
 def test_the_forces_are_the_differences_from_what_was_expected():
     _, here = model(lean_deg=20.0, speed_mps=15.0)
-    left, up = measurements.forces(here, [0.03, -0.2, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0], 0.0, 0.0)
+    left, up = forces({"lean_deg": 20.0, "speed_mps": 15.0}, mean0=0.03, mean1=-0.2)
     assert (left[0], up[0]) == (here.left_row, here.up_row)
     near(left[1], 0.03, 1e-12)
     near(up[1], -0.2, 1e-12)
+
+
+def test_vibration_rolling_and_pitching_make_the_forces_less_certain():
+    for at, changed in (
+        ({}, {"mean8": 0.2**2}),
+        ({"lean_deg": 30.0}, {"roll_acceleration": radians(100.0)}),
+        ({}, {"mean4": radians(100.0)}),
+        ({}, {"mean4": radians(-100.0)}),
+        ({"speed_mps": 15.0, "rates": (radians(5.0), 0.0, 0.0)}, {}),
+    ):
+        (_, _, left), (_, _, up) = forces(at, **changed)
+        (_, _, still_left), (_, _, still_up) = forces()
+        assert left > still_left + 1e-4 or up > still_up + 1e-4, (at, changed)
+    assert forces(mean8=-1e-6)[0][2] > 0.0  # rounding may make less than nothing of the vibration
+
+
+def test_a_sensor_above_the_roll_axis_has_the_roll_taken_off_its_forces():
+    for sign in (1.0, -1.0):
+        left, _ = forces(roll_acceleration=sign * radians(100.0))
+        assert 0.05 < sign * left[1] < 0.1
+        assert 0.1 < forces(mean4=sign * radians(100.0))[1][1] < 0.15  # centripetal, to whichever side it rolls
+
+
+def test_the_accelerometers_error_at_rest_is_taken_off_the_force_up():
+    near(forces(scale_error=-0.01, mean6=1.2)[1][1], 0.012, 1e-9)
+
+
+def test_roads_are_level_and_a_wheelie_is_pulled_down_less_than_a_hill():
+    """The pull on the pitch is innovation over variance: of 30 degrees it is smaller than of 6."""
+    x, here = model(lean_deg=30.0, pitch_deg=2.0, speed_mps=15.0, yaw_error_deg=4.0)
+    row, innovation, _ = measurements.level_road(here, x, WINDOW_S)
+    assert row == here.level_row
+    near(degrees(innovation), -(2.0 + 4.0 * 0.5), 1e-6)
+    pulls = []
+    for pitch_deg in (2.0, 6.0, 30.0):
+        x, here = model(pitch_deg=pitch_deg, speed_mps=15.0)
+        _, innovation, variance = measurements.level_road(here, x, WINDOW_S)
+        pulls.append(innovation / variance)
+    assert pulls[1] < pulls[0] < 0.0
+    assert pulls[1] < pulls[2] < 0.0
 
 
 def test_on_a_straight_the_bike_is_upright_and_elsewhere_its_speed_is_the_usual_one():
@@ -43,6 +90,14 @@ def test_on_a_straight_the_bike_is_upright_and_elsewhere_its_speed_is_the_usual_
         )
         assert (state, factor) == (LEAN if straight else SPEED, 1.0)
         near(innovation, radians(-lean_deg) if straight else 15.0 - mps, 1e-6)
+
+
+def test_a_measured_speed_is_less_certain_while_it_changes():
+    row, innovation, steady = measurements.measured_speed(12.0, 10.0, 0.0)
+    assert row == ((SPEED, 1.0),)
+    near(innovation, 2.0, 1e-6)
+    for change in (6.0, -6.0):
+        assert measurements.measured_speed(1.0, 1.0, change)[2] > 2.0 * steady
 
 
 def test_at_rest_there_is_no_speed_the_rates_are_bias_and_the_force_is_the_vertical():

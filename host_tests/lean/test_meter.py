@@ -236,3 +236,53 @@ def test_the_formulas_lean_takes_the_yaw_rate():
     shown = meter()
     shown.update(reading(force, [-rate[0], rate[1], rate[2]]), 0)
     near(shown.lean_formula_deg, 30.0, 0.01)
+
+
+def test_the_g_shown_follows_smoothly_whether_aligned_or_not():
+    for aligned in (True, False):
+        calibration = Calibration()
+        calibration.aligned = aligned
+        shown, seen = meter(calibration, leans=False), []
+        shown.update(STILL, 0)
+        for _ in range(150):
+            shown.update((0.2, 1.2, 0.4, 25.0, 0.0, 0.0, 0.0), DT_US)
+            seen.append(shown.smooth_force[2])
+        assert seen == sorted(seen)
+        assert seen[10] < 0.2
+        for value, force in zip(shown.smooth_force, (0.2, 1.2, 0.4)):
+            near(value, force, 0.01)
+
+
+def test_a_smoothed_force_that_is_not_kept_up_is_no_number():
+    """Left and up of an aligned motorcycle; they are back with a calibration that is not aligned."""
+    aligned, other = Calibration(), Calibration()
+    aligned.aligned = True
+    shown = meter(aligned)
+    shown.update(STILL, 0)
+    left, up, forward = shown.smooth_force
+    assert left != left and up != up
+    near(forward, 0.0, 1e-6)
+    shown.use(other)
+    shown.update(STILL, 0)
+    near(shown.smooth_force[1], 1.0, 1e-6)
+
+
+def test_a_speed_below_zero_is_no_news():
+    given, alone = meter(), meter()
+    for shown in (given, alone):
+        ride(speed_up(ride(shown, 3.0), 0.0, 20.0, 6.0), 1.0, speed_mps=20.0)
+    given.measure_speed(-1.0)
+    for shown in (given, alone):
+        ride(shown, 1.0, speed_mps=20.0)
+    assert given.speed_mps == alone.speed_mps
+    given.measure_speed(0.0)  # a zero is one
+    ride(given, 1.0, speed_mps=20.0)
+    assert given.speed_mps < alone.speed_mps - 0.5
+
+
+def test_a_standing_bike_is_at_rest_and_upright():
+    shown = ride(meter(), 3.0)
+    assert shown.at_rest
+    assert shown.trusted
+    near(shown.speed_mps, 0.0, 0.01)
+    near(shown.lean_deg, 0.0, 0.01)

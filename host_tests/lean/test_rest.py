@@ -66,3 +66,9 @@ def test_an_estimate_of_the_bias_that_went_astray_does_not_hide_a_rest():
     """The rate is small without it: so the calibration's bias was right."""
     assert rested_after(RestDetector(False), 3.0, bias=(0.05, 0.0, 0.0)) == 1.5
     assert rested_after(RestDetector(False), 12.0, rates=(0.03, 0.0, 0.0), bias=(0.06, 0.0, 0.0)) is None
+
+
+def test_rest_is_a_second_and_a_half_of_stillness():
+    detector = RestDetector()
+    assert not detector.resting
+    assert rested_after(detector, 3.0) == 1.5

@@ -143,3 +143,10 @@ def test_no_real_log_is_frozen_and_a_freeze_in_one_is_found(shared_data):
     begin, end = np.searchsorted(log.t_s, [40.0, 60.0])
     log.accel_g[begin:end], log.gyro_dps[begin:end] = log.accel_g[begin], log.gyro_dps[begin]
     assert np.flatnonzero(frozen(log)).tolist() == list(range(begin + 1, end))
+
+
+@pytest.mark.parametrize("digits", [5, 1])
+def test_a_phone_that_freezes_in_a_ride_is_not(digits):
+    readings = riding(30, 4, digits)
+    readings[1000:2000] = readings[1000]
+    assert np.count_nonzero(frozen(log_of(readings))) == 999

@@ -103,3 +103,22 @@ def test_a_block_of_littlefs_begins_with_a_pointer_for_each_halving(index):
     pointers = 1 + max(k for k in range(20) if index % (1 << k) == 0)
     assert block_length(index) == 4096 - 4 * pointers
     assert block_length(0) == 4096
+
+
+def test_the_first_position_of_all_is_left_out_where_no_room_was_kept_for_it():
+    """From then on there is room in each block, however full it is."""
+    block = RideBlock(5000)
+    for sequence in range(3):
+        ride_writer.begun(512, sequence, block)
+        sign = 1
+        while not block.full():
+            sign = -sign
+            block.add_speed((1 << 24) * (sign > 0))
+            if sequence:
+                block.add_place(ride_writer.place(sequence))
+            block.add([sign * 8 * 32767] * 7, 8, (1 << 29) if sign > 0 else 0)
+            if block.full() and not sequence:
+                block.add_place(ride_writer.place(0))
+        read = ride_writer.ended(block)
+        assert places(read) == (len(read.turns) if sequence else 0)
+        assert read.turns[-1].sums == (sign * 8 * 32767,) * 6

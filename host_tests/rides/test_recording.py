@@ -314,3 +314,25 @@ def test_a_card_that_is_refused_says_so_itself(recorder, keeper):
     assert not recorder.active
     assert recorder.problem is keeper.error
     assert keeper.steps == ["begin"]
+
+
+def test_a_new_ride_ends_the_one_before(recorder, keeper):
+    start(recorder)
+    add(recorder, 3)
+    start(recorder)
+    assert keeper.steps[-2:] == ["end", "begin"]
+    assert len(keeper.taken) == 1
+    assert recorder.seconds() == 0
+
+
+def test_what_is_not_ready_is_asked_again_in_the_next_turn(recorder, keeper):
+    start(recorder)
+    keeper.is_ready = False
+    while "ready" not in keeper.steps:
+        add(recorder, 1)
+    add(recorder, 5)
+    assert keeper.steps.count("ready") == 6
+    assert "write" not in keeper.steps
+    keeper.is_ready = True
+    add(recorder, 5)
+    assert len(keeper.taken) == 1

@@ -1,5 +1,7 @@
 """Positions in recorded rides: exact in each block, with the turn they came with, and nothing lost by them."""
 
+import struct
+
 import devices
 import engines
 import numpy as np
@@ -99,3 +101,17 @@ def test_a_log_has_the_columns_that_there_is_something_in(tmp_path):
         assert header.split(",")[7:] == [*columns, "temp_c"]
         if "lat_deg" in columns:
             assert first.split(",")[-4:] == ["-33.8687242", "-179.9999998", f"{MIDNIGHT_S - 17.9:.3f}", "31.25"]
+
+
+def test_an_older_reader_finds_all_but_the_positions():
+    """It takes the number of positions for a byte of the version's name, and their bytes for zeros."""
+    data, _ = ride_writer.blocks(3, places_every=10)
+    for content in data:
+        fields = struct.unpack_from("<4sHHIIqhHHH11sB", content)
+        assert fields[:3] == (b"KRID", 1, len(content))
+        assert fields[10].startswith(block_format.__version__.encode() + b"\0")
+        count, _ = struct.unpack_from("<HI", content, len(content) - 6)
+        block = block_reader.parse(content)
+        start = len(content) - 6
+        old = list(block_reader._turns(block, content[block_reader._START : start], count, {}))
+        assert [(t.time_us, t.sums, t.n) for t in old] == [(t.time_us, t.sums, t.n) for t in block.turns]

@@ -143,10 +143,19 @@ def other(board, **differs):
     board.modules["sys"].implementation = types.SimpleNamespace(**implementation)
 
 
-def test_a_board_that_does_not_fit_is_left_alone(line, board):
-    other(board, name="circuitpython")
+@pytest.mark.parametrize(
+    ("differs", "platform", "words"),
+    [
+        ({"version": (1, 22, 2)}, "rp2", "1.22.2: put MicroPython 1.23 or newer"),
+        ({"name": "circuitpython"}, "rp2", "this port runs circuitpython: put MicroPython on the board first"),
+        ({}, "stm32", "runs on a Raspberry Pi Pico"),
+    ],
+)
+def test_a_board_that_does_not_fit_is_left_alone(line, board, differs, platform, words):
+    other(board, **differs)
+    board.modules["sys"].platform = platform
     line.plug_in(RawPrompt(board))
-    assert "this port runs circuitpython: put MicroPython on the board first" in line.look()
+    assert words in line.look()
     assert line.rider.page.is_hidden("#config")
     assert board.written == [] and board.resets == 1
 
