@@ -41,7 +41,7 @@ MEAN[HEIGHT], SIGMA[HEIGHT] = 0.5, 0.3
 MEAN[AHEAD], SIGMA[AHEAD] = 0.6, 0.5
 MEAN[TYRES], SIGMA[TYRES] = 0.07, 0.06
 SIGMA[BESIDE] = 0.001
-SIGMA[CAMBER] = 0.0055  # ordinary tyres, whose TYRES is 0.12, on a road that falls to the side by 2.6 degrees
+SIGMA[CAMBER] = 0.0035  # ordinary tyres, whose TYRES is 0.12, on a road that falls to the side by 3 %
 MEAN[DELAY], SIGMA[DELAY] = 0.4, 0.4
 MEAN[DIVE], SIGMA[DIVE] = 0.026, 0.035  # none or, as of anti-dive forks, below 0, to 6 degrees per g
 
