@@ -147,6 +147,12 @@ _MOUNT: _Table = {
 _OTHERS: _Table = {
     "absurd-readings": "readings that no vehicle gives, at {0:.1f} s up to {1:.0f} deg/s and {2:.1f} g, where the lean "
     "is not known: check the sensor, and the units in the log",
+    "axis-dead": "{0} is dead: from {2:.1f} s on it does not change for {1:.0f} s while others do; these readings are "
+    "left out, and the lean is not known there: check the sensor and its solder joints, or replace it",
+    "gyro-saturated": "gyro {0} is at the end of its range {1} times, {2:.1f} s in all, first at {3:.1f} s: these "
+    "readings are left out: fix the sensor firmly, or set a larger GYRO_RANGE_DPS",
+    "sensor-odd": "no sound gyro fits this ride: its error of scale or axes comes out at {0:.0f} standard deviations, "
+    "so the smoothed lean is not certain, and its standard deviation says so: is an axis of the gyro ill?",
     "moved": "moved or knocked",
     "vibration": "not still: vibration",
     "tilting": "not still: slowly tilting",
