@@ -16,6 +16,7 @@ from .board import port
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
 from .devices import open_button
+from .errors import report
 from .imu.sensor import SampleClock
 from .lean.meter import LeanMeter
 from .rides.recording import Recording
@@ -144,7 +145,12 @@ class App:
         display. It waits for nothing."""
         now_us, now_ms = ticks_us(), ticks_ms()
         n = self.sensor.fetch(now_ms)
+        if self.sensor.clipped:
+            self.clock.skip(self.sensor.clipped)
+            self.sensor.clipped = 0
         if n:
+            if self._restarts != self.sensor.restarts:
+                self._sensor_started()
             dt_us = self.clock.step(n, now_us)
             self._pass_on(n, dt_us, now_ms)
         if self.drive:
@@ -152,7 +158,6 @@ class App:
         if ticks_diff(now_ms, self._page_ms) >= 0:  # asked twice: a local would put this frame on the heap
             self.sensor.check(now_ms)
         if self.sensor.fault is not None:
-            self.clock.restart()
             self.screen.interrupt(now_ms)
         elif not self.sensor.chip.frames_left:
             self.clock.emptied(now_us)
@@ -197,6 +202,10 @@ class App:
         if self.screen.menu:  # a recording that is started there should begin at once
             self.rides.prepare()
         problem = self.rides.recorder.take_problem() or (self.drive and self.drive.speed.take_problem())
+        ill = self.sensor.chip.axes.take_notice()
+        if ill:
+            report(ill)
+            problem = problem or ill
         if self.user:
             self.user.lean(self.settings.leans and self.sensor.fault is None and self.screen.pages.trusted)
             problem = problem or self.user.take_problem()
@@ -209,9 +218,6 @@ class App:
     def _pass_on(self, n, dt_us, now_ms):
         """Pass on n new samples: their sum to the meter, each one to a wizard. dt_us: from the last sample before them
         to the last of them."""
-        if self._restarts != self.sensor.restarts:
-            self._restarts = self.sensor.restarts
-            self._sensor_started()
         chip = self.sensor.chip
         self.meter.update_sum(chip.sums, n, dt_us)
         if self.rides.recorder.active:
@@ -231,6 +237,8 @@ class App:
 
     def _sensor_started(self):
         """React to a chip that was set up, for the first time or again after a fault; it may be another chip."""
+        self._restarts = self.sensor.restarts
+        self.clock.restart()
         self.meter.restart()
         if self.recording:
             self.rides.recorder.mark_gap()
