@@ -38,9 +38,9 @@ def ride(seconds, seed=0):
     return samples
 
 
-def judged(samples, gyro_range=1, dlpf=3):
+def judged(samples, gyro_range=1, dlpf=3, accel_range=3):
     """What is said, [(seconds, words or None), ...], each change of it."""
-    axes = AxisWatch(RATE_HZ, gyro_range, dlpf, 20)
+    axes = AxisWatch(RATE_HZ, accel_range, gyro_range, dlpf, 20)
     sums = array("i", [0] * 7)
     said: list[tuple[float, str | None]] = [(0.0, None)]
     for k, sample in enumerate(np.clip(np.round(samples), -32768, 32767).astype(">i2")):
@@ -141,3 +141,11 @@ def test_now_and_then_at_the_end_of_the_range_is_no_fault():
     samples = ride(20)
     samples[np.random.default_rng(1).random(len(samples)) < 0.05, 1] = 32767
     assert judged(samples) == []
+
+
+@pytest.mark.parametrize(("accel_range", "said"), [(0, 0), (1, 0), (2, 2), (3, 2)])
+def test_hard_vibration_is_clipping_unless_the_range_is_small(accel_range, said):
+    """What the low-pass has left of it reaches half of 8 g or of 16 g for three seconds. In a range of 2 g bends do."""
+    samples = ride(8)
+    samples[400:1000, 1] += 17000 * np.sin(np.arange(600) * 2.2)
+    assert [words for _, words in judged(samples, accel_range=accel_range)] == ["Accel", None][:said]

@@ -89,7 +89,7 @@ def test_a_sample_at_the_end_of_the_range_is_left_out(engine):
     assert (count, sums) == (5, good.sum(axis=0).tolist())
     assert moved == np.ravel(frames(good)).tolist()
     assert watch[3:8] == [3, 0, 0b1010011, 3, 2]  # lost; in a row; which axes; frames, with the gyro
-    assert watch[24:31] == np.abs(samples).max(axis=0).tolist()
+    assert watch[26:33] == np.abs(samples).max(axis=0).tolist()
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
@@ -103,11 +103,11 @@ def test_a_watch_notes_what_the_counts_have_shown(engine):
     chosen, python = engines.run(engine, [("add_up", ([frames(samples[:1]), frames(samples)], LIMIT))])[0]
     assert chosen == python
     before, after = (answer[3] for answer in chosen)
-    assert before[10:17] == samples[0].tolist()
+    assert before[12:19] == samples[0].tolist()
     for column in range(7):
         low = sum(1 << value for value in set((samples[:, column] & 15).tolist()))
-        assert after[17 + column] & 0xFFFF == low, column
-    assert [seen >> 16 for seen in after[17:24]] == [0, 2, 1, 1, 1, 1, 1]
+        assert after[19 + column] & 0xFFFF == low, column
+    assert [seen >> 16 for seen in after[19:26]] == [0, 2, 1, 1, 1, 1, 1]
     assert after[8] == 0b1101111
 
 

@@ -17,7 +17,7 @@ class Chip:
     def __init__(self):
         from kickstand.imu.fifo_frames import AxisWatch
 
-        self.axes = AxisWatch(200, 1, 3, 20)
+        self.axes = AxisWatch(200, 3, 1, 3, 20)
         self.axes.notes[9] = 1 << 29  # the next look is far away
         self.waiting, self.setups, self.states = [], [], []
         self.bad = 0

@@ -75,7 +75,7 @@ def add_up(batches, limit):
     does it and in Python."""
     out = []
     for function in (fifo_frames.add_up, fifo_frames.add_up_python):
-        watch = fifo_frames.AxisWatch(200, 1, 3, limit).notes
+        watch = fifo_frames.AxisWatch(200, 3, 1, 3, limit).notes
         sums = array("i", [99] * 7)  # whatever was in it before
         answers = []
         for batch in batches:

@@ -16,7 +16,7 @@ FRAME = const(14)  # bytes
 SATURATED = const(32700)  # |counts|: from here on a reading is at the end of its range
 LOOK_MS = const(400)
 
-# Places in the array('i', 31) that add_up() keeps its notes in; in the machine code they are numbers. The hash of the
+# Places in the array('i', 33) that add_up() keeps its notes in; in the machine code they are numbers. The hash of the
 # last frame; how many times in a row it was repeated; how many repetitions make a frame dead; the number of frames at
 # the end of the range in this call; the same in a row until now.
 _HASH = const(0)
@@ -32,11 +32,14 @@ _CLIPPED = const(6)
 _GYRO_CLIPPED = const(7)
 _DIFFER = const(8)
 DUE = const(9)
+# |counts| of the accelerometer that hard vibration reaches, and the number of frames with so much since the last look.
+_HARD = const(10)
+_SHAKEN = const(11)
 # From each of these on seven places, in the frame's order: the counts of the last frame; a bit for each value that
 # their lowest four bits had since the last look; the largest |counts| since power-on.
-_LAST = const(10)
-_SEEN = const(17)
-_PEAK = const(24)
+_LAST = const(12)
+_SEEN = const(19)
+_PEAK = const(26)
 _HIGH_BYTE = const(0x10000)  # in _SEEN: the high byte has changed
 _WRAPPED = const(0x20000)  # in _SEEN: the counts jumped by _JUMP or more, but the high byte stayed
 _JUMP = const(192)
@@ -51,6 +54,9 @@ _WRAP_LOOKS = const(2)  # looks in which a stuck high byte must show
 _WELL_LOOKS = const(2)  # successive looks without a fault that end one
 _CLIP_LOOKS = const(2)  # successive looks with half of the samples at the end of the range that are a fault,
 _RAIL_LOOKS = const(5)  # and with all of them: not the vibration, but the axis
+# Half of 8 g and of 16 g. The low-pass hides most of a vibration: where so much is left, it was cut off before, and the
+# mean of what was cut off unevenly is wrong. A range below 8 g has no such limit, because bends reach half of it.
+_HARD_COUNTS = const(16384)
 _SETUP_LOOKS = const(25)  # looks from one set-up of a chip with an ill axis to the next
 _QUIET_LOOKS = const(150)  # looks until the same notice is shown again
 
@@ -90,7 +96,7 @@ def add_up_python(frames, n, sums, watch):
         watch[_HASH] = mark
         if watch[_REPEATS] >= watch[_LIMIT]:
             return good
-        ends = 0  # a bit for each column at the end of its range
+        ends = shaken = 0  # ends: a bit for each column at the end of its range
         for i in range(7):
             value, last = _int16(frames, at + 2 * i), watch[_LAST + i]
             watch[_LAST + i] = value
@@ -108,6 +114,9 @@ def add_up_python(frames, n, sums, watch):
                 watch[_PEAK + i] = size
             if size >= SATURATED and i != 3:
                 ends |= 1 << i
+            if size >= watch[_HARD] and i < 3:
+                shaken = 1
+        watch[_SHAKEN] += shaken
         if ends:
             watch[_ENDS] |= ends
             watch[LOST] += 1
@@ -137,16 +146,17 @@ class AxisWatch:
     dead, or its low byte is stuck), if they jump through 256 counts while their high byte stays (which is stuck), or if
     they equal those of another axis.
 
-    rate_hz: samples a second. gyro_range: 0 (250 deg/s) to 3 (2000). dlpf: see Mpu6050. repeats: repetitions of a frame
-    that make it dead.
+    rate_hz: samples a second. accel_range, gyro_range: 0 (2 g, 250 deg/s) to 3 (16 g, 2000 deg/s). dlpf: see Mpu6050.
+    repeats: repetitions of a frame that make it dead.
 
     notes: what add_up() notes. fault: None, or a Notice: an axis is ill, or half of the samples are at the end of the
     range. clipped: samples that were left out since power-on, because an axis was at its end.
     """
 
-    def __init__(self, rate_hz, gyro_range, dlpf, repeats):
-        self.notes = array("i", [0] * 31)
+    def __init__(self, rate_hz, accel_range, gyro_range, dlpf, repeats):
+        self.notes = array("i", [0] * 33)
         self.notes[_LIMIT] = repeats
+        self.notes[_HARD] = _HARD_COUNTS if accel_range > 1 else 32769
         self.notes[DUE] = self._look = rate_hz * LOOK_MS // 1000
         self._limits = _ACCEL_LOOKS[dlpf - 1], _GYRO_LOOKS[6 * gyro_range + dlpf - 1]
         # For each column: successive looks in which it was quiet; looks in which it wrapped since its high byte changed
@@ -161,6 +171,7 @@ class AxisWatch:
         """Forget the samples since the last look, because the chip was set up."""
         notes = self.notes
         notes[_REPEATS] = notes[_ROW] = notes[_ENDS] = notes[_CLIPPED] = notes[_GYRO_CLIPPED] = notes[_DIFFER] = 0
+        notes[_SHAKEN] = 0
         for i in range(7):
             notes[_SEEN + i] = 0
         notes[DUE] = self._look
@@ -191,7 +202,8 @@ class AxisWatch:
         lost, gyro = notes[_CLIPPED], notes[_GYRO_CLIPPED]
         self.clipped += lost
         enough = 2 * lost < samples  # good ones to judge by
-        if not enough:
+        shaken = 10 * notes[_SHAKEN] >= samples
+        if shaken or not enough:
             self._clips += 1
         elif 4 * lost < samples:
             self._clips = 0
@@ -199,12 +211,12 @@ class AxisWatch:
         if not enough:
             fault = _ill(notes[_ENDS]) if lost == samples and self._clips >= _RAIL_LOOKS else None
         self._ill = self._ill + 1 if fault else 0
-        if 10 * lost >= samples and not fault:
-            clips = Notice("clips", "Gyro" if 2 * gyro >= lost else "Accel")
+        if not fault and (shaken or 10 * lost >= samples):
+            clips = Notice("clips", "Gyro" if lost and 2 * gyro >= lost else "Accel")
             self._notice(clips)
             if self._clips >= _CLIP_LOOKS:
                 fault = clips
-        notes[_ENDS] = notes[_CLIPPED] = notes[_GYRO_CLIPPED] = notes[_DIFFER] = 0
+        notes[_ENDS] = notes[_CLIPPED] = notes[_GYRO_CLIPPED] = notes[_DIFFER] = notes[_SHAKEN] = 0
         if fault:
             self._well = 0
             self.fault = fault
@@ -268,5 +280,5 @@ else:
     for _k in range(7):
         _TRIAL[14 * _k + 1] = _TRIAL[14 * _k + 9] = 250 - 40 * _k
     _TRIAL[28], _TRIAL[29], _TRIAL[66], _TRIAL[67] = 0x7F, 0xFF, 0x80, 0x00
-    add_up = checked(add_up, add_up_python, _TRIAL, 8, array("i", range(7)), AxisWatch(20, 1, 3, 2).notes)
+    add_up = checked(add_up, add_up_python, _TRIAL, 8, array("i", range(7)), AxisWatch(20, 2, 1, 3, 2).notes)
     del _TRIAL

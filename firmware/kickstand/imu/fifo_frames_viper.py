@@ -38,30 +38,34 @@ def add_up(frames: ptr8, n: int, sums: ptr32, watch: ptr32) -> int:  # noqa: F82
         if watch[1] >= watch[2]:
             return good
         ends = 0
+        shaken = 0
         for i in range(7):
             value = frames[at] << 8 | frames[at + 1]
             if value > 32767:
                 value -= 65536
-            last = watch[10 + i]
-            watch[10 + i] = value
+            last = watch[12 + i]
+            watch[12 + i] = value
             if value < 0:
                 value = 0 - value
-            if value > watch[24 + i]:
-                watch[24 + i] = value
+            if value > watch[26 + i]:
+                watch[26 + i] = value
             if value >= 32700 and i != 3:
                 ends |= 1 << i
-            value = watch[10 + i]  # as last, which a computer of 64 bits reads without its sign
+            if value >= watch[10] and i < 3:
+                shaken = 1
+            value = watch[12 + i]  # as last, which a computer of 64 bits reads without its sign
             seen = 1 << (value & 15)
             if value >> 8 != last >> 8:
                 seen |= 0x10000
             elif value - last >= 192 or last - value >= 192:
                 seen |= 0x20000
-            watch[17 + i] |= seen
-            if i & 3 and value != watch[9 + i]:
+            watch[19 + i] |= seen
+            if i & 3 and value != watch[11 + i]:
                 watch[8] |= 1 << i
-            if i & 3 == 2 and value != watch[8 + i]:
+            if i & 3 == 2 and value != watch[10 + i]:
                 watch[8] |= 1 << i - 2
             at += 2
+        watch[11] += shaken
         if ends:
             watch[5] |= ends
             watch[3] += 1
@@ -72,7 +76,7 @@ def add_up(frames: ptr8, n: int, sums: ptr32, watch: ptr32) -> int:  # noqa: F82
             continue
         watch[4] = 0
         for i in range(7):
-            sums[i] += watch[10 + i]
+            sums[i] += watch[12 + i]
         if good < k:
             last = (k - good) * 14
             for i in range(at - 14, at):

@@ -93,7 +93,7 @@ class Mpu6050:
 
     SATURATED = SATURATED
 
-    def __init__(self, i2c, address=0x68, accel_range_g=8, gyro_range_dps=500, dlpf=3, rate_hz=200, accept=None):
+    def __init__(self, i2c, address=0x68, accel_range_g=16, gyro_range_dps=500, dlpf=3, rate_hz=200, accept=None):
         self._i2c = i2c
         self._address = address
         self._accept = accept
@@ -116,7 +116,7 @@ class Mpu6050:
         self._started = False  # setup() has run to its end: the FIFO is filling
         self._full = 0  # with so many bytes in it the FIFO may have overflowed
         self.counts, self.sums = array("h", [0] * 7), array("i", [0] * 7)
-        self.axes = AxisWatch(rate_hz, gyro_bits >> 3, dlpf, rate_hz * FROZEN_MS // 1000)
+        self.axes = AxisWatch(rate_hz, accel_bits >> 3, gyro_bits >> 3, dlpf, rate_hz * FROZEN_MS // 1000)
 
     @property
     def name(self):
