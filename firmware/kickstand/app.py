@@ -13,6 +13,7 @@ import os
 from time import sleep_us, ticks_add, ticks_diff, ticks_ms, ticks_us
 
 from .board import port
+from .board.display import STOPPED
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
 from .devices import open_button
@@ -95,16 +96,19 @@ class App:
         return BackgroundAlignment(self.settings.leans, open_speed(self.settings), self.meter, self.calibration)
 
     def run(self):
-        """Loop until Ctrl-C, LOOP_US a turn."""
+        """Loop until Ctrl-C, LOOP_US a turn. Whatever ends it, the display then says so: it must not keep a lean."""
         try:
             self._loop()
-        except KeyboardInterrupt:
-            port.rest_watchdog()  # not fed from here on; comes first, because a second Ctrl-C may interrupt the rest
+        except BaseException as error:
+            if not isinstance(error, Exception):  # nobody restarts the board after Ctrl-C and its like
+                port.rest_watchdog()  # not fed from here on; comes first, because a second Ctrl-C may interrupt the rest
+            self.lcd.end(*STOPPED)
             global worst
             worst = LOOP_US - self._least_wait_us, self.sensor.chip.least_free_samples()
-            self.rides.stop()
-            if self.live:
-                self.live.stop()
+            if not isinstance(error, Exception):
+                self.rides.stop()
+                if self.live:
+                    self.live.stop()
             raise
 
     def _loop(self):

@@ -64,5 +64,5 @@ def tell(refusal):
     """Print a Refusal's sentence, unless a print was slow in the last QUIET_MS."""
     from time import ticks_diff, ticks_ms
 
-    if _slow_ms is None or ticks_diff(ticks_ms(), _slow_ms) >= QUIET_MS:
+    if _slow_ms is None or not 0 <= ticks_diff(ticks_ms(), _slow_ms) < QUIET_MS:
         say(sentence(refusal))
