@@ -46,8 +46,8 @@ def fill_gaps(n):
         value = -value  # each float is boxed: one block of the heap
 
 
-# Of the last run, once Ctrl-C has ended it: microseconds of its longest turn, and the fewest places that were left in
-# the chip's FIFO. kickstand.status() prints them
+# Of the last run, once Ctrl-C has ended it: microseconds of its longest turn, the fewest places that were left in the
+# chip's FIFO, and its axes' AxisWatch.shaken(). kickstand.status() prints them
 worst = None
 
 
@@ -104,7 +104,8 @@ class App:
                 port.rest_watchdog()  # not fed from here on; comes first, because a second Ctrl-C may interrupt the rest
             self.lcd.end(*STOPPED)
             global worst
-            worst = LOOP_US - self._least_wait_us, self.sensor.chip.least_free_samples()
+            chip = self.sensor.chip
+            worst = LOOP_US - self._least_wait_us, chip.least_free_samples(), chip.axes.shaken()
             if not isinstance(error, Exception):
                 self.rides.stop()
                 if self.live:

@@ -188,9 +188,9 @@ class AxisWatch:
             return None
         return Notice("clips", "Gyro" if notes[_ENDS] > 7 else "Accel")
 
-    def peak(self, column):
-        """The largest |counts| of this column (0 to 6) since power-on."""
-        return self.notes[_PEAK + column]
+    def shaken(self):
+        """Since power-on: the largest |counts| of the accelerometer's axes (3), and the share of lost samples."""
+        return self.notes[_PEAK : _PEAK + 3], self.clipped / max(1, self._looks * self._look)
 
     def look(self):
         """Judge the samples since the last look. To be called when notes[DUE] is 0 or less. Returns True if the chip
