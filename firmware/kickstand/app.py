@@ -100,13 +100,14 @@ class App:
         try:
             self._loop()
         except BaseException as error:
-            if not isinstance(error, Exception):  # nobody restarts the board after Ctrl-C and its like
+            if isinstance(error, KeyboardInterrupt):
                 port.rest_watchdog()  # not fed from here on; comes first, because a second Ctrl-C may interrupt the rest
             self.lcd.end(*STOPPED)
             global worst
             chip = self.sensor.chip
             worst = LOOP_US - self._least_wait_us, chip.least_free_samples(), chip.axes.shaken()
-            if not isinstance(error, Exception):
+            if not isinstance(error, Exception):  # nobody restarts the board, as after an error
+                port.rest_watchdog()
                 self.rides.stop()
                 if self.live:
                     self.live.stop()

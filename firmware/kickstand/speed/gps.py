@@ -40,7 +40,7 @@ class Gps:
         self._line = b""  # the sentence so far
         # When, in ticks_ms(), the receiver last sent: any byte; a whole sentence; a sentence with a fix; an RMC.
         self._heard_ms = None
-        self._sentence_ms = self._fix_ms = 0
+        self._sentence_ms = self._fix_ms = self._carried_ms = 0
         self._rmc_ms = None
         self._time = b""  # time of day in the last RMC
         # A fix is remembered as (ticks_ms() when it came, its time of day in ms).
