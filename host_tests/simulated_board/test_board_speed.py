@@ -357,7 +357,10 @@ def later(days, seconds=0):
 class Once:
     """A source that gives each value once."""
 
-    age_ms, problem, value = 0, None, None
+    age_ms, problem = 0, None
+
+    def __init__(self, value):
+        self.value = value
 
     def poll(self, now_ms):
         value, self.value = self.value, None
@@ -370,9 +373,8 @@ def test_a_speed_is_taken_after_days_without_one():
         from kickstand.speed.source import Speed
 
         for days in DAYS:
-            source = Once()
+            source = Once(0.0)
             speed = Speed(source)
-            source.value = 0.0
             assert speed.poll(1000) == 0.0
             for k in range(1, int(24 * days)):
                 assert speed.poll(later(k / 24)) is None
@@ -392,7 +394,8 @@ def test_a_receiver_stays_silent_for_days():
                 gps.poll(1000)
             for k in range(1, int(24 * days)):
                 gps.poll(later(k / 24))
-                assert gps.fault(later(k / 24)).code == "gps-silent", (days, k)
+                fault = gps.fault(later(k / 24))
+                assert fault and fault.code == "gps-silent", (days, k)
 
 
 def test_a_wheel_that_stood_for_days_turns_again():

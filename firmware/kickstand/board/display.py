@@ -19,8 +19,9 @@ draws                           True if it shows pictures. A picture is (draw, v
 A display that lost its power or whose transfer failed is set up again, and dark or crossed out until it is right.
 """
 
-import micropython
 from time import sleep_ms, ticks_diff, ticks_ms
+
+import micropython
 
 from ..errors import attempt
 
