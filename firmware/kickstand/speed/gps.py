@@ -64,7 +64,7 @@ class Gps:
         waiting = self._uart.any()
         if not waiting:
             return None
-        if heard_ms is not None and ticks_diff(now_ms, self._heard_ms) > SILENT_MS:
+        if heard_ms is not None and ticks_diff(now_ms, heard_ms) > SILENT_MS:
             self._begin(now_ms)
         self._heard_ms = now_ms
         chunk = self._uart.read(min(waiting, MAX_CHUNK)) or b""
