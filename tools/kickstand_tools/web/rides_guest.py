@@ -102,7 +102,7 @@ def take(log, is_log, columns, units, track, progress):
         found = import_recording(log, json.loads(columns) or None, json.loads(units))
         out = str(_made(log, f"{log.partition('.')[0]}.csv"))
         write_imported(out, found)
-        warnings = [sentence(notice, PAGE) for notice in found.notices]
+        warnings = [sentence(notice, PAGE) for notice in [*found.notices, *found.shortfalls]]
     if track:
         try:
             joined = join_track(Path(out), Path(track), progress)
