@@ -68,11 +68,13 @@ class Finding:
 
 @dataclass
 class Findings:
-    """What each quantity is: "t", "a", "g", "speed", "lat", "lon", "temp", as far as it is found. lacking: the
-    quantities that are needed and missing, in words."""
+    """What each quantity is: "t", "a", "g", "speed", "lat", "lon", as far as it is found. lacking: the quantities that
+    are needed and missing, in words. single: columns of single axes, by the keys of REQUIRED, of a sensor that lacks
+    another axis. remarks: what is wrong with the columns that are there."""
 
     found: dict[str, Finding] = field(default_factory=dict)
     lacking: list[str] = field(default_factory=list)
+    single: dict[str, str] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
 
     @property
@@ -83,7 +85,7 @@ class Findings:
     @property
     def columns(self) -> dict[str, str]:
         """The columns by the keys of REQUIRED and OPTIONAL."""
-        pairs: dict[str, str] = {}
+        pairs = dict(self.single)
         for key, finding in self.found.items():
             keys = ACCEL if key == "a" else GYRO if key == "g" else (key,)
             pairs |= dict(zip(keys, finding.columns))
@@ -110,6 +112,9 @@ def find(sheet: Sheet) -> Findings:
         findings.found["t"] = time
     seconds = _seconds(sheet, time)
     _accel_and_gyro(sheet, seconds, findings)
+    for key, kind in (("a", "accel"), ("g", "gyro")):
+        if key not in findings.found:
+            findings.single |= _single(sheet, key, kind)
     for key, places in (
         ("speed", _speed(sheet)),
         ("lat", _named(sheet, "^lat|latitude")),
@@ -213,6 +218,12 @@ def _threes(sheet: Sheet) -> list[_Three]:
     if not found:
         found = _side_by_side(sheet)
     return found
+
+
+def _single(sheet: Sheet, key: str, kind: str) -> dict[str, str]:
+    """The columns of single axes that are named as those of a sensor of this kind."""
+    named = [(stem, axis, name) for name in sheet.columns for stem, axis in _stems(name)]
+    return {key + axis: name for stem, axis, name in reversed(named) if axis in "xyz" and _kind(stem) == kind}
 
 
 def _numeric(sheet: Sheet, places: Sequence[int]) -> bool:

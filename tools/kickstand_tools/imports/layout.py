@@ -139,8 +139,6 @@ def _rows(lines: Sequence[str], separator: str, comma: bool) -> tuple[int, int, 
     rows = [k for k, count in enumerate(counts) if count >= FEWEST_CELLS and len(split[k]) == width]
     numbers = int(np.median([counts[k] for k in rows]))
     first = rows[0]
-    if len(rows) < 2:
-        return None
     names = next((k for k in range(first - 1, -1, -1) if lines[k].strip()), None)
     if names is not None and not _is_names(split_row(lines[names].lstrip(_MARKS), separator), width):
         names = _names_by_commas(lines, names, width)
@@ -148,6 +146,8 @@ def _rows(lines: Sequence[str], separator: str, comma: bool) -> tuple[int, int, 
         above = names - 1
         if above >= 0 and _is_names(split_row(lines[above].lstrip(_MARKS), separator), width):
             names = above
+    if len(rows) < 2 and names is None:
+        return None
     return len(rows), numbers, Grid(names, first, separator, comma, width)
 
 

@@ -46,11 +46,12 @@ _TIMES_OFF = 3.0  # a unit is refused if the turns of gravity show another one t
 
 @dataclass
 class Table:
-    """A table of sensors of an unknown app: its columns, and what they seem to be."""
+    """A table of sensors of an unknown app: its columns, and what they seem to be. joined: made of several files."""
 
     name: str
     sheet: Sheet
     findings: Findings
+    joined: bool = False
 
     @property
     def columns(self) -> list[str]:
@@ -70,6 +71,23 @@ class Table:
     def missing(self) -> list[str]:
         """The columns of REQUIRED that are not found."""
         return [key for key in REQUIRED if key not in self.found]
+
+    def first_seconds(self, seconds: float = 10.0, points: int = 300) -> dict[str, list[float] | list[list[float]]]:
+        """The beginning of the time (t, s), accelerometer (a) and gyro (g) that are found, thinned out, as they are in
+        the table; empty without a time."""
+        found = self.findings.found
+        if "t" not in found:
+            return {}
+        place = self.columns.index(found["t"].columns[0])
+        since = _seconds(self.sheet.times(place, found["t"].unit))
+        shown = np.flatnonzero(since <= seconds)
+        shown = shown[:: max(1, len(shown) // points)]
+        picture: dict[str, list[float] | list[list[float]]] = {"t": since[shown].round(3).tolist()}
+        for key in ("a", "g"):
+            if key in found:
+                values = self.sheet.table([self.columns.index(name) for name in found[key].columns])[shown]
+                picture[key] = np.nan_to_num(values).round(5).T.tolist()
+        return picture
 
     @property
     def lacking(self) -> str:
@@ -123,7 +141,7 @@ def table_in(files: list[RecordingFile]) -> Table | None:
         joined = joined_sheet(files)
         of_all = None if joined is None else findings.find(joined)
         if joined and of_all and (found is None or len(of_all.lacking) < len(found.lacking)):
-            return Table(joined.name, joined, of_all)
+            return Table(joined.name, joined, of_all, True)
     if sheet is None or found is None or not ({"a", "g"} & set(found.found) or len(sheet.columns) >= len(REQUIRED)):
         return None
     return Table(largest.name, sheet, found)
@@ -179,7 +197,7 @@ def unknown(files: list[RecordingFile], source: str, table: Table | None = None)
         )
     given = [f"{key}={_typed(table, key)}" for key in (*REQUIRED, *OPTIONAL) if key in (*REQUIRED, *table.found)]
     units = ",".join(f"{key}={name}" for key, name in table.units.items())
-    where = source if len(files) == 1 or ":" in table.columns[-1] else f"{source}/{table.name}"
+    where = source if len(files) == 1 or table.joined else f"{source}/{table.name}"
     ask = "Put in what the ? stand for" if table.missing else "Put in what is not right"
     reasons = f" ({found.reasons})" if found.reasons else ""
     return InputError(

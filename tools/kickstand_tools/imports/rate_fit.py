@@ -16,6 +16,7 @@ from ..checks.handedness import EXCHANGES
 from ..signals import Array
 
 CELL_S = 0.05  # readings are averaged over cells of this length
+MOST_CELLS = 12_000  # ten minutes show a unit
 WINDOW_S = 0.4
 LEAST_TURN = 0.03  # rad, rms: a smaller turn of gravity in the windows shows nothing
 STRAIGHT = 0.25  # a cell's force is gravity's if its length is this close to the median
@@ -135,13 +136,15 @@ def _in_cells(seconds: Array, force: Array, rates: Array) -> tuple[Array, Array]
     if len(seconds) < 4:
         return None
     begin, end = float(np.percentile(seconds, 1.0)), float(np.percentile(seconds, 99.0))
-    count = int(min((end - begin) / CELL_S, 20_000))
+    count = int(min((end - begin) / CELL_S, MOST_CELLS))
     if count < 2 * WINDOW_S / CELL_S:
         return None
     edges = begin + CELL_S * np.arange(count + 1)
+    within = (seconds >= begin) & (seconds <= edges[-1])
+    seconds, force, rates = seconds[within], force[within], rates[within]
     found = []
     for values in (force, rates):
-        known = np.all(np.isfinite(values), axis=1) & (seconds >= begin) & (seconds <= end)
+        known = np.all(np.isfinite(values), axis=1)
         order = np.argsort(seconds[known], kind="stable")
         at, rows = seconds[known][order], values[known][order]
         if len(at) < 4:
