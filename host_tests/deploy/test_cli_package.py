@@ -53,7 +53,7 @@ def test_the_wheel_carries_the_firmware(tmp_path):
     web = firmware_path.TOOLS / "kickstand_tools" / "web"
     pages = [path for name in ("npm", "page") for path in (web / name).rglob("*") if path.is_file()]
     assert {f"kickstand_tools/web/{path.relative_to(web).as_posix()}" for path in pages} <= names
-    assert {name.split("/")[0] for name in names} == {"kickstand", "kickstand_tools", "kickstand-0.4.0.dist-info"}
+    assert {name.split("/")[0] for name in names} == {"kickstand", "kickstand_tools", "kickstand_lean-0.4.0.dist-info"}
     assert not [name for name in names if "__pycache__" in name or name.endswith(".cal")]
 
 
