@@ -68,7 +68,5 @@ def _package(entry_point: EntryPoint) -> str:
 
 
 def _refusal(entry_point: EntryPoint, why: str) -> InputError:
-    package = _package(entry_point)
-    return InputError(
-        f"the command {entry_point.name} of the package {package} cannot be loaded ({why}): update or uninstall {package}"
-    )
+    name, package = entry_point.name, _package(entry_point)
+    return InputError(f"the command {name} of the package {package} cannot be loaded ({why}): update or uninstall it")

@@ -83,7 +83,7 @@ def emulate_command(port: int, chip: str, display: str) -> None:
 
 
 def ready_emulator(chip: str) -> None:
-    """Find what the emulator of this chip needs and nothing else; compile that of the Pico. Call it before importing the
+    """Find what this chip's emulator needs and nothing else; compile that of the Pico. Call it before importing the
     emulator. Raises InputError if something is missing."""
     if chip == "esp32":
         esp32_library.find()
