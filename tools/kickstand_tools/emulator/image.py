@@ -2,7 +2,6 @@
 
 import hashlib
 import importlib.util
-import urllib.error
 import urllib.request
 from pathlib import Path
 
@@ -39,9 +38,10 @@ def _download(to: Path) -> None:
     try:
         with urllib.request.urlopen(URL, timeout=_TIMEOUT_S) as response:
             data = response.read()
-    except (OSError, urllib.error.HTTPError) as error:
+    except OSError as error:  # a URLError too, whose reason is another error
+        why = cause(getattr(error, "reason", error) or error)
         raise InputError(
-            f"no MicroPython image: {URL} cannot be had ({cause(error)}); put the file into {to.parent}"
+            f"no MicroPython image for the Pico: {URL} cannot be downloaded ({why}); put that file into {to.parent}"
         ) from error
     to.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(to) as temporary:
