@@ -51,7 +51,7 @@ _TABLE = {
     "ACCEL_RANGE_G": (8, _one_of(*sorted(ACCEL_LSB_PER_G))),
     "GYRO_RANGE_DPS": (500, _one_of(*sorted(GYRO_LSB_PER_DPS))),
     "DLPF": (3, _whole(1, 6)),
-    "ACCEPT_WHO_AM_I": (None, (lambda v: v is None or isinstance(v, int), "None or a number as 0x75")),
+    "ACCEPT_WHO_AM_I": (None, _or_none(_whole(0x01, 0xFE))),
     "SENSOR_ADDRESS": (0x68, _one_of(0x68, 0x69)),
     "SENSOR_I2C": (0, _one_of(0, 1)),
     "SENSOR_BUS_HZ": (400_000, _whole(100_000, 400_000)),
