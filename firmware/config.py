@@ -26,7 +26,9 @@
 # BUTTON_PIN = 15           # (4) between the pin and ground
 
 # Display
-# DISPLAY = "auto"          # what answers at 0x3C or 0x3D is an OLED; or "lcd" (HD44780), "ssd1306", "sh1106" (OLEDs)
+# DISPLAY = "auto"          # what answers at 0x3C or 0x3D is an OLED; or "lcd" (HD44780), "ssd1306", "sh1106" (OLEDs
+#                           # of 128x64 pixels), "ssd1306-32" (128x32)
+# LCD_WIRING = 1            # 1 to 4: how the backpack of an LCD that stays blank is wired; kickstand status --wirings
 # OLED_CONTRAST = 255       # 0 (dim) to 255
 # OLED_INVERTED = False     # True: dark on bright
 

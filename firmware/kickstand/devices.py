@@ -10,8 +10,9 @@ from .imu.mpu6050 import Mpu6050
 from .imu.sensor import Sensor
 
 
-def open_lcd(settings):
-    """The Display. Its tick() raises SettingsError for pins that the I2C controller cannot use."""
+def open_lcd(settings, wiring=None):
+    """The Display. wiring: of a character display's backpack, if not the settings'. Its tick() raises SettingsError for
+    pins that the I2C controller cannot use."""
     return Display(
         lambda hz: open_bus(settings, "LCD", hz),
         settings.LCD_BUS_HZ,
@@ -19,6 +20,7 @@ def open_lcd(settings):
         settings.LCD_ADDRESSES,
         settings.OLED_CONTRAST,
         settings.OLED_INVERTED,
+        wiring or settings.LCD_WIRING,
     )
 
 

@@ -59,6 +59,7 @@ _TABLE = {
     "OLED_CONTRAST": (255, _whole(0, 255)),
     "OLED_INVERTED": (False, _one_of(True, False)),
     "LCD_ADDRESSES": (ADDRESSES, (_addresses, "I2C addresses as (0x27, 0x3F)")),
+    "LCD_WIRING": (1, _whole(1, 4)),
     "LCD_I2C": (1, _one_of(0, 1)),
     "LCD_BUS_HZ": (None, _or_none(_whole(100_000, 400_000))),
     "WATCHDOG": (True, _one_of(True, False)),
@@ -131,7 +132,7 @@ class Settings:
         self.one_bus = (self.SENSOR_SDA, self.SENSOR_SCL) == (self.LCD_SDA, self.LCD_SCL) != (None, None)
         if self.one_bus:  # a PCF8574 is made for 100 kHz, and sets the speed of a bus that it shares
             self.LCD_I2C = self.SENSOR_I2C
-            lcd_hz = self.LCD_BUS_HZ or (OLED_HZ if self.DISPLAY in ("ssd1306", "sh1106") else LCD_HZ)
+            lcd_hz = self.LCD_BUS_HZ or (OLED_HZ if self.DISPLAY not in ("auto", "lcd") else LCD_HZ)
             self.SENSOR_BUS_HZ = self.LCD_BUS_HZ = min(self.SENSOR_BUS_HZ, lcd_hz)
         try:
             if refusal:

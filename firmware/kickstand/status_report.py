@@ -17,6 +17,8 @@ from .ui import messages
 from .units import __version__
 
 LISTEN_MS = 3500
+WIRINGS = 4  # of LCD_WIRING
+WIRING_MS = 4000  # for each of them
 _TRIAL = "trial.tmp"  # a file that is written to measure the flash, then removed
 
 
@@ -24,8 +26,8 @@ def _print(label, words, *values):
     print("%-13s" % label + words % values)
 
 
-def report():
-    """Print the whole report. Opens sensor and display itself: the app must not be running."""
+def report(wirings=False):
+    """Print the whole report. Opens sensor and display itself: the app must not be running. wirings: see status()."""
     release = ".".join(str(n) for n in sys.implementation.version[:3])
     machine_name = getattr(sys.implementation, "_machine", sys.platform)
     print("Kickstand %s on %s, MicroPython %s" % (__version__, machine_name, release))
@@ -36,6 +38,8 @@ def report():
         sensor = open_sensor(settings)
         who_am_i = _sensor(sensor, settings)
         _display(open_lcd(settings), settings)
+        if wirings:
+            _wirings(settings)
         pressed = "pressed" if open_button(settings).held() else "not pressed"
         _print("Button", "GPIO %d, %s", settings.BUTTON_PIN, pressed)
         _speed(settings)
@@ -107,6 +111,19 @@ def _display(lcd, settings):
         if not lcd.address:
             words = sentence(notice) if notice else "none answers: check wiring and LCD_ADDRESSES"
             _print("Display", "%s", words)
+
+
+def _wirings(settings):
+    """Show the number of each wiring of a character display's backpack on it: the right one can be read."""
+    for number in range(1, WIRINGS + 1):
+        lcd = open_lcd(settings, number)
+        lcd.show("This is readable", "LCD_WIRING = %d" % number)
+        lcd.flush()
+        _print("", "LCD_WIRING = %d is shown for %d s", number, WIRING_MS // 1000)
+        sleep_ms(WIRING_MS)
+    _print(
+        "", "%s", "put the line that the display has shown into config.py; if it has shown none: its contrast, or 5 V"
+    )
 
 
 def _speed(settings):

@@ -229,3 +229,22 @@ def test_a_nack_in_the_set_up_costs_no_set_up(nth, tmp_path, monkeypatch):
         opened = open_sensor(Settings())
         assert board.run(opened.set_up, 1.0) == "returned"
         assert board.clock.now_us < 200_000
+
+
+@pytest.mark.parametrize("wiring", [1, 2, 3, 4])
+def test_status_finds_the_wiring_of_a_backpack(wiring, tmp_path, monkeypatch):
+    """Each is shown with its number: only that of the right one can be read, and is lit."""
+    monkeypatch.chdir(tmp_path)
+    board = Board(noisy)
+    board.lcd.wiring = wiring
+    seen = set()
+    board.every(0.1, lambda: seen.add((*board.lcd.text(), board.lcd.backlight)))
+    with board, redirect_stdout(io.StringIO()) as out:
+        import kickstand
+        from kickstand import status_report
+
+        monkeypatch.setattr(status_report.gc, "mem_free", lambda: 0, raising=False)
+        board.run(lambda: kickstand.status(True), 60)
+    readable = {second.strip() for first, second, lit in seen if lit and first == "This is readable"}
+    assert {line for line in readable if line[-1:].isdigit()} == {f"LCD_WIRING = {wiring}"}
+    assert f"LCD_WIRING = {wiring} is shown for 4 s" in out.getvalue()

@@ -51,9 +51,10 @@ def flash_command(port: str | None, config: bool) -> None:
 
 @click.command()
 @PORT
-def status_command(port: str | None) -> None:
+@click.option("--wirings", is_flag=True, help="Show each LCD_WIRING on a character display that stays blank.")
+def status_command(port: str | None, wirings: bool) -> None:
     """Ask a board how it is: versions, settings, sensor, display, calibration."""
-    click.echo(status(port))
+    click.echo(status(port, wirings))
 
 
 @click.command()
