@@ -121,6 +121,8 @@ def _wirings(settings):
         lcd.flush()
         _print("", "LCD_WIRING = %d is shown for %d s", number, WIRING_MS // 1000)
         sleep_ms(WIRING_MS)
+        lcd.show("", "")  # the next wiring may not be able to
+        lcd.flush()
     _print(
         "", "%s", "put the line that the display has shown into config.py; if it has shown none: its contrast, or 5 V"
     )

@@ -1,6 +1,7 @@
 """What the display and kickstand.status() say of a sensor that cannot be used, and who is on its bus."""
 
 import io
+from collections import Counter
 from contextlib import redirect_stdout
 
 import pytest
@@ -237,14 +238,16 @@ def test_status_finds_the_wiring_of_a_backpack(wiring, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     board = Board(noisy)
     board.lcd.wiring = wiring
-    seen = set()
-    board.every(0.1, lambda: seen.add((*board.lcd.text(), board.lcd.backlight)))
+    seen = Counter()
+    board.every(0.1, lambda: seen.update([(*board.lcd.text(), board.lcd.backlight)]))
     with board, redirect_stdout(io.StringIO()) as out:
         import kickstand
         from kickstand import status_report
 
         monkeypatch.setattr(status_report.gc, "mem_free", lambda: 0, raising=False)
         board.run(lambda: kickstand.status(True), 60)
-    readable = {second.strip() for first, second, lit in seen if lit and first == "This is readable"}
-    assert {line for line in readable if line[-1:].isdigit()} == {f"LCD_WIRING = {wiring}"}
+    readable = [
+        text[1].strip() for text, count in seen.items() if text[2] and text[0] == "This is readable" and count > 9
+    ]
+    assert readable == [f"LCD_WIRING = {wiring}"]
     assert f"LCD_WIRING = {wiring} is shown for 4 s" in out.getvalue()

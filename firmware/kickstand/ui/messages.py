@@ -56,6 +56,7 @@ live-memory|No Bluetooth:|no memory
 
 gps-silent|GPS silent|check wiring
 gps-garbled|GPS garbled|check GPS_BAUD
+gps-other|GPS sends {0}|no RMC or VTG
 gps-no-fix|GPS: no fix|needs open sky
 no-pulse|Wheel: no pulse|ride, or wiring?
 wheel-storm|Wheel: noise|check wiring
