@@ -200,7 +200,7 @@ class Mpu6050:
 
     def read(self):
         """Read the newest sample into counts, in one burst. Takes no heap. Raises OSError from the bus."""
-        self._i2c.readfrom_mem_into(self.address, _ACCEL_XOUT_H, self._some_frames[1])
+        self._read_into(_ACCEL_XOUT_H, self._some_frames[1])
         self.take(0)
 
     def fetch(self):
