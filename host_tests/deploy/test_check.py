@@ -1,8 +1,12 @@
 """`kickstand check` on the simulated board: nothing on good ones, each planted defect by its name."""
 
+import contextlib
+
+import command
 import pytest
 from checked_board import CheckedBoard, part
-from kickstand_tools.deploy import check
+from kickstand_tools.deploy import check, check_limits
+from kickstand_tools.errors import InputError
 from kickstand_tools.simulated_board.i2c import OPEN
 from kickstand_tools.simulated_board.mpu6050 import FIFO_COUNTH, FIFO_COUNTL, PWR_MGMT_1, Fifo
 from kickstand_tools.simulated_board.other_devices import Ds3231, Registers
@@ -195,3 +199,68 @@ def test_little_memory_is_found(tmp_path):
     checked.free_bytes = 9000
     found = faults(checked, tmp_path)
     assert list(found) == ["memory"]
+
+
+@pytest.mark.parametrize("good", [True, False])
+def test_the_command_prints_each_finding_and_ends_with_a_verdict(good, tmp_path, monkeypatch):
+    """As text for an issue. Exit status 1 if something is wrong."""
+    checked = CheckedBoard(REST, {"SPEED": "gps"}, [(1, 0.2)])
+    if good:
+        checked.board.fit_gps(lambda t_s: 5.0)
+    results, restarted = [], []
+
+    def run(ask):
+        class Transport:
+            def exec_raw(self, code, timeout):
+                return ask(code).encode(), b""
+
+        monkeypatch.setattr(check, "connected", lambda port: contextlib.nullcontext((Transport(), "a port")))
+        monkeypatch.setattr(check, "describe", lambda transport, name: "")
+        monkeypatch.setattr(check, "restart", restarted.append)
+        results.append(command.run("check"))
+
+    checked.run(tmp_path, run)
+    (result,) = results
+    assert (result.status, result.err, len(restarted)) == (0 if good else 1, "", 1)
+    lines = result.out.split("\n")
+    assert "Press the push button once" in lines[2]
+    whats = [one.what for one in checks(lines)]
+    assert {"board", "button", "sensor", "I2C errors", "FIFO under load", "longest turn", "memory"} <= set(whats)
+    last = "all 31 are as they should be" if good else "1 of 31 are not as they should be: speed source"
+    assert lines[-2] == last
+
+
+def checks(lines):
+    return [check.Finding(text[5:34].strip(), text[:4].strip(), text[34:]) for text in lines]
+
+
+def test_a_board_without_the_firmware_or_with_a_wrong_config_is_refused():
+    def failing(text):
+        def ask(code):
+            raise check.GuestFailed(text)
+
+        return ask
+
+    for text, words in (
+        ("ImportError: no module named 'kickstand'", "Kickstand is not on the board at P"),
+        ("SettingsError: ('not-allowed', 'DLPF', 9)", "config.py cannot be used"),
+        ("MemoryError: ", "cannot be checked"),
+    ):
+        with pytest.raises(InputError, match=words):
+            check.measured(failing(text), print, "P")
+
+
+def test_nonsense_of_the_board_is_refused():
+    for said in ("", "()", "(1, 2)", "('a', 'b', 'c', 'd', 3, 4)", "nan", "{[}"):
+        with pytest.raises(InputError, match="makes no sense"):
+            check.measured(lambda code, said=said: said, lambda text: None)
+
+
+def test_the_factory_trim_is_that_of_the_register_map():
+    """RM-MPU-6000A rev 4.2, p. 11: code 1 is 0.34 g and 25 deg/s, code 31 is 0.92 g; code 0 is no trim."""
+    ones = check_limits.factory_trims((0b000_00001, 0b000_00001, 0b000_00001, 0b01_01_01))
+    assert ones == pytest.approx([1392.64] * 3 + [3275, -3275, 3275])
+    most = check_limits.factory_trims((0xFF, 0xFF, 0xFF, 0x3F))
+    assert most == pytest.approx([4096 * 0.92] * 3 + [3275 * 1.046**30, -3275 * 1.046**30, 3275 * 1.046**30])
+    assert check_limits.factory_trims((0, 0, 0, 0)) == [0.0] * 6
+    assert check_limits.self_test((0, 0, 0, 0), (0.0,) * 6, (1.0,) * 6)[0].verdict == check.SKIPPED

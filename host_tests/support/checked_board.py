@@ -37,19 +37,26 @@ class CheckedBoard:
         self._config = type("Config", (), config or {})
         self._presses = presses
         self.said: list[str] = []
+        self.free_bytes = 90_000
 
     def findings(self, folder: Path) -> list[Finding]:
         """All of them. folder: its flash."""
         found: list[Finding] = []
+        self.run(folder, lambda ask: found.extend(check.measured(ask, self.say)))
+        return found
+
+    def say(self, text: str) -> None:
+        """What check() calls: presses the button when it is asked for."""
+        self.said.append(text)
+        if text.startswith("Press") and self._presses is None:
+            self.board.press(self.board.clock.now_us / 1e6 + PRESS_S, 0.2)
+
+    def run(self, folder: Path, function: Callable[[check.Ask], object]) -> None:
+        """Call function(ask) with the power on."""
         space: dict = {}
         board = self.board
         for press in self._presses or ():
             board.press(*press)
-
-        def say(text: str) -> None:
-            self.said.append(text)
-            if text.startswith("Press") and self._presses is None:
-                board.press(board.clock.now_us / 1e6 + PRESS_S, 0.2)
 
         def ask(code: str) -> str:
             out = io.StringIO()
@@ -65,8 +72,4 @@ class CheckedBoard:
 
             patch.setattr(settings, "load", lambda: settings.Settings(self._config))
             patch.setattr(gc, "mem_free", lambda: self.free_bytes, raising=False)
-            end = board.run(lambda: found.extend(check.measured(ask, say)), 1e6)
-        assert end == "returned"
-        return found
-
-    free_bytes = 90_000
+            assert board.run(lambda: function(ask), 1e6) == "returned"

@@ -140,7 +140,7 @@ class _Check:
         except GuestFailed as failed:
             self.add([Finding(_NAMES.get(name, name), BAD, f"broken off by {failed}")])
             return None
-        except (SyntaxError, ValueError, TypeError, LookupError, ArithmeticError):
+        except (SyntaxError, ValueError, TypeError, LookupError, ArithmeticError, AttributeError, RecursionError):
             raise InputError(
                 f"the board's answer to {name} makes no sense: plug it in again, then repeat this"
             ) from None
