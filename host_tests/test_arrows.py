@@ -28,7 +28,7 @@ ARROWS = {
     "ui": {"board.button", "lean", "calibration", "drive_alignment"},
     "settings": {"board", "imu.mpu6050"},  # ranges and pins that can be chosen
     "devices": {"board", "imu"},
-    "diagnosis": {"board", "imu"},
+    "diagnosis": {"imu"},
     "status_report": {
         "board.display",
         "diagnosis",
@@ -55,7 +55,7 @@ LATE = {
 }
 # What only drivers may import: modules of MicroPython that speak to hardware
 HARDWARE = {"machine", "micropython", "esp32", "rp2", "neopixel", "network", "bluetooth"}
-DRIVERS = {"board", "imu", "speed", "devices", "start", "live.radio"}
+DRIVERS = {"board", "imu", "speed", "devices", "diagnosis", "start", "live.radio"}
 
 
 def modules():

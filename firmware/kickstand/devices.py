@@ -37,12 +37,18 @@ def open_sensor(settings):
         said = []
 
         def look():
-            from .diagnosis import explain_sensor  # a board whose sensor answers has no heap to spare for it
+            from .diagnosis import explain_sensor, fifo_fault  # 6 KB of heap, where most boards never need it
 
-            said.extend(explain_sensor(settings.SENSOR_SDA, settings.SENSOR_SCL, reopen, chip, error))
+            if error is None:
+                said.extend((fifo_fault(chip), []))
+            else:
+                said.extend(explain_sensor(settings.SENSOR_SDA, settings.SENSOR_SCL, reopen, chip, error))
 
-        problem = tried(look)
-        return (Notice("no-sensor"), []) if problem else said
+        try:
+            problem = tried(look)
+        except OSError as fault:
+            problem = fault
+        return (error and Notice("no-sensor"), []) if problem else said
 
     return Sensor(chip, reopen, explain)
 

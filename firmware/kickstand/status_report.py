@@ -9,7 +9,7 @@ from .board.display import LCD_HZ
 from .calibration.store import Store
 from .console import sentence
 from .devices import open_bus, open_button, open_lcd, open_sensor
-from .diagnosis import MOTION_ADDRESSES, scan
+from .diagnosis import MOTION_ADDRESSES, bus_line, fifo_fault, scan, show_wirings
 from .errors import SettingsError
 from .imu.mpu6050 import UnknownChip
 from .settings import load
@@ -39,7 +39,7 @@ def report(wirings=False):
         who_am_i = _sensor(sensor, settings)
         _display(open_lcd(settings), settings)
         if wirings:
-            _wirings(settings)
+            show_wirings(lambda number: open_lcd(settings, number), WIRINGS, WIRING_MS)
         pressed = "pressed" if open_button(settings).held() else "not pressed"
         _print("Button", "GPIO %d, %s", settings.BUTTON_PIN, pressed)
         _speed(settings)
@@ -81,7 +81,7 @@ def _sensor(sensor, settings):
             words = "it answers at %s and is used; SENSOR_ADDRESS = %s in config.py looks there first"
             _print("", words, hex(chip.address), hex(chip.address))
         _print("Reading", "%.3f %.3f %.3f g", *[chip.counts[i] / chip.accel_lsb_per_g for i in range(3)])
-        fault = chip.fifo_fault()
+        fault = fifo_fault(chip)
     except (UnknownChip, OSError) as error:
         who_am_i = 0
         fault, _ = sensor.explain(chip, error)
@@ -96,8 +96,7 @@ def _bus(label, settings, name, addresses):
     sda, scl = getattr(settings, name + "_SDA"), getattr(settings, name + "_SCL")
     hz = getattr(settings, name + "_BUS_HZ") or LCD_HZ
     notice, devices = scan(sda, scl, lambda: open_bus(settings, name, hz), addresses)
-    words = ", ".join([("%s %s" % (hex(address), found)).strip() for address, found, _ in devices])
-    _print(label + " bus", "SDA %d, SCL %d: %s", sda, scl, words or "nothing answers")
+    print(bus_line(label, sda, scl, devices))
     return notice
 
 
@@ -111,21 +110,6 @@ def _display(lcd, settings):
         if not lcd.address:
             words = sentence(notice) if notice else "none answers: check wiring and LCD_ADDRESSES"
             _print("Display", "%s", words)
-
-
-def _wirings(settings):
-    """Show the number of each wiring of a character display's backpack on it: the right one can be read."""
-    for number in range(1, WIRINGS + 1):
-        lcd = open_lcd(settings, number)
-        lcd.show("This is readable", "LCD_WIRING = %d" % number)
-        lcd.flush()
-        _print("", "LCD_WIRING = %d is shown for %d s", number, WIRING_MS // 1000)
-        sleep_ms(WIRING_MS)
-        lcd.show("", "")  # the next wiring may not be able to
-        lcd.flush()
-    _print(
-        "", "%s", "put the line that the display has shown into config.py; if it has shown none: its contrast, or 5 V"
-    )
 
 
 def _speed(settings):

@@ -257,14 +257,6 @@ class Mpu6050:
         if not self._fifo_runs(self.read_register(_FIFO_EN), self.read_register(_USER_CTRL)):
             raise NotKept("MPU6050 FIFO does not read back")
 
-    def fifo_fault(self):
-        """None, or the Notice "sensor-fifo": the chip measures, but its FIFO does not work. values[0]: how it fails.
-
-        It takes up to 0.3 s, and leaves the FIFO empty. Call it after setup(). Raises OSError from the bus."""
-        from .fifo_trial import try_out  # most boards never need it
-
-        return try_out(self)
-
     def _fifo_runs(self, fifo_en, user_ctrl):
         """True if these values of the two registers mean that all three sensors go into the FIFO."""
         bits = self._chip()[_FIFO_EN_BITS]

@@ -21,7 +21,8 @@ class Sensor:
     """Samples of one chip that may fail at any time. A transfer that fails, by NACK or time-out, ends in _missed().
 
     chip: an Mpu6050.  reopen: called to free the bus, returns it as a machine.I2C.  explain(chip, error): returns a
-    Notice, why the chip could not be set up, and the addresses that answer; None: no such function.
+    Notice, why the chip could not be set up, and the addresses that answer; for error None whether its FIFO works, a
+    Notice or None. None: no such function.
     found: the addresses on the bus when it was last explained, a list.
     fault: None, or a Notice: what is wrong.  restarts: number of times that the chip was set up, or that no sample
     could be read for STALE_MS. After each, samples do not follow on from those before.
@@ -105,10 +106,7 @@ class Sensor:
             self.fault = fifo_fault
 
     def _fifo_fault(self):
-        try:
-            return self.chip.fifo_fault()
-        except (ImportError, MemoryError, OSError):
-            return None
+        return self.explain(self.chip, None)[0] if self.explain else None
 
     def check(self, now_ms):
         """Make sure that the chip is still configured: a supply dip during a transfer leaves a sample that is half

@@ -233,10 +233,11 @@ def fifo(parts, writes):
     writes: 1 for writing blocks of flash meanwhile, as a ride's recorder does."""
     from time import sleep_ms, ticks_diff, ticks_ms, ticks_us
 
+    from kickstand.diagnosis import fifo_fault
     from kickstand.imu.mpu6050 import CHIPS
 
     chip = parts.sensor.chip
-    fault = chip.fifo_fault()
+    fault = fifo_fault(chip)
     size = CHIPS.get(chip.who_am_i, CHIPS[0x70])[4]
     lasts = size // 14 * chip.period_ms
     if fault:
