@@ -13,6 +13,7 @@ from . import added
 # numpy, which takes its time
 COMMANDS = {
     "calibrate": (".calibrate", "Compute a calibration from recorded poses or drives."),
+    "check": (".board", "Measure a board and all that is wired to it, in two minutes."),
     "compare": (".ride", "Compare the leans of two devices on one bike."),
     "cut": (".ride", "Cut a stretch out of a log."),
     "demo": (".without_a_board", "The firmware on a simulated board, in the terminal."),
