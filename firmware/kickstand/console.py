@@ -45,6 +45,8 @@ wire-low|{0} (GPIO {1}) stays low: it touches GND, or a device without power or 
 no-pull-ups|none answers, SDA {0} and SCL {1} have no pull-up: connect the module's wires, and its 3.3 V
 no-pull-up|none answers: nothing pulls up {0} (GPIO {1}): that wire is open
 sensor-fifo|the sensor measures, but its FIFO {0}: a clone that cannot be used; use another module
+axis-ill|sensor: {0} {1} {2}, so there is no lean: switch it off and on; if that does not help, replace it
+clips|sensor: {0} at the end of its range: mount the sensor softly, on foam or rubber
 no-such-pin|config.py: {0} = {1} is no pin of this board ({2})
 i2c-pins|config.py: {1}_SDA = {2} and {1}_SCL = {3} do not belong to I2C {4} ({5})
 uart-pins|config.py: GPS_TX = {1} and GPS_RX = {2} do not belong to UART {3} ({4})
@@ -74,5 +76,5 @@ def tell(refusal):
     """Print a Refusal's sentence, unless a print was slow in the last QUIET_MS."""
     from time import ticks_diff, ticks_ms
 
-    if _slow_ms is None or ticks_diff(ticks_ms(), _slow_ms) >= QUIET_MS:
+    if _slow_ms is None or not 0 <= ticks_diff(ticks_ms(), _slow_ms) < QUIET_MS:
         say(sentence(refusal))

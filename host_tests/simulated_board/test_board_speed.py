@@ -413,3 +413,81 @@ def test_a_date_that_cannot_be_is_none():
             assert [gps.poll(1000), gps.poll(1000)][1] is not None
             place = gps.place(1000)
             assert place is not None and place[0] == value, text
+
+
+DAYS = 6.3, 9.0, 12.4, 12.5, 19.0
+
+
+def later(days, seconds=0):
+    """ticks_ms() so long after 1000."""
+    return (1000 + round(86_400_000 * days) + 1000 * seconds) & 0x3FFFFFFF
+
+
+class Once:
+    """A source that gives each value once."""
+
+    age_ms, problem = 0, None
+
+    def __init__(self, value):
+        self.value = value
+
+    def poll(self, now_ms):
+        value, self.value = self.value, None
+        return value
+
+
+def test_a_speed_is_taken_after_days_without_one():
+    """ticks_diff() is negative after 6.2 days."""
+    with Board(level):
+        from kickstand.speed.source import Speed
+
+        for days in DAYS:
+            source = Once(0.0)
+            speed = Speed(source)
+            assert speed.poll(1000) == 0.0
+            for k in range(1, int(24 * days)):
+                assert speed.poll(later(k / 24)) is None
+            source.value = 20.0
+            assert speed.poll(later(days)) == 20.0
+
+
+def test_a_receiver_stays_silent_for_days():
+    fix = sentence("GPRMC,120000.00,A,4807.038,N,01131.000,E,022.4,084.4,230394,003.1,W").encode()
+    with Board(level):
+        from kickstand.speed.gps import Gps
+
+        for days in DAYS:
+            uart = Listing(fix)
+            gps = Gps(uart)
+            while uart.any():
+                gps.poll(1000)
+            for k in range(1, int(24 * days)):
+                gps.poll(later(k / 24))
+                fault = gps.fault(later(k / 24))
+                assert fault and fault.code == "gps-silent", (days, k)
+
+
+def test_a_wheel_that_stood_for_days_turns_again():
+    """Also one that never turned."""
+
+    class Line:
+        IRQ_FALLING = IRQ_RISING = 0
+
+        def irq(self, *handler, **kind):
+            pass
+
+    with Board(level):
+        from kickstand.speed.wheel import Wheel
+
+        for before in (True, False):
+            for days in DAYS:
+                wheel = Wheel(Line(), 1.0, {"hard": True})
+                wheel.poll(1000)
+                if before:
+                    wheel.count += 1
+                    wheel.poll(1200)
+                for k in range(1, int(24 * days)):
+                    assert wheel.poll(later(k / 24)) == (0.0 if before else None)
+                wheel.count += 1
+                wheel.poll(later(days))
+                assert wheel._moved_ms == later(days)

@@ -26,6 +26,7 @@ VALUES |= {"no-chip": (0xFF, 0x68), "not-kept": (0x68,), "other-chip": ("ICM-426
 VALUES |= {"other-device": ("barometer", 0x76), "wire-low": ("SDA", 28), "no-pull-up": ("SCL", 28)}
 VALUES |= {"gps-other": ("PUBX",)}
 VALUES |= {"sensor-fifo": ("stands still",), "bus-errors": (0x68,), "no-sensor": (28, 29)}
+VALUES |= {"axis-ill": ("Accel", "xyz", "stuck"), "clips": ("Accel",)}
 VALUES |= {"speed-late": (2.5,), "aligned": (9.9,)}
 
 
