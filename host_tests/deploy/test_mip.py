@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 class Quiet(http.server.SimpleHTTPRequestHandler):
     """Serves a folder, without a line per request."""
 
-    def log_message(self, *_):
+    def log_message(self, format, *args):
         pass
 
 

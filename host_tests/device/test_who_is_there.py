@@ -15,7 +15,8 @@ def still(_t_s):
 
 
 def noisy(t_s):
-    return (0.01 * (t_s * 977 % 1), 1, 0, 0.5 * (t_s * 577 % 1), 0, 0)
+    a, b, c = (t_s * k % 1 for k in (977, 577, 433))  # every axis of a sensor at work changes
+    return (0.01 * a, 1 + 0.01 * b, 0.01 * c, 0.5 * b, 0.5 * c, 0.5 * a)
 
 
 def shown(tmp_path, monkeypatch, fit, world=noisy, until_s=4.0, config=None, **fitted):
@@ -122,7 +123,7 @@ def test_the_other_address_is_tried(mine, tmp_path, monkeypatch):
         lines = shown(tmp_path, monkeypatch, fit, config=config, sensor_address=there)
         assert lines[0].startswith("Raw ")
         said = status(tmp_path, monkeypatch, fit, config=config, sensor_address=there)
-        assert said[2].startswith("Sensor       MPU6050 (0x68), +-8 g")
+        assert said[2].startswith("Sensor       MPU6050 (0x68), +-16 g")
         assert f"it answers at 0x{there:02x} and is used" in said[3]
 
 
@@ -237,7 +238,7 @@ def test_status_finds_the_wiring_of_a_backpack(wiring, tmp_path, monkeypatch):
     """Each is shown with its number: only that of the right one can be read, and is lit."""
     monkeypatch.chdir(tmp_path)
     board = Board(noisy)
-    board.lcd.wiring = wiring
+    setattr(board.lcd, "wiring", wiring)  # noqa: B010 - of an Lcd, not of an Oled
     seen = Counter()
     board.every(0.1, lambda: seen.update([(*board.lcd.text(), board.lcd.backlight)]))
     with board, redirect_stdout(io.StringIO()) as out:
