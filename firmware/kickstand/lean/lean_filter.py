@@ -15,6 +15,7 @@ from math import atan2, degrees, pi, sin, sqrt
 from ..units import STANDARD_GRAVITY
 from . import measurements
 from .bike_model import BIAS_LEFT, LEAN, PITCH, SPEED, STATES, YAW_ERROR, Linearisation, possible_pitch, predict
+from .dive import Dive
 from .kalman import Covariance
 from .rest import MAX_BIAS_RADPS, RestDetector
 from .upright_trim import UprightTrim
@@ -44,11 +45,14 @@ class LeanFilter:
         # error of the accelerometer's magnitude (bias and scale factor together), as a share of the force: found at
         # rest, where it should read 1 g
         self._force_error = 0.0
+        self.dive = Dive()
         self.restart()
 
     def restart(self):
-        """Forget the ride: lean, pitch and speed, because readings were missing. The sensor's errors are kept."""
+        """Forget the ride: lean, pitch and speed, because readings were missing. The sensor's errors and the bike's
+        dive are kept."""
         x = [0.0] * STATES
+        self.dive.restart()
         self._kept = []  # (state, variance) of the sensor's errors
         if self._p is not None:
             for i in range(BIAS_LEFT, STATES):
@@ -144,7 +148,8 @@ class LeanFilter:
             self._start(means)
             return
         if not (abs(x[LEAN]) < 2 * pi and x[SPEED] < MAX_SPEED):  # also not-a-number
-            self._p, self._force_error = None, 0.0  # nothing is kept: the sensor's errors may be no numbers either
+            # Nothing is kept: the sensor's errors may be no numbers either
+            self._p, self._force_error, self.dive = None, 0.0, Dive()
             self.restart()
             return
         roll_acceleration = (self._roll_rate - self._last_roll_rate) / seconds
@@ -222,7 +227,8 @@ class LeanFilter:
         """A generator: update with the window's forces, the level road, and the measured speed; without one with
         straight_or_prior_speed(). Update the trim where speed and lean are certain enough."""
         p, x = self._p, self._x
-        for measurement in measurements.forces(model, means, roll_acceleration, self._force_error):
+        dive = self.dive.update(means[7] - model.sin_pitch, model.pitch_rate, model.speed, seconds)
+        for measurement in measurements.forces(model, means, roll_acceleration, self._force_error, dive):
             yield from p.update(*measurement)
         yield from p.update(*measurements.level_road(model, x, seconds))
         lean, speed, measured = x[LEAN] - self._upright, x[SPEED], self._speed
