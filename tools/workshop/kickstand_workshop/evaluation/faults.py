@@ -5,7 +5,7 @@ of its range); ILL, what only shows in whether the readings fit together; HARMLE
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -60,7 +60,7 @@ def _gyro_dead(part: Part) -> None:
 
 
 def _gyro_axis_at_rail(part: Part) -> None:
-    part.rate[:, part.axis] = part.sign * GYRO_RANGE_DPS
+    part.rate[:, part.axis] = part.sign * 2.0 * GYRO_RANGE_DPS
 
 
 def _accel_axis_dead(part: Part) -> None:
@@ -68,7 +68,7 @@ def _accel_axis_dead(part: Part) -> None:
 
 
 def _accel_axis_at_rail(part: Part) -> None:
-    part.force[:, part.axis] = part.sign * ACCEL_RANGE_G
+    part.force[:, part.axis] = part.sign * 2.0 * ACCEL_RANGE_G
 
 
 def _accel_frozen(part: Part) -> None:
@@ -206,12 +206,16 @@ class Ill:
     readings: Array
     lost: NDArray[np.bool_]
     first: int
-    end: int = field(default=0)
+    end: int
+
+    @property
+    def saturated(self) -> NDArray[np.bool_]:
+        """(n) True where an axis is at the end of its range: the driver takes such a reading as lost."""
+        force, rate = np.abs(self.readings[:, :3]), np.abs(self.readings[:, 4:])
+        return (force >= ACCEL_RANGE_G).any(axis=1) | (rate >= GYRO_RANGE_DPS).any(axis=1)
 
 
-def apply(
-    fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: int, vehicle_from_sensor: Array
-) -> Ill:
+def apply(fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: int, vehicle_from_sensor: Array) -> Ill:
     """A copy of the readings with the fault in it. begin_s: when one begins that is not there from power-on.
 
     The seed chooses the axis, the sign, and whether the chip sits square: then its axes are the bike's.
@@ -222,7 +226,9 @@ def apply(
     first = 0 if fault.from_start else round(begin_s * rate_hz)
     end = len(made) if fault.seconds is None else min(len(made), first + round(fault.seconds * rate_hz))
     span = slice(first, end)
-    turned = vehicle_from_sensor if seed // 3 % 2 == 0 else np.eye(3)
+    # What counts show has to be in the chip's own axes
+    square = seed // 3 % 2 == 0 and fault.kind != SEEN
+    turned = vehicle_from_sensor if square else np.eye(3)
     part = Part(
         made[span, :3] @ turned.T,
         made[span, 4:] @ turned.T,

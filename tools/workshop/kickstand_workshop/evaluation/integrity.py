@@ -6,18 +6,22 @@ than STANDS_S.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from kickstand.lean.meter import FALLEN_DEG
 from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.errors import InputError
 from kickstand_tools.replay.replay_engine import NO_SPEED, Replay
+from kickstand_tools.simulation.physics.mount import MOUNTS
+from kickstand_tools.simulation.physics.road import CLASSES
 from kickstand_tools.simulation.ride import Ride, ride
 from numpy.typing import NDArray
 
-from .faults import Fault, apply
+from .faults import FAULTS, SEEN, Fault, Ill, apply
 from .runs import calibrated_by_poses, on_all_processors
+from .whole_device import display_of
 
 Array = NDArray[np.float64]
 
@@ -28,18 +32,28 @@ TURN = 2  # readings in a turn of the loop
 GPS_LATE_S = 0.4
 PROFILES = "street", "track", "hills", "city", "sweeper"
 SIGMA_EDGES = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0])  # degrees, claimed
+# What is claimed of a lean; a display gives no sigma
+CLAIMS = [f"{low:g}-{high:g}" for low, high in zip(SIGMA_EDGES, SIGMA_EDGES[1:])] + ["display", "hidden"]
 ERROR_EDGES = np.array([0.0, 1.0, 2.0, 3.0, 5.0, WRONG_DEG, 12.0, 20.0, 40.0, 180.0])  # degrees
 
 
 @dataclass(frozen=True)
 class Job:
-    """A ride of this seed with a fault, or with none. road, mount: as for simulation.ride.ride()."""
+    """A ride of this seed with a fault, or with none. road, mount: as for simulation.ride.ride(). profile: None for the
+    seed's own of PROFILES. device: on the whole device, not on the meter alone."""
 
     fault: Fault | None
     seed: int
     seconds: float = 120.0
     road: str | None = None
     mount: str | None = None
+    profile: str | None = None
+    device: bool = False
+
+    @property
+    def gps(self) -> bool:
+        """Every fourth ride has a speed that is measured once a second, late, as by GPS."""
+        return self.seed % 4 == 3
 
     @property
     def title(self) -> str:
@@ -70,7 +84,7 @@ class Outcome:
 
     misleading_s: see above. hidden, available: shares of the riding. hidden_after_s, named_after_s: from the fault's
     begin, NaN where it never was. recovered: of a fault that ends, whether RECOVERY_S later the lean stands right;
-    None for the others. diagram (sigma, error): seconds by SIGMA_EDGES, the last row hidden, and ERROR_EDGES.
+    None for the others. diagram: seconds, a row for each of CLAIMS, by ERROR_EDGES.
     """
 
     job: Job
@@ -105,9 +119,10 @@ def judge(job: Job, trace: Trace) -> Outcome:
         stands = (trace.time > trace.end_s + RECOVERY_S - STANDS_S) & (trace.time <= trace.end_s + RECOVERY_S)
         recovered = bool(np.all(trace.shown[stands] & (error[stands] <= WRONG_DEG)))
     row = np.digitize(trace.sigma, SIGMA_EDGES[1:-1])
-    row[~trace.shown] = len(SIGMA_EDGES) - 1
+    row[np.isnan(trace.sigma)] = len(CLAIMS) - 2
+    row[~trace.shown] = len(CLAIMS) - 1
     column = np.digitize(error, ERROR_EDGES[1:-1])
-    diagram = np.zeros((len(SIGMA_EDGES), len(ERROR_EDGES) - 1))
+    diagram = np.zeros((len(CLAIMS), len(ERROR_EDGES) - 1))
     np.add.at(diagram, (row[riding], column[riding]), step)
     return Outcome(
         job,
@@ -128,26 +143,54 @@ def _first(time: Array, mask: NDArray[np.bool_]) -> float:
 @lru_cache(maxsize=4)
 def _made(profile: str, seed: int, seconds: float, road: str | None, mount: str | None) -> tuple[Ride, CalibrationFile]:
     made = ride(profile, seed, seconds, road=road, mount=mount)
-    return made, calibrated_by_poses(made)
+    try:
+        return made, calibrated_by_poses(made)
+    except InputError:  # some sensors' cross-axis errors are more than the slanted pose may show
+        return made, calibrated_by_poses(replace(made, poses=made.poses[:6]))
 
 
 def follow(job: Job) -> Trace:
-    """The firmware's meter over the job's ride, alone: without the driver, which names what counts show."""
-    made, calibration = _made(PROFILES[job.seed % len(PROFILES)], job.seed, job.seconds, job.road, job.mount)
-    return trace_of(job, made.readings, made.rate_hz, calibration, made.truth["lean_deg"], made.truth["speed_mps"])
+    """The job's ride, as it was shown."""
+    made, calibration = _made(
+        job.profile or PROFILES[job.seed % len(PROFILES)], job.seed, job.seconds, job.road, job.mount
+    )
+    of = device_trace_of if job.device else trace_of
+    return of(job, made.readings, made.rate_hz, calibration, made.truth["lean_deg"], made.truth["speed_mps"])
+
+
+def _ill(job: Job, readings: Array, rate_hz: float, calibration: CalibrationFile) -> Ill:
+    """The readings with the job's fault in them."""
+    if not job.fault:
+        return Ill(readings, np.zeros(len(readings), dtype=bool), 0, len(readings))
+    begin_s = (0.35 + 0.2 * (job.seed * 0.618 % 1.0)) * len(readings) / rate_hz
+    return apply(job.fault, readings, rate_hz, begin_s, job.seed, calibration.vehicle_from_sensor)
+
+
+def device_trace_of(
+    job: Job, readings: Array, rate_hz: float, calibration: CalibrationFile, true: Array, speed: Array
+) -> Trace:
+    """trace_of() of the whole device, an entry for each tenth of a second; sigma is NaN."""
+    ill = _ill(job, readings, rate_hz, calibration)
+    end = len(readings) - 1
+
+    def known(t_s: float) -> float:
+        return float(speed[min(end, int(t_s * rate_hz))])
+
+    time, lean, named_s = display_of(ill.readings, rate_hz, calibration, ill.lost, known if job.gps else None)
+    at = np.minimum(end, (time * rate_hz).astype(int))
+    shown = ~np.isnan(lean)
+    nothing = np.full(len(time), np.nan)
+    lean = np.where(shown, lean, true[at])
+    return Trace(time, lean, nothing, shown, true[at], speed[at], named_s, ill.first / rate_hz, ill.end / rate_hz)
 
 
 def trace_of(
     job: Job, readings: Array, rate_hz: float, calibration: CalibrationFile, true: Array, speed: Array
 ) -> Trace:
-    """The same of any ride: readings (n, 7) in the chip's order, true lean (n, degrees) and speed (n, m/s). Every
-    fourth seed has the speed measured once a second, late, as by GPS."""
-    begin_s = (0.35 + 0.2 * (job.seed * 0.618 % 1.0)) * len(readings) / rate_hz
-    first, end, lost = 0, len(readings), np.zeros(len(readings), dtype=bool)
-    if job.fault:
-        turned = calibration.vehicle_from_sensor
-        ill = apply(job.fault, readings, rate_hz, begin_s, job.seed, turned)
-        readings, lost, first, end = ill.readings, ill.lost, ill.first, ill.end
+    """The firmware's meter alone, without the driver, over any ride: readings (n, 7) in the chip's order, true lean (n,
+    degrees) and speed (n, m/s)."""
+    ill = _ill(job, readings, rate_hz, calibration)
+    readings, lost, first, end = ill.readings, ill.lost | ill.saturated, ill.first, ill.end
     force, rate = calibration.in_vehicle(readings)
     turns = len(readings) // TURN
     shape = (turns, TURN, 3)
@@ -155,7 +198,7 @@ def trace_of(
     rate = np.radians(rate[: turns * TURN]).reshape(shape).mean(axis=1).tolist()
     lost = lost[: turns * TURN].reshape(turns, TURN).any(axis=1)
     last = np.arange(1, turns + 1) * TURN - 1
-    gps, late = job.seed % 4 == 3, round(GPS_LATE_S * rate_hz)
+    late = round(GPS_LATE_S * rate_hz)
     replay = Replay(calibration.to_firmware(), delay_s=calibration.delay_s())
     lean, sigma, shown = np.zeros(turns), np.full(turns, 180.0), np.zeros(turns, dtype=bool)
     named_s = float("nan")
@@ -163,7 +206,7 @@ def trace_of(
     before = None
     step_us = round(1e6 * TURN / rate_hz)
     for k in range(turns):
-        if gps and k % round(rate_hz / TURN) == 0:
+        if job.gps and k % round(rate_hz / TURN) == 0:
             meter.measure_speed(float(speed[max(0, int(last[k]) - late)]) if k else NO_SPEED)
         if lost[k]:
             lean[k], sigma[k], shown[k] = lean[k - 1], sigma[k - 1], False
@@ -184,12 +227,28 @@ def run(job: Job) -> Outcome:
     return judge(job, follow(job))
 
 
+def jobs(seeds: int, first_seed: int = 0, seconds: float = 120.0, device: bool = False) -> list[Job]:
+    """A ride of each seed with no fault, on good and bad mounts and roads, and one with each fault. device: all on the
+    whole device; else those are whose fault the driver sees."""
+    numbers = range(first_seed, first_seed + seeds)
+    conditions: list[tuple[str | None, str | None]] = [(None, None), *[(None, road) for road in CLASSES]]
+    conditions += [(mount, None) for mount in MOUNTS]
+    sound = [Job(None, seed, seconds, road, mount, device=device) for mount, road in conditions for seed in numbers]
+    return sound + [
+        Job(fault, seed, seconds, device=device or fault.kind == SEEN) for fault in FAULTS for seed in numbers
+    ]
+
+
 def evaluate(jobs: list[Job], done: Callable[[], None] = lambda: None) -> list[Outcome]:
     """run() for each job, on all processors, in the order of the jobs. done(): called after each."""
-    # Jobs of one seed one after the other: they share its ride
-    order = sorted(range(len(jobs)), key=lambda k: (jobs[k].seed, str(jobs[k].road), str(jobs[k].mount)))
+
+    def ride_of(k: int) -> tuple[int | str, ...]:
+        job = jobs[k]
+        return (job.seed, str(job.profile), str(job.road), str(job.mount))
+
+    order = sorted(range(len(jobs)), key=ride_of)  # jobs of one ride one after the other: it is made once
     found: dict[int, Outcome] = {}
-    for k, outcome in zip(order, on_all_processors(run, [jobs[k] for k in order], chunk=16), strict=True):
+    for k, outcome in zip(order, on_all_processors(run, [jobs[k] for k in order], chunk=8), strict=True):
         found[k] = outcome
         done()
     return [found[k] for k in range(len(jobs))]
