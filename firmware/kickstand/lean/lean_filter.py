@@ -15,6 +15,7 @@ from math import atan2, degrees, pi, sin, sqrt
 from ..units import STANDARD_GRAVITY
 from . import measurements
 from .bike_model import BIAS_LEFT, LEAN, PITCH, SPEED, STATES, YAW_ERROR, Linearisation, possible_pitch, predict
+from .consistency import Consistency
 from .kalman import Covariance
 from .rest import MAX_BIAS_RADPS, RestDetector
 from .upright_trim import UprightTrim
@@ -44,11 +45,15 @@ class LeanFilter:
         # error of the accelerometer's magnitude (bias and scale factor together), as a share of the force: found at
         # rest, where it should read 1 g
         self._force_error = 0.0
+        self.consistency = Consistency()
+        self._doubts = 0
         self.restart()
 
-    def restart(self):
-        """Forget the ride: lean, pitch and speed, because readings were missing. The sensor's errors are kept."""
+    def restart(self, keep=True):
+        """Forget the ride: lean, pitch and speed, because readings were missing. keep: the sensor's errors are kept."""
         x = [0.0] * STATES
+        if not keep:
+            self._p, self._force_error = None, 0.0
         self._kept = []  # (state, variance) of the sensor's errors
         if self._p is not None:
             for i in range(BIAS_LEFT, STATES):
@@ -80,6 +85,14 @@ class LeanFilter:
         p.add_noise(LEAN, (measurements.SIGMA_LOST_RATE * seconds) ** 2)
         p.add_noise(PITCH, (measurements.SIGMA_LOST_RATE * seconds) ** 2 / 16)
         p.add_noise(SPEED, (measurements.SIGMA_LOST_FORCE * STANDARD_GRAVITY * seconds) ** 2)
+
+    def _free(self):
+        """Doubt the state and the sensor's errors, because the readings do not fit them."""
+        p = self._p
+        for i in (LEAN, PITCH, SPEED):
+            p.add_noise(i, measurements.SIGMA_DOUBT[i] ** 2)
+        for i in range(BIAS_LEFT, STATES):
+            p.set_variance(i, max(p.rows[i][i], measurements.SIGMA_DOUBT[i] ** 2))
 
     @property
     def speed_mps(self):
@@ -144,9 +157,14 @@ class LeanFilter:
             self._start(means)
             return
         if not (abs(x[LEAN]) < 2 * pi and x[SPEED] < MAX_SPEED):  # also not-a-number
-            self._p, self._force_error = None, 0.0  # nothing is kept: the sensor's errors may be no numbers either
-            self.restart()
+            self.restart(False)  # the sensor's errors may be no numbers either
             return
+        if self._doubts:
+            doubts, self._doubts = self._doubts, 0
+            if doubts > 1:
+                self.restart(False)
+                return
+            self._free()
         roll_acceleration = (self._roll_rate - self._last_roll_rate) / seconds
         self._last_roll_rate = self._roll_rate
         rested = self._rest.resting
@@ -222,8 +240,14 @@ class LeanFilter:
         """A generator: update with the window's forces, the level road, and the measured speed; without one with
         straight_or_prior_speed(). Update the trim where speed and lean are certain enough."""
         p, x = self._p, self._x
-        for measurement in measurements.forces(model, means, roll_acceleration, self._force_error):
-            yield from p.update(*measurement)
+        left, up = measurements.forces(model, means, roll_acceleration, self._force_error)
+        yield from p.update(*left)
+        misfit = p.misfit
+        yield from p.update(*up)
+        sideways = (means[5] - means[7] * x[YAW_ERROR]) / max(means[6], 0.5) - self.trim.angle
+        if x[SPEED] < 4.0 or p.rows[SPEED][SPEED] > 64.0:
+            sideways = 0.0
+        self._doubts = self.consistency.add(misfit, p.misfit, sideways, x[PITCH], seconds)
         yield from p.update(*measurements.level_road(model, x, seconds))
         lean, speed, measured = x[LEAN] - self._upright, x[SPEED], self._speed
         self._speed_s += seconds

@@ -33,6 +33,22 @@ SIGMA_START = (
     0.014,  # ratio: forward axis' reading of a rate about up
     0.014,  # ratio: scale error of the forward axis
 )
+# The same where the readings do not fit any more (consistency.py): for the first three it is added. Larger: a sensor that
+# has changed is found again sooner, and less surely.
+SIGMA_DOUBT = (
+    radians(20.0),  # lean
+    radians(5.0),  # pitch
+    8.0,  # m/s: speed
+    radians(4.0),  # biases
+    radians(4.0),
+    radians(4.0),
+    radians(5.0),  # yaw error
+    0.03,
+    0.02,
+    0.02,
+    0.02,
+    0.02,
+)
 # rad/s: the bias where the pose on the kickstand has just measured it. Larger: after it the lean is shown later.
 SIGMA_FRESH_BIAS = radians(0.2)
 # rad: the first lean's standard deviation where the bike moves. Larger: lean is shown later, and follows forces more.

@@ -79,6 +79,10 @@ class LeanMeter:
         return self.filter.speed_mps
 
     @property
+    def odd(self):
+        return self.filter.consistency.odd
+
+    @property
     def trim_deg(self):
         """The roll-misalignment correction estimated so far, > 0 right; see keep_trim() for the calibration's."""
         return degrees(self.filter.trim.angle)
@@ -91,6 +95,8 @@ class LeanMeter:
         if self.suppressed_reason:
             return False
         lean = self.filter
+        if lean.consistency.doubt:
+            return False
         return 0.0 <= lean.variance <= MAX_VARIANCE and abs(lean.pitch_deg) < WHEELIE_DEG
 
     def keep_trim(self):
