@@ -21,8 +21,8 @@ CHARGE_MS = 100
 # list repeats the import statements, because MicroPython has no hook between imports; a test compares both.
 STEPS = (
     "calibration.parameters calibration.store calibration.active calibration.transform lean.bike_model lean.kalman "
-    "lean.measurements lean.rest lean.upright_trim lean.lean_filter lean.meter ui.messages ui.pages ui.page_ring "
-    "ui.screen rides.recording"
+    "lean.measurements lean.rest lean.upright_trim lean.dive lean.lean_filter lean.meter ui.messages ui.pages "
+    "ui.page_ring ui.screen rides.recording"
 ).split()
 
 

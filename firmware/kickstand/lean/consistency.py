@@ -28,7 +28,7 @@ class Consistency:
     def reset_means(self):
         self._left = self._left_long = self._up = self._up_long = self._side = self._pitch = 0.0
 
-    def add(self, left, up, sideways, pitch, seconds):
+    def add(self, left, up, sideways, pitch, yaw_rate, seconds):
         left, up = clip(left), clip(up)
         gain, long_gain = min(1.0, seconds / SHORT_S), min(1.0, seconds / LONG_S)
         self._left += gain * (left - self._left)
@@ -49,7 +49,8 @@ class Consistency:
             return self._doubts
         if self.doubt and max(of_left, of_up, of_pitch) > FIT_SHARE:
             self._fits_s = 0.0
-        self._fits_s += seconds
+        if abs(yaw_rate) > 0.05 or self._doubts < 3:
+            self._fits_s += seconds
         if self.doubt and self._fits_s >= HOLDS[min(self._doubts, len(HOLDS)) - 1]:
             self.doubt, self.odd, self._fits_s = False, None, 0.0
         elif self._fits_s >= FORGET_S and self._doubts:

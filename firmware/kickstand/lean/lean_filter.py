@@ -16,6 +16,7 @@ from ..units import STANDARD_GRAVITY
 from . import measurements
 from .bike_model import BIAS_LEFT, LEAN, PITCH, SPEED, STATES, YAW_ERROR, Linearisation, possible_pitch, predict
 from .consistency import Consistency
+from .dive import Dive
 from .kalman import Covariance
 from .rest import MAX_BIAS_RADPS, RestDetector
 from .upright_trim import UprightTrim
@@ -47,13 +48,17 @@ class LeanFilter:
         self._force_error = 0.0
         self.consistency = Consistency()
         self._doubts = 0
+        # The sensor's errors (from BIAS_LEFT on) some seconds ago, and less long ago, while all fitted
+        self._good = self._next_good = [0.0] * (STATES - BIAS_LEFT)
+        self._good_s = 0.0
+        self.dive = Dive()
         self.restart()
 
-    def restart(self, keep=True):
-        """Forget the ride: lean, pitch and speed, because readings were missing. keep: the sensor's errors are kept."""
+    def restart(self):
+        """Forget the ride: lean, pitch and speed, because readings were missing. The sensor's errors and the bike's
+        dive are kept."""
         x = [0.0] * STATES
-        if not keep:
-            self._p, self._force_error = None, 0.0
+        self.dive.restart()
         self._kept = []  # (state, variance) of the sensor's errors
         if self._p is not None:
             for i in range(BIAS_LEFT, STATES):
@@ -85,6 +90,28 @@ class LeanFilter:
         p.add_noise(LEAN, (measurements.SIGMA_LOST_RATE * seconds) ** 2)
         p.add_noise(PITCH, (measurements.SIGMA_LOST_RATE * seconds) ** 2 / 16)
         p.add_noise(SPEED, (measurements.SIGMA_LOST_FORCE * STANDARD_GRAVITY * seconds) ** 2)
+
+    def _remember(self, seconds):
+        """Keep the sensor's errors of some seconds ago, while all fits."""
+        self._good_s += seconds
+        if self.consistency.doubt:
+            self._good_s = 0.0
+        elif self._good_s >= measurements.REMEMBER_S:
+            self._good_s = 0.0
+            self._good, self._next_good = self._next_good, self._x[BIAS_LEFT:STATES]
+
+    def _forget(self, keep_good=False):
+        """Restart with nothing kept. keep_good: but for the sensor's errors as they were while all fitted."""
+        self._p, self._force_error, self.dive = None, 0.0, Dive()
+        self.restart()
+        for i in range(BIAS_LEFT, STATES):
+            if keep_good:
+                self._x[i] = self._good[i - BIAS_LEFT]
+                self._kept.append((i, measurements.SIGMA_START[i] ** 2))
+            else:
+                self._kept.append((i, measurements.SIGMA_DOUBT[i] ** 2))
+        if not keep_good:
+            self._good = self._next_good = self._x[BIAS_LEFT:STATES]
 
     def _free(self):
         """Doubt the state and the sensor's errors, because the readings do not fit them."""
@@ -157,12 +184,12 @@ class LeanFilter:
             self._start(means)
             return
         if not (abs(x[LEAN]) < 2 * pi and x[SPEED] < MAX_SPEED):  # also not-a-number
-            self.restart(False)  # the sensor's errors may be no numbers either
+            self._forget()  # the sensor's errors may be no numbers either
             return
         if self._doubts:
             doubts, self._doubts = self._doubts, 0
             if doubts > 1:
-                self.restart(False)
+                self._forget(doubts == 2)
                 return
             self._free()
         roll_acceleration = (self._roll_rate - self._last_roll_rate) / seconds
@@ -240,14 +267,18 @@ class LeanFilter:
         """A generator: update with the window's forces, the level road, and the measured speed; without one with
         straight_or_prior_speed(). Update the trim where speed and lean are certain enough."""
         p, x = self._p, self._x
-        left, up = measurements.forces(model, means, roll_acceleration, self._force_error)
+        dive = self.dive.update(means[7] - model.sin_pitch, model.pitch_rate, model.speed, seconds)
+        left, up = measurements.forces(model, means, roll_acceleration, self._force_error, dive)
         yield from p.update(*left)
         misfit = p.misfit
         yield from p.update(*up)
         sideways = (means[5] - means[7] * x[YAW_ERROR]) / max(means[6], 0.5) - self.trim.angle
-        if x[SPEED] < 4.0 or p.rows[SPEED][SPEED] > 64.0:
+        if x[SPEED] < measurements.BALANCE_SPEED or p.rows[SPEED][SPEED] > measurements.SIGMA_BALANCE_SPEED**2:
             sideways = 0.0
-        self._doubts = self.consistency.add(misfit, p.misfit, sideways, x[PITCH], seconds)
+        self._doubts = self.consistency.add(misfit, p.misfit, sideways, x[PITCH], model.yaw_rate, seconds)
+        if hasattr(self,'log'):
+            self.log.append((misfit, p.misfit, sideways, x[PITCH], x[SPEED], p.rows[SPEED][SPEED]**.5,x[LEAN],model.yaw_rate))
+        self._remember(seconds)
         yield from p.update(*measurements.level_road(model, x, seconds))
         lean, speed, measured = x[LEAN] - self._upright, x[SPEED], self._speed
         self._speed_s += seconds

@@ -49,6 +49,9 @@ SIGMA_DOUBT = (
     0.02,
     0.02,
 )
+REMEMBER_S = 10.0  # s
+BALANCE_SPEED = 2.0
+SIGMA_BALANCE_SPEED = 12.0
 # rad/s: the bias where the pose on the kickstand has just measured it. Larger: after it the lean is shown later.
 SIGMA_FRESH_BIAS = radians(0.2)
 # rad: the first lean's standard deviation where the bike moves. Larger: lean is shown later, and follows forces more.
@@ -69,8 +72,8 @@ SIGMA_LOST_FORCE = 0.3  # g: likewise for the forward force. Larger, both: after
 # Measurement noise while riding
 SIGMA_LEFT = 0.04  # g: force to the left. Larger: lean follows it less, and the gyro and level roads more.
 SIGMA_UP = 0.07  # g: upward force, which bumps disturb. Larger: in held turns scale errors are found later.
-# times speed x pitch rate / g: noise of the upward force (1 sigma), because the springs pitch the bike while its wheels
-# do not rise. Larger: braking disturbs less.
+# times speed x pitch rate / g: noise of the upward force (1 sigma), and times sin(lean) that of the force to the left,
+# because the springs pitch the bike while its wheels do not rise. Larger: braking disturbs less.
 PITCHING_SHARE = 2.0
 # ratio: part of the samples' variance by vibration that stays in a window's mean, and is added to the noise of the
 # force to the left. Larger: forces count less on rough roads.
@@ -115,21 +118,23 @@ SIGMA_TRIM_SPEED = 8.0  # m/s
 SIGMA_TRIM_LEAN = radians(1.4)  # rad
 
 
-def forces(model, means, roll_acceleration, force_error):
+def forces(model, means, roll_acceleration, force_error, dive=0.0):
     """Two measurements: the force to the left, (4), and up, (5). roll_acceleration: rad/s^2. force_error:
-    relative error of the accelerometer's magnitude, as found at rest."""
+    relative error of the accelerometer's magnitude, as found at rest. dive: see Dive.update(), in g."""
     rolling = roll_acceleration / STANDARD_GRAVITY  # g in a metre of height, as is square below
     uncertain = SIGMA_ROLL_HEIGHT_M * rolling
     left = means[0]
     shaken = max(0.0, means[8] - left * left)
-    left_variance = SIGMA_LEFT**2 + SHAKEN_SHARE * shaken + uncertain**2
-    left += ROLL_HEIGHT_M * rolling * model.cos_lean
+    # Where the springs pitch the bike its wheels do not rise: v times that pitch rate is no acceleration. dive is the
+    # part of it that braking explains, (8); the rest is noise.
+    pitching = PITCHING_SHARE * model.pitching
+    sideways = pitching * model.sin_lean
+    left_variance = SIGMA_LEFT**2 + SHAKEN_SHARE * shaken + uncertain**2 + sideways * sideways
+    left += ROLL_HEIGHT_M * rolling * model.cos_lean + dive * model.sin_lean
     # In a held turn the upward force, 1 / cos(lean), makes the lean observable whatever the gyro's scale factor. One
     # window tells little, a minute tells much, as long as no error of this force keeps its sign.
     square = means[4] * means[4] / STANDARD_GRAVITY
-    up = means[1] + ROLL_HEIGHT_M * square - force_error * means[6]
-    # Where the springs pitch the bike its wheels do not rise: v w_x is no acceleration then.
-    pitching = PITCHING_SHARE * model.pitching
+    up = means[1] + ROLL_HEIGHT_M * square - force_error * means[6] + dive * model.cos_lean
     up_variance = (
         SIGMA_UP**2 + pitching * pitching + SIGMA_ROLL_HEIGHT_M**2 * square * square + (uncertain * model.sin_lean) ** 2
     )

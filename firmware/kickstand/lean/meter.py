@@ -97,7 +97,7 @@ class LeanMeter:
         lean = self.filter
         if lean.consistency.doubt:
             return False
-        return 0.0 <= lean.variance <= MAX_VARIANCE and abs(lean.pitch_deg) < WHEELIE_DEG
+        return 0.0 <= lean.variance <= (MAX_VARIANCE*4/9 if lean.consistency._doubts else MAX_VARIANCE) and abs(lean.pitch_deg) < WHEELIE_DEG
 
     def keep_trim(self):
         """If the bike stands and the trim is certain enough and has changed, copy it to the calibration and return
