@@ -3,13 +3,14 @@
 SHORT_S = 3.0  # s: time constant of the short means. Larger: seen later, and less of what is sound.
 LONG_S = 10.0  # s: of the long ones. Larger: as above.
 MOST = 4.0  # standard deviations: more counts as this. Larger: a blow counts for more.
-LEFT_SHORT, LEFT_LONG = 0.9, 0.6
-UP_SHORT, UP_LONG = 0.8, 0.36
+LEFT_SHORT, LEFT_LONG = 0.75, 0.5
+UP_SHORT, UP_LONG = 0.9, 0.35
 SIDEWAYS = 0.15
 PITCH = 0.21
-FIT_SHARE = 0.5
-HOLDS = (4.0, 5.0, 20.0, 60.0)
+FIT_SHARE = 0.6
+HOLDS = (3.0, 4.0, 5.0, 20.0, 60.0)
 FORGET_S = 60.0  # s: fitting for so long takes one doubt back. Larger: a fault that comes again is named more surely.
+MILD = 3
 NAMED = 3  # doubts after which the sensor is called odd
 
 
@@ -49,7 +50,7 @@ class Consistency:
             return self._doubts
         if self.doubt and max(of_left, of_up, of_pitch) > FIT_SHARE:
             self._fits_s = 0.0
-        if abs(yaw_rate) > 0.05 or self._doubts < 3:
+        if abs(yaw_rate) > 0.05 or self._doubts <= MILD:
             self._fits_s += seconds
         if self.doubt and self._fits_s >= HOLDS[min(self._doubts, len(HOLDS)) - 1]:
             self.doubt, self.odd, self._fits_s = False, None, 0.0

@@ -51,6 +51,7 @@ class LeanFilter:
         # The sensor's errors (from BIAS_LEFT on) some seconds ago, and less long ago, while all fitted
         self._good = self._next_good = [0.0] * (STATES - BIAS_LEFT)
         self._good_s = 0.0
+        self._kept_speed = None
         self.dive = Dive()
         self.restart()
 
@@ -102,12 +103,15 @@ class LeanFilter:
 
     def _forget(self, keep_good=False):
         """Restart with nothing kept. keep_good: but for the sensor's errors as they were while all fitted."""
+        speed, known = self._x[SPEED], self._p.rows[SPEED][SPEED]
         self._p, self._force_error, self.dive = None, 0.0, Dive()
         self.restart()
+        if keep_good:
+            self._kept_speed = speed, known + measurements.SIGMA_DOUBT[SPEED]**2
         for i in range(BIAS_LEFT, STATES):
             if keep_good:
                 self._x[i] = self._good[i - BIAS_LEFT]
-                self._kept.append((i, measurements.SIGMA_START[i] ** 2))
+                self._kept.append((i, measurements.SIGMA_GOOD[i] ** 2))
             else:
                 self._kept.append((i, measurements.SIGMA_DOUBT[i] ** 2))
         if not keep_good:
@@ -222,6 +226,10 @@ class LeanFilter:
         x[LEAN] = atan2(fx, fy)
         x[PITCH] = 0.0
         x[SPEED] = measurements.PRIOR_SPEED if moving else 0.0  # most rides begin at rest
+        if self._kept_speed:
+            x[SPEED], variance = self._kept_speed
+            self._p.set_variance(SPEED, variance)
+            self._kept_speed = None
         if posed and not moving:
             self._stand(means)
 

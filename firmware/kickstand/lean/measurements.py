@@ -50,6 +50,7 @@ SIGMA_DOUBT = (
     0.02,
 )
 REMEMBER_S = 10.0  # s
+SIGMA_GOOD = (0,0,0, radians(0.3), radians(0.3), radians(0.3), radians(2.0), 0.01, 0.007, 0.007, 0.007, 0.007)
 BALANCE_SPEED = 2.0
 SIGMA_BALANCE_SPEED = 12.0
 # rad/s: the bias where the pose on the kickstand has just measured it. Larger: after it the lean is shown later.

@@ -8,6 +8,7 @@ from .lean_filter import DELAY_S, LeanFilter
 
 SMOOTH_US = 300_000  # time constant of smooth_force
 MAX_VARIANCE = radians(3.0) ** 2  # a lean less certain than this is not shown
+DOUBTED_VARIANCE = radians(2.0) ** 2  # the same after the readings did not fit
 TRIM_MAX_VARIANCE = radians(0.5) ** 2  # a trim less certain than this is not kept
 TRIM_STEP_DEG = 0.3  # a smaller change of the trim is not saved: flash wears
 FALLEN_DEG = 65.0  # the bike has fallen after FALLEN_US of at least this lean
@@ -97,7 +98,7 @@ class LeanMeter:
         lean = self.filter
         if lean.consistency.doubt:
             return False
-        return 0.0 <= lean.variance <= (MAX_VARIANCE*4/9 if lean.consistency._doubts else MAX_VARIANCE) and abs(lean.pitch_deg) < WHEELIE_DEG
+        return 0.0 <= lean.variance <= (DOUBTED_VARIANCE if lean.consistency._doubts else MAX_VARIANCE) and abs(lean.pitch_deg) < WHEELIE_DEG
 
     def keep_trim(self):
         """If the bike stands and the trim is certain enough and has changed, copy it to the calibration and return
