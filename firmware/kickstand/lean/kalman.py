@@ -27,7 +27,7 @@ class Covariance:
             self.rows[i][i] = variance
         self.correction = [0.0] * self.n
         self._column = [0.0] * self.n
-        self.misfit = 0.0
+        self.misfit = 0.0  # see update()
 
     def set_variance(self, i, variance):
         """Set the variance of state i, and its covariances with the other states to 0."""
@@ -67,7 +67,7 @@ class Covariance:
 
         derivatives: H, ((state, d measurement / d state), ...).  innovation: measured minus expected, for the states
         before this window's corrections.  variance: R, in the measurement's unit squared. Beyond GATE the
-        innovation's variance is raised until it lies on it.
+        innovation's variance is raised until it lies on it. misfit is then the innovation in standard deviations.
         """
         rows, column, correction = self.rows, self._column, self.correction
         n = self.n

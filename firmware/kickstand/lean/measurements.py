@@ -33,24 +33,24 @@ SIGMA_START = (
     0.014,  # ratio: forward axis' reading of a rate about up
     0.014,  # ratio: scale error of the forward axis
 )
-# The same where the readings do not fit any more (consistency.py): for the first three it is added. Larger: a sensor that
-# has changed is found again sooner, and less surely.
-SIGMA_DOUBT = (
-    radians(20.0),  # lean
-    radians(5.0),  # pitch
-    8.0,  # m/s: speed
-    radians(4.0),  # biases
-    radians(4.0),
-    radians(4.0),
-    radians(5.0),  # yaw error
-    0.03,
-    0.02,
-    0.02,
-    0.02,
-    0.02,
-)
-REMEMBER_S = 10.0  # s
-SIGMA_GOOD = (0,0,0, radians(0.3), radians(0.3), radians(0.3), radians(2.0), 0.01, 0.007, 0.007, 0.007, 0.007)
+# Where the readings do not fit any more (consistency.py) the filter restarts, first with the sensor's errors as they were
+# REMEMBER_S to twice as long ago, and with the speed, then with nothing kept.
+REMEMBER_S = 10.0  # s. Larger: less of what came before the doubt is remembered, and it is older.
+SIGMA_GOOD_BIAS = radians(0.6)  # rad/s: of a bias that is remembered. Larger: one that has changed is found sooner.
+GOOD_SHARE = 0.7  # ratio: of SIGMA_START, for the other errors that are remembered. Larger: as above.
+SIGMA_GOOD_SPEED = 3.0  # m/s: added to the speed's standard deviation. Larger: less is kept of the speed.
+SIGMA_DOUBT_BIAS = radians(
+    2.5
+)  # rad/s: of a bias of which nothing is known. Larger: as SIGMA_START, a stepped one sooner.
+# rad: a lean that no bike has, where the force does not show it for so many seconds. Larger: a filter that has gone
+# astray restarts later.
+IMPOSSIBLE_LEAN = radians(80.0)
+IMPOSSIBLE_S = 1.0
+# m/s: a measured speed above is no standstill, for MOVING_S. Larger: slow riding on a smooth road is taken for rest.
+MOVING_SPEED = 2.0
+MOVING_S = 2.5  # s. Larger: a stop is detected later.
+# m/s: riding, where a bike is in balance, and how well the speed has to be known for that. Larger, the first: a mount that
+# has slipped is seen at fewer speeds; the second: a bike that is pushed about is taken for one that rides.
 BALANCE_SPEED = 2.0
 SIGMA_BALANCE_SPEED = 12.0
 # rad/s: the bias where the pose on the kickstand has just measured it. Larger: after it the lean is shown later.

@@ -187,7 +187,7 @@ FAULTS: tuple[Fault, ...] = (
     Fault("accelerometer axis off by 0.3 g", ILL, partial(_accel_axis_steps, g=0.3)),
     Fault("accelerometer axis off by 0.3 g", ILL, partial(_accel_axis_steps, g=0.3), seconds=5.0),
     Fault("accelerometer axis at half scale", ILL, partial(_accel_axis_scaled, scale=0.5)),
-    Fault("accelerometer clipped at 1 g", ILL, partial(_accel_clipped, g=1.0)),
+    Fault("accelerometer clipped at 1.2 g", ILL, partial(_accel_clipped, g=1.2)),
     Fault("accelerometer axis noisy, 1 g", ILL, partial(_accel_axis_noisy, g=1.0)),
     Fault("readings lost", ILL, _readings_lost, seconds=1.0),
     Fault("readings lost", ILL, _readings_lost, seconds=5.0),

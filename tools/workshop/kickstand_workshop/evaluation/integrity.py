@@ -216,7 +216,7 @@ def trace_of(
         lean[k] = meter.lean_deg
         sigma[k] = np.degrees(np.sqrt(max(0.0, meter.filter.variance)))
         shown[k] = meter.trusted and not meter.fallen and abs(meter.lean_deg) <= FALLEN_DEG
-        if named_s != named_s and getattr(meter, "odd", None):
+        if named_s != named_s and meter.odd:
             named_s = k * TURN / rate_hz
     time = last / rate_hz
     return Trace(time, lean, sigma, shown, true[last], speed[last], named_s, first / rate_hz, end / rate_hz)
