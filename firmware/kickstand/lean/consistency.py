@@ -31,6 +31,9 @@ FIT = 0.6  # ratio: share of the limits in which the means have to stay while do
 GAP_S = 4.5  # s: the same after a gap of the readings. Larger: as above.
 HOLDS_S = (3.0, 4.0, 4.0, 20.0, 60.0)
 MILD = 3  # doubts; after more of them it has to fit in turns, because on a straight nearly all does, and is called odd
+AGAIN_S = (
+    12.0  # s: then the next doubt comes no sooner, so that rest is found. Larger: what has changed is found later.
+)
 TURNING = 0.05  # rad/s: yaw rate of a turn. Larger: it takes longer.
 FORGET_S = 60.0  # s: fitting for so long takes one doubt back. Larger: a fault that comes again is hidden for longer.
 
@@ -46,6 +49,7 @@ class Consistency:
         self.odd = None
         self.doubts = 0
         self._fits_s = 0.0
+        self._since_s = 0.0  # since the last doubt
         self._in_rest = True  # rest counts as fitting
         self._forget_means()
 
@@ -74,10 +78,14 @@ class Consistency:
         up = max(abs(self._up) / UP_SHORT, abs(self._up_long) / UP_LONG)
         pitch = abs(self._pitch) / STEEP
         worst = max(left, up, pitch)
-        if not worst <= (STRICT if self.doubts else 1.0):  # also not-a-number
+        self._since_s += seconds
+        if self.doubts > MILD and self._since_s < AGAIN_S:
+            if worst > FIT:
+                self._fits_s = 0.0
+        elif not worst <= (STRICT if self.doubts else 1.0):  # also not-a-number
             self.fail("odd-left" if worst == left else "odd-up" if worst == up else "odd-pitch")
             return True
-        if self.doubt and worst > FIT:
+        elif self.doubt and worst > FIT:
             self._fits_s = 0.0
         elif self.doubts <= MILD or abs(yaw_rate) > TURNING:
             self._fit(seconds)
@@ -92,14 +100,15 @@ class Consistency:
         """Doubt, because it does not fit. code: see odd."""
         global last_odd
         self.gap()
-        self.doubts += 1
+        self._since_s = 0.0
+        self.doubts = min(self.doubts + 1, len(HOLDS_S))
         if self.doubts >= MILD:
             self.odd = last_odd = code
 
     def _fit(self, seconds):
         self._fits_s += seconds
         if self.doubt:
-            if self._fits_s >= (HOLDS_S[min(self.doubts, len(HOLDS_S)) - 1] if self.doubts else GAP_S):
+            if self._fits_s >= (HOLDS_S[self.doubts - 1] if self.doubts else GAP_S):
                 self.doubt, self.odd, self._fits_s = False, None, 0.0
         elif self.doubts and self._fits_s >= FORGET_S:
             self.doubts -= 1

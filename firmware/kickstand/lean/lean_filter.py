@@ -305,7 +305,8 @@ class LeanFilter:
         sideways = (means[5] - means[7] * x[YAW_ERROR]) / max(means[6], 0.5) - self.trim.angle
         if x[SPEED] < measurements.BALANCE_SPEED or p.rows[SPEED][SPEED] > measurements.SIGMA_BALANCE_SPEED**2:
             sideways = 0.0
-        self._failed = self.consistency.add(misfit, p.misfit, sideways, x[PITCH], model.yaw_rate, seconds)
+        if abs(means[7]) < measurements.MOST_FORWARD * abs(means[6]):  # else the sensor is on no bike
+            self._failed = self.consistency.add(misfit, p.misfit, sideways, x[PITCH], model.yaw_rate, seconds)
         self._remember(seconds)
         yield from p.update(*measurements.level_road(model, x, seconds))
         lean, speed, measured = x[LEAN] - self._upright, x[SPEED], self._speed

@@ -53,6 +53,9 @@ MOVING_S = 2.5  # s. Larger: a stop is detected later.
 # has slipped is seen at fewer speeds; the second: a bike that is pushed about is taken for one that rides.
 BALANCE_SPEED = 2.0
 SIGMA_BALANCE_SPEED = 12.0
+MOST_FORWARD = (
+    1.5  # ratio: force forward over force up of a bike. Larger: a board on a table is taken for one that is ill.
+)
 # rad/s: the bias where the pose on the kickstand has just measured it. Larger: after it the lean is shown later.
 SIGMA_FRESH_BIAS = radians(0.2)
 # rad: the first lean's standard deviation where the bike moves. Larger: lean is shown later, and follows forces more.
