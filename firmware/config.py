@@ -5,7 +5,7 @@
 
 # Sensor
 # SAMPLE_HZ = 200           # readings per second: 50, 100, 125 or 200
-# ACCEL_RANGE_G = 8         # 2, 4, 8 or 16
+# ACCEL_RANGE_G = 16        # 2, 4, 8 or 16: a hard vibration beyond it makes the lean wrong
 # GYRO_RANGE_DPS = 500      # 250, 500, 1000 or 2000
 # DLPF = 3                  # low-pass of the chip, which has to keep what is faster than half of SAMPLE_HZ out:
 #                           # 2 (98 Hz) to 6 (5 Hz) at 200; 3 (44 Hz) to 6 at 100 and 125; 4 (21 Hz) to 6 at 50

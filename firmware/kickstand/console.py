@@ -33,6 +33,8 @@ no-radio|LIVE: this board has no Bluetooth in its MicroPython: nothing goes to a
 no-pairing|LIVE_PIN: this board cannot ask for a PIN: nothing goes to a phone; LIVE_PIN = None lets every phone in
 radio-fault|LIVE: the radio does not start ({0}): nothing goes to a phone, the lean goes on
 live-memory|LIVE: too little memory ({0}): nothing goes to a phone, the lean goes on
+axis-ill|sensor: {0} {1} {2}, so there is no lean: switch it off and on; if that does not help, replace it
+clips|sensor: {0} at the end of its range: mount the sensor softly, on foam or rubber
 no-such-pin|config.py: {0} = {1} is no pin of this board ({2})
 i2c-pins|config.py: {1}_SDA = {2} and {1}_SCL = {3} do not belong to I2C {4} ({5})
 uart-pins|config.py: GPS_TX = {1} and GPS_RX = {2} do not belong to UART {3} ({4})
@@ -62,5 +64,5 @@ def tell(refusal):
     """Print a Refusal's sentence, unless a print was slow in the last QUIET_MS."""
     from time import ticks_diff, ticks_ms
 
-    if _slow_ms is None or ticks_diff(ticks_ms(), _slow_ms) >= QUIET_MS:
+    if _slow_ms is None or not 0 <= ticks_diff(ticks_ms(), _slow_ms) < QUIET_MS:
         say(sentence(refusal))

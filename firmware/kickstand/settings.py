@@ -48,7 +48,7 @@ _SPEED_PINS = {None: (), "gps": ("GPS_TX", "GPS_RX"), "wheel": ("WHEEL_PIN",)}
 _TABLE = {
     "SIDE": ("left", _one_of("left", "right")),
     "SAMPLE_HZ": (200, (lambda v: isinstance(v, int) and v in MIN_DLPF, "50, 100, 125 or 200")),
-    "ACCEL_RANGE_G": (8, _one_of(*sorted(ACCEL_LSB_PER_G))),
+    "ACCEL_RANGE_G": (16, _one_of(*sorted(ACCEL_LSB_PER_G))),
     "GYRO_RANGE_DPS": (500, _one_of(*sorted(GYRO_LSB_PER_DPS))),
     "DLPF": (3, _whole(1, 6)),
     "ACCEPT_WHO_AM_I": (None, (lambda v: v is None or isinstance(v, int), "None or a number as 0x75")),

@@ -15,6 +15,7 @@ from .ui import messages
 from .units import __version__
 
 LISTEN_MS = 3500
+WATCH_MS = 1400  # for setting the sensor up and two looks at its axes
 _TRIAL = "trial.tmp"  # a file that is written to measure the flash, then removed
 
 
@@ -33,6 +34,8 @@ def report():
         _print("Settings", words, settings.VEHICLE, settings.SIDE, settings.SAMPLE_HZ)
         sensor = open_sensor(settings)
         who_am_i = _sensor(sensor, settings)
+        if who_am_i:
+            _axes(sensor)
         _display(open_lcd(settings))
         pressed = "pressed" if open_button(settings).held() else "not pressed"
         _print("Button", "GPIO %d, %s", settings.BUTTON_PIN, pressed)
@@ -42,7 +45,7 @@ def report():
         return
     _calibration(who_am_i, settings)
     _machine_code()
-    _worst()
+    _worst(sensor.chip)
     gc.collect()
     space = os.statvfs("/")
     free_kb = gc.mem_free() // 1024, space[0] * space[3] // 1024
@@ -81,6 +84,14 @@ def _sensor(sensor, settings):
     return chip.who_am_i
 
 
+def _axes(sensor):
+    """Print what is wrong with the axes of a sensor that answers: their counts of a second show it."""
+    for _ in range(WATCH_MS // 10):
+        sensor.fetch(ticks_ms())
+        sleep_ms(10)
+    _print("Axes", "%s", ", ".join(messages.lines(sensor.fault)) if sensor.fault else "all six measure")
+
+
 def _display(lcd):
     lcd.show("Kickstand", "status: console")
     lcd.flush()
@@ -114,12 +125,16 @@ def _speed(settings):
         print("  nothing yet" if heard is None else "  %.1f m/s" % heard)
 
 
-def _worst():
-    """Print what the app has noted, if it has run since the board was started."""
+def _worst(chip):
+    """Print what the app has noted, if it has run since the board was started. chip: an Mpu6050."""
     app = sys.modules.get("kickstand.app")
     if app and app.worst:
+        longest_us, places, (peaks, share) = app.worst
         words = "longest turn %.1f ms; places left in the FIFO, at the fewest: %d"
-        _print("Since start", words, app.worst[0] / 1000, app.worst[1])
+        _print("Since start", words, longest_us / 1000, places)
+        words = "largest force %.1f %.1f %.1f g of %d; %.2f %% of the readings lost at the end of the range"
+        forces = [peak / chip.accel_lsb_per_g for peak in peaks]
+        _print("Vibration", words, *(forces + [chip.accel_range_g, 100 * share]))
 
 
 def _machine_code():

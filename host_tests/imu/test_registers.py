@@ -50,7 +50,7 @@ class Wires:
             self.read_of_fifo.append(len(buffer))
             return
         if register == USER_CTRL:
-            assert len(buffer) <= 2
+            assert len(buffer) <= 3
         buffer[:] = self.registers[register : register + len(buffer)]
 
 

@@ -15,6 +15,10 @@ class Chip:
     spoilt. setups: what set-ups raise in their last step, None for nothing. calls: what was done."""
 
     def __init__(self):
+        from kickstand.imu.fifo_frames import AxisWatch
+
+        self.axes = AxisWatch(200, 3, 1, 3, 20)
+        self.axes.notes[9] = 1 << 29  # the next look is far away
         self.waiting, self.setups, self.states = [], [], []
         self.bad = 0
         self.overflows = self.frames_left = 0

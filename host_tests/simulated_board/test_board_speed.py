@@ -344,3 +344,78 @@ def test_jumps_that_no_vehicle_makes_are_refused_until_they_last():
         ):
             source.speed = value
             assert (speed.poll(at_ms) is not None) == expected, (at_ms, value)
+
+
+DAYS = 6.3, 9.0, 12.4, 12.5, 19.0
+
+
+def later(days, seconds=0):
+    """ticks_ms() so long after 1000."""
+    return (1000 + round(86_400_000 * days) + 1000 * seconds) & 0x3FFFFFFF
+
+
+class Once:
+    """A source that gives each value once."""
+
+    age_ms, problem, value = 0, None, None
+
+    def poll(self, now_ms):
+        value, self.value = self.value, None
+        return value
+
+
+def test_a_speed_is_taken_after_days_without_one():
+    """ticks_diff() is negative after 6.2 days."""
+    with Board(level):
+        from kickstand.speed.source import Speed
+
+        for days in DAYS:
+            source = Once()
+            speed = Speed(source)
+            source.value = 0.0
+            assert speed.poll(1000) == 0.0
+            for k in range(1, int(24 * days)):
+                assert speed.poll(later(k / 24)) is None
+            source.value = 20.0
+            assert speed.poll(later(days)) == 20.0
+
+
+def test_a_receiver_stays_silent_for_days():
+    fix = sentence("GPRMC,120000.00,A,4807.038,N,01131.000,E,022.4,084.4,230394,003.1,W").encode()
+    with Board(level):
+        from kickstand.speed.gps import Gps
+
+        for days in DAYS:
+            uart = Listing(fix)
+            gps = Gps(uart)
+            while uart.any():
+                gps.poll(1000)
+            for k in range(1, int(24 * days)):
+                gps.poll(later(k / 24))
+                assert gps.fault(later(k / 24)).code == "gps-silent", (days, k)
+
+
+def test_a_wheel_that_stood_for_days_turns_again():
+    """Also one that never turned."""
+
+    class Line:
+        IRQ_FALLING = IRQ_RISING = 0
+
+        def irq(self, *handler, **kind):
+            pass
+
+    with Board(level):
+        from kickstand.speed.wheel import Wheel
+
+        for before in (True, False):
+            for days in DAYS:
+                wheel = Wheel(Line(), 1.0, {"hard": True})
+                wheel.poll(1000)
+                if before:
+                    wheel.count += 1
+                    wheel.poll(1200)
+                for k in range(1, int(24 * days)):
+                    assert wheel.poll(later(k / 24)) == (0.0 if before else None)
+                wheel.count += 1
+                wheel.poll(later(days))
+                assert wheel._moved_ms == later(days)

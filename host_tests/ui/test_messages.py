@@ -22,6 +22,7 @@ VALUES = {"dead-axis": ("x", 0.1), "odd-axis": ("x", 0.1, 1.0), "side-tilted": (
 VALUES |= {"not-one-g": ("kickstand", 1.23), "mount-moved": ("between-stops", 12.0), "few-events": (4, 5, 12)}
 VALUES |= {"uncertain": (180.0, 12), "unknown-chip": (0x12,), "speed-unit": (99.9,)}
 VALUES |= {"no-pins": ("SENSOR_SDA", "SENSOR_SDA, SENSOR_SCL", "a board")}
+VALUES |= {"axis-ill": ("Accel", "xyz", "stuck"), "clips": ("Accel",)}
 VALUES |= {"speed-late": (2.5,), "aligned": (9.9,)}
 
 

@@ -19,6 +19,7 @@ draws                           True if it shows pictures. A picture is (draw, v
 A display that lost its power or whose transfer failed is set up again, and dark or crossed out until it is right.
 """
 
+import micropython
 from time import sleep_ms, ticks_diff, ticks_ms
 
 from ..errors import attempt
@@ -27,6 +28,7 @@ OLED_ADDRESSES = (0x3C, 0x3D)
 ADDRESSES = (0x27, 0x3F) + OLED_ADDRESSES  # the backpack's PCF8574 and PCF8574A with all jumpers open
 _FAMILY = tuple(range(0x20, 0x27)) + tuple(range(0x38, 0x3C)) + (0x3E,)  # a backpack's other addresses
 LCD_HZ, OLED_HZ = 100_000, 400_000  # the fastest clocks that a PCF8574 and the OLEDs allow
+STOPPED = "Kickstand", "stopped"  # what a display shows when the firmware has ended
 KINDS = ("auto", "lcd", "ssd1306", "sh1106")
 PROBE_MS = 200  # time between two searches for a display, while there is none
 MOST_WAIT_MS = 60_000  # the longest, while a driver cannot be loaded: each is twice as long as the last
@@ -90,6 +92,25 @@ class Display:
             if self.address is None or not self._driver.busy:
                 return
             sleep_ms(STEP_MS)
+
+    def end(self, line1, line2):
+        """Show two lines for good, because the firmware ends. Raises nothing, and Ctrl-C does not interrupt it.
+
+        The display is set up again: what ends the firmware may have interrupted a transfer."""
+        interrupt = getattr(micropython, "kbd_intr", None)  # computers have none
+        if interrupt:
+            interrupt(-1)
+        try:
+            if self._wanted[:2] != (line1, line2):
+                self.address = None
+                self._fresh = True
+                self.show(line1, line2)
+                self.flush()
+        except Exception:  # of pins, drivers, memory: there is nobody left to report it to
+            pass
+        finally:
+            if interrupt:
+                interrupt(3)
 
     def _probe(self):
         """Look for the display at each address."""

@@ -22,7 +22,7 @@ from time import sleep_ms
 
 from micropython import const
 
-from .fifo_frames import FRAME, add_up, decode
+from .fifo_frames import FRAME, SATURATED, AxisWatch, add_up, decode
 
 # setup() writes the registers from here on one after the other: SMPLRT_DIV (p. 11), CONFIG with DLPF_CFG (p. 13),
 # GYRO_CONFIG (p. 14), ACCEL_CONFIG (p. 15) and, where the chip has it, ACCEL_CONFIG2: the accelerometer's own low-pass
@@ -36,6 +36,7 @@ _FIFO_R_W = const(0x74)  # p. 44
 _WHO_AM_I = const(0x75)  # p. 45
 
 _RESET = const(0x80)  # bit of PWR_MGMT_1
+_STANDBY = const(0x3F)  # bits of PWR_MGMT_2 (p. 42), which follows PWR_MGMT_1: an axis each that does not measure
 _CLOCK_PLL_GYRO_X = const(0x01)  # in PWR_MGMT_1: 1 % accurate; the oscillator used after a reset is off by up to 5 %
 _FIFO_ALL = const(0xF8)  # in FIFO_EN: temperature, gyro and accelerometer, the same fourteen bytes as one burst
 _FIFO_ENABLE = const(0x40)  # bit of USER_CTRL
@@ -87,11 +88,12 @@ class Mpu6050:
     temperature gx gy gz.  sums: array('i', 7) of the last add_up(), in the same order.  accel_lsb_per_g and
     gyro_lsb_per_dps: counts per g and per deg/s.  gyro_delay_s: delay of the gyro by the low-pass.  overflows: number
     of times that the FIFO had to be emptied, losing samples.  frames_left: samples that the last fetch() left in it.
+    axes: an AxisWatch, which judges each axis.
     """
 
-    SATURATED = 32700  # |counts|: from here on a reading is at the end of its range
+    SATURATED = SATURATED
 
-    def __init__(self, i2c, address=0x68, accel_range_g=8, gyro_range_dps=500, dlpf=3, rate_hz=200, accept=None):
+    def __init__(self, i2c, address=0x68, accel_range_g=16, gyro_range_dps=500, dlpf=3, rate_hz=200, accept=None):
         self._i2c = i2c
         self._address = address
         self._accept = accept
@@ -103,7 +105,7 @@ class Mpu6050:
         accel_bits = (2, 4, 8, 16).index(accel_range_g) << 3
         gyro_bits = (250, 500, 1000, 2000).index(gyro_range_dps) << 3
         self._configuration = bytes((1000 // rate_hz - 1, dlpf, gyro_bits, accel_bits, dlpf))  # SMPLRT_DIV and on
-        self._one, self._two = bytearray(1), bytearray(2)
+        self._one, self._two, self._three = bytearray(1), bytearray(2), bytearray(3)
         self._readback = bytearray(_FIFO_EN - _SMPLRT_DIV + 1)
         self._frames = bytearray(FRAME * MAX_FRAMES)
         # The first n frames, for each n: made once, because each slice takes heap.
@@ -114,7 +116,7 @@ class Mpu6050:
         self._started = False  # setup() has run to its end: the FIFO is filling
         self._full = 0  # with so many bytes in it the FIFO may have overflowed
         self.counts, self.sums = array("h", [0] * 7), array("i", [0] * 7)
-        self._watch = array("i", (0, 0, rate_hz * FROZEN_MS // 1000))
+        self.axes = AxisWatch(rate_hz, accel_bits >> 3, gyro_bits >> 3, dlpf, rate_hz * FROZEN_MS // 1000)
 
     @property
     def name(self):
@@ -163,19 +165,19 @@ class Mpu6050:
         """Start the FIFO of a chip that is configured. Raises OSError as restart_fifo() does."""
         self.restart_fifo()
         self._started = True
-        self._watch[1] = 0
+        self.axes.restart()
 
     def configured(self):
         """True if the chip is awake with the configuration that setup() wrote. Raises OSError from the bus."""
         self._i2c.readfrom_mem_into(self._address, _SMPLRT_DIV, self._readback)  # SMPLRT_DIV to FIFO_EN
-        self._i2c.readfrom_mem_into(self._address, _USER_CTRL, self._two)  # USER_CTRL and PWR_MGMT_1
+        self._i2c.readfrom_mem_into(self._address, _USER_CTRL, self._three)  # USER_CTRL, PWR_MGMT_1 and PWR_MGMT_2
         # An unknown chip that is accepted is sent ACCEL_CONFIG2 as well, but it need not have that register.
         for i in range(5 if self.who_am_i in CHIPS and self._chip()[_HAS_ACCEL_CONFIG2] else 4):
             if self._readback[i] != self._configuration[i]:
                 return False
-        return self._two[1] == _CLOCK_PLL_GYRO_X and (
-            not self._started or self._fifo_runs(self._readback[_FIFO_EN - _SMPLRT_DIV], self._two[0])
-        )
+        if self._three[1] != _CLOCK_PLL_GYRO_X or self._three[2] & _STANDBY:
+            return False
+        return not self._started or self._fifo_runs(self._readback[_FIFO_EN - _SMPLRT_DIV], self._three[0])
 
     def read(self):
         """Read the newest sample into counts, in one burst. Takes no heap. Raises OSError from the bus."""
@@ -221,9 +223,10 @@ class Mpu6050:
     def add_up(self, n):
         """Sum the first n samples of the last fetch() into sums; return the number of those. Takes no heap.
 
-        It stops at a sample that only a dead chip sends: a force of all zeros or all ones, or the same reading as
-        for FROZEN_MS before it."""
-        return add_up(self._frames, n, self.sums, self._watch)
+        Samples at the end of the range are left out, and take() then finds only the others; axes.notes[LOST] is their
+        number. It stops at a sample that only a dead chip sends: a force of all zeros or all ones, or the same reading
+        as for FROZEN_MS before it."""
+        return add_up(self._frames, n, self.sums, self.axes.notes)
 
     def restart_fifo(self):
         """Empty the FIFO and start it again, after an overflow or a transfer that broke off. Raises OSError from the

@@ -10,7 +10,7 @@ and *.
 """
 
 from array import array
-from time import ticks_diff
+from time import ticks_add, ticks_diff
 
 from ..errors import Notice
 
@@ -18,6 +18,7 @@ MAX_SENTENCE = 100  # bytes: the standard says 82, but receivers with many decim
 MAX_CHUNK = 64  # bytes read in one pass of the loop: at 10 ms a pass, twice what 10 fixes a second need
 SILENT_MS = 3000  # after so long without a byte, a whole sentence or a fix, fault() reports which
 LATE_MS = 2000  # a fix that waited in the receiver for longer is dropped
+CARRY_MS = 60_000  # a time that is longer ago is kept as so long ago: after 6 days ticks_diff() is negative
 TIME_JUMP_MS = 5000  # a larger difference is not a delay: the receiver has corrected its clock
 # The delay of a fix is counted from a fix that was not late, the reference. When at least so many fixes over more than
 # TIME_JUMP_MS all came late, the one with the smallest delay becomes the reference: the receiver set its clock back.
@@ -39,7 +40,7 @@ class Gps:
         self._line = b""  # the sentence so far
         # When, in ticks_ms(), the receiver last sent: any byte; a whole sentence; a sentence with a fix; an RMC.
         self._heard_ms = None
-        self._sentence_ms = self._fix_ms = 0
+        self._sentence_ms = self._fix_ms = self._carried_ms = 0
         self._rmc_ms = None
         self._time = b""  # time of day in the last RMC
         # A fix is remembered as (ticks_ms() when it came, its time of day in ms).
@@ -58,10 +59,12 @@ class Gps:
         heard_ms = self._heard_ms
         if heard_ms is None:
             self._begin(now_ms)
+        elif ticks_diff(now_ms, self._carried_ms) > CARRY_MS:
+            self._carry(now_ms)
         waiting = self._uart.any()
         if not waiting:
             return None
-        if heard_ms is not None and ticks_diff(now_ms, heard_ms) > SILENT_MS:
+        if heard_ms is not None and ticks_diff(now_ms, self._heard_ms) > SILENT_MS:
             self._begin(now_ms)
         self._heard_ms = now_ms
         chunk = self._uart.read(min(waiting, MAX_CHUNK)) or b""
@@ -82,8 +85,17 @@ class Gps:
 
     def _begin(self, now_ms):
         """Restart the time-outs."""
-        self._heard_ms = self._sentence_ms = self._fix_ms = now_ms
+        self._heard_ms = self._sentence_ms = self._fix_ms = self._carried_ms = now_ms
         self._fix = None
+
+    def _carry(self, now_ms):
+        """Carry the times on that are longer ago than CARRY_MS."""
+        self._carried_ms = now_ms
+        oldest_ms = ticks_add(now_ms, -CARRY_MS)
+        for name in ("_heard_ms", "_sentence_ms", "_fix_ms", "_rmc_ms"):
+            then_ms = getattr(self, name)
+            if then_ms is not None and ticks_diff(oldest_ms, then_ms) > 0:
+                setattr(self, name, oldest_ms)
 
     def place(self, now_ms):
         """The position of the fix whose speed poll(now_ms) has returned; None if there is none.

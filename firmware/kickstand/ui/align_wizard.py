@@ -48,6 +48,6 @@ class AlignWizard(Wizard):
             self._show(ASKING, _ASK[1])
             return
         new, tilt = align(self._calibration.value, self._kickstand, pose, self._side)
-        self._calibration.save(new, ticks_diff(now_ms, self._kickstand_ms) < FRESH_MS)
+        self._calibration.save(new, 0 <= ticks_diff(now_ms, self._kickstand_ms) < FRESH_MS)
         warning = "Little, 8%s best" % messages.DEGREE if tilt < WARN_TILT_DEG else "Ride safely"
         self._show_for(RESULT_MS, RESULT, now_ms, "Aligned! %5.1f%s" % (tilt, messages.DEGREE), warning)

@@ -38,6 +38,8 @@ sensor-frozen|Sensor frozen|starting again
 sensor-silent|Sensor silent|starting again
 sensor-reset|Sensor reset|starting again
 readings-lost|Readings lost|board too busy
+axis-ill|{0} {1} {2}|power off and on
+clips|{0} clips|mount it softly
 
 no-radio|No Bluetooth|on this board
 no-pairing|LIVE_PIN: not|on this board
