@@ -1,11 +1,12 @@
 """Whether the readings fit the model: the lean filter judges itself by its own innovations.
 
-A filter's covariance knows nothing of a sensor that has failed in part. Its innovations do. The square of one over the
-variance that the filter expects of it, the normalised innovation squared, is 1 on average where all fits (Y. Bar-Shalom
-and others, Estimation with Applications to Tracking and Navigation, section 5.4). Here it is its root, with its sign,
-whose mean is taken: vibration and bumps, which a sound sensor has, cancel in it, and an axis that is dead, mirrored or of
-half its scale, a bias that has stepped, or a mount that has slipped does not. Of the force to the left and of the force
-up there is a short mean, which sees much within a second or two, and a long one, which sees little after some seconds.
+A filter's covariance knows nothing of a sensor that has failed in part. Its innovations do. The square of one over
+the variance that the filter expects of it, the normalised innovation squared, is 1 on average where all fits (Y.
+Bar-Shalom and others, Estimation with Applications to Tracking and Navigation, section 5.4). Here the mean is of its
+root, with its sign: vibration and bumps, which a sound sensor has too, cancel in it. An axis that is dead, mirrored or
+of half its scale, a bias that has stepped and a mount that has slipped do not. Of the force to the left and of the
+force up there is a short mean, which sees much within a second or two, and a long one, which sees little after some
+seconds.
 
 Two more means are of what no road and no rider does for long: a force to the side, because a bike is in balance, and a
 steep pitch.
@@ -64,8 +65,9 @@ class Consistency:
         self._forget_means()
 
     def add(self, left, up, sideways, pitch, yaw_rate, seconds):
-        """Take a window of `seconds` while riding: the normalised innovations of the forces left and up, the force to the
-        side over the force up, pitch (rad) and yaw rate (rad/s). Returns True if just now it does not fit any more."""
+        """Take a window of `seconds` while riding. left, up: the normalised innovations of these forces. sideways:
+        force to the side over force up. pitch in rad, yaw_rate in rad/s. Returns True if just now it does not fit any
+        more."""
         gain, long_gain = min(1.0, seconds / SHORT_S), min(1.0, seconds / LONG_S)
         left, up = max(-MOST, min(MOST, left)), max(-MOST, min(MOST, up))
         self._left += gain * (left - self._left)
@@ -82,7 +84,7 @@ class Consistency:
         if self.doubts > MILD and self._since_s < AGAIN_S:
             if worst > FIT:
                 self._fits_s = 0.0
-        elif not worst <= (STRICT if self.doubts else 1.0):  # also not-a-number
+        elif not worst <= (STRICT if self.doubts else 1.0):
             self.fail("odd-left" if worst == left else "odd-up" if worst == up else "odd-pitch")
             return True
         elif self.doubt and worst > FIT:

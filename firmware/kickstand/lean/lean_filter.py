@@ -105,8 +105,8 @@ class LeanFilter:
             self._good, self._next_good = self._next_good, self._x[BIAS_LEFT:STATES]
 
     def _doubt(self):
-        """Restart, because the readings do not fit. The fault may be over, or a bias may have stepped: with the sensor's
-        errors as they were before, and with nothing known, in turns; again and again: with nothing known."""
+        """Restart, because the readings do not fit: with the sensor's errors as they were before, as the fault may be
+        over, and with nothing known, as a bias may have stepped, in turns. Again and again: with nothing known."""
         good = self.consistency.doubts in (1, 3)
         speed, variance, rest = self._x[SPEED], self._p.rows[SPEED][SPEED], self._rest
         self._forget()
@@ -191,6 +191,7 @@ class LeanFilter:
             self._start(means)
             return
         if not (abs(x[LEAN]) < 2 * pi and x[SPEED] < MAX_SPEED):  # also not-a-number
+            self.consistency.gap()
             self._forget()  # the sensor's errors may be no numbers either
             return
         if self._impossible(means, seconds):
@@ -214,8 +215,8 @@ class LeanFilter:
         self._work = self._process(means, seconds, roll_acceleration)
 
     def _impossible(self, means, seconds):
-        """True where the lean has been one that no bike has, and that the force does not show: for a bike that has fallen,
-        or a sensor in the hand, it does."""
+        """True where the lean has been one that no bike has, and that the force does not show. Of a bike that has
+        fallen and of a sensor in the hand it does."""
         lean = self._x[LEAN]
         apart = abs(lean - atan2(means[5], means[6]))
         if abs(lean) > measurements.IMPOSSIBLE_LEAN and pi / 4 < apart < 7 * pi / 4:

@@ -33,8 +33,8 @@ SIGMA_START = (
     0.014,  # ratio: forward axis' reading of a rate about up
     0.014,  # ratio: scale error of the forward axis
 )
-# Where the readings do not fit any more (consistency.py) the filter restarts, first with the sensor's errors as they were
-# REMEMBER_S to twice as long ago, and with the speed, then with nothing kept.
+# Where the readings do not fit any more (consistency.py) the filter restarts, first with the speed and with the
+# sensor's errors as they were REMEMBER_S to twice as long ago, then with nothing kept.
 REMEMBER_S = 10.0  # s. Larger: less of what came before the doubt is remembered, and it is older.
 SIGMA_GOOD_BIAS = radians(0.6)  # rad/s: of a bias that is remembered. Larger: one that has changed is found sooner.
 GOOD_SHARE = 0.7  # ratio: of SIGMA_START, for the other errors that are remembered. Larger: as above.
@@ -46,13 +46,12 @@ SIGMA_DOUBT_BIAS = radians(
 # astray restarts later.
 IMPOSSIBLE_LEAN = radians(80.0)
 IMPOSSIBLE_S = 1.0
-# m/s: a measured speed above is no standstill, for MOVING_S. Larger: slow riding on a smooth road is taken for rest.
-MOVING_SPEED = 2.0
+# A bike whose measured speed is above the first does not stand, for so many seconds.
+MOVING_SPEED = 2.0  # m/s. Larger: slow riding on a smooth road is taken for rest.
 MOVING_S = 2.5  # s. Larger: a stop is detected later.
-# m/s: riding, where a bike is in balance, and how well the speed has to be known for that. Larger, the first: a mount that
-# has slipped is seen at fewer speeds; the second: a bike that is pushed about is taken for one that rides.
-BALANCE_SPEED = 2.0
-SIGMA_BALANCE_SPEED = 12.0
+# A bike is in balance above this speed, if it is known so well.
+BALANCE_SPEED = 2.0  # m/s. Larger: a mount that has slipped is seen at fewer speeds.
+SIGMA_BALANCE_SPEED = 12.0  # m/s. Larger: a bike that is pushed about is taken for one that rides.
 MOST_FORWARD = (
     1.5  # ratio: force forward over force up of a bike. Larger: a board on a table is taken for one that is ill.
 )

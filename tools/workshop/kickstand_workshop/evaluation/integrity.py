@@ -8,6 +8,7 @@ than STANDS_S.
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from kickstand.lean.meter import FALLEN_DEG
@@ -33,7 +34,7 @@ GPS_LATE_S = 0.4
 PROFILES = "street", "track", "hills", "city", "sweeper"
 SIGMA_EDGES = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0])  # degrees, claimed
 # What is claimed of a lean; a display gives no sigma
-CLAIMS = [f"{low:g}-{high:g}" for low, high in zip(SIGMA_EDGES, SIGMA_EDGES[1:])] + ["display", "hidden"]
+CLAIMS = [f"{low:g}-{high:g}" for low, high in pairwise(SIGMA_EDGES)] + ["display", "hidden"]
 ERROR_EDGES = np.array([0.0, 1.0, 2.0, 3.0, 5.0, WRONG_DEG, 12.0, 20.0, 40.0, 180.0])  # degrees
 
 

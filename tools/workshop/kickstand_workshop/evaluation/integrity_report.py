@@ -5,6 +5,7 @@ The picture is the diagram that aviation calls after Stanford: error against wha
 
 import json
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +17,9 @@ from rich.table import Table
 from .integrity import CLAIMS, ERROR_EDGES, STANDS_S, WRONG_DEG, Outcome
 
 CAPTION = (
-    f"misleading: seconds a ride in which a lean over {WRONG_DEG:.0f} degrees wrong stood for over {STANDS_S:.0f} s, mean "
-    "and most; shown: share of the riding with a lean; hidden, named: seconds after the fault began, median, and in how "
-    "many of the rides; right again: 10 s after a fault that ends"
+    f"misleading: seconds a ride in which a lean over {WRONG_DEG:.0f} degrees wrong stood for over {STANDS_S:.0f} s, "
+    "mean and most; shown: share of the riding with a lean; hidden, named: seconds after the fault began, median, and "
+    "in how many of the rides; right again: 10 s after a fault that ends"
 )
 _UNKNOWN = "--"
 
@@ -118,7 +119,7 @@ def diagram_table(outcomes: list[Outcome]) -> Table:
     """The shares of good, hidden and misleading, with a fault and without."""
     made = Table(title="Error against claim, % of the riding", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     made.add_column("claimed sigma")
-    for low, high in zip(ERROR_EDGES, ERROR_EDGES[1:]):
+    for low, high in pairwise(ERROR_EDGES):
         made.add_column(f"{low:.0f}-{high:.0f}", justify="right")
     for faulty in (False, True):
         shares = diagram(outcomes, faulty)
@@ -163,7 +164,7 @@ def draw(path: Path, outcomes: list[Outcome]) -> None:
 
     figure = Figure(figsize=(13, 5), layout="constrained")
     axes = figure.subplots(1, 2, squeeze=False)[0]
-    errors = [f"{low:g}-{high:g}" for low, high in zip(ERROR_EDGES, ERROR_EDGES[1:])]
+    errors = [f"{low:g}-{high:g}" for low, high in pairwise(ERROR_EDGES)]
     wrong = int(np.searchsorted(ERROR_EDGES, WRONG_DEG))
     for axis, faulty in zip(axes, (False, True)):
         shares = 100.0 * diagram(outcomes, faulty)

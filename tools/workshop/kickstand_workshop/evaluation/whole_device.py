@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 LOOK_S = 0.1
 # What names a fault of the sensor; `Lean  --` and what is said of a speed source or a display do not
-NAMES = re.compile("Sensor|Gyro|Accel|No sensor|Mount", re.IGNORECASE)
+NAMES = re.compile("Sensor|Gyro|Accel|No sensor", re.IGNORECASE)
 STARTED_S = 2.0  # before, the display says what it is doing
 WRITING = 2  # looks at a display that is just being written, in a row
 
@@ -51,7 +51,7 @@ def display_of(
         lean = shown_lean(text)
         times.append(now_s)
         leans.append(np.nan if lean is None else lean)
-        if NAMES.match(text[0]) and now_s > STARTED_S:
+        if any(NAMES.match(line) for line in text) and now_s > STARTED_S:
             named.append(now_s)
 
     board.every(LOOK_S, look)
