@@ -10,12 +10,13 @@ from kickstand.lean.lean_filter import LeanFilter
 WINDOW_S = 0.2
 
 
-def windows(judge, seconds, left=0.0, up=0.0, sideways=0.0, pitch=0.0, yaw_rate=0.0):
-    """How many of the windows of so many seconds were said not to fit any more. Numbers, or functions of the window."""
+def windows(judge, seconds, left=0.0, up=0.0, sideways=0.0, pitch=0.0, yaw_rate=0.0, shaken=0.0):
+    """How many of the windows of so many seconds were said not to fit any more. shaken: added to both forces, and taken
+    off in every other window."""
     failed = 0
-    for k in range(int(seconds / WINDOW_S + 0.5)):
-        values = [value(k) if callable(value) else value for value in (left, up, sideways, pitch)]
-        failed += judge.add(*values, yaw_rate, WINDOW_S)
+    for _ in range(int(seconds / WINDOW_S + 0.5)):
+        failed += judge.add(left + shaken, up + shaken, sideways, pitch, yaw_rate, WINDOW_S)
+        shaken = -shaken
     return failed
 
 
@@ -26,13 +27,9 @@ def doubted(times=1):
     return judge
 
 
-def shaken(k):
-    return 3.0 if k % 2 else -3.0
-
-
 def test_vibration_is_no_reason_to_doubt():
     judge = Consistency()
-    assert windows(judge, 60.0, left=shaken, up=shaken) == 0
+    assert windows(judge, 60.0, shaken=3.0) == 0
     assert not judge.doubt
 
 

@@ -212,7 +212,7 @@ class Ill:
     def saturated(self) -> NDArray[np.bool_]:
         """(n) True where an axis is at the end of its range: the driver takes such a reading as lost."""
         force, rate = np.abs(self.readings[:, :3]), np.abs(self.readings[:, 4:])
-        return (force >= ACCEL_RANGE_G).any(axis=1) | (rate >= GYRO_RANGE_DPS).any(axis=1)
+        return np.any(np.hstack((force >= ACCEL_RANGE_G, rate >= GYRO_RANGE_DPS)), axis=1)
 
 
 def apply(fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: int, vehicle_from_sensor: Array) -> Ill:

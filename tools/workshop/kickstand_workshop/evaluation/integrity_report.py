@@ -166,6 +166,7 @@ def draw(path: Path, outcomes: list[Outcome]) -> None:
     axes = figure.subplots(1, 2, squeeze=False)[0]
     errors = [f"{low:g}-{high:g}" for low, high in pairwise(ERROR_EDGES)]
     wrong = int(np.searchsorted(ERROR_EDGES, WRONG_DEG))
+    image = None
     for axis, faulty in zip(axes, (False, True)):
         shares = 100.0 * diagram(outcomes, faulty)
         image = axis.pcolormesh(np.where(shares > 0.0, shares, np.nan), norm=LogNorm(1e-3, 100.0), cmap="Blues")

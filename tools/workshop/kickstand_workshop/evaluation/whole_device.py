@@ -15,6 +15,8 @@ from kickstand_tools.simulated_board.lcd import shown_lean
 from kickstand_tools.simulated_board.simulator import Board
 from numpy.typing import NDArray
 
+from .faults import ACCEL_RANGE_G
+
 LOOK_S = 0.1
 # What names a fault of the sensor; `Lean  --` and what is said of a speed source or a display do not
 NAMES = re.compile("Sensor|Gyro|Accel|No sensor", re.IGNORECASE)
@@ -64,7 +66,7 @@ def display_of(
 
                 load = settings.load
                 settings.load = lambda: settings.Settings(type("Config", (), config))
-                Store(board.sensor.who_am_i, settings.load().ACCEL_RANGE_G, os.curdir).save(calibration.to_firmware())
+                Store(board.sensor.who_am_i, int(ACCEL_RANGE_G), os.curdir).save(calibration.to_firmware())
                 try:
                     board.run(start.main, (last + 1) / rate_hz)
                 finally:
