@@ -25,7 +25,7 @@ from .ui.screen import Screen
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
 COLLECT_TURNS = 42  # turns between two garbage collections: they use 90 KB of heap, of 120 free while recording
-COLLECT_TURNS_DRIVING = 25  # the same while aligning by driving, with an OLED, a phone or user.py: 85 KB are free
+COLLECT_TURNS_DRIVING = 23  # the same while aligning by driving, with an OLED, a phone or user.py: 80 KB are free
 SINGLE_GAPS = 300  # single free heap blocks that a collection leaves
 PAGE_MS = 100
 # A page shows no lean if its own delay and the age of the readings still in the FIFO add up to more: so a lean on the
@@ -101,7 +101,8 @@ class App:
             self._loop()
         except BaseException as error:
             if isinstance(error, KeyboardInterrupt):
-                port.rest_watchdog()  # not fed from here on; comes first, because a second Ctrl-C may interrupt the rest
+                # It is not fed from here on. This comes first, because a second Ctrl-C may interrupt the rest.
+                port.rest_watchdog()
             self.lcd.end(*STOPPED)
             global worst
             chip = self.sensor.chip
@@ -208,10 +209,10 @@ class App:
         if self.screen.menu:  # a recording that is started there should begin at once
             self.rides.prepare()
         problem = self.rides.recorder.take_problem() or (self.drive and self.drive.speed.take_problem())
-        ill = self.sensor.chip.axes.take_notice()
-        if ill:
-            report(ill)
-            problem = problem or ill
+        axes = self.sensor.chip.axes
+        if axes.notice:
+            report(axes.notice)
+            problem, axes.notice = problem or axes.notice, None
         if self.user:
             self.user.lean(self.settings.leans and self.sensor.fault is None and self.screen.pages.trusted)
             problem = problem or self.user.take_problem()

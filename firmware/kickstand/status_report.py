@@ -5,9 +5,11 @@ import os
 import sys
 from time import sleep_ms, ticks_diff, ticks_ms
 
+from .board.display import LCD_HZ
 from .calibration.store import Store
 from .console import sentence
-from .devices import open_button, open_lcd, open_sensor
+from .devices import open_bus, open_button, open_lcd, open_sensor
+from .diagnosis import MOTION_ADDRESSES, bus_line, fifo_fault, scan, show_wirings
 from .errors import SettingsError
 from .imu.mpu6050 import UnknownChip
 from .settings import load
@@ -17,6 +19,8 @@ from .units import __version__
 LISTEN_MS = 3500
 # What did not fit, by the code of lean/consistency.py
 MEASURED = {"odd-left": "force to the left", "odd-up": "force up", "odd-pitch": "pitch"}
+WIRINGS = 4  # of LCD_WIRING
+WIRING_MS = 4000  # for each of them
 WATCH_MS = 1400  # for setting the sensor up and two looks at its axes
 _TRIAL = "trial.tmp"  # a file that is written to measure the flash, then removed
 
@@ -25,8 +29,8 @@ def _print(label, words, *values):
     print("%-13s" % label + words % values)
 
 
-def report():
-    """Print the whole report. Opens sensor and display itself: the app must not be running."""
+def report(wirings=False):
+    """Print the whole report. Opens sensor and display itself: the app must not be running. wirings: see status()."""
     release = ".".join(str(n) for n in sys.implementation.version[:3])
     machine_name = getattr(sys.implementation, "_machine", sys.platform)
     print("Kickstand %s on %s, MicroPython %s" % (__version__, machine_name, release))
@@ -38,7 +42,9 @@ def report():
         who_am_i = _sensor(sensor, settings)
         if who_am_i:
             _axes(sensor)
-        _display(open_lcd(settings))
+        _display(open_lcd(settings), settings)
+        if wirings:
+            show_wirings(lambda number: open_lcd(settings, number), WIRINGS, WIRING_MS)
         pressed = "pressed" if open_button(settings).held() else "not pressed"
         _print("Button", "GPIO %d, %s", settings.BUTTON_PIN, pressed)
         _speed(settings)
@@ -66,24 +72,28 @@ def _write_ms():
 
 
 def _sensor(sensor, settings):
-    """Print which sensor answers; return its WHO_AM_I, or 0 if none does."""
+    """Print which sensor answers and who else is on its bus; return its WHO_AM_I, or 0 if none does."""
     chip = sensor.chip
+    fault = None
     try:
         sensor.set_up()
         chip.read()
-    except UnknownChip as error:
-        words = "unknown chip, WHO_AM_I %s: set ACCEPT_WHO_AM_I in config.py to try it"
-        _print("Sensor", words, hex(error.args[0]))
-        return 0
-    except OSError as error:
-        words = "none answers on SDA %d, SCL %d: check the wiring (%s)"
-        _print("Sensor", words, settings.SENSOR_SDA, settings.SENSOR_SCL, error)
-        return 0
-    ranges = settings.ACCEL_RANGE_G, settings.GYRO_RANGE_DPS
-    temperature_c = chip.temperature_c(chip.counts[3])
-    _print("Sensor", "%s (%s), +-%d g, +-%d deg/s, %.1f C", chip.name, hex(chip.who_am_i), *ranges, temperature_c)
-    _print("Reading", "%.3f %.3f %.3f g", *[chip.counts[i] / chip.accel_lsb_per_g for i in range(3)])
-    return chip.who_am_i
+        who_am_i = chip.who_am_i
+        ranges = settings.ACCEL_RANGE_G, settings.GYRO_RANGE_DPS
+        temperature_c = chip.temperature_c(chip.counts[3])
+        _print("Sensor", "%s (%s), +-%d g, +-%d deg/s, %.1f C", chip.name, hex(who_am_i), *ranges, temperature_c)
+        if chip.address != settings.SENSOR_ADDRESS:
+            words = "it answers at %s and is used; SENSOR_ADDRESS = %s in config.py looks there first"
+            _print("", words, hex(chip.address), hex(chip.address))
+        _print("Reading", "%.3f %.3f %.3f g", *[chip.counts[i] / chip.accel_lsb_per_g for i in range(3)])
+        fault = fifo_fault(chip)
+    except (UnknownChip, OSError) as error:
+        who_am_i = 0
+        fault, _ = sensor.explain(chip, error)
+    if fault:
+        _print("Sensor", "%s", sentence(fault))
+    _bus("Sensor", settings, "SENSOR", MOTION_ADDRESSES)
+    return who_am_i
 
 
 def _axes(sensor):
@@ -94,13 +104,25 @@ def _axes(sensor):
     _print("Axes", "%s", ", ".join(messages.lines(sensor.fault)) if sensor.fault else "all six measure")
 
 
-def _display(lcd):
+def _bus(label, settings, name, addresses):
+    """Print who answers on a bus, or what is wrong with its wires; return that, a Notice or None."""
+    sda, scl = getattr(settings, name + "_SDA"), getattr(settings, name + "_SCL")
+    hz = getattr(settings, name + "_BUS_HZ") or LCD_HZ
+    notice, devices = scan(sda, scl, lambda: open_bus(settings, name, hz), addresses)
+    print(bus_line(label, sda, scl, devices))
+    return notice
+
+
+def _display(lcd, settings):
     lcd.show("Kickstand", "status: console")
     lcd.flush()
     if lcd.address:
         _print("Display", "%s at %s", "OLED" if lcd.draws else "LCD", hex(lcd.address))
-    else:
-        _print("Display", "none answers: check wiring and LCD_ADDRESSES")
+    if not (lcd.address and settings.one_bus):
+        notice = _bus("Display", settings, "LCD", settings.LCD_ADDRESSES)
+        if not lcd.address:
+            words = sentence(notice) if notice else "none answers: check wiring and LCD_ADDRESSES"
+            _print("Display", "%s", words)
 
 
 def _speed(settings):

@@ -28,8 +28,9 @@ MAX_TRIM_DEG = 3.6  # the limit in lean/upright_trim.py plus a margin for roundi
 class Store:
     """Calibration records of one chip.
 
-    who_am_i, accel_range_g: those of the chip in use; records of another chip are not valid, those of another range are:
-    offset and slope hardly depend on it.  directory: that of the files, "" for the current one.  message: after load(), in a few words, which record is in use or why none is.
+    who_am_i, accel_range_g: those of the chip in use; records of another chip are not valid. Those of another range are
+    valid, because offset and slope hardly depend on it.  directory: that of the files, "" for the current one.
+    message: after load(), in a few words, which record is in use or why none is.
     """
 
     def __init__(self, who_am_i, accel_range_g, directory=""):

@@ -88,6 +88,8 @@ class BackgroundAlignment:
         if self._look_ms is None or ticks_diff(now_ms, self._look_ms) >= 0:
             self._look_ms = ticks_add(now_ms, LOOK_MS)
             self.fresh_speed(now_ms)
+            if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > LOOK_MS:
+                self._begin_again()  # now: after 6 days without a reading ticks_diff() is negative
             self._look(now_ms)
         return speed
 
@@ -117,7 +119,8 @@ class BackgroundAlignment:
     def feed(self, sums, n, dt_us, now_ms):
         """Take the n samples of a pass of the loop. sums: 7, their sums in counts, in the chip's order. dt_us: the time
         that they cover. Call it once in each pass that has samples."""
-        self._notice_gap(now_ms)
+        if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > GAP_MS:
+            self._begin_again()
         self._fed_ms = now_ms
         total = self._total
         for i in range(7):
@@ -131,11 +134,11 @@ class BackgroundAlignment:
             self.drive.update(self._force, self._rate, self._us)
             self._clear_sums()
 
-    def _notice_gap(self, now_ms):
-        if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > GAP_MS:
-            self._fed_ms = None
-            self._clear_sums()
-            self.drive.interrupt()
+    def _begin_again(self):
+        """Drop the sums, because readings are missing."""
+        self._fed_ms = None
+        self._clear_sums()
+        self.drive.interrupt()
 
     def _look(self, now_ms):
         """Act on the drive's result, but only while speed and sensor say that the vehicle stands. Called once a

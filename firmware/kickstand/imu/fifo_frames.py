@@ -1,16 +1,16 @@
-"""Decodes frames of the chip's FIFO, sums them up, and judges each axis by its counts.
+"""Decodes frames of the chip's FIFO, sums them up, and watches the counts of each axis.
 
 A frame is one sample: 14 bytes, seven big-endian int16 in the order ax ay az temperature gx gy gz (register map
 RM-MPU-6000A rev 4.2, pp. 29 to 31). On the board decode() and add_up() are the machine code of fifo_frames_viper.py;
 elsewhere they are decode_python() and add_up_python(), which give the same results.
 """
 
+import gc
 from array import array
 
 from micropython import const
 
-from ..errors import NO_MACHINE_CODE, Notice, checked
-from ..units import AXES
+from ..errors import NO_MACHINE_CODE, Notice, checked, tried
 
 FRAME = const(14)  # bytes
 SATURATED = const(32700)  # |counts|: from here on a reading is at the end of its range
@@ -44,21 +44,11 @@ _HIGH_BYTE = const(0x10000)  # in _SEEN: the high byte has changed
 _WRAPPED = const(0x20000)  # in _SEEN: the counts jumped by _JUMP or more, but the high byte stayed
 _JUMP = const(192)
 
-# Looks in which an axis must be quiet to be ill, by dlpf 1 to 6, for the gyro in rows from 250 deg/s up. With the noise
-# of the quietest chip (accelerometer 100 ug/sqrt(Hz), at 16 g; gyro 0.004 deg/s/sqrt(Hz)) a working axis at rest is
-# that quiet once in 1e12 looks. 0: its noise is so much less than a count that nobody can tell.
-_ACCEL_LOOKS = b"\x01\x01\x01\x04\x0f\x50"
-_GYRO_LOOKS = b"\x01\x01\x01\x03\x05\x0b\x01\x01\x01\x03\x09\x25\x01\x01\x02\x0a\x3e\x00\x01\x02\x0e\x00\x00\x00"
-_COLUMNS = (0, 1, 2, 4, 5, 6)  # of the axes
-_WRAP_LOOKS = const(2)  # looks in which a stuck high byte must show
-_WELL_LOOKS = const(2)  # successive looks without a fault that end one
-_CLIP_LOOKS = const(2)  # successive looks with half of the samples at the end of the range that are a fault,
-_RAIL_LOOKS = const(5)  # and with all of them: not the vibration, but the axis
 # Half of 8 g and of 16 g. The low-pass hides most of a vibration: where so much is left, it was cut off before, and the
 # mean of what was cut off unevenly is wrong. A range below 8 g has no such limit, because bends reach half of it.
 _HARD_COUNTS = const(16384)
-_SETUP_LOOKS = const(25)  # looks from one set-up of a chip with an ill axis to the next
-_QUIET_LOOKS = const(150)  # looks until the same notice is shown again
+_COLUMNS = (0, 1, 2, 4, 5, 6)  # of the axes
+_ALL_DIFFER = const(0x77)
 
 
 def decode_python(frames, at, counts):
@@ -141,16 +131,15 @@ def _int16(frames, at):
 
 
 class AxisWatch:
-    """Judges each axis. A working one is never quiet: its noise changes the counts (product specification PS-MPU-6000A
-    rev 3.4, sections 6.1 and 6.2). So an axis is ill if its counts have only two values or keep their lowest bit (it is
-    dead, or its low byte is stuck), if they jump through 256 counts while their high byte stays (which is stuck), or if
-    they equal those of another axis.
+    """Looks at each axis. A working one is never quiet: its noise changes the counts (product specification
+    PS-MPU-6000A rev 3.4, sections 6.1 and 6.2). What is not well is judged by axis_judge.py, imported only then.
 
     rate_hz: samples a second. accel_range, gyro_range: 0 (2 g, 250 deg/s) to 3 (16 g, 2000 deg/s). dlpf: see Mpu6050.
     repeats: repetitions of a frame that make it dead.
 
     notes: what add_up() notes. fault: None, or a Notice: an axis is ill, or half of the samples are at the end of the
-    range. clipped: samples that were left out since power-on, because an axis was at its end.
+    range. notice: None, or a Notice that is to be shown for a moment; who shows it sets it to None. clipped: samples
+    that were left out since power-on, because an axis was at its end. looks: number of looks.
     """
 
     def __init__(self, rate_hz, accel_range, gyro_range, dlpf, repeats):
@@ -158,28 +147,19 @@ class AxisWatch:
         self.notes[_LIMIT] = repeats
         self.notes[_HARD] = _HARD_COUNTS if accel_range > 1 else 32769
         self.notes[DUE] = self._look = rate_hz * LOOK_MS // 1000
-        self._limits = _ACCEL_LOOKS[dlpf - 1], _GYRO_LOOKS[6 * gyro_range + dlpf - 1]
-        # For each column: successive looks in which it was quiet; looks in which it wrapped since its high byte changed
-        self._quiet, self._wrapped = bytearray(7), bytearray(7)
-        self._clips = self._well = self._ill = 0  # successive looks: clipped; without a fault; with an ill axis
-        self._looks = 0
-        self._noticed = {}  # number of the look at which a code was last shown
-        self._shown = self.fault = None  # _shown: the Notice that is still to be shown
-        self.clipped = 0
+        self._settings = gyro_range, dlpf
+        self._judge = self.fault = self.notice = None
+        self.clipped = self.looks = 0
 
     def restart(self):
         """Forget the samples since the last look, because the chip was set up."""
         notes = self.notes
-        notes[_REPEATS] = notes[_ROW] = notes[_ENDS] = notes[_CLIPPED] = notes[_GYRO_CLIPPED] = notes[_DIFFER] = 0
-        notes[_SHAKEN] = 0
-        for i in range(7):
-            notes[_SEEN + i] = 0
+        for i in range(_ROW, DUE):
+            notes[i] = 0
+        for i in range(_SEEN, _SEEN + 7):
+            notes[i] = 0
+        notes[_REPEATS] = notes[_SHAKEN] = 0
         notes[DUE] = self._look
-
-    def take_notice(self):
-        """Return a Notice that is to be shown for a moment, or None, and clear it."""
-        notice, self._shown = self._shown, None
-        return notice
 
     def clips(self):
         """A Notice if the last samples, those of 0.1 s or more, were all at the end of the range; else None."""
@@ -190,82 +170,43 @@ class AxisWatch:
 
     def shaken(self):
         """Since power-on: the largest |counts| of the accelerometer's axes (3), and the share of lost samples."""
-        return self.notes[_PEAK : _PEAK + 3], self.clipped / max(1, self._looks * self._look)
+        return self.notes[_PEAK : _PEAK + 3], self.clipped / max(1, self.looks * self._look)
 
     def look(self):
         """Judge the samples since the last look. To be called when notes[DUE] is 0 or less. Returns True if the chip
         should be set up, which may cure an axis: when it fell ill, and now and then."""
-        notes = self.notes
-        samples = self._look - notes[DUE]
-        notes[DUE] = self._look
-        self._looks += 1
-        lost, gyro = notes[_CLIPPED], notes[_GYRO_CLIPPED]
-        self.clipped += lost
-        enough = 2 * lost < samples  # good ones to judge by
-        shaken = 10 * notes[_SHAKEN] >= samples
-        if shaken or not enough:
-            self._clips += 1
-        elif 4 * lost < samples:
-            self._clips = 0
-        fault = self._ill_axes()
-        if not enough:
-            fault = _ill(notes[_ENDS]) if lost == samples and self._clips >= _RAIL_LOOKS else None
-        self._ill = self._ill + 1 if fault else 0
-        if not fault and (shaken or 10 * lost >= samples):
-            clips = Notice("clips", "Gyro" if lost and 2 * gyro >= lost else "Accel")
-            self._notice(clips)
-            if self._clips >= _CLIP_LOOKS:
-                fault = clips
-        notes[_ENDS] = notes[_CLIPPED] = notes[_GYRO_CLIPPED] = notes[_DIFFER] = notes[_SHAKEN] = 0
-        if fault:
-            self._well = 0
-            self.fault = fault
-            self._notice(fault)
-        elif self.fault and enough:
-            self._well += 1
-            if self._well >= _WELL_LOOKS:
+        samples = self._look - self.notes[DUE]
+        self.notes[DUE] = self._look
+        self.looks += 1
+        if self._judge is None:
+            if self._well():
                 self.fault = None
-        return self._ill % _SETUP_LOOKS == 1
+                return False
+            self.fault = tried(self._load)
+            if self.fault:  # no memory, or the firmware is incomplete
+                return False
+        return self._judge.look(self, samples)
 
-    def _ill_axes(self):
-        """A Notice for axes that are ill, or None."""
-        notes, quiet, wrapped = self.notes, self._quiet, self._wrapped
-        dead = equal = 0
+    def _well(self):
+        """True if all axes are certainly well; then the next look begins."""
+        notes = self.notes
+        if notes[_DIFFER] & _ALL_DIFFER != _ALL_DIFFER or notes[_CLIPPED] or notes[_SHAKEN]:
+            return False
         for i in _COLUMNS:
-            limit = self._limits[i > 3]
-            if limit == 1 and not notes[_DIFFER] >> i & 1:
-                equal |= 1 << i | 1 << (i - 1 if i & 3 else i + 2)
             seen = notes[_SEEN + i]
-            values = seen & 0xFFFF
-            more = values & (values - 1)  # without its lowest 1: 0 if there was one value
-            if not (more & (more - 1) and values & 0x5555 and values & 0xAAAA):
-                if quiet[i] < 255:
-                    quiet[i] += 1
-                if quiet[i] < limit or not limit:
-                    continue  # the values of several looks are put together
-                dead |= 1 << i
-            else:
-                quiet[i] = 0
-                if seen & _HIGH_BYTE:
-                    wrapped[i] = 0
-                elif seen & _WRAPPED and wrapped[i] < _WRAP_LOOKS:
-                    wrapped[i] += 1
-                if wrapped[i] == _WRAP_LOOKS:
-                    dead |= 1 << i
+            more = seen & (seen - 1) & 0xFFFF  # without its lowest 1: 0 if there was one value
+            if not (more & (more - 1) and seen & 0x5555 and seen & 0xAAAA and (seen & _HIGH_BYTE or seen < _WRAPPED)):
+                return False
+        for i in _COLUMNS:
             notes[_SEEN + i] = 0
-        return _ill(dead) if dead else _ill(equal, "equal") if equal else None
+        notes[_DIFFER] = 0
+        return True
 
-    def _notice(self, notice):
-        if self._looks - self._noticed.get(notice.code, -_QUIET_LOOKS) >= _QUIET_LOOKS:
-            self._noticed[notice.code] = self._looks
-            self._shown = notice
+    def _load(self):
+        gc.collect()  # or lasting objects would lie behind garbage
+        from .axis_judge import AxisJudge
 
-
-def _ill(axes, how=None):
-    """The Notice for these axes, a bit for each column: of the gyro, or if none of its is ill of the accelerometer."""
-    gyro = axes >> 4
-    names = "".join([AXES[i] for i in range(3) if (gyro or axes) >> i & 1])
-    return Notice("axis-ill", "Gyro" if gyro else "Accel", names, how or ("dead" if gyro else "stuck"))
+        self._judge = AxisJudge(*self._settings)
 
 
 try:

@@ -11,21 +11,33 @@ RETRY_MS = 50  # time between two attempts to set the chip up
 FAILURES = 3  # so many failed transfers in a row are a fault; a NACK or two are tolerated
 SILENT_MS = 100  # this long without a sample is a fault
 STALE_MS = 500  # and this long if all samples were lost in overflows, because the board had no time to read
+SETTLED_MS = 1000  # a fault sooner after a set-up than this has outlasted the set-up
+FRUITLESS = 3  # after so many of those in a row the FIFO is tried out
+# Of set-ups in a row that fail: the first one that is explained, and each so many later, about once a second
+EXPLAINED, EXPLAINED_EVERY = 3, 20
 CORRECTION_SHIFT = 4  # SampleClock.emptied() corrects by 1/16 of the difference between the two clocks
 
 
 class Sensor:
     """Samples of one chip that may fail at any time. A transfer that fails, by NACK or time-out, ends in _missed().
 
-    chip: an Mpu6050.  reopen: called to free the bus, returns it as a machine.I2C.
+    chip: an Mpu6050.  reopen: called to free the bus, returns it as a machine.I2C.  explain(chip, error): returns a
+    Notice, why the chip could not be set up, and the addresses that answer; for error None whether its FIFO works, a
+    Notice or None. None: no such function.
+    found: the addresses on the bus when it was last explained, a list.
     fault: None, or a Notice: what is wrong.  restarts: number of times that the chip was set up, that no sample could
     be read for STALE_MS, or that an axis was ill. After each, samples do not follow on from those before.  clipped:
     samples that fetch() has left out, because an axis was at the end of its range; the caller sets it to 0.
     """
 
-    def __init__(self, chip, reopen):
+    def __init__(self, chip, reopen, explain=None):
         self.chip = chip
         self.reopen = reopen
+        self.explain = explain
+        self.found = []
+        self._refused = 0  # set-ups that failed in a row
+        self._fruitless = 0  # set-ups in a row that a fault followed within SETTLED_MS
+        self._started_ms = 0
         self._failures = 0  # transfers that failed in a row
         self._overflows = 0  # the chip's overflows that have been dealt with
         self._due_ms = ticks_ms()  # when the next step of setting the chip up is due
@@ -84,7 +96,7 @@ class Sensor:
             clipped = axes.notes[LOST]
             self.clipped += clipped
             if good + clipped < waiting:
-                self._fail("sensor-frozen", now_ms)
+                self._fail_again("sensor-frozen", now_ms)
                 return good
             if not good:
                 self.fault = axes.clips() or self.fault
@@ -111,15 +123,28 @@ class Sensor:
             # now_ms may be from before the long pause that led to the overflow
             self._sample_ms = self._emptied_ms = ticks_ms()
             if ticks_diff(self._emptied_ms, self._read_ms) > STALE_MS:
-                self.fault = Notice("readings-lost")
+                self.fault = self._fifo_fault() or Notice("readings-lost")
                 self.restarts += 1
         elif ticks_diff(now_ms, self._sample_ms) > SILENT_MS:
-            self._fail("sensor-silent", now_ms)
+            self._fail_again("sensor-silent", now_ms)
+
+    def _fail_again(self, code, now_ms):
+        """Fail, and name the FIFO if set-ups do not help because that is broken."""
+        self._fruitless = self._fruitless + 1 if ticks_diff(now_ms, self._started_ms) < SETTLED_MS else 1
+        fifo_fault = self._fifo_fault() if self._fruitless >= FRUITLESS else None
+        self._fail(code, now_ms)
+        if fifo_fault:
+            self.fault = fifo_fault
+
+    def _fifo_fault(self):
+        return self.explain(self.chip, None)[0] if self.explain else None
 
     def check(self, now_ms):
         """Make sure that the chip is still configured: a supply dip during a transfer leaves a sample that is half
-        garbage. Call it before readings are shown; it takes 0.6 ms. Raises nothing. now_ms: ticks_ms()."""
-        if not self._running:
+        garbage. Call it before readings are shown; it takes 0.6 ms. Raises nothing. now_ms: ticks_ms().
+
+        After a transfer that failed nothing is judged: restarting the FIFO may have failed half way."""
+        if not self._running or self._failures:
             return
         try:
             if not self.chip.configured():  # a supply dip: the chip has reset itself
@@ -157,10 +182,15 @@ class Sensor:
         self._due_ms = ticks_add(now_ms, wait_ms)
 
     def _not_set_up(self, error):
-        """Set the fault after an attempt to set the chip up failed; the next attempt begins with the bus."""
+        """Set the fault once attempts to set the chip up have failed; the next attempt begins with the bus."""
         self._ready = False
         self._steps = None
-        self.fault = Notice("unknown-chip", error.args[0]) if isinstance(error, UnknownChip) else Notice("no-sensor")
+        self._refused += 1
+        if not self.explain:
+            unknown = isinstance(error, UnknownChip)
+            self.fault = Notice("unknown-chip", error.args[0]) if unknown else Notice("no-sensor")
+        elif self._refused % EXPLAINED_EVERY == EXPLAINED:
+            self.fault, self.found = self.explain(self.chip, error)
 
     def _start(self, now_ms):
         """Start the FIFO of the chip, which is set up."""
@@ -170,6 +200,8 @@ class Sensor:
             self._not_set_up(error)
             return
         self._running = True  # but the fault stays until there is a good sample
+        self._refused = 0
+        self._started_ms = now_ms
         self.restarts += 1
         self._failures = 0
         self._sample_ms = now_ms

@@ -18,6 +18,7 @@ MAX_SENTENCE = 100  # bytes: the standard says 82, but receivers with many decim
 MAX_CHUNK = 64  # bytes read in one pass of the loop: at 10 ms a pass, twice what 10 fixes a second need
 SILENT_MS = 3000  # after so long without a byte, a whole sentence or a fix, fault() reports which
 LATE_MS = 2000  # a fix that waited in the receiver for longer is dropped
+LOOK_MS = 1500  # after so long without a speed's sentence other kinds are looked at
 CARRY_MS = 60_000  # a time that is longer ago is kept as so long ago: after 6 days ticks_diff() is negative
 TIME_JUMP_MS = 5000  # a larger difference is not a delay: the receiver has corrected its clock
 # The delay of a fix is counted from a fix that was not late, the reference. When at least so many fixes over more than
@@ -26,6 +27,10 @@ MIN_FIXES_FOR_NEW_REFERENCE = 4
 KNOT_MPS = 1852.0 / 3600.0  # one knot in m/s
 KMH_MPS = 1.0 / 3.6  # one km/h in m/s
 _DAY_MS = 86_401_000  # a day with a leap second
+_YEARS = (25, 79)  # since 2000: before the first a receiver has lost count of the weeks, or not heard the date yet
+_POSITIONS = (b"GGA", b"GLL", b"GNS")  # of the kinds without a speed these are named first
+_UBX = b"\xb5b"  # begins a message of u-blox's binary protocol: class, number and length of two bytes follow
+_UBX_CLASSES = b"\x01\x02\x05\x06\x0a\x0b\x0d\x10\x13\x21\x27\x28"
 _DIGITS = 5  # decimals of a minute of arc: 2 cm
 
 
@@ -42,6 +47,7 @@ class Gps:
         self._heard_ms = None
         self._sentence_ms = self._fix_ms = self._carried_ms = 0
         self._rmc_ms = None
+        self._other = b""  # a kind of sentence or message that it sends and that has no speed
         self._time = b""  # time of day in the last RMC
         # A fix is remembered as (ticks_ms() when it came, its time of day in ms).
         self._reference = None  # the fix that delays are counted from
@@ -68,6 +74,9 @@ class Gps:
             self._begin(now_ms)
         self._heard_ms = now_ms
         chunk = self._uart.read(min(waiting, MAX_CHUNK)) or b""
+        looks = ticks_diff(now_ms, self._sentence_ms) > LOOK_MS
+        if looks and _has_ubx(self._line + chunk):
+            self._other = self._other or b"UBX"
         speed = None
         end = chunk.find(b"\n")
         while end >= 0:
@@ -87,6 +96,7 @@ class Gps:
         """Restart the time-outs."""
         self._heard_ms = self._sentence_ms = self._fix_ms = self._carried_ms = now_ms
         self._fix = None
+        self._other = b""
 
     def _carry(self, now_ms):
         """Carry the times on that are longer ago than CARRY_MS."""
@@ -126,7 +136,7 @@ class Gps:
         if ticks_diff(now_ms, self._heard_ms) > SILENT_MS:
             return Notice("gps-silent")
         if ticks_diff(now_ms, self._sentence_ms) > SILENT_MS:
-            return Notice("gps-garbled")
+            return Notice("gps-other", self._other.decode()) if self._other else Notice("gps-garbled")
         if ticks_diff(now_ms, self._fix_ms) > SILENT_MS:
             return Notice("gps-no-fix")
         return None
@@ -136,6 +146,8 @@ class Gps:
         start = line.rfind(b"$")  # there may be noise in front of it
         kind = line[start + 3 : start + 6]
         if start < 0 or kind not in (b"RMC", b"VTG"):
+            if start >= 0 and ticks_diff(now_ms, self._sentence_ms) > LOOK_MS:
+                self._look_at(line[start:])
             return None
         star = line.rfind(b"*")
         try:
@@ -146,9 +158,24 @@ class Gps:
         except (ValueError, IndexError, OverflowError):  # OverflowError: a number such as 1e999
             return None
         self._sentence_ms = now_ms
+        self._other = b""
         if speed is not None:
             self._fix_ms = now_ms
         return speed
+
+    def _look_at(self, line):
+        """Remember the kind of a whole sentence without a speed."""
+        star = line.rfind(b"*")
+        try:
+            if star < 6 or _checksum(line, 1, star) != int(line[star + 1 : star + 3], 16):
+                return
+            name = line[1 : line.find(b",")]
+            kind = name if name[:1] == b"P" else name[2:]  # P: a maker's own, such as PUBX
+            kind.decode()
+        except ValueError:
+            return
+        if kind and len(kind) <= 5 and self._other not in _POSITIONS:
+            self._other = kind
 
     def _rmc(self, fields, now_ms):
         """The speed in the fields of $--RMC,time,A or V,lat,N,lon,E,knots,course,date,variation,E[,mode[,...]]"""
@@ -226,12 +253,22 @@ def _minutes(field, degrees, negative):
 
 
 def _date(field):
-    """The date ddmmyy in the form of place(), 0 if it is invalid."""
+    """The date ddmmyy in the form of place(), 0 if there is no such day, or it cannot be today's."""
     try:
         date = int(field)
     except ValueError:
         return 0
-    return (date % 100 << 9 | date // 100 % 100 << 5 | date // 10_000) & 0xFFFF
+    year, month, day = date % 100, date // 100 % 100, date // 10_000
+    if not (_YEARS[0] <= year <= _YEARS[1] and 1 <= month <= 12 and day >= 1):
+        return 0
+    days = 30 + (month + month // 8) % 2 if month != 2 else 28 if year % 4 else 29
+    return year << 9 | month << 5 | day if day <= days else 0
+
+
+def _has_ubx(data):
+    """True if a message of u-blox's binary protocol begins in these bytes."""
+    at = data.find(_UBX)
+    return 0 <= at <= len(data) - 6 and data[at + 2] in _UBX_CLASSES and data[at + 5] < 4
 
 
 def _checksum(line, start, end):

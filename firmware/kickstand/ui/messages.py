@@ -33,6 +33,16 @@ no-memory|No memory for it|restart it
 starting|Kickstand|starting
 no-sensor|No sensor|check wiring
 unknown-chip|Unknown sensor|WHO_AM_I 0x{0:02x}
+no-chip|No MPU6050: 0x{1:02x}|answers 0x{0:02x}
+not-kept|Sensor keeps no|settings: broken
+bus-errors|Sensor answers,|wires are bad
+other-chip|{0}|not supported
+other-device|No sensor, but a|{0} 0x{1:02x}
+exchanged|SDA and SCL are|exchanged
+wire-low|{0} stays low|check wiring
+no-pull-ups|No sensor: wires|open, no pull-up
+no-pull-up|No sensor: open|{0}, no pull-up
+sensor-fifo|Sensor: its FIFO|{0}
 sensor-lost|Sensor lost|check wiring
 sensor-frozen|Sensor frozen|starting again
 sensor-silent|Sensor silent|starting again
@@ -48,6 +58,7 @@ live-memory|No Bluetooth:|no memory
 
 gps-silent|GPS silent|check wiring
 gps-garbled|GPS garbled|check GPS_BAUD
+gps-other|GPS sends {0}|no RMC or VTG
 gps-no-fix|GPS: no fix|needs open sky
 no-pulse|Wheel: no pulse|ride, or wiring?
 wheel-storm|Wheel: noise|check wiring
