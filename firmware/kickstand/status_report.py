@@ -17,6 +17,8 @@ from .ui import messages
 from .units import __version__
 
 LISTEN_MS = 3500
+# What did not fit, by the code of lean/consistency.py
+MEASURED = {"odd-left": "force to the left", "odd-up": "force up", "odd-pitch": "pitch"}
 WIRINGS = 4  # of LCD_WIRING
 WIRING_MS = 4000  # for each of them
 WATCH_MS = 1400  # for setting the sensor up and two looks at its axes
@@ -149,6 +151,10 @@ def _speed(settings):
 
 def _worst(chip):
     """Print what the app has noted, if it has run since the board was started. chip: an Mpu6050."""
+    judge = sys.modules.get("kickstand.lean.consistency")
+    if judge and judge.last_odd:
+        words = "the readings did not fit, again and again: %s. Sensor, alignment or mount: align again"
+        _print("Sensor odd", words, MEASURED[judge.last_odd])
     app = sys.modules.get("kickstand.app")
     if app and app.worst:
         longest_us, places, (peaks, share) = app.worst

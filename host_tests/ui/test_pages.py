@@ -18,6 +18,13 @@ def bar(lean_deg):
     return "".join(names[code] for code in pages.lean_bar(lean_deg))
 
 
+@pytest.mark.parametrize("what", ["left", "up", "tilt"])
+def test_a_sensor_that_is_odd_is_named_in_place_of_its_lean(what):
+    code = "odd-pitch" if what == "tilt" else "odd-" + what
+    assert pages.unsure(code) == ("Lean  --", "sensor odd: " + what)
+    assert len(pages.unsure(code)[1]) <= 16
+
+
 def meter(**values):
     return types.SimpleNamespace(**values)
 

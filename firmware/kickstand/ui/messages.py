@@ -98,8 +98,14 @@ mount-moved|Mount has moved|Align again
 side-fixed|Side corrected|Set SIDE too
 aligned|Aligned by drive|error about {0:.1f}\xdf
 """
-# In place of the lean while the alignment is in question, by LeanMeter.suppressed_reason
-NO_LEAN = {"other-side": "side was wrong?", "mount-moved": "mount has moved"}
+# In place of the lean, by LeanMeter.suppressed_reason while the alignment is in question, and by LeanMeter.odd
+NO_LEAN = {
+    "other-side": "side was wrong?",
+    "mount-moved": "mount has moved",
+    "odd-left": "sensor odd: left",
+    "odd-up": "sensor odd: up",
+    "odd-pitch": "sensor odd: tilt",
+}
 _OTHER_SETTING = "config.py: wrong|{0}"  # {0}: the setting's name; the console says what is wrong with it
 
 
