@@ -93,6 +93,10 @@ class CalibrationError(Refusal):
     """Six-position poses that give no plausible calibration."""
 
 
+class GyroError(Refusal):
+    """A gyro whose rates do not explain how the sensor turned between its poses."""
+
+
 class AlignmentError(Refusal):
     """Two poses, or a drive, that do not show how the sensor is mounted."""
 
