@@ -39,13 +39,15 @@ class Turn:
         self._sums = [0, 0, 0]
         self._n = self._us = 0
         self.seconds = 0.0
-        self.quick = self.lost = False
+        self.quick = self.lost = self._held = False
         self.running = True
 
-    def add(self, sums, n, dt_us):
-        """Take n samples: their sums (7, counts, the chip's order), and microseconds since the samples before."""
+    def add(self, sums, n, dt_us, hold=False):
+        """Take n samples: their sums (7, counts, the chip's order), and microseconds since the samples before. hold: they
+        belong to a still pose, after which the turn ends; or they count after all, if that pose is spoilt."""
         if not self.running:
             return
+        self._held = hold
         if dt_us > (n + 3) * self._period_us:
             self.lost = True
         quick, own = n * self._quick, self._sums
@@ -59,12 +61,12 @@ class Turn:
                 step = True
         self._n += n
         self._us += dt_us
-        if step or self._us > STEP_US:
+        if (step or self._us > STEP_US) and not hold:
             self._step()
 
     def end(self, bias):
         """End at a still pose. bias: the one measured there; the mean of both holds for the turn."""
-        if self._n:
+        if self._n and not self._held:
             self._step()
         self.running = False
         turned, s = [0.0] * 3, self.s

@@ -47,7 +47,7 @@ class LeanMeter:
         self._smooth_all = not (calibration.aligned and self._leans)  # pages then show left and up as well
         self.smooth_force[0] = self.smooth_force[1] = 0.0 if self._smooth_all else float("nan")
         self._transform = Transform(calibration)
-        self.filter = LeanFilter(self._delay_s, radians(calibration.trim_deg), posed)
+        self.filter = LeanFilter(self._delay_s, radians(calibration.trim_deg), posed, calibration.gyro_sigma)
         self.restart()
 
     def restart(self):
