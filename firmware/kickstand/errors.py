@@ -89,6 +89,10 @@ class CaptureError(Refusal):
     """A pose that was not held still, or readings that no still sensor gives."""
 
 
+class SickSensor(CaptureError):
+    """Readings in a pose that only a defective sensor gives."""
+
+
 class CalibrationError(Refusal):
     """Six-position poses that give no plausible calibration."""
 

@@ -21,6 +21,8 @@ CONSOLE_ONLY = {"wrong-code"}  # found while modules are imported, before there 
 VALUES = {"dead-axis": ("x", 0.1), "odd-axis": ("x", 0.1, 1.0), "side-tilted": ("+x", 25.0, 20.0)}
 VALUES |= {"not-one-g": ("kickstand", 1.23), "mount-moved": ("between-stops", 12.0), "few-events": (4, 5, 12)}
 VALUES |= {"uncertain": (180.0, 12), "unknown-chip": (0x12,), "speed-unit": (99.9,)}
+VALUES |= {code: ("x", 100.0) for code in ("dead-gyro", "noisy-gyro", "stuck-accel", "gyro-reversed", "gyro-scale")}
+VALUES |= {"unproved-gyro": ("x",), "gyro-tilt": (60.0, -180.0)}
 VALUES |= {"no-pins": ("SENSOR_SDA", "SENSOR_SDA, SENSOR_SCL", "a board")}
 VALUES |= {"speed-late": (2.5,), "aligned": (9.9,)}
 

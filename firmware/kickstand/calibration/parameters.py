@@ -8,6 +8,7 @@ MAX_OFFSET_G = 0.5
 MIN_SLOPE, MAX_SLOPE = 0.8, 1.2
 MAX_MATRIX_ERROR = 0.15  # largest difference of an entry of accel_matrix or gyro_matrix from the identity's
 MAX_GYRO_SIGMA = 0.05
+_UNKNOWN = (0.0,) * 9
 
 
 class Calibration:
@@ -15,8 +16,8 @@ class Calibration:
 
     accel_offset (3, g) and accel_slope (3): calibrated = slope * reading + offset, Nicolae's equations 18-20.
     gyro_bias (3, deg/s): what the gyro reads at rest. accel_matrix, gyro_matrix (9, row-major): what remains, force =
-    accel_matrix * calibrated, and rate = gyro_matrix * (reading - bias). gyro_sigma: standard error of an entry of
-    gyro_matrix, 0 where that was not measured. vehicle_from_sensor (9, row-major, rows left, up, forward): the
+    accel_matrix * calibrated, and rate = gyro_matrix * (reading - bias). gyro_sigma (9): standard error of each entry
+    of gyro_matrix, 0 where that was not measured. vehicle_from_sensor (9, row-major, rows left, up, forward): the
     alignment, a rotation matrix. trim_deg: the roll-misalignment correction, which riding has found: degrees by which
     the lean would read too far to the right. six_done: offset and slope were measured. aligned:
     vehicle_from_sensor was measured. by_drive: it was measured or refined by driving.
@@ -27,7 +28,7 @@ class Calibration:
         self.accel_slope = vector(1.0, 1.0, 1.0)
         self.gyro_bias = vector()
         self.accel_matrix, self.gyro_matrix = matrix(), matrix()
-        self.gyro_sigma = 0.0
+        self.gyro_sigma = matrix(_UNKNOWN)
         self.vehicle_from_sensor = matrix()
         self.trim_deg = 0.0
         self.six_done = False
@@ -75,16 +76,16 @@ class Calibration:
     @property
     def whole(self):
         """True if the matrices were measured."""
-        return self.gyro_sigma > 0.0 or not (is_identity(self.accel_matrix) and is_identity(self.gyro_matrix))
+        return any(self.gyro_sigma) or not (is_identity(self.accel_matrix) and is_identity(self.gyro_matrix))
 
     def matrices(self):
-        """accel_matrix (9), gyro_matrix (9) and gyro_sigma: 19 numbers."""
-        return list(self.accel_matrix) + list(self.gyro_matrix) + [self.gyro_sigma]
+        """accel_matrix, gyro_matrix and gyro_sigma: 27 numbers."""
+        return list(self.accel_matrix) + list(self.gyro_matrix) + list(self.gyro_sigma)
 
     def set_matrices(self, values):
-        """Set the 19 numbers, in the order of matrices()."""
+        """Set the 27 numbers, in the order of matrices()."""
         self.accel_matrix, self.gyro_matrix = matrix(values[0:9]), matrix(values[9:18])
-        self.gyro_sigma = values[18]
+        self.gyro_sigma = matrix(values[18:27])
 
     def correct(self, accel):
         """Return a mean accelerometer reading (3, g) calibrated, as a new array."""
@@ -132,7 +133,7 @@ class Calibration:
 
 
 def six_position_calibration(offset, slope, gyro_bias, matrices=None):
-    """A new Calibration with the six-position result: offset (3, g), slope (3), gyro_bias (3, deg/s). matrices: the 19
+    """A new Calibration with the six-position result: offset (3, g), slope (3), gyro_bias (3, deg/s). matrices: the 27
     numbers of Calibration.matrices(), where the gyro was measured too.
 
     It is not aligned, because the sensor was off the vehicle for the six poses.

@@ -45,8 +45,8 @@ class SensorFit:
     """A fit under way. poses: mean readings (3, g) in the order in which they were taken. turns: one fewer, each
     Turn.packed() and its duration in seconds, or None where it cannot be used. offset (g), slope: the first guess.
 
-    run() does it. Then: offset (3, g), slope (3), accel_matrix (9), gyro_matrix (9), sigma (9: the standard error of
-    each entry of gyro_matrix), gyro_sigma (their root mean square), unproved (names of axes that no turn has measured).
+    run() does it. Then: offset (3, g), slope (3), accel_matrix (9), gyro_matrix (9), gyro_sigma (9: the standard error
+    of each entry of gyro_matrix), unproved (names of axes that no turn has measured).
     """
 
     def __init__(self, poses, turns, offset, slope):
@@ -77,6 +77,10 @@ class SensorFit:
         """run() at once."""
         for _ in self.run():
             pass
+
+    def matrices(self):
+        """The 27 numbers of Calibration.matrices()."""
+        return list(self.accel_matrix) + list(self.gyro_matrix) + self.gyro_sigma
 
     def force(self, k):
         """The force (3, g) of pose k."""
@@ -192,7 +196,7 @@ class SensorFit:
         self.offset, self.slope = p[0:3], p[3:6]
         self.accel_matrix = matrix(self._accel())
         self.gyro_matrix = matrix([p[_GYRO + i] + (1.0 if i % 4 == 0 else 0.0) for i in range(9)])
-        self.sigma = []
+        self.gyro_sigma = []
         for m in range(_GYRO, UNKNOWNS):
             column, square = [0.0] * UNKNOWNS, 0.0
             for i in range(m, UNKNOWNS):
@@ -201,9 +205,8 @@ class SensorFit:
                     total -= h[_triangle(i) + k] * column[k]
                 column[i] = total / h[_triangle(i) + i]
                 square += column[i] * column[i]
-            self.sigma.append(square**0.5)
-        self.gyro_sigma = (sum([value * value for value in self.sigma]) / 9) ** 0.5
-        self.unproved = [AXES[i] for i in range(3) if self.sigma[4 * i] > PROOF_SIGMA]
+            self.gyro_sigma.append(square**0.5)
+        self.unproved = [AXES[i] for i in range(3) if self.gyro_sigma[4 * i] > PROOF_SIGMA]
 
     def _check_gross(self):
         """Raise GyroError if a turn by the gyro is not at all that by gravity."""
@@ -217,7 +220,7 @@ class SensorFit:
         best, found = self._cost(x)[0] / 4, None
         for axis in range(3):
             if self._turned(axis) < DEAD_RAD:
-                return GyroError("gyro-dead", AXES[axis])
+                return GyroError("dead-gyro", AXES[axis])
             for reads in READS:
                 x[4 * axis] = 1.0 / reads - 1.0
                 cost = self._cost(x)[0]
@@ -261,5 +264,5 @@ class SensorFit:
             error = p[_GYRO + i]
             if i % 4 == 0 and not abs(error) < MAX_SCALE_ERROR:
                 raise GyroError("gyro-scale", AXES[i // 4], -100.0 * error)
-            if not abs(error) < MAX_CROSS_ERROR + 2 * self.sigma[i]:
+            if not abs(error) < MAX_CROSS_ERROR + 2 * self.gyro_sigma[i]:
                 raise GyroError("gyro-misfit", degrees(abs(error)))

@@ -6,7 +6,7 @@ and a gyro axis must not be too noisy.
 Sums are kept as integers until the end: 32-bit floats would lose the digits that averaging gains.
 """
 
-from ..errors import CaptureError
+from ..errors import CaptureError, SickSensor
 from ..units import AXES
 
 # Largest difference of a sample from the first one: more is a knock. Ten times the chip's noise with its widest filter.
@@ -80,11 +80,11 @@ class StillPose:
             raise CaptureError("frozen-pose")
         for i in range(3):
             if not self._squares[i]:
-                raise CaptureError("stuck-accel", AXES[i])
+                raise SickSensor("stuck-accel", AXES[i])
             if not self._squares[4 + i]:
-                raise CaptureError("dead-gyro", AXES[i])
+                raise SickSensor("dead-gyro", AXES[i])
             if self._changes[4 + i] > 2 * n * (NOISE_DPS * self._gyro_lsb) ** 2:
-                raise CaptureError("noisy-gyro", AXES[i])
+                raise SickSensor("noisy-gyro", AXES[i])
         late = n - self._half
         for i in range(3):
             off = self._sums[i] / n

@@ -1,7 +1,7 @@
 """The calibration in flash: two files that are written in turn, so that after a power cut one of them is whole.
 
 Each holds a record: magic, version, length, sequence number, the chip's WHO_AM_I and range, flags, 19 floats, in a
-record of version 2 another 19 for the matrices, and the CRC32 of everything before it. A calibration without matrices
+record of version 2 another 27 for the matrices, and the CRC32 of everything before it. A calibration without matrices
 is written as version 1, which all releases read. load() takes the newest valid record; save() writes over the other one and reads it back.
 Nothing is ever written because a read failed: while the supply sags a good file can read as empty.
 """
@@ -21,7 +21,7 @@ _MAGIC = b"KSTD"
 _HEAD = "<4sHHI"  # magic, version, length of the whole record in bytes, sequence number
 _BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, how aligned; offset, slope, gyro bias, matrix, trim
 _NOT_ALIGNED, _BY_POSES, _BY_DRIVE = 0, 1, 2  # how aligned
-_WHOLE = "<19f"  # accel_matrix, gyro_matrix, gyro_sigma
+_WHOLE = "<27f"  # accel_matrix, gyro_matrix, gyro_sigma
 BODY_LENGTH = struct.calcsize(_BODY)
 WHOLE_BODY_LENGTH = BODY_LENGTH + struct.calcsize(_WHOLE)
 _HEAD_LENGTH = struct.calcsize(_HEAD)
@@ -157,6 +157,6 @@ def plausible(calibration):
         for values in (calibration.accel_matrix, calibration.gyro_matrix):
             if not abs(values[i] - one) <= MAX_MATRIX_ERROR:
                 return False
-    if not 0.0 <= calibration.gyro_sigma <= MAX_GYRO_SIGMA:
-        return False
+        if not 0.0 <= calibration.gyro_sigma[i] <= MAX_GYRO_SIGMA:
+            return False
     return is_rotation(calibration.vehicle_from_sensor, 1e-4) and abs(calibration.trim_deg) <= MAX_TRIM_DEG

@@ -20,7 +20,7 @@ class Turn:
 
     lsb_per_dps: counts per deg/s. period_us: nominal time between two samples.
     quick: the rate came near the end of the gyro's range since start(). lost: readings were missing since then.
-    r (9), s (36): R and S by rows, rad, once end() was called. seconds: duration of the turn.
+    seconds: duration of the turn, once end() was called.
     """
 
     def __init__(self, lsb_per_dps, period_us):
@@ -64,20 +64,41 @@ class Turn:
         if (step or self._us > STEP_US) and not hold:
             self._step()
 
-    def end(self, bias):
-        """End at a still pose. bias: the one measured there; the mean of both holds for the turn."""
+    def end(self):
+        """End at a still pose."""
         if self._n and not self._held:
             self._step()
         self.running = False
-        turned, s = [0.0] * 3, self.s
+
+    def attitude(self, bias, share):
+        """R as a list of 9, with another bias: of start()'s and this one (3, deg/s), the mean where share is 0.5."""
+        turned, out = [0.0] * 3, self.r[:]
         for i in range(3):
-            error = radians(0.5 * (self._bias[i] / self._lsb - bias[i]))
+            error = radians(share * (self._bias[i] / self._lsb - bias[i]))
             for a in range(3):
-                turned[a] += s[12 * a + 4 * i + 3] * error
+                turned[a] += self.s[12 * a + 4 * i + 3] * error
         for i in range(3):
             column = rotated(turned, self.r[i::3])
             for a in range(3):
-                self.r[3 * a + i] = column[a]
+                out[3 * a + i] = column[a]
+        return out
+
+    def packed(self, bias):
+        """The turn as array('f', 36): R (9), then S (27) without the columns of the bias. bias: 3, deg/s, of the pose at
+        its end; the mean of both ends is taken for the turn."""
+        out = array("f", self.attitude(bias, 0.5))
+        for i in range(36):
+            if i % 4 != 3:
+                out.append(self.s[i])
+        return out
+
+    def angle(self):
+        """Size of the turn by the gyro, rad."""
+        total = 0.0
+        for a in range(0, 36, 12):
+            turned = self.s[a] + self.s[a + 5] + self.s[a + 10]
+            total += turned * turned
+        return total**0.5
 
     def _step(self):
         """Turn R and S on by the sums of counts. A row of R times [w] is row x w, and half a step first makes it
@@ -103,14 +124,6 @@ class Turn:
                 for step in steps:
                     s[at] += value * step
                     at += 1
-
-    def packed(self):
-        """The turn as array('f', 36): R (9), then S (27) without the columns of the bias."""
-        out = array("f", self.r)
-        for i in range(36):
-            if i % 4 != 3:
-                out.append(self.s[i])
-        return out
 
 
 def rotated(turned, vector):

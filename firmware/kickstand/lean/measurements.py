@@ -102,11 +102,23 @@ SIGMA_TRIM_SPEED = 8.0  # m/s
 SIGMA_TRIM_LEAN = radians(1.4)  # rad
 
 
-def gyro_variances(sigma):
-    """The priors of the last five states where the six positions have measured the gyro to this standard error. The
-    first is a difference of two axes."""
-    variance = sigma * sigma + SIGMA_GYRO_DRIFT**2
-    return [2 * variance] + [variance] * 4
+def gyro_variances(sigma, r):
+    """The priors' variances of the last five states where the six positions have measured the gyro, else None.
+
+    sigma (9): standard errors of the entries of its matrix in the sensor's axes, taken as independent, or zeros. r (9):
+    vehicle_from_sensor."""
+    if not any(sigma):
+        return None
+
+    def variance(i, j):
+        """Of the reading of axis i of a rate about axis j, of the vehicle."""
+        total = SIGMA_GYRO_DRIFT**2
+        for a in range(3):
+            for b in range(3):
+                total += (r[3 * i + a] * r[3 * j + b] * sigma[3 * a + b]) ** 2
+        return total
+
+    return [variance(0, 0) + variance(1, 1), variance(0, 1), variance(2, 0), variance(2, 1), variance(2, 2)]
 
 
 def forces(model, means, roll_acceleration, force_error):

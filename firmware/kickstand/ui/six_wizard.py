@@ -84,8 +84,8 @@ class SixWizard(Wizard):
         sensor. Raises CalibrationError."""
         turn, spoilt = self._turn, self._spoilt_turn
         if self._poses:
-            turn.end(pose.gyro)
-            self._turns.append(None if spoilt else (turn.packed(), turn.seconds))
+            turn.end()
+            self._turns.append(None if spoilt else (turn.packed(pose.gyro), turn.seconds))
         turn.start(pose.gyro)
         self._told = False
         self._poses.append(pose.accel)
@@ -126,8 +126,7 @@ class SixWizard(Wizard):
             self._next_pose()
             return
         bias = [value / len(self._poses) for value in self._bias]
-        matrices = list(fit.accel_matrix) + list(fit.gyro_matrix) + [fit.gyro_sigma]
-        self._calibration.save(six_position_calibration(fit.offset, fit.slope, bias, matrices))
+        self._calibration.save(six_position_calibration(fit.offset, fit.slope, bias, fit.matrices()))
         self._show_for(RESULT_MS, RESULT, now_ms, "Saved, err %d mg" % round(abs(self._error) * 1000), "Now align it")
 
     def _notice(self, now_ms, *lines):

@@ -6,7 +6,7 @@ from time import ticks_add, ticks_diff
 from ..board.button import LONG
 from ..calibration.pose_taker import DONE, SETTLED, PoseTaker
 from ..calibration.turn import Turn
-from ..errors import CaptureError, GyroError, Refusal, report
+from ..errors import CaptureError, GyroError, Refusal, SickSensor, report
 from . import messages
 
 # The states of a wizard
@@ -52,6 +52,8 @@ class Wizard:
             else:
                 self._progress(*self._taker.progress())
         except CaptureError as problem:
+            if isinstance(problem, SickSensor):
+                report(problem)
             self._spoilt(problem, now_ms)
         except Refusal as problem:
             self._refuse(problem)
