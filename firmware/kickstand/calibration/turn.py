@@ -11,23 +11,23 @@ from math import cos, radians, sin
 
 STEP_RAD = 0.02  # a step ends when the sensor has turned by so much about one axis. Larger: less exact
 STEP_US = 60_000  # or has taken so long
-QUICK_SHARE = 0.95  # of the gyro's range: the chip's low-pass hides that single conversions were at its end
-_RANGE = 32768
+QUICK = 31_000  # counts, 0.95 of the gyro's range: the chip's low-pass hides that single conversions were at its end
 
 
 class Turn:
     """Integrates the gyro from start() to end(). Fixed memory.
 
-    lsb_per_dps: counts per deg/s. period_us: nominal time between two samples.
+    lsb_per_dps: counts per deg/s. period_us: nominal time between two samples. quick: |counts| of a rate that is too
+    quick.
     quick: the rate came near the end of the gyro's range since start(). lost: readings were missing since then.
     seconds: duration of the turn, once end() was called.
     """
 
-    def __init__(self, lsb_per_dps, period_us):
+    def __init__(self, lsb_per_dps, period_us, quick=QUICK):
         self._rad = radians(1.0 / lsb_per_dps) * 1e-6  # rad per count and microsecond
         self._lsb = lsb_per_dps
         self._period_us = period_us
-        self._quick = int(QUICK_SHARE * _RANGE)
+        self._quick = quick
         self._step_counts = int(STEP_RAD / self._rad / period_us)  # a sum of counts: the angle of a step
         self.running = False
 
