@@ -31,7 +31,7 @@ RAISE_S = 0.3  # how long a bike takes from one lean of standing() to the next
 
 
 def standing(plan):
-    """motion(t_s) of a bike that stands at the leans of the plan [[from_s, lean_deg], ...] and is moved between them."""
+    """motion(t_s) of a bike that stands at the leans of the plan [[from_s, lean_deg], ...] and moves between them."""
 
     def motion(t_s):
         now = before = plan[0]

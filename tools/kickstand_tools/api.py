@@ -2,7 +2,7 @@
 
     from kickstand_tools import api
 
-    six = api.fit_procedure("SIX.csv")                                    # or fit_six_positions(["1.csv", "2.csv", ...])
+    six = api.fit_procedure("SIX.csv")                                    # or fit_six_positions(["1.csv", ...])
     two = api.fit_two_positions("KICKSTAND.csv", "UPRIGHT.csv", six.calibration)
     lean = api.replay("RIDE.csv.gz", two.calibration)                     # lean.t_s, lean.lean_deg, ...
     after = api.smooth("RIDE.csv.gz", two.calibration)                    # after.lean_deg, after.lean_sigma_deg, ...

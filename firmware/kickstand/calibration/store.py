@@ -2,8 +2,8 @@
 
 Each holds a record: magic, version, length, sequence number, the chip's WHO_AM_I and range, flags, 19 floats, in a
 record of version 2 another 27 for the matrices, and the CRC32 of everything before it. A calibration without matrices
-is written as version 1, which all releases read. load() takes the newest valid record; save() writes over the other one and reads it back.
-Nothing is ever written because a read failed: while the supply sags a good file can read as empty.
+is written as version 1, which all releases read. load() takes the newest valid record; save() writes over the other one
+and reads it back. Nothing is ever written because a read failed: while the supply sags a good file can read as empty.
 """
 
 import struct

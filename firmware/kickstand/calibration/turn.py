@@ -43,8 +43,8 @@ class Turn:
         self.running = True
 
     def add(self, sums, n, dt_us, hold=False):
-        """Take n samples: their sums (7, counts, the chip's order), and microseconds since the samples before. hold: they
-        belong to a still pose, after which the turn ends; or they count after all, if that pose is spoilt."""
+        """Take n samples: their sums (7, counts, the chip's order), and microseconds since the samples before. hold:
+        they belong to a still pose, after which the turn ends; or they count after all, if that pose is spoilt."""
         if not self.running:
             return
         self._held = hold
@@ -84,8 +84,8 @@ class Turn:
         return out
 
     def packed(self, bias):
-        """The turn as array('f', 36): R (9), then S (27) without the columns of the bias. bias: 3, deg/s, of the pose at
-        its end; the mean of both ends is taken for the turn."""
+        """The turn as array('f', 36): R (9), then S (27) without the columns of the bias. bias: 3, deg/s, of the pose
+        at its end; the mean of both ends holds for the turn."""
         out = array("f", self.attitude(bias, 0.5))
         for i in range(36):
             if i % 4 != 3:

@@ -78,8 +78,8 @@ def check_turn(calibration, kickstand, upright, turn):
     """Raise GyroError unless the gyro says that between the two poses (StillPose each) the bike turned by the tilt
     between them. turn: the Turn, which has ended; calibration: as for align().
 
-    The longer it took, the less the gyro can say: after a minute a tilt of 12 degrees is hardly checked any more. Nor is
-    it where readings were lost.
+    The longer it took, the less the gyro can say: after a minute a tilt of 12 degrees is hardly checked any more. Where
+    readings were lost nothing is checked.
     """
     if turn.lost:
         return

@@ -3,8 +3,8 @@
 A block is: a head (magic, format version, length, ride, sequence, time in us since power-on, temperature at its end in
 hundredths of a degree Celsius, counts per g, ten times the counts per deg/s, samples per second, firmware version,
 number of positions, how late the gyro's low-pass is in tenths of a millisecond, 0 in rides of version 0.3.0 and
-before); the calibration as store.pack() writes it, with matrices in blocks of format 2; the entries; zeros; the positions, the last one first; a tail
-(number of entries, CRC32 of everything before it).
+before); the calibration as store.pack() writes it, with matrices in blocks of format 2; the entries; zeros; the
+positions, the last one first; a tail (number of entries, CRC32 of everything before it).
 
 An entry is one pass of the main loop, App.turn(), called "a turn" here: the number of samples in it (n), the
 microseconds since the turn before, and the sums of the samples' six counts (ax ay az gx gy gz). So the mean from which

@@ -63,7 +63,7 @@ class SixWizard(Wizard):
             self._side_done(now_ms, "Side %s is done")
 
     def _again(self):
-        """True if a side may be taken again, because the turn since the last pose cannot be used: to turn from there."""
+        """True if a side may be taken again, to turn from there: the turn since the last pose cannot be used."""
         return self._spoilt_turn and len(self._poses) + self._sides.count(None) + 1 < MAX_POSES
 
     @property

@@ -276,7 +276,9 @@ def _check_ranges(name: str, calibration: CalibrationFile) -> None:
     for entry, most in (("accel_matrix", MAX_MATRIX_ERROR), ("gyro_matrix", MAX_MATRIX_ERROR)):
         worst = float(np.max(np.abs(getattr(calibration, entry) - np.eye(3))))
         if not worst <= most:
-            raise InputError(f"{name}: {entry} is {worst:g} from the identity, a sensor's is within {most:g}: calibrate again")
+            raise InputError(
+                f"{name}: {entry} is {worst:g} from the identity, a sensor's is within {most:g}: calibrate again"
+            )
     if not (np.all(calibration.gyro_sigma >= 0.0) and np.all(calibration.gyro_sigma <= MAX_GYRO_SIGMA)):
         raise InputError(f"{name}: gyro_sigma has to be 0 to {MAX_GYRO_SIGMA:g}: calibrate again")
     if not is_rotation(calibration.vehicle_from_sensor.ravel().tolist(), ROTATION_TOLERANCE):

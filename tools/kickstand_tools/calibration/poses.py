@@ -89,8 +89,9 @@ class SixPositions:
 
     sides: the pose of each side in the order of kickstand.calibration.six_position.SIDES (+x -x +y -y +z -z up);
     tilt_deg: the tilt of each from its axis. free_pose, free_pose_error_g: the seventh, slanted one, and its calibrated
-    length less 1 g; None without one. beyond_sheet: axes whose offset or slope exceeds the data sheet's limits. turns:
-    number of turns between poses that have calibrated the gyro, 0 where each pose was a log of its own.
+    length less 1 g; None without one. beyond_sheet: axes whose offset or slope exceeds the data sheet's limits. turns,
+    all_turns: number of turns between poses that have calibrated the gyro, and of all; 0 where each pose was a log of
+    its own.
     """
 
     calibration: CalibrationFile
@@ -100,6 +101,7 @@ class SixPositions:
     free_pose_error_g: float | None
     beyond_sheet: list[str]
     turns: int = 0
+    all_turns: int = 0
 
 
 def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
@@ -117,10 +119,7 @@ def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
     ((3,), True)
     """
     if len(poses) not in (6, 7):
-        raise InputError(
-            f"{len(poses)} captures given: six are needed, one for each side up, or seven with a free pose; or one log "
-            "of the whole procedure"
-        )
+        raise wrong_number(len(poses))
     refuse_same_file(poses)
     sides, free = _sides([read_pose(source) for source in poses])
     means = [pose.accel_g.tolist() for pose in sides]
@@ -137,6 +136,14 @@ def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
         free,
         error_g,
         beyond_sheet(offset, slope),
+    )
+
+
+def wrong_number(captures: int) -> InputError:
+    """The refusal of so many captures of a still pose."""
+    return InputError(
+        f"{captures} captures given: six are needed, one for each side up, or seven with a free pose; or one log of "
+        "the whole procedure"
     )
 
 

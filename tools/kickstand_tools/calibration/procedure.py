@@ -14,7 +14,7 @@ from ..logs.log import Log
 from ..logs.reader import Source, read_log
 from ..refusals import RefusedInput
 from .file import CalibrationFile
-from .poses import Pose, SixPositions, beyond_sheet, take_pose
+from .poses import Pose, SixPositions, beyond_sheet, take_pose, wrong_number
 
 _WINDOW_S = 0.5  # stillness is looked for in windows of this length
 _LEAST_S = 1.0  # a shorter stretch of it is no pose
@@ -24,7 +24,9 @@ _STILL_SPREAD_G = 0.02  # largest standard deviation
 _STILL_DRIFT_G = 0.007  # largest difference of the means of both halves
 _ROUGH_TILT_DEG = 30.0  # a pose further from every axis is a slanted one
 _MICRO = 1_000_000  # Turn sums integers: millionths of deg/s
-_NO_LIMIT = 1 << 62  # a log does not say what its gyro's range was
+_RANGES_DPS = (250.0, 500.0, 1000.0, 2000.0)  # of a gyro; a log does not say which one it was
+_AT_RANGE = 0.985, 1.01  # a largest rate that is so large a share of a range is taken for its end
+_QUICK = 0.95  # share of the range from which on a rate may have been clipped before the chip's low-pass
 
 
 def fit_procedure(source: Source) -> SixPositions:
@@ -43,11 +45,14 @@ def fit_procedure(source: Source) -> SixPositions:
     """
     log = read_log(source)
     stretches = _still(log)
+    if len(stretches) == 1:
+        raise wrong_number(1)
     poses = [_pose(log, first, last) for first, last in stretches]
     means = [pose.accel_g.tolist() for pose in poses]
     sides = _sides(log, means)
     turns = _turns(log, stretches, poses)
-    free = [k for k, mean in enumerate(means) if six_position.tilt_deg(mean) >= six_position.FREE_TILT_DEG and k not in sides]
+    slanted = [k for k, mean in enumerate(means) if six_position.tilt_deg(mean) >= six_position.FREE_TILT_DEG]
+    free = [k for k in slanted if k not in sides]
     try:
         offset, slope = six_position.fit([means[k] for k in sides])
         errors = [six_position.check_free_pose(offset, slope, means[k]) for k in free]
@@ -72,6 +77,7 @@ def fit_procedure(source: Source) -> SixPositions:
         errors[0] if free else None,
         beyond_sheet(fit.offset, fit.slope),
         sum(turn is not None for turn in turns),
+        len(turns),
     )
 
 
@@ -126,23 +132,27 @@ def _sides(log: Log, means: list[list[float]]) -> list[int]:
     missing = [name for side, name in enumerate(SIDES) if side not in best]
     if missing:
         raise InputError(
-            f"{log.name}: {len(means)} still poses, none with side {', '.join(missing)} up: one log has to have all six "
-            "sides, each held still for two seconds"
+            f"{log.name}: {len(means)} still poses, none with side {', '.join(missing)} up: one log has to have all "
+            "six sides, each held still for two seconds"
         )
     return [best[side] for side in range(6)]
 
 
 def _turns(log: Log, stretches: list[tuple[int, int]], poses: list[Pose]) -> list[tuple[list[float], float] | None]:
-    """The turns between the poses, as SensorFit takes them."""
+    """The turns between the poses, as SensorFit takes them: None where readings are missing, or clipped."""
     times_us = np.round(log.t_s * 1e6).astype(int)
     steps_us = np.diff(times_us, prepend=times_us[0])
     rates = np.round(log.gyro_dps * _MICRO).astype(int).tolist()
-    turn = Turn(_MICRO, int(np.median(steps_us[1:])), _NO_LIMIT)
+    most = float(np.max(np.abs(log.gyro_dps)))
+    limit = next(
+        (_QUICK * end for end in _RANGES_DPS if _AT_RANGE[0] * end <= most <= _AT_RANGE[1] * end), 2 * most + 1
+    )
+    turn = Turn(_MICRO, int(np.median(steps_us[1:])), int(limit * _MICRO))
     found: list[tuple[list[float], float] | None] = []
     for (_, begin), (end, _), before, after in zip(stretches, stretches[1:], poses, poses[1:]):
         turn.start(before.gyro_dps.tolist())
         for k in range(begin, end):
             turn.add((0, 0, 0, 0, *rates[k]), 1, int(steps_us[k]))
         turn.end()
-        found.append(None if turn.lost else (list(turn.packed(after.gyro_dps.tolist())), turn.seconds))
+        found.append(None if turn.lost or turn.quick else (list(turn.packed(after.gyro_dps.tolist())), turn.seconds))
     return found

@@ -129,6 +129,9 @@ def _six_lines(found: SixPositions) -> Iterable[str]:
         matrix, sigma = found.calibration.gyro_matrix, found.calibration.gyro_sigma
         scales, known = 100.0 * (1.0 / matrix.diagonal() - 1.0), 100.0 * sigma.diagonal()
         yield f"gyro scale  {_along_axes(scales, '%+.2f %%')}, by {found.turns} turns, known to {max(known):.1f} %"
+        if found.turns < found.all_turns:
+            left_out = found.all_turns - found.turns
+            yield f"warning: {left_out} of {found.all_turns} turns left out, too quick or with a gap: turn it slower"
     if found.beyond_sheet:
         axes = ", ".join(found.beyond_sheet)
         yield f"warning: {axes} is beyond the data sheet (50 mg, z 80 mg, slope 3 %): used anyway"

@@ -2,8 +2,8 @@
 
     micropython replay_engine.py RECORDS > RESULTS
 
-RECORDS starts with the calibration (46 doubles, Calibration.parameters() and matrices()) and the gyro's delay in seconds
-(a double), then one record a sample:
+RECORDS starts with the calibration (46 doubles, Calibration.parameters() and matrices()) and the gyro's delay in
+seconds (a double), then one record a sample:
 its time in microseconds (int64), seven readings in the chip's order (doubles; g, C, deg/s) and the speed in m/s,
 negative where there is no new one. RESULTS has the doubles of COLUMNS for each. Both are binary, because a number that
 is printed and read again may be another number.

@@ -13,6 +13,7 @@ from kickstand.rides import block as block_format
 
 _HEAD_LENGTH = struct.calcsize(block_format.HEAD)
 _TAIL_LENGTH = struct.calcsize(block_format.TAIL)
+_START = _HEAD_LENGTH + store.BODY_LENGTH  # of the entries, where the calibration has no matrices
 _PLACE_LENGTH = struct.calcsize(block_format.PLACE)
 _LATE_PERIODS = 2  # a turn that is later by so many sample periods has lost samples, as in kickstand.imu.sensor
 _DEGREE = 60 * 100_000  # in the unit of positions, 0.00001 minutes
@@ -116,7 +117,7 @@ def parse(data: bytes) -> Block:
     """One whole block. Raises BadBlock."""
     if not data.startswith(block_format.MAGIC[: len(data)]):
         raise BadBlock("not of a ride")
-    if len(data) < _HEAD_LENGTH + store.BODY_LENGTH + _TAIL_LENGTH:
+    if len(data) < _START + _TAIL_LENGTH:
         raise BadBlock(CUT_SHORT)
     _, version, length, *rest, firmware, places, delay = struct.unpack_from(block_format.HEAD, data)
     if version not in block_format.BODY_LENGTHS:

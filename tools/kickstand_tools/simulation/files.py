@@ -33,9 +33,9 @@ def simulate(
 ) -> Ride:
     """Simulate a ride of exactly this length and write it to out_dir. conditions: see ride.ride. Raises InputError.
 
-    Logs: POSE_1.csv to POSE_7.csv (the last one slanted), SIX.csv (seven poses in one log, with the turns between them),
-    KICKSTAND.csv, UPRIGHT.csv, RIDE.csv. TRUTH.csv has one row for each row of RIDE.csv. A RIDE.cal.json in out_dir is removed. speed: RIDE.csv gets a speed and a position once a
-    second.
+    Logs: POSE_1.csv to POSE_7.csv (the last one slanted), SIX.csv (seven poses in one log, with the turns between
+    them), KICKSTAND.csv, UPRIGHT.csv, RIDE.csv. TRUTH.csv has one row for each row of RIDE.csv. A RIDE.cal.json in
+    out_dir is removed. speed: RIDE.csv gets a speed and a position once a second.
     """
     check_profile(profile)
     directory = Path(out_dir)

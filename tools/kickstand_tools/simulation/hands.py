@@ -1,6 +1,7 @@
 """The six positions in one go: a sensor that a hand puts on its sides, one after the other, and turns in between."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +40,7 @@ def procedure(
         rates.append(np.zeros((n, 3)))
 
     hold()
-    for before, after in zip(ups, ups[1:]):
+    for before, after in pairwise(ups):
         heading = np.radians(chance.uniform(-hand.heading_deg, hand.heading_deg))
         after_attitude = _rotations(np.array([[0.0, 0.0, heading]]))[0] @ attitude @ _turn_between(after, before)
         way = _rotation_vector(after_attitude @ attitude.T)
@@ -52,8 +53,9 @@ def procedure(
         stray = np.sin(np.pi * smoothstep(u)) ** 2
         path = _rotations(share[:, None] * way) @ _rotations(stray[:, None] * detour) @ attitude
         steps = np.einsum("nji,njk->nik", path[:-1], path[1:])
-        spin = np.stack((steps[:, 2, 1] - steps[:, 1, 2], steps[:, 0, 2] - steps[:, 2, 0], steps[:, 1, 0] - steps[:, 0, 1]))
-        rates.append(np.degrees(0.5 * spin.T * RATE_HZ))
+        skew = steps - np.swapaxes(steps, 1, 2)
+        spin = np.stack((skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]), axis=1)
+        rates.append(np.degrees(0.5 * spin * RATE_HZ))
         push = np.stack([band_noise(chance, n, 0.5, 4.0, RATE_HZ) for _ in range(3)], axis=1)
         forces.append(path[:-1, 2] + hand.push_g * (np.sin(np.pi * u[:-1]) ** 2)[:, None] * push)
         attitude = path[-1]
@@ -84,7 +86,7 @@ def _rotations(vectors: NDArray) -> NDArray:
 
 def _rotation_vector(m: NDArray) -> NDArray:
     """The rotation vector of a rotation matrix, by its quaternion."""
-    values, vectors = np.linalg.eigh(
+    _, vectors = np.linalg.eigh(
         np.array(
             [
                 [m[0, 0] - m[1, 1] - m[2, 2], m[1, 0] + m[0, 1], m[2, 0] + m[0, 2], m[2, 1] - m[1, 2]],

@@ -26,8 +26,8 @@ def seven(chance: np.random.Generator, chip: Chip, temp_c: float) -> list[NDArra
 
 
 def ups(chance: np.random.Generator) -> Iterator[NDArray[np.float64]]:
-    """The unit vector upward (3) in the sensor's axes in seven poses: each of the six sides up once, in random order and
-    up to 4 degrees askew, then a slanted pose."""
+    """The unit vector upward (3) in the sensor's axes in seven poses: each of the six sides up once, in random order
+    and up to 4 degrees askew, then a slanted pose."""
     for side in chance.permutation(6):
         up = chance.standard_normal(3)
         axis = np.zeros(3)
