@@ -47,6 +47,8 @@ class Turn:
         they belong to a still pose, after which the turn ends; or they count after all, if that pose is spoilt."""
         if not self.running:
             return
+        if hold and not self._held and self._n:
+            self._step()
         self._held = hold
         if dt_us > (n + 3) * self._period_us:
             self.lost = True
