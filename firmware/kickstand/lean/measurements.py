@@ -11,7 +11,7 @@ Standing still and the trim have their own parameters in rest.py and upright_tri
 from math import radians
 
 from ..units import STANDARD_GRAVITY
-from .bike_model import BIAS_LEFT, LEAN, PITCH, SPEED, YAW_ERROR
+from .bike_model import BIAS_LEFT, LEAN, PITCH, SCALE_LEFT, SPEED, YAW_ERROR
 
 # Symbol = default  # unit: what it is. "Larger:" says what raising it does.
 
@@ -118,7 +118,8 @@ def gyro_variances(sigma, r):
                 total += (r[3 * i + a] * r[3 * j + b] * sigma[3 * a + b]) ** 2
         return total
 
-    return [variance(0, 0) + variance(1, 1), variance(0, 1), variance(2, 0), variance(2, 1), variance(2, 2)]
+    found = variance(0, 0) + variance(1, 1), variance(0, 1), variance(2, 0), variance(2, 1), variance(2, 2)
+    return [min(found[k], SIGMA_START[SCALE_LEFT + k] ** 2) for k in range(5)]
 
 
 def forces(model, means, roll_acceleration, force_error):
