@@ -70,9 +70,9 @@ def _asks(item: pytest.Function) -> bool:
     return bool(marked) or not ASKED_FOR.isdisjoint(item.fixturenames)
 
 
-def _uses_the_machine(module: ModuleType) -> bool:
+def _uses_the_machine(module: ModuleType | None) -> bool:
     """True if a module of tests starts programs, uses boards or pages, or reads the checkout's files."""
-    for value in vars(module).values():
+    for value in vars(module).values() if module else ():
         home = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
         if value == ROOT if isinstance(value, Path) else f"{home}.".startswith(tuple(f"{n}." for n in OF_THE_MACHINE)):
             return True

@@ -234,13 +234,14 @@ class App:
         if self.live and self.live.period_ms:
             self.live.feed(chip.sums, n)
         if self.screen.wizard:
-            self._pass_each(n, now_ms)
+            self._pass_each(n, dt_us, now_ms)
 
-    def _pass_each(self, n, now_ms):
+    def _pass_each(self, n, dt_us, now_ms):
         chip, wizard = self.sensor.chip, self.screen.wizard
         for k in range(n):
             chip.take(k)
             wizard.sample(chip.counts, now_ms)
+        wizard.follow(chip.sums, n, dt_us, now_ms)
 
     def _sensor_started(self):
         """React to a chip that was set up, for the first time or again after a fault; it may be another chip."""

@@ -12,6 +12,19 @@ _slow_ms = None  # ticks_ms() of the last slow print
 _SENTENCES = """
 not-written|calibration not saved: {0}; the old one is kept
 read-back|calibration not saved: it reads back differently; the old one is kept
+gyro-scale|calibration refused: the gyro reads rates about {0} with {1:+.0f} %: another sensor is needed
+gyro-reversed|calibration refused: the gyro reads rates about {0} with the wrong sign: another sensor is needed
+gyro-misfit|calibration refused: by the gyro a turn between two poses is {0:.1f} degrees off: repeat the six \
+positions; if it happens again, an axis is late, clipped or dead: another sensor is needed
+unproved-gyro|calibration refused: no turn shows that the gyro is right about {0}: repeat the six positions
+dead-gyro|pose refused: the gyro's reading about {0} never changes: switch off and on; if it stays, another sensor \
+is needed
+stuck-accel|pose refused: the accelerometer's reading along {0} never changes: switch off and on; if it stays, another \
+sensor is needed
+noisy-gyro|pose refused: the gyro is very noisy about {0}: switch the engine off; if it stays, another sensor is \
+needed
+gyro-tilt|not aligned: between the poses are {0:.1f} degrees, but by the gyro {1:.1f}: align again; if it happens \
+again, another sensor is needed
 incomplete|incomplete firmware ({0}): run kickstand flash
 no-memory|no memory for that ({0}): restart the board
 no-driver|SD card: its driver is not on the board: mpremote mip install sdcard

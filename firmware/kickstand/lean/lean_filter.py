@@ -14,7 +14,18 @@ from math import atan2, degrees, pi, sin, sqrt
 
 from ..units import STANDARD_GRAVITY
 from . import measurements
-from .bike_model import BIAS_LEFT, LEAN, PITCH, SPEED, STATES, YAW_ERROR, Linearisation, possible_pitch, predict
+from .bike_model import (
+    BIAS_LEFT,
+    LEAN,
+    PITCH,
+    SCALE_LEFT,
+    SPEED,
+    STATES,
+    YAW_ERROR,
+    Linearisation,
+    possible_pitch,
+    predict,
+)
 from .consistency import Consistency
 from .dive import Dive
 from .kalman import Covariance
@@ -35,13 +46,15 @@ class LeanFilter:
     """Estimates lean from force and rate in the vehicle's axes. Fixed memory.
 
     delay_s: by how much the gyro's low-pass is late; lean is extrapolated to now. trim: rad, see UprightTrim.
-    posed: see LeanMeter.use().
+    posed: see LeanMeter.use(). gyro_variances: of the priors of its scale and cross-axis errors, the last five
+    states, where the six positions have measured them.
     """
 
-    def __init__(self, delay_s=DELAY_S, trim=0.0, posed=False):
+    def __init__(self, delay_s=DELAY_S, trim=0.0, posed=False, gyro_variances=None):
         self.trim = UprightTrim(trim)
         self._delay_s = delay_s
         self._posed = posed
+        self._gyro_variances = gyro_variances
         self._p = None
         # error of the accelerometer's magnitude (bias and scale factor together), as a share of the force: found at
         # rest, where it should read 1 g
@@ -235,6 +248,8 @@ class LeanFilter:
         posed, self._posed = self._posed, False  # a later start with nothing kept may come much later
         if posed:
             variances[BIAS_LEFT : BIAS_LEFT + 3] = [measurements.SIGMA_FRESH_BIAS**2] * 3
+        if self._gyro_variances:
+            variances[SCALE_LEFT:STATES] = self._gyro_variances
         if moving:
             variances[LEAN] = measurements.SIGMA_START_LEAN_MOVING**2
         self._p = Covariance(variances)

@@ -11,7 +11,7 @@ Standing still and the trim have their own parameters in rest.py and upright_tri
 from math import radians
 
 from ..units import STANDARD_GRAVITY
-from .bike_model import BIAS_LEFT, LEAN, PITCH, SPEED, YAW_ERROR
+from .bike_model import BIAS_LEFT, LEAN, PITCH, SCALE_LEFT, SPEED, YAW_ERROR
 
 # Symbol = default  # unit: what it is. "Larger:" says what raising it does.
 
@@ -55,6 +55,9 @@ SIGMA_BALANCE_SPEED = 12.0  # m/s. Larger: a bike that is pushed about is taken 
 MOST_FORWARD = (
     1.5  # ratio: force forward over force up of a bike. Larger: a board on a table is taken for one that is ill.
 )
+# ratio: change of the gyro's errors with temperature since the six positions have measured them; the data sheet allows
+# 2 % from -40 to 85 C. Larger: what was measured counts for less.
+SIGMA_GYRO_DRIFT = 0.002
 # rad/s: the bias where the pose on the kickstand has just measured it. Larger: after it the lean is shown later.
 SIGMA_FRESH_BIAS = radians(0.2)
 # rad: the first lean's standard deviation where the bike moves. Larger: lean is shown later, and follows forces more.
@@ -119,6 +122,26 @@ ROLLING_SIGMAS = 3.0  # standard deviations
 # and less exact.
 SIGMA_TRIM_SPEED = 8.0  # m/s
 SIGMA_TRIM_LEAN = radians(1.4)  # rad
+
+
+def gyro_variances(sigma, r):
+    """The priors' variances of the last five states where the six positions have measured the gyro, else None.
+
+    sigma (9): standard errors of the entries of its matrix in the sensor's axes, taken as independent, or zeros. r (9):
+    vehicle_from_sensor."""
+    if not any(sigma):
+        return None
+
+    def variance(i, j):
+        """Of the reading of axis i of a rate about axis j, of the vehicle."""
+        total = SIGMA_GYRO_DRIFT**2
+        for a in range(3):
+            for b in range(3):
+                total += (r[3 * i + a] * r[3 * j + b] * sigma[3 * a + b]) ** 2
+        return total
+
+    found = variance(0, 0) + variance(1, 1), variance(0, 1), variance(2, 0), variance(2, 1), variance(2, 2)
+    return [min(found[k], SIGMA_START[SCALE_LEFT + k] ** 2) for k in range(5)]
 
 
 def forces(model, means, roll_acceleration, force_error, dive=0.0):

@@ -6,6 +6,7 @@ from ..calibration.transform import Transform
 from ..units import GAP_US, LOST_US
 from .consistency import MILD
 from .lean_filter import DELAY_S, LeanFilter
+from .measurements import gyro_variances
 
 SMOOTH_US = 300_000  # time constant of smooth_force
 MAX_VARIANCE = radians(3.0) ** 2  # a lean less certain than this is not shown
@@ -49,7 +50,8 @@ class LeanMeter:
         self._smooth_all = not (calibration.aligned and self._leans)  # pages then show left and up as well
         self.smooth_force[0] = self.smooth_force[1] = 0.0 if self._smooth_all else float("nan")
         self._transform = Transform(calibration)
-        self.filter = LeanFilter(self._delay_s, radians(calibration.trim_deg), posed)
+        measured = gyro_variances(calibration.gyro_sigma, calibration.vehicle_from_sensor)
+        self.filter = LeanFilter(self._delay_s, radians(calibration.trim_deg), posed, measured)
         self.restart()
 
     def restart(self):

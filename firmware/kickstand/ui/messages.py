@@ -12,17 +12,25 @@ saturated|Accel saturated|Check sensor
 too-few|Too few readings|Check sensor
 frozen-pose|Sensor frozen|Check wiring
 gyro-offset|Gyro offset big|Hold still
+stuck-accel|Accel {0} stuck|Check sensor
+dead-gyro|Gyro {0} is dead|Check sensor
+noisy-gyro|Gyro {0} is noisy|Check sensor
 
 dead-axis|Axis {0} is dead|Check sensor
 unclear|Poses unclear|Do them again
 odd-axis|Axis {0} is off|Do them again
 side-tilted|Side {0}: {1:.0f}\xdf off|Do them again
 free-pose-off|Check: {0:.3f} g|Do them again
+gyro-scale|Gyro {0}: {1:+.0f} %|Check sensor
+gyro-reversed|Gyro {0} reversed|Check sensor
+gyro-misfit|Gyro is {0:.0f}\xdf off|Check sensor
+unproved-gyro|Gyro {0} not seen|Do them again
 
 not-one-g|Reads {1:.2f} g!|Do six positions
 same-pose|Same pose twice|Stand, then up
 tilt-small|Tilt only {0:.1f}\xdf|Need {1:.0f}\xdf or more
 tilt-large|Tilt {0:.0f}\xdf: over|{1:.0f}\xdf, do it again
+gyro-tilt|Tilt {0:.0f}\xdf, gyro|says {1:.0f}\xdf: redo
 
 not-written|Not saved: flash|Old one is kept
 read-back|Not saved: flash|Old one is kept
