@@ -99,6 +99,8 @@ def connected(port: Port) -> Iterator[tuple[Board, str]]:
     except TransportError as error:
         raise InputError(f"{name}: the board stopped answering: plug it in again, then repeat this") from error
     except OSError as error:
+        if error.filename is not None:  # a file of this computer
+            raise InputError(f"{error.filename}: {cause(error)}: check the disk or the file, then repeat") from error
         if error.errno == errno.ENOSPC:
             raise InputError(f"the board at {name} is full: remove files of your own from it") from error
         raise InputError(f"{name}: connection lost ({cause(error)}): plug the board in again, then repeat") from error
