@@ -1,8 +1,12 @@
 """The `kickstand` command. What it refuses: one line on standard error, status 2, nothing written."""
 
+import contextlib
 import importlib
 import os
+import signal
 import sys
+import threading
+from collections.abc import Iterator
 
 import click
 
@@ -74,7 +78,10 @@ def main(arguments: list[str] | None = None) -> None:
     # Before a command imports numpy. The matrices are small: more threads would take twice the processor for nothing
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        sys.exit(kickstand.main(arguments, prog_name="kickstand", standalone_mode=False))
+        with _ended_by_signals():
+            sys.exit(kickstand.main(arguments, prog_name="kickstand", standalone_mode=False))
+    except _Ended as ended:
+        _refuse("stopped", 128 + ended.number)
     except InputError as error:
         _refuse(str(error))
     except click.Abort:
@@ -90,12 +97,41 @@ def main(arguments: list[str] | None = None) -> None:
         _refuse(f"{about}{cause(error)}: check the disk, the file or the connection, then repeat this")
     except MemoryError:
         _refuse("this takes more memory than there is: give a part of it, or close other programs")
+    except RecursionError:
+        _refuse("a file has data within data, deeper than this program follows: it is damaged, or of no use here")
     except UnicodeError as error:
         _refuse(f"a name or a text is not in the letters that it should be in ({error}): rename the file")
     except Exception as error:
         if sys.flags.dev_mode:  # python -X dev: for whoever looks for the fault
             raise
         _refuse(f"unexpected {type(error).__name__}: {error}: a fault in {added.owner(error)}, please report it")
+
+
+class _Ended(BaseException):
+    """A signal asks this program to end. number: that of the signal."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
+
+
+@contextlib.contextmanager
+def _ended_by_signals() -> Iterator[None]:
+    """A context in which kill and a closed terminal raise _Ended, so that no temporary file is left."""
+
+    def end(number: int, _frame: object) -> None:
+        raise _Ended(number)
+
+    before = {}
+    if threading.current_thread() is threading.main_thread():
+        names = ("SIGTERM", "SIGHUP")  # the second is not on Windows, and is ignored after nohup
+        numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+        before = {n: signal.signal(n, end) for n in numbers if signal.getsignal(n) == signal.SIG_DFL}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _refuse(text: str, status: int = 2) -> None:

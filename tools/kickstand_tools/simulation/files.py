@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..logs.cells import COLUMNS, TRACK
-from ..output import check_directory
+from ..output import check_directory, make_directory, whole_file
 from .profiles import check_profile
 from .ride import Ride, ride
 
@@ -42,7 +42,7 @@ def simulate(
     check_directory(directory)
     made = _cut(ride(profile, seed, seconds, exact=True, **conditions), seconds)
     try:
-        directory.mkdir(parents=True, exist_ok=True)
+        make_directory(directory)
         # It belongs to an earlier ride and another sensor, but report, plot and export would use it for this one
         (directory / "RIDE.cal.json").unlink(missing_ok=True)
         write_poses(directory, made)
@@ -91,7 +91,7 @@ def _log(time: NDArray, readings: NDArray) -> NDArray:
 def _write(path: Path, names: Iterable[str], formats: list[str], table: NDArray, *texts: list[str]) -> None:
     """A CSV file of the table's columns, and of one of each of the texts."""
     form = ",".join(formats)
-    with path.open("w", encoding="ascii") as file:
+    with whole_file(path) as temporary, temporary.open("w", encoding="ascii") as file:
         print(*names, sep=",", file=file)
         for row, *more in zip(table, *texts):
             print(form % tuple(row), *more, sep=",", file=file)

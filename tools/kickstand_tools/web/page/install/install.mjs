@@ -33,7 +33,7 @@ async function look() {
   });
   atWork(false);
   if (!said) return;
-  const { refused, board: name, settings, usual, by_hand } = JSON.parse(said);
+  const { refused, board: name, settings, usual, by_hand, others } = JSON.parse(said);
   if (refused) return tell(`Not installed: ${inPages(refused)}.`);
   board = { port, guest };
   byHand = by_hand;
@@ -41,7 +41,8 @@ async function look() {
   byId("settings").hidden = Boolean(byHand);
   if (!byHand) fields.fill(settings, usual);
   byId("config").hidden = false;
-  tell(`${name} is there. ${byHand ? "Press" : "Look through its settings, then press"} Install.`);
+  const kept = others.map((line) => `${line}. `).join("");
+  tell(`${name} is there. ${kept}${byHand ? "Press" : "Look through its settings, then press"} Install.`);
   check();
 }
 
