@@ -280,7 +280,7 @@ def test_ctrl_c_keeps_the_worst_for_the_status(tmp_path, monkeypatch, capsys):
     def interrupt():
         raise KeyboardInterrupt
 
-    with Board(level) as board:
+    with Board(sensor_errors.resting(sensor_errors.Sensor(), (0, 1, 0))) as board:  # level would be a frozen sensor
         from kickstand import app, devices, settings, status_report
         from kickstand.lean import consistency
 
