@@ -66,6 +66,7 @@ class LeanFilter:
         self._good = self._next_good = [0.0] * (STATES - BIAS_LEFT)
         self._good_s = 0.0
         self._kept_speed = None  # (speed, variance) for the next start
+        self._gap = False  # readings were missing before the next start
         self._moving_s = 0.0  # for so long a measured speed still says that the bike does not stand
         self.restart()
 
@@ -76,7 +77,7 @@ class LeanFilter:
         self.dive.restart()
         self._kept = []  # (state, variance) of the sensor's errors
         if self._p is not None:
-            self.consistency.gap()  # the covariance of a filter that begins in a bend may be too good to be true
+            self._gap = True
             for i in range(BIAS_LEFT, STATES):
                 x[i] = self._x[i]
                 self._kept.append((i, self._p.rows[i][i]))
@@ -252,6 +253,9 @@ class LeanFilter:
             variances[SCALE_LEFT:STATES] = self._gyro_variances
         if moving:
             variances[LEAN] = measurements.SIGMA_START_LEAN_MOVING**2
+            if self._gap:
+                self.consistency.gap()  # in a bend the covariance of a filter that begins may be too good to be true
+        self._gap = False
         self._p = Covariance(variances)
         for i, variance in self._kept:
             self._p.set_variance(i, variance)
