@@ -146,8 +146,7 @@ def test_implausible_matrices_are_not_loaded(store, index, value):
         (record(magic=b"KSTE"), "of another version"),
         (record(version=2), "of another version"),
         (record(sequence=0), "of another version"),
-        (record(chip=(0x70, 8)), "of another sensor or range"),
-        (record(chip=(0x68, 16)), "of another sensor or range"),
+        (record(chip=(0x70, 8)), "of another sensor"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
@@ -158,6 +157,13 @@ def test_what_is_wrong_with_a_record_is_reported(store, tmp_path, content, probl
     (tmp_path / FILES[0]).write_bytes(record())
     assert store.load().aligned
     assert store.message == f"record 7 (other record: {FILES[1]} {problem})"
+
+
+def test_a_record_of_another_range_stays_valid(store, tmp_path):
+    """Boards in use measured up to 8 g when they were calibrated; 16 g became the default later."""
+    (tmp_path / FILES[1]).write_bytes(record(chip=(0x68, 16)))
+    assert store.load().aligned
+    assert store.message == "record 7"
 
 
 @pytest.mark.parametrize("saved_before", [0, 1, 2])
@@ -219,13 +225,13 @@ def test_flash_that_does_not_keep_what_is_written(store, tmp_path, monkeypatch):
 
 
 def test_a_trim_may_be_stored_beside_a_record_that_never_was_this_sensors(store, tmp_path):
-    """Such as that of another range, or one that a power cut left empty."""
+    """Such as that of another chip, or one that a power cut left empty."""
     store.save(calibration(1))
     store.save(calibration(2))
-    other = Store(0x68, 16, str(tmp_path))
+    other = Store(0x70, 8, str(tmp_path))
     other.load()
     other.save(calibration(3))
-    again = Store(0x68, 16, str(tmp_path))
+    again = Store(0x70, 8, str(tmp_path))
     assert mark_of(again.load()) == 3 and "another sensor" in again.message
     assert again.unchanged()
     newest = newest_file(tmp_path, other)
@@ -236,4 +242,4 @@ def test_a_trim_may_be_stored_beside_a_record_that_never_was_this_sensors(store,
     assert again.unchanged()
     again.save(calibration(4))
     assert again.unchanged()
-    assert mark_of(Store(0x68, 16, str(tmp_path)).load()) == 4
+    assert mark_of(Store(0x70, 8, str(tmp_path)).load()) == 4

@@ -24,6 +24,11 @@ VALUES |= {"uncertain": (180.0, 12), "unknown-chip": (0x12,), "speed-unit": (99.
 VALUES |= dict.fromkeys(("dead-gyro", "noisy-gyro", "stuck-accel", "gyro-reversed", "gyro-scale"), ("x", 100.0))
 VALUES |= {"unproved-gyro": ("x",), "gyro-tilt": (60.0, -180.0)}
 VALUES |= {"no-pins": ("SENSOR_SDA", "SENSOR_SDA, SENSOR_SCL", "a board")}
+VALUES |= {"no-chip": (0xFF, 0x68), "not-kept": (0x68,), "other-chip": ("ICM-42688-V", 0x68)}
+VALUES |= {"other-device": ("barometer", 0x76), "wire-low": ("SDA", 28), "no-pull-up": ("SCL", 28)}
+VALUES |= {"gps-other": ("PUBX",)}
+VALUES |= {"sensor-fifo": ("stands still",), "bus-errors": (0x68,), "no-sensor": (28, 29)}
+VALUES |= {"axis-ill": ("Accel", "xyz", "stuck"), "clips": ("Accel",)}
 VALUES |= {"speed-late": (2.5,), "aligned": (9.9,)}
 
 

@@ -216,6 +216,8 @@ _OTHERS: _Table = {
     + ", else the ride is mirrored and {sign}",
     "import-damaged": "damaged rows that are left out: {0}; a cell or a time is no number, a time is out of order, "
     "a row has too many cells, or a reading is past any sensor's",
+    "import-slow": "{0:.3g} samples per second: at least 20 are needed to find a lean: record it faster",
+    "import-short": "it lasts {0:.0f} s: to find the alignment from it, at least {1:.0f} s of riding are needed",
     "car-replayed": "the calibration is a car's, whose display shows no lean: lean_deg is that of a motorcycle which "
     "would feel the same, and lean_sigma_deg is nan",
     "mount-moved": _mount_moved,

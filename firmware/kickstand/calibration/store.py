@@ -33,8 +33,9 @@ MAX_TRIM_DEG = 3.6  # the limit in lean/upright_trim.py plus a margin for roundi
 class Store:
     """Calibration records of one chip.
 
-    who_am_i, accel_range_g: those of the chip in use; records of another chip or range are not valid.  directory: that
-    of the files, "" for the current one.  message: after load(), in a few words, which record is in use or why none is.
+    who_am_i, accel_range_g: those of the chip in use; records of another chip are not valid. Those of another range are
+    valid, because offset and slope hardly depend on it.  directory: that of the files, "" for the current one.
+    message: after load(), in a few words, which record is in use or why none is.
     """
 
     def __init__(self, who_am_i, accel_range_g, directory=""):
@@ -115,9 +116,9 @@ class Store:
             return 0, None, "damaged"
         if magic != _MAGIC or length != len(record) or _LENGTHS.get(version) != length or sequence == 0:
             return 0, None, "of another version"
-        who_am_i, accel_range_g, calibration = unpack(record[_HEAD_LENGTH:-4])
-        if (who_am_i, accel_range_g) != self._chip:
-            return 0, None, "of another sensor or range"
+        who_am_i, _, calibration = unpack(record[_HEAD_LENGTH:-4])
+        if who_am_i != self.who_am_i:
+            return 0, None, "of another sensor"
         if not plausible(calibration):
             return 0, None, "out of range"
         return sequence, calibration, None

@@ -52,6 +52,6 @@ class AlignWizard(Wizard):
         new, tilt = align(before, self._kickstand, pose, self._side)
         self._turn.end()
         check_turn(before, self._kickstand, pose, self._turn)
-        self._calibration.save(new, ticks_diff(now_ms, self._kickstand_ms) < FRESH_MS)
+        self._calibration.save(new, 0 <= ticks_diff(now_ms, self._kickstand_ms) < FRESH_MS)
         warning = "Little, 8%s best" % messages.DEGREE if tilt < WARN_TILT_DEG else "Ride safely"
         self._show_for(RESULT_MS, RESULT, now_ms, "Aligned! %5.1f%s" % (tilt, messages.DEGREE), warning)

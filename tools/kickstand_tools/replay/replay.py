@@ -17,7 +17,7 @@ from .. import unix_port
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
 from ..logs.csv_lines import write_lean
-from ..logs.log import Block, Stretch, Table, within
+from ..logs.log import Block, Log, Stretch, Table, within
 from ..logs.reader import Source, apart, read_blocks, read_twice
 from ..logs.source import Progress, total_bytes
 from ..signals import Array
@@ -93,7 +93,8 @@ def replay_to_csv(
     notices: list[Notice] = []
     whole = log.source if isinstance(log, Stretch) else log
     # for the command alone: a second process imports the main program again, which may not allow that
-    run = "two processes" if engine == "cpython" and total_bytes(whole) > _LONG_BYTES else engine
+    long = not isinstance(whole, Log) and total_bytes(whole) > _LONG_BYTES
+    run = "two processes" if engine == "cpython" and long else engine
     rows = replay_blocks(log, calibration, run, progress, notices)
     return write_lean(out, replay_engine.COLUMNS, [5] * len(replay_engine.COLUMNS), rows), notices
 
