@@ -162,7 +162,7 @@ def test_the_fit_is_numpys_and_so_is_its_covariance():
             out += [weight * value for value in fit._misfit(k, fit._p[9:])[0]]
         return np.array(out)
 
-    found, p = np.array(fit._p), start.copy()
+    found, p, j = np.array(fit._p), start.copy(), np.eye(18)
     for _ in range(8):
         r = residuals(p)
         j = np.array([(residuals(p + 1e-6 * e) - r) / 1e-6 for e in np.eye(18)]).T

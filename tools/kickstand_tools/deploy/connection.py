@@ -98,11 +98,12 @@ def connected(port: Port) -> Iterator[tuple[Board, str]]:
         _enter(transport, name)
         yield transport, name
     except TransportExecError as error:
-        if damaged(last_line(error.error_output)):
+        said = last_line(error.error_output)
+        if damaged(said):
             raise InputError(
-                f"{name}: the board's file system is damaged ({last_line(error.error_output)}): erase its flash: {_NUKE}"
+                f"{name}: the board's file system is damaged ({said}): erase its flash: {_NUKE}"
             ) from error
-        raise InputError(f"{name}: the board reports {last_line(error.error_output)}: try again") from error
+        raise InputError(f"{name}: the board reports {said}: try again") from error
     except TransportError as error:
         raise InputError(f"{name}: the board stopped answering: plug it in again, then repeat this") from error
     except OSError as error:

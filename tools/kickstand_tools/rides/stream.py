@@ -5,7 +5,7 @@ import contextlib
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import IO
+from io import TextIOBase
 
 from kickstand.lean.meter import FALLEN_DEG
 
@@ -75,7 +75,7 @@ class Recording:
         self.written = False
         self._live = live
 
-    def write(self, file: IO[str], blocks: Iterator[Block], notes: list[str]) -> None:
+    def write(self, file: TextIOBase, blocks: Iterator[Block], notes: list[str]) -> None:
         """Write all blocks as they come. notes: gets a line for each gap. Raises InputError if there is no block."""
         missing, expected = 0, 0
         missing_s: list[float] = []

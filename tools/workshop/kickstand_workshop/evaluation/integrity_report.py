@@ -185,6 +185,7 @@ def draw(path: Path, outcomes: list[Outcome]) -> None:
         axis.set(
             title=f"{title}, % of the riding", xlabel="error of the lean, degrees", ylabel="claimed sigma, degrees"
         )
+    assert image is not None
     figure.colorbar(image, ax=axes)
     figure.savefig(path, dpi=100)
 
