@@ -5,6 +5,8 @@ import sys
 from . import firmware_path
 from .remedies import COMMANDS, Remedies
 
+DISTRIBUTION = "kickstand-lean"  # as in pyproject.toml; a package "kickstand" is another project's
+
 
 class InputError(Exception):
     """Something that the user has given cannot be used. Its text is one line: what is wrong, and what to do.
@@ -33,9 +35,9 @@ def cause(error: BaseException) -> str:
 def extra(name: str) -> str:
     """How to install an optional part of the project.
 
-    From a checkout with -e, because otherwise a copy would replace the checkout, and `kickstand flash` would take the
-    copy's firmware.
+    From a checkout with -e and its path, because otherwise a copy would replace the checkout, and `kickstand flash`
+    would take the copy's firmware.
     """
     if firmware_path.installed():
-        return f'{sys.executable} -m pip install "kickstand[{name}]"'
-    return f'in the project\'s directory, {sys.executable} -m pip install -e ".[{name}]"'
+        return f'{sys.executable} -m pip install "{DISTRIBUTION}[{name}]"'
+    return f'{sys.executable} -m pip install -e "{firmware_path.TOOLS.parent}[{name}]"'

@@ -1,14 +1,17 @@
-"""The commands of `kickstand` that talk to a board: flash, status, pull, record."""
+"""The commands of `kickstand` that talk to a board: flash, status, check, pull, record."""
 
 import contextlib
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import click
 
 from .. import firmware_path
+from ..deploy.check import check, verdict
 from ..deploy.connection import Progress, status
 from ..deploy.flash import flash
+from ..errors import InputError
 from ..progress import Bar
 from ..rides.pull import PulledRide, pull
 from ..rides.record import live_line, record
@@ -21,11 +24,14 @@ _NAMED_ONE_BY_ONE = 5
 @click.command()
 @PORT
 @click.option("--config", is_flag=True, help="Replace the board's config.py too, which is otherwise kept.")
-def flash_command(port: str | None, config: bool) -> None:
+@click.option("--yes", is_flag=True, help="Do not ask before files of another project on the board get other names.")
+def flash_command(port: str | None, config: bool, yes: bool) -> None:
     """Copy the firmware to a board that runs MicroPython, check it, and start it."""
     with _bar() as progress:
-        result = flash(port, config, progress)
+        result = flash(port, config, progress, agree=None if yes else _agree)
     click.echo(f"{result.board} on {result.port}")
+    for line in result.others:
+        click.echo(f"kept: {line}")
     if result.config:
         click.echo(f"config.py is {result.config}")
         if firmware_path.installed() and result.config.parent == firmware_path.directory():
@@ -49,11 +55,34 @@ def flash_command(port: str | None, config: bool) -> None:
     click.echo("restarted: the display shows the rest")
 
 
+def _agree(lines: list[str]) -> None:
+    """Ask whether these files may get other names. Raises InputError if not."""
+    if not sys.stdin.isatty():
+        raise InputError(f"{'; '.join(lines)}: run kickstand flash --yes for that")
+    for line in lines:
+        click.echo(line, err=True)
+    if not click.confirm("Put Kickstand onto this board?", err=True):
+        raise InputError("nothing was changed on the board")
+
+
 @click.command()
 @PORT
-def status_command(port: str | None) -> None:
+@click.option("--wirings", is_flag=True, help="Show each LCD_WIRING on a character display that stays blank.")
+def status_command(port: str | None, wirings: bool) -> None:
     """Ask a board how it is: versions, settings, sensor, display, calibration."""
-    click.echo(status(port))
+    click.echo(status(port, wirings))
+
+
+@click.command()
+@PORT
+def check_command(port: str | None) -> None:
+    """Measure a board and all that is wired to it, each figure with its limit, in two minutes.
+
+    The sensor must lie still. Exit status 1: something is not as it should be."""
+    checked = check(port, click.echo)
+    click.echo(verdict(checked.findings))
+    if checked.faults:
+        raise click.exceptions.Exit(1)
 
 
 @click.command()
