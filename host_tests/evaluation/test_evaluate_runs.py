@@ -43,7 +43,8 @@ def swept():
 
 def test_every_estimator_is_scored(swept):
     assert swept.refusal is None
-    assert set(swept.scores) == {"kickstand", "smoothed", "formula", "formula 0.3 s", *THERE}
+    names = {"kickstand", "smoothed", "formula", "formula 0.3 s", "possible", "GPS 1 Hz", "GPS 10 Hz"}
+    assert set(swept.scores) == {*names, *THERE}
     for lean in swept.traces.values():
         assert lean.shape == swept.traces["time"].shape
         assert np.all(np.isfinite(lean))
@@ -57,6 +58,23 @@ def test_filters_that_trust_the_force_decay_in_a_held_turn(swept):
     assert swept.scores["kickstand"].rms_deg < swept.scores["formula 0.3 s"].rms_deg
     assert swept.scores["smoothed"].rms_deg < 0.6 * swept.scores["kickstand"].rms_deg
     assert 0.9 < swept.scores["kickstand"].slope < 1.1
+
+
+def test_nothing_live_is_better_than_what_is_possible(swept):
+    """The oracle loses to the display as soon as it does not know one of the sensor's errors."""
+    others = [score.rms_deg for name, score in swept.scores.items() if name not in ("possible", "smoothed")]
+    assert swept.scores["possible"].rms_deg < min(0.25, 0.8 * min(others))
+
+
+def test_best_gains_are_far_better_than_the_defaults(swept):
+    for name in [name for name in THERE if name + " best" in THERE]:
+        assert swept.scores[name + " best"].rms_deg < 0.5 * swept.scores[name].rms_deg
+
+
+def test_a_receivers_course_is_late_at_one_hertz(swept):
+    slow, quick = (swept.scores[f"GPS {hz} Hz"] for hz in (1, 10))
+    assert slow.lag_ms > 300.0 > quick.lag_ms
+    assert quick.slope == pytest.approx(1.0, abs=0.15)
 
 
 def test_the_calibration_is_from_the_poses_alone():

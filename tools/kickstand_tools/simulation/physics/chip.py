@@ -18,8 +18,8 @@ _GYRO_COUNTS = 32750.0  # of a range: the sheet has 65.5 counts per deg/s at 500
 _ACCEL_NOISE_G = 400e-6 * np.sqrt(RATE_HZ / 2)  # rms of a conversion, from 400 ug/sqrt(Hz)
 _GYRO_NOISE_DPS = 0.005 * np.sqrt(RATE_HZ / 2)
 _CROSS_AXIS = 0.02  # sensitivity of an axis to its neighbours
-_GYRO_DPS_PER_G = 0.1  # sensitivity to linear acceleration
-_CALIBRATED_C = 25.0
+GYRO_DPS_PER_G = 0.1  # sensitivity to linear acceleration
+CALIBRATED_C = 25.0
 
 # A Bessel low-pass of second order with -3 dB at 44 Hz has the sheet's 4.9 ms of delay.
 _DLPF_NATURAL_HZ, _DLPF_DAMPING = 44.0 * 1.272, 0.866
@@ -89,7 +89,7 @@ class Chip:
         force (n, 3) in g and rates (n, 3) in deg/s: true values along the sensor's axes at 1 kHz. temp_c (n,).
         """
         n = len(force)
-        warm = (temp_c - _CALIBRATED_C)[:, None]
+        warm = (temp_c - CALIBRATED_C)[:, None]
         walk = chance.standard_normal((n, 3))
         np.cumsum(walk, axis=0, out=walk)
         walk *= self.gyro_walk
@@ -105,7 +105,7 @@ class Chip:
         values += walk
         del walk
         noise = _noise(chance, n, _GYRO_NOISE_DPS)
-        noise += _GYRO_DPS_PER_G * force
+        noise += GYRO_DPS_PER_G * force
         values += noise
         del noise
         temp = np.round(temp_c[::DIVIDER] * 340.0) / 340.0

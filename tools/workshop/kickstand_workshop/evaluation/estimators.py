@@ -2,7 +2,8 @@
 of hobby projects and of the literature.
 
 Each takes Samples and returns the lean in degrees of every sample, > 0 to the right. The filters of the packages
-`ahrs` and `vqf` run with their authors' default gains, started from the first reading.
+`ahrs`, `vqf` and `imufusion` run with their authors' default gains, and once more ("best") with the gain that has the
+least error on a ride of each profile with another seed (20); started from the first reading.
 """
 
 from collections.abc import Callable
@@ -23,7 +24,8 @@ COMPLEMENTARY = 0.98  # weight of the integrated lean at each sample; the direct
 
 _SHOWN, _FORMULA = (replay_engine.COLUMNS.index(name) for name in ("lean_deg", "lean_formula_deg"))
 _TO_XYZ = [2, 0, 1]  # left, up, forward to forward, left, up: the body frame of ahrs and vqf
-PACKAGES = {"mahony": "ahrs", "madgwick": "ahrs", "vqf": "vqf"}
+PACKAGES = {"mahony": "ahrs", "madgwick": "ahrs", "vqf": "vqf", "fusion": "imufusion"}
+PACKAGES |= {f"{name} best": package for name, package in PACKAGES.items()}
 
 
 @dataclass
@@ -66,18 +68,36 @@ def complementary(samples: Samples) -> NDArray[np.float64]:
     return result
 
 
-def of_ahrs(name: str, samples: Samples) -> NDArray[np.float64]:
+def of_ahrs(name: str, samples: Samples, **gains: float) -> NDArray[np.float64]:
     from ahrs import filters
 
     gyro, accel = _xyz(samples)
-    return _roll(getattr(filters, name)(gyr=gyro, acc=accel, frequency=samples.rate_hz).Q)
+    return _roll(getattr(filters, name)(gyr=gyro, acc=accel, frequency=samples.rate_hz, **gains).Q)
 
 
-def vqf(samples: Samples) -> NDArray[np.float64]:
+def vqf(samples: Samples, **gains: float) -> NDArray[np.float64]:
     from vqf import VQF
 
     gyro, accel = _xyz(samples)
-    return _roll(VQF(1.0 / samples.rate_hz).updateBatch(gyro, accel)["quat6D"])
+    return _roll(VQF(1.0 / samples.rate_hz, **gains).updateBatch(gyro, accel)["quat6D"])
+
+
+def fusion(samples: Samples, **settings: float) -> NDArray[np.float64]:
+    """x-io's Fusion."""
+    import imufusion
+
+    gyro, accel = _xyz(samples)
+    gyro, accel = np.degrees(gyro), accel / STANDARD_GRAVITY
+    ahrs, chosen = imufusion.Ahrs(), imufusion.AhrsSettings()
+    for name, value in {"sample_rate": samples.rate_hz, **settings}.items():
+        setattr(chosen, name, value)
+    ahrs.set_settings(chosen)
+    ahrs.set_sample_period(1.0 / samples.rate_hz)
+    found = np.empty((len(gyro), 4))
+    for k in range(len(gyro)):
+        ahrs.update_no_magnetometer(gyro[k], accel[k])
+        found[k] = ahrs.get_quaternion()
+    return _roll(found)
 
 
 OTHERS: dict[str, Callable[[Samples], NDArray[np.float64]]] = {
@@ -85,6 +105,11 @@ OTHERS: dict[str, Callable[[Samples], NDArray[np.float64]]] = {
     "mahony": partial(of_ahrs, "Mahony"),
     "madgwick": partial(of_ahrs, "Madgwick"),
     "vqf": vqf,
+    "fusion": fusion,
+    "mahony best": partial(of_ahrs, "Mahony", k_P=0.05, k_I=1e-6),
+    "madgwick best": partial(of_ahrs, "Madgwick", gain=0.005),
+    "vqf best": partial(vqf, tauAcc=30.0),
+    "fusion best": partial(fusion, gain=0.03),
 }
 
 

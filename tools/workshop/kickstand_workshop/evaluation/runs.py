@@ -17,7 +17,7 @@ from kickstand_tools.simulation.profiles import check_profile
 from kickstand_tools.simulation.ride import Ride, ride
 from numpy.typing import NDArray
 
-from . import estimators, real_ride
+from . import estimators, possible, real_ride
 from .metrics import Score, score
 
 
@@ -86,7 +86,7 @@ def run(job: Job) -> Result:
         calibration = calibrated_by_poses(made)
     except InputError as error:
         return Result(job, refusal=str(error))
-    shown = estimators.estimate(as_log(made), calibration)
+    shown = estimators.estimate(as_log(made), calibration) | possible.leans(made)
     scores = {name: score(lean, made.truth, made.rate_hz) for name, lean in shown.items()}
     traces = {"time": made.time, "true": made.truth["lean_deg"], **shown} if job.traces else {}
     return Result(job, scores, traces)

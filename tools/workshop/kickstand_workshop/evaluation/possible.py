@@ -1,0 +1,78 @@
+"""What is possible: leans that need what no board has, the sensor's true errors or a perfect position.
+
+oracle() is the firmware's own filter with readings without the sensor's errors (its noise stays), the true alignment
+and the true speed. Nothing that the filter has to estimate is left but the motion. gps_lean() is what apps on phones
+show: speed x yaw rate from a receiver's course.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import radians
+from unittest.mock import patch
+
+import numpy as np
+from kickstand.lean import measurements, upright_trim
+from kickstand.lean.bike_model import BIAS_LEFT
+from kickstand.units import STANDARD_GRAVITY
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.logs.log import Log
+from kickstand_tools.replay.replay import replay
+from kickstand_tools.simulation.physics.chip import CALIBRATED_C, GYRO_DPS_PER_G
+from kickstand_tools.simulation.ride import Ride
+from numpy.typing import NDArray
+
+NAME = "possible"
+GPS_HZ = (1.0, 10.0)
+GPS_MPS = 0.05  # noise of each component of a receiver's velocity, 1 sigma: data sheet of u-blox M8 and M9
+# The filter's noises that are least in error for the oracle, found on two seeds of each profile
+_ORACLE = {
+    "SIGMA_START": tuple(s if i < BIAS_LEFT else 1e-3 * s for i, s in enumerate(measurements.SIGMA_START)),
+    "SIGMA_FRESH_BIAS": 1e-4,
+    "SIGMA_MEASURED_SPEED": 0.1,
+    "MEASURED_SPEED_LATE_S": 0.0,
+    "SIGMA_LEFT": 0.02,
+    "NOISE_ANGLE": radians(0.12),
+    "NOISE_BIAS": radians(0.008),
+}
+
+
+def oracle(made: Ride) -> NDArray[np.float64]:
+    """(N,) lean in degrees: the least error that a filter on this sensor can be asked for."""
+    readings, chip = made.readings, made.chip
+    warm = (readings[:, 3] - CALIBRATED_C)[:, None]
+    force = readings[:, :3] - chip.accel_offset - warm * chip.accel_per_c
+    force = force @ np.linalg.inv(chip.accel_matrix).T
+    rate = readings[:, 4:] - chip.gyro_bias - warm * chip.gyro_per_c - GYRO_DPS_PER_G * force
+    rate = rate @ np.linalg.inv(chip.gyro_matrix).T
+    calibration = CalibrationFile(vehicle_from_sensor=made.vehicle_from_sensor, aligned=True, six_done=True)
+    log = Log(made.time, force, rate, made.truth["speed_mps"].copy(), name="RIDE.csv")
+    with _knowing():
+        return replay(log, calibration).lean_deg
+
+
+@contextmanager
+def _knowing() -> Iterator[None]:
+    """The filter's parameters for readings without errors, in this process."""
+    with patch.multiple(measurements, **_ORACLE), patch.object(upright_trim, "MAX_TRIM", 0.0):
+        yield
+
+
+def gps_lean(made: Ride, rate_hz: float) -> NDArray[np.float64]:
+    """(N,) lean in degrees as apps show it: atan(speed x change of course / g), held until the next position."""
+    time, truth = made.time, made.truth
+    chance = np.random.default_rng(len(time))
+    at = np.arange(time[0], time[-1], 1.0 / rate_hz)
+    course = np.cumsum(np.radians(truth["yaw_rate_dps"])) / made.rate_hz
+    speed, course = (np.interp(at, time, values) for values in (truth["speed_mps"], course))
+    speed, course = (
+        speed + GPS_MPS * chance.normal(size=len(at)),
+        course + GPS_MPS / np.maximum(speed, 1.0) * (chance.normal(size=len(at))),
+    )
+    yaw_rate = np.diff(course, prepend=course[0]) * rate_hz
+    lean = -np.degrees(np.arctan(speed * yaw_rate / STANDARD_GRAVITY))
+    return lean[np.searchsorted(at, time, side="right").clip(1) - 1]
+
+
+def leans(made: Ride) -> dict[str, NDArray[np.float64]]:
+    """By name: the oracle's lean, and the GPS formula's at each of GPS_HZ."""
+    return {NAME: oracle(made), **{f"GPS {rate_hz:g} Hz": gps_lean(made, rate_hz) for rate_hz in GPS_HZ}}
