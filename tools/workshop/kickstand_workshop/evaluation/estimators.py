@@ -75,11 +75,11 @@ def of_ahrs(name: str, samples: Samples, **gains: float) -> NDArray[np.float64]:
     return _roll(getattr(filters, name)(gyr=gyro, acc=accel, frequency=samples.rate_hz, **gains).Q)
 
 
-def vqf(samples: Samples, **gains: float) -> NDArray[np.float64]:
+def vqf(samples: Samples, tau_s: float = 3.0) -> NDArray[np.float64]:
     from vqf import VQF
 
     gyro, accel = _xyz(samples)
-    return _roll(VQF(1.0 / samples.rate_hz, **gains).updateBatch(gyro, accel)["quat6D"])
+    return _roll(VQF(1.0 / samples.rate_hz, tauAcc=tau_s).updateBatch(gyro, accel)["quat6D"])
 
 
 def fusion(samples: Samples, **settings: float) -> NDArray[np.float64]:
@@ -108,7 +108,7 @@ OTHERS: dict[str, Callable[[Samples], NDArray[np.float64]]] = {
     "fusion": fusion,
     "mahony best": partial(of_ahrs, "Mahony", k_P=0.05, k_I=1e-6),
     "madgwick best": partial(of_ahrs, "Madgwick", gain=0.005),
-    "vqf best": partial(vqf, tauAcc=30.0),
+    "vqf best": partial(vqf, tau_s=30.0),
     "fusion best": partial(fusion, gain=0.03),
 }
 
