@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from drawn_rides import drawn_ride, judged
-from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.api import Log, smooth
 from kickstand_tools.estimation import smooth as module
 from kickstand_tools.estimation.least_squares import Estimate
@@ -104,7 +103,7 @@ def test_wheelies_are_not_taken_for_a_soft_mount():
 def test_the_dive_of_a_bike_is_learned(monkeypatch, dive_deg_per_g):
     """Taken for the road's slope, or for an acceleration, it made the lean depend on the bike's fork."""
     drawn, made = Bike.random, []
-    dives = {"dive_deg_per_mps2": dive_deg_per_g / STANDARD_GRAVITY}
+    dives = {"dive_deg_per_g": dive_deg_per_g, "squat_deg_per_g": dive_deg_per_g}
     monkeypatch.setattr(Bike, "random", staticmethod(lambda chance: replace(drawn(chance), **dives)))
     monkeypatch.setattr(module, "Estimate", lambda *given: made.append(Estimate(*given)) or made[-1])
     ride = simulated("track", 31, 120.0)
