@@ -243,7 +243,9 @@ def test_a_log_is_on_the_disk_before_the_ride_is_deleted(board, tmp_path, monkey
     put(board, "000/03/00000.rid", ride_writer.blocks(4, ride=3)[0])
     events = []
     flush, remove = os.fsync, board.fs_rmfile
-    monkeypatch.setattr(os, "fsync", lambda number: events.append(os.readlink(f"/proc/self/fd/{number}")) or flush(number))
+    monkeypatch.setattr(
+        os, "fsync", lambda number: events.append(os.readlink(f"/proc/self/fd/{number}")) or flush(number)
+    )
     monkeypatch.setattr(board, "fs_rmfile", lambda path: events.append("removed") or remove(path))
     command.works("pull", "--out", tmp_path / "out", "--delete")
     assert [Path(event).suffix for event in events] == [".gz", "", ".json", "", ""]

@@ -1,5 +1,7 @@
 """The error for input that cannot be used, and parts of its text."""
 
+import importlib.metadata
+import re
 import sys
 
 from . import firmware_path
@@ -30,12 +32,24 @@ def cause(error: BaseException) -> str:
     return getattr(error, "strerror", None) or str(error) or type(error).__name__
 
 
+def printable(text: str) -> str:
+    """The text with the codes of characters that would be commands to a terminal, as ESC, in their place."""
+    return "".join(c if c in "\n\t" or c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
 def extra(name: str) -> str:
     """How to install an optional part of the project.
 
     From a checkout with -e, because otherwise a copy would replace the checkout, and `kickstand flash` would take the
-    copy's firmware.
+    copy's firmware. Of an installed copy the packages are named: on a package registry `kickstand` is another project.
     """
     if firmware_path.installed():
-        return f'{sys.executable} -m pip install "kickstand[{name}]"'
+        return f"{sys.executable} -m pip install {' '.join(_packages(name))}"
     return f'in the project\'s directory, {sys.executable} -m pip install -e ".[{name}]"'
+
+
+def _packages(name: str) -> list[str]:
+    """What an optional part needs, as the installed package states it."""
+    marker = re.compile(r"""extra\s*==\s*['"]""" + re.escape(name) + r"""['"]""")
+    stated = importlib.metadata.requires("kickstand") or []
+    return [f'"{one.partition(";")[0].strip()}"' for one in stated if marker.search(one.partition(";")[2])]

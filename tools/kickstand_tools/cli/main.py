@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import click
 
-from ..errors import InputError, cause
+from ..errors import InputError, cause, printable
 
 # name: (the module of its function name_command, a line of help). Modules are imported when a command runs: most take
 # numpy, which takes its time
@@ -143,7 +143,7 @@ def _ended_by_signals() -> Iterator[None]:
 def _refuse(text: str, status: int = 2) -> None:
     """Leave with one printable line on standard error."""
     line = " ".join(text.split())
-    print("kickstand: " + "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line), file=sys.stderr)
+    print("kickstand: " + printable(line), file=sys.stderr)
     sys.exit(status)
 
 

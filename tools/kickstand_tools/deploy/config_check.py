@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
 # Of the standard library, those that MicroPython has on a Pico and an ESP32
 _MODULES = set(
-    "array asyncio binascii builtins cmath collections errno gc hashlib heapq io json math os platform random re select "
-    "socket ssl struct sys time zlib __future__".split()
+    "array asyncio binascii builtins cmath collections errno gc hashlib heapq io json math os platform random re "
+    "select socket ssl struct sys time zlib __future__".split()
 )
 LONGEST_S = 60.0  # longest time for a config.py to run, on a busy computer
 

@@ -98,11 +98,12 @@ def connected(port: Port) -> Iterator[tuple[Board, str]]:
         _enter(transport, name)
         yield transport, name
     except TransportExecError as error:
-        if damaged(last_line(error.error_output)):
+        said = last_line(error.error_output)
+        if damaged(said):
             raise InputError(
-                f"{name}: the board's file system is damaged ({last_line(error.error_output)}): erase its flash: {_NUKE}"
+                f"{name}: the board's file system is damaged ({said}): erase its flash: {_NUKE}"
             ) from error
-        raise InputError(f"{name}: the board reports {last_line(error.error_output)}: try again") from error
+        raise InputError(f"{name}: the board reports {said}: try again") from error
     except TransportError as error:
         raise InputError(f"{name}: the board stopped answering: plug it in again, then repeat this") from error
     except OSError as error:
@@ -284,7 +285,7 @@ def _why_silent(name: str, heard: bytes) -> InputError:
         return InputError(f"{name}: the board says that its file system is damaged: erase its flash: {_NUKE}")
     lower = text.lower()
     said = next((line.strip() for line in reversed(text.splitlines()) if line.strip().strip("\0\ufffd>")), "")
-    words = f"the board prints {ascii(said[:_LONGEST_WORDS])}: " if said else ""
+    words = f"the board prints {said[:_LONGEST_WORDS]!a}: " if said else ""
     if any(mark in lower for mark in _CRASHES):
         return InputError(f"{name}: {words}its MicroPython crashes: erase its flash: {_NUKE}")
     if any(mark in lower for mark in _WATCHDOG):

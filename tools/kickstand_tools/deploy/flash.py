@@ -38,8 +38,9 @@ class InstallResult:
 @dataclass(frozen=True)
 class FlashResult:
     """board: its name and version of MicroPython.  port: its name.  config: the config.py that was checked to be
-    copied, or None.  others: a line for each file of another project that was kept under another name.  unused: settings in the rider's config.py that are behind a '#'.  why_sources: why the firmware
-    was not compiled, or None.  installed: the files."""
+    copied, or None.  others: a line for each file of another project that was kept under another name.  unused:
+    settings in the rider's config.py that are behind a '#'.  why_sources: why the firmware was not compiled, or None.
+    installed: the files."""
 
     board: str
     port: str

@@ -44,6 +44,9 @@ def read_mapped(file: RecordingFile, columns: Mapping[str, str], units: Mapping[
     _check_keys(columns, units)
     sheet = read_sheet(file, header_line(file, columns))
     places = {key: _place(sheet, key, wanted) for key, wanted in columns.items()}
+    for key, place in places.items():
+        if same := [other for other in places if other != key and places[other] == place]:
+            raise InputError(f"{key} and {same[0]} are both column {sheet.columns[place]}: give each its own column")
     _check_units(sheet, places, units)
     t_unit = units.get("t") or unit_in(sheet.columns[places["t"]])
     t_unit = time_unit(sheet.cells[places["t"]], t_unit if unit(t_unit) in TIMES else "")
