@@ -11,6 +11,7 @@ import machine
 
 from . import settings
 from .board import port
+from .board.display import STOPPED
 from .devices import open_button, open_lcd, open_sensor
 from .errors import LiveError, SettingsError, report, tried
 from .units import __version__
@@ -21,8 +22,8 @@ CHARGE_MS = 100
 # list repeats the import statements, because MicroPython has no hook between imports; a test compares both.
 STEPS = (
     "calibration.parameters calibration.store calibration.active calibration.transform lean.bike_model lean.kalman "
-    "lean.measurements lean.rest lean.upright_trim lean.lean_filter lean.meter ui.messages ui.pages ui.page_ring "
-    "ui.screen rides.recording"
+    "lean.measurements lean.rest lean.upright_trim lean.dive lean.lean_filter lean.meter ui.messages ui.pages "
+    "ui.page_ring ui.screen rides.recording"
 ).split()
 
 
@@ -64,6 +65,8 @@ def main():
             pass
     except KeyboardInterrupt:
         port.rest_watchdog()
+        if lcd:
+            lcd.end(*STOPPED)
         print("Kickstand stopped. Ctrl-D starts it again; import kickstand; kickstand.status() reports how it is.")
 
 

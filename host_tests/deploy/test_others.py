@@ -1,4 +1,4 @@
-"""A used board: files of another project are kept, and a config.py that would stop the firmware is refused."""
+"""A used board: other projects' files are named and kept; a config.py that would stop the firmware is refused."""
 
 import sys
 

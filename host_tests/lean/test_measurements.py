@@ -3,7 +3,7 @@
 The figures that the variances come to are those of test_known_ride.py.
 """
 
-from math import degrees, radians, sin
+from math import cos, degrees, radians, sin
 
 from bike_motion import near
 from kickstand.lean import measurements
@@ -113,3 +113,17 @@ def test_at_rest_there_is_no_speed_the_rates_are_bias_and_the_force_is_the_verti
         assert state == PITCH
         near(factor, 0.99863, 1e-5)
         near(forward[1], 0.06 - sin(radians(3.0)), 1e-6)
+
+
+def test_the_springs_pitch_is_taken_off_the_forces_of_a_bike_that_leans():
+    at = {"lean_deg": 30.0, "speed_mps": 15.0}
+    left, up = measurements.forces(model(**at)[1], STILL, 0.0, 0.0, 0.1)
+    near(left[1], 0.1 * sin(radians(30.0)), 1e-7)
+    near(up[1], 0.1 * cos(radians(30.0)), 1e-7)
+
+
+def test_pitching_makes_the_force_to_the_left_of_a_leaning_bike_less_certain():
+    pitching = {"speed_mps": 15.0, "rates": (radians(-5.0), 0.0, 0.0)}
+    near(forces(pitching)[0][2], forces()[0][2], 1e-12)
+    leaning = forces({"lean_deg": 30.0, "speed_mps": 15.0})[0][2]
+    assert forces({"lean_deg": 30.0, **pitching})[0][2] > leaning + 1e-3

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.simulation.physics.mount import MOUNTS, Holder
 from kickstand_tools.simulation.physics.road import CLASSES
 from kickstand_tools.simulation.ride import ride
@@ -88,3 +89,13 @@ def test_simulated_roads_reach_what_a_real_motorcycle_meets():
     calm, rough = (of_simulated("street", 0, 100.0, road, None)[QUANTITIES[0]] for road in "CD")
     assert len(calm) == len(BANDS_HZ)
     assert calm[3] < 0.151 and rough[3] > 0.078
+
+
+def test_a_dive_that_is_set_is_that_of_the_ride():
+    """The same ride otherwise. The springs turn the sensor; the road under the wheels stays."""
+    soft, stiff = (ride("track", 3, 60.0, dive=dive) for dive in ((6.0, 3.0), (0.0, 0.0)))
+    assert np.array_equal(soft.truth["slope_deg"], stiff.truth["slope_deg"])
+    push = np.gradient(soft.truth["speed_mps"]) * soft.rate_hz / STANDARD_GRAVITY
+    nose = soft.truth["pitch_deg"] - stiff.truth["pitch_deg"]
+    for part, per_g in ((push < -0.25, 6.0), (push > 0.25, 3.0)):
+        assert nose[part] @ push[part] / (push[part] @ push[part]) == pytest.approx(per_g, rel=0.15)

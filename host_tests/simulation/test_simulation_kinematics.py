@@ -124,3 +124,12 @@ def test_wind_from_the_left_leans_a_straight_ride_to_the_left():
     rolled = physics.roll(command, Bike(), np.zeros_like(command.time))
     assert np.degrees(rolled.balance[3000]) == pytest.approx(-np.degrees(np.arctan(0.5 / STANDARD_GRAVITY)))
     assert abs(rolled.yaw_rate[3000]) < 1e-6
+
+
+def test_braking_lowers_the_nose_and_acceleration_raises_it():
+    bike = Bike(dive_deg_per_g=4.0, squat_deg_per_g=1.5)
+    for g, nose_deg in ((-0.5, -2.0), (0.5, 0.75)):
+        push = np.where(np.arange(8000) > 1000, g * STANDARD_GRAVITY, 0.0)
+        assert np.degrees(bike.dive(push, RATE)[3000]) == pytest.approx(nose_deg, abs=0.01)
+    rising = Bike(dive_deg_per_g=-1.0)
+    assert rising.dive(np.full(8000, -0.5 * STANDARD_GRAVITY), RATE)[4000] > np.radians(0.49)

@@ -1,11 +1,11 @@
 """The error for input that cannot be used, and parts of its text."""
 
-import importlib.metadata
-import re
 import sys
 
 from . import firmware_path
 from .remedies import COMMANDS, Remedies
+
+DISTRIBUTION = "kickstand-lean"  # as in pyproject.toml; a package "kickstand" is another project's
 
 
 class InputError(Exception):
@@ -40,16 +40,9 @@ def printable(text: str) -> str:
 def extra(name: str) -> str:
     """How to install an optional part of the project.
 
-    From a checkout with -e, because otherwise a copy would replace the checkout, and `kickstand flash` would take the
-    copy's firmware. Of an installed copy the packages are named: on a package registry `kickstand` is another project.
+    From a checkout with -e and its path, because otherwise a copy would replace the checkout, and `kickstand flash`
+    would take the copy's firmware.
     """
     if firmware_path.installed():
-        return f"{sys.executable} -m pip install {' '.join(_packages(name))}"
-    return f'in the project\'s directory, {sys.executable} -m pip install -e ".[{name}]"'
-
-
-def _packages(name: str) -> list[str]:
-    """What an optional part needs, as the installed package states it."""
-    marker = re.compile(r"""extra\s*==\s*['"]""" + re.escape(name) + r"""['"]""")
-    stated = importlib.metadata.requires("kickstand") or []
-    return [f'"{one.partition(";")[0].strip()}"' for one in stated if marker.search(one.partition(";")[2])]
+        return f'{sys.executable} -m pip install "{DISTRIBUTION}[{name}]"'
+    return f'{sys.executable} -m pip install -e "{firmware_path.TOOLS.parent}[{name}]"'

@@ -20,13 +20,16 @@ Equations, with ' for the derivative by time
     rotation, exact          t' = w_z - tan q (w_x sin t + w_y cos t)                  (1)
                              q' = w_y sin t - w_x cos t                                (2)
     wheels do not slide      v' = g (f_z - sin q) + v w_y psi                          (3)
-                             f_x = cos q sin t + (v w_y + psi v' - h cos t w_z') / g   (4)
-                             f_y = cos q cos t - (v w_x + h w_z^2) / g                 (5)
+                             f_x = cos q sin t + (v (w_y - d sin t) + psi v' - h cos t w_z') / g   (4)
+                             f_y = cos q cos t - (v (w_x + d cos t) + h w_z^2) / g                 (5)
     roads are level          0 = q + psi sin t  on average                             (6)
     lean of the bike itself  t - psi cos t (q + psi sin t)                             (7)
 
 t and q are those of the sensor's axes, which psi has turned: they share in the bike's own pitch, q + psi sin t. On a
 slope of 10 % a yaw error of 5 degrees makes half a degree of lean.
+
+d is the part of the pitch rate q' that is the springs' and not the road's: the wheels do not rise with it. Braking
+explains most of it; dive.py has (8).
 
 h is the height of the sensor above the roll axis. (4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a
 steady turn (4) and (5) cannot separate lean from speed, because their derivatives by lean and by speed are in the same
@@ -64,8 +67,8 @@ def predict(x, force, rate, seconds, sums):
 
     sums (9 values) grows by the sample's values. Divided by the number of samples at the end of a window (the samples
     of a fifth of a second, which make one update of the filter) they are the window's means:
-        0       innovation of (4) without its term in h, at the state before the step, in g
-        1       innovation of (5) without its term in h, at the same state, in g
+        0       innovation of (4) without its terms in h and d, at the state before the step, in g
+        1       innovation of (5) without its terms in h and d, at the same state, in g
         2 to 4  corrected rates about left, up, forward, in rad/s
         5 to 7  force left, up, forward, in g
         8       square of innovation 0, in g^2
@@ -186,7 +189,8 @@ class Linearisation:
         )
         self.sin_lean, self.cos_lean, self.sin_pitch, self.cos_pitch = st, ct, sq, cq
         self.speed, self.yaw_rate, self.sideways = speed, yaw_rate, sideways
-        self.pitching = per_rate * (wy * st - wx * ct)  # speed x pitch rate, in g
+        self.pitch_rate = wy * st - wx * ct
+        self.pitching = per_rate * self.pitch_rate  # in g
 
     def lean_by_pitch(self, x):
         """(7): the part of the state's lean, rad, that is the bike's own pitch, which the yaw error shows as lean."""

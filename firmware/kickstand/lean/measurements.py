@@ -11,7 +11,7 @@ Standing still and the trim have their own parameters in rest.py and upright_tri
 from math import radians
 
 from ..units import STANDARD_GRAVITY
-from .bike_model import BIAS_LEFT, LEAN, PITCH, SPEED, YAW_ERROR
+from .bike_model import BIAS_LEFT, LEAN, PITCH, SCALE_LEFT, SPEED, YAW_ERROR
 
 # Symbol = default  # unit: what it is. "Larger:" says what raising it does.
 
@@ -33,6 +33,31 @@ SIGMA_START = (
     0.014,  # ratio: forward axis' reading of a rate about up
     0.014,  # ratio: scale error of the forward axis
 )
+# Where the readings do not fit any more (consistency.py) the filter restarts, first with the speed and with the
+# sensor's errors as they were REMEMBER_S to twice as long ago, then with nothing kept.
+REMEMBER_S = 10.0  # s. Larger: less of what came before the doubt is remembered, and it is older.
+SIGMA_GOOD_BIAS = radians(0.6)  # rad/s: of a bias that is remembered. Larger: one that has changed is found sooner.
+GOOD_SHARE = 0.7  # ratio: of SIGMA_START, for the other errors that are remembered. Larger: as above.
+SIGMA_GOOD_SPEED = 3.0  # m/s: added to the speed's standard deviation. Larger: less is kept of the speed.
+SIGMA_DOUBT_BIAS = radians(
+    2.5
+)  # rad/s: of a bias of which nothing is known. Larger: as SIGMA_START, a stepped one sooner.
+# rad: a lean that no bike has, where the force does not show it for so many seconds. Larger: a filter that has gone
+# astray restarts later.
+IMPOSSIBLE_LEAN = radians(80.0)
+IMPOSSIBLE_S = 1.0
+# A bike whose measured speed is above the first does not stand, for so many seconds.
+MOVING_SPEED = 2.0  # m/s. Larger: slow riding on a smooth road is taken for rest.
+MOVING_S = 2.5  # s. Larger: a stop is detected later.
+# A bike is in balance above this speed, if it is known so well.
+BALANCE_SPEED = 2.0  # m/s. Larger: a mount that has slipped is seen at fewer speeds.
+SIGMA_BALANCE_SPEED = 12.0  # m/s. Larger: a bike that is pushed about is taken for one that rides.
+MOST_FORWARD = (
+    1.5  # ratio: force forward over force up of a bike. Larger: a board on a table is taken for one that is ill.
+)
+# ratio: change of the gyro's errors with temperature since the six positions have measured them; the data sheet allows
+# 2 % from -40 to 85 C. Larger: what was measured counts for less.
+SIGMA_GYRO_DRIFT = 0.002
 # rad/s: the bias where the pose on the kickstand has just measured it. Larger: after it the lean is shown later.
 SIGMA_FRESH_BIAS = radians(0.2)
 # rad: the first lean's standard deviation where the bike moves. Larger: lean is shown later, and follows forces more.
@@ -53,8 +78,8 @@ SIGMA_LOST_FORCE = 0.3  # g: likewise for the forward force. Larger, both: after
 # Measurement noise while riding
 SIGMA_LEFT = 0.04  # g: force to the left. Larger: lean follows it less, and the gyro and level roads more.
 SIGMA_UP = 0.07  # g: upward force, which bumps disturb. Larger: in held turns scale errors are found later.
-# times speed x pitch rate / g: noise of the upward force (1 sigma), because the springs pitch the bike while its wheels
-# do not rise. Larger: braking disturbs less.
+# times speed x pitch rate / g: noise of the upward force (1 sigma), and times sin(lean) that of the force to the left,
+# because the springs pitch the bike while its wheels do not rise. Larger: braking disturbs less.
 PITCHING_SHARE = 2.0
 # ratio: part of the samples' variance by vibration that stays in a window's mean, and is added to the noise of the
 # force to the left. Larger: forces count less on rough roads.
@@ -99,21 +124,43 @@ SIGMA_TRIM_SPEED = 8.0  # m/s
 SIGMA_TRIM_LEAN = radians(1.4)  # rad
 
 
-def forces(model, means, roll_acceleration, force_error):
+def gyro_variances(sigma, r):
+    """The priors' variances of the last five states where the six positions have measured the gyro, else None.
+
+    sigma (9): standard errors of the entries of its matrix in the sensor's axes, taken as independent, or zeros. r (9):
+    vehicle_from_sensor."""
+    if not any(sigma):
+        return None
+
+    def variance(i, j):
+        """Of the reading of axis i of a rate about axis j, of the vehicle."""
+        total = SIGMA_GYRO_DRIFT**2
+        for a in range(3):
+            for b in range(3):
+                total += (r[3 * i + a] * r[3 * j + b] * sigma[3 * a + b]) ** 2
+        return total
+
+    found = variance(0, 0) + variance(1, 1), variance(0, 1), variance(2, 0), variance(2, 1), variance(2, 2)
+    return [min(found[k], SIGMA_START[SCALE_LEFT + k] ** 2) for k in range(5)]
+
+
+def forces(model, means, roll_acceleration, force_error, dive=0.0):
     """Two measurements: the force to the left, (4), and up, (5). roll_acceleration: rad/s^2. force_error:
-    relative error of the accelerometer's magnitude, as found at rest."""
+    relative error of the accelerometer's magnitude, as found at rest. dive: see Dive.update(), in g."""
     rolling = roll_acceleration / STANDARD_GRAVITY  # g in a metre of height, as is square below
     uncertain = SIGMA_ROLL_HEIGHT_M * rolling
     left = means[0]
     shaken = max(0.0, means[8] - left * left)
-    left_variance = SIGMA_LEFT**2 + SHAKEN_SHARE * shaken + uncertain**2
-    left += ROLL_HEIGHT_M * rolling * model.cos_lean
+    # Where the springs pitch the bike its wheels do not rise: v times that pitch rate is no acceleration. dive is the
+    # part of it that braking explains, (8); the rest is noise.
+    pitching = PITCHING_SHARE * model.pitching
+    sideways = pitching * model.sin_lean
+    left_variance = SIGMA_LEFT**2 + SHAKEN_SHARE * shaken + uncertain**2 + sideways * sideways
+    left += ROLL_HEIGHT_M * rolling * model.cos_lean + dive * model.sin_lean
     # In a held turn the upward force, 1 / cos(lean), makes the lean observable whatever the gyro's scale factor. One
     # window tells little, a minute tells much, as long as no error of this force keeps its sign.
     square = means[4] * means[4] / STANDARD_GRAVITY
-    up = means[1] + ROLL_HEIGHT_M * square - force_error * means[6]
-    # Where the springs pitch the bike its wheels do not rise: v w_x is no acceleration then.
-    pitching = PITCHING_SHARE * model.pitching
+    up = means[1] + ROLL_HEIGHT_M * square - force_error * means[6] + dive * model.cos_lean
     up_variance = (
         SIGMA_UP**2 + pitching * pitching + SIGMA_ROLL_HEIGHT_M**2 * square * square + (uncertain * model.sin_lean) ** 2
     )

@@ -110,7 +110,8 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None):
     yaw_rate = np.where(v > 0.5, (falling - G * np.tan(balance)) / np.maximum(v, 3.0), 0.0)
     steep = chance.uniform(1.5, 4.0) if kind == "hills" else chance.uniform(0.3, 1.5)
     slope = np.radians(steep) * _noise(chance, n, chance.uniform(4.0, 10.0)) * riding
-    dive = np.radians(chance.uniform(0.15, 0.4)) * np.gradient(v) * FINE_HZ
+    chance.uniform(0.15, 0.4)  # once the dive's: without it a seed would give another ride
+    dive = _dive(np.random.default_rng([seed, 25]), np.gradient(v) * FINE_HZ / G)
     dive = _through(dive, *_spring(chance.uniform(1.4, 2.2), chance.uniform(0.35, 0.6)))
     low, high = ROUGH.get(kind, USUALLY_ROUGH)
     wheelbase = chance.uniform(1.3, 1.55)
@@ -129,6 +130,13 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None):
         calibrations.append(calibration)
     step = FINE_HZ // 200
     return DrawnRide(logs, calibrations, time[::step], np.degrees(chassis[::step]), v[::step], kind, used)
+
+
+def _dive(chance, push):
+    """Pitch (rad, nose up) by the springs at a forward acceleration (g): a fork dives by up to 6 degrees per g and a
+    rear sits down by up to half as much; one fork of eight is an anti-dive one, which rises a little."""
+    braking = chance.uniform(-1.0, 0.5) if chance.random() < 0.125 else chance.uniform(0.0, 6.0)
+    return np.radians(np.where(push < 0.0, braking, chance.uniform(0.0, 3.0))) * push
 
 
 def _device(chance, mount, force, rates, v, engine, turns):

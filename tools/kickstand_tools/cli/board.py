@@ -1,4 +1,4 @@
-"""The commands of `kickstand` that talk to a board: flash, status, pull, record."""
+"""The commands of `kickstand` that talk to a board: flash, status, check, pull, record."""
 
 import contextlib
 import sys
@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from .. import firmware_path
+from ..deploy.check import check, verdict
 from ..deploy.connection import Progress, status
 from ..deploy.flash import flash
 from ..errors import InputError
@@ -66,9 +67,22 @@ def _agree(lines: list[str]) -> None:
 
 @click.command()
 @PORT
-def status_command(port: str | None) -> None:
+@click.option("--wirings", is_flag=True, help="Show each LCD_WIRING on a character display that stays blank.")
+def status_command(port: str | None, wirings: bool) -> None:
     """Ask a board how it is: versions, settings, sensor, display, calibration."""
-    echo(status(port))
+    echo(status(port, wirings))
+
+
+@click.command()
+@PORT
+def check_command(port: str | None) -> None:
+    """Measure a board and all that is wired to it, each figure with its limit, in two minutes.
+
+    The sensor must lie still. Exit status 1: something is not as it should be."""
+    checked = check(port, echo)
+    echo(verdict(checked.findings))
+    if checked.faults:
+        raise click.exceptions.Exit(1)
 
 
 @click.command()

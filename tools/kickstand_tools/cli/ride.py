@@ -16,7 +16,7 @@ from ..analysis.overview import Overview, overview
 from ..analysis.plot import plot
 from ..analysis.report import as_data, page
 from ..analysis.ride import Ride, open_ride
-from ..calibration.file import calibration_beside, calibration_path, read_calibration
+from ..calibration.file import CalibrationFile, calibration_beside, calibration_path, read_calibration
 from ..errors import InputError
 from ..estimation.alignment import fit_ride
 from ..estimation.smooth import smooth_to_csv
@@ -52,8 +52,9 @@ from . import common
 @common.from_to("Seconds from the start; negative: from the end.", "The same, for the end.")
 @common.RIGHT_HANDED
 @common.help_adds(
-    f"Known: {', '.join(NAMES)}. Any other table of accelerations (with gravity) and rates of rotation needs --columns "
-    "and --units."
+    f"Known: {', '.join(NAMES)}. Of any other table of accelerations (with gravity) and rates of rotation, columns and "
+    "units are found from its values; what is not certain is asked for, with the --columns and --units to type. "
+    "Raw counts of a sensor have the unit counts, or counts/131 for 131 counts per deg/s."
 )
 def import_command(
     source: Path, out: Path, columns: str | None, units: str | None, from_s: float | None, to_s: float | None
@@ -65,6 +66,7 @@ def import_command(
         found = import_recording(source, named, _pairs(units or "", "--units"), from_s, to_s)
         write_imported(out, found)
     Console().print(_import_table(found))
+    common.print_lines(f"{taken.quantity}: {taken.why}" for taken in found.taken if taken.why)
     common.warn(source, found.notices)
     t_s, gaps_s = found.log.t_s, found.gaps_s
     count = "1 gap" if len(gaps_s) == 1 else f"{len(gaps_s)} gaps"
@@ -76,6 +78,8 @@ def import_command(
     if beside.exists():
         common.echo(f"{beside} belongs to an earlier ride.")
         common.echo("If the sensor has been moved since, recalibrate: kickstand calibrate ride")
+    elif found.shortfalls:
+        common.warn(source, found.shortfalls)
     elif not any(notice.code in WRONG_AXES for notice in found.notices):
         common.echo(f"next: kickstand calibrate ride {out} --out {beside}")
         common.echo(f"      kickstand report {out}")
@@ -141,7 +145,7 @@ def compare_command(
 
 
 @click.command()
-@common.file_argument("ride", "LOG.csv")
+@common.ride_or_export
 @common.CALIBRATION
 @common.STRETCH
 @click.option("--engine", type=click.Choice(["cpython", "micropython", "rp2040"]), default="cpython")
@@ -149,27 +153,28 @@ def compare_command(
 @common.RIGHT_HANDED
 def replay_command(ride: Path, calibration: Path | None, engine: str, out: Path, **stretch: float | None) -> None:
     """Run the firmware's own lean meter over a recorded log."""
-    calibration = _given_or_beside(ride, calibration, out)
-    parameters = read_calibration(calibration)
+    log, parameters = _log_of(ride, calibration, out)
     with Bar("replaying") as bar:
-        count, notices = replay_to_csv(_stretch(ride, **stretch), parameters, engine, out, bar.reach)
+        count, notices = replay_to_csv(_stretch(log, **stretch), parameters, engine, out, bar.reach)
     common.warn(ride, notices)
     if not parameters.aligned:
-        common.warning(f"{calibration} is not aligned: this is the lean of the sensor, not of the bike")
+        common.warning(
+            f"{calibration or calibration_path(ride)} is not aligned: this is the lean of the sensor, not of the bike"
+        )
     common.echo(f"written: {out}, {count} samples")
 
 
 @click.command()
-@common.RIDE
+@common.ride_or_export
 @common.CALIBRATION
 @common.STRETCH
 @common.OUT
 @common.RIGHT_HANDED
 def smooth_command(ride: Path, calibration: Path | None, out: Path, **stretch: float | None) -> None:
     """Find the lean afterwards, from the whole ride, each sample with its standard deviation."""
-    parameters = read_calibration(_given_or_beside(ride, calibration, out))
+    log, parameters = _log_of(ride, calibration, out)
     with Bar("smoothing") as bar:
-        count, notices = smooth_to_csv(_stretch(ride, **stretch), parameters, out, bar.reach)
+        count, notices = smooth_to_csv(_stretch(log, **stretch), parameters, out, bar.reach)
     common.warn(ride, notices)
     common.echo(f"written: {out}, {count} samples")
 
@@ -284,25 +289,49 @@ def overlay_command(
     common.echo(f"written: {out}, {made.pictures} frames, {made.end_s - made.begin_s:.1f} s, {made.fps:g} per second")
 
 
-def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> tuple[Ride, list[Notice]]:
-    """A ride, and notices about its import. What an app has exported is imported and, where no calibration is given or
-    beside it, aligned by itself; a line says so."""
+def _from_export(source: Path, calibration: Path | None) -> tuple[Imported, CalibrationFile] | None:
+    """An app's export or a table, imported, with its calibration: the one given or beside it, else it is aligned by its
+    bends; a line says so. None for anything else, such as a log."""
     found = None
     if not is_log(source):
         with spinner("importing"):
             found = import_of_app(source)
     if found is None:
-        return open_ride(_stretch(source, **stretch), calibration, smoothed=not live), []
+        return None
     said = f"{source}: imported from {found.app}, {len(found.log.t_s)} samples, {found.rate_hz:.0f} a second"
     beside = calibration_path(source)
-    known = calibration or (beside if beside.exists() else None)
-    if known is None:
+    path = calibration or (beside if beside.exists() else None)
+    if path is not None:
+        known = read_calibration(path)
+    else:
         with Bar("aligning") as bar:
             fit = fit_ride(found.log, None, bar.reach)
         known = fit.calibration
         said += f"; aligned by its bends, {common.known_to(fit)}"
     common.echo(said, err=True)
+    return found, known
+
+
+def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> tuple[Ride, list[Notice]]:
+    """A ride, and notices about its import. See _from_export()."""
+    taken = _from_export(source, calibration)
+    if taken is None:
+        return open_ride(_stretch(source, **stretch), calibration, smoothed=not live), []
+    found, known = taken
     return open_ride(_stretch(found.log, **stretch), known, smoothed=not live), found.notices
+
+
+def _log_of(source: Path, calibration: Path | None, out: Path) -> tuple[Path | Log, CalibrationFile]:
+    """A ride's log and its calibration; notices about its import are printed. See _from_export(). Raises InputError
+    without a calibration, and where writing out would fail or destroy an input."""
+    if is_log(source) or source.suffix.lower() == ".json":
+        return source, read_calibration(_given_or_beside(source, calibration, out))
+    check_output(out, [*_inputs(source), *([calibration] if calibration else [])])
+    taken = _from_export(source, calibration)
+    if taken is None:
+        return source, read_calibration(_given_or_beside(source, calibration, out))
+    common.warn(source, taken[0].notices)
+    return taken[0].log, taken[1]
 
 
 def _overview(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> Overview:

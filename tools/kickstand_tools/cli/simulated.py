@@ -43,6 +43,12 @@ def pose_options(pitch_change_deg: float | None, words: str) -> Command:
     "--road", type=click.Choice(list(CLASSES)), help="Roughness by ISO 8608, with camber; if not given, the profile's."
 )
 @click.option("--mount", type=click.Choice(list(MOUNTS)), help="What is wrong with the sensor's mount or its logger.")
+@click.option(
+    "--dive",
+    type=(click.FloatRange(-2.0, 8.0), click.FloatRange(-2.0, 8.0)),
+    metavar="BRAKING ACCELERATING",
+    help="How far the springs pitch the bike, degrees per g; at random, about 3 and 1.4, if not given.",
+)
 @click.option("--speed", is_flag=True, help="Write what a GPS receiver gives into the log: speed, position, time.")
 @click.option(
     "--fleet",

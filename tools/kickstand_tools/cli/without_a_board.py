@@ -75,6 +75,7 @@ def web_command(out: Path | None) -> None:
 @_DISPLAY
 def emulate_command(port: int, chip: str, display: str) -> None:
     """An emulated board on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
+    click.echo("starting: the emulator is being loaded, then the board is switched on, which takes some seconds")
     ready_emulator(chip)
     from ..emulator.emulate import emulate
 
@@ -82,11 +83,12 @@ def emulate_command(port: int, chip: str, display: str) -> None:
 
 
 def ready_emulator(chip: str) -> None:
-    """Find what the emulator of this chip needs, and compile it. To be called before anything of it is imported. Raises
-    InputError where something is missing."""
-    image.find()
+    """Find what this chip's emulator needs and nothing else; compile that of the Pico. Call it before importing the
+    emulator. Raises InputError if something is missing."""
     if chip == "esp32":
         esp32_library.find()
-    else:
-        with spinner("compiling the emulator, once"):
-            native.build()
+        return
+    with spinner(f"downloading {image.URL} into {image.path().parent}"):
+        image.find()
+    with spinner("compiling the emulator, once"):
+        native.build()

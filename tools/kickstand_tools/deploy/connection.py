@@ -225,12 +225,13 @@ def printed(transport: SerialTransport, name: str, code: str, what: str) -> byte
     return output
 
 
-def status(port: Port) -> str:
-    """The output of kickstand.status() on the board, which is restarted afterwards. Raises InputError."""
+def status(port: Port, wirings: bool = False) -> str:
+    """The output of kickstand.status() on the board, which is restarted afterwards. wirings: its display shows each
+    wiring of a backpack. Raises InputError."""
     with connected(port) as (transport, name):
         describe(transport, name)
         try:
-            text = printed(transport, name, "import kickstand\nkickstand.status()", "its status")
+            text = printed(transport, name, f"import kickstand\nkickstand.status({wirings or ''})", "its status")
         finally:
             restart(transport)
     return text.decode(errors="replace").replace("\r\n", "\n").rstrip()

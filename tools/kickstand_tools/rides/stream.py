@@ -5,7 +5,7 @@ import contextlib
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from io import TextIOBase
 
 from kickstand.lean.meter import FALLEN_DEG
 
@@ -60,14 +60,6 @@ class LiveReading:
     seconds: float
 
 
-class Writable(Protocol):
-    """A file of text, as far as Recording needs it."""
-
-    def write(self, text: str, /) -> object:
-        """Write all of the text. Raises OSError."""
-        ...
-
-
 class Recording:
     """Writes blocks to a log. stopped: an event that is set where the log has to end, which ends the stream.  live:
     called with each block's LiveReading.  A log that cannot be written any further ends there, with a note.
@@ -83,7 +75,7 @@ class Recording:
         self.written = False
         self._live = live
 
-    def write(self, file: Writable, blocks: Iterator[Block], notes: list[str]) -> None:
+    def write(self, file: TextIOBase, blocks: Iterator[Block], notes: list[str]) -> None:
         """Write all blocks as they come. notes: gets a line for each gap. Raises InputError if there is no block."""
         missing, expected = 0, 0
         missing_s: list[float] = []

@@ -33,9 +33,9 @@ def simulate(
 ) -> Ride:
     """Simulate a ride of exactly this length and write it to out_dir. conditions: see ride.ride. Raises InputError.
 
-    Logs: POSE_1.csv to POSE_7.csv (the last one slanted), KICKSTAND.csv, UPRIGHT.csv, RIDE.csv. TRUTH.csv has one row
-    for each row of RIDE.csv. A RIDE.cal.json in out_dir is removed. speed: RIDE.csv gets a speed and a position once a
-    second.
+    Logs: POSE_1.csv to POSE_7.csv (the last one slanted), SIX.csv (seven poses in one log, with the turns between
+    them), KICKSTAND.csv, UPRIGHT.csv, RIDE.csv. TRUTH.csv has one row for each row of RIDE.csv. A RIDE.cal.json in
+    out_dir is removed. speed: RIDE.csv gets a speed and a position once a second.
     """
     check_profile(profile)
     directory = Path(out_dir)
@@ -46,6 +46,7 @@ def simulate(
         # It belongs to an earlier ride and another sensor, but report, plot and export would use it for this one
         (directory / "RIDE.cal.json").unlink(missing_ok=True)
         write_poses(directory, made)
+        _write_readings(directory / "SIX.csv", made.procedure, made.rate_hz)
         write_ride(directory / "RIDE.csv", made, speed)
         _write_truth(directory / "TRUTH.csv", made)
     except OSError as error:
@@ -65,8 +66,12 @@ def write_poses(directory: Path, made: Ride) -> tuple[list[Path], Path, Path]:
     seven = [directory / f"POSE_{k}.csv" for k in range(1, 8)]
     pair = directory / "KICKSTAND.csv", directory / "UPRIGHT.csv"
     for path, readings in zip([*seven, *pair], [*made.poses, made.kickstand, made.upright]):
-        _write(path, _LOG, _FORMATS, _log(np.arange(len(readings)) / made.rate_hz, readings))
+        _write_readings(path, readings, made.rate_hz)
     return seven, *pair
+
+
+def _write_readings(path: Path, readings: NDArray, rate_hz: float) -> None:
+    _write(path, _LOG, _FORMATS, _log(np.arange(len(readings)) / rate_hz, readings))
 
 
 def positions(made: Ride) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

@@ -1,12 +1,13 @@
 """Simulates a whole ride from plan, bike, road, engine and chip."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
-from . import poses
+from . import hands, poses
 from .commands import Commands, commands
 from .physics.bike import Bike, roll, weave
 from .physics.chip import DIVIDER, RATE_HZ, Chip
@@ -14,7 +15,7 @@ from .physics.engine import vibration
 from .physics.kinematics import Motion, body_rates, specific_force
 from .physics.mount import MOUNTS, Mount
 from .physics.road import CLASSES, Shaking, add_bumps, profile_slope, shaking
-from .physics.signals import band_noise, second_order, smoothed, smoothstep
+from .physics.signals import band_noise, smoothed, smoothstep
 from .plan import Conditions, Plan
 from .profiles import PROFILES
 
@@ -45,6 +46,14 @@ class Ride:
     chip: Chip
     bike: Bike
     stand_deg: float
+    seed: tuple[int, ...]  # of the procedure
+    home_c: float
+
+    @cached_property
+    def procedure(self) -> NDArray[np.float64]:
+        """(n, 7) at rate_hz: seven other poses, as for `poses`, taken in one go, with the turns between them."""
+        chance = np.random.default_rng(self.seed)
+        return hands.procedure(chance, self.chip, np.array(list(poses.ups(chance))), self.home_c)
 
 
 def ride(
@@ -56,6 +65,7 @@ def ride(
     share: float = 1.0,
     road: str | None = None,
     mount: str | None = None,
+    dive: tuple[float, float] | None = None,
     exact: bool = False,
 ) -> Ride:
     """Simulate a ride of about this length; a profile and a seed always give the same one.
@@ -63,8 +73,9 @@ def ride(
     upright_error_deg: lean of the bike to the right in the upright pose. pitch_change_deg: pitch on the kickstand less
     that in the upright pose; random within 1 degree if None. share: factor on the sensor's tolerances.
     road: a class of ISO 8608 in place of the profile's own road; it is cambered, the rider moves about and the bike
-    slips a little. mount: one of MOUNTS in place of a firm one. exact: exactly this length, where it is enough for
-    setting off and stopping.
+    slips a little. mount: one of MOUNTS in place of a firm one. dive: by how much the springs
+    lower the nose in braking and raise it in acceleration, degrees per g; random, about 3 and 1.4, if None. exact:
+    exactly this length, where it is enough for setting off and stopping.
 
     >>> made = ride("parked", seed=1, seconds=20.0)
     >>> made.rate_hz, len(made.poses), made.readings.shape == (len(made.time), 7)
@@ -77,6 +88,8 @@ def ride(
         plan.fit(seconds)
     bike, chip = Bike.random(chance), Chip.random(chance, share, conditions.drift)
     mounting = random_rotation(chance)
+    if dive is not None:
+        bike = replace(bike, dive_deg_per_g=dive[0], squat_deg_per_g=dive[1])
     # From a source of its own: without them a profile and a seed give the ride that they always gave
     more = np.random.default_rng([seed, *profile.encode(), 1])
     if road is not None:
@@ -128,6 +141,8 @@ def ride(
         chip,
         bike,
         lean,
+        (seed, *profile.encode(), 2),
+        home_c,
     )
 
 
@@ -161,8 +176,7 @@ def _motion(
     for phase, spacing, height, length in conditions.bumps:
         add_bumps(surface, _places(command, phase, spacing), height, length)
     shaken = shaking(chance, command.distance, command.speed, surface, bike, rate)
-    acceleration = np.gradient(command.speed, 1.0 / rate)
-    dive = np.radians(bike.dive_deg_per_mps2) * second_order(acceleration, bike.dive_hz, bike.dive_damping, rate)
+    dive = bike.dive(np.gradient(command.speed, 1.0 / rate), rate)
     motion = Motion(
         rate,
         command.speed,

@@ -1,4 +1,4 @@
-"""`kickstand flash` and `kickstand status` in the browser: their own code on CPython for WebAssembly.
+"""`kickstand flash`, `status` and `check` in the browser: their own code on CPython for WebAssembly.
 page/install/install.mjs runs it. What goes to it is JSON.
 """
 
@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from .. import firmware_path
-from ..deploy import bytecode, config_check, config_text, connection, flash, others
+from ..deploy import bytecode, check as board_check, config_check, config_text, connection, flash, others
 from ..deploy.firmware_files import CONFIG
 from ..errors import InputError
 from .serial_guest import BrowserBoard
@@ -108,6 +108,16 @@ def status(line, name):
         return json.dumps({"text": connection.status(BrowserBoard(line, name))})
     except InputError as error:
         return json.dumps({"refused": str(error)})
+
+
+def check(line, name, say):
+    """`kickstand check` of the board at a SerialLine: {"text"} or {"refused": why}. say(text): each line."""
+    try:
+        checked = board_check.check(BrowserBoard(line, name), say)
+    except InputError as error:
+        return json.dumps({"refused": str(error)})
+    lines = [board_check.line(finding) for finding in checked.findings]
+    return json.dumps({"text": "\n".join([*lines, board_check.verdict(checked.findings)])})
 
 
 def _describe(transport, name):

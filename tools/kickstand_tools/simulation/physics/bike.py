@@ -5,13 +5,13 @@ The line from the contact point to the centre of mass leans by the balance lean 
 tyres touch the road beside their middle.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
 from ..commands import Commands
-from .signals import Signal, band_noise, derivative, smoothed, smoothstep
+from .signals import Signal, band_noise, derivative, second_order, smoothed, smoothstep
 
 _STEERING_S = 0.04  # smoothing of the steering, because its rate is limited
 _WANDER = 0.06  # rms of the lean's changes in a bend, as a share of the lean
@@ -33,14 +33,16 @@ class Bike:
     sensor_height: float = 0.70
     sensor_forward: float = 0.75  # distance of the sensor in front of the rear contact point
     sensor_left: float = 0.0
-    dive_deg_per_mps2: float = 0.3  # the nose dives by 3 degrees at 1 g of braking
+    # Pitch by the springs, as a superbike's suspension sensors show it. Its wheels do not rise meanwhile.
+    dive_deg_per_g: float = 2.8  # nose down in braking, of a telescopic fork; an anti-dive fork has less than 0
+    squat_deg_per_g: float = 1.3  # nose up in acceleration
     dive_hz: float = 1.7
     dive_damping: float = 0.45
     max_curvature: float = 0.4  # 1/m: the steering lock
 
     @staticmethod
     def random(chance: np.random.Generator) -> "Bike":
-        return Bike(
+        bike = Bike(
             mass_height=chance.uniform(0.55, 0.68),
             roll_gyration=chance.uniform(0.22, 0.30),
             tyre_radius=chance.uniform(0.045, 0.075),
@@ -49,10 +51,17 @@ class Bike:
             sensor_height=chance.uniform(0.6, 0.8),
             sensor_forward=chance.uniform(0.4, 1.1),
             sensor_left=chance.uniform(-0.1, 0.1),
-            dive_deg_per_mps2=chance.uniform(0.2, 0.4),
+            dive_deg_per_g=chance.uniform(2.0, 4.0),
             dive_hz=chance.uniform(1.4, 2.1),
             dive_damping=chance.uniform(0.35, 0.6),
         )
+        return replace(bike, squat_deg_per_g=0.46 * bike.dive_deg_per_g)
+
+    def dive(self, acceleration: Signal, rate_hz: float) -> Signal:
+        """Pitch by the springs at a forward acceleration in m/s^2: rad, > 0 nose up."""
+        per_g = np.where(acceleration < 0.0, self.dive_deg_per_g, self.squat_deg_per_g)
+        pushed = np.radians(per_g) * acceleration / STANDARD_GRAVITY
+        return second_order(pushed, self.dive_hz, self.dive_damping, rate_hz)
 
     @property
     def pendulum(self) -> float:

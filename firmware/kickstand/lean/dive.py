@@ -1,0 +1,54 @@
+"""Suspension dive: how far braking and acceleration pitch the bike on its springs, found while riding.
+
+Under braking a telescopic fork dives, under acceleration the rear sits down: on a superbike by 2.8 and 1.3 degrees per
+g. The wheels do not rise meanwhile, so that this pitch rate times the speed is no acceleration. The springs' pitch is
+close to a share of the forward acceleration a, and its rate is
+
+    dive' = share a'                                                                  (8)
+
+Where the road's slope changes and the bike does not brake, the pitch rate has nothing to do with a'. So regression of
+the pitch rate on a' finds the share: sum(a' pitch rate) / sum(a'^2), each sum with a prior.
+"""
+
+from ..units import STANDARD_GRAVITY
+
+# Symbol = default  # unit: what it is. "Larger:" says what raising it does.
+PRIOR_SHARE = 0.026  # rad per g: 1.5 degrees per g. Larger: before the share is found, more pitch counts as dive.
+PRIOR_SQUARE = 5.3  # (g/s)^2: weight of that prior in the sum of a'^2. Larger: the share is found later, and steadier.
+MIN_SHARE = -0.035  # rad per g: anti-dive forks lift the nose a little
+MAX_SHARE = 0.14  # rad per g: 8 degrees per g, as of soft long forks
+MIN_SPEED = 5.0  # m/s. Larger: braking to a stop tells less.
+MAX_JERK = 3.0  # g/s. Larger: bumps and lost readings count as braking.
+
+
+class Dive:
+    """What braking does to the pitch. share (read only): rad per g; nose down in braking > 0. Fixed memory."""
+
+    def __init__(self):
+        self.share = PRIOR_SHARE
+        self._product = PRIOR_SHARE * PRIOR_SQUARE  # sum of a' times the pitch rate
+        self._square = PRIOR_SQUARE  # sum of a'^2
+        self.restart()
+
+    def restart(self):
+        """Forget the last window, because readings were missing. The share stays: it is the bike's."""
+        self._push = None
+        self._pitch_rate = 0.0
+
+    def update(self, push, pitch_rate, speed, seconds):
+        """Take one window: push, the mean of the forward acceleration in g, pitch_rate in rad/s, speed in m/s.
+
+        Returns speed x dive' / g, in g: the acceleration that (4) and (5) would see where there is none.
+        """
+        last_push, last_rate = self._push, self._pitch_rate
+        self._push, self._pitch_rate = push, pitch_rate
+        if last_push is None:
+            return 0.0
+        jerk = (push - last_push) / seconds  # in g/s, from the middle of the last window to the middle of this one
+        if not -MAX_JERK < jerk < MAX_JERK:  # also not-a-number
+            return 0.0
+        if speed > MIN_SPEED:
+            self._product += jerk * 0.5 * (pitch_rate + last_rate)
+            self._square += jerk * jerk
+            self.share = max(MIN_SHARE, min(MAX_SHARE, self._product / self._square))
+        return speed * self.share * jerk / STANDARD_GRAVITY
