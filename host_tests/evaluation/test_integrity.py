@@ -16,7 +16,7 @@ NAMED = {fault.title: fault for fault in FAULTS}
 def trace(error_deg, shown=None, first_s=10.0, end_s=100.0):
     """60 s of riding with an error (600), shown (600) where it says so."""
     n = 600
-    time = np.array(STEP_S * np.arange(n), dtype=np.float64)
+    time = np.linspace(0.0, STEP_S * (n - 1), n)
     shown = np.ones(n, dtype=bool) if shown is None else shown
     true = np.full(n, 20.0)
     return Trace(time, true + error_deg, np.ones(n), shown, true, np.full(n, 15.0), np.nan, first_s, end_s)

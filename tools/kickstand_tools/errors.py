@@ -32,6 +32,11 @@ def cause(error: BaseException) -> str:
     return getattr(error, "strerror", None) or str(error) or type(error).__name__
 
 
+def printable(text: str) -> str:
+    """The text with the codes of characters that would be commands to a terminal, as ESC, in their place."""
+    return "".join(c if c in "\n\t" or c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
 def extra(name: str) -> str:
     """How to install an optional part of the project.
 

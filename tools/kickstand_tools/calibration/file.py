@@ -181,9 +181,18 @@ def read_calibration(source: File) -> CalibrationFile:
     calibration.aligned = data.get("aligned", not np.array_equal(matrix, np.eye(3))) is True
     neutral = not np.any(calibration.accel_offset_g) and bool(np.all(calibration.accel_slope == 1.0))
     calibration.six_done = data.get("six_positions", not neutral) is True
-    calibration.vehicle = data["vehicle"] if data.get("vehicle") in ("car", "motorcycle") else ""
-    calibration.kickstand_side = data["kickstand_side"] if data.get("kickstand_side") in ("left", "right") else ""
+    calibration.vehicle = _one_of(name, data, "vehicle", ("car", "motorcycle"))
+    calibration.kickstand_side = _one_of(name, data, "kickstand_side", ("left", "right"))
     return calibration
+
+
+def _one_of(name: str, data: dict[str, Any], entry: str, words: tuple[str, str]) -> str:
+    """The entry, one of these words; "" without it. Raises InputError for another."""
+    if data.get(entry) in (None, ""):
+        return ""
+    if data[entry] not in words:
+        raise InputError(f"{name}: {entry} is {_shown(data[entry])}: write {' or '.join(words)}, or leave it out")
+    return data[entry]
 
 
 def write_calibration(target: Path | str | IO[str], calibration: CalibrationFile) -> None:

@@ -22,7 +22,7 @@ from ..logs.reader import read_log
 from ..output import check_output
 from ..progress import Bar
 from ..refusals import OPPOSITE_SIGN, sentence
-from .common import OUT, PATH, RIGHT_HANDED, VEHICLES, file_argument, known_to, print_lines, warn
+from .common import OUT, PATH, RIGHT_HANDED, VEHICLES, echo, file_argument, known_to, print_lines, warn
 
 
 @click.group(no_args_is_help=False)
@@ -110,7 +110,7 @@ def ride(log: Path, phone: str | None, out: Path) -> None:
 
 def _write(out: Path, calibration: CalibrationFile) -> None:
     write_calibration(out, calibration)
-    click.echo(f"written: {out}")
+    echo(f"written: {out}")
 
 
 def _six_lines(found: SixPositions) -> Iterable[str]:

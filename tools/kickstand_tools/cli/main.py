@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import click
 
-from ..errors import DISTRIBUTION, InputError, cause
+from ..errors import DISTRIBUTION, InputError, cause, printable
 from . import added
 
 # name: (the module of its function name_command, a line of help). Modules are imported when a command runs: most take
@@ -137,7 +137,7 @@ def _ended_by_signals() -> Iterator[None]:
 def _refuse(text: str, status: int = 2) -> None:
     """Leave with one printable line on standard error."""
     line = " ".join(text.split())
-    print("kickstand: " + "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line), file=sys.stderr)
+    print("kickstand: " + printable(line), file=sys.stderr)
     sys.exit(status)
 
 

@@ -71,19 +71,19 @@ def import_command(
     t_s, gaps_s = found.log.t_s, found.gaps_s
     count = "1 gap" if len(gaps_s) == 1 else f"{len(gaps_s)} gaps"
     gaps = f", {count} of {gaps_s.sum():.1f} s in all" if len(gaps_s) else ""
-    click.echo(f"written: {out}, {len(t_s)} samples in {t_s[-1]:.1f} s, {found.rate_hz:.0f} a second{gaps}")
+    common.echo(f"written: {out}, {len(t_s)} samples in {t_s[-1]:.1f} s, {found.rate_hz:.0f} a second{gaps}")
     if found.vehicle_axes:
-        click.echo("x is left, y up, z forward, as far as the logger was mounted so")
+        common.echo("x is left, y up, z forward, as far as the logger was mounted so")
     beside = calibration_path(out)
     if beside.exists():
-        click.echo(f"{beside} belongs to an earlier ride.")
-        click.echo("If the sensor has been moved since, recalibrate: kickstand calibrate ride")
+        common.echo(f"{beside} belongs to an earlier ride.")
+        common.echo("If the sensor has been moved since, recalibrate: kickstand calibrate ride")
     elif found.shortfalls:
         common.warn(source, found.shortfalls)
     elif not any(notice.code in WRONG_AXES for notice in found.notices):
-        click.echo(f"next: kickstand calibrate ride {out} --out {beside}")
-        click.echo(f"      kickstand report {out}")
-        click.echo(f"      kickstand plot {out} --out plots")
+        common.echo(f"next: kickstand calibrate ride {out} --out {beside}")
+        common.echo(f"      kickstand report {out}")
+        common.echo(f"      kickstand plot {out} --out plots")
 
 
 @click.command()
@@ -105,9 +105,9 @@ def join_command(ride: Path, track: Path, out: Path) -> None:
     with Bar("writing") as bar:
         count = write_joined(out, joined, bar.reach)
     common.print_lines(_joined_lines(joined))
-    click.echo(f"written: {out}, {count} positions")
+    common.echo(f"written: {out}, {count} positions")
     if calibration_path(ride).is_file() and not calibration_path(out).exists():
-        click.echo(f"next: kickstand report {out} --calibration {calibration_path(ride)}")
+        common.echo(f"next: kickstand report {out} --calibration {calibration_path(ride)}")
 
 
 @click.command()
@@ -138,7 +138,7 @@ def compare_command(
         with whole_file(picture) as path:
             agreement.draw(path, found)
     if as_json:
-        click.echo(json.dumps(found.as_data()))
+        common.echo(json.dumps(found.as_data()))
     else:
         common.print_lines(agreement.words(found))
         common.print_lines([f"written: {picture}"] if picture is not None else [])
@@ -161,7 +161,7 @@ def replay_command(ride: Path, calibration: Path | None, engine: str, out: Path,
         common.warning(
             f"{calibration or calibration_path(ride)} is not aligned: this is the lean of the sensor, not of the bike"
         )
-    click.echo(f"written: {out}, {count} samples")
+    common.echo(f"written: {out}, {count} samples")
 
 
 @click.command()
@@ -176,7 +176,7 @@ def smooth_command(ride: Path, calibration: Path | None, out: Path, **stretch: f
     with Bar("smoothing") as bar:
         count, notices = smooth_to_csv(_stretch(log, **stretch), parameters, out, bar.reach)
     common.warn(ride, notices)
-    click.echo(f"written: {out}, {count} samples")
+    common.echo(f"written: {out}, {count} samples")
 
 
 @click.command()
@@ -193,7 +193,7 @@ def export_command(ride: Path, form: str, calibration: Path | None, live: bool, 
     with Bar("exporting") as bar:
         count = export(opened, form, out, bar.reach, notices)
     common.warn(ride, notices)
-    click.echo(f"written: {out}, {count} rows")
+    common.echo(f"written: {out}, {count} rows")
 
 
 @click.command()
@@ -207,7 +207,7 @@ def report_command(ride: Path, calibration: Path | None, live: bool, as_json: bo
     """Summarise a ride on one page: maxima, time at large leans, and each stop evaluated as a brake test."""
     seen = _overview(ride, calibration, live, **stretch)
     if as_json:
-        click.echo(json.dumps(as_data(seen)))
+        common.echo(json.dumps(as_data(seen)))
     else:
         Console().print(page(seen))
 
@@ -244,7 +244,7 @@ def cut_command(log: Path, from_s: float | None, to_s: float | None, out: Path) 
     with Bar("cutting") as bar:
         count, seconds = cut_log(log, out, from_s, to_s, bar.reach, notices)
     common.warn(log, notices)
-    click.echo(f"written: {out}, {count} samples, {seconds:.1f} s")
+    common.echo(f"written: {out}, {count} samples, {seconds:.1f} s")
 
 
 @click.command()
@@ -282,11 +282,11 @@ def overlay_command(
         made = overlay(ride, out, calibration, video, fps=rate, progress=bar.reach, **options)
     common.warn(ride, made.notices)
     if made.correlation is not None:
-        click.echo(
+        common.echo(
             f"the video begins at {made.offset_s:.2f} s of the ride, as the camera's gyro has it (correlation "
             f"{made.correlation:.2f}): --offset {made.offset_s:.2f}"
         )
-    click.echo(f"written: {out}, {made.pictures} frames, {made.end_s - made.begin_s:.1f} s, {made.fps:g} per second")
+    common.echo(f"written: {out}, {made.pictures} frames, {made.end_s - made.begin_s:.1f} s, {made.fps:g} per second")
 
 
 def _from_export(source: Path, calibration: Path | None) -> tuple[Imported, CalibrationFile] | None:
@@ -308,7 +308,7 @@ def _from_export(source: Path, calibration: Path | None) -> tuple[Imported, Cali
             fit = fit_ride(found.log, None, bar.reach)
         known = fit.calibration
         said += f"; aligned by its bends, {common.known_to(fit)}"
-    click.echo(said, err=True)
+    common.echo(said, err=True)
     return found, known
 
 

@@ -13,7 +13,7 @@ from ..emulator import esp32_library, image, native
 from ..output import check_directory
 from ..progress import spinner
 from ..web import serve, site
-from .common import CHIP, PATH, file_argument
+from .common import CHIP, PATH, echo, file_argument
 
 _HAND = click.option("--hand", is_flag=True, help="Lean the bike and press the button yourself, with keys.")
 _CPYTHON = click.option("--cpython", is_flag=True, help="Run the firmware on CPython, not on MicroPython.")
@@ -45,7 +45,7 @@ def _demo(**chosen: Any) -> None:
     try:
         demo(**chosen)
     except DeviceStopped as error:
-        click.echo(str(error), err=True)
+        echo(str(error), err=True)
         sys.exit(1)
 
 
@@ -59,11 +59,11 @@ def web_command(out: Path | None) -> None:
         files = site.site_files()
     if out is not None:
         site.write_site(files, out)
-        click.echo(f"written: {out}, {len(files)} files for a web server: opened as files they do not run")
+        echo(f"written: {out}, {len(files)} files for a web server: opened as files they do not run")
         return
     with serve.server(files) as server:
         address = f"http://{serve.HOST}:{server.server_address[1]}/"
-        click.echo(f"Kickstand in the browser: {address} (Ctrl-C ends it)")
+        echo(f"Kickstand in the browser: {address} (Ctrl-C ends it)")
         webbrowser.open(address)
         with contextlib.suppress(KeyboardInterrupt):
             server.serve_forever()

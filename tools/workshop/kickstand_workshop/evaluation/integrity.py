@@ -197,7 +197,7 @@ def trace_of(
     shape = (turns, TURN, 3)
     force = force[: turns * TURN].reshape(shape).mean(axis=1).tolist()
     rate = np.radians(rate[: turns * TURN]).reshape(shape).mean(axis=1).tolist()
-    lost = np.any(lost[: turns * TURN].reshape(turns, TURN), axis=1)
+    lost = np.any(lost[: turns * TURN].reshape(turns, TURN), axis=1).tolist()
     last = np.arange(1, turns + 1) * TURN - 1
     late = round(GPS_LATE_S * rate_hz)
     replay = Replay(calibration.to_firmware(), delay_s=calibration.delay_s())

@@ -166,10 +166,9 @@ def draw(path: Path, outcomes: list[Outcome]) -> None:
     axes = figure.subplots(1, 2, squeeze=False)[0]
     errors = [f"{low:g}-{high:g}" for low, high in pairwise(ERROR_EDGES)]
     wrong = int(np.searchsorted(ERROR_EDGES, WRONG_DEG))
-    image = None
     for axis, faulty in zip(axes, (False, True)):
         shares = 100.0 * diagram(outcomes, faulty)
-        image = axis.pcolormesh(np.where(shares > 0.0, shares, np.nan), norm=LogNorm(1e-3, 100.0), cmap="Blues")
+        axis.pcolormesh(np.where(shares > 0.0, shares, np.nan), norm=LogNorm(1e-3, 100.0), cmap="Blues")
         for (row, column), share in np.ndenumerate(shares):
             if share > 0.0:
                 colour = "white" if share > 3.0 else "black"
@@ -185,8 +184,7 @@ def draw(path: Path, outcomes: list[Outcome]) -> None:
         axis.set(
             title=f"{title}, % of the riding", xlabel="error of the lean, degrees", ylabel="claimed sigma, degrees"
         )
-    assert image is not None
-    figure.colorbar(image, ax=axes)
+    figure.colorbar(axes[0].collections[0], ax=axes)
     figure.savefig(path, dpi=100)
 
 
