@@ -224,7 +224,7 @@ class LeanFilter:
         self._inject(model)
 
     def _update_ride(self, model, means, seconds, roll_acceleration):
-        """A generator: update with the window's forces, the level road, and the measured speed; without one with
+        """A generator: update with the window's forces, the level road, and the measured speed; without a new one with
         straight_or_prior_speed(). Update the trim where speed and lean are certain enough."""
         p, x = self._p, self._x
         dive = self.dive.update(means[7] - model.sin_pitch, model.pitch_rate, model.speed, seconds)
@@ -233,11 +233,13 @@ class LeanFilter:
         yield from p.update(*measurements.level_road(model, x, seconds))
         lean, speed, measured = x[LEAN] - self._upright, x[SPEED], self._speed
         self._speed_s += seconds
-        if measured is not None:
+        if measured is not None and (self._last_speed is None or self._speed_s > measurements.MEASURED_SPEED_EVERY_S):
             # From the measured speeds alone: a pitch error would bias the estimated acceleration.
-            acceleration = 0.0 if self._last_speed is None else (measured - self._last_speed) / self._speed_s
+            acceleration, since = 0.0, 2 * measurements.MEASURED_SPEED_S  # of the first: its errors count once
+            if self._last_speed is not None:
+                acceleration, since = (measured - self._last_speed) / self._speed_s, self._speed_s
             self._speed, self._last_speed, self._speed_s = None, measured, 0.0
-            yield from p.update(*measurements.measured_speed(measured, speed, acceleration))
+            yield from p.update(*measurements.measured_speed(measured, speed, acceleration, since))
         else:
             yield from p.update(*measurements.straight_or_prior_speed(lean, speed, model.yaw_rate, seconds))
         certain = p.rows[SPEED][SPEED] < measurements.SIGMA_TRIM_SPEED**2
