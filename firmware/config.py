@@ -5,12 +5,12 @@
 
 # Sensor
 # SAMPLE_HZ = 200           # readings per second: 50, 100, 125 or 200
-# ACCEL_RANGE_G = 8         # 2, 4, 8 or 16
+# ACCEL_RANGE_G = 16        # 2, 4, 8 or 16: a hard vibration beyond it makes the lean wrong
 # GYRO_RANGE_DPS = 500      # 250, 500, 1000 or 2000
 # DLPF = 3                  # low-pass of the chip, which has to keep what is faster than half of SAMPLE_HZ out:
 #                           # 2 (98 Hz) to 6 (5 Hz) at 200; 3 (44 Hz) to 6 at 100 and 125; 4 (21 Hz) to 6 at 50
 # ACCEPT_WHO_AM_I = None    # the number on the display, to try a chip that is refused as unknown
-# SENSOR_ADDRESS = 0x68     # 0x69 if AD0 is tied high
+# SENSOR_ADDRESS = 0x68     # where it is looked for first; the other one is 0x69, with AD0 high
 
 # Wiring (GPIO numbers; the defaults are for a Pico and Pico 2, those of a classic ESP32 in brackets). Every other
 # board needs the five pins of sensor, display and button named here: not each board has all pins, and some are taken.
@@ -26,7 +26,9 @@
 # BUTTON_PIN = 15           # (4) between the pin and ground
 
 # Display
-# DISPLAY = "auto"          # what answers at 0x3C or 0x3D is an OLED; or "lcd" (HD44780), "ssd1306", "sh1106" (OLEDs)
+# DISPLAY = "auto"          # what answers at 0x3C or 0x3D is an OLED; or "lcd" (HD44780), "ssd1306", "sh1106" (OLEDs
+#                           # of 128x64 pixels), "ssd1306-32" (128x32)
+# LCD_WIRING = 1            # 1 to 4: how the backpack of an LCD that stays blank is wired; kickstand status --wirings
 # OLED_CONTRAST = 255       # 0 (dim) to 255
 # OLED_INVERTED = False     # True: dark on bright
 

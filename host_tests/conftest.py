@@ -5,8 +5,12 @@ import gc
 import importlib.util
 import itertools
 import os
+import re
+import shutil
 import sys
+from collections import Counter
 from pathlib import Path
+from types import ModuleType
 
 import hypothesis
 import pytest
@@ -42,12 +46,15 @@ def _compiled_once(source: Path, architecture: str = "armv6m") -> bytes:
 
 bytecode.cross_compiled = _compiled_once  # before a module of the tools or a test takes it by name
 
-CHROMIUM = Path("/usr/bin/chromium")
 ROOT = Path(__file__).resolve().parent.parent
+# What differs between machines: fixtures, markers, and modules whose programs, boards and pages depend on what is there
+ASKED_FOR = {"chromium", "files", "shared_data"}
+OF_THE_MACHINE = ("subprocess", "emulated", "kickstand_tools.deploy", "kickstand_tools.emulator", "kickstand_tools.web")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "chip: runs the firmware on the emulated Pico, which takes its time")
+    config.addinivalue_line("markers", "machine: its result can depend on the machine; conftest.py marks these tests")
     config.addinivalue_line("markers", "esp32: on the emulated ESP32, where its library is")
     config.addinivalue_line("markers", "nightly: takes long and is much like another test: runs only with --nightly")
     config.addinivalue_line("markers", "long: for over half a minute")
@@ -57,8 +64,29 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--nightly", action="store_true", help="Run the longest tests too.")
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Long tests first: begun last, one of them would keep one processor busy while the others idle."""
+def _asks(item: pytest.Function) -> bool:
+    """True if a test asks for an image, a library, a browser, or recordings."""
+    marked = item.get_closest_marker("chip") or item.get_closest_marker("esp32")
+    return bool(marked) or not ASKED_FOR.isdisjoint(item.fixturenames)
+
+
+def _uses_the_machine(module: ModuleType | None) -> bool:
+    """True if a module of tests starts programs, uses boards or pages, or reads the checkout's files."""
+    for value in vars(module).values() if module else ():
+        home = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
+        if value == ROOT if isinstance(value, Path) else f"{home}.".startswith(tuple(f"{n}." for n in OF_THE_MACHINE)):
+            return True
+    return False
+
+
+@pytest.hookimpl(tryfirst=True)  # before -m chooses by the markers
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Function]) -> None:
+    """Mark the tests that depend on the machine. Put long tests first: begun last, one of them would keep one processor
+    busy while the others idle."""
+    on_machine = {item.path for item in items if _asks(item) or _uses_the_machine(item.module)}
+    for item in items:
+        if item.path in on_machine:
+            item.add_marker("machine")
     if not config.getoption("--nightly"):
         nightly = [item for item in items if item.get_closest_marker("nightly")]
         items[:] = [item for item in items if item not in nightly]
@@ -85,6 +113,21 @@ def pytest_runtest_setup() -> None:
     gc.freeze()
 
 
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """One line: how many tests were skipped for want of what. Reasons are written "no X", "no X: how to have it"."""
+    reasons = [str(report.longrepr[-1]) for report in terminalreporter.stats.get("skipped", ())]
+    wanted = Counter(_wanted(reason.removeprefix("Skipped: ")) for reason in reasons)
+    if wanted:
+        numbers = [f"{number} for want of {what}" for what, number in wanted.most_common()]
+        terminalreporter.write_line("skipped: " + ", ".join(numbers))
+
+
+def _wanted(reason: str) -> str:
+    """What is missing, by the reason for which a test was skipped."""
+    missing = re.match(r"no (.+?)(?: for this system)?(?:: |$)|needs (.+)|could not import '([\w.]+)'", reason)
+    return next(filter(None, missing.groups())) if missing else reason
+
+
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """The directory of real recordings, which is not part of the repository."""
@@ -96,16 +139,17 @@ def shared_data() -> Path:
 
 @pytest.fixture(scope="session")
 def chromium():
-    """Debian's Chromium as playwright's browser, one for all tests of a process: playwright cannot be begun twice."""
-    if not CHROMIUM.exists():
-        pytest.skip(f"no {CHROMIUM}: on Debian the package chromium")
+    """Chromium as playwright's browser, one for all tests of a process: playwright cannot be begun twice."""
+    executable = shutil.which("chromium")
+    if executable is None:
+        pytest.skip("no Chromium: on Debian the package chromium")
     if importlib.util.find_spec("playwright") is None:
         pytest.skip("no playwright")
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(
-            executable_path=CHROMIUM, args=["--no-sandbox", "--enable-unsafe-swiftshader"]
+            executable_path=executable, args=["--no-sandbox", "--enable-unsafe-swiftshader"]
         )
         yield browser
         browser.close()

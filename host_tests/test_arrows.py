@@ -28,7 +28,18 @@ ARROWS = {
     "ui": {"board.button", "lean", "calibration", "drive_alignment"},
     "settings": {"board", "imu.mpu6050"},  # ranges and pins that can be chosen
     "devices": {"board", "imu"},
-    "status_report": {"imu", "calibration", "speed", "ui.messages", "console", "devices", "settings"},
+    "diagnosis": {"imu"},
+    "status_report": {
+        "board.display",
+        "diagnosis",
+        "imu",
+        "calibration",
+        "speed",
+        "ui.messages",
+        "console",
+        "devices",
+        "settings",
+    },
     "app": {"board", "imu", "calibration", "lean", "drive_alignment", "speed", "rides", "ui", "devices"},
     "user_code": set(),
     "start": {"board", "devices", "settings"},
@@ -39,11 +50,12 @@ LATE = {
     "errors": {"console"},  # report() prints a refusal in words
     "status_report": {"rides"},  # is its machine code used?
     "app": {"user_code"},
+    "devices": {"diagnosis"},  # why no sensor answers
     "start": {"app", "console", "ui.messages", "live"},  # the display says "starting" meanwhile
 }
 # What only drivers may import: modules of MicroPython that speak to hardware
 HARDWARE = {"machine", "micropython", "esp32", "rp2", "neopixel", "network", "bluetooth"}
-DRIVERS = {"board", "imu", "speed", "devices", "start", "live.radio"}
+DRIVERS = {"board", "imu", "speed", "devices", "diagnosis", "start", "live.radio"}
 
 
 def modules():

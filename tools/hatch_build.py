@@ -1,16 +1,27 @@
-"""project.urls of what is built on GitHub, which knows where the project is at home: a copy elsewhere names its own."""
+"""What a build adds to pyproject.toml: the addresses of a project on GitHub, the commands of a checkout."""
 
 import os
 
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 
 class Urls(MetadataHookInterface):
-    """Called when a wheel is built or the project is installed."""
+    """project.urls of what is built on GitHub, which knows where the project is at home. Elsewhere it has none."""
 
     def update(self, metadata: dict) -> None:
-        """Add the addresses, none of a build that GitHub does not do."""
+        """Add the addresses."""
         server, repository = os.environ.get("GITHUB_SERVER_URL"), os.environ.get("GITHUB_REPOSITORY")
         home = f"{server}/{repository}" if server and repository else ""
         pages = {"Homepage": "", "Source": "", "Issues": "/issues", "Changelog": "/blob/main/CHANGELOG.md"}
         metadata["urls"] = {name: home + page for name, page in pages.items() if home}
+
+
+class Workshop(BuildHookInterface):
+    """The workshop's commands, for an editable installation. pyproject.toml lists them in the hook's settings."""
+
+    def initialize(self, version: str, build_data: dict) -> None:
+        """Add the entry points. A wheel does not contain their modules and gets none of them."""
+        if version == "editable":
+            for group, commands in self.config["entry-points"].items():
+                self.metadata.core.entry_points.setdefault(group, {}).update(commands)

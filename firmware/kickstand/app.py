@@ -13,9 +13,11 @@ import os
 from time import sleep_us, ticks_add, ticks_diff, ticks_ms, ticks_us
 
 from .board import port
+from .board.display import STOPPED
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
 from .devices import open_button
+from .errors import report
 from .imu.sensor import SampleClock
 from .lean.meter import LeanMeter
 from .rides.recording import Recording
@@ -23,7 +25,7 @@ from .ui.screen import Screen
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
 COLLECT_TURNS = 42  # turns between two garbage collections: they use 90 KB of heap, of 120 free while recording
-COLLECT_TURNS_DRIVING = 25  # the same while aligning by driving, with an OLED, a phone or user.py: 85 KB are free
+COLLECT_TURNS_DRIVING = 23  # the same while aligning by driving, with an OLED, a phone or user.py: 80 KB are free
 SINGLE_GAPS = 300  # single free heap blocks that a collection leaves
 PAGE_MS = 100
 # A page shows no lean if its own delay and the age of the readings still in the FIFO add up to more: so a lean on the
@@ -44,8 +46,8 @@ def fill_gaps(n):
         value = -value  # each float is boxed: one block of the heap
 
 
-# Of the last run, once Ctrl-C has ended it: microseconds of its longest turn, and the fewest places that were left in
-# the chip's FIFO. kickstand.status() prints them
+# Of the last run, once Ctrl-C has ended it: microseconds of its longest turn, the fewest places that were left in the
+# chip's FIFO, and its axes' AxisWatch.shaken(). kickstand.status() prints them
 worst = None
 
 
@@ -94,16 +96,22 @@ class App:
         return BackgroundAlignment(self.settings.leans, open_speed(self.settings), self.meter, self.calibration)
 
     def run(self):
-        """Loop until Ctrl-C, LOOP_US a turn."""
+        """Loop until Ctrl-C, LOOP_US a turn. Whatever ends it, the display then says so: it must not keep a lean."""
         try:
             self._loop()
-        except KeyboardInterrupt:
-            port.rest_watchdog()  # not fed from here on; comes first, because a second Ctrl-C may interrupt the rest
+        except BaseException as error:
+            if isinstance(error, KeyboardInterrupt):
+                # It is not fed from here on. This comes first, because a second Ctrl-C may interrupt the rest.
+                port.rest_watchdog()
+            self.lcd.end(*STOPPED)
             global worst
-            worst = LOOP_US - self._least_wait_us, self.sensor.chip.least_free_samples()
-            self.rides.stop()
-            if self.live:
-                self.live.stop()
+            chip = self.sensor.chip
+            worst = LOOP_US - self._least_wait_us, chip.least_free_samples(), chip.axes.shaken()
+            if not isinstance(error, Exception):  # nobody restarts the board, as after an error
+                port.rest_watchdog()
+                self.rides.stop()
+                if self.live:
+                    self.live.stop()
             raise
 
     def _loop(self):
@@ -144,7 +152,12 @@ class App:
         display. It waits for nothing."""
         now_us, now_ms = ticks_us(), ticks_ms()
         n = self.sensor.fetch(now_ms)
+        if self.sensor.clipped:
+            self.clock.skip(self.sensor.clipped)
+            self.sensor.clipped = 0
         if n:
+            if self._restarts != self.sensor.restarts:
+                self._sensor_started()
             dt_us = self.clock.step(n, now_us)
             self._pass_on(n, dt_us, now_ms)
         if self.drive:
@@ -152,7 +165,6 @@ class App:
         if ticks_diff(now_ms, self._page_ms) >= 0:  # asked twice: a local would put this frame on the heap
             self.sensor.check(now_ms)
         if self.sensor.fault is not None:
-            self.clock.restart()
             self.screen.interrupt(now_ms)
         elif not self.sensor.chip.frames_left:
             self.clock.emptied(now_us)
@@ -197,6 +209,10 @@ class App:
         if self.screen.menu:  # a recording that is started there should begin at once
             self.rides.prepare()
         problem = self.rides.recorder.take_problem() or (self.drive and self.drive.speed.take_problem())
+        axes = self.sensor.chip.axes
+        if axes.notice:
+            report(axes.notice)
+            problem, axes.notice = problem or axes.notice, None
         if self.user:
             self.user.lean(self.settings.leans and self.sensor.fault is None and self.screen.pages.trusted)
             problem = problem or self.user.take_problem()
@@ -209,9 +225,6 @@ class App:
     def _pass_on(self, n, dt_us, now_ms):
         """Pass on n new samples: their sum to the meter, each one to a wizard. dt_us: from the last sample before them
         to the last of them."""
-        if self._restarts != self.sensor.restarts:
-            self._restarts = self.sensor.restarts
-            self._sensor_started()
         chip = self.sensor.chip
         self.meter.update_sum(chip.sums, n, dt_us)
         if self.rides.recorder.active:
@@ -221,16 +234,19 @@ class App:
         if self.live and self.live.period_ms:
             self.live.feed(chip.sums, n)
         if self.screen.wizard:
-            self._pass_each(n, now_ms)
+            self._pass_each(n, dt_us, now_ms)
 
-    def _pass_each(self, n, now_ms):
+    def _pass_each(self, n, dt_us, now_ms):
         chip, wizard = self.sensor.chip, self.screen.wizard
         for k in range(n):
             chip.take(k)
             wizard.sample(chip.counts, now_ms)
+        wizard.follow(chip.sums, n, dt_us, now_ms)
 
     def _sensor_started(self):
         """React to a chip that was set up, for the first time or again after a fault; it may be another chip."""
+        self._restarts = self.sensor.restarts
+        self.clock.restart()
         self.meter.restart()
         if self.recording:
             self.rides.recorder.mark_gap()

@@ -12,6 +12,19 @@ _slow_ms = None  # ticks_ms() of the last slow print
 _SENTENCES = """
 not-written|calibration not saved: {0}; the old one is kept
 read-back|calibration not saved: it reads back differently; the old one is kept
+gyro-scale|calibration refused: the gyro reads rates about {0} with {1:+.0f} %: another sensor is needed
+gyro-reversed|calibration refused: the gyro reads rates about {0} with the wrong sign: another sensor is needed
+gyro-misfit|calibration refused: by the gyro a turn between two poses is {0:.1f} degrees off: repeat the six \
+positions; if it happens again, an axis is late, clipped or dead: another sensor is needed
+unproved-gyro|calibration refused: no turn shows that the gyro is right about {0}: repeat the six positions
+dead-gyro|pose refused: the gyro's reading about {0} never changes: switch off and on; if it stays, another sensor \
+is needed
+stuck-accel|pose refused: the accelerometer's reading along {0} never changes: switch off and on; if it stays, another \
+sensor is needed
+noisy-gyro|pose refused: the gyro is very noisy about {0}: switch the engine off; if it stays, another sensor is \
+needed
+gyro-tilt|not aligned: between the poses are {0:.1f} degrees, but by the gyro {1:.1f}: align again; if it happens \
+again, another sensor is needed
 incomplete|incomplete firmware ({0}): run kickstand flash
 no-memory|no memory for that ({0}): restart the board
 no-driver|SD card: its driver is not on the board: mpremote mip install sdcard
@@ -33,6 +46,20 @@ no-radio|LIVE: this board has no Bluetooth in its MicroPython: nothing goes to a
 no-pairing|LIVE_PIN: this board cannot ask for a PIN: nothing goes to a phone; LIVE_PIN = None lets every phone in
 radio-fault|LIVE: the radio does not start ({0}): nothing goes to a phone, the lean goes on
 live-memory|LIVE: too little memory ({0}): nothing goes to a phone, the lean goes on
+no-sensor|none answers on SDA {0}, SCL {1}: check these wires and the 3.3 V of the module
+unknown-chip|unknown chip, WHO_AM_I 0x{0:02x}: set ACCEPT_WHO_AM_I = 0x{0:02x} in config.py to try it as an MPU6500
+no-chip|what answers at 0x{1:02x} is no MPU6050 (it reads 0x{0:02x}): another device, such as a clock, or a broken chip
+not-kept|the chip at 0x{0:02x} answers, but does not keep its settings: it is broken or no MPU6050; the wires are good
+bus-errors|the sensor at 0x{0:02x} answers, but transfers fail: use shorter wires, or SENSOR_BUS_HZ = 100_000
+other-chip|{0} at 0x{1:02x}: not supported, its registers are different ones; use a module with an MPU6050
+other-device|none answers, but a {0} at 0x{1:02x}: connect a module with an MPU6050
+exchanged|SDA and SCL are exchanged: GPIO {0} belongs to SDA and GPIO {1} to SCL
+wire-low|{0} (GPIO {1}) stays low: it touches GND, or a device without power or a broken one pulls it down
+no-pull-ups|none answers, SDA {0} and SCL {1} have no pull-up: connect the module's wires, and its 3.3 V
+no-pull-up|none answers: nothing pulls up {0} (GPIO {1}): that wire is open
+sensor-fifo|the sensor measures, but its FIFO {0}: a clone that cannot be used; use another module
+axis-ill|sensor: {0} {1} {2}, so there is no lean: switch it off and on; if that does not help, replace it
+clips|sensor: {0} at the end of its range: mount the sensor softly, on foam or rubber
 no-such-pin|config.py: {0} = {1} is no pin of this board ({2})
 i2c-pins|config.py: {1}_SDA = {2} and {1}_SCL = {3} do not belong to I2C {4} ({5})
 uart-pins|config.py: GPS_TX = {1} and GPS_RX = {2} do not belong to UART {3} ({4})
@@ -62,5 +89,5 @@ def tell(refusal):
     """Print a Refusal's sentence, unless a print was slow in the last QUIET_MS."""
     from time import ticks_diff, ticks_ms
 
-    if _slow_ms is None or ticks_diff(ticks_ms(), _slow_ms) >= QUIET_MS:
+    if _slow_ms is None or not 0 <= ticks_diff(ticks_ms(), _slow_ms) < QUIET_MS:
         say(sentence(refusal))

@@ -5,20 +5,22 @@ from machine import Pin
 from .board import i2c_bus
 from .board.button import Button
 from .board.display import Display
-from .errors import SettingsError
+from .errors import Notice, SettingsError, tried
 from .imu.mpu6050 import Mpu6050
 from .imu.sensor import Sensor
 
 
-def open_lcd(settings):
-    """The Display. Its tick() raises SettingsError for pins that the I2C controller cannot use."""
+def open_lcd(settings, wiring=None):
+    """The Display. wiring: of a character display's backpack, if not the settings'. Its tick() raises SettingsError for
+    pins that the I2C controller cannot use."""
     return Display(
-        lambda hz: _open_bus(settings, "LCD", hz),
+        lambda hz: open_bus(settings, "LCD", hz),
         settings.LCD_BUS_HZ,
         settings.DISPLAY,
         settings.LCD_ADDRESSES,
         settings.OLED_CONTRAST,
         settings.OLED_INVERTED,
+        wiring or settings.LCD_WIRING,
     )
 
 
@@ -27,7 +29,28 @@ def open_sensor(settings):
     ranges = settings.ACCEL_RANGE_G, settings.GYRO_RANGE_DPS
     rates = settings.DLPF, settings.SAMPLE_HZ
     chip = Mpu6050(None, settings.SENSOR_ADDRESS, *ranges, *rates, settings.ACCEPT_WHO_AM_I)
-    return Sensor(chip, lambda: _open_bus(settings, "SENSOR", settings.SENSOR_BUS_HZ))
+
+    def reopen():
+        return open_bus(settings, "SENSOR", settings.SENSOR_BUS_HZ)
+
+    def explain(chip, error):
+        said = []
+
+        def look():
+            from .diagnosis import explain_sensor, fifo_fault  # 6 KB of heap, where most boards never need it
+
+            if error is None:
+                said.extend((fifo_fault(chip), []))
+            else:
+                said.extend(explain_sensor(settings.SENSOR_SDA, settings.SENSOR_SCL, reopen, chip, error))
+
+        try:
+            problem = tried(look)
+        except OSError as fault:
+            problem = fault
+        return (error and Notice("no-sensor"), []) if problem else said
+
+    return Sensor(chip, reopen, explain)
 
 
 def open_button(settings):
@@ -38,7 +61,7 @@ def open_button(settings):
         raise SettingsError("no-such-pin", "BUTTON_PIN", settings.BUTTON_PIN, str(error))
 
 
-def _open_bus(settings, name, hz):
+def open_bus(settings, name, hz):
     """A machine.I2C. name: "SENSOR" or "LCD", with which the names of its settings begin."""
     controller = getattr(settings, name + "_I2C")
     sda, scl = getattr(settings, name + "_SDA"), getattr(settings, name + "_SCL")

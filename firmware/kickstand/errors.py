@@ -89,8 +89,16 @@ class CaptureError(Refusal):
     """A pose that was not held still, or readings that no still sensor gives."""
 
 
+class SickSensor(CaptureError):
+    """Readings in a pose that only a defective sensor gives."""
+
+
 class CalibrationError(Refusal):
     """Six-position poses that give no plausible calibration."""
+
+
+class GyroError(Refusal):
+    """A gyro whose rates do not explain how the sensor turned between its poses."""
 
 
 class AlignmentError(Refusal):

@@ -47,11 +47,26 @@ def normalize(a):
 
 
 def rotate(out, m, a):
-    """out = M a (Nicolae's equation 15: from the sensor's axes to the vehicle's)."""
+    """out = M a (Nicolae's equation 15: from the sensor's axes to the vehicle's). Here out may be a."""
     x, y, z = a[0], a[1], a[2]
     out[0] = m[0] * x + m[1] * y + m[2] * z
     out[1] = m[3] * x + m[4] * y + m[5] * z
     out[2] = m[6] * x + m[7] * y + m[8] * z
+
+
+def product(out, a, b):
+    """out = A B, of two matrices."""
+    for i in (0, 3, 6):
+        for k in range(3):
+            out[i + k] = a[i] * b[k] + a[i + 1] * b[3 + k] + a[i + 2] * b[6 + k]
+
+
+def is_identity(m):
+    """True if M is exactly the identity."""
+    for i in range(9):
+        if m[i] != (1.0 if i % 4 == 0 else 0.0):
+            return False
+    return True
 
 
 def frame(out, up, forward):

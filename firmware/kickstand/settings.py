@@ -48,10 +48,10 @@ _SPEED_PINS = {None: (), "gps": ("GPS_TX", "GPS_RX"), "wheel": ("WHEEL_PIN",)}
 _TABLE = {
     "SIDE": ("left", _one_of("left", "right")),
     "SAMPLE_HZ": (200, (lambda v: isinstance(v, int) and v in MIN_DLPF, "50, 100, 125 or 200")),
-    "ACCEL_RANGE_G": (8, _one_of(*sorted(ACCEL_LSB_PER_G))),
+    "ACCEL_RANGE_G": (16, _one_of(*sorted(ACCEL_LSB_PER_G))),
     "GYRO_RANGE_DPS": (500, _one_of(*sorted(GYRO_LSB_PER_DPS))),
     "DLPF": (3, _whole(1, 6)),
-    "ACCEPT_WHO_AM_I": (None, (lambda v: v is None or isinstance(v, int), "None or a number as 0x75")),
+    "ACCEPT_WHO_AM_I": (None, _or_none(_whole(0x01, 0xFE))),
     "SENSOR_ADDRESS": (0x68, _one_of(0x68, 0x69)),
     "SENSOR_I2C": (0, _one_of(0, 1)),
     "SENSOR_BUS_HZ": (400_000, _whole(100_000, 400_000)),
@@ -59,6 +59,7 @@ _TABLE = {
     "OLED_CONTRAST": (255, _whole(0, 255)),
     "OLED_INVERTED": (False, _one_of(True, False)),
     "LCD_ADDRESSES": (ADDRESSES, (_addresses, "I2C addresses as (0x27, 0x3F)")),
+    "LCD_WIRING": (1, _whole(1, 4)),
     "LCD_I2C": (1, _one_of(0, 1)),
     "LCD_BUS_HZ": (None, _or_none(_whole(100_000, 400_000))),
     "WATCHDOG": (True, _one_of(True, False)),
@@ -131,7 +132,7 @@ class Settings:
         self.one_bus = (self.SENSOR_SDA, self.SENSOR_SCL) == (self.LCD_SDA, self.LCD_SCL) != (None, None)
         if self.one_bus:  # a PCF8574 is made for 100 kHz, and sets the speed of a bus that it shares
             self.LCD_I2C = self.SENSOR_I2C
-            lcd_hz = self.LCD_BUS_HZ or (OLED_HZ if self.DISPLAY in ("ssd1306", "sh1106") else LCD_HZ)
+            lcd_hz = self.LCD_BUS_HZ or (OLED_HZ if self.DISPLAY not in ("auto", "lcd") else LCD_HZ)
             self.SENSOR_BUS_HZ = self.LCD_BUS_HZ = min(self.SENSOR_BUS_HZ, lcd_hz)
         try:
             if refusal:

@@ -11,6 +11,7 @@ import machine
 
 from . import settings
 from .board import port
+from .board.display import STOPPED
 from .devices import open_button, open_lcd, open_sensor
 from .errors import LiveError, SettingsError, report, tried
 from .units import __version__
@@ -64,6 +65,8 @@ def main():
             pass
     except KeyboardInterrupt:
         port.rest_watchdog()
+        if lcd:
+            lcd.end(*STOPPED)
         print("Kickstand stopped. Ctrl-D starts it again; import kickstand; kickstand.status() reports how it is.")
 
 

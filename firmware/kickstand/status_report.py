@@ -5,9 +5,11 @@ import os
 import sys
 from time import sleep_ms, ticks_diff, ticks_ms
 
+from .board.display import LCD_HZ
 from .calibration.store import Store
 from .console import sentence
-from .devices import open_button, open_lcd, open_sensor
+from .devices import open_bus, open_button, open_lcd, open_sensor
+from .diagnosis import MOTION_ADDRESSES, bus_line, fifo_fault, scan, show_wirings
 from .errors import SettingsError
 from .imu.mpu6050 import UnknownChip
 from .settings import load
@@ -15,6 +17,11 @@ from .ui import messages
 from .units import __version__
 
 LISTEN_MS = 3500
+# What did not fit, by the code of lean/consistency.py
+MEASURED = {"odd-left": "force to the left", "odd-up": "force up", "odd-pitch": "pitch"}
+WIRINGS = 4  # of LCD_WIRING
+WIRING_MS = 4000  # for each of them
+WATCH_MS = 1400  # for setting the sensor up and two looks at its axes
 _TRIAL = "trial.tmp"  # a file that is written to measure the flash, then removed
 
 
@@ -22,8 +29,8 @@ def _print(label, words, *values):
     print("%-13s" % label + words % values)
 
 
-def report():
-    """Print the whole report. Opens sensor and display itself: the app must not be running."""
+def report(wirings=False):
+    """Print the whole report. Opens sensor and display itself: the app must not be running. wirings: see status()."""
     release = ".".join(str(n) for n in sys.implementation.version[:3])
     machine_name = getattr(sys.implementation, "_machine", sys.platform)
     print("Kickstand %s on %s, MicroPython %s" % (__version__, machine_name, release))
@@ -33,7 +40,11 @@ def report():
         _print("Settings", words, settings.VEHICLE, settings.SIDE, settings.SAMPLE_HZ)
         sensor = open_sensor(settings)
         who_am_i = _sensor(sensor, settings)
-        _display(open_lcd(settings))
+        if who_am_i:
+            _axes(sensor)
+        _display(open_lcd(settings), settings)
+        if wirings:
+            show_wirings(lambda number: open_lcd(settings, number), WIRINGS, WIRING_MS)
         pressed = "pressed" if open_button(settings).held() else "not pressed"
         _print("Button", "GPIO %d, %s", settings.BUTTON_PIN, pressed)
         _speed(settings)
@@ -42,7 +53,7 @@ def report():
         return
     _calibration(who_am_i, settings)
     _machine_code()
-    _worst()
+    _worst(sensor.chip)
     gc.collect()
     space = os.statvfs("/")
     free_kb = gc.mem_free() // 1024, space[0] * space[3] // 1024
@@ -61,33 +72,57 @@ def _write_ms():
 
 
 def _sensor(sensor, settings):
-    """Print which sensor answers; return its WHO_AM_I, or 0 if none does."""
+    """Print which sensor answers and who else is on its bus; return its WHO_AM_I, or 0 if none does."""
     chip = sensor.chip
+    fault = None
     try:
         sensor.set_up()
         chip.read()
-    except UnknownChip as error:
-        words = "unknown chip, WHO_AM_I %s: set ACCEPT_WHO_AM_I in config.py to try it"
-        _print("Sensor", words, hex(error.args[0]))
-        return 0
-    except OSError as error:
-        words = "none answers on SDA %d, SCL %d: check the wiring (%s)"
-        _print("Sensor", words, settings.SENSOR_SDA, settings.SENSOR_SCL, error)
-        return 0
-    ranges = settings.ACCEL_RANGE_G, settings.GYRO_RANGE_DPS
-    temperature_c = chip.temperature_c(chip.counts[3])
-    _print("Sensor", "%s (%s), +-%d g, +-%d deg/s, %.1f C", chip.name, hex(chip.who_am_i), *ranges, temperature_c)
-    _print("Reading", "%.3f %.3f %.3f g", *[chip.counts[i] / chip.accel_lsb_per_g for i in range(3)])
-    return chip.who_am_i
+        who_am_i = chip.who_am_i
+        ranges = settings.ACCEL_RANGE_G, settings.GYRO_RANGE_DPS
+        temperature_c = chip.temperature_c(chip.counts[3])
+        _print("Sensor", "%s (%s), +-%d g, +-%d deg/s, %.1f C", chip.name, hex(who_am_i), *ranges, temperature_c)
+        if chip.address != settings.SENSOR_ADDRESS:
+            words = "it answers at %s and is used; SENSOR_ADDRESS = %s in config.py looks there first"
+            _print("", words, hex(chip.address), hex(chip.address))
+        _print("Reading", "%.3f %.3f %.3f g", *[chip.counts[i] / chip.accel_lsb_per_g for i in range(3)])
+        fault = fifo_fault(chip)
+    except (UnknownChip, OSError) as error:
+        who_am_i = 0
+        fault, _ = sensor.explain(chip, error)
+    if fault:
+        _print("Sensor", "%s", sentence(fault))
+    _bus("Sensor", settings, "SENSOR", MOTION_ADDRESSES)
+    return who_am_i
 
 
-def _display(lcd):
+def _axes(sensor):
+    """Print what is wrong with the axes of a sensor that answers: their counts of a second show it."""
+    for _ in range(WATCH_MS // 10):
+        sensor.fetch(ticks_ms())
+        sleep_ms(10)
+    _print("Axes", "%s", ", ".join(messages.lines(sensor.fault)) if sensor.fault else "all six measure")
+
+
+def _bus(label, settings, name, addresses):
+    """Print who answers on a bus, or what is wrong with its wires; return that, a Notice or None."""
+    sda, scl = getattr(settings, name + "_SDA"), getattr(settings, name + "_SCL")
+    hz = getattr(settings, name + "_BUS_HZ") or LCD_HZ
+    notice, devices = scan(sda, scl, lambda: open_bus(settings, name, hz), addresses)
+    print(bus_line(label, sda, scl, devices))
+    return notice
+
+
+def _display(lcd, settings):
     lcd.show("Kickstand", "status: console")
     lcd.flush()
     if lcd.address:
         _print("Display", "%s at %s", "OLED" if lcd.draws else "LCD", hex(lcd.address))
-    else:
-        _print("Display", "none answers: check wiring and LCD_ADDRESSES")
+    if not (lcd.address and settings.one_bus):
+        notice = _bus("Display", settings, "LCD", settings.LCD_ADDRESSES)
+        if not lcd.address:
+            words = sentence(notice) if notice else "none answers: check wiring and LCD_ADDRESSES"
+            _print("Display", "%s", words)
 
 
 def _speed(settings):
@@ -114,12 +149,20 @@ def _speed(settings):
         print("  nothing yet" if heard is None else "  %.1f m/s" % heard)
 
 
-def _worst():
-    """Print what the app has noted, if it has run since the board was started."""
+def _worst(chip):
+    """Print what the app has noted, if it has run since the board was started. chip: an Mpu6050."""
+    judge = sys.modules.get("kickstand.lean.consistency")
+    if judge and judge.last_odd:
+        words = "the readings did not fit, again and again: %s. Sensor, alignment or mount: align again"
+        _print("Sensor odd", words, MEASURED[judge.last_odd])
     app = sys.modules.get("kickstand.app")
     if app and app.worst:
+        longest_us, places, (peaks, share) = app.worst
         words = "longest turn %.1f ms; places left in the FIFO, at the fewest: %d"
-        _print("Since start", words, app.worst[0] / 1000, app.worst[1])
+        _print("Since start", words, longest_us / 1000, places)
+        words = "largest force %.1f %.1f %.1f g of %d; %.2f %% of the readings lost at the end of the range"
+        forces = [peak / chip.accel_lsb_per_g for peak in peaks]
+        _print("Vibration", words, *(forces + [chip.accel_range_g, 100 * share]))
 
 
 def _machine_code():

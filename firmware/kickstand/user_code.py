@@ -26,22 +26,30 @@ LEAST_FREE = 20_000  # bytes of heap: below, the lean meter's own work would fai
 _CALLED = ("setup", "on_lean", "on_press")
 
 
+def _functions_of(name):
+    """The functions of a module that are called, by name. A module's own __dir__() or __getattr__() may raise."""
+    module = __import__(name)
+    found = {}
+    for name in dir(module):
+        if name in _CALLED or name.startswith("page"):
+            function = getattr(module, name)
+            if callable(function):
+                found[name] = function
+    return found
+
+
 class UserCode:
     """app: the App. pages: a function without arguments for each page, which gives its lines."""
 
     def __init__(self, app):
         self._app = app
         self._functions = {}
-        self._functions["import"] = __import__  # _call() also guards the import
+        self._functions["import"] = _functions_of  # _call() also guards the import
         self._slow = {}  # how often in a row a function has been slow, once it has been
         self._problems = []
         self._drawn = self._draw  # kept: each access makes a new bound method, and the display compares pictures by it
         sys.modules.pop("user", None)
-        module = self._call("import", "user")
-        for name in dir(module) if module else ():
-            function = getattr(module, name)
-            if (name in _CALLED or name.startswith("page")) and callable(function):
-                self._functions[name] = function
+        self._functions.update(self._call("import", "user") or {})
         pages = sorted([name for name in self._functions if name.startswith("page")])
         self.pages = [lambda name=name: self._page(name) for name in pages]
         self._call("setup", app)

@@ -2,11 +2,15 @@
 
 import json
 import os
+from array import array
 
 import command
 import numpy as np
 import pytest
+from kickstand.calibration.transform import Transform
 from kickstand_tools.calibration.file import CalibrationFile, read_calibration, write_calibration
+from kickstand_tools.errors import InputError
+from kickstand_tools.replay.replay_engine import ReplayMeter
 
 I = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]  # noqa: E741 - its name
 
@@ -135,3 +139,67 @@ def test_a_link_is_written_through(tmp_path, log):
     command.works("replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv")
     assert (tmp_path / "LEAN.csv").is_symlink()
     assert (tmp_path / "kept" / "LEAN.csv").read_text().startswith("t_s,")
+
+
+def whole():
+    """A calibration with matrices, and how its sensor sits."""
+    turned = np.array([[0.0, 0.6, -0.8], [1.0, 0.0, 0.0], [0.0, -0.8, -0.6]])
+    return CalibrationFile(
+        np.array([0.01, -0.02, 0.03]),
+        np.array([1.01, 0.99, 1.02]),
+        np.array([3.0, -2.0, 1.0]),
+        turned,
+        aligned=True,
+        six_done=True,
+        accel_matrix=np.array([[1.0, 0.01, -0.02], [0.01, 1.0, 0.003], [-0.02, 0.003, 1.0]]),
+        gyro_matrix=np.array([[1.02, 0.01, 0.02], [-0.03, 0.98, 0.004], [0.005, -0.006, 1.01]]),
+        gyro_sigma=np.full((3, 3), 0.004),
+    )
+
+
+def test_matrices_are_applied_alike_wherever_a_calibration_is(tmp_path):
+    """In the file, in numpy, and in the firmware's own meter."""
+    write_calibration(tmp_path / "CAL.json", whole())
+    found = read_calibration(tmp_path / "CAL.json")
+    assert found == whole()
+    reading = np.array([[0.3, -0.5, 0.8, 25.0, 50.0, -30.0, 70.0]])
+    c = whole()
+    force = c.vehicle_from_sensor @ c.accel_matrix @ (c.accel_slope * reading[0, :3] + c.accel_offset_g)
+    rate = c.vehicle_from_sensor @ c.gyro_matrix @ (reading[0, 4:] - c.gyro_bias_dps)
+    for got, want in zip(found.in_vehicle(reading), (force, rate), strict=True):
+        assert got[0] == pytest.approx(want)
+    meter = ReplayMeter(found.to_firmware())
+    meter.update(reading[0].tolist(), 0)
+    assert meter.force == pytest.approx(force.tolist(), abs=1e-5)
+    assert np.degrees(meter.rate) == pytest.approx(rate, abs=1e-3)
+    board = found.to_firmware()
+    board.set_scale(4096, 65.5)
+    sums = array("i", [round(v * lsb) for v, lsb in zip(reading[0], [4096] * 3 + [1] + [65.5] * 3)])
+    on_board = [0.0] * 3, [0.0] * 3
+    Transform(board).apply_sum(sums, 1, *on_board)
+    assert on_board[0] == pytest.approx(force.tolist(), abs=0.001)
+    assert np.degrees(on_board[1]) == pytest.approx(rate, abs=0.1)
+    sensor = [0.0] * 3, [0.0] * 3
+    board.apply(sums, *sensor)
+    assert c.vehicle_from_sensor @ sensor[0] == pytest.approx(force, abs=0.001)
+    assert c.vehicle_from_sensor @ sensor[1] == pytest.approx(rate, abs=0.02)
+
+
+def test_a_file_without_matrices_has_none_of_their_keys():
+    assert not {"accel_matrix", "gyro_matrix", "gyro_sigma"} & set(CalibrationFile().as_json())
+
+
+@pytest.mark.parametrize(
+    ("entry", "value", "words"),
+    [
+        ("gyro_matrix", [[1.3, 0, 0], [0, 1, 0], [0, 0, 1]], "gyro_matrix is 0.3 from the identity"),
+        ("accel_matrix", [1.0, 1.0, 1.0], "accel_matrix, row 1, has to be 3 numbers"),
+        ("gyro_matrix", [[1, 0, 0], [0, 1, 0]], "gyro_matrix has to be 3 rows of 3 numbers"),
+        ("gyro_sigma", [[-0.1] * 3] * 3, "gyro_sigma has to be 0 to 0.05"),
+    ],
+)
+def test_matrices_that_no_sensor_has_are_refused(tmp_path, entry, value, words):
+    path = tmp_path / "CAL.json"
+    path.write_text(json.dumps(whole().as_json() | {entry: value}))
+    with pytest.raises(InputError, match=words):
+        read_calibration(path)

@@ -1,5 +1,7 @@
 """A still pose, each axis by itself: 8192 counts per g, 65.5 per deg/s. What else spoils one: test_calibration.py."""
 
+import math
+
 import pytest
 from kickstand.calibration.still_pose import StillPose
 from kickstand.errors import CaptureError
@@ -52,19 +54,41 @@ def test_a_pose_has_at_least_20_samples():
     assert problem_of(samples(21)) is None
 
 
-def test_readings_that_never_change_are_frozen_and_one_that_does_is_enough():
+def test_readings_that_never_change_are_frozen():
     rows = [list(LEVEL) for _ in range(100)]
     assert problem_of(rows) == "frozen-pose"
     for row in rows:
         row[3] = row[3] + 1  # only the temperature
     rows[50][3] += 7
     assert problem_of(rows) == "frozen-pose"
-    rows[50][5] += 1
+
+
+@pytest.mark.parametrize(
+    ("axis", "code"),
+    [(0, "stuck-accel"), (1, "stuck-accel"), (2, "stuck-accel"), (4, "dead-gyro"), (5, "dead-gyro"), (6, "dead-gyro")],
+)
+def test_each_axis_has_to_change_by_a_count_now_and_then(axis, code):
+    rows = [[*row[:axis], LEVEL[axis], *row[axis + 1 :]] for row in samples()]
+    assert problem_of(rows) == code
+    rows[50][axis] += 1
+    assert problem_of(rows) is None
+
+
+@pytest.mark.parametrize("axis", [4, 5, 6])
+def test_a_noisy_gyro_spoils_the_pose_and_a_sway_does_not(axis):
+    for dps, code in ((0.5, None), (0.7, "noisy-gyro")):
+        rows = samples(600)
+        for k, row in enumerate(rows):  # the rms of this noise is dps
+            row[axis] += round((-1, 1, 1, -1)[k % 4] * dps * 65.5)
+        assert problem_of(rows) == code
+    rows = samples(600)
+    for k, row in enumerate(rows):
+        row[axis] += round(2.0 * 65.5 * math.sin(2 * math.pi * k / 300))
     assert problem_of(rows) is None
 
 
 @pytest.mark.parametrize("axis", [4, 5, 6])
 @pytest.mark.parametrize(("rate_dps", "code"), [(-46, "gyro-offset"), (-44, None), (44, None), (46, "gyro-offset")])
 def test_a_large_gyro_offset_spoils_the_pose(axis, rate_dps, code):
-    rows = [[*row[:axis], round(rate_dps * 65.5), *row[axis + 1 :]] for row in samples()]
+    rows = [[*row[:axis], round(rate_dps * 65.5) + k % 2, *row[axis + 1 :]] for k, row in enumerate(samples())]
     assert problem_of(rows) == code

@@ -74,6 +74,68 @@ def test_records_are_read_and_written_as_by_the_first_release(store, tmp_path, s
     assert (tmp_path / FILES[1]).read_bytes() == record(sequence=9, six_done=six_done, how=how)
 
 
+# What a board with firmware 0.4.0 has in its flash after the six positions, and then after the two presses
+OF_0_4_0 = {
+    "kickstand_b.cal": "4b535444010060000100000068080100a69b443c96430bbd4260653d7368813f08ac7c3faaf1823f000050400000"
+    "c0bf0000403f0000803f0000000000000000000000000000803f0000000000000000000000000000803f000000007ca03fb8",
+    "kickstand_a.cal": "4b535444010060000200000068080101a69b443c96430bbd4260653d7368813f08ac7c3faaf1823f000060400000"
+    "a0bf0000003f000000009a99193fcdcc4cbf0000803f000000000000000000000000cdcc4cbf9a9919bf0000a03fe2591250",
+}
+
+
+def test_the_flash_of_a_board_with_0_4_0_is_read(store, tmp_path):
+    for name, content in OF_0_4_0.items():
+        (tmp_path / name).write_bytes(bytes.fromhex(content))
+    loaded = store.load()
+    assert store.message == "record 2"
+    assert loaded.parameters()[:9] == pytest.approx([0.012, -0.034, 0.056, 1.011, 0.987, 1.023, 3.5, -1.25, 0.5])
+    assert loaded.parameters()[9:] == pytest.approx([0.0, 0.6, -0.8, 1.0, 0.0, 0.0, 0.0, -0.8, -0.6, 1.25])
+    assert loaded.matrices() == [*IDENTITY, *IDENTITY, *[0.0] * 9]
+    assert loaded.six_done and loaded.aligned and not loaded.whole
+    store.save(loaded)
+    assert len((tmp_path / FILES[1]).read_bytes()) == 96  # a board that goes back to 0.4.0 reads it
+
+
+MATRICES = [1.0, 0.01, -0.02, 0.01, 1.0, 0.003, -0.02, 0.003, 1.0]
+MATRICES += [1.02, 0.01, 0.02, -0.03, 0.98, 0.004, 0.005, -0.006, 1.01] + [0.001 * k for k in range(1, 10)]
+
+
+def whole(mark=1):
+    new = calibration(mark)
+    new.set_matrices(MATRICES)
+    return new
+
+
+def test_the_matrices_are_kept_through_a_new_alignment(store):
+    store.save(whole().with_alignment(IDENTITY, [1.0, 2.0, 3.0]))
+    loaded = store.load()
+    assert loaded.matrices() == pytest.approx(MATRICES)
+    assert loaded.whole
+
+
+def test_a_cut_or_damaged_record_with_matrices_leaves_the_one_before(store, tmp_path):
+    store.save(calibration(1))
+    store.save(whole(9))
+    written = newest_file(tmp_path, store)
+    record = written.read_bytes()
+    for cut in range(len(record)):
+        written.write_bytes(record[:cut])
+        assert mark_of(store.load()) == 1
+    assert "cut short" in store.message
+    for at in range(0, len(record), 7):
+        written.write_bytes(record[:at] + bytes([record[at] ^ 4]) + record[at + 1 :])
+        assert mark_of(store.load()) == 1
+
+
+@pytest.mark.parametrize(("index", "value"), [(0, 1.2), (10, -0.2), (14, float("nan")), (20, 0.06), (26, -0.001)])
+def test_implausible_matrices_are_not_loaded(store, index, value):
+    new = calibration(1)
+    new.set_matrices([*MATRICES[:index], value, *MATRICES[index + 1 :]])
+    store.save(new)
+    assert store.message != "" or not store.load().aligned
+    assert not store.load().aligned
+
+
 @pytest.mark.parametrize(
     ("content", "problem"),
     [
@@ -84,8 +146,7 @@ def test_records_are_read_and_written_as_by_the_first_release(store, tmp_path, s
         (record(magic=b"KSTE"), "of another version"),
         (record(version=2), "of another version"),
         (record(sequence=0), "of another version"),
-        (record(chip=(0x70, 8)), "of another sensor or range"),
-        (record(chip=(0x68, 16)), "of another sensor or range"),
+        (record(chip=(0x70, 8)), "of another sensor"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
@@ -96,6 +157,13 @@ def test_what_is_wrong_with_a_record_is_reported(store, tmp_path, content, probl
     (tmp_path / FILES[0]).write_bytes(record())
     assert store.load().aligned
     assert store.message == f"record 7 (other record: {FILES[1]} {problem})"
+
+
+def test_a_record_of_another_range_stays_valid(store, tmp_path):
+    """Boards in use measured up to 8 g when they were calibrated; 16 g became the default later."""
+    (tmp_path / FILES[1]).write_bytes(record(chip=(0x68, 16)))
+    assert store.load().aligned
+    assert store.message == "record 7"
 
 
 @pytest.mark.parametrize("saved_before", [0, 1, 2])
@@ -157,13 +225,13 @@ def test_flash_that_does_not_keep_what_is_written(store, tmp_path, monkeypatch):
 
 
 def test_a_trim_may_be_stored_beside_a_record_that_never_was_this_sensors(store, tmp_path):
-    """Such as that of another range, or one that a power cut left empty."""
+    """Such as that of another chip, or one that a power cut left empty."""
     store.save(calibration(1))
     store.save(calibration(2))
-    other = Store(0x68, 16, str(tmp_path))
+    other = Store(0x70, 8, str(tmp_path))
     other.load()
     other.save(calibration(3))
-    again = Store(0x68, 16, str(tmp_path))
+    again = Store(0x70, 8, str(tmp_path))
     assert mark_of(again.load()) == 3 and "another sensor" in again.message
     assert again.unchanged()
     newest = newest_file(tmp_path, other)
@@ -174,4 +242,4 @@ def test_a_trim_may_be_stored_beside_a_record_that_never_was_this_sensors(store,
     assert again.unchanged()
     again.save(calibration(4))
     assert again.unchanged()
-    assert mark_of(Store(0x68, 16, str(tmp_path)).load()) == 4
+    assert mark_of(Store(0x70, 8, str(tmp_path)).load()) == 4

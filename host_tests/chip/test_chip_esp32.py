@@ -57,7 +57,7 @@ def test_ctrl_c_unplugged_parts_and_a_soft_reset():
         assert device.resets == 0
         assert b"Kickstand stopped." in device.said
         status = device.exec("import kickstand\nkickstand.status()", 20.0)
-        assert re.search(r"Sensor +MPU6050 \(0x68\), \+-8 g", status)
+        assert re.search(r"Sensor +MPU6050 \(0x68\), \+-16 g", status)
         assert re.search(r"Display .* at 0x27", status)
         assert re.search(r"Machine code +used\n", status)
         assert re.search(r"aligned: yes", status)

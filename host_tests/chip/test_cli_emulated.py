@@ -12,10 +12,9 @@ from typing import Any
 
 import command
 import pytest
-from emulated import CHIPS, calibrated, firmware
+from emulated import CHIPS, calibrated, firmware, need
 from kickstand_tools.deploy import bytecode, connection
-from kickstand_tools.emulator import esp32_library, image
-from kickstand_tools.errors import InputError
+from kickstand_tools.emulator import esp32_library
 from mpremote import transport_serial
 from terminal import Terminal
 
@@ -24,19 +23,12 @@ pytestmark = pytest.mark.chip
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 @pytest.mark.parametrize(
-    ("chip", "name", "library"),
-    [
-        ("rp2040", "Pico", image),
-        pytest.param("esp32", "ESP32", esp32_library, marks=pytest.mark.esp32),
-    ],
-    ids=["rp2040", "esp32"],
+    ("chip", "name"),
+    [("rp2040", "Pico"), pytest.param("esp32", "ESP32", marks=pytest.mark.esp32)],
 )
-def test_emulate_in_a_terminal(chip, name, library):
+def test_emulate_in_a_terminal(chip, name):
     """The bike is drawn, the button and the end follow the keys."""
-    try:
-        library.find()
-    except InputError as error:
-        pytest.skip(str(error))
+    need("esp32" if chip == "esp32" else "pico")
     with socket.create_server(("127.0.0.1", 0)) as found:
         free = found.getsockname()[1]
     with Terminal([sys.executable, "-m", "kickstand_tools.cli", "emulate", "--chip", chip, "--port", str(free)]) as at:

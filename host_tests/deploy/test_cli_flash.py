@@ -151,7 +151,7 @@ def test_a_flash_that_fills_up_all_the_same_and_a_cable_pulled_while_copying(boa
     broken_off(board, words)
 
 
-@pytest.mark.parametrize("verb", ["flash", "status"])
+@pytest.mark.parametrize("verb", ["flash", "status", "check"])
 @pytest.mark.parametrize(
     ("board_is", "words"),
     [
@@ -164,7 +164,7 @@ def test_what_is_no_micropython_is_refused(board, monkeypatch, verb, board_is, w
     refused(fake_board.plug_in(monkeypatch, fake_board.FakeBoard(board.root, **board_is)), verb, words=words)
 
 
-@pytest.mark.parametrize("verb", ["flash", "status"])
+@pytest.mark.parametrize("verb", ["flash", "status", "check"])
 @pytest.mark.parametrize(
     ("found", "words"),
     [

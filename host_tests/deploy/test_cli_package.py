@@ -49,11 +49,13 @@ def test_the_wheel_carries_the_firmware(tmp_path):
         for target, source in firmware_files.firmware_files().items():
             inside = target[1:] if target.startswith("/kickstand/") else "kickstand_tools/firmware" + target
             assert archive.read(inside) == source.read_bytes()
+        commands = archive.read("kickstand_lean-0.4.0.dist-info/entry_points.txt").decode()
     assert {"kickstand_tools/cli/main.py", "kickstand_tools/py.typed"} <= names
     web = firmware_path.TOOLS / "kickstand_tools" / "web"
     pages = [path for name in ("npm", "page") for path in (web / name).rglob("*") if path.is_file()]
     assert {f"kickstand_tools/web/{path.relative_to(web).as_posix()}" for path in pages} <= names
-    assert {name.split("/")[0] for name in names} == {"kickstand", "kickstand_tools", "kickstand-0.4.0.dist-info"}
+    assert {name.split("/")[0] for name in names} == {"kickstand", "kickstand_tools", "kickstand_lean-0.4.0.dist-info"}
+    assert "kickstand = " in commands and "workshop" not in commands  # whose modules are not in it
     assert not [name for name in names if "__pycache__" in name or name.endswith(".cal")]
 
 

@@ -50,7 +50,7 @@ def test_an_installed_package_takes_a_config_from_the_current_folder(board, tmp_
     assert f"config.py is {tmp_path / 'mine' / 'config.py'}\n" in result.out
     assert "to change settings" not in result.out
     assert board.path("config.py").read_text() == 'SIDE = "right"\n'
-    assert '-m pip install "kickstand[rides]"' in errors.extra("rides")
+    assert '-m pip install "kickstand-lean[rides]"' in errors.extra("rides")
 
 
 @pytest.mark.parametrize("arguments", [["flash"], ["flash", "--config"]])

@@ -34,6 +34,7 @@ NONSENSE = {
 COMMANDS = {
     "flash": ("flash",),
     "status": ("status",),
+    "check": ("check",),
     "pull": ("pull", "--out", "out"),
     "record": ("record", "--out", "RIDE.csv"),
 }

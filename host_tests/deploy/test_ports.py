@@ -1,6 +1,7 @@
 """Pico and ESP32: the firmware uses what both ports of MicroPython have, and compiles for both."""
 
 import ast
+import contextlib
 import hashlib
 import json
 import os
@@ -44,8 +45,9 @@ def stubs(request):
             )
             if done.returncode != 0:
                 said = done.stderr.strip() or "pip failed"
-                pytest.skip(f"{wanted[0]} cannot be installed: {said.splitlines()[-1]}")
-            os.replace(f"{scratch}/stubs", directory)
+                pytest.skip(f"no {wanted[0]}: it cannot be installed: {said.splitlines()[-1]}")
+            with contextlib.suppress(OSError):  # another process was first
+                os.rename(f"{scratch}/stubs", directory)
     return request.param, directory
 
 

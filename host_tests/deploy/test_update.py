@@ -1,6 +1,7 @@
 """Updates of a board with an older version: what goes, broken off at any step, and the room that is needed."""
 
 import functools
+import hashlib
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -8,7 +9,7 @@ import command
 import fake_board
 import pytest
 from kickstand.rides import flash_ring
-from kickstand_tools.deploy import bytecode, firmware_files, flash, update
+from kickstand_tools.deploy import bytecode, firmware_files, flash, others, update
 from kickstand_tools.deploy.board_files import BoardFiles, fingerprint, survey
 from kickstand_tools.deploy.update import needed_blocks, plan, refuse_without_room
 from kickstand_tools.errors import InputError
@@ -47,12 +48,17 @@ def before(which):
         f"/kickstand/{name}{ending}": bytes(FLAT_BYTES[ending] if i % 6 else FLAT_SMALL_BYTES)
         for i, name in enumerate(FLAT)
     }
-    return modules | {"/main.py": b"# 0.2.0\n" * 330, "/config.py": b"# 0.2.0\n" * 700}
+    return modules | {"/main.py": MAIN_THEN, "/config.py": b"# 0.2.0\n" * 700}
+
+
+MAIN_THEN = b"# 0.2.0\n" * 330
 
 
 @pytest.fixture
 def plugged(monkeypatch):
     """plugged(board): the only board that there is."""
+    then = MAIN_THEN, before("nested .py")["/main.py"]
+    monkeypatch.setattr(others, "_OWN_MAIN", {hashlib.sha256(text).hexdigest()[:16] for text in then})
 
     def plug(board):
         monkeypatch.setattr(flash, "contents", lambda mpy, _compiler: dict(contents(mpy or None)))
@@ -216,7 +222,7 @@ def test_the_ring_of_rides_knows_what_the_firmware_takes():
 def test_plain_mpremote_needs_the_room_that_the_readme_says():
     """It puts each .py beside the .mpy, which stays."""
     blocks = sum(update.most_blocks(len(data), BLOCK) for data in wanted(".py").values())
-    assert 0.9 * 540 < blocks * BLOCK / 1024 <= 540
+    assert 0.9 * 580 < blocks * BLOCK / 1024 <= 580
 
 
 @pytest.mark.parametrize("size", [0, 1, 512, 513, 4096, 4097, 8188, 8189, 12276, 100_000, 400_001])

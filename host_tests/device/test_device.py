@@ -8,7 +8,9 @@ import devices
 import engines
 import pytest
 from devices import ALIGNED, LEFT_S, PRESSES, RIDE, RIGHT_S, STRAIGHT_S
+from kickstand.calibration.store import Store
 from kickstand_tools import firmware_path
+from kickstand_tools.simulation.scripted import sensor_errors
 
 
 @pytest.mark.parametrize(("engine", "seed"), [("cpython", None), ("micropython", 3)])
@@ -107,7 +109,8 @@ def test_pages_and_menu(tmp_path):
     assert record.at(menu_s + 5.5)[0] == "Maxima reset    "
     assert record.first("Max left +[01]°", menu_s + 8) < math.inf
     assert record.at(menu_s + 15.5)[0] == "MPU6050   25.0°C"
-    assert {record.at(menu_s + after_s)[1] for after_s in (15.5, 17.5)} == {"6pos no  ali yes", "0 gaps 1 starts "}
+    info = {record.at(menu_s + after_s)[1] for after_s in (15.5, 17.5)}
+    assert len(info & {"6pos no  ali yes", "0 gaps 1 starts ", "samples lost   0", "I2C address 0x68"}) == 2
     assert record.last[0].startswith("Max left")
 
 
@@ -134,6 +137,73 @@ def test_six_positions_then_alignment_of_a_part_with_errors(engine, tmp_path):
     assert ride.first("Aligned! +12.0°") < math.inf
     for t_s, lean in ((LEFT_S, -30), (RIGHT_S, 40), (STRAIGHT_S, 0)):
         assert ride.lean_at(t_s) == pytest.approx(lean, abs=2.5)
+
+
+def test_the_six_positions_calibrate_the_gyro_too(tmp_path):
+    devices.run("cpython", tmp_path, {**six_positions([0.5, 0.6, -0.7]), "seed": 3})
+    gyro = sensor_errors.Sensor(seed=3).gyro_scale
+    stored = Store(0x68, 8, str(tmp_path)).load()
+    assert [stored.gyro_matrix[i] for i in (0, 4, 8)] == pytest.approx([1 / scale for scale in gyro], abs=0.004)
+    assert all(0.0 < sigma < 0.02 for sigma in stored.gyro_sigma)
+
+
+def test_a_quick_turn_is_complained_of_and_another_pose_asked_for(tmp_path):
+    """All turns take a tenth of a second: no axis of the gyro is proved."""
+    plan = six_positions([0.5, 0.6, -0.7])
+    steps = plan["poses"]
+    for i in range(2, len(steps) - 1, 2):
+        steps[i][0] = steps[i + 1][0] - 0.15
+    record = devices.run("cpython", tmp_path, {**plan, "seed": 3})
+    assert record.first("Turned too fast") < 20
+    assert record.first("turn it slower") < 20
+    assert record.first("Slant it again") < math.inf
+    assert list(tmp_path.iterdir()) == []
+
+
+def ill(monkeypatch, change):
+    """Parts whose gyro reads about x what change() makes of it."""
+    read = sensor_errors.Sensor.read
+
+    def changed(self, motion, t_s):
+        values = list(read(self, motion, t_s))
+        values[3] = self.gyro_bias_dps[0] + change(values[3] - self.gyro_bias_dps[0])
+        return tuple(values)
+
+    monkeypatch.setattr(sensor_errors.Sensor, "read", changed)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda rate: 0.5 * rate, "Gyro x: -5[01] %"),
+        (lambda rate: -rate, "Gyro x reversed"),
+        (lambda _: 0.0, "Gyro x is dead"),
+    ],
+    ids=["half", "mirrored", "dead"],
+)
+def test_the_six_positions_refuse_an_ill_gyro(tmp_path, monkeypatch, capsys, change, words):
+    ill(monkeypatch, change)
+    record = devices.run("cpython", tmp_path, {**six_positions([0.5, 0.6, -0.7]), "seed": 3}, capsys)
+    assert record.first(words) < math.inf
+    assert "another sensor" in record.console
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("share", "aligned"), [(0.5, False), (-1.0, False), (0.95, True), (1.05, True)])
+def test_the_two_presses_refuse_a_gyro_that_is_ill(tmp_path, monkeypatch, capsys, share, aligned):
+    """The bike's roll is about the sensor's z in a part without a mounting."""
+    read = sensor_errors.Sensor.read
+
+    def changed(self, motion, t_s):
+        values = list(read(self, motion, t_s))
+        values[5] *= share
+        return tuple(values)
+
+    monkeypatch.setattr(sensor_errors.Sensor, "read", changed)
+    record = devices.run("cpython", tmp_path, {**ALIGNED, "until": 18}, capsys)
+    assert (record.first("Aligned!") < math.inf) == aligned
+    assert (record.first("Tilt 12°, gyro") == math.inf) == aligned
+    assert ("not aligned: between the poses are 12.0 degrees" in record.console) != aligned
 
 
 def test_six_positions_says_what_it_wants(tmp_path):

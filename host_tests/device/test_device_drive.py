@@ -280,10 +280,12 @@ def test_ctrl_c_keeps_the_worst_for_the_status(tmp_path, monkeypatch, capsys):
     def interrupt():
         raise KeyboardInterrupt
 
-    with Board(level) as board:
+    with Board(sensor_errors.resting(sensor_errors.Sensor(), (0, 1, 0))) as board:  # level would be a frozen sensor
         from kickstand import app, devices, settings, status_report
+        from kickstand.lean import consistency
 
         monkeypatch.setattr(app, "worst", None)
+        monkeypatch.setattr(consistency, "last_odd", "odd-up")
         monkeypatch.setattr(status_report.gc, "mem_free", lambda: 0, raising=False)
         chosen = settings.Settings(None)
         monkeypatch.setattr(status_report, "load", lambda: chosen)
@@ -297,7 +299,9 @@ def test_ctrl_c_keeps_the_worst_for_the_status(tmp_path, monkeypatch, capsys):
             board.run(run, 10.0)
         board.run(status_report.report, 20.0)
     words = r"Since start  longest turn ([\d.]+) ms; places left in the FIFO, at the fewest: (\d+)"
-    found = re.search(words, capsys.readouterr().out)
+    said = capsys.readouterr().out
+    assert "again and again: force up" in said
+    found = re.search(words, said)
     assert found
     assert 245.0 < float(found[1]) < 275.0
     assert 15 <= int(found[2]) <= 25

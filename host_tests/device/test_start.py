@@ -1,7 +1,6 @@
 """What main.py runs, when something is missing or broken."""
 
 import builtins
-import math
 import os
 import subprocess
 import sys
@@ -11,6 +10,7 @@ import pytest
 from kickstand import errors
 from kickstand_tools import firmware_path
 from kickstand_tools.simulated_board.simulator import Board
+from kickstand_tools.simulation.scripted import sensor_errors
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def board(request, tmp_path, monkeypatch):
     """A board with nothing in its flash; an indirect parameter: arguments of Board."""
     monkeypatch.chdir(tmp_path)
     fitted = getattr(request, "param", {})
-    made = Board(lambda t_s: (0.002 * math.sin(700 * t_s), 0.0, 1.0, 0.0, 0.0, 0.0, 25.0), **fitted)
+    made = Board(sensor_errors.resting(sensor_errors.Sensor(), (0, 0, 1)), **fitted)
     with made:
         yield made
 

@@ -130,3 +130,10 @@ def test_without_a_user_py_its_module_is_not_loaded(run, tmp_path):
     run("", PLAN | {"until": 1.0}, "cpython")
     assert "kickstand.user_code" in sys.modules
     sys.modules.pop("kickstand.user_code")
+
+
+@pytest.mark.parametrize("name", ["__dir__", "__getattr__"])
+def test_a_module_that_raises_when_it_is_looked_at_is_left_out(run, name):
+    """Only CPython asks a module for its names. The lean goes on, and the board does not restart."""
+    record = run(f"def {name}(*_):\n    raise ValueError('mine')\n", engine="cpython")
+    assert goes_on(record)

@@ -6,10 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from drawn_rides import drawn_ride, judged
+from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.api import Log, smooth
 from kickstand_tools.estimation import smooth as module
+from kickstand_tools.estimation.least_squares import Estimate
+from kickstand_tools.estimation.unknowns import DIVE
 from kickstand_tools.refusals import sentence
 from kickstand_tools.signals import rotation_matrix
+from kickstand_tools.simulation.physics.bike import Bike
 from smoothed_rides import Known, other, rms, simulated
 
 RIDES = {
@@ -94,6 +98,18 @@ def test_wheelies_are_not_taken_for_a_soft_mount():
     ride, found = known("wheelie"), smoothed("wheelie")
     assert not np.any(found.doubtful)
     assert rms((found.lean_deg - ride.lean_deg)[ride.riding]) < 0.13
+
+
+@pytest.mark.parametrize("dive_deg_per_g", [-1.5, 6.0])
+def test_the_dive_of_a_bike_is_learned(monkeypatch, dive_deg_per_g):
+    """Taken for the road's slope, or for an acceleration, it made the lean depend on the bike's fork."""
+    drawn, made = Bike.random, []
+    dives = {"dive_deg_per_mps2": dive_deg_per_g / STANDARD_GRAVITY}
+    monkeypatch.setattr(Bike, "random", staticmethod(lambda chance: replace(drawn(chance), **dives)))
+    monkeypatch.setattr(module, "Estimate", lambda *given: made.append(Estimate(*given)) or made[-1])
+    ride = simulated("track", 31, 120.0)
+    assert rms(error(ride)[ride.riding]) < 0.3
+    assert np.degrees(made[0].parameters[0, DIVE]) == pytest.approx(dive_deg_per_g, abs=1.2)
 
 
 @pytest.mark.parametrize("wrong_deg", [-4.0, 4.0])

@@ -166,6 +166,26 @@ def test_two_runs_do_not_share_a_journal(tmp_path):
         assert "a" in second
 
 
+def test_a_journal_that_is_removed_is_not_the_one_that_is_locked(tmp_path, monkeypatch):
+    """It is locked until it is gone; a run that has opened it meanwhile makes another."""
+    fcntl = pytest.importorskip("fcntl", reason="files are not locked on this system")
+    path = tmp_path / "journal.jsonl"
+    locks, lock = [], fcntl.flock
+
+    def removed_before_the_first(file, how):
+        if not locks:
+            path.unlink()
+        locks.append(how)
+        lock(file, how)
+
+    monkeypatch.setattr(fcntl, "flock", removed_before_the_first)
+    with Journal(path) as journal:
+        journal.add("a", failed(Period("v", "", "car", ()), "unreadable", "x"))
+        assert len(locks) == 2
+    with Journal(path) as again:
+        assert "a" in again
+
+
 def test_a_damaged_line_of_a_journal_costs_that_line_and_is_counted_once(tmp_path):
     path = tmp_path / "journal.jsonl"
     names = ["a", "b", "c"]

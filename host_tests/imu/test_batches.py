@@ -19,16 +19,16 @@ def noise(count, seed=0):
 
 
 def added(engine, batches):
-    """What add_up() gives for each batch; add_up_python() must give the same."""
+    """How many of each batch add_up() takes, and their sums; add_up_python() must give the same and note the same."""
     chosen, python = engines.run(engine, [("add_up", (batches, LIMIT))])[0]
     assert chosen == python
-    return chosen
+    return [answer[:2] for answer in chosen]
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_sums(engine):
-    """Of no sample, of one, of eight, and at the ends of the range."""
-    ends = np.array([[-32768] * 7, [32767] * 7, [-32768] * 7, [32767] * 7])
+    """Of no sample, of one, of eight, and near the ends of the range."""
+    ends = np.array([[-32699] * 7, [32699] * 7, [-32699] * 7, [32697] * 7])
     batches = [noise(0), noise(1), noise(8), ends]
     answers = added(engine, [frames(batch) for batch in batches])
     assert answers == [[len(batch), batch.sum(axis=0).tolist()] for batch in batches]
@@ -74,7 +74,41 @@ def test_the_same_again_and_again_is_a_frozen_chip(engine):
     answers = engines.run(engine, [("add_up", ([frames(batch) for batch in call], LIMIT)) for call in calls])
     for (chosen, python), counts in zip(answers, expected, strict=True):
         assert chosen == python
-        assert [good for good, _ in chosen] == counts
+        assert [good for good, *_ in chosen] == counts
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_a_sample_at_the_end_of_the_range_is_left_out(engine):
+    """Of any axis, at either end, but not of the temperature. The good samples move up."""
+    samples = noise(8) // 2
+    samples[2, 1], samples[3, 6], samples[5, 0], samples[5, 4], samples[6, 3] = 32700, -32768, -32700, 32767, 32767
+    good = samples[[0, 1, 4, 6, 7]]
+    chosen, python = engines.run(engine, [("add_up", ([frames(samples)], LIMIT))])[0]
+    assert chosen == python
+    count, sums, moved, watch = chosen[0]
+    assert (count, sums) == (5, good.sum(axis=0).tolist())
+    assert moved == np.ravel(frames(good)).tolist()
+    assert watch[3:8] == [3, 0, 0b1010011, 3, 2]  # lost; in a row; which axes; frames, with the gyro
+    assert watch[26:33] == np.abs(samples).max(axis=0).tolist()
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_a_watch_notes_what_the_counts_have_shown(engine):
+    """The lowest four bits that have come, a changed high byte, a jump below it, and which axes differ."""
+    samples = np.full((8, 7), 700) + np.arange(7)
+    samples[:, 0] = 5, 6, 5, 6, 5, 6, 5, 6  # two values
+    samples[:, 1] = 2, 194, 5, 6, 7, 198, 9, 8  # jumps within one high byte
+    samples[:, 2] = -1, 0, 1, 2, 3, 4, 5, 6
+    samples[:, 4] = samples[:, 6] = np.arange(8) * 3 - 8
+    chosen, python = engines.run(engine, [("add_up", ([frames(samples[:1]), frames(samples)], LIMIT))])[0]
+    assert chosen == python
+    before, after = (answer[3] for answer in chosen)
+    assert before[12:19] == samples[0].tolist()
+    for column in range(7):
+        low = sum(1 << value for value in set((samples[:, column] & 15).tolist()))
+        assert after[19 + column] & 0xFFFF == low, column
+    assert [seen >> 16 for seen in after[19:26]] == [0, 2, 1, 1, 1, 1, 1]
+    assert after[8] == 0b1101111
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)

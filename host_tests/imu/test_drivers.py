@@ -149,7 +149,7 @@ def test_status_shows_how_the_board_is(board, monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(os, "statvfs", lambda path: (4096, 4096, 300, 200))
     on(board, kickstand.status)
     report = capsys.readouterr().out
-    assert "MPU6050 (0x68), +-8 g, +-500 deg/s" in report
+    assert "MPU6050 (0x68), +-16 g, +-500 deg/s" in report
     assert "Reading      0.250 -0.500 1.000 g" in report
     assert "at 0x27" in report
     assert "six positions: no, aligned: no; not calibrated" in report

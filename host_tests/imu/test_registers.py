@@ -33,8 +33,12 @@ class Wires:
         self.waiting = 0
         self.read_of_fifo = []
 
+    def _expect(self, address):
+        if address != 0x68:
+            raise OSError(5)
+
     def writeto_mem(self, address, register, data):
-        assert address == 0x68
+        self._expect(address)
         for value in data:
             self.log.append((register, value))
             self.times_us.append(self.clock.now_us if self.clock else 0)
@@ -42,7 +46,7 @@ class Wires:
                 self.registers[register] = value
 
     def readfrom_mem_into(self, address, register, buffer):
-        assert address == 0x68
+        self._expect(address)
         if register not in (FIFO_R_W, USER_CTRL):  # no byte more than is used: each takes 25 us
             assert len(buffer) == {SMPLRT_DIV: 11, 0x3B: 14, FIFO_COUNT_H: 2}.get(register, 1)
         self.registers[FIFO_COUNT_H], self.registers[FIFO_COUNT_H + 1] = divmod(self.waiting, 256)
@@ -50,7 +54,7 @@ class Wires:
             self.read_of_fifo.append(len(buffer))
             return
         if register == USER_CTRL:
-            assert len(buffer) <= 2
+            assert len(buffer) <= 3
         buffer[:] = self.registers[register : register + len(buffer)]
 
 

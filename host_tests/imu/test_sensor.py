@@ -15,6 +15,10 @@ class Chip:
     spoilt. setups: what set-ups raise in their last step, None for nothing. calls: what was done."""
 
     def __init__(self):
+        from kickstand.imu.fifo_frames import AxisWatch
+
+        self.axes = AxisWatch(200, 3, 1, 3, 20)
+        self.axes.notes[9] = 1 << 29  # the next look is far away
         self.waiting, self.setups, self.states = [], [], []
         self.bad = 0
         self.overflows = self.frames_left = 0
@@ -56,11 +60,11 @@ def raised_or(value):
     return value
 
 
-def made(board):
+def made(board, explain=None):
     from kickstand.imu.sensor import Sensor
 
     chip = Chip()
-    return Sensor(chip, lambda: "bus"), chip
+    return Sensor(chip, lambda: "bus", explain), chip
 
 
 def set_up(sensor, now_ms):
@@ -71,9 +75,9 @@ def set_up(sensor, now_ms):
     return now_ms - 10
 
 
-def running(board):
+def running(board, explain=None):
     """A sensor whose chip runs, and the time in ms: its first sample has just come."""
-    sensor, chip = made(board)
+    sensor, chip = made(board, explain)
     now_ms = set_up(sensor, 0)
     assert sensor.fetch(now_ms) == 1
     assert sensor.fault is None
@@ -215,11 +219,90 @@ def test_a_chip_that_has_reset_itself_is_set_up_again(board):
 
 def test_a_check_that_is_lost_counts_as_a_lost_transfer(board):
     sensor, chip, now_ms = running(board)
-    chip.states = [OSError(5)] * 3
-    for k in (1, 2, 3):
+    chip.states = [OSError(5)]
+    chip.waiting = [OSError(5)] * 2
+    sensor.check(now_ms + 100)
+    for k in (1, 2):
         assert code(sensor) is None
-        sensor.check(now_ms + 100 * k)
+        sensor.fetch(now_ms + 100 + 10 * k)
     assert code(sensor) == "sensor-lost"
+
+
+def test_nothing_is_judged_after_a_lost_transfer(board):
+    """Restarting the FIFO may have failed half way. The next transfer that succeeds ends this."""
+    sensor, chip, now_ms = running(board)
+    chip.waiting, chip.states = [OSError(5)], [False, False]
+    sensor.fetch(now_ms + 10)
+    sensor.check(now_ms + 10)
+    assert (code(sensor), chip.states) == (None, [False, False])
+    sensor.fetch(now_ms + 20)
+    sensor.check(now_ms + 20)
+    assert code(sensor) == "sensor-reset"
+
+
+def until_failed(sensor, chip, now_ms, since_ms):
+    """Let a chip that is set up give nothing for since_ms; return when it is at fault."""
+    chip.waiting = [0] * 20
+    sensor.fetch(now_ms + since_ms)
+    return now_ms + since_ms
+
+
+def test_the_fifo_is_tried_out_once_set_ups_do_not_help(board):
+    """At the third fault in a row, each soon after a set-up."""
+    from kickstand.errors import Notice
+
+    sensor, chip, now_ms = running(board, lambda chip, error: (Notice("sensor-fifo", "stays empty"), []))
+    said = []
+    for _ in range(4):
+        now_ms = until_failed(sensor, chip, now_ms, 150)
+        said.append(code(sensor))
+        now_ms = set_up(sensor, now_ms)
+    assert said == ["sensor-silent", "sensor-silent", "sensor-fifo", "sensor-fifo"]
+    chip.waiting = []
+    sensor.fetch(now_ms + 5)
+    assert code(sensor) is None
+
+
+def test_faults_far_apart_do_not_question_the_fifo(board):
+    sensor, chip, now_ms = running(board, lambda chip, error: 1 / 0)
+    for _ in range(5):
+        now_ms = until_failed(sensor, chip, now_ms, 1500)
+        assert code(sensor) == "sensor-silent"
+        now_ms = set_up(sensor, now_ms)
+
+
+def test_lost_readings_are_the_fifos_fault_where_it_has_one(board):
+    from kickstand.errors import Notice
+
+    sensor, chip, now_ms = running(board, lambda chip, error: (Notice("sensor-fifo", "stays full"), []))
+    board.clock.advance((now_ms + 600) * 1000 - board.clock.now_us)
+    chip.waiting, chip.overflows = [0], 1
+    sensor.fetch(now_ms + 600)
+    assert code(sensor) == "sensor-fifo"
+
+
+def test_failed_set_ups_are_explained_about_once_a_second(board):
+    from kickstand.errors import Notice
+    from kickstand.imu.sensor import Sensor
+
+    chip, asked = Chip(), []
+    chip.setups = [OSError(5)] * 60
+
+    def explain(chip, error):
+        asked.append(now_ms)
+        return Notice("exchanged", 4, 5), [0x3C]
+
+    sensor = Sensor(chip, lambda: "bus", explain)
+    chip.configure = lambda: iter_failing()
+    for now_ms in range(0, 3000, 10):
+        sensor.fetch(now_ms)
+        assert code(sensor) == ("exchanged" if asked else "starting")
+    assert asked == [100, 1100, 2100]
+    assert sensor.found == [0x3C]
+
+
+def iter_failing():
+    raise OSError(5)
 
 
 def test_a_fifo_that_does_not_start_is_tried_again_with_the_bus(board):

@@ -5,7 +5,15 @@ from pathlib import Path
 import pytest
 from mpy import run_tests
 
-MODULES = "test_meter", "test_filter_states", "test_rest", "test_upright_trim", "test_dive", "test_known_ride"
+MODULES = (
+    "test_meter",
+    "test_filter_states",
+    "test_rest",
+    "test_upright_trim",
+    "test_dive",
+    "test_consistency",
+    "test_known_ride",
+)
 
 
 @pytest.mark.parametrize("module", MODULES)

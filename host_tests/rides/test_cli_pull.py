@@ -1,7 +1,10 @@
 """kickstand pull, from an imagined board: rides become logs, damage is said, nothing unverified is deleted."""
 
+import errno
 import json
+import os
 import types
+from pathlib import Path
 
 import command
 import fake_board
@@ -151,3 +154,111 @@ def test_a_board_without_rides_or_without_the_recorder(board, tmp_path):
     words = "kickstand flash brings it up to date"
     command.refused(tmp_path, "pull", "--out", tmp_path / "out", words=words)
     command.refused(tmp_path, "pull", "--out", tmp_path / "out" / "a" / "b", words="make it first")
+
+
+class Altered:
+    """A file of the board that ends early."""
+
+    def __init__(self, file, count):
+        self.file, self.left = file, count
+
+    def read(self, count=-1):
+        piece = self.file.read(min(count, self.left))
+        self.left -= len(piece)
+        return piece
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.file.close()
+
+
+def ends_early(board, count):
+    """Reading a ride ends after so many bytes, as of a damaged FAT chain."""
+    opened = board._open
+    board._globals["__builtins__"]["open"] = lambda path, mode="r": (
+        Altered(opened(path, mode), count) if mode == "rb" else opened(path, mode)
+    )
+
+
+def on_the_cable(board, change, times=99):
+    """change(bytes) of the first transfers of a ride."""
+    send, left = board.exec_raw_no_follow, [times]
+
+    def sends(script):
+        before = board.serial.data
+        send(script)
+        content, end, rest = board.serial.data[len(before) :].partition(b"\x04")
+        if len(content) > 5000 and left[0]:
+            left[0] -= 1
+            content = change(content)
+        board.serial.data = before + content + end + rest
+
+    board.exec_raw_no_follow = sends
+
+
+@pytest.mark.parametrize(
+    "trouble",
+    [
+        lambda board: ends_early(board, 2 * 4096),
+        lambda board: ends_early(board, 2 * 4096 + 1000),
+        lambda board: on_the_cable(board, lambda content: b"\n".join([*content.split(b"\n")[:-2], b""])),
+        lambda board: on_the_cable(board, lambda content: content[:5000] + content[5001:]),
+        lambda board: on_the_cable(board, lambda content: content[: len(content) // 2] + b"\n"),
+        lambda board: on_the_cable(board, lambda content: content.replace(b"A", b"B", 1)),
+    ],
+)
+def test_a_ride_that_came_over_short_stays_on_the_board(trouble, board, tmp_path):
+    put(board, "000/03/00000.rid", ride_writer.blocks(4, ride=3)[0])
+    trouble(board)
+    result = command.works("pull", "--out", tmp_path / "out", "--delete")
+    assert "try another cable" in result.err
+    assert "ride 3: not deleted" in result.err
+    assert left(board)[-1] == "000/03/00000.rid"
+
+
+def test_a_transfer_that_was_disturbed_once_is_repeated(board, tmp_path):
+    put(board, "000/03/00000.rid", ride_writer.blocks(4, ride=3)[0])
+    on_the_cable(board, lambda content: content[:5000] + content[5001:], times=1)
+    assert command.works("pull", "--out", tmp_path / "out", "--delete").err == ""
+    assert left(board) == []
+
+
+def test_what_was_pulled_is_not_replaced_by_less(board, tmp_path):
+    blocks, _ = ride_writer.blocks(4, ride=3)
+    put(board, "000/03/00000.rid", blocks)
+    command.works("pull", "--out", tmp_path / "out")
+    (log,) = logs(tmp_path)
+    before = log.read_bytes()
+    put(board, "000/03/00000.rid", blocks[:2])
+    result = command.works("pull", "--out", tmp_path / "out", "--delete")
+    assert "has more of this ride" in result.err
+    assert log.read_bytes() == before
+    assert [path.name for path in logs(tmp_path)] == [log.name.replace(".csv", "-2.csv"), log.name]
+    assert left(board)
+
+
+def test_a_log_is_on_the_disk_before_the_ride_is_deleted(board, tmp_path, monkeypatch):
+    put(board, "000/03/00000.rid", ride_writer.blocks(4, ride=3)[0])
+    events = []
+    flush, remove = os.fsync, board.fs_rmfile
+    monkeypatch.setattr(
+        os, "fsync", lambda number: events.append(os.readlink(f"/proc/self/fd/{number}")) or flush(number)
+    )
+    monkeypatch.setattr(board, "fs_rmfile", lambda path: events.append("removed") or remove(path))
+    command.works("pull", "--out", tmp_path / "out", "--delete")
+    assert [Path(event).suffix for event in events] == [".gz", "", ".json", "", ""]
+    assert events[-1] == "removed"
+
+
+def test_a_folder_that_cannot_be_made_is_named(board, tmp_path, monkeypatch):
+    put(board, "000/03/00000.rid", ride_writer.blocks(4, ride=3)[0])
+
+    def refuses(path, *_rest, **_more):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
+
+    monkeypatch.setattr(os, "mkdir", refuses)
+    said = command.refused(tmp_path, "pull", "--out", tmp_path / "new", "--delete", words="give --out another place")
+    assert str(tmp_path / "new") in said
+    assert "connection" not in said

@@ -7,6 +7,7 @@ import gzip
 import json
 import os
 import re
+import resource
 import signal
 import types
 from itertools import pairwise
@@ -304,3 +305,27 @@ def test_nothing_recorded_writes_nothing(streaming, tmp_path):
     streaming([], "silence")
     command.refused(tmp_path, "record", "--out", tmp_path / "a.csv", words="nothing was recorded")
     command.refused(tmp_path, "record", "--out", tmp_path / "a.txt", words="ends in .csv or .csv.gz")
+
+
+@pytest.mark.parametrize("name", ["ride.csv", "ride.csv.gz"])
+@pytest.mark.parametrize("share", [0.3, 0.9])
+def test_a_full_disk_keeps_what_was_recorded(name, share, streaming, tmp_path, monkeypatch):
+    data, turns = half_seconds(12)
+    streaming(data, "ctrl-c")
+    (tmp_path / "whole").mkdir()
+    command.works("record", "--out", tmp_path / "whole" / name)
+    most = round(share * (tmp_path / "whole" / name).stat().st_size)
+    streaming(data, "ctrl-c")
+    handler, limits = signal.signal(signal.SIGXFSZ, signal.SIG_IGN), resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most, limits[1]))
+    try:
+        result = command.works("record", "--out", tmp_path / name)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert "the log cannot be written any further (File too large): what came until then is kept" in result.err
+    kept = len(read_log(tmp_path / name).time_us)
+    assert (share - 0.2) * len(turns) < kept < len(turns)
+    assert f", {kept} readings" in result.out
+    assert (tmp_path / "ride.cal.json").exists()
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["ride.cal.json", name, "whole"])

@@ -170,10 +170,59 @@ def test_free_and_all_bytes_are_blocks_of_the_size_that_counts(monkeypatch):
 def test_numbers_of_rides_go_on(root):
     Path("rides").mkdir()
     assert ride_paths.newest_ride("rides") == 0
-    (root.path / "rides/002").mkdir()
-    assert ride_paths.newest_ride("rides") == 200
     old_ride(root, 99)
+    (root.path / "rides/002").mkdir()  # without parts: the owner's, or power was lost before the first block
     ring = RideRing(FLASH)
-    assert ring.begin() == 200
+    assert ring.begin() == ring.begin() == 100
     write_block(ring)
-    assert ring.begin() == 201
+    assert ring.begin() == 101
+
+
+def strays(root, *names):
+    """Directories and files among those of the rides, each file with a content of its own."""
+    for name in names:
+        path = root.path / "rides" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if name.endswith("/"):
+            path.mkdir(parents=True, exist_ok=True)
+        else:
+            path.write_text(name)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["999/99/00000.rid"],
+        ["999/99/00000.rid", "999/98/00000.rid", "999/97/notes.txt"],
+        ["999/99/", "998/", "500/"],
+        ["1000/00/00000.rid", "100/5/00000.rid"],
+        ["000/01", "000/02"],
+        ["000"],
+        ["001", "000/99/00000.rid"],
+        ["999/98/00003.rid", "999/99/"],
+    ],
+)
+def test_no_stray_name_makes_a_ride_overwrite_another(names, root):
+    strays(root, *names)
+    before = {path: path.read_bytes() for path in Path("rides").rglob("*") if path.is_file()}
+    numbers = []
+    for k in range(5):
+        ring = RideRing(FLASH)
+        numbers.append(ring.begin())
+        write_block(ring, 100 + k)
+        ring.end()
+    assert len(set(numbers)) == 5
+    assert {path: path.read_bytes() for path in before} == before
+    found = {ride: size for ride, part, size in ride_paths.parts("rides") if ride in numbers}
+    assert found == {number: 100 + k for k, number in enumerate(numbers)}  # pull lists each
+
+
+def test_a_part_that_is_there_is_never_opened_for_writing(root):
+    ring = RideRing(FLASH)
+    number = ring.begin()
+    path = root.path / ride_paths.part_path("rides", number, 0)
+    path.write_bytes(b"a ride")
+    write_block(ring)
+    ring.end()
+    assert path.read_bytes() == b"a ride"
+    assert {part: size for _, part, size in ride_paths.parts("rides")} == {0: 6, 1: 100}

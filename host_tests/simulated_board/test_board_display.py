@@ -20,11 +20,11 @@ def as_text(lines):
     return [line.replace("\xdf", "\xb0") + " " * (16 - len(line)) for line in lines]
 
 
-def open_display(board, hz=None, kind="auto"):
+def open_display(board, hz=None, kind="auto", wiring=1):
     from kickstand.board import i2c_bus
     from kickstand.board.display import Display
 
-    return Display(lambda rate: i2c_bus.open_i2c(1, 6, 7, rate), hz, kind)
+    return Display(lambda rate: i2c_bus.open_i2c(1, 6, 7, rate), hz, kind, wiring=wiring)
 
 
 def turns(board, display, count, after=lambda: None):
@@ -239,6 +239,78 @@ def test_a_status_that_never_says_on_keeps_no_oled_dark(board, display):
     changes = set()
     turns(board, display, 200, lambda: changes.add(board.lcd.on))
     assert board.lcd.text() == as_text(NEW) and board.lcd.on
+
+
+def test_no_status_leaves_an_oled_dark():
+    """It tells the two apart, but each gets the supply commands of both. A picture may be two columns off."""
+    for kind in OLEDS:
+        for identity in range(16):
+
+            def run(board, identity=identity):
+                board.lcd.identity = identity
+                display = open_display(board)
+                display.show(*OLD)
+                turns(board, display, 60)
+                assert board.lcd.backlight and board.lcd.unknown == 0, identity
+                sure = {"ssd1306": (1, 3, 6, 15), "sh1106": (0, 8, 12)}[board.lcd.kind]
+                assert identity not in sure or board.lcd.text() == as_text(OLD), identity
+
+            assert on_board(run, 1e6, display=kind)[0] == "returned"
+
+
+def test_a_panel_of_32_rows_shows_both_lines():
+    """Letters of 16 rows fill it. It moves down by a pixel or two, over rows that letters leave blank."""
+
+    def run(board):
+        display = open_display(board, None, "ssd1306-32")
+        starts = set()
+        for lines in (OLD, NEW, OLD):
+            display.show(lines[0], lines[1], (lambda canvas: 1 / 0,))
+            turns(board, display, 60)
+            assert board.lcd.text() == as_text(lines) and not display.draws
+        assert board.lcd.rows == 32 and not board.lcd.alternate
+        for _ in range(25):
+            turns(board, display, 1010)
+            starts.add(board.lcd.start_line)
+            assert not any(page[x] & 0x80 for page in (board.lcd.pages()[3],) for x in range(128))
+        assert starts == {0, 62, 63}
+
+    assert on_board(run, 1e6, display="ssd1306")[0] == "returned"
+
+
+def test_each_wiring_of_a_backpack_works():
+    for wiring in (1, 2, 3, 4):
+
+        def run(board, wiring=wiring):
+            board.lcd.wiring = wiring
+            display = open_display(board, None, "auto", wiring)
+            for lines in (OLD, NEW):
+                display.show(*lines)
+                turns(board, display, 60)
+                assert board.lcd.text() == as_text(lines) and board.lcd.backlight, wiring
+            board.lcd.power_off()
+            board.lcd.power_on()
+            turns(board, display, 60)
+            assert board.lcd.text() == as_text(NEW), wiring
+
+        assert on_board(run, 1e6)[0] == "returned"
+
+
+def test_the_rows_of_a_larger_display_are_blanked():
+    """Of a 20x4 the third and fourth row are the memory behind the first two; a program before may have used it."""
+
+    def run(board):
+        board.lcd.ddram[0x10:0x28] = board.lcd.ddram[0x50:0x68] = b"x" * 24
+        display = open_display(board)
+        display.show(*OLD)
+        turns(board, display, 60)
+        assert board.lcd.text() == as_text(OLD)
+        assert bytes(board.lcd.ddram[0x10:0x28]) == bytes(board.lcd.ddram[0x50:0x68]) == b" " * 24
+        board.lcd.ddram[0x14] = 0x55  # noise
+        turns(board, display, 1100)
+        assert board.lcd.ddram[0x14] == 0x20
+
+    assert on_board(run, 1e6)[0] == "returned"
 
 
 @on_each((None,), OLEDS)

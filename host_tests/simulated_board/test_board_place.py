@@ -57,9 +57,9 @@ def test_what_is_no_position_is_none_and_hurts_nothing():
 
 
 def test_a_date_that_is_not_known_yet_is_0():
-    for date in ("", "xx1126", "0x1126"):
+    for date in ("", "xx1126", "0x1126", "311299"):  # no receiver is as old as the last
         assert places_of(rmc(date=date))[0][:2] == [0, NOON]
-    assert places_of(rmc(date="311299"))[0][0] == 99 << 9 | 12 << 5 | 31
+    assert places_of(rmc(date="311226"))[0][0] == 26 << 9 | 12 << 5 | 31
 
 
 def test_midnight_and_ten_a_second():

@@ -344,3 +344,150 @@ def test_jumps_that_no_vehicle_makes_are_refused_until_they_last():
         ):
             source.speed = value
             assert (speed.poll(at_ms) is not None) == expected, (at_ms, value)
+
+
+def fault_of(data, seconds=8):
+    """The code and the values of the fault of a Gps that is sent these bytes once a second."""
+    with Board(level):
+        from kickstand.speed.gps import Gps
+
+        wire = Listing(b"")
+        gps = Gps(wire)
+        for tenth in range(10 * seconds):
+            if tenth % 10 == 0:
+                wire._data = data
+            gps.poll(1000 + 100 * tenth)
+        fault = gps.fault(1000 + 100 * 10 * seconds - 100)
+    return fault and (fault.code,) + tuple(fault.values)
+
+
+GGA = "GPGGA,120001.00,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,"
+GLL = "GNGLL,4807.038,N,01131.000,E,120001.00,A,A"
+GSV = "GPGSV,1,1,01,21,00,000,33"
+
+
+def test_sentences_without_a_speed_are_named():
+    for bodies, name in (((GGA,), "GGA"), ((GLL, GSV), "GLL"), ((GSV, GGA, GSV), "GGA"), ((GSV,), "GSV")):
+        assert fault_of("".join([sentence(body) for body in bodies]).encode()) == ("gps-other", name), bodies
+    assert fault_of(sentence("PUBX,00,1,2").encode()) == ("gps-other", "PUBX")
+    damaged = sentence(GGA).replace("545", "546").encode()
+    assert fault_of(damaged) == ("gps-garbled",)
+    assert fault_of((sentence(GGA) + sentence(RMC % ("GP", 1, "V", "", ""))).encode()) == ("gps-no-fix",)
+
+
+def test_u_blox_s_binary_protocol_is_named():
+    """NAV-PVT of 92 bytes, whose line ends fall anywhere."""
+    for filler in (b"\x00", b"\x0a", b"\x24"):
+        assert fault_of(b"\xb5b\x01\x07\x5c\x00" + filler * 92 + b"\x12\x34") == ("gps-other", "UBX")
+    assert fault_of(bytes(range(256))) == ("gps-garbled",)
+
+
+def test_a_date_that_cannot_be_is_none():
+    dates = (
+        ("230394", 0),
+        ("211126", 26 << 9 | 11 << 5 | 21),
+        ("060180", 0),
+        ("220806", 0),
+        ("310226", 0),
+        ("000026", 0),
+    )
+    dates += (
+        ("310426", 0),
+        ("290228", 28 << 9 | 2 << 5 | 29),
+        ("290227", 0),
+        ("321226", 0),
+        ("311226", 26 << 9 | 12 << 5 | 31),
+    )
+    dates += (
+        ("311326", 0),
+        ("", 0),
+        ("-10126", 0),
+        ("310726", 26 << 9 | 7 << 5 | 31),
+        ("310826", 26 << 9 | 8 << 5 | 31),
+    )
+    with Board(level):
+        from kickstand.speed.gps import Gps
+
+        for text, value in dates:
+            gps = Gps(Listing(sentence((RMC % ("GP", 1, "A", "19.438", "")).replace("230394", text)).encode()))
+            assert [gps.poll(1000), gps.poll(1000)][1] is not None
+            place = gps.place(1000)
+            assert place is not None and place[0] == value, text
+
+
+DAYS = 6.3, 9.0, 12.4, 12.5, 19.0
+
+
+def later(days, seconds=0):
+    """ticks_ms() so long after 1000."""
+    return (1000 + round(86_400_000 * days) + 1000 * seconds) & 0x3FFFFFFF
+
+
+class Once:
+    """A source that gives each value once."""
+
+    age_ms, problem = 0, None
+
+    def __init__(self, value):
+        self.value = value
+
+    def poll(self, now_ms):
+        value, self.value = self.value, None
+        return value
+
+
+def test_a_speed_is_taken_after_days_without_one():
+    """ticks_diff() is negative after 6.2 days."""
+    with Board(level):
+        from kickstand.speed.source import Speed
+
+        for days in DAYS:
+            source = Once(0.0)
+            speed = Speed(source)
+            assert speed.poll(1000) == 0.0
+            for k in range(1, int(24 * days)):
+                assert speed.poll(later(k / 24)) is None
+            source.value = 20.0
+            assert speed.poll(later(days)) == 20.0
+
+
+def test_a_receiver_stays_silent_for_days():
+    fix = sentence("GPRMC,120000.00,A,4807.038,N,01131.000,E,022.4,084.4,230394,003.1,W").encode()
+    with Board(level):
+        from kickstand.speed.gps import Gps
+
+        for days in DAYS:
+            uart = Listing(fix)
+            gps = Gps(uart)
+            while uart.any():
+                gps.poll(1000)
+            for k in range(1, int(24 * days)):
+                gps.poll(later(k / 24))
+                fault = gps.fault(later(k / 24))
+                assert fault and fault.code == "gps-silent", (days, k)
+
+
+def test_a_wheel_that_stood_for_days_turns_again():
+    """Also one that never turned."""
+
+    class Line:
+        IRQ_FALLING = IRQ_RISING = 0
+
+        def irq(self, *handler, **kind):
+            pass
+
+    with Board(level):
+        from kickstand.speed.wheel import Wheel
+
+        for before in (True, False):
+            for days in DAYS:
+                wheel = Wheel(Line(), 1.0, {"hard": True})
+                wheel.poll(1000)
+                if before:
+                    wheel.count += 1
+                    wheel.poll(1200)
+                for k in range(1, int(24 * days)):
+                    assert wheel.poll(later(k / 24)) == (0.0 if before else None)
+                wheel.count += 1
+                wheel.poll(later(days))
+                assert wheel._moved_ms == later(days)

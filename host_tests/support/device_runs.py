@@ -27,25 +27,38 @@ class CarRide(script.Ride):
         return state[:1] + (self.ROLL_SHARE * state[1], self.ROLL_SHARE * state[2]) + state[3:]
 
 
+RAISE_S = 0.3  # how long a bike takes from one lean of standing() to the next
+
+
 def standing(plan):
-    """motion(t_s) of a bike that stands at the leans of the plan [[from_s, lean_deg], ...] and jumps between them."""
+    """motion(t_s) of a bike that stands at the leans of the plan [[from_s, lean_deg], ...] and moves between them."""
 
     def motion(t_s):
-        now = plan[0]
+        now = before = plan[0]
         for entry in plan:
             if t_s >= entry[0]:
-                now = entry
-        lean = math.radians(now[1])
-        return (math.sin(lean), math.cos(lean), 0.0, 0.0, 0.0, 0.0)
+                before, now = now, entry
+        share = min(1.0, (t_s - now[0]) / RAISE_S) if now is not before else 1.0
+        change = now[1] - before[1]
+        lean = math.radians(before[1] + change * share)
+        return (math.sin(lean), math.cos(lean), 0.0, 0.0, 0.0, change / RAISE_S if share < 1.0 else 0.0)
 
     return motion
 
 
 def poses_of(seed, steps):
     """world(t_s) of the bare sensor: steps [[from_s, [up in its own axes] or None while it is being turned],
-    ...]."""
+    ...]. Before the first pose and after the last one it is shaken."""
     part = sensor_errors.Sensor(seed=seed)
-    worlds = [(start, sensor_errors.resting(part, up) if up else None) for start, up in steps]
+    worlds = []
+    for i, (start, up) in enumerate(steps):
+        if up:
+            worlds.append((start, sensor_errors.resting(part, up)))
+        elif 0 < i < len(steps) - 1:
+            turned = sensor_errors.turning(part, steps[i - 1][1], steps[i + 1][1], start, steps[i + 1][0])
+            worlds.append((start, turned))
+        else:
+            worlds.append((start, None))
     still = sensor_errors.resting(part, (1, 0, 0))
 
     def world(t_s):

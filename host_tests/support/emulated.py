@@ -2,6 +2,7 @@
 
 import functools
 import hashlib
+import importlib
 import re
 import time
 from collections.abc import Callable
@@ -16,28 +17,41 @@ from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 PART = Sensor(seed=1, share=0.5)  # an ordinary part, stuck on at some angle
 
 
-def pico(world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any):
-    """An emulator.pico.Pico, without power yet. Skips where emulator or image cannot be had."""
-    try:
-        from kickstand_tools.emulator import image
-        from kickstand_tools.emulator.pico import Pico
+def need(chip: str) -> None:
+    """Skip the test if what emulates this chip is missing: "pico" or "esp32"."""
+    if reason := _lacking(chip):
+        pytest.skip(reason)
 
-        image.find()
+
+@functools.cache  # what is missing is not downloaded for each test
+def _lacking(chip: str) -> str:
+    """Why this chip cannot be emulated, "" if it can."""
+    from kickstand_tools.emulator import esp32_library, image
+
+    try:
+        if chip == "esp32":
+            esp32_library.find()
+        else:
+            image.find()
+            importlib.import_module("kickstand_tools.emulator.pico")
     except InputError as reason:
-        pytest.skip(str(reason))
+        return str(reason)
     except ImportError as reason:
-        pytest.skip(f"no emulator for this system: {reason}")
+        return f"no emulator of the {chip} for this system: {reason}"
+    return ""
+
+
+def pico(world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any):
+    """An emulator.pico.Pico, without power yet. Skips if emulator or image is missing."""
+    need("pico")
+    from kickstand_tools.emulator.pico import Pico
+
     return Pico(world, files, **fitted)
 
 
 def esp32(world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any):
-    """An emulator.esp32.Esp32, without power yet. Skips where QEMU's library cannot be had."""
-    from kickstand_tools.emulator import esp32_library
-
-    try:
-        esp32_library.find()
-    except InputError as reason:
-        pytest.skip(str(reason))
+    """An emulator.esp32.Esp32, without power yet. Skips if QEMU's library is missing."""
+    need("esp32")
     from kickstand_tools.emulator.esp32 import Esp32
 
     return Esp32(world, files, **fitted)

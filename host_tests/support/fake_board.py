@@ -131,8 +131,9 @@ class FakeBoard(Transport):
 
         def rename(old: str, new: str) -> None:
             self.path(old).rename(self.path(new))
-            self.written.remove(old)
-            self.written.append(new)
+            if old in self.written:
+                self.written.remove(old)
+                self.written.append(new)
 
         return types.SimpleNamespace(
             ilistdir=ilistdir,

@@ -71,10 +71,11 @@ def transform(offset, slope, matrix, sums, n):
 
 
 def add_up(batches, limit):
-    """Batches of frames of 14 bytes: [how many are good, their sums] of each, as the board does it and in Python."""
+    """Batches of frames of 14 bytes: [how many are good, their sums, the good frames, the watch] of each, as the board
+    does it and in Python."""
     out = []
     for function in (fifo_frames.add_up, fifo_frames.add_up_python):
-        watch = array("i", (0, 0, limit))
+        watch = fifo_frames.AxisWatch(200, 3, 1, 3, limit).notes
         sums = array("i", [99] * 7)  # whatever was in it before
         answers = []
         for batch in batches:
@@ -82,7 +83,7 @@ def add_up(batches, limit):
             for frame in batch:
                 data.extend(bytes(frame))
             good = function(data, len(batch), sums, watch)
-            answers.append([good, list(sums)])
+            answers.append([good, list(sums), list(data[: 14 * good]), list(watch)])
         out.append(answers)
     return out
 

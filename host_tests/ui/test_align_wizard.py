@@ -14,7 +14,8 @@ def test_a_bias_that_was_measured_long_ago_is_not_taken_for_known(monkeypatch, w
         from kickstand.ui import align_wizard
 
         monkeypatch.setattr(align_wizard, "align", lambda *_: ("aligned", 12.0))
+        monkeypatch.setattr(align_wizard, "check_turn", lambda *_: None)
         wizard = align_wizard.AlignWizard(chip, 200, calibration, "left")
-        wizard._pose_done("on the stand", 1000)
-        wizard._pose_done("upright", 1000 + waited_ms)
+        wizard._pose_done(SimpleNamespace(gyro=[0.0] * 3), 1000)
+        wizard._pose_done(SimpleNamespace(gyro=[0.0] * 3), 1000 + waited_ms)
     assert saved == [fresh]

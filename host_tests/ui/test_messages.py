@@ -21,7 +21,14 @@ CONSOLE_ONLY = {"wrong-code"}  # found while modules are imported, before there 
 VALUES = {"dead-axis": ("x", 0.1), "odd-axis": ("x", 0.1, 1.0), "side-tilted": ("+x", 25.0, 20.0)}
 VALUES |= {"not-one-g": ("kickstand", 1.23), "mount-moved": ("between-stops", 12.0), "few-events": (4, 5, 12)}
 VALUES |= {"uncertain": (180.0, 12), "unknown-chip": (0x12,), "speed-unit": (99.9,)}
+VALUES |= dict.fromkeys(("dead-gyro", "noisy-gyro", "stuck-accel", "gyro-reversed", "gyro-scale"), ("x", 100.0))
+VALUES |= {"unproved-gyro": ("x",), "gyro-tilt": (60.0, -180.0)}
 VALUES |= {"no-pins": ("SENSOR_SDA", "SENSOR_SDA, SENSOR_SCL", "a board")}
+VALUES |= {"no-chip": (0xFF, 0x68), "not-kept": (0x68,), "other-chip": ("ICM-42688-V", 0x68)}
+VALUES |= {"other-device": ("barometer", 0x76), "wire-low": ("SDA", 28), "no-pull-up": ("SCL", 28)}
+VALUES |= {"gps-other": ("PUBX",)}
+VALUES |= {"sensor-fifo": ("stands still",), "bus-errors": (0x68,), "no-sensor": (28, 29)}
+VALUES |= {"axis-ill": ("Accel", "xyz", "stuck"), "clips": ("Accel",)}
 VALUES |= {"speed-late": (2.5,), "aligned": (9.9,)}
 
 

@@ -4,6 +4,7 @@ import types
 
 import pytest
 from kickstand.calibration.parameters import Calibration
+from kickstand.errors import Notice
 from kickstand.lean.meter import LeanMeter
 from kickstand.ui import pages
 
@@ -15,6 +16,13 @@ def bar(lean_deg):
     """The bar as text: # a full cell, 1 to 4 its columns from the left, a to d from the right, a space nothing."""
     names = {0x20: " ", 0xFF: FULL, **{i: str(i + 1) for i in range(4)}, **{4 + i: "abcd"[i] for i in range(4)}}
     return "".join(names[code] for code in pages.lean_bar(lean_deg))
+
+
+@pytest.mark.parametrize("what", ["left", "up", "tilt"])
+def test_a_sensor_that_is_odd_is_named_in_place_of_its_lean(what):
+    code = "odd-pitch" if what == "tilt" else "odd-" + what
+    assert pages.unsure(code) == ("Lean  --", "sensor odd: " + what)
+    assert len(pages.unsure(code)[1]) <= 16
 
 
 def meter(**values):
@@ -163,16 +171,25 @@ def test_before_alignment_tilt_and_g_are_the_sensors_own():
     assert pages.not_aligned(shown, 3, "Drive: brake")[1] == "Drive: brake"
 
 
+def test_the_sensor_page_of_a_fault_says_who_answers():
+    sensor = types.SimpleNamespace(fault=Notice("no-sensor"), found=[0x27, 0x68, 0x77])
+    seen = [pages.sensor_info(sensor, 0, meter(), seconds) for seconds in range(5)]
+    fault, there = ("No sensor", "check wiring"), ("On its I2C bus:", "27 68 77")
+    assert seen == [fault, fault, there, there, fault]
+    sensor.found = []
+    assert pages.sensor_info(sensor, 0, meter(), 2) == ("On its I2C bus:", "nothing")
+
+
 def test_the_sensor_page_counts_gaps_starts_and_lost_samples():
     """Two seconds each."""
-    chip = types.SimpleNamespace(name="MPU6050", temperature_c=lambda counts: counts / 10.0, overflows=3)
+    chip = types.SimpleNamespace(name="MPU6050", temperature_c=lambda counts: counts / 10.0, overflows=3, address=0x69)
     calibration = types.SimpleNamespace(six_done=True, aligned=False)
     shown = meter(reading=[1, 2, 3, 285, 5, 6, 7], calibration=calibration)
-    sensor = types.SimpleNamespace(chip=chip, restarts=1)
-    seen = [pages.sensor_info(sensor, 0, shown, seconds) for seconds in range(7)]
+    sensor = types.SimpleNamespace(chip=chip, restarts=1, fault=None)
+    seen = [pages.sensor_info(sensor, 0, shown, seconds) for seconds in range(9)]
     assert {line1 for line1, _ in seen} == {f"MPU6050   28.5{DEGREE}C"}
-    words = ["6pos yes ali no", "3 gaps 1 starts", "samples lost   0"]
-    assert [line2 for _, line2 in seen] == [words[seconds // 2 % 3] for seconds in range(7)]
+    words = ["6pos yes ali no", "3 gaps 1 starts", "samples lost   0", "I2C address 0x69"]
+    assert [line2 for _, line2 in seen] == [words[seconds // 2 % 4] for seconds in range(9)]
     chip.overflows, sensor.restarts, chip.name = 12345, 678, "MPU6050 clone"
     assert pages.sensor_info(sensor, 123456, shown, 2)[1] == "99 gaps 9 starts"
     assert pages.sensor_info(sensor, 123456, shown, 4)[1] == "samples lost9999"

@@ -37,7 +37,7 @@ def sensor():
 @pytest.fixture
 def screen(sensor, drive):
     """An aligned motorcycle's Screen, on a simulated board, for MicroPython's clock."""
-    meter = types.SimpleNamespace(fallen=False, trusted=True, lean_deg=12.0, suppressed_reason=None)
+    meter = types.SimpleNamespace(fallen=False, trusted=True, lean_deg=12.0, suppressed_reason=None, odd=None)
     meter.max_left_deg = meter.max_right_deg = 0.0
     calibration = types.SimpleNamespace(aligned=True, value=None)
     rides = types.SimpleNamespace(recorder=types.SimpleNamespace(active=False))

@@ -16,7 +16,7 @@ def files() -> dict[str, bytes]:
     try:
         return site.site_files()
     except InputError as error:
-        pytest.skip(f"the site cannot be put together: {error}")
+        pytest.skip(f"no packages for the pages: {error}")
 
 
 @pytest.fixture(scope="session")

@@ -84,7 +84,7 @@ def test_one_of_several_rides_is_chosen(page, ride, calibration, tmp_path):
     [
         ("picture.png", b"\x89PNG\r\n\x1a\n" + bytes(8), "not text: give what an app has exported"),
         ("made", b"as what was made is called", "not a file of an app that is known"),
-        ("slow.csv", b"t_s,ax_g,ay_g,az_g\n0,0,1,0\n", "and no gyro found in it: needed are a time, the acceleration"),
+        ("slow.csv", b"t_s,ax_g,ay_g,az_g\n0,0,1,0\n", "and no table of sensors"),
         ("ride.parquet", b"PAR1" + bytes(40), "is Parquet, which this page cannot read: give the ride as"),
         ("report.json", b'{"ride": "A"}', "is no calibration: version is missing: give the"),
     ],
@@ -149,6 +149,7 @@ def test_the_columns_of_a_table_can_be_named(page, tmp_path):
     log.write_text(app_exports.any_table(riding).replace("Acc_X", "Quantity 1", 1))
     assert page.give(log).endswith("and no acceleration found in it: say what its columns are.")
     assert page.page.eval_on_selector("[name=ay]", "select => select.value") == "Acc_Y"
+    assert page.page.locator("#first-seconds polyline").count() == 3  # of the gyro
     page.page.click("#table button")
     assert page.page.is_visible("#table")  # one is missing
     page.page.select_option("[name=ax]", "Quantity 1")

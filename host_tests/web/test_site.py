@@ -9,6 +9,7 @@ import re
 import shutil
 import socket
 import threading
+import time
 import urllib.request
 import zipfile
 from pathlib import Path
@@ -256,6 +257,21 @@ def test_connections_that_send_now_and_then_are_ended_for_others(monkeypatch):
         for connection in held:
             connection.close()
         server.shutdown()
+
+
+def test_silent_connections_do_not_hold_the_page():
+    """190 of them, with the limits as they are: each beyond the limit ends the oldest that has asked for nothing."""
+    with serve.server({"index.html": b"the page"}, 0) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        port = server.server_address[1]
+        held = [socket.create_connection((serve.HOST, port)) for _ in range(190)]
+        begun_s = time.monotonic()
+        assert ask(port, b"GET / HTTP/1.0\r\n\r\n").endswith(b"the page")
+        took_s = time.monotonic() - begun_s
+        for connection in held:
+            connection.close()
+        server.shutdown()
+    assert took_s < 5.0, took_s
 
 
 def test_an_installed_package_gives_no_other_one_to_the_pages(tmp_path, monkeypatch):

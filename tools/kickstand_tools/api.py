@@ -2,7 +2,7 @@
 
     from kickstand_tools import api
 
-    six = api.fit_six_positions(["1.csv", "2.csv", "3.csv", "4.csv", "5.csv", "6.csv", "7.csv"])
+    six = api.fit_procedure("SIX.csv")                                    # or fit_six_positions(["1.csv", ...])
     two = api.fit_two_positions("KICKSTAND.csv", "UPRIGHT.csv", six.calibration)
     lean = api.replay("RIDE.csv.gz", two.calibration)                     # lean.t_s, lean.lean_deg, ...
     after = api.smooth("RIDE.csv.gz", two.calibration)                    # after.lean_deg, after.lean_sigma_deg, ...
@@ -34,6 +34,7 @@ from .calibration.poses import (
     fit_six_positions as fit_six_positions,
     fit_two_positions as fit_two_positions,
 )
+from .calibration.procedure import fit_procedure as fit_procedure
 from .errors import InputError as InputError
 from .estimation.alignment import RideFit as RideFit, fit_ride as fit_ride
 from .estimation.smooth import SmoothedRide as SmoothedRide, smooth as smooth

@@ -5,6 +5,8 @@ import sys
 from . import firmware_path
 from .remedies import COMMANDS, Remedies
 
+DISTRIBUTION = "kickstand-lean"  # as in pyproject.toml; a package "kickstand" is another project's
+
 
 class InputError(Exception):
     """Something that the user has given cannot be used. Its text is one line: what is wrong, and what to do.
@@ -30,12 +32,17 @@ def cause(error: BaseException) -> str:
     return getattr(error, "strerror", None) or str(error) or type(error).__name__
 
 
+def printable(text: str) -> str:
+    """The text with the codes of characters that would be commands to a terminal, as ESC, in their place."""
+    return "".join(c if c in "\n\t" or c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
 def extra(name: str) -> str:
     """How to install an optional part of the project.
 
-    From a checkout with -e, because otherwise a copy would replace the checkout, and `kickstand flash` would take the
-    copy's firmware.
+    From a checkout with -e and its path, because otherwise a copy would replace the checkout, and `kickstand flash`
+    would take the copy's firmware.
     """
     if firmware_path.installed():
-        return f'{sys.executable} -m pip install "kickstand[{name}]"'
-    return f'in the project\'s directory, {sys.executable} -m pip install -e ".[{name}]"'
+        return f'{sys.executable} -m pip install "{DISTRIBUTION}[{name}]"'
+    return f'{sys.executable} -m pip install -e "{firmware_path.TOOLS.parent}[{name}]"'

@@ -1,18 +1,25 @@
 """Writes files completely or not at all, and makes the directories for them."""
 
 import contextlib
+import errno
 import gzip
 import os
+import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from .errors import InputError, cause
 
+_MOST_LINKS = 40  # as Linux follows
+
 
 def check_output(path: Path, inputs: list[Path]) -> None:
     """Refuse, before any work is done, an output that could not be written or that would destroy an input."""
+    _resolved(path)
     if path.is_dir():
         raise InputError(f"{path} is a directory: give --out the name of a file")
+    if _is_open_here(path):  # a file that the shell has opened would be replaced, with what is in it
+        raise InputError(f"{path} is this command's own input or output: give --out the name of another file")
     if path.exists() and not path.is_file():
         raise InputError(f"{path} is not an ordinary file: give --out the name of one")
     if not path.parent.is_dir():
@@ -22,8 +29,35 @@ def check_output(path: Path, inputs: list[Path]) -> None:
             raise InputError(f"{path} is also an input: give --out another name")
 
 
+def _resolved(path: Path) -> Path:
+    """The path without symbolic links. Raises InputError for links that lead to each other."""
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle, before Python 3.13
+        raise InputError(f"{path} cannot be followed: its links lead in a circle: give --out another place") from error
+
+
+def _is_open_here(path: Path) -> bool:
+    """True for standard input, output and error under any name, and for the names of open files, as /dev/fd/3."""
+    with contextlib.suppress(OSError):
+        there = path.stat()
+        for number in (0, 1, 2):
+            with contextlib.suppress(OSError):
+                if os.path.samestat(os.fstat(number), there) and path.is_file():
+                    return True
+    place = Path(os.path.abspath(path))
+    for _ in range(_MOST_LINKS):  # /dev/stdout is a link to /proc/self/fd/1
+        if place.is_relative_to("/dev/fd") or (place.is_relative_to("/proc") and place.parent.name == "fd"):
+            return True
+        if not place.is_symlink():
+            return False
+        place = Path(os.path.abspath(place.parent / os.readlink(place)))
+    return False
+
+
 def check_directory(path: Path) -> None:
     """Refuse, before any work is done, a directory to write to if that is a file."""
+    _resolved(path)
     if path.exists() and not path.is_dir():
         raise InputError(f"{path} is a file: give --out the name of a directory")
 
@@ -45,23 +79,52 @@ def new_directory(path: Path) -> Iterator[None]:
                 one.rmdir()
 
 
+def make_directory(path: Path) -> None:
+    """Make a directory and those above it, if they are not there. Raises InputError."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path} cannot be made: {cause(error)}: give --out another place") from error
+
+
 @contextlib.contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
     """A temporary path to write to; at the end of the `with` that file becomes path. If it fails, a file that was at
-    path stays. Raises InputError.
+    path stays. The file is then on the disk, also after a loss of power. Raises InputError.
 
     The temporary name has the ending of path, from which libraries tell the format.
     """
-    path = path.resolve()  # a symbolic link stays one
+    path = _resolved(path)  # a symbolic link stays one
     temporary = path.with_name(f".{os.getpid()}-{path.name}")
     try:
         yield temporary
+        flush_to_disk(temporary)
         os.replace(temporary, path)
+        flush_to_disk(path.parent)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {cause(error)}; choose another place") from error
     finally:
         with contextlib.suppress(OSError):  # on a read-only file system it would hide the reason
             temporary.unlink(missing_ok=True)
+
+
+def flush_to_disk(path: Path) -> None:
+    """Wait until a file, or the entries of a directory, are on the disk. Raises OSError.
+
+    Without it a file system may store the new name before the content, and a loss of power then leaves neither the old
+    content nor the new one (fsync(2)).
+    """
+    directory = path.is_dir()
+    if sys.platform == "emscripten" or (directory and os.name == "nt"):  # has no disk; opens no directories
+        return
+    number = os.open(path, os.O_RDONLY if directory else os.O_RDWR)
+    try:
+        os.fsync(number)
+    except OSError as error:
+        if not (directory and error.errno in (errno.EINVAL, errno.ENOTSUP)):  # some network disks
+            raise
+    finally:
+        os.close(number)
 
 
 def write_packed(path: Path, parts: Iterable[bytes]) -> None:

@@ -147,12 +147,29 @@ _MOUNT: _Table = {
 _OTHERS: _Table = {
     "absurd-readings": "readings that no vehicle gives, at {0:.1f} s up to {1:.0f} deg/s and {2:.1f} g, where the lean "
     "is not known: check the sensor, and the units in the log",
+    "axis-dead": "{0} is dead: from {2:.1f} s on it does not change for {1:.0f} s while others do; these readings are "
+    "left out, and the lean is not known there: check the sensor and its solder joints, or replace it",
+    "gyro-saturated": "gyro {0} is at the end of its range {1} times, {2:.1f} s in all, first at {3:.1f} s: these "
+    "readings are left out: fix the sensor firmly, or set a larger GYRO_RANGE_DPS",
+    "sensor-odd": "no sound gyro fits this ride: its error of scale or axes comes out at {0:.0f} standard deviations, "
+    "so the smoothed lean is not certain, and its standard deviation says so: is an axis of the gyro ill?",
     "moved": "moved or knocked",
     "vibration": "not still: vibration",
     "tilting": "not still: slowly tilting",
     "saturated": "saturated: the accelerometer is at the end of its range",
     "too-few": "too short: {0} samples, at least {1} needed",
     "frozen-pose": "frozen: every reading is the same, check the sensor and its wires",
+    "stuck-accel": "the accelerometer's reading along {0} never changes: check the sensor",
+    "dead-gyro": "the gyro's rate about {0} never changes: check the sensor",
+    "noisy-gyro": "the gyro is very noisy about {0}: engine off, or check the sensor",
+    "gyro-scale": "by the turns between the poses the gyro's rates about {0} are {1:+.0f} % off: check the sensor, and "
+    "the unit of the rates",
+    "gyro-reversed": "by the turns between the poses the gyro's rates about {0} have the wrong sign: check the sensor, "
+    "and the axes of the log",
+    "gyro-misfit": "by the gyro a turn between two poses is {0:.1f} degrees off: repeat the six positions; if it "
+    "happens again, an axis of the gyro is late, clipped or dead",
+    "unproved-gyro": "no turn between the poses shows that the gyro is right about {0}: turn the sensor about it too",
+    "gyro-tilt": "between the poses are {0:.1f} degrees, by the gyro {1:.1f}: repeat the poses, or check the sensor",
     "gyro-offset": "turning, or a gyro offset of over {0:.0f} deg/s",
     "dead-axis": "axis {0} barely changes when turned over: {1:.2f} g",
     "unclear": "the six poses do not determine the calibration: repeat them, each side once",
@@ -205,6 +222,8 @@ _OTHERS: _Table = {
     + ", else the ride is mirrored and {sign}",
     "import-damaged": "damaged rows that are left out: {0}; a cell or a time is no number, a time is out of order, "
     "a row has too many cells, or a reading is past any sensor's",
+    "import-slow": "{0:.3g} samples per second: at least 20 are needed to find a lean: record it faster",
+    "import-short": "it lasts {0:.0f} s: to find the alignment from it, at least {1:.0f} s of riding are needed",
     "car-replayed": "the calibration is a car's, whose display shows no lean: lean_deg is that of a motorcycle which "
     "would feel the same, and lean_sigma_deg is nan",
     "mount-moved": _mount_moved,

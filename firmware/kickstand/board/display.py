@@ -21,13 +21,16 @@ A display that lost its power or whose transfer failed is set up again, and dark
 
 from time import sleep_ms, ticks_diff, ticks_ms
 
+import micropython
+
 from ..errors import attempt
 
 OLED_ADDRESSES = (0x3C, 0x3D)
 ADDRESSES = (0x27, 0x3F) + OLED_ADDRESSES  # the backpack's PCF8574 and PCF8574A with all jumpers open
 _FAMILY = tuple(range(0x20, 0x27)) + tuple(range(0x38, 0x3C)) + (0x3E,)  # a backpack's other addresses
 LCD_HZ, OLED_HZ = 100_000, 400_000  # the fastest clocks that a PCF8574 and the OLEDs allow
-KINDS = ("auto", "lcd", "ssd1306", "sh1106")
+STOPPED = "Kickstand", "stopped"  # what a display shows when the firmware has ended
+KINDS = ("auto", "lcd", "ssd1306", "sh1106", "ssd1306-32")
 PROBE_MS = 200  # time between two searches for a display, while there is none
 MOST_WAIT_MS = 60_000  # the longest, while a driver cannot be loaded: each is twice as long as the last
 REOPEN_PROBES = 5  # while there is no display the bus is freed once in so many probes
@@ -40,17 +43,19 @@ class Display:
     """A display that may be absent, or come and go.
 
     reopen(hz): called to free the bus, returns it as a machine.I2C.  bus_hz: its clock; None: as the display allows.
-    kind: of KINDS.  addresses: to look for it at.  contrast, inverted: of an OLED.
+    kind: of KINDS.  addresses: to look for it at.  contrast, inverted: of an OLED.  wiring: of an LCD's backpack.
 
     address: where it was found, or None while no display answers.  draws: see above.
     """
 
-    def __init__(self, reopen, bus_hz=None, kind="auto", addresses=ADDRESSES, contrast=255, inverted=False):
+    def __init__(self, reopen, bus_hz=None, kind="auto", addresses=ADDRESSES, contrast=255, inverted=False, wiring=1):
         self._reopen = reopen
         self._bus_hz = bus_hz
         self._kind = kind
         self._addresses = addresses
         self._look = contrast, inverted
+        self._wiring = wiring
+        self._oled = False  # the driver is that of an OLED
         self._i2c = self._driver = None
         self._wanted = "", "", None
         self._status = bytearray(1)
@@ -91,6 +96,25 @@ class Display:
                 return
             sleep_ms(STEP_MS)
 
+    def end(self, line1, line2):
+        """Show two lines for good, because the firmware ends. Raises nothing, and Ctrl-C does not interrupt it.
+
+        The display is set up again: what ends the firmware may have interrupted a transfer."""
+        interrupt = getattr(micropython, "kbd_intr", None)  # computers have none
+        if interrupt:
+            interrupt(-1)
+        try:
+            if self._wanted[:2] != (line1, line2):
+                self.address = None
+                self._fresh = True
+                self.show(line1, line2)
+                self.flush()
+        except Exception:  # of pins, drivers, memory: there is nobody left to report it to
+            pass
+        finally:
+            if interrupt:
+                interrupt(3)
+
     def _probe(self):
         """Look for the display at each address."""
         if self._probes % REOPEN_PROBES == 0:  # a stuck bus has to be freed, but to do so each time would take too long
@@ -120,7 +144,7 @@ class Display:
 
     def _begin(self, address):
         oled = self._kind[0] == "s" or (self._kind == "auto" and address in OLED_ADDRESSES)
-        if self._driver is None or self.draws != oled:
+        if self._driver is None or self._oled != oled:
             self._driver = None
             if oled:
                 from .oled import Oled
@@ -129,9 +153,9 @@ class Display:
             else:
                 from .hd44780 import Lcd
 
-                self._driver = Lcd()
+                self._driver = Lcd(self._wiring)
             self._driver.show(*self._wanted)
-            self.draws = oled
+            self._oled, self.draws = oled, self._driver.draws
         hz = self._bus_hz or (OLED_HZ if oled else LCD_HZ)
         if hz != (self._bus_hz or LCD_HZ):
             self._i2c = self._reopen(hz)

@@ -1,18 +1,23 @@
-"""Driver for an HD44780 character display, 16x2, behind a PCF8574 port expander (the usual I2C backpack). display.py
-finds it, and says what its methods do.
+"""Driver for an HD44780 character display, 16x2 or larger, behind a PCF8574 port expander (the usual I2C backpack).
+display.py finds it, and says what its methods do.
 
 Sources: data sheets Hitachi HD44780U (ADE-207-272) and NXP PCF8574. The display is driven in 4-bit mode. The part of a
 line that has changed is sent in two transfers, dashes and then the text, each of 6 ms for a whole line at 100 kHz.
-Wiring of the backpack: P0 RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7.
+
+Backpacks differ in which pin of the PCF8574 goes where: see WIRINGS. R/W, which stays low, is between RS and E.
 """
 
 from time import ticks_diff, ticks_ms
 
 from micropython import const
 
-_RS = const(0x01)  # bits of the port expander
-_E = const(0x04)
-_LIGHT = const(0x08)
+# By LCD_WIRING - 1: the bits of RS and E, the bit that lights the backlight, and True if D4 to D7 are P0 to P3
+WIRINGS = (
+    (0x01, 0x04, 0x08, False),  # the usual one: P0 RS, P2 E, P3 light
+    (0x40, 0x10, 0x00, True),  # MJKDZ, GY-IICLCD: P6 RS, P4 E, P7 light, on while low
+    (0x10, 0x40, 0x80, True),  # P4 RS, P6 E, P7 light
+    (0x01, 0x04, 0x00, False),  # as the usual one, but the light is on while P3 is low
+)
 _LINE_ADDRESSES = (0x80, 0xC0)  # instruction "set DDRAM address" for the beginning of each line (table 6)
 _CGRAM_ADDRESS = const(0x40)  # instruction "set CGRAM address" (table 6)
 
@@ -32,7 +37,10 @@ _POWER_UP = const(-8)  # the first step after power-up, for 40 ms of which the d
 _NIBBLES = (0x30, 0x30, 0x30, 0x20)
 _COMMANDS = b"\x28\x0c\x06\x02"
 _GLYPH_PARTS = const(4)  # the 64 bytes of character patterns are sent 16 at a time
-_STEPS = len(_NIBBLES) + 1 + _GLYPH_PARTS
+# The display memory of a line is longer than 16 characters. What is behind them is visible on a larger display, 20x4 or
+# 20x2: it is blanked, one line a step.
+_BEHIND = const(24)
+_STEPS = len(_NIBBLES) + 1 + _GLYPH_PARTS + 2
 
 
 def _bar_glyphs():
@@ -51,12 +59,14 @@ class Lcd:
 
     draws = False
 
-    def __init__(self):
+    def __init__(self, wiring=1):
+        """wiring: a number from 1 on, see WIRINGS."""
+        self._rs, self._e, self._light, self._low = WIRINGS[wiring - 1]
         self._wanted = [bytearray(b" " * COLUMNS), bytearray(b" " * COLUMNS)]
         self._shown = [bytearray(COLUMNS), bytearray(COLUMNS)]
         self._texts = [_NO_TEXT, _NO_TEXT]  # the text that each line showed last, if it was a str
         self._changed = True  # a line may have to be sent
-        self._packed = bytearray(4 * (COLUMNS + 1))
+        self._packed = bytearray(4 * (_BEHIND + 1))
         self._port = bytearray(1)
         self._glyphs = _bar_glyphs()
 
@@ -116,11 +126,13 @@ class Lcd:
 
     def _initialise(self, step):
         if step < len(_NIBBLES):
-            nibble = _NIBBLES[step] | _LIGHT
-            self._i2c.writeto(self._address, bytes((nibble | _E, nibble)))
+            nibble = (_NIBBLES[step] >> 4 if self._low else _NIBBLES[step]) | self._light
+            self._i2c.writeto(self._address, bytes((nibble | self._e, nibble)))
         elif step == len(_NIBBLES):
             for command in _COMMANDS:
                 self._send(command, b"")
+        elif step >= _STEPS - 2:
+            self._send(_LINE_ADDRESSES[step - _STEPS] + COLUMNS, b" " * _BEHIND)
         else:
             quarter = (step - len(_NIBBLES) - 1) * COLUMNS
             self._send(_CGRAM_ADDRESS + quarter, memoryview(self._glyphs)[quarter : quarter + COLUMNS])
@@ -134,7 +146,7 @@ class Lcd:
         The PCF8574's pins are high after power-up, but every transfer leaves E low. So it must be asked before
         anything is sent."""
         self._i2c.readfrom_into(self._address, self._port)
-        return not self._port[0] & _E
+        return not self._port[0] & self._e
 
     def _refresh(self):
         """Send the changed part of one line; False if no line has changed."""
@@ -161,19 +173,23 @@ class Lcd:
     def _send(self, command, data):
         """Send an instruction and the data that follow it in one transfer."""
         packed = self._packed
-        self._pack(0, command, _LIGHT)
+        self._pack(0, command, self._light)
         for i in range(len(data)):
-            self._pack(4 * (i + 1), data[i], _LIGHT | _RS)
+            self._pack(4 * (i + 1), data[i], self._light | self._rs)
         self._i2c.writeto(self._address, memoryview(packed)[: 4 * (len(data) + 1)])
 
     def _pack(self, at, value, control):
         """Put a byte into _packed as two nibbles, each with E high and then low: the falling edge latches it.
 
         RS changes in the byte that raises E: at 100 kHz that is 90 us before E falls."""
-        packed = self._packed
-        high = value & 0xF0 | control
-        low = value << 4 & 0xF0 | control
-        packed[at] = high | _E
+        packed, enable = self._packed, self._e
+        if self._low:
+            high = value >> 4 | control
+            low = value & 0x0F | control
+        else:
+            high = value & 0xF0 | control
+            low = value << 4 & 0xF0 | control
+        packed[at] = high | enable
         packed[at + 1] = high
-        packed[at + 2] = low | _E
+        packed[at + 2] = low | enable
         packed[at + 3] = low

@@ -1,4 +1,5 @@
-"""Driver for an OLED of 128x64 pixels with an SSD1306 or SH1106. display.py finds it, and says what its methods do.
+"""Driver for an OLED of 128x64 pixels with an SSD1306 or SH1106, or of 128x32 with an SSD1306. display.py finds it, and
+says what its methods do.
 
 Sources: data sheets Solomon Systech SSD1306 rev 1.1 and Sino Wealth SH1106 V2.3. Both are addressed page by page, which
 is 8 rows, because an SH1106 knows no other way. It has 132 columns, of which the panel shows the middle ones.
@@ -17,17 +18,21 @@ PROBE_MS = 200  # time between two checks whether it has kept its power
 REFRESH_MS = 10_000  # send everything again so often: nothing else repairs what noise has changed
 _POWER_UP_MS = 40
 _OFF = 0x40  # bit of the status
-_SH1106_STATUS = 0x08  # low half of the status; of an SSD1306 it is 3 or 6
+_SH1106_STATUS = (0x08, 0x00, 0x0C)  # low half of the status; of an SSD1306 it is 3 or 6, or that of a clone
 _SH1106_OFFSET = 2  # its first visible column
 # Rows by which the picture is shifted, each for SHIFT_REFRESHES: the same pixels must not glow for ever. The rows that
 # leave at the top come back at the bottom, so pictures leave the first two blank.
 _SHIFTS = (0, 1, 2, 1)
 SHIFT_REFRESHES = 6
-# Control byte of a stream of commands, then: clock, 64 rows, no offset, columns and rows from the side opposite to the
-# cable, alternate COM pins, pre-charge, VCOMH, show the RAM
+# A panel of 32 rows has none to spare: its picture moves down, over the two blank rows below the letters.
+_SHIFTS_32 = (0, 63, 62, 63)
+# Control byte of a stream of commands, then: clock, rows - 1, no offset, columns and rows from the side opposite to the
+# cable, COM pins alternate (64 rows) or in sequence (32), pre-charge, VCOMH, show the RAM
 _SET_UP = b"\x00\xd5\x80\xa8\x3f\xd3\x00\xa1\xc8\xda\x12\xd9\xf1\xdb\x40\xa4"
-# charge pump, page addressing, no scrolling; an SH1106's DC-DC converter
-_SUPPLY = (b"\x8d\x14\x20\x02\x2e", b"\xad\x8b")
+_SET_UP_32 = b"\x00\xd5\x80\xa8\x1f\xd3\x00\xa1\xc8\xda\x02\xd9\xf1\xdb\x40\xa4"
+# An SH1106's DC-DC converter; an SSD1306's charge pump, page addressing, no scrolling. Each ignores the other's. The
+# status of a clone may be that of either, and without its own the panel would stay dark.
+_SUPPLY = b"\xad\x8b\x8d\x14\x20\x02\x2e"
 _SPREAD = bytes((i & 1) * 3 | (i & 2) * 6 | (i & 4) * 12 | (i & 8) * 24 for i in range(16))  # each bit twice
 
 
@@ -51,21 +56,22 @@ class Canvas(framebuf.FrameBuffer):
 
 
 class Oled:
-    """kind: "ssd1306", "sh1106" or "auto".  contrast: 0 to 255.  inverted: dark on bright.
+    """kind: "ssd1306", "sh1106", "auto", or "ssd1306-32": a panel of 32 rows, which shows the two lines alone.
+    contrast: 0 to 255.  inverted: dark on bright.
 
     canvas: the Canvas on which pictures are drawn.
     """
 
-    draws = True
-
     def __init__(self, kind, contrast, inverted):
         self._kind = kind
+        self.draws = kind != "ssd1306-32"
         self._look = bytes((0x81, contrast, 0xA7 if inverted else 0xA6))
         self._pixels = bytearray(WIDTH * HEIGHT // 8)
         self._sent = bytearray(WIDTH * HEIGHT // 8)
         self.canvas = Canvas(self._pixels)
         # part by part, the pixels to show and those that were sent: a digit's parts, one below the other, in a row
-        starts = [page * WIDTH + x for x in range(0, WIDTH, _PART) for page in range(HEIGHT // 8)]
+        self._pages = HEIGHT // 8 if self.draws else HEIGHT // 16
+        starts = [page * WIDTH + x for x in range(0, WIDTH, _PART) for page in range(self._pages)]
         self._new, self._old = [
             [memoryview(pixels)[at : at + _PART] for at in starts] for pixels in (self._pixels, self._sent)
         ]
@@ -84,7 +90,7 @@ class Oled:
 
     def _restart(self):
         # asked each time: it may be another one that was plugged in
-        self._sh1106 = self._kind == "sh1106" or (self._kind == "auto" and self._state() & 0x0F == _SH1106_STATUS)
+        self._sh1106 = self._kind == "sh1106" or (self._kind == "auto" and self._state() & 0x0F in _SH1106_STATUS)
         self._set_up = self._lit = False
         self._send_all()
 
@@ -98,7 +104,9 @@ class Oled:
 
     def show(self, line1, line2, picture=None):
         """Without a picture: the lines, in letters of twice their height. Codes as of an HD44780, see hd44780.py."""
-        wanted = picture or tuple([line if isinstance(line, str) else bytes(line) for line in (line1, line2)])
+        wanted = (self.draws and picture) or tuple(
+            [line if isinstance(line, str) else bytes(line) for line in (line1, line2)]
+        )
         if wanted != self._wanted:
             self._wanted = wanted
 
@@ -140,8 +148,9 @@ class Oled:
         self._i2c.writeto(self._address, commands)
 
     def _configure(self):
-        shift = _SHIFTS[self._refreshes // SHIFT_REFRESHES % len(_SHIFTS)]
-        self._command(_SET_UP + _SUPPLY[self._sh1106] + self._look + bytes((0x40 | shift,)))
+        shifts = _SHIFTS if self.draws else _SHIFTS_32
+        shift = shifts[self._refreshes // SHIFT_REFRESHES % len(shifts)]
+        self._command((_SET_UP if self.draws else _SET_UP_32) + _SUPPLY + self._look + bytes((0x40 | shift,)))
 
     def _send(self):
         """Send the first parts that have changed, or have to be sent anyway."""
@@ -149,8 +158,8 @@ class Oled:
         for k in range(len(self._new)):
             new, old = self._new[k], self._old[k]
             if k >= len(self._new) - self._unsent or new != old:
-                column = k // 8 * _PART + (_SH1106_OFFSET if self._sh1106 else 0)
-                packet[1] = 0xB0 | k % 8
+                column = k // self._pages * _PART + (_SH1106_OFFSET if self._sh1106 else 0)
+                packet[1] = 0xB0 | k % self._pages
                 packet[3] = column & 0x0F
                 packet[5] = 0x10 | column >> 4
                 packet[7:] = new
@@ -169,8 +178,8 @@ class Oled:
         if callable(wanted[0]):
             wanted[0](self.canvas, *wanted[1:])
         else:
-            self.canvas.tall(wanted[0], 1)
-            self.canvas.tall(wanted[1], 5)
+            self.canvas.tall(wanted[0], 1 if self.draws else 0)
+            self.canvas.tall(wanted[1], 5 if self.draws else 2)
 
 
 def character(canvas, code, x, y):

@@ -59,8 +59,9 @@ class ActiveCalibration:
 
     def keep_trim(self, now_ms):
         """Save the trim that riding has found, if the bike stands and TRIM_MS are over. Call it about every 100 ms."""
-        if self.value.aligned and ticks_diff(now_ms, self._trim_due_ms) >= 0 and self._save_trim():
-            self._trim_due_ms = ticks_add(now_ms, TRIM_MS)
+        if ticks_diff(now_ms, self._trim_due_ms) >= 0:
+            saved = self.value.aligned and self._save_trim()
+            self._trim_due_ms = ticks_add(now_ms, TRIM_MS if saved else 0)
 
     def _save_trim(self):
         """Save the trim if it has changed enough; return True if so."""

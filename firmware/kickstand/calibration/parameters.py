@@ -1,20 +1,23 @@
 """The parameters that turn counts into specific force (g) and angular rate (deg/s), and the sensor's axes into the
 vehicle's."""
 
-from array import array
-
-from ..rotation import matrix, vector
+from ..rotation import is_identity, matrix, product, rotate, vector
 
 # Limits of plausible parameters. The data sheet allows 50 to 80 mg and 3 %; boards that are sold exceed that.
 MAX_OFFSET_G = 0.5
 MIN_SLOPE, MAX_SLOPE = 0.8, 1.2
+MAX_MATRIX_ERROR = 0.15  # largest difference of an entry of accel_matrix or gyro_matrix from the identity's
+MAX_GYRO_SIGMA = 0.05
+_UNKNOWN = (0.0,) * 9
 
 
 class Calibration:
     """The parameters of one mounted sensor. By default they change nothing: offset 0, slope 1, bias 0, the identity.
 
     accel_offset (3, g) and accel_slope (3): calibrated = slope * reading + offset, Nicolae's equations 18-20.
-    gyro_bias (3, deg/s): what the gyro reads at rest. vehicle_from_sensor (9, row-major, rows left, up, forward): the
+    gyro_bias (3, deg/s): what the gyro reads at rest. accel_matrix, gyro_matrix (9, row-major): what remains, force =
+    accel_matrix * calibrated, and rate = gyro_matrix * (reading - bias). gyro_sigma (9): standard error of each entry
+    of gyro_matrix, 0 where that was not measured. vehicle_from_sensor (9, row-major, rows left, up, forward): the
     alignment, a rotation matrix. trim_deg: the roll-misalignment correction, which riding has found: degrees by which
     the lean would read too far to the right. six_done: offset and slope were measured. aligned:
     vehicle_from_sensor was measured. by_drive: it was measured or refined by driving.
@@ -24,6 +27,8 @@ class Calibration:
         self.accel_offset = vector()
         self.accel_slope = vector(1.0, 1.0, 1.0)
         self.gyro_bias = vector()
+        self.accel_matrix, self.gyro_matrix = matrix(), matrix()
+        self.gyro_sigma = matrix(_UNKNOWN)
         self.vehicle_from_sensor = matrix()
         self.trim_deg = 0.0
         self.six_done = False
@@ -32,10 +37,11 @@ class Calibration:
         self.set_scale(1.0, 1.0)
 
     def with_alignment(self, vehicle_from_sensor, gyro_bias, trim_deg=0.0, by_drive=False):
-        """A new Calibration with offset and slope of this one, aligned by vehicle_from_sensor (9). gyro_bias: 3,
-        deg/s."""
+        """A new Calibration with offset, slope and matrices of this one, aligned by vehicle_from_sensor (9). gyro_bias:
+        3, deg/s."""
         new = Calibration()
         new.set_accel(self.accel_offset, self.accel_slope)
+        new.set_matrices(self.matrices())
         new.six_done = self.six_done
         new.aligned = True
         new.by_drive = by_drive
@@ -67,13 +73,49 @@ class Calibration:
         self.vehicle_from_sensor = matrix(values[9:18])
         self.trim_deg = values[18]
 
+    @property
+    def whole(self):
+        """True if the matrices were measured."""
+        return any(self.gyro_sigma) or not (is_identity(self.accel_matrix) and is_identity(self.gyro_matrix))
+
+    def matrices(self):
+        """accel_matrix, gyro_matrix and gyro_sigma: 27 numbers."""
+        return list(self.accel_matrix) + list(self.gyro_matrix) + list(self.gyro_sigma)
+
+    def set_matrices(self, values):
+        """Set the 27 numbers, in the order of matrices()."""
+        self.accel_matrix, self.gyro_matrix = matrix(values[0:9]), matrix(values[9:18])
+        self.gyro_sigma = matrix(values[18:27])
+
     def correct(self, accel):
         """Return a mean accelerometer reading (3, g) calibrated, as a new array."""
-        return array("f", [self.accel_slope[i] * accel[i] + self.accel_offset[i] for i in range(3)])
+        out = vector()
+        rotate(out, self.accel_matrix, [self.accel_slope[i] * accel[i] + self.accel_offset[i] for i in range(3)])
+        return out
+
+    def correct_rate(self, gyro):
+        """Return a mean gyro reading (3, deg/s) calibrated, as a new array."""
+        out = vector()
+        rotate(out, self.gyro_matrix, [gyro[i] - self.gyro_bias[i] for i in range(3)])
+        return out
 
     def scales(self):
         """(3) g per count of each accelerometer axis, slope included; and deg/s per count of the gyro."""
         return self._scale, self._gyro_scale
+
+    def in_vehicle(self):
+        """The whole calibration and the alignment, for counts of accelerometer and gyro.
+
+        Four lists: matrix (9) and offset (3) of force = matrix * counts + offset, in g; of the rate likewise, in deg/s.
+        These are Nicolae's equations (18)-(20), the matrices, and (15), multiplied out: 18 products a reading."""
+        of_force, of_rate = matrix(), matrix()
+        product(of_force, self.vehicle_from_sensor, self.accel_matrix)
+        product(of_rate, self.vehicle_from_sensor, self.gyro_matrix)
+        force_offset, rate_offset = [0.0] * 3, [0.0] * 3
+        rotate(force_offset, of_force, self.accel_offset)
+        rotate(rate_offset, of_rate, [-bias for bias in self.gyro_bias])
+        force = [of_force[i] * self._scale[i % 3] for i in range(9)]
+        return force, force_offset, [value * self._gyro_scale for value in of_rate], rate_offset
 
     def apply(self, reading, force, rate):
         """Fill force (3, g) and rate (3, deg/s), both in the sensor's axes, from a reading (7, the chip's order:
@@ -85,10 +127,14 @@ class Calibration:
         rate[0] = gyro_scale * reading[4] - bias[0]
         rate[1] = gyro_scale * reading[5] - bias[1]
         rate[2] = gyro_scale * reading[6] - bias[2]
+        if self.whole:
+            rotate(force, self.accel_matrix, force)
+            rotate(rate, self.gyro_matrix, rate)
 
 
-def six_position_calibration(offset, slope, gyro_bias):
-    """A new Calibration with the six-position result: offset (3, g), slope (3), gyro_bias (3, deg/s).
+def six_position_calibration(offset, slope, gyro_bias, matrices=None):
+    """A new Calibration with the six-position result: offset (3, g), slope (3), gyro_bias (3, deg/s). matrices: the 27
+    numbers of Calibration.matrices(), where the gyro was measured too.
 
     It is not aligned, because the sensor was off the vehicle for the six poses.
     """
@@ -96,4 +142,6 @@ def six_position_calibration(offset, slope, gyro_bias):
     new.set_accel(offset, slope)
     new.six_done = True
     new.gyro_bias = vector(*gyro_bias)
+    if matrices:
+        new.set_matrices(matrices)
     return new

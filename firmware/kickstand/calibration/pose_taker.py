@@ -46,6 +46,11 @@ class PoseTaker:
         return _ENDED
 
     @property
+    def averaging(self):
+        """True from SETTLED until DONE or a refusal."""
+        return self._state == AVERAGING
+
+    @property
     def restless(self):
         """True after waiting for stillness for longer than a sensor at rest needs."""
         return self._state == SETTLING and self._waited > 2 * self._settle_count

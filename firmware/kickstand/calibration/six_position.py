@@ -15,7 +15,7 @@ from .parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE
 SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")  # which axis points up, in the order of the six poses
 MAX_TILT_DEG = 20.0  # largest angle between a side's axis and the vertical
 FREE_TILT_DEG = 20.0  # a free pose nearer to one of the sides than this adds little information
-FREE_MAX_G = 0.020  # largest error of a free pose: 2 % of cross-axis sensitivity, which six numbers cannot describe
+FREE_MAX_G = 0.028  # largest error of a free pose: six numbers cannot describe the 2 % of cross-axis sensitivity
 
 
 def side_of(accel):

@@ -1,13 +1,20 @@
 """The mean reading of one still pose, with a check that it was still.
 
+A sensor that is ill is no still one: each axis must change by a count now and then, as noise makes a working one do,
+and a gyro axis must not be too noisy.
+
 Sums are kept as integers until the end: 32-bit floats would lose the digits that averaging gains.
 """
 
-from ..errors import CaptureError
+from ..errors import CaptureError, SickSensor
+from ..units import AXES
 
 # Largest difference of a sample from the first one: more is a knock. Ten times the chip's noise with its widest filter.
 PEAK_G = 0.08
 PEAK_DPS = 5.0
+# Largest noise of a gyro axis, by the differences of samples that follow each other: a hand's sway has none. Fifteen
+# times the chip's with its usual filter.
+NOISE_DPS = 0.6
 SPREAD_G = 0.02  # largest standard deviation: being still matters more than the exact angle of a pose
 DRIFT_G = 0.007  # largest difference between the means of both halves: 0.4 degrees of slow tilt
 MAX_REST_RATE_DPS = 45.0  # the data sheet allows 20 deg/s of gyro offset, and as much again over temperature
@@ -37,6 +44,8 @@ class StillPose:
         self._sums = [0] * 7  # sums of the deviations from the first sample, so that they stay small integers
         self._early = [0] * 7  # the sums at half time
         self._squares = [0] * 7
+        self._last = [0] * 7  # the deviations of the sample before, and the sums of the squares of their changes
+        self._changes = [0] * 7
         self.count = 0
         self.accel = None
         self.gyro = None
@@ -52,6 +61,9 @@ class StillPose:
                 raise CaptureError("moved")
             if i < 3 and not -self._limit < counts[i] < self._limit:
                 raise CaptureError("saturated")
+            change = deviation - self._last[i]
+            self._last[i] = deviation
+            self._changes[i] += change * change
             self._sums[i] += deviation
             self._squares[i] += deviation * deviation
         self.count += 1
@@ -66,6 +78,13 @@ class StillPose:
             raise CaptureError("too-few", n, MIN_SAMPLES)
         if not any(self._squares):
             raise CaptureError("frozen-pose")
+        for i in range(3):
+            if not self._squares[i]:
+                raise SickSensor("stuck-accel", AXES[i])
+            if not self._squares[4 + i]:
+                raise SickSensor("dead-gyro", AXES[i])
+            if self._changes[4 + i] > 2 * n * (NOISE_DPS * self._gyro_lsb) ** 2:
+                raise SickSensor("noisy-gyro", AXES[i])
         late = n - self._half
         for i in range(3):
             off = self._sums[i] / n

@@ -1,8 +1,9 @@
 """The calibration in flash: two files that are written in turn, so that after a power cut one of them is whole.
 
-Each holds a record: magic, version, length, sequence number, the chip's WHO_AM_I and range, flags, 19 floats, and the
-CRC32 of everything before it. load() takes the newest valid record; save() writes over the other one and reads it back.
-Nothing is ever written because a read failed: while the supply sags a good file can read as empty.
+Each holds a record: magic, version, length, sequence number, the chip's WHO_AM_I and range, flags, 19 floats, in a
+record of version 2 another 27 for the matrices, and the CRC32 of everything before it. A calibration without matrices
+is written as version 1, which all releases read. load() takes the newest valid record; save() writes over the other one
+and reads it back. Nothing is ever written because a read failed: while the supply sags a good file can read as empty.
 """
 
 import struct
@@ -11,16 +12,20 @@ from errno import ENOENT
 
 from ..errors import StoreError
 from ..rotation import is_rotation
-from .parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE, Calibration
+from .parameters import MAX_GYRO_SIGMA, MAX_MATRIX_ERROR, MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE, Calibration
 
 FILES = ("kickstand_a.cal", "kickstand_b.cal")
 VERSION = 1
+WHOLE_VERSION = 2  # with the matrices
 _MAGIC = b"KSTD"
 _HEAD = "<4sHHI"  # magic, version, length of the whole record in bytes, sequence number
 _BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, how aligned; offset, slope, gyro bias, matrix, trim
 _NOT_ALIGNED, _BY_POSES, _BY_DRIVE = 0, 1, 2  # how aligned
+_WHOLE = "<27f"  # accel_matrix, gyro_matrix, gyro_sigma
 BODY_LENGTH = struct.calcsize(_BODY)
-_LENGTH = struct.calcsize(_HEAD) + BODY_LENGTH + 4
+WHOLE_BODY_LENGTH = BODY_LENGTH + struct.calcsize(_WHOLE)
+_HEAD_LENGTH = struct.calcsize(_HEAD)
+_LENGTHS = {VERSION: _HEAD_LENGTH + BODY_LENGTH + 4, WHOLE_VERSION: _HEAD_LENGTH + WHOLE_BODY_LENGTH + 4}
 MAX_BIAS_DPS = 60.0  # deg/s of the gyro
 MAX_TRIM_DEG = 3.6  # the limit in lean/upright_trim.py plus a margin for rounding to 32 bits
 
@@ -28,8 +33,9 @@ MAX_TRIM_DEG = 3.6  # the limit in lean/upright_trim.py plus a margin for roundi
 class Store:
     """Calibration records of one chip.
 
-    who_am_i, accel_range_g: those of the chip in use; records of another chip or range are not valid.  directory: that
-    of the files, "" for the current one.  message: after load(), in a few words, which record is in use or why none is.
+    who_am_i, accel_range_g: those of the chip in use; records of another chip are not valid. Those of another range are
+    valid, because offset and slope hardly depend on it.  directory: that of the files, "" for the current one.
+    message: after load(), in a few words, which record is in use or why none is.
     """
 
     def __init__(self, who_am_i, accel_range_g, directory=""):
@@ -79,7 +85,7 @@ class Store:
         for name in FILES:
             try:
                 with open(self._path(name), "rb") as file:
-                    record = file.read(_LENGTH + 1)
+                    record = file.read(_LENGTHS[WHOLE_VERSION] + 1)
             except OSError as error:
                 if error.args[0] != ENOENT:  # a missing file is normal: save() makes it
                     problems.append("%s unreadable" % name)
@@ -95,39 +101,46 @@ class Store:
         return self._directory + "/" + name if self._directory else name
 
     def _pack(self, calibration, sequence):
-        record = struct.pack(_HEAD, _MAGIC, VERSION, _LENGTH, sequence) + pack(*self._chip, calibration)
+        version = WHOLE_VERSION if calibration.whole else VERSION
+        record = struct.pack(_HEAD, _MAGIC, version, _LENGTHS[version], sequence) + pack(*self._chip, calibration)
         return record + struct.pack("<I", crc32(record))
 
     def _unpack(self, record):
         """(sequence, calibration, None) of a record's bytes, or (0, None, what is wrong in words)."""
-        if len(record) != _LENGTH:
-            return 0, None, "empty" if not record else "cut short" if len(record) < _LENGTH else "too long"
+        if len(record) not in _LENGTHS.values():
+            whole = len(record) >= 6 and record[4] == WHOLE_VERSION
+            length = _LENGTHS[WHOLE_VERSION if whole else VERSION]
+            return 0, None, "empty" if not record else "cut short" if len(record) < length else "too long"
         magic, version, length, sequence = struct.unpack_from(_HEAD, record, 0)
-        if struct.unpack_from("<I", record, _LENGTH - 4)[0] != crc32(record[:-4]):
+        if struct.unpack_from("<I", record, len(record) - 4)[0] != crc32(record[:-4]):
             return 0, None, "damaged"
-        if magic != _MAGIC or version != VERSION or length != _LENGTH or sequence == 0:
+        if magic != _MAGIC or length != len(record) or _LENGTHS.get(version) != length or sequence == 0:
             return 0, None, "of another version"
-        who_am_i, accel_range_g, calibration = unpack(record, struct.calcsize(_HEAD))
-        if (who_am_i, accel_range_g) != self._chip:
-            return 0, None, "of another sensor or range"
+        who_am_i, _, calibration = unpack(record[_HEAD_LENGTH:-4])
+        if who_am_i != self.who_am_i:
+            return 0, None, "of another sensor"
         if not plausible(calibration):
             return 0, None, "out of range"
         return sequence, calibration, None
 
 
 def pack(who_am_i, accel_range_g, calibration):
-    """A Calibration and the chip it belongs to, as BODY_LENGTH bytes. accel_range_g: a whole number of g."""
+    """A Calibration and the chip it belongs to, as BODY_LENGTH bytes, or WHOLE_BODY_LENGTH with matrices.
+    accel_range_g: a whole number of g."""
     how = (_BY_DRIVE if calibration.by_drive else _BY_POSES) if calibration.aligned else _NOT_ALIGNED
-    return struct.pack(_BODY, who_am_i, accel_range_g, calibration.six_done, how, *calibration.parameters())
+    body = struct.pack(_BODY, who_am_i, accel_range_g, calibration.six_done, how, *calibration.parameters())
+    return body + struct.pack(_WHOLE, *calibration.matrices()) if calibration.whole else body
 
 
-def unpack(data, at):
-    """(who_am_i, accel_range_g, Calibration) from the bytes of pack() that begin at byte `at` of data."""
-    fields = struct.unpack_from(_BODY, data, at)
+def unpack(data):
+    """(who_am_i, accel_range_g, Calibration) from the bytes of pack()."""
+    fields = struct.unpack_from(_BODY, data, 0)
     calibration = Calibration()
     calibration.six_done, calibration.aligned = bool(fields[2]), fields[3] != _NOT_ALIGNED
     calibration.by_drive = fields[3] == _BY_DRIVE
     calibration.set_parameters(fields[4:])
+    if len(data) == WHOLE_BODY_LENGTH:
+        calibration.set_matrices(struct.unpack_from(_WHOLE, data, BODY_LENGTH))
     return fields[0], fields[1], calibration
 
 
@@ -139,5 +152,12 @@ def plausible(calibration):
         if not MIN_SLOPE < calibration.accel_slope[i] < MAX_SLOPE:
             return False
         if not abs(calibration.gyro_bias[i]) < MAX_BIAS_DPS:
+            return False
+    for i in range(9):
+        one = 1.0 if i % 4 == 0 else 0.0
+        for values in (calibration.accel_matrix, calibration.gyro_matrix):
+            if not abs(values[i] - one) <= MAX_MATRIX_ERROR:
+                return False
+        if not 0.0 <= calibration.gyro_sigma[i] <= MAX_GYRO_SIGMA:
             return False
     return is_rotation(calibration.vehicle_from_sensor, 1e-4) and abs(calibration.trim_deg) <= MAX_TRIM_DEG

@@ -1,7 +1,7 @@
 """From the chip's counts to the vehicle's force and rate in one step: calibration and alignment multiplied out.
 
-    force = R (slope * counts / lsb + offset)          Nicolae's equations (18)-(20), then (15)
-    rate  = R (counts / lsb - bias)                    R: vehicle_from_sensor
+    force = R A (slope * counts / lsb + offset)        Nicolae's equations (18)-(20), then (15)
+    rate  = R G (counts / lsb - bias)                  R: vehicle_from_sensor; A, G: accel_matrix, gyro_matrix
 
 That takes eighteen products a sample instead of twenty-seven. On the board a product of floats takes 12 us and 32 bytes
 of heap, so there they are products of integers in machine code, which are right to 0.03 degrees of lean.
@@ -11,7 +11,6 @@ from array import array
 from math import radians
 
 from ..errors import NO_MACHINE_CODE, checked
-from ..rotation import rotate
 
 ONE = 2048  # the integer that stands for the largest scale: times the sum of eight samples it still fits 32 bits
 
@@ -42,19 +41,15 @@ class Transform:
     """calibration: a Calibration whose set_scale() was called; later changes to it are not seen."""
 
     def __init__(self, calibration):
-        r = calibration.vehicle_from_sensor
+        force, force_offset, rate, rate_offset = calibration.in_vehicle()
         scale, gyro_scale = calibration.scales()
-        self._force_unit, self._rate_unit = max(scale) / ONE, radians(gyro_scale) / ONE
-        force_offset, rate_offset = [0.0] * 3, [0.0] * 3
-        rotate(force_offset, r, calibration.accel_offset)
-        rotate(rate_offset, r, [-radians(bias) for bias in calibration.gyro_bias])
+        force_unit, rate_unit = max(scale) / ONE, gyro_scale / ONE
         self._integers, self._products = array("i", [0] * 24), array("i", [0] * 6)
         for i in range(12):
             row, k = i // 4, i % 4
-            force = r[3 * row + k] * scale[k] if k < 3 else force_offset[row]
-            rate = r[3 * row + k] * radians(gyro_scale) if k < 3 else rate_offset[row]
-            self._integers[i] = round(force / self._force_unit)
-            self._integers[12 + i] = round(rate / self._rate_unit)
+            self._integers[i] = round((force[3 * row + k] if k < 3 else force_offset[row]) / force_unit)
+            self._integers[12 + i] = round((rate[3 * row + k] if k < 3 else rate_offset[row]) / rate_unit)
+        self._force_unit, self._rate_unit = force_unit, radians(rate_unit)
 
     def apply_sum(self, sums, n, force, rate):
         """Put the mean force and rate of n samples, at most 8, into force and rate.

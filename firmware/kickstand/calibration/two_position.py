@@ -7,8 +7,8 @@ and z come out pointing right and backward, and both signs are changed.
 
 from math import atan2, degrees
 
-from ..errors import AlignmentError
-from ..rotation import cross, dot, frame, matrix, norm, normalize, vector
+from ..errors import AlignmentError, GyroError
+from ..rotation import cross, dot, frame, matrix, norm, normalize, rotate, vector
 
 # Least tilt between the poses. At 5 degrees, one degree of pitch between them makes a yaw error of 11 degrees; at 8, 7.
 MIN_TILT_DEG = 5.0
@@ -19,6 +19,11 @@ SAME_POSE_DEG = 1.0
 # after the six positions there remain 35 mg of drift over temperature.
 UNCALIBRATED_TOLERANCE_G = 0.15
 CALIBRATED_TOLERANCE_G = 0.05
+# By how much the turn between the poses, by the gyro, may differ from the tilt: a constant (rad); the share of the tilt
+# by which uncalibrated sensors and the gyro's scale change it; the share of another turn, as while the bike is pushed
+# about, that cross-axis errors add; drift (rad/s) and random walk (rad/s per sqrt(s), 3 sigma) of the gyro's bias
+GYRO_RAD, GYRO_TILT_SHARE, GYRO_TURN_SHARE = 0.02, 0.15, 0.04
+GYRO_DRIFT, GYRO_WALK = 0.0005, 0.0002
 
 
 def check_one_g(force, tolerance_g, pose):
@@ -67,3 +72,33 @@ def align(calibration, kickstand, upright, side):
     tolerance_g = CALIBRATED_TOLERANCE_G if calibration.six_done else UNCALIBRATED_TOLERANCE_G
     tilt = two_position(vehicle_from_sensor, *poses, side, tolerance_g)
     return calibration.with_alignment(vehicle_from_sensor, kickstand.gyro), tilt
+
+
+def check_turn(calibration, kickstand, upright, turn):
+    """Raise GyroError unless the gyro says that between the two poses (StillPose each) the bike turned by the tilt
+    between them. turn: the Turn, which has ended; calibration: as for align().
+
+    The longer it took, the less the gyro can say: after a minute a tilt of 12 degrees is hardly checked any more. Where
+    readings were lost nothing is checked.
+    """
+    if turn.lost:
+        return
+    u, v = calibration.correct(kickstand.accel), calibration.correct(upright.accel)
+    normalize(u)
+    normalize(v)
+    axis, back, claimed = vector(), vector(), vector()
+    cross(axis, u, v)
+    tilt = atan2(norm(axis), dot(u, v))
+    misfit = 9.9
+    for share in (0.0, 0.5):  # a stand holds the bike stiller; but the bias may have drifted, evenly
+        r = turn.attitude(upright.gyro, share)
+        rotate(back, r, v)
+        misfit = min(misfit, norm([u[i] - back[i] for i in range(3)]))
+    seconds = turn.seconds
+    tolerance = GYRO_RAD + GYRO_TILT_SHARE * tilt + GYRO_TURN_SHARE * turn.angle()
+    tolerance += GYRO_DRIFT * seconds + GYRO_WALK * (seconds**3 / 3) ** 0.5
+    if misfit > tolerance:
+        rotate(claimed, (r[0], r[3], r[6], r[1], r[4], r[7], r[2], r[5], r[8]), u)
+        normalize(axis)
+        cross(back, u, claimed)
+        raise GyroError("gyro-tilt", degrees(tilt), degrees(atan2(dot(back, axis), dot(u, claimed))))

@@ -87,13 +87,17 @@ class BackgroundAlignment:
             speed = self._share(speed)
         if self._look_ms is None or ticks_diff(now_ms, self._look_ms) >= 0:
             self._look_ms = ticks_add(now_ms, LOOK_MS)
+            self.fresh_speed(now_ms)
+            if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > LOOK_MS:
+                self._begin_again()  # now: after 6 days without a reading ticks_diff() is negative
             self._look(now_ms)
         return speed
 
     def fresh_speed(self, now_ms):
         """The speed measured last (m/s), or None if that was long ago."""
-        fresh = self._speed_ms is not None and ticks_diff(now_ms, self._speed_ms) < FRESH_MS
-        return self._speed_mps if fresh else None
+        if self._speed_ms is not None and ticks_diff(now_ms, self._speed_ms) >= FRESH_MS:
+            self._speed_ms = None  # kept, it would be fresh again after 6 days: then ticks_diff() is negative
+        return self._speed_mps if self._speed_ms is not None else None
 
     def _share(self, speed):
         """Pass a speed (m/s) on to the lean filter if it is reliable. Returns that speed, rounded as a recording keeps
@@ -116,8 +120,7 @@ class BackgroundAlignment:
         """Take the n samples of a pass of the loop. sums: 7, their sums in counts, in the chip's order. dt_us: the time
         that they cover. Call it once in each pass that has samples."""
         if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > GAP_MS:
-            self._clear_sums()
-            self.drive.interrupt()
+            self._begin_again()
         self._fed_ms = now_ms
         total = self._total
         for i in range(7):
@@ -130,6 +133,12 @@ class BackgroundAlignment:
             self._calibration.apply([t / n for t in total], self._force, self._rate)
             self.drive.update(self._force, self._rate, self._us)
             self._clear_sums()
+
+    def _begin_again(self):
+        """Drop the sums, because readings are missing."""
+        self._fed_ms = None
+        self._clear_sums()
+        self.drive.interrupt()
 
     def _look(self, now_ms):
         """Act on the drive's result, but only while speed and sensor say that the vehicle stands. Called once a

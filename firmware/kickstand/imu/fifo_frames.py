@@ -1,15 +1,54 @@
-"""Decodes frames of the chip's FIFO and sums them up.
+"""Decodes frames of the chip's FIFO, sums them up, and watches the counts of each axis.
 
 A frame is one sample: 14 bytes, seven big-endian int16 in the order ax ay az temperature gx gy gz (register map
 RM-MPU-6000A rev 4.2, pp. 29 to 31). On the board decode() and add_up() are the machine code of fifo_frames_viper.py;
 elsewhere they are decode_python() and add_up_python(), which give the same results.
 """
 
+import gc
 from array import array
 
-from ..errors import NO_MACHINE_CODE, checked
+from micropython import const
 
-FRAME = 14  # bytes
+from ..errors import NO_MACHINE_CODE, Notice, checked, tried
+
+FRAME = const(14)  # bytes
+SATURATED = const(32700)  # |counts|: from here on a reading is at the end of its range
+LOOK_MS = const(400)
+
+# Places in the array('i', 33) that add_up() keeps its notes in; in the machine code they are numbers. The hash of the
+# last frame; how many times in a row it was repeated; how many repetitions make a frame dead; the number of frames at
+# the end of the range in this call; the same in a row until now.
+_HASH = const(0)
+_REPEATS = const(1)
+_LIMIT = const(2)
+LOST = const(3)
+_ROW = const(4)
+# Since the last look: a bit for each column that was at its end; the number of frames in which one was, and in which
+# one of the gyro's was; bits for axes that differed: y from x (bits 1 and 5), z from y (2 and 6), z from x (0 and 4).
+# The number of samples until the next look.
+_ENDS = const(5)
+_CLIPPED = const(6)
+_GYRO_CLIPPED = const(7)
+_DIFFER = const(8)
+DUE = const(9)
+# |counts| of the accelerometer that hard vibration reaches, and the number of frames with so much since the last look.
+_HARD = const(10)
+_SHAKEN = const(11)
+# From each of these on seven places, in the frame's order: the counts of the last frame; a bit for each value that
+# their lowest four bits had since the last look; the largest |counts| since power-on.
+_LAST = const(12)
+_SEEN = const(19)
+_PEAK = const(26)
+_HIGH_BYTE = const(0x10000)  # in _SEEN: the high byte has changed
+_WRAPPED = const(0x20000)  # in _SEEN: the counts jumped by _JUMP or more, but the high byte stayed
+_JUMP = const(192)
+
+# Half of 8 g and of 16 g. The low-pass hides most of a vibration: where so much is left, it was cut off before, and the
+# mean of what was cut off unevenly is wrong. A range below 8 g has no such limit, because bends reach half of it.
+_HARD_COUNTS = const(16384)
+_COLUMNS = (0, 1, 2, 4, 5, 6)  # of the axes
+_ALL_DIFFER = const(0x77)
 
 
 def decode_python(frames, at, counts):
@@ -19,14 +58,17 @@ def decode_python(frames, at, counts):
 
 
 def add_up_python(frames, n, sums, watch):
-    """Add n frames into sums, array('i', 7), and return n; stop at the first bad frame and return how many came before.
+    """Add n frames into sums, array('i', 7). Return how many are in the sums.
 
-    A frame is bad if the six bytes of its force are all 0x00 or all 0xFF, or if it is like watch[2] frames before it.
-    watch: array('i', 3) that the caller keeps from call to call: a hash of the last frame, how many times in a row it
-    has been repeated, and how many repetitions make a frame bad.
+    A frame with an axis at the end of its range is left out: it is counted in watch[LOST], and the good frames after it
+    move up in `frames`, so that the good ones are the first ones there. It stops at the first dead frame: the result
+    and watch[LOST] then add up to less than n. A frame is dead if the six bytes of its force are all 0x00 or all 0xFF,
+    or if it is like so many frames before it. watch: AxisWatch.notes.
     """
     for i in range(7):
         sums[i] = 0
+    watch[LOST] = good = 0
+    watch[DUE] -= n
     for k in range(n):
         at = k * FRAME
         first = frames[at]
@@ -39,14 +81,47 @@ def add_up_python(frames, n, sums, watch):
             if i < 6 or i > 7:  # without the temperature: a working chip may repeat it
                 mark = (mark * 31 + byte) & 0xFFFFFF
         if same == 6 and (first == 0 or first == 255):
-            return k
-        watch[1] = watch[1] + 1 if mark == watch[0] else 0
-        watch[0] = mark
-        if watch[1] >= watch[2]:
-            return k
+            return good
+        watch[_REPEATS] = watch[_REPEATS] + 1 if mark == watch[_HASH] else 0
+        watch[_HASH] = mark
+        if watch[_REPEATS] >= watch[_LIMIT]:
+            return good
+        ends = shaken = 0  # ends: a bit for each column at the end of its range
         for i in range(7):
-            sums[i] += _int16(frames, at + 2 * i)
-    return n
+            value, last = _int16(frames, at + 2 * i), watch[_LAST + i]
+            watch[_LAST + i] = value
+            watch[_SEEN + i] |= 1 << (value & 15)
+            if value >> 8 != last >> 8:
+                watch[_SEEN + i] |= _HIGH_BYTE
+            elif not -_JUMP < value - last < _JUMP:
+                watch[_SEEN + i] |= _WRAPPED
+            if i & 3 and value != watch[_LAST - 1 + i]:
+                watch[_DIFFER] |= 1 << i
+            if i & 3 == 2 and value != watch[_LAST - 2 + i]:
+                watch[_DIFFER] |= 1 << i - 2
+            size = abs(value)
+            if size > watch[_PEAK + i]:
+                watch[_PEAK + i] = size
+            if size >= SATURATED and i != 3:
+                ends |= 1 << i
+            if size >= watch[_HARD] and i < 3:
+                shaken = 1
+        watch[_SHAKEN] += shaken
+        if ends:
+            watch[_ENDS] |= ends
+            watch[LOST] += 1
+            watch[_ROW] += 1
+            watch[_CLIPPED] += 1
+            watch[_GYRO_CLIPPED] += ends > 7
+            continue
+        watch[_ROW] = 0
+        for i in range(7):
+            sums[i] += watch[_LAST + i]
+        if good < k:
+            for i in range(FRAME):
+                frames[good * FRAME + i] = frames[at + i]
+        good += 1
+    return good
 
 
 def _int16(frames, at):
@@ -55,12 +130,96 @@ def _int16(frames, at):
     return value - 65536 if value > 32767 else value
 
 
+class AxisWatch:
+    """Looks at each axis. A working one is never quiet: its noise changes the counts (product specification
+    PS-MPU-6000A rev 3.4, sections 6.1 and 6.2). What is not well is judged by axis_judge.py, imported only then.
+
+    rate_hz: samples a second. accel_range, gyro_range: 0 (2 g, 250 deg/s) to 3 (16 g, 2000 deg/s). dlpf: see Mpu6050.
+    repeats: repetitions of a frame that make it dead.
+
+    notes: what add_up() notes. fault: None, or a Notice: an axis is ill, or half of the samples are at the end of the
+    range. notice: None, or a Notice that is to be shown for a moment; who shows it sets it to None. clipped: samples
+    that were left out since power-on, because an axis was at its end. looks: number of looks.
+    """
+
+    def __init__(self, rate_hz, accel_range, gyro_range, dlpf, repeats):
+        self.notes = array("i", [0] * 33)
+        self.notes[_LIMIT] = repeats
+        self.notes[_HARD] = _HARD_COUNTS if accel_range > 1 else 32769
+        self.notes[DUE] = self._look = rate_hz * LOOK_MS // 1000
+        self._settings = gyro_range, dlpf
+        self._judge = self.fault = self.notice = None
+        self.clipped = self.looks = 0
+
+    def restart(self):
+        """Forget the samples since the last look, because the chip was set up."""
+        notes = self.notes
+        for i in range(_ROW, DUE):
+            notes[i] = 0
+        for i in range(_SEEN, _SEEN + 7):
+            notes[i] = 0
+        notes[_REPEATS] = notes[_SHAKEN] = 0
+        notes[DUE] = self._look
+
+    def clips(self):
+        """A Notice if the last samples, those of 0.1 s or more, were all at the end of the range; else None."""
+        notes = self.notes
+        if notes[_ROW] < notes[_LIMIT]:
+            return None
+        return Notice("clips", "Gyro" if notes[_ENDS] > 7 else "Accel")
+
+    def shaken(self):
+        """Since power-on: the largest |counts| of the accelerometer's axes (3), and the share of lost samples."""
+        return self.notes[_PEAK : _PEAK + 3], self.clipped / max(1, self.looks * self._look)
+
+    def look(self):
+        """Judge the samples since the last look. To be called when notes[DUE] is 0 or less. Returns True if the chip
+        should be set up, which may cure an axis: when it fell ill, and now and then."""
+        samples = self._look - self.notes[DUE]
+        self.notes[DUE] = self._look
+        self.looks += 1
+        if self._judge is None:
+            if self._well():
+                self.fault = None
+                return False
+            self.fault = tried(self._load)
+            if self.fault:  # no memory, or the firmware is incomplete
+                return False
+        return self._judge.look(self, samples)
+
+    def _well(self):
+        """True if all axes are certainly well; then the next look begins."""
+        notes = self.notes
+        if notes[_DIFFER] & _ALL_DIFFER != _ALL_DIFFER or notes[_CLIPPED] or notes[_SHAKEN]:
+            return False
+        for i in _COLUMNS:
+            seen = notes[_SEEN + i]
+            more = seen & (seen - 1) & 0xFFFF  # without its lowest 1: 0 if there was one value
+            if not (more & (more - 1) and seen & 0x5555 and seen & 0xAAAA and (seen & _HIGH_BYTE or seen < _WRAPPED)):
+                return False
+        for i in _COLUMNS:
+            notes[_SEEN + i] = 0
+        notes[_DIFFER] = 0
+        return True
+
+    def _load(self):
+        gc.collect()  # or lasting objects would lie behind garbage
+        from .axis_judge import AxisJudge
+
+        self._judge = AxisJudge(*self._settings)
+
+
 try:
     from .fifo_frames_viper import add_up, decode
 except NO_MACHINE_CODE:
     add_up, decode = add_up_python, decode_python
 else:
-    _ENDS = b"\x7f\xff\x80\x00\xff\xff\x00\x80\x80\xff\x01\x00\xab\xcd"
-    decode = checked(decode, decode_python, _ENDS, 0, array("h", range(7)))
-    # array("i", (12493472, 3, 9)): a watch whose last frame has the same hash as this one
-    add_up = checked(add_up, add_up_python, _ENDS, 1, array("i", range(7)), array("i", (12493472, 3, 9)))
+    _FRAME = b"\x7f\x00\x80\xff\xff\xff\x80\x00\x80\xff\x01\x00\xab\xcd"
+    decode = checked(decode, decode_python, _FRAME, 0, array("h", range(7)))
+    # Eight frames: numbers 2 and 4 are at the ends of the range, the last one repeats the one before
+    _TRIAL = bytearray(_FRAME * 8)
+    for _k in range(7):
+        _TRIAL[14 * _k + 1] = _TRIAL[14 * _k + 9] = 250 - 40 * _k
+    _TRIAL[28], _TRIAL[29], _TRIAL[66], _TRIAL[67] = 0x7F, 0xFF, 0x80, 0x00
+    add_up = checked(add_up, add_up_python, _TRIAL, 8, array("i", range(7)), AxisWatch(20, 2, 1, 3, 2).notes)
+    del _TRIAL

@@ -22,7 +22,7 @@ from time import sleep_ms
 
 from micropython import const
 
-from .fifo_frames import FRAME, add_up, decode
+from .fifo_frames import FRAME, SATURATED, AxisWatch, add_up, decode
 
 # setup() writes the registers from here on one after the other: SMPLRT_DIV (p. 11), CONFIG with DLPF_CFG (p. 13),
 # GYRO_CONFIG (p. 14), ACCEL_CONFIG (p. 15) and, where the chip has it, ACCEL_CONFIG2: the accelerometer's own low-pass
@@ -36,6 +36,7 @@ _FIFO_R_W = const(0x74)  # p. 44
 _WHO_AM_I = const(0x75)  # p. 45
 
 _RESET = const(0x80)  # bit of PWR_MGMT_1
+_STANDBY = const(0x3F)  # bits of PWR_MGMT_2 (p. 42), which follows PWR_MGMT_1: an axis each that does not measure
 _CLOCK_PLL_GYRO_X = const(0x01)  # in PWR_MGMT_1: 1 % accurate; the oscillator used after a reset is off by up to 5 %
 _FIFO_ALL = const(0xF8)  # in FIFO_EN: temperature, gyro and accelerometer, the same fourteen bytes as one burst
 _FIFO_ENABLE = const(0x40)  # bit of USER_CTRL
@@ -76,34 +77,41 @@ class UnknownChip(Exception):
     """A chip answers, but it is not in CHIPS. args[0]: its WHO_AM_I."""
 
 
+class NotKept(OSError):
+    """A chip answers, but registers that were written do not read back. args[0]: which, in words."""
+
+
 class Mpu6050:
     """One chip on one bus.
 
-    i2c: a machine.I2C.  address: 0x68, or 0x69 with AD0 high.  accel_range_g: 2, 4, 8 or 16.  gyro_range_dps: 250, 500,
-    1000 or 2000 deg/s.  dlpf: DLPF_CFG, the low-pass, from 1 (184 Hz) to 6 (5 Hz).  rate_hz: samples a second, 1000
-    divided by 1 to 256.  accept: one more WHO_AM_I, to be treated as an MPU6500.
+    i2c: a machine.I2C.  address: 0x68, or 0x69 with AD0 high: where it is looked for first.  accel_range_g: 2, 4, 8 or
+    16.  gyro_range_dps: 250, 500, 1000 or 2000 deg/s.  dlpf: DLPF_CFG, the low-pass, from 1 (184 Hz) to 6 (5 Hz).
+    rate_hz: samples a second, 1000 divided by 1 to 256.  accept: one more WHO_AM_I, to be treated as an MPU6500.
 
+    address: where it answers. Until a set-up has succeeded, each one also tries the other of the two addresses.
     who_am_i: what the chip answered, 0 before setup().  counts: array('h', 7) of the last read() or take(), ax ay az
     temperature gx gy gz.  sums: array('i', 7) of the last add_up(), in the same order.  accel_lsb_per_g and
-    gyro_lsb_per_dps: counts per g and per deg/s.  gyro_delay_s: delay of the gyro by the low-pass.  overflows: number
-    of times that the FIFO had to be emptied, losing samples.  frames_left: samples that the last fetch() left in it.
+    gyro_lsb_per_dps: counts per g and per deg/s.  period_ms: time from one sample to the next.  gyro_delay_s: delay of
+    the gyro by the low-pass.  overflows: number of times that the FIFO had to be emptied, losing samples.  frames_left:
+    samples that the last fetch() left in it.  axes: an AxisWatch, which judges each axis.
     """
 
-    SATURATED = 32700  # |counts|: from here on a reading is at the end of its range
+    SATURATED = SATURATED
 
-    def __init__(self, i2c, address=0x68, accel_range_g=8, gyro_range_dps=500, dlpf=3, rate_hz=200, accept=None):
+    def __init__(self, i2c, address=0x68, accel_range_g=16, gyro_range_dps=500, dlpf=3, rate_hz=200, accept=None):
         self._i2c = i2c
-        self._address = address
+        self.address = address
         self._accept = accept
         self.who_am_i = 0
         self.accel_range_g = accel_range_g
         self.accel_lsb_per_g = ACCEL_LSB_PER_G[accel_range_g]
         self.gyro_lsb_per_dps = GYRO_LSB_PER_DPS[gyro_range_dps]
         self.gyro_delay_s = GYRO_DELAY_S[dlpf]
+        self.period_ms = 1000 // rate_hz
         accel_bits = (2, 4, 8, 16).index(accel_range_g) << 3
         gyro_bits = (250, 500, 1000, 2000).index(gyro_range_dps) << 3
-        self._configuration = bytes((1000 // rate_hz - 1, dlpf, gyro_bits, accel_bits, dlpf))  # SMPLRT_DIV and on
-        self._one, self._two = bytearray(1), bytearray(2)
+        self._configuration = bytes((self.period_ms - 1, dlpf, gyro_bits, accel_bits, dlpf))  # SMPLRT_DIV and on
+        self._one, self._two, self._three = bytearray(1), bytearray(2), bytearray(3)
         self._readback = bytearray(_FIFO_EN - _SMPLRT_DIV + 1)
         self._frames = bytearray(FRAME * MAX_FRAMES)
         # The first n frames, for each n: made once, because each slice takes heap.
@@ -111,10 +119,11 @@ class Mpu6050:
         self.frames_left = self.overflows = 0
         self._most = 0  # bytes that have waited in the FIFO
         self._odd = False  # the last fetch() found a frame that was not complete
+        self._settled = False  # a chip was started at this address, and no other one is looked for
         self._started = False  # setup() has run to its end: the FIFO is filling
         self._full = 0  # with so many bytes in it the FIFO may have overflowed
         self.counts, self.sums = array("h", [0] * 7), array("i", [0] * 7)
-        self._watch = array("i", (0, 0, rate_hz * FROZEN_MS // 1000))
+        self.axes = AxisWatch(rate_hz, accel_bits >> 3, gyro_bits >> 3, dlpf, rate_hz * FROZEN_MS // 1000)
 
     @property
     def name(self):
@@ -127,9 +136,22 @@ class Mpu6050:
 
     def identify(self):
         """Read WHO_AM_I and return it. Raises UnknownChip, or OSError from the bus."""
-        self.who_am_i = self._read(_WHO_AM_I)
+        try:
+            return self._identify()
+        except (UnknownChip, OSError) as error:
+            if self._settled:
+                raise
+            self.address ^= 1  # AD0 may be tied the other way, and a clock may have the usual address
+            try:
+                return self._identify()
+            except (UnknownChip, OSError) as other:
+                self.address ^= 1
+                raise error if isinstance(error, UnknownChip) or isinstance(other, OSError) else other
+
+    def _identify(self):
+        self.who_am_i = self.read_register(_WHO_AM_I)
         # Twice, because a misread number would choose the calibration of another chip.
-        if self._read(_WHO_AM_I) != self.who_am_i:
+        if self.read_register(_WHO_AM_I) != self.who_am_i:
             raise OSError("MPU6050 WHO_AM_I reads differently each time")
         if self.who_am_i not in CHIPS and self.who_am_i != self._accept:
             raise UnknownChip(self.who_am_i)
@@ -139,7 +161,7 @@ class Mpu6050:
 
     def setup(self):
         """Identify, reset and configure the chip and start its FIFO, in 0.2 s. Raises UnknownChip, or OSError from the
-        bus or when the configuration does not read back."""
+        bus, or NotKept."""
         for wait_ms in self.configure():
             sleep_ms(wait_ms)
         self.start()
@@ -149,37 +171,37 @@ class Mpu6050:
         continued, so that the caller can do something else meanwhile. Raises the same."""
         self._started = False
         self.identify()
-        self._write(_PWR_MGMT_1, _RESET)
+        self.write_register(_PWR_MGMT_1, _RESET)
         yield 100
-        self._write(_PWR_MGMT_1, _CLOCK_PLL_GYRO_X)
+        self.write_register(_PWR_MGMT_1, _CLOCK_PLL_GYRO_X)
         yield 60  # a write that comes too early after a reset is lost without an error
         for i in range(5 if self._chip()[_HAS_ACCEL_CONFIG2] else 4):
-            self._write(_SMPLRT_DIV + i, self._configuration[i])
+            self.write_register(_SMPLRT_DIV + i, self._configuration[i])
         if not self.configured():
-            raise OSError("MPU6050 configuration does not read back")
+            raise NotKept("MPU6050 configuration does not read back")
         yield 20  # until the low-pass has settled
 
     def start(self):
         """Start the FIFO of a chip that is configured. Raises OSError as restart_fifo() does."""
         self.restart_fifo()
-        self._started = True
-        self._watch[1] = 0
+        self._started = self._settled = True
+        self.axes.restart()
 
     def configured(self):
         """True if the chip is awake with the configuration that setup() wrote. Raises OSError from the bus."""
-        self._i2c.readfrom_mem_into(self._address, _SMPLRT_DIV, self._readback)  # SMPLRT_DIV to FIFO_EN
-        self._i2c.readfrom_mem_into(self._address, _USER_CTRL, self._two)  # USER_CTRL and PWR_MGMT_1
+        self._read_into(_SMPLRT_DIV, self._readback)  # SMPLRT_DIV to FIFO_EN
+        self._read_into(_USER_CTRL, self._three)  # USER_CTRL, PWR_MGMT_1 and PWR_MGMT_2
         # An unknown chip that is accepted is sent ACCEL_CONFIG2 as well, but it need not have that register.
         for i in range(5 if self.who_am_i in CHIPS and self._chip()[_HAS_ACCEL_CONFIG2] else 4):
             if self._readback[i] != self._configuration[i]:
                 return False
-        return self._two[1] == _CLOCK_PLL_GYRO_X and (
-            not self._started or self._fifo_runs(self._readback[_FIFO_EN - _SMPLRT_DIV], self._two[0])
-        )
+        if self._three[1] != _CLOCK_PLL_GYRO_X or self._three[2] & _STANDBY:
+            return False
+        return not self._started or self._fifo_runs(self._readback[_FIFO_EN - _SMPLRT_DIV], self._three[0])
 
     def read(self):
         """Read the newest sample into counts, in one burst. Takes no heap. Raises OSError from the bus."""
-        self._i2c.readfrom_mem_into(self._address, _ACCEL_XOUT_H, self._some_frames[1])
+        self._read_into(_ACCEL_XOUT_H, self._some_frames[1])
         self.take(0)
 
     def fetch(self):
@@ -189,7 +211,7 @@ class Mpu6050:
         After an overflow the frames no longer begin at multiples of 14 bytes. Then the FIFO is emptied, overflows is
         incremented, and 0 is returned. 0 is also returned while the chip is writing a frame: see below.
         """
-        self._i2c.readfrom_mem_into(self._address, _FIFO_COUNT_H, self._two)
+        self._i2c.readfrom_mem_into(self.address, _FIFO_COUNT_H, self._two)
         waiting = self._two[0] << 8 | self._two[1]
         if waiting > self._most:
             self._most = waiting
@@ -207,7 +229,7 @@ class Mpu6050:
         taken = MAX_FRAMES if n >= MAX_FRAMES else FEW_FRAMES if n > FEW_FRAMES else n
         self.frames_left = n - taken
         if taken:
-            self._i2c.readfrom_mem_into(self._address, _FIFO_R_W, self._some_frames[taken])
+            self._i2c.readfrom_mem_into(self.address, _FIFO_R_W, self._some_frames[taken])
         return taken
 
     def least_free_samples(self):
@@ -221,20 +243,21 @@ class Mpu6050:
     def add_up(self, n):
         """Sum the first n samples of the last fetch() into sums; return the number of those. Takes no heap.
 
-        It stops at a sample that only a dead chip sends: a force of all zeros or all ones, or the same reading as
-        for FROZEN_MS before it."""
-        return add_up(self._frames, n, self.sums, self._watch)
+        Samples at the end of the range are left out, and take() then finds only the others; axes.notes[LOST] is their
+        number. It stops at a sample that only a dead chip sends: a force of all zeros or all ones, or the same reading
+        as for FROZEN_MS before it."""
+        return add_up(self._frames, n, self.sums, self.axes.notes)
 
     def restart_fifo(self):
         """Empty the FIFO and start it again, after an overflow or a transfer that broke off. Raises OSError from the
-        bus, or when the FIFO's registers do not read back."""
-        self._write(_FIFO_EN, 0)
-        self._write(_USER_CTRL, _FIFO_RESET)  # works only while the FIFO is disabled (p. 38)
-        self._write(_USER_CTRL, _FIFO_ENABLE)
-        self._write(_FIFO_EN, _FIFO_ALL)
+        bus, or NotKept."""
+        self.write_register(_FIFO_EN, 0)
+        self.write_register(_USER_CTRL, _FIFO_RESET)  # works only while the FIFO is disabled (p. 38)
+        self.write_register(_USER_CTRL, _FIFO_ENABLE)
+        self.write_register(_FIFO_EN, _FIFO_ALL)
         self._odd = False
-        if not self._fifo_runs(self._read(_FIFO_EN), self._read(_USER_CTRL)):
-            raise OSError("MPU6050 FIFO does not read back")
+        if not self._fifo_runs(self.read_register(_FIFO_EN), self.read_register(_USER_CTRL)):
+            raise NotKept("MPU6050 FIFO does not read back")
 
     def _fifo_runs(self, fifo_en, user_ctrl):
         """True if these values of the two registers mean that all three sensors go into the FIFO."""
@@ -249,10 +272,29 @@ class Mpu6050:
     def _chip(self):
         return CHIPS.get(self.who_am_i, CHIPS[0x70])  # a chip accepted by its number is treated as an MPU6500
 
-    def _read(self, register):
-        self._i2c.readfrom_mem_into(self._address, register, self._one)
+    def waiting(self):
+        """The number of bytes in the FIFO. Raises OSError from the bus."""
+        self._read_into(_FIFO_COUNT_H, self._two)
+        return self._two[0] << 8 | self._two[1]
+
+    # A transfer to registers that fails is tried once more: else a bad contact for a moment would cost a whole set-up.
+    # A read of the FIFO is not, because the chip has dropped what it sent.
+
+    def read_register(self, register):
+        """The content of a register. Raises OSError from the bus."""
+        self._read_into(register, self._one)
         return self._one[0]
 
-    def _write(self, register, value):
+    def _read_into(self, register, buf):
+        try:
+            self._i2c.readfrom_mem_into(self.address, register, buf)
+        except OSError:
+            self._i2c.readfrom_mem_into(self.address, register, buf)
+
+    def write_register(self, register, value):
+        """Set a register. Raises OSError from the bus."""
         self._one[0] = value
-        self._i2c.writeto_mem(self._address, register, self._one)
+        try:
+            self._i2c.writeto_mem(self.address, register, self._one)
+        except OSError:
+            self._i2c.writeto_mem(self.address, register, self._one)

@@ -4,26 +4,40 @@ samples' times."""
 from time import ticks_add, ticks_diff, ticks_ms
 
 from ..errors import Notice
+from .fifo_frames import DUE, LOST
 from .mpu6050 import UnknownChip
 
 RETRY_MS = 50  # time between two attempts to set the chip up
 FAILURES = 3  # so many failed transfers in a row are a fault; a NACK or two are tolerated
 SILENT_MS = 100  # this long without a sample is a fault
 STALE_MS = 500  # and this long if all samples were lost in overflows, because the board had no time to read
+SETTLED_MS = 1000  # a fault sooner after a set-up than this has outlasted the set-up
+FRUITLESS = 3  # after so many of those in a row the FIFO is tried out
+# Of set-ups in a row that fail: the first one that is explained, and each so many later, about once a second
+EXPLAINED, EXPLAINED_EVERY = 3, 20
 CORRECTION_SHIFT = 4  # SampleClock.emptied() corrects by 1/16 of the difference between the two clocks
 
 
 class Sensor:
     """Samples of one chip that may fail at any time. A transfer that fails, by NACK or time-out, ends in _missed().
 
-    chip: an Mpu6050.  reopen: called to free the bus, returns it as a machine.I2C.
-    fault: None, or a Notice: what is wrong.  restarts: number of times that the chip was set up, or that no sample
-    could be read for STALE_MS. After each, samples do not follow on from those before.
+    chip: an Mpu6050.  reopen: called to free the bus, returns it as a machine.I2C.  explain(chip, error): returns a
+    Notice, why the chip could not be set up, and the addresses that answer; for error None whether its FIFO works, a
+    Notice or None. None: no such function.
+    found: the addresses on the bus when it was last explained, a list.
+    fault: None, or a Notice: what is wrong.  restarts: number of times that the chip was set up, that no sample could
+    be read for STALE_MS, or that an axis was ill. After each, samples do not follow on from those before.  clipped:
+    samples that fetch() has left out, because an axis was at the end of its range; the caller sets it to 0.
     """
 
-    def __init__(self, chip, reopen):
+    def __init__(self, chip, reopen, explain=None):
         self.chip = chip
         self.reopen = reopen
+        self.explain = explain
+        self.found = []
+        self._refused = 0  # set-ups that failed in a row
+        self._fruitless = 0  # set-ups in a row that a fault followed within SETTLED_MS
+        self._started_ms = 0
         self._failures = 0  # transfers that failed in a row
         self._overflows = 0  # the chip's overflows that have been dealt with
         self._due_ms = ticks_ms()  # when the next step of setting the chip up is due
@@ -32,7 +46,7 @@ class Sensor:
         self._sample_ms = 0  # when the last sample was read, or the FIFO was emptied after an overflow
         # _emptied_ms: when the FIFO last overflowed; _read_ms: when the last sample before that overflow was read
         self._emptied_ms = self._read_ms = 0
-        self.restarts = 0
+        self.restarts = self.clipped = 0
         self.fault = Notice("starting")
         self._running = False
 
@@ -44,8 +58,9 @@ class Sensor:
     def fetch(self, now_ms):
         """Read the samples that have come in; return their number, at most MAX_FRAMES. now_ms: ticks_ms().
 
-        Their sum is in chip.sums; chip.take(k) gives each of them. A chip that does not run is set up first, which
-        takes 0.2 s of calls. Raises SettingsError for pins that cannot be used, and nothing else."""
+        Their sum is in chip.sums; chip.take(k) gives each of them. While an axis is ill there are none. A chip that
+        does not run is set up first, which takes 0.2 s of calls. Raises SettingsError for pins that cannot be used, and
+        nothing else."""
         if not self._running:
             self.prepare(now_ms)
             if self._ready:
@@ -64,10 +79,38 @@ class Sensor:
             return 0
         self._sample_ms = now_ms
         good = self.chip.add_up(waiting)
+        axes = self.chip.axes
+        if good == waiting and axes.notes[DUE] > 0 and axes.fault is None:
+            self.fault = None
+            return good
+        return self._judge(good, waiting, now_ms)
+
+    def _judge(self, good, waiting, now_ms):
+        """Return the number of samples that can be used: good, or 0 while an axis is ill. Set the fault.
+
+        good: those of the waiting ones that are in the sums."""
+        axes = self.chip.axes
         if good:
             self.fault = None
         if good < waiting:
-            self._fail("sensor-frozen", now_ms)
+            clipped = axes.notes[LOST]
+            self.clipped += clipped
+            if good + clipped < waiting:
+                self._fail_again("sensor-frozen", now_ms)
+                return good
+            if not good:
+                self.fault = axes.clips() or self.fault
+        if axes.notes[DUE] <= 0:
+            ill = axes.fault
+            setup = axes.look()
+            if ill and not axes.fault:
+                self.restarts += 1
+            if setup:
+                self._running = self._ready = False
+                self._due_ms = now_ms
+        if axes.fault:
+            self.fault = axes.fault
+            return 0
         return good
 
     def _no_sample(self, now_ms):
@@ -80,15 +123,28 @@ class Sensor:
             # now_ms may be from before the long pause that led to the overflow
             self._sample_ms = self._emptied_ms = ticks_ms()
             if ticks_diff(self._emptied_ms, self._read_ms) > STALE_MS:
-                self.fault = Notice("readings-lost")
+                self.fault = self._fifo_fault() or Notice("readings-lost")
                 self.restarts += 1
         elif ticks_diff(now_ms, self._sample_ms) > SILENT_MS:
-            self._fail("sensor-silent", now_ms)
+            self._fail_again("sensor-silent", now_ms)
+
+    def _fail_again(self, code, now_ms):
+        """Fail, and name the FIFO if set-ups do not help because that is broken."""
+        self._fruitless = self._fruitless + 1 if ticks_diff(now_ms, self._started_ms) < SETTLED_MS else 1
+        fifo_fault = self._fifo_fault() if self._fruitless >= FRUITLESS else None
+        self._fail(code, now_ms)
+        if fifo_fault:
+            self.fault = fifo_fault
+
+    def _fifo_fault(self):
+        return self.explain(self.chip, None)[0] if self.explain else None
 
     def check(self, now_ms):
         """Make sure that the chip is still configured: a supply dip during a transfer leaves a sample that is half
-        garbage. Call it before readings are shown; it takes 0.6 ms. Raises nothing. now_ms: ticks_ms()."""
-        if not self._running:
+        garbage. Call it before readings are shown; it takes 0.6 ms. Raises nothing. now_ms: ticks_ms().
+
+        After a transfer that failed nothing is judged: restarting the FIFO may have failed half way."""
+        if not self._running or self._failures:
             return
         try:
             if not self.chip.configured():  # a supply dip: the chip has reset itself
@@ -126,10 +182,15 @@ class Sensor:
         self._due_ms = ticks_add(now_ms, wait_ms)
 
     def _not_set_up(self, error):
-        """Set the fault after an attempt to set the chip up failed; the next attempt begins with the bus."""
+        """Set the fault once attempts to set the chip up have failed; the next attempt begins with the bus."""
         self._ready = False
         self._steps = None
-        self.fault = Notice("unknown-chip", error.args[0]) if isinstance(error, UnknownChip) else Notice("no-sensor")
+        self._refused += 1
+        if not self.explain:
+            unknown = isinstance(error, UnknownChip)
+            self.fault = Notice("unknown-chip", error.args[0]) if unknown else Notice("no-sensor")
+        elif self._refused % EXPLAINED_EVERY == EXPLAINED:
+            self.fault, self.found = self.explain(self.chip, error)
 
     def _start(self, now_ms):
         """Start the FIFO of the chip, which is set up."""
@@ -139,6 +200,8 @@ class Sensor:
             self._not_set_up(error)
             return
         self._running = True  # but the fault stays until there is a good sample
+        self._refused = 0
+        self._started_ms = now_ms
         self.restarts += 1
         self._failures = 0
         self._sample_ms = now_ms
@@ -149,18 +212,25 @@ class SampleClock:
     by 1 %, which is corrected by the board's. Times are integers of microseconds: a 32-bit float could no longer hold
     them after 17 seconds.
 
-    period_us: nominal time from one sample to the next.  lost: samples lost in overflows, since power-on."""
+    period_us: nominal time from one sample to the next.  lost: samples lost in overflows or skipped, since power-on."""
 
     def __init__(self, period_us):
         self._period_us = period_us
         self.lost = 0
         self._pending_us = 0  # correction that the next step() adds
+        self._skipped_us = 0  # time of samples that were skipped since the last step()
         self._sample_us = None  # when the last sample was taken, in ticks_us(); None: no sample yet
 
     def restart(self):
         """Drop the time of the last sample: the next ones do not follow on from it."""
         self._sample_us = None
-        self._pending_us = 0
+        self._pending_us = self._skipped_us = 0
+
+    def skip(self, n):
+        """Count n samples that are left out: the next step() spans them."""
+        self.lost += n
+        if self._sample_us is not None:
+            self._skipped_us += n * self._period_us
 
     def step(self, n, now_us):
         """Count n new samples; return the microseconds from the last sample before them to the last of them.
@@ -170,8 +240,8 @@ class SampleClock:
         if self._sample_us is None:
             n -= 1
             self._sample_us = ticks_add(now_us, -n * self._period_us)
-        dt_us = max(0, n * self._period_us + self._pending_us)
-        self._pending_us = 0
+        dt_us = max(0, n * self._period_us + self._skipped_us + self._pending_us)
+        self._pending_us = self._skipped_us = 0
         self._sample_us = ticks_add(self._sample_us, dt_us)
         return dt_us
 
@@ -181,7 +251,7 @@ class SampleClock:
         So the last sample was then half a period old on average."""
         if self._sample_us is None:
             return
-        late_us = ticks_diff(now_us, self._sample_us) - self._period_us // 2
+        late_us = ticks_diff(now_us, self._sample_us) - self._skipped_us - self._period_us // 2
         if late_us > 2 * self._period_us:  # samples were lost in an overflow: the next step() spans the gap
             self.lost += (late_us - self._pending_us) // self._period_us
             self._pending_us = late_us

@@ -5,6 +5,8 @@ does not. The methods that take long are generators, which yield where the work 
 are given as ((state, value), ...), because most of their values are zero.
 """
 
+from math import sqrt
+
 MIN_VARIANCE = 1e-10  # rounding in 32-bit floats could make a variance negative
 # How much is done between two yields: about a millisecond on an RP2040
 TERMS_PER_STEP = 3  # terms of a Jacobian's row
@@ -25,6 +27,7 @@ class Covariance:
             self.rows[i][i] = variance
         self.correction = [0.0] * self.n
         self._column = [0.0] * self.n
+        self.misfit = 0.0  # see update()
 
     def set_variance(self, i, variance):
         """Set the variance of state i, and its covariances with the other states to 0."""
@@ -64,7 +67,7 @@ class Covariance:
 
         derivatives: H, ((state, d measurement / d state), ...).  innovation: measured minus expected, for the states
         before this window's corrections.  variance: R, in the measurement's unit squared. Beyond GATE the
-        innovation's variance is raised until it lies on it.
+        innovation's variance is raised until it lies on it. misfit is then the innovation in standard deviations.
         """
         rows, column, correction = self.rows, self._column, self.correction
         n = self.n
@@ -82,8 +85,10 @@ class Covariance:
         for j, h in derivatives:
             expected += h * column[j]
             innovation -= h * correction[j]
-        if innovation * innovation > GATE * expected:
-            expected = innovation * innovation / GATE
+        square = innovation * innovation
+        self.misfit = innovation / sqrt(expected)
+        if square > GATE * expected:
+            expected = square / GATE
         innovation /= expected
         for i in range(n):
             correction[i] += column[i] * innovation

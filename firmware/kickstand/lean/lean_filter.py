@@ -14,7 +14,19 @@ from math import atan2, degrees, pi, sin, sqrt
 
 from ..units import STANDARD_GRAVITY
 from . import measurements
-from .bike_model import BIAS_LEFT, LEAN, PITCH, SPEED, STATES, YAW_ERROR, Linearisation, possible_pitch, predict
+from .bike_model import (
+    BIAS_LEFT,
+    LEAN,
+    PITCH,
+    SCALE_LEFT,
+    SPEED,
+    STATES,
+    YAW_ERROR,
+    Linearisation,
+    possible_pitch,
+    predict,
+)
+from .consistency import Consistency
 from .dive import Dive
 from .kalman import Covariance
 from .rest import MAX_BIAS_RADPS, RestDetector
@@ -34,18 +46,28 @@ class LeanFilter:
     """Estimates lean from force and rate in the vehicle's axes. Fixed memory.
 
     delay_s: by how much the gyro's low-pass is late; lean is extrapolated to now. trim: rad, see UprightTrim.
-    posed: see LeanMeter.use().
+    posed: see LeanMeter.use(). gyro_variances: of the priors of its scale and cross-axis errors, the last five
+    states, where the six positions have measured them.
     """
 
-    def __init__(self, delay_s=DELAY_S, trim=0.0, posed=False):
+    def __init__(self, delay_s=DELAY_S, trim=0.0, posed=False, gyro_variances=None):
         self.trim = UprightTrim(trim)
         self._delay_s = delay_s
         self._posed = posed
+        self._gyro_variances = gyro_variances
         self._p = None
         # error of the accelerometer's magnitude (bias and scale factor together), as a share of the force: found at
         # rest, where it should read 1 g
         self._force_error = 0.0
         self.dive = Dive()
+        self.consistency = Consistency()
+        self._failed = False  # just now the readings do not fit any more
+        # the sensor's errors (from BIAS_LEFT on) some time ago, and less long ago, while all fitted
+        self._good = self._next_good = [0.0] * (STATES - BIAS_LEFT)
+        self._good_s = 0.0
+        self._kept_speed = None  # (speed, variance) for the next start
+        self._gap = False  # readings were missing before the next start
+        self._moving_s = 0.0  # for so long a measured speed still says that the bike does not stand
         self.restart()
 
     def restart(self):
@@ -55,6 +77,7 @@ class LeanFilter:
         self.dive.restart()
         self._kept = []  # (state, variance) of the sensor's errors
         if self._p is not None:
+            self._gap = True
             for i in range(BIAS_LEFT, STATES):
                 x[i] = self._x[i]
                 self._kept.append((i, self._p.rows[i][i]))
@@ -70,6 +93,7 @@ class LeanFilter:
         self._steps = 1  # steps of it that each sample runs
         self._sums = [0.0] * 9  # see predict()
         self._count = self._window_us = 0
+        self._astray_s = 0.0  # how long the lean has been impossible
         self._axis = 0  # the axis of the gyro whose bias the next window at rest measures
         self._roll_rate = self._last_roll_rate = 0.0
 
@@ -85,6 +109,38 @@ class LeanFilter:
         p.add_noise(PITCH, (measurements.SIGMA_LOST_RATE * seconds) ** 2 / 16)
         p.add_noise(SPEED, (measurements.SIGMA_LOST_FORCE * STANDARD_GRAVITY * seconds) ** 2)
 
+    def _remember(self, seconds):
+        """Keep the sensor's errors of some time ago, while all fits."""
+        self._good_s += seconds
+        if self.consistency.doubt:
+            self._good_s = 0.0
+        elif self._good_s >= measurements.REMEMBER_S:
+            self._good_s = 0.0
+            self._good, self._next_good = self._next_good, self._x[BIAS_LEFT:STATES]
+
+    def _doubt(self):
+        """Restart, because the readings do not fit: with the sensor's errors as they were before, as the fault may be
+        over, and with nothing known, as a bias may have stepped, in turns. Again and again: with nothing known."""
+        good = self.consistency.doubts in (1, 3)
+        speed, variance, rest = self._x[SPEED], self._p.rows[SPEED][SPEED], self._rest
+        self._forget()
+        self._rest = rest
+        if not good:
+            self._good = self._next_good = [0.0] * (STATES - BIAS_LEFT)
+            return
+        self._kept_speed = speed, variance + measurements.SIGMA_GOOD_SPEED**2
+        self._kept = []
+        for i in range(BIAS_LEFT, STATES):
+            self._x[i] = self._good[i - BIAS_LEFT]
+            sigma = measurements.GOOD_SHARE * measurements.SIGMA_START[i]
+            self._kept.append((i, (measurements.SIGMA_GOOD_BIAS if i < YAW_ERROR else sigma) ** 2))
+
+    def _forget(self):
+        """Restart with nothing kept."""
+        self._p, self._force_error, self.dive = None, 0.0, Dive()
+        self.restart()
+        self._kept = [(i, measurements.SIGMA_DOUBT_BIAS**2) for i in range(BIAS_LEFT, YAW_ERROR)]
+
     @property
     def speed_mps(self):
         """Estimated speed."""
@@ -98,6 +154,7 @@ class LeanFilter:
     def measure_speed(self, speed_mps):
         """Keep a measured speed for the next window. Optional."""
         self._speed = speed_mps
+        self._moving_s = measurements.MOVING_S if speed_mps > measurements.MOVING_SPEED else 0.0
 
     @property
     def variance(self):
@@ -148,20 +205,39 @@ class LeanFilter:
             self._start(means)
             return
         if not (abs(x[LEAN]) < 2 * pi and x[SPEED] < MAX_SPEED):  # also not-a-number
-            # Nothing is kept: the sensor's errors may be no numbers either
-            self._p, self._force_error, self.dive = None, 0.0, Dive()
-            self.restart()
+            self.consistency.gap()
+            self._forget()  # the sensor's errors may be no numbers either
+            return
+        if self._impossible(means, seconds):
+            self.consistency.fail("odd-up")
+            self._failed = True
+        if self._failed:
+            self._failed = False
+            self._doubt()
             return
         roll_acceleration = (self._roll_rate - self._last_roll_rate) / seconds
         self._last_roll_rate = self._roll_rate
         rested = self._rest.resting
         pushed = abs(means[7] - sin(x[PITCH])) > measurements.MAX_REST_PUSH
         bias = x[BIAS_LEFT : BIAS_LEFT + 3]
-        self._rest.update(means[2:5], means[5:8], bias, seconds, self.rolling or pushed)
+        moving = self._moving_s > 0.0
+        self._moving_s -= seconds
+        self._rest.update(means[2:5], means[5:8], bias, seconds, self.rolling or pushed, moving)
         if self._rest.resting and not rested:
             self._stand(means)
             return  # this window's innovations belong to the state before _stand()
         self._work = self._process(means, seconds, roll_acceleration)
+
+    def _impossible(self, means, seconds):
+        """True where the lean has been one that no bike has, and that the force does not show. Of a bike that has
+        fallen and of a sensor in the hand it does."""
+        lean = self._x[LEAN]
+        apart = abs(lean - atan2(means[5], means[6]))
+        if abs(lean) > measurements.IMPOSSIBLE_LEAN and pi / 4 < apart < 7 * pi / 4:
+            self._astray_s += seconds
+        else:
+            self._astray_s = 0.0
+        return self._astray_s >= measurements.IMPOSSIBLE_S
 
     def _start(self, means):
         """Set the first state and its covariance from the means of the first window."""
@@ -173,8 +249,13 @@ class LeanFilter:
         posed, self._posed = self._posed, False  # a later start with nothing kept may come much later
         if posed:
             variances[BIAS_LEFT : BIAS_LEFT + 3] = [measurements.SIGMA_FRESH_BIAS**2] * 3
+        if self._gyro_variances:
+            variances[SCALE_LEFT:STATES] = self._gyro_variances
         if moving:
             variances[LEAN] = measurements.SIGMA_START_LEAN_MOVING**2
+            if self._gap:
+                self.consistency.gap()  # in a bend the covariance of a filter that begins may be too good to be true
+        self._gap = False
         self._p = Covariance(variances)
         for i, variance in self._kept:
             self._p.set_variance(i, variance)
@@ -182,6 +263,10 @@ class LeanFilter:
         x[LEAN] = atan2(fx, fy)
         x[PITCH] = 0.0
         x[SPEED] = measurements.PRIOR_SPEED if moving else 0.0  # most rides begin at rest
+        if self._kept_speed:
+            x[SPEED], variance = self._kept_speed
+            self._p.set_variance(SPEED, variance)
+            self._kept_speed = None
         if posed and not moving:
             self._stand(means)
 
@@ -190,6 +275,10 @@ class LeanFilter:
         stays unless it is far off, as after the sensor was moved about in a hand."""
         fx, fy, fz = means[5:8]
         x, p = self._x, self._p
+        rates = [abs(means[2 + i] + x[BIAS_LEFT + i]) for i in range(3)]
+        if max(rates) > MAX_BIAS_RADPS:
+            # The rates are a bias that has changed much since the calibration, or those of a long, smooth bend
+            self.consistency.gap(False)
         x[LEAN] = atan2(fx, fy)
         x[PITCH] = possible_pitch(atan2(fz, sqrt(fx * fx + fy * fy)))
         x[SPEED] = 0.0
@@ -214,6 +303,7 @@ class LeanFilter:
         for i in range(BIAS_LEFT, BIAS_LEFT + 3):
             p.add_noise(i, measurements.NOISE_BIAS**2 * seconds)
         if self._rest.resting:
+            self.consistency.rest(seconds)
             size = sqrt(means[5] * means[5] + means[6] * means[6] + means[7] * means[7])
             self._force_error += measurements.REST_FORCE_SHARE * (size - 1.0 - self._force_error)
             self._axis = (self._axis + 1) % 3
@@ -228,8 +318,16 @@ class LeanFilter:
         straight_or_prior_speed(). Update the trim where speed and lean are certain enough."""
         p, x = self._p, self._x
         dive = self.dive.update(means[7] - model.sin_pitch, model.pitch_rate, model.speed, seconds)
-        for measurement in measurements.forces(model, means, roll_acceleration, self._force_error, dive):
-            yield from p.update(*measurement)
+        left, up = measurements.forces(model, means, roll_acceleration, self._force_error, dive)
+        yield from p.update(*left)
+        misfit = p.misfit
+        yield from p.update(*up)
+        sideways = (means[5] - means[7] * x[YAW_ERROR]) / max(means[6], 0.5) - self.trim.angle
+        if x[SPEED] < measurements.BALANCE_SPEED or p.rows[SPEED][SPEED] > measurements.SIGMA_BALANCE_SPEED**2:
+            sideways = 0.0
+        if abs(means[7]) < measurements.MOST_FORWARD * abs(means[6]):  # else the sensor is on no bike
+            self._failed = self.consistency.add(misfit, p.misfit, sideways, x[PITCH], model.yaw_rate, seconds)
+        self._remember(seconds)
         yield from p.update(*measurements.level_road(model, x, seconds))
         lean, speed, measured = x[LEAN] - self._upright, x[SPEED], self._speed
         self._speed_s += seconds

@@ -11,7 +11,7 @@ Standing still and the trim have their own parameters in rest.py and upright_tri
 from math import radians
 
 from ..units import STANDARD_GRAVITY
-from .bike_model import BIAS_LEFT, LEAN, PITCH, SPEED, YAW_ERROR
+from .bike_model import BIAS_LEFT, LEAN, PITCH, SCALE_LEFT, SPEED, YAW_ERROR
 
 # Symbol = default  # unit: what it is. "Larger:" says what raising it does.
 
@@ -33,6 +33,31 @@ SIGMA_START = (
     0.014,  # ratio: forward axis' reading of a rate about up
     0.014,  # ratio: scale error of the forward axis
 )
+# Where the readings do not fit any more (consistency.py) the filter restarts, first with the speed and with the
+# sensor's errors as they were REMEMBER_S to twice as long ago, then with nothing kept.
+REMEMBER_S = 10.0  # s. Larger: less of what came before the doubt is remembered, and it is older.
+SIGMA_GOOD_BIAS = radians(0.6)  # rad/s: of a bias that is remembered. Larger: one that has changed is found sooner.
+GOOD_SHARE = 0.7  # ratio: of SIGMA_START, for the other errors that are remembered. Larger: as above.
+SIGMA_GOOD_SPEED = 3.0  # m/s: added to the speed's standard deviation. Larger: less is kept of the speed.
+SIGMA_DOUBT_BIAS = radians(
+    2.5
+)  # rad/s: of a bias of which nothing is known. Larger: as SIGMA_START, a stepped one sooner.
+# rad: a lean that no bike has, where the force does not show it for so many seconds. Larger: a filter that has gone
+# astray restarts later.
+IMPOSSIBLE_LEAN = radians(80.0)
+IMPOSSIBLE_S = 1.0
+# A bike whose measured speed is above the first does not stand, for so many seconds.
+MOVING_SPEED = 2.0  # m/s. Larger: slow riding on a smooth road is taken for rest.
+MOVING_S = 2.5  # s. Larger: a stop is detected later.
+# A bike is in balance above this speed, if it is known so well.
+BALANCE_SPEED = 2.0  # m/s. Larger: a mount that has slipped is seen at fewer speeds.
+SIGMA_BALANCE_SPEED = 12.0  # m/s. Larger: a bike that is pushed about is taken for one that rides.
+MOST_FORWARD = (
+    1.5  # ratio: force forward over force up of a bike. Larger: a board on a table is taken for one that is ill.
+)
+# ratio: change of the gyro's errors with temperature since the six positions have measured them; the data sheet allows
+# 2 % from -40 to 85 C. Larger: what was measured counts for less.
+SIGMA_GYRO_DRIFT = 0.002
 # rad/s: the bias where the pose on the kickstand has just measured it. Larger: after it the lean is shown later.
 SIGMA_FRESH_BIAS = radians(0.2)
 # rad: the first lean's standard deviation where the bike moves. Larger: lean is shown later, and follows forces more.
@@ -103,6 +128,26 @@ ROLLING_SIGMAS = 3.0  # standard deviations
 # and less exact.
 SIGMA_TRIM_SPEED = 8.0  # m/s
 SIGMA_TRIM_LEAN = radians(1.4)  # rad
+
+
+def gyro_variances(sigma, r):
+    """The priors' variances of the last five states where the six positions have measured the gyro, else None.
+
+    sigma (9): standard errors of the entries of its matrix in the sensor's axes, taken as independent, or zeros. r (9):
+    vehicle_from_sensor."""
+    if not any(sigma):
+        return None
+
+    def variance(i, j):
+        """Of the reading of axis i of a rate about axis j, of the vehicle."""
+        total = SIGMA_GYRO_DRIFT**2
+        for a in range(3):
+            for b in range(3):
+                total += (r[3 * i + a] * r[3 * j + b] * sigma[3 * a + b]) ** 2
+        return total
+
+    found = variance(0, 0) + variance(1, 1), variance(0, 1), variance(2, 0), variance(2, 1), variance(2, 2)
+    return [min(found[k], SIGMA_START[SCALE_LEFT + k] ** 2) for k in range(5)]
 
 
 def forces(model, means, roll_acceleration, force_error, dive=0.0):

@@ -4,10 +4,13 @@ from math import degrees, radians
 
 from ..calibration.transform import Transform
 from ..units import GAP_US, LOST_US
+from .consistency import MILD
 from .lean_filter import DELAY_S, LeanFilter
+from .measurements import gyro_variances
 
 SMOOTH_US = 300_000  # time constant of smooth_force
 MAX_VARIANCE = radians(3.0) ** 2  # a lean less certain than this is not shown
+DOUBTED_VARIANCE = radians(2.0) ** 2  # the same after they did not fit again and again
 TRIM_MAX_VARIANCE = radians(0.5) ** 2  # a trim less certain than this is not kept
 TRIM_STEP_DEG = 0.3  # a smaller change of the trim is not saved: flash wears
 FALLEN_DEG = 65.0  # the bike has fallen after FALLEN_US of at least this lean
@@ -47,7 +50,8 @@ class LeanMeter:
         self._smooth_all = not (calibration.aligned and self._leans)  # pages then show left and up as well
         self.smooth_force[0] = self.smooth_force[1] = 0.0 if self._smooth_all else float("nan")
         self._transform = Transform(calibration)
-        self.filter = LeanFilter(self._delay_s, radians(calibration.trim_deg), posed)
+        measured = gyro_variances(calibration.gyro_sigma, calibration.vehicle_from_sensor)
+        self.filter = LeanFilter(self._delay_s, radians(calibration.trim_deg), posed, measured)
         self.restart()
 
     def restart(self):
@@ -79,6 +83,11 @@ class LeanMeter:
         return self.filter.speed_mps
 
     @property
+    def odd(self):
+        """Code of what does not fit again and again, or None: see Consistency."""
+        return self.filter.consistency.odd
+
+    @property
     def trim_deg(self):
         """The roll-misalignment correction estimated so far, > 0 right; see keep_trim() for the calibration's."""
         return degrees(self.filter.trim.angle)
@@ -91,7 +100,10 @@ class LeanMeter:
         if self.suppressed_reason:
             return False
         lean = self.filter
-        return 0.0 <= lean.variance <= MAX_VARIANCE and abs(lean.pitch_deg) < WHEELIE_DEG
+        doubts = lean.consistency.doubts
+        if lean.consistency.doubt or abs(lean.pitch_deg) >= WHEELIE_DEG:
+            return False
+        return 0.0 <= lean.variance <= (MAX_VARIANCE if doubts < MILD else DOUBTED_VARIANCE)
 
     def keep_trim(self):
         """If the bike stands and the trim is certain enough and has changed, copy it to the calibration and return

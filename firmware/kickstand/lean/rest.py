@@ -28,9 +28,10 @@ class RestDetector:
         self._average = None  # rates without the estimated bias taken off, and forces
         self._max_bias = MAX_FIRST_BIAS_RADPS if first else MAX_BIAS_RADPS
 
-    def update(self, rates, force, bias, seconds, rolling=False):
+    def update(self, rates, force, bias, seconds, rolling=False, moving=False):
         """Take the means over a window of `seconds`: rates (rad/s) less the estimated bias, that bias (rad/s), and
-        force (g). rolling: other evidence says that the bike moves."""
+        force (g). rolling: other evidence says that the bike moves. moving: a measured
+        speed does: it stands in no case."""
         readings = [rates[i] + bias[i] for i in range(3)] + force
         if self._average is None:
             self._average = readings
@@ -48,7 +49,7 @@ class RestDetector:
                 near_calibration = near_calibration and abs(average[i]) < self._max_bias
             else:
                 still = still and abs(deviation) < MAX_FORCE_G
-        still = still and (near_estimate or near_calibration)
+        still = still and (near_estimate or near_calibration) and not moving
         self._still_s = self._still_s + seconds if still else 0.0
         # A second timer: steady braking looks still, and must not count as rest the moment the estimated speed gets low
         self._not_rolling_s = self._not_rolling_s + seconds if still and not rolling else 0.0

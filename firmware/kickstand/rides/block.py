@@ -3,8 +3,8 @@
 A block is: a head (magic, format version, length, ride, sequence, time in us since power-on, temperature at its end in
 hundredths of a degree Celsius, counts per g, ten times the counts per deg/s, samples per second, firmware version,
 number of positions, how late the gyro's low-pass is in tenths of a millisecond, 0 in rides of version 0.3.0 and
-before); the calibration as store.pack() writes it; the entries; zeros; the positions, the last one first; a tail
-(number of entries, CRC32 of everything before it).
+before); the calibration as store.pack() writes it, with matrices in blocks of format 2; the entries; zeros; the
+positions, the last one first; a tail (number of entries, CRC32 of everything before it).
 
 An entry is one pass of the main loop, App.turn(), called "a turn" here: the number of samples in it (n), the
 microseconds since the turn before, and the sums of the samples' six counts (ax ay az gx gy gz). So the mean from which
@@ -24,12 +24,14 @@ import struct
 from array import array
 from binascii import crc32
 
-from ..calibration.store import BODY_LENGTH
+from ..calibration.store import BODY_LENGTH, WHOLE_BODY_LENGTH
 from ..errors import NO_MACHINE_CODE, checked
 from ..units import __version__
 
 MAGIC = b"KRID"
 VERSION = 1
+WHOLE_VERSION = 2  # the calibration has matrices
+BODY_LENGTHS = {VERSION: BODY_LENGTH, WHOLE_VERSION: WHOLE_BODY_LENGTH}
 HEAD = "<4sHHIIqhHHH10sBB"
 _TEMPERATURE_AT = struct.calcsize("<4sHHIIq")
 _PLACES_AT = struct.calcsize("<4sHHIIqhHHH10s")
@@ -44,7 +46,7 @@ MEAN_SHIFT = 4  # a mean is that of about the last 16 sizes, and is kept times 1
 START_MEAN = 128 << MEAN_SHIFT
 MAX_SIZE = 1 << 20  # a larger size counts as this in the mean, so that it fits 32 bits
 MAX_DT_US = 1 << 29  # the longest time between two turns that an entry can hold
-_HEAD_LENGTH = struct.calcsize(HEAD) + BODY_LENGTH
+_HEAD_LENGTH = struct.calcsize(HEAD)
 _TAIL_LENGTH = struct.calcsize(TAIL)
 _PLACE_LENGTH = struct.calcsize(PLACE)
 _WORST = (FIELDS + 1) * (LIMIT + RAW_BITS) // 8 + 2  # the most bytes that a turn and a speed can take
@@ -145,13 +147,13 @@ class RideBlock:
             state[_MEANS + i] = START_MEAN
         state[0] = 1  # the prediction divides by the n of the turn before
         state[_PENDING] = state[_BITS] = 0
-        state[_AT] = _HEAD_LENGTH
+        state[_AT] = _HEAD_LENGTH + len(body)
         # the zeros, temperature and number of positions, are written by close()
-        numbers = MAGIC, VERSION, length, ride, sequence, time_us, 0
+        numbers = MAGIC, WHOLE_VERSION if len(body) > BODY_LENGTH else VERSION, length, ride, sequence, time_us, 0
         rates = chip.accel_lsb_per_g, int(10 * chip.gyro_lsb_per_dps + 0.5), sample_hz
         version, delay = __version__.encode()[:10], int(10_000 * chip.gyro_delay_s + 0.5)
         struct.pack_into(HEAD, self.buffer, 0, *numbers, *rates, version, 0, delay)
-        self.buffer[_HEAD_LENGTH - BODY_LENGTH : _HEAD_LENGTH] = body
+        self.buffer[_HEAD_LENGTH : state[_AT]] = body
         self._chip = chip
         self.length = length
         self.count = self._places = 0

@@ -10,11 +10,12 @@ from errno import EEXIST
 from . import ride_paths
 from .block import BLOCK, block_length
 
+_DIRECTORY = 0x4000  # in the mode of os.stat()
 ENOSPC = 28  # MicroPython's errno does not have it
 PART_BLOCKS = 16  # ride blocks in a part in flash
 CARD_PART_BLOCKS = 256  # ride blocks in a part on a card: a day's ride is 85 files, not 1300
-FIRMWARE = 92 * BLOCK  # compiled: each of its files takes whole blocks, each folder two
-RESERVE = 51 * BLOCK  # what an update of compiled firmware needs at most, with some to spare
+FIRMWARE = 97 * BLOCK  # compiled: each of its files takes whole blocks, each folder two
+RESERVE = 54 * BLOCK  # what an update of compiled firmware needs at most, with some to spare
 
 
 def free_bytes(path):
@@ -30,12 +31,20 @@ def all_bytes(path):
 
 
 def make(path):
-    """Make a directory, unless it exists. Raises OSError."""
+    """Make a directory, unless it exists. Raises OSError, with EEXIST if a file has its name."""
     try:
         os.mkdir(path)
     except OSError as error:
-        if error.args[0] != EEXIST:
+        if error.args[0] != EEXIST or not os.stat(path)[0] & _DIRECTORY:
             raise
+
+
+def _exists(path):
+    try:
+        os.stat(path)
+    except OSError:
+        return False
+    return True
 
 
 def _remove_emptied(path):
@@ -68,9 +77,7 @@ class RideRing:
             raise self.refused
         self._directory = ride_paths.directory(self._settings)
         make(self._directory)
-        self._use(ride_paths.newest_ride(self._directory) or 1)
-        if ride_paths.first_part(self._path):  # else power was lost before its first block: use its number again
-            self._use(self._ride + 1)
+        self._use(ride_paths.next_ride(self._directory))
         self._part = 0
         self._block = 0  # number of the ride block in its part
         self._free = free_bytes(self._directory)
@@ -82,11 +89,18 @@ class RideRing:
         return self._ride
 
     def _use(self, ride):
-        """Make the directory of this ride, for the parts to come."""
-        self._ride = ride
-        self._path = ride_paths.ride_path(self._directory, ride)
-        make(ride_paths.group_path(self._directory, ride // ride_paths.RIDES_IN_GROUP))
-        make(self._path)
+        """Make the directory of this ride, for the parts to come; of a later one if somebody's file has its name."""
+        while True:
+            self._ride = ride
+            self._path = ride_paths.ride_path(self._directory, ride)
+            try:
+                make(ride_paths.group_path(self._directory, ride // ride_paths.RIDES_IN_GROUP))
+                make(self._path)
+                return
+            except OSError as error:
+                if error.args[0] != EEXIST or ride + 1 == ride_paths.RIDES_IN_ALL:
+                    raise
+            ride += 1
 
     def next_length(self):
         """Length in bytes that the ride's next block has to have. The block before it may not be written yet."""
@@ -105,8 +119,11 @@ class RideRing:
         if self._free < self.needed:
             self._make_room()
         else:
-            self._file = open(ride_paths.part_path(self._directory, self._ride, self._part), "wb")
+            path = ride_paths.part_path(self._directory, self._ride, self._part)
             self._part += 1
+            if _exists(path):  # it may be a ride, whatever the listing says
+                return False
+            self._file = open(path, "wb")
             self._left = self._part_blocks
         return False
 

@@ -7,6 +7,7 @@ each ride has its own directory. The names have the form 8.3, which takes one di
 import os
 
 RIDES_IN_GROUP = 100
+RIDES_IN_ALL = 100_000  # a group of four digits would not be found again
 _GROUP_DIGITS = 3
 _RIDE_DIGITS = 2
 _PART_DIGITS = 5
@@ -55,10 +56,34 @@ def first_part(ride_directory):
     return min(_numbers(ride_directory, _PART_DIGITS, _ENDING), default=None)
 
 
-def newest_ride(directory):
-    """The number of the newest ride; 0 if there is none. Raises OSError."""
-    group = max(groups(directory), default=None)
-    return 0 if group is None else max(rides(directory, group), default=RIDES_IN_GROUP * group)
+def newest_ride(directory, below=RIDES_IN_ALL):
+    """The number of the newest ride that has a part, of those with a number below this; 0 if there is none. Raises
+    OSError.
+
+    A directory without parts does not count: the board's owner may have made it."""
+    while True:
+        group = max((n for n in groups(directory) if RIDES_IN_GROUP * n < below), default=None)
+        if group is None:
+            return 0
+        ride = max((n for n in rides(directory, group) if n < below), default=None)
+        if ride is None:
+            below = RIDES_IN_GROUP * group
+        elif first_part(ride_path(directory, ride)):
+            return ride
+        else:
+            below = ride
+
+
+def next_ride(directory):
+    """The number for a new ride: that after the newest. Raises OSError.
+
+    A directory may have the last number of all, which no ring reaches. The new ride then comes below it."""
+    below = RIDES_IN_ALL
+    while True:
+        newest = newest_ride(directory, below)
+        if newest + 1 < below:
+            return newest + 1
+        below = newest
 
 
 def parts(directory):

@@ -46,7 +46,7 @@ class RideStream:
         if not say(text, ""):
             return
         before_ms, self._slow_ms = self._slow_ms, ticks_ms()
-        if before_ms is not None and ticks_diff(self._slow_ms, before_ms) < SLOW_APART_MS:
+        if before_ms is not None and 0 <= ticks_diff(self._slow_ms, before_ms) < SLOW_APART_MS:
             raise OSError(ETIMEDOUT)
 
     def end(self):

@@ -10,7 +10,7 @@ and *.
 """
 
 from array import array
-from time import ticks_diff
+from time import ticks_add, ticks_diff
 
 from ..errors import Notice
 
@@ -18,6 +18,8 @@ MAX_SENTENCE = 100  # bytes: the standard says 82, but receivers with many decim
 MAX_CHUNK = 64  # bytes read in one pass of the loop: at 10 ms a pass, twice what 10 fixes a second need
 SILENT_MS = 3000  # after so long without a byte, a whole sentence or a fix, fault() reports which
 LATE_MS = 2000  # a fix that waited in the receiver for longer is dropped
+LOOK_MS = 1500  # after so long without a speed's sentence other kinds are looked at
+CARRY_MS = 60_000  # a time that is longer ago is kept as so long ago: after 6 days ticks_diff() is negative
 TIME_JUMP_MS = 5000  # a larger difference is not a delay: the receiver has corrected its clock
 # The delay of a fix is counted from a fix that was not late, the reference. When at least so many fixes over more than
 # TIME_JUMP_MS all came late, the one with the smallest delay becomes the reference: the receiver set its clock back.
@@ -25,6 +27,10 @@ MIN_FIXES_FOR_NEW_REFERENCE = 4
 KNOT_MPS = 1852.0 / 3600.0  # one knot in m/s
 KMH_MPS = 1.0 / 3.6  # one km/h in m/s
 _DAY_MS = 86_401_000  # a day with a leap second
+_YEARS = (25, 79)  # since 2000: before the first a receiver has lost count of the weeks, or not heard the date yet
+_POSITIONS = (b"GGA", b"GLL", b"GNS")  # of the kinds without a speed these are named first
+_UBX = b"\xb5b"  # begins a message of u-blox's binary protocol: class, number and length of two bytes follow
+_UBX_CLASSES = b"\x01\x02\x05\x06\x0a\x0b\x0d\x10\x13\x21\x27\x28"
 _DIGITS = 5  # decimals of a minute of arc: 2 cm
 
 
@@ -39,8 +45,9 @@ class Gps:
         self._line = b""  # the sentence so far
         # When, in ticks_ms(), the receiver last sent: any byte; a whole sentence; a sentence with a fix; an RMC.
         self._heard_ms = None
-        self._sentence_ms = self._fix_ms = 0
+        self._sentence_ms = self._fix_ms = self._carried_ms = 0
         self._rmc_ms = None
+        self._other = b""  # a kind of sentence or message that it sends and that has no speed
         self._time = b""  # time of day in the last RMC
         # A fix is remembered as (ticks_ms() when it came, its time of day in ms).
         self._reference = None  # the fix that delays are counted from
@@ -58,6 +65,8 @@ class Gps:
         heard_ms = self._heard_ms
         if heard_ms is None:
             self._begin(now_ms)
+        elif ticks_diff(now_ms, self._carried_ms) > CARRY_MS:
+            self._carry(now_ms)
         waiting = self._uart.any()
         if not waiting:
             return None
@@ -65,6 +74,9 @@ class Gps:
             self._begin(now_ms)
         self._heard_ms = now_ms
         chunk = self._uart.read(min(waiting, MAX_CHUNK)) or b""
+        looks = ticks_diff(now_ms, self._sentence_ms) > LOOK_MS
+        if looks and _has_ubx(self._line + chunk):
+            self._other = self._other or b"UBX"
         speed = None
         end = chunk.find(b"\n")
         while end >= 0:
@@ -82,8 +94,18 @@ class Gps:
 
     def _begin(self, now_ms):
         """Restart the time-outs."""
-        self._heard_ms = self._sentence_ms = self._fix_ms = now_ms
+        self._heard_ms = self._sentence_ms = self._fix_ms = self._carried_ms = now_ms
         self._fix = None
+        self._other = b""
+
+    def _carry(self, now_ms):
+        """Carry the times on that are longer ago than CARRY_MS."""
+        self._carried_ms = now_ms
+        oldest_ms = ticks_add(now_ms, -CARRY_MS)
+        for name in ("_heard_ms", "_sentence_ms", "_fix_ms", "_rmc_ms"):
+            then_ms = getattr(self, name)
+            if then_ms is not None and ticks_diff(oldest_ms, then_ms) > 0:
+                setattr(self, name, oldest_ms)
 
     def place(self, now_ms):
         """The position of the fix whose speed poll(now_ms) has returned; None if there is none.
@@ -114,7 +136,7 @@ class Gps:
         if ticks_diff(now_ms, self._heard_ms) > SILENT_MS:
             return Notice("gps-silent")
         if ticks_diff(now_ms, self._sentence_ms) > SILENT_MS:
-            return Notice("gps-garbled")
+            return Notice("gps-other", self._other.decode()) if self._other else Notice("gps-garbled")
         if ticks_diff(now_ms, self._fix_ms) > SILENT_MS:
             return Notice("gps-no-fix")
         return None
@@ -124,6 +146,8 @@ class Gps:
         start = line.rfind(b"$")  # there may be noise in front of it
         kind = line[start + 3 : start + 6]
         if start < 0 or kind not in (b"RMC", b"VTG"):
+            if start >= 0 and ticks_diff(now_ms, self._sentence_ms) > LOOK_MS:
+                self._look_at(line[start:])
             return None
         star = line.rfind(b"*")
         try:
@@ -134,9 +158,24 @@ class Gps:
         except (ValueError, IndexError, OverflowError):  # OverflowError: a number such as 1e999
             return None
         self._sentence_ms = now_ms
+        self._other = b""
         if speed is not None:
             self._fix_ms = now_ms
         return speed
+
+    def _look_at(self, line):
+        """Remember the kind of a whole sentence without a speed."""
+        star = line.rfind(b"*")
+        try:
+            if star < 6 or _checksum(line, 1, star) != int(line[star + 1 : star + 3], 16):
+                return
+            name = line[1 : line.find(b",")]
+            kind = name if name[:1] == b"P" else name[2:]  # P: a maker's own, such as PUBX
+            kind.decode()
+        except ValueError:
+            return
+        if kind and len(kind) <= 5 and self._other not in _POSITIONS:
+            self._other = kind
 
     def _rmc(self, fields, now_ms):
         """The speed in the fields of $--RMC,time,A or V,lat,N,lon,E,knots,course,date,variation,E[,mode[,...]]"""
@@ -214,12 +253,22 @@ def _minutes(field, degrees, negative):
 
 
 def _date(field):
-    """The date ddmmyy in the form of place(), 0 if it is invalid."""
+    """The date ddmmyy in the form of place(), 0 if there is no such day, or it cannot be today's."""
     try:
         date = int(field)
     except ValueError:
         return 0
-    return (date % 100 << 9 | date // 100 % 100 << 5 | date // 10_000) & 0xFFFF
+    year, month, day = date % 100, date // 100 % 100, date // 10_000
+    if not (_YEARS[0] <= year <= _YEARS[1] and 1 <= month <= 12 and day >= 1):
+        return 0
+    days = 30 + (month + month // 8) % 2 if month != 2 else 28 if year % 4 else 29
+    return year << 9 | month << 5 | day if day <= days else 0
+
+
+def _has_ubx(data):
+    """True if a message of u-blox's binary protocol begins in these bytes."""
+    at = data.find(_UBX)
+    return 0 <= at <= len(data) - 6 and data[at + 2] in _UBX_CLASSES and data[at + 5] < 4
 
 
 def _checksum(line, start, end):

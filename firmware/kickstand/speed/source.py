@@ -33,12 +33,15 @@ class Speed:
         not within 0 to MAX_MPS, and what no vehicle could have reached from the last accepted speed, but the latter for
         GIVE_UP_MS only. Call it in each turn of the loop. now_ms: ticks_ms()."""
         speed = self.source.poll(now_ms)
+        if self._last is not None:
+            waited_ms = ticks_diff(now_ms, self._last_ms)
+            if waited_ms >= GIVE_UP_MS:  # without a new speed too: after 6 days ticks_diff() is negative
+                self._last = None
         if speed is None or not 0.0 <= speed <= MAX_MPS:
             return None
         if self._last is not None:
-            waited_ms = ticks_diff(now_ms, self._last_ms)
-            allowed = NOISE_MPS + MAX_CHANGE_MPS2 * waited_ms / 1000.0
-            if waited_ms < GIVE_UP_MS and not -allowed <= speed - self._last <= allowed:
+            allowed = NOISE_MPS + MAX_CHANGE_MPS2 * ticks_diff(now_ms, self._last_ms) / 1000.0
+            if not -allowed <= speed - self._last <= allowed:
                 return None
         self._last = speed
         self._last_ms = now_ms

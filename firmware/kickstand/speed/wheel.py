@@ -8,7 +8,7 @@ turns it on again later.
 >>> speed_mps = wheel.poll(time.ticks_ms())     # None: no new speed
 """
 
-from time import ticks_diff, ticks_us
+from time import ticks_add, ticks_diff, ticks_us
 
 from machine import Pin
 
@@ -124,8 +124,11 @@ class Wheel:
         if pulses:
             return self._pulses(pulses, count, pulse_us, now_ms)
         if self._moved_ms is None or ticks_diff(now_ms, self._moved_ms) < self._stop_ms or waited_ms < STANDING_MS:
+            if waited_ms > MAX_STOP_MS:  # it never moved; carried on, because after 6 days ticks_diff() is negative
+                self._report_ms = ticks_add(now_ms, -MAX_STOP_MS)
             return None
         self._report_ms = now_ms
+        self._moved_ms = ticks_add(now_ms, -self._stop_ms)  # likewise
         self._noisy = False
         self._usual_us = 0
         self._seen_us = None  # the next period begins with the next pulse

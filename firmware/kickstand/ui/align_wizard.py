@@ -2,7 +2,7 @@
 
 from time import ticks_diff
 
-from ..calibration.two_position import WARN_TILT_DEG, align
+from ..calibration.two_position import WARN_TILT_DEG, align, check_turn
 from . import messages, pages
 from .wizard import ASKING, RESULT, Wizard
 
@@ -42,12 +42,16 @@ class AlignWizard(Wizard):
 
     def _pose_done(self, pose, now_ms):
         """Keep the first pose; with the second one compute and save the alignment. Raises AlignmentError for poses that
-        do not fit together, StoreError."""
+        do not fit together, GyroError where the gyro does not fit them, StoreError."""
         if self._kickstand is None:
             self._kickstand, self._kickstand_ms = pose, now_ms
+            self._turn.start(pose.gyro)
             self._show(ASKING, _ASK[1])
             return
-        new, tilt = align(self._calibration.value, self._kickstand, pose, self._side)
-        self._calibration.save(new, ticks_diff(now_ms, self._kickstand_ms) < FRESH_MS)
+        before = self._calibration.value
+        new, tilt = align(before, self._kickstand, pose, self._side)
+        self._turn.end()
+        check_turn(before, self._kickstand, pose, self._turn)
+        self._calibration.save(new, 0 <= ticks_diff(now_ms, self._kickstand_ms) < FRESH_MS)
         warning = "Little, 8%s best" % messages.DEGREE if tilt < WARN_TILT_DEG else "Ride safely"
         self._show_for(RESULT_MS, RESULT, now_ms, "Aligned! %5.1f%s" % (tilt, messages.DEGREE), warning)

@@ -12,17 +12,25 @@ saturated|Accel saturated|Check sensor
 too-few|Too few readings|Check sensor
 frozen-pose|Sensor frozen|Check wiring
 gyro-offset|Gyro offset big|Hold still
+stuck-accel|Accel {0} stuck|Check sensor
+dead-gyro|Gyro {0} is dead|Check sensor
+noisy-gyro|Gyro {0} is noisy|Check sensor
 
 dead-axis|Axis {0} is dead|Check sensor
 unclear|Poses unclear|Do them again
 odd-axis|Axis {0} is off|Do them again
 side-tilted|Side {0}: {1:.0f}\xdf off|Do them again
 free-pose-off|Check: {0:.3f} g|Do them again
+gyro-scale|Gyro {0}: {1:+.0f} %|Check sensor
+gyro-reversed|Gyro {0} reversed|Check sensor
+gyro-misfit|Gyro is {0:.0f}\xdf off|Check sensor
+unproved-gyro|Gyro {0} not seen|Do them again
 
 not-one-g|Reads {1:.2f} g!|Do six positions
 same-pose|Same pose twice|Stand, then up
 tilt-small|Tilt only {0:.1f}\xdf|Need {1:.0f}\xdf or more
 tilt-large|Tilt {0:.0f}\xdf: over|{1:.0f}\xdf, do it again
+gyro-tilt|Tilt {0:.0f}\xdf, gyro|says {1:.0f}\xdf: redo
 
 not-written|Not saved: flash|Old one is kept
 read-back|Not saved: flash|Old one is kept
@@ -33,11 +41,23 @@ no-memory|No memory for it|restart it
 starting|Kickstand|starting
 no-sensor|No sensor|check wiring
 unknown-chip|Unknown sensor|WHO_AM_I 0x{0:02x}
+no-chip|No MPU6050: 0x{1:02x}|answers 0x{0:02x}
+not-kept|Sensor keeps no|settings: broken
+bus-errors|Sensor answers,|wires are bad
+other-chip|{0}|not supported
+other-device|No sensor, but a|{0} 0x{1:02x}
+exchanged|SDA and SCL are|exchanged
+wire-low|{0} stays low|check wiring
+no-pull-ups|No sensor: wires|open, no pull-up
+no-pull-up|No sensor: open|{0}, no pull-up
+sensor-fifo|Sensor: its FIFO|{0}
 sensor-lost|Sensor lost|check wiring
 sensor-frozen|Sensor frozen|starting again
 sensor-silent|Sensor silent|starting again
 sensor-reset|Sensor reset|starting again
 readings-lost|Readings lost|board too busy
+axis-ill|{0} {1} {2}|power off and on
+clips|{0} clips|mount it softly
 
 no-radio|No Bluetooth|on this board
 no-pairing|LIVE_PIN: not|on this board
@@ -46,6 +66,7 @@ live-memory|No Bluetooth:|no memory
 
 gps-silent|GPS silent|check wiring
 gps-garbled|GPS garbled|check GPS_BAUD
+gps-other|GPS sends {0}|no RMC or VTG
 gps-no-fix|GPS: no fix|needs open sky
 no-pulse|Wheel: no pulse|ride, or wiring?
 wheel-storm|Wheel: noise|check wiring
@@ -85,8 +106,14 @@ mount-moved|Mount has moved|Align again
 side-fixed|Side corrected|Set SIDE too
 aligned|Aligned by drive|error about {0:.1f}\xdf
 """
-# In place of the lean while the alignment is in question, by LeanMeter.suppressed_reason
-NO_LEAN = {"other-side": "side was wrong?", "mount-moved": "mount has moved"}
+# In place of the lean, by LeanMeter.suppressed_reason while the alignment is in question, and by LeanMeter.odd
+NO_LEAN = {
+    "other-side": "side was wrong?",
+    "mount-moved": "mount has moved",
+    "odd-left": "sensor odd: left",
+    "odd-up": "sensor odd: up",
+    "odd-pitch": "sensor odd: tilt",
+}
 _OTHER_SETTING = "config.py: wrong|{0}"  # {0}: the setting's name; the console says what is wrong with it
 
 

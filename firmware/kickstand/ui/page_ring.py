@@ -106,7 +106,7 @@ class PageRing:
         if meter.fallen:
             return pages.FALLEN
         if not self.trusted:
-            lines = pages.unsure(meter.suppressed_reason)
+            lines = pages.unsure(meter.suppressed_reason or meter.odd)
             return lines + (pictures.unsure(*lines),) if pictures else lines
         line1, line2 = page(meter)
         if recording:

@@ -123,15 +123,22 @@ def not_aligned(meter, seconds, todo="On stand: press"):
 
 def sensor_info(sensor, lost, meter, seconds):
     """The chip's name and temperature; below that alternately what is calibrated, the numbers of FIFO overflows and of
-    set-ups of the chip, and the number of samples that overflows have lost (lost)."""
+    set-ups of the chip, the number of samples that overflows have lost (lost), and the chip's address. While the sensor
+    has a fault: that, and the addresses that answer on its bus, in turn."""
+    if sensor.fault is not None:
+        if seconds // 2 % 2 == 0:
+            return messages.lines(sensor.fault)
+        return "On its I2C bus:", " ".join(["%02x" % address for address in sensor.found]) or "nothing"
     chip, calibration = sensor.chip, meter.calibration
     line1 = "%-9s%5.1f%sC" % (chip.name[:9], chip.temperature_c(meter.reading[3]), DEGREE)
-    turn = seconds // 2 % 3
+    turn = seconds // 2 % 4
     if turn == 0:
         return line1, "6pos %-3s ali %s" % (_yes(calibration.six_done), _yes(calibration.aligned))
     if turn == 1:
         return line1, "%d gaps %d starts" % (min(chip.overflows, 99), min(sensor.restarts, 9))
-    return line1, "samples lost%4d" % min(lost, 9999)
+    if turn == 2:
+        return line1, "samples lost%4d" % min(lost, 9999)
+    return line1, "I2C address 0x%02x" % chip.address
 
 
 def _yes(flag):

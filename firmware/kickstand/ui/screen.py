@@ -127,7 +127,7 @@ class Screen:
     def _update_front(self, now_ms):
         """Return the view in front and its two lines: the first in this order that has something to show. Drop a
         wizard or menu that has ended, and go back to the first page when a question is shown."""
-        for view in (self._notice, self.wizard, self.menu, self._fault, self._info, self._question, self.pages):
+        for view in (self._notice, self.wizard, self.menu, self._info, self._fault, self._question, self.pages):
             lines = view.lines(now_ms) if view else None
             if lines:
                 break

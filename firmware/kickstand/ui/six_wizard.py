@@ -1,30 +1,42 @@
-"""Guides the rider through the six positions, each side up once in any order, and a slanted pose that verifies them."""
+"""Guides the rider through the six positions, each side up once in any order, and a slanted pose that verifies them.
+
+Between the poses the sensor is turned, and that calibrates the gyro: see calibration/sensor_fit.py.
+"""
 
 from ..calibration import six_position
 from ..calibration.parameters import six_position_calibration
+from ..errors import GyroError
 from . import messages, pages
-from .wizard import NOTICE, RESULT, Wizard
+from .wizard import COMPUTING, NOTICE, RESULT, TAKING, Wizard
 
 NOTICE_MS = 1500
 RESULT_MS = 6000
 ROUGH_TILT_DEG = 30.0  # largest tilt of a side in uncalibrated readings; the fit has a stricter limit
+MAX_POSES = 12  # six sides, a slanted pose, and those that repeat a turn that could not be used
 
 
 class SixWizard(Wizard):
     """See Wizard."""
 
     def _start(self):
-        self._poses = [None] * 6
-        self._gyro = [0.0] * 3
+        self._sides = [None] * 6  # the number of each side's pose, once it is taken
+        self._poses, self._turns = [], []  # for SensorFit
+        self._bias = [0.0] * 3
         self._fitted = None  # offset and slope, once all six poses are taken
+        self._unproved = None  # the axis that needs another turn
+        self._work = self._fit = None
+        self._told = False  # that the turn under way cannot be used
+        self._turn.running = False
         self._next_pose()
 
     def _next_pose(self):
         """Ask for the next pose and wait until the sensor lies still."""
-        if self._fitted:
+        if self._unproved:
+            self._begin_pose("Slant it again,", "another way")
+        elif self._fitted:
             self._begin_pose("Check: slant it", "and hold still")
         else:
-            missing = [six_position.SIDES[k] for k in range(6) if self._poses[k] is None]
+            missing = [six_position.SIDES[k] for k in range(6) if self._sides[k] is None]
             self._begin_pose("Side up, still:", "any of the six" if len(missing) == 6 else " ".join(missing))
 
     def _progress(self, done, total):
@@ -47,31 +59,75 @@ class SixWizard(Wizard):
         tilt = six_position.tilt_deg(accel)
         if tilt > ROUGH_TILT_DEG:
             self._notice(now_ms, "Not on a side:", "%d%s off" % (tilt, messages.DEGREE))
-        elif self._poses[self._side] is not None:
+        elif self._sides[self._side] is not None and not self._again():
             self._side_done(now_ms, "Side %s is done")
 
+    def _again(self):
+        """True if a side may be taken again, to turn from there: the turn since the last pose cannot be used."""
+        return self._spoilt_turn and len(self._poses) + self._sides.count(None) + 1 < MAX_POSES
+
+    @property
+    def _spoilt_turn(self):
+        """True if the turn since the last pose cannot be used."""
+        return self._turn.running and (self._turn.quick or self._turn.lost)
+
+    def _followed(self, now_ms):
+        if self._state == COMPUTING:
+            if next(self._work, True):  # a yield gives None, the end gives True
+                self._computed(now_ms)
+        elif self._turn.running and self._turn.quick and not self._told and self._state in (TAKING, NOTICE):
+            self._told = True
+            self._notice(now_ms, "Turned too fast:", "turn it slower")
+
     def _pose_done(self, pose, now_ms):
-        """Keep the pose; after the sixth one fit the calibration. Raises CalibrationError, StoreError."""
-        if self._fitted:
-            self._prove(pose, now_ms)
-            return
-        self._poses[self._side] = pose.accel
+        """Keep the pose, and the turn to it; after the sixth side fit the accelerometer, after a slanted one the whole
+        sensor. Raises CalibrationError."""
+        turn, spoilt = self._turn, self._spoilt_turn
+        if self._poses:
+            turn.end()
+            self._turns.append(None if spoilt else (turn.packed(pose.gyro), turn.seconds))
+        turn.start(pose.gyro)
+        self._told = False
+        self._poses.append(pose.accel)
         for i in range(3):
-            self._gyro[i] += pose.gyro[i] / 6
-        if None not in self._poses:
-            self._fitted = six_position.fit(self._poses)
+            self._bias[i] += pose.gyro[i]
+        if self._fitted:
+            self._prove(pose)
+            return
+        if self._sides[self._side] is None:
+            self._sides[self._side] = len(self._poses) - 1
+        if None not in self._sides:
+            self._fitted = six_position.fit([self._poses[k] for k in self._sides])
         self._side_done(now_ms, "Side %s done")
 
     def _side_done(self, now_ms, words):
-        done = 6 - self._poses.count(None)
+        done = 6 - self._sides.count(None)
         self._notice(now_ms, words % six_position.SIDES[self._side], "%d/6, turn it" % done)
 
-    def _prove(self, pose, now_ms):
-        """Save the calibration if the seventh pose confirms it. Raises CalibrationError, StoreError."""
+    def _prove(self, pose):
+        """Begin to fit the whole sensor if the slanted pose confirms the six. Raises CalibrationError."""
+        from ..calibration.sensor_fit import SensorFit  # 5 KB of heap
+
         offset, slope = self._fitted
-        error = six_position.check_free_pose(offset, slope, pose.accel)
-        self._calibration.save(six_position_calibration(offset, slope, self._gyro))
-        self._show_for(RESULT_MS, RESULT, now_ms, "Saved, err %d mg" % round(abs(error) * 1000), "Now align it")
+        self._error = six_position.check_free_pose(offset, slope, pose.accel)
+        self._fit = SensorFit(self._poses, self._turns, offset, slope)
+        self._work = self._fit.run()
+        self._show(COMPUTING, ("Computing...", ""))
+
+    def _computed(self, now_ms):
+        """Save the result, or ask for another pose where an axis of the gyro was not turned enough. Raises GyroError,
+        StoreError."""
+        fit = self._fit
+        self._work = self._fit = None
+        self._unproved = fit.unproved[0] if fit.unproved else None
+        if self._unproved:
+            if len(self._poses) == MAX_POSES:
+                raise GyroError("unproved-gyro", self._unproved)
+            self._next_pose()
+            return
+        bias = [value / len(self._poses) for value in self._bias]
+        self._calibration.save(six_position_calibration(fit.offset, fit.slope, bias, fit.matrices()))
+        self._show_for(RESULT_MS, RESULT, now_ms, "Saved, err %d mg" % round(abs(self._error) * 1000), "Now align it")
 
     def _notice(self, now_ms, *lines):
         self._show_for(NOTICE_MS, NOTICE, now_ms, *lines)

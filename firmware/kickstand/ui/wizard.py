@@ -1,10 +1,12 @@
-"""The base of both wizards: a view that takes poses, one after the other, in one of a few named states."""
+"""The base of both wizards: a view that takes poses, one after the other, in one of a few named states. Between two
+poses it integrates the gyro, whose rates must explain how the sensor has turned."""
 
 from time import ticks_add, ticks_diff
 
 from ..board.button import LONG
 from ..calibration.pose_taker import DONE, SETTLED, PoseTaker
-from ..errors import CaptureError, Refusal
+from ..calibration.turn import Turn
+from ..errors import CaptureError, GyroError, Refusal, SickSensor, report
 from . import messages
 
 # The states of a wizard
@@ -14,6 +16,7 @@ NOTICE = 2  # shows a notice for a moment, then asks for the next pose
 REFUSED = 3  # shows the reason until a press, then starts again
 RESULT = 4  # shows the result for some seconds, then ends
 ENDED = 5
+COMPUTING = 6  # step by step, with each pass of the main loop
 
 
 class Wizard:
@@ -27,6 +30,7 @@ class Wizard:
 
     def __init__(self, chip, rate_hz, calibration):
         self._taker = PoseTaker(chip, rate_hz, self.POSE_SECONDS)
+        self._turn = Turn(chip.gyro_lsb_per_dps, 1_000_000 // rate_hz)
         self._calibration = calibration
         self._start()
 
@@ -48,9 +52,29 @@ class Wizard:
             else:
                 self._progress(*self._taker.progress())
         except CaptureError as problem:
+            if isinstance(problem, SickSensor):
+                report(problem)
             self._spoilt(problem, now_ms)
         except Refusal as problem:
-            self._show(REFUSED, messages.lines(problem))
+            self._refuse(problem)
+
+    def follow(self, sums, n, dt_us, now_ms):
+        """Take the sums of the n samples that sample() has just taken, and the microseconds since those before."""
+        self._turn.add(sums, n, dt_us, self._state == TAKING and self._taker.averaging)
+        try:
+            self._followed(now_ms)
+        except Refusal as problem:
+            self._refuse(problem)
+
+    def _refuse(self, problem):
+        """Show why, until a press. What is wrong with the gyro is printed, too: it calls for another sensor."""
+        if isinstance(problem, GyroError):
+            report(problem)
+        self._turn.running = False
+        self._show(REFUSED, messages.lines(problem))
+
+    def _followed(self, now_ms):
+        """Called with each pass of the main loop. May raise a Refusal, which is shown."""
 
     def _start(self):
         """Ask for the first pose."""

@@ -73,6 +73,12 @@ class SerialLine:
         why = self._said_by("#status", "#status-said")
         return self.rider.text("#status-text") if self.rider.page.is_visible("#status-text") else why
 
+    def check(self):
+        """Click, and the text of the check that the page shows, or why it shows none."""
+        self.rider.page.click("#check")
+        why = self._said_by("#check", "#status-said")
+        return self.rider.text("#status-text") if self.rider.page.is_visible("#status-text") else why
+
     def _said_by(self, button, where="#install-said"):
         self.rider.page.wait_for_selector(f"{button}:enabled", timeout=600_000)
         return self.rider.text(where)

@@ -136,12 +136,14 @@ def fit_logs(
     watch = DriveWatch(alignment, on_event)
     feed(alignment, logs, before, steps, watch)
     matrix = array("f", [0.0] * 9)
+    # what it found at stops is a rate, the bias is a reading
+    bias = before.gyro_bias_dps + np.linalg.solve(before.gyro_matrix, alignment.standing.bias)
     refusal, result = None, before
     try:
         alignment.matrix(matrix)
         result = replace(
             before,
-            gyro_bias_dps=before.gyro_bias_dps + np.array(alignment.standing.bias),
+            gyro_bias_dps=bias,
             vehicle_from_sensor=np.array(matrix),
             aligned=True,
             trim_deg=0.0,
@@ -170,7 +172,7 @@ def fit_logs(
         pose_check,
         watch.events,
         [(log.name, notice) for log in logs for notice in log.notices],
-        before.gyro_bias_dps + np.array(alignment.standing.bias),
+        bias,
         refusal,
     )
 

@@ -8,7 +8,14 @@ from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-from kickstand.calibration.parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE, Calibration
+from kickstand.calibration.parameters import (
+    MAX_GYRO_SIGMA,
+    MAX_MATRIX_ERROR,
+    MAX_OFFSET_G,
+    MAX_SLOPE,
+    MIN_SLOPE,
+    Calibration,
+)
 from kickstand.calibration.store import MAX_BIAS_DPS, MAX_TRIM_DEG
 from kickstand.lean.lean_filter import DELAY_S
 from kickstand.rotation import is_rotation
@@ -23,6 +30,8 @@ from ..signals import Array, rotated
 VERSION = 1
 MOST_BYTES = 1_000_000  # largest file; those of kickstand have a thousandth of that
 MAX_DELAY_S = 0.05  # largest delay of a chip's low-pass: the slowest has 33 ms
+_NEUTRAL = {"accel_matrix": np.eye(3), "gyro_matrix": np.eye(3), "gyro_sigma": np.zeros((3, 3))}
+_MATRICES = tuple(_NEUTRAL)  # in the order of the firmware's Calibration.matrices()
 ROTATION_TOLERANCE = 2e-3  # a matrix copied with three or four decimals is still good to 0.1 degrees
 
 
@@ -36,7 +45,8 @@ class CalibrationFile:
     set to one, else "".
     kickstand_side: "left" or "right", to which the kickstand leaned the bike in the two poses, else "". notes: further
     entries to write to the file. gyro_delay_s: delay of the gyro by the low-pass DLPF in a recorded ride, None if
-    unknown.
+    unknown. accel_matrix, gyro_matrix (3, 3): what remains, force = accel_matrix x (slope * reading + offset), rate =
+    gyro_matrix x (reading - bias). gyro_sigma (3, 3): standard errors of gyro_matrix, zeros where it was not measured.
 
     >>> calibration = CalibrationFile(gyro_bias_dps=[1.0, 0.0, 0.0])
     >>> calibration.vehicle_from_sensor @ [0.0, 1.0, 0.0]
@@ -54,12 +64,16 @@ class CalibrationFile:
     vehicle: str = ""
     kickstand_side: str = ""
     gyro_delay_s: float | None = None
+    accel_matrix: Array = field(default_factory=lambda: np.eye(3))
+    gyro_matrix: Array = field(default_factory=lambda: np.eye(3))
+    gyro_sigma: Array = field(default_factory=lambda: np.zeros((3, 3)))
 
     def __post_init__(self) -> None:
         self.accel_offset_g, self.accel_slope, self.gyro_bias_dps = (
             np.array(values, dtype=float) for values in (self.accel_offset_g, self.accel_slope, self.gyro_bias_dps)
         )
-        self.vehicle_from_sensor = np.reshape(np.array(self.vehicle_from_sensor, dtype=float), (3, 3))
+        for name in ("vehicle_from_sensor", *_MATRICES):
+            setattr(self, name, np.reshape(np.array(getattr(self, name), dtype=float), (3, 3)))
 
     def __eq__(self, other: object) -> bool:
         """True if both give the same file."""
@@ -70,10 +84,15 @@ class CalibrationFile:
         measured = self.accel_offset_g, self.accel_slope, self.gyro_bias_dps, self.vehicle_from_sensor.ravel()
         return [*np.concatenate(measured).tolist(), self.trim_deg]
 
+    def matrices(self) -> list[float]:
+        """The 27 numbers of the firmware's Calibration.matrices()."""
+        return np.concatenate([getattr(self, name).ravel() for name in _MATRICES]).tolist()
+
     def to_firmware(self) -> Calibration:
         """The firmware's Calibration with these parameters, for readings in g and deg/s."""
         calibration = Calibration()
         calibration.set_parameters(self.parameters())
+        calibration.set_matrices(self.matrices())
         calibration.six_done, calibration.aligned = self.six_done, self.aligned
         return calibration
 
@@ -83,9 +102,11 @@ class CalibrationFile:
         return force, rate
 
     def in_sensor(self, accel_g: Array, gyro_dps: Array) -> tuple[Array, Array]:
-        """Force (n, 3, g) and rate (n, 3, deg/s) along the sensor's own axes, by (18)-(20). A gyro's reading is its
-        rate plus its bias."""
-        return accel_g * self.accel_slope + self.accel_offset_g, gyro_dps - self.gyro_bias_dps
+        """Force (n, 3, g) and rate (n, 3, deg/s) along the sensor's own axes, by (18)-(20) and the matrices. A gyro's
+        reading is its rate plus its bias."""
+        force, rate = accel_g * self.accel_slope + self.accel_offset_g, gyro_dps - self.gyro_bias_dps
+        (force,), (rate,) = rotated(self.accel_matrix, force), rotated(self.gyro_matrix, rate)
+        return force, rate
 
     def delay_s(self) -> float:
         """gyro_delay_s, or that of the default DLPF."""
@@ -106,6 +127,10 @@ class CalibrationFile:
         data |= {"vehicle": self.vehicle} if self.vehicle else {}
         data |= {"kickstand_side": self.kickstand_side} if self.kickstand_side else {}
         data |= {"gyro_delay_s": self.gyro_delay_s} if self.gyro_delay_s is not None else {}
+        for name in _MATRICES:
+            matrix = getattr(self, name)
+            if not np.array_equal(matrix, _NEUTRAL[name]):
+                data[name] = [_rounded(row) for row in matrix]
         return data | self.notes
 
 
@@ -141,22 +166,33 @@ def read_calibration(source: File) -> CalibrationFile:
         raise InputError(f"{name} is no calibration: version is missing", "give_calibration")
     if data["version"] != VERSION or isinstance(data["version"], bool):
         raise InputError(f"{name}: version {_shown(data['version'])}, this program reads {VERSION}: calibrate again")
-    rows = _list(name, data, "vehicle_from_sensor")
     offset, slope, bias = (
         np.array(_numbers(name, entry, _list(name, data, entry)))
         for entry in ("accel_offset_g", "accel_slope", "gyro_bias_dps")
     )
-    matrix = np.array([_numbers(name, f"vehicle_from_sensor, row {i + 1},", row) for i, row in enumerate(rows)])
+    matrix = _matrix(name, data, "vehicle_from_sensor")
     calibration = CalibrationFile(offset, slope, bias, matrix, trim_deg=_within(name, data, "trim_deg", MAX_TRIM_DEG))
     if "gyro_delay_s" in data:
         calibration.gyro_delay_s = _within(name, data, "gyro_delay_s", MAX_DELAY_S)
+    for entry in _MATRICES:
+        if entry in data:
+            setattr(calibration, entry, _matrix(name, data, entry))
     _check_ranges(name, calibration)
     calibration.aligned = data.get("aligned", not np.array_equal(matrix, np.eye(3))) is True
     neutral = not np.any(calibration.accel_offset_g) and bool(np.all(calibration.accel_slope == 1.0))
     calibration.six_done = data.get("six_positions", not neutral) is True
-    calibration.vehicle = data["vehicle"] if data.get("vehicle") in ("car", "motorcycle") else ""
-    calibration.kickstand_side = data["kickstand_side"] if data.get("kickstand_side") in ("left", "right") else ""
+    calibration.vehicle = _one_of(name, data, "vehicle", ("car", "motorcycle"))
+    calibration.kickstand_side = _one_of(name, data, "kickstand_side", ("left", "right"))
     return calibration
+
+
+def _one_of(name: str, data: dict[str, Any], entry: str, words: tuple[str, str]) -> str:
+    """The entry, one of these words; "" without it. Raises InputError for another."""
+    if data.get(entry) in (None, ""):
+        return ""
+    if data[entry] not in words:
+        raise InputError(f"{name}: {entry} is {_shown(data[entry])}: write {' or '.join(words)}, or leave it out")
+    return data[entry]
 
 
 def write_calibration(target: Path | str | IO[str], calibration: CalibrationFile) -> None:
@@ -205,9 +241,15 @@ def _list(name: str, data: dict[str, Any], entry: str) -> list[Any]:
     if entry not in data:
         raise InputError(f"{name}: {entry} is missing", "give_calibration")
     if not isinstance(data[entry], list) or len(data[entry]) != 3:
-        what = "3 rows of 3 numbers" if entry == "vehicle_from_sensor" else "3 numbers"
+        what = "3 rows of 3 numbers" if entry in ("vehicle_from_sensor", *_MATRICES) else "3 numbers"
         raise InputError(f"{name}: {entry} has to be {what}: calibrate again")
     return data[entry]
+
+
+def _matrix(name: str, data: dict[str, Any], entry: str) -> Array:
+    """An entry of three rows of three numbers. Raises InputError for others."""
+    rows = _list(name, data, entry)
+    return np.array([_numbers(name, f"{entry}, row {i + 1},", row) for i, row in enumerate(rows)])
 
 
 def _numbers(name: str, entry: str, values: Any) -> list[float]:
@@ -240,6 +282,14 @@ def _check_ranges(name: str, calibration: CalibrationFile) -> None:
             wrong = f"gyro bias of {axis} is {bias:g} deg/s, a sensor's is under {MAX_BIAS_DPS:g}"
         if wrong:
             raise InputError(f"{name}: {wrong}: calibrate again")
+    for entry, most in (("accel_matrix", MAX_MATRIX_ERROR), ("gyro_matrix", MAX_MATRIX_ERROR)):
+        worst = float(np.max(np.abs(getattr(calibration, entry) - np.eye(3))))
+        if not worst <= most:
+            raise InputError(
+                f"{name}: {entry} is {worst:g} from the identity, a sensor's is within {most:g}: calibrate again"
+            )
+    if not (np.all(calibration.gyro_sigma >= 0.0) and np.all(calibration.gyro_sigma <= MAX_GYRO_SIGMA)):
+        raise InputError(f"{name}: gyro_sigma has to be 0 to {MAX_GYRO_SIGMA:g}: calibrate again")
     if not is_rotation(calibration.vehicle_from_sensor.ravel().tolist(), ROTATION_TOLERANCE):
         raise InputError(f"{name}: vehicle_from_sensor is no rotation (rows left, up, forward): align again")
 

@@ -13,6 +13,7 @@ from kickstand.errors import AlignmentError, CalibrationError, CaptureError
 from kickstand.units import AXES
 
 from ..errors import InputError
+from ..logs.log import ROOM_TEMP_C
 from ..logs.reader import Source, read_log
 from ..refusals import RefusedInput
 from ..signals import Array
@@ -53,17 +54,24 @@ def read_pose(source: Source) -> Pose:
     """Average a recorded pose (see read_log for source). Raises InputError naming the file; RefusedInput, a subclass,
     where the pose was not still."""
     log = read_log(source)
-    still = StillPose(_MICRO, _MICRO, _SATURATED, len(log.t_s))
-    where = f"{log.name}: pose refused"
+    return take_pose(log.name, log.readings, "capture this pose again")
+
+
+def take_pose(name: str, readings: Array, advice: str) -> Pose:
+    """Average the readings (n, 7) of a still pose, in the chip's order (g, C, deg/s). name: what messages call it.
+    Raises RefusedInput, with the advice, if it was not still."""
+    still = StillPose(_MICRO, _MICRO, _SATURATED, len(readings))
+    where = f"{name}: pose refused"
+    counts = np.round(np.nan_to_num(readings, nan=ROOM_TEMP_C) * _MICRO).astype(int).tolist()
     try:
-        for number, (_, reading, _) in enumerate(log.rows(), 1):
-            where = f"{log.name}, sample {number}"
-            still.add([round(value * _MICRO) for value in reading])
-        where = f"{log.name}: pose refused"
+        for number, row in enumerate(counts, 1):
+            where = f"{name}, sample {number}"
+            still.add(row)
+        where = f"{name}: pose refused"
         still.finish()
     except CaptureError as error:
-        raise RefusedInput(error, where, ": capture this pose again") from error
-    return Pose(log.name, still)
+        raise RefusedInput(error, where, f": {advice}") from error
+    return Pose(name, still)
 
 
 def refuse_same_file(sources: Sequence[Source]) -> None:
@@ -81,7 +89,9 @@ class SixPositions:
 
     sides: the pose of each side in the order of kickstand.calibration.six_position.SIDES (+x -x +y -y +z -z up);
     tilt_deg: the tilt of each from its axis. free_pose, free_pose_error_g: the seventh, slanted one, and its calibrated
-    length less 1 g; None without one. beyond_sheet: axes whose offset or slope exceeds the data sheet's limits.
+    length less 1 g; None without one. beyond_sheet: axes whose offset or slope exceeds the data sheet's limits. turns,
+    all_turns: number of turns between poses that have calibrated the gyro, and of all; 0 where each pose was a log of
+    its own.
     """
 
     calibration: CalibrationFile
@@ -90,6 +100,8 @@ class SixPositions:
     free_pose: Pose | None
     free_pose_error_g: float | None
     beyond_sheet: list[str]
+    turns: int = 0
+    all_turns: int = 0
 
 
 def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
@@ -107,9 +119,7 @@ def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
     ((3,), True)
     """
     if len(poses) not in (6, 7):
-        raise InputError(
-            f"{len(poses)} captures given: six are needed, one for each side up, or seven with a free pose"
-        )
+        raise wrong_number(len(poses))
     refuse_same_file(poses)
     sides, free = _sides([read_pose(source) for source in poses])
     means = [pose.accel_g.tolist() for pose in sides]
@@ -125,7 +135,15 @@ def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
         [six_position.tilt_deg(mean) for mean in means],
         free,
         error_g,
-        _beyond_sheet(offset, slope),
+        beyond_sheet(offset, slope),
+    )
+
+
+def wrong_number(captures: int) -> InputError:
+    """The refusal of so many captures of a still pose."""
+    return InputError(
+        f"{captures} captures given: six are needed, one for each side up, or seven with a free pose; or one log of "
+        "the whole procedure"
     )
 
 
@@ -167,7 +185,7 @@ def _with_file(error: CalibrationError, sides: list[Pose], free: Pose | None) ->
     return RefusedInput(error, free.name if free and error.code == "free-pose-off" else "")
 
 
-def _beyond_sheet(offset: Sequence[float], slope: Sequence[float]) -> list[str]:
+def beyond_sheet(offset: Sequence[float], slope: Sequence[float]) -> list[str]:
     """The axes whose offset or slope exceeds the data sheet's limits: usable, but worth a warning."""
     return [
         axis

@@ -1,19 +1,22 @@
-"""The commands of `kickstand` that talk to a board: flash, status, pull, record."""
+"""The commands of `kickstand` that talk to a board: flash, status, check, pull, record."""
 
 import contextlib
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import click
 
 from .. import firmware_path
+from ..deploy.check import check, verdict
 from ..deploy.connection import Progress, status
 from ..deploy.flash import flash
+from ..errors import InputError
 from ..progress import Bar
 from ..rides.pull import PulledRide, pull
 from ..rides.record import live_line, record
 from ..rides.stream import LiveReading
-from .common import OUT, PATH, PORT, warning
+from .common import OUT, PATH, PORT, echo, warning
 
 _NAMED_ONE_BY_ONE = 5
 
@@ -21,39 +24,65 @@ _NAMED_ONE_BY_ONE = 5
 @click.command()
 @PORT
 @click.option("--config", is_flag=True, help="Replace the board's config.py too, which is otherwise kept.")
-def flash_command(port: str | None, config: bool) -> None:
+@click.option("--yes", is_flag=True, help="Do not ask before files of another project on the board get other names.")
+def flash_command(port: str | None, config: bool, yes: bool) -> None:
     """Copy the firmware to a board that runs MicroPython, check it, and start it."""
     with _bar() as progress:
-        result = flash(port, config, progress)
-    click.echo(f"{result.board} on {result.port}")
+        result = flash(port, config, progress, agree=None if yes else _agree)
+    echo(f"{result.board} on {result.port}")
+    for line in result.others:
+        echo(f"kept: {line}")
     if result.config:
-        click.echo(f"config.py is {result.config}")
+        echo(f"config.py is {result.config}")
         if firmware_path.installed() and result.config.parent == firmware_path.directory():
-            click.echo("to change settings, copy that file into a folder of yours, edit it, and run this command there")
+            echo("to change settings, copy that file into a folder of yours, edit it, and run this command there")
     for setting in result.unused:
-        click.echo(f"note: {setting} is not used, because a '#' is in front of it: remove it, and flash --config")
+        echo(f"note: {setting} is not used, because a '#' is in front of it: remove it, and flash --config")
     if result.why_sources:
-        click.echo(f"note: {result.why_sources}: it gets the sources, and starts more slowly")
+        echo(f"note: {result.why_sources}: it gets the sources, and starts more slowly")
     done = result.installed
     if done.config_differs:
-        click.echo("kept: config.py on the board is not this version's; --config would replace it")
+        echo("kept: config.py on the board is not this version's; --config would replace it")
     if len(done.removed) > _NAMED_ONE_BY_ONE:
-        click.echo(f"removed: {len(done.removed)} files that are no longer part")
+        echo(f"removed: {len(done.removed)} files that are no longer part")
     else:
         for path in done.removed:
-            click.echo(f"removed: {path[1:]} is no longer part")
-    click.echo(
+            echo(f"removed: {path[1:]} is no longer part")
+    echo(
         f"copied {len(done.copied)} files, {done.copied_bytes / 1000:.1f} kB, and verified them; "
         f"{len(done.kept)} left as they were"
     )
-    click.echo("restarted: the display shows the rest")
+    echo("restarted: the display shows the rest")
+
+
+def _agree(lines: list[str]) -> None:
+    """Ask whether these files may get other names. Raises InputError if not."""
+    if not sys.stdin.isatty():
+        raise InputError(f"{'; '.join(lines)}: run kickstand flash --yes for that")
+    for line in lines:
+        echo(line, err=True)
+    if not click.confirm("Put Kickstand onto this board?", err=True):
+        raise InputError("nothing was changed on the board")
 
 
 @click.command()
 @PORT
-def status_command(port: str | None) -> None:
+@click.option("--wirings", is_flag=True, help="Show each LCD_WIRING on a character display that stays blank.")
+def status_command(port: str | None, wirings: bool) -> None:
     """Ask a board how it is: versions, settings, sensor, display, calibration."""
-    click.echo(status(port))
+    echo(status(port, wirings))
+
+
+@click.command()
+@PORT
+def check_command(port: str | None) -> None:
+    """Measure a board and all that is wired to it, each figure with its limit, in two minutes.
+
+    The sensor must lie still. Exit status 1: something is not as it should be."""
+    checked = check(port, echo)
+    echo(verdict(checked.findings))
+    if checked.faults:
+        raise click.exceptions.Exit(1)
 
 
 @click.command()
@@ -67,16 +96,16 @@ def pull_command(port: str | None, out: Path, delete: bool) -> None:
         for problem in ride.problems:
             warning(problem)
         if ride.log:
-            click.echo(f"written: {ride.log}, {ride.seconds / 60:.1f} min, {ride.readings} readings")
+            echo(f"written: {ride.log}, {ride.seconds / 60:.1f} min, {ride.readings} readings")
         if ride.deleted:
-            click.echo(f"deleted from the board: ride {ride.number}")
+            echo(f"deleted from the board: ride {ride.number}")
         elif delete:
             warning(f"ride {ride.number}: not deleted from the board, because not all of it came over")
 
     with _bar() as progress:
         result = pull(port, out, delete, progress, say)
     if not result.rides:
-        click.echo(f"no rides on the board at {result.port}: its menu's Record ride makes one")
+        echo(f"no rides on the board at {result.port}: its menu's Record ride makes one")
 
 
 @click.command()
@@ -88,15 +117,13 @@ def record_command(port: str | None, out: Path) -> None:
         show: list[Callable[[str], None]] = []
 
         def begin(name: str) -> None:
-            click.echo(f"recording from {name}: Ctrl-C ends it")
+            echo(f"recording from {name}: Ctrl-C ends it")
             show.append(stack.enter_context(live_line()))
 
         result = record(port, out, begin, lambda reading: show[0](_live_text(reading)))
     for note in result.notes:
         warning(note)
-    click.echo(
-        f"written: {result.log}, {result.seconds:.1f} s, {result.readings} readings, and {result.calibration.name}"
-    )
+    echo(f"written: {result.log}, {result.seconds:.1f} s, {result.readings} readings, and {result.calibration.name}")
 
 
 def _live_text(reading: LiveReading) -> str:

@@ -14,6 +14,7 @@ from ..calibration import drive_events as events
 from ..calibration.drive import DriveFit, fit_drive
 from ..calibration.file import CalibrationFile, read_calibration, write_calibration
 from ..calibration.poses import GOOD_FREE_POSE_G, SixPositions, TwoPositions, fit_six_positions, fit_two_positions
+from ..calibration.procedure import fit_procedure
 from ..checks.log import remarks
 from ..checks.mount import of_calibration
 from ..estimation.alignment import RideFit, fit_ride
@@ -21,7 +22,7 @@ from ..logs.reader import read_log
 from ..output import check_output
 from ..progress import Bar
 from ..refusals import OPPOSITE_SIGN, sentence
-from .common import OUT, PATH, RIGHT_HANDED, VEHICLES, file_argument, known_to, print_lines, warn
+from .common import OUT, PATH, RIGHT_HANDED, VEHICLES, echo, file_argument, known_to, print_lines, warn
 
 
 @click.group(no_args_is_help=False)
@@ -29,16 +30,18 @@ def calibrate_command() -> None:
     """Compute a calibration from recorded poses or drives."""
 
 
-@calibrate_command.command(short_help="Offset and slope of the accelerometer, from six poses.")
-@file_argument("poses", "POSE.csv...", nargs=-1, required=True)
+@calibrate_command.command(short_help="The sensor's own errors, from six poses.")
+@file_argument("poses", "LOG.csv | POSE.csv...", nargs=-1, required=True)
 @OUT
 def six(poses: tuple[Path, ...], out: Path) -> None:
-    """Accelerometer offset and slope from six still poses, each side up once, in any order.
+    """The sensor's own errors from six still poses, each side up once, in any order.
 
-    A seventh, slanted pose checks the result.
+    One log of the whole procedure calibrates accelerometer and gyro: the sensor lies still for three seconds on each
+    side and once slanted, and the turns in between measure the gyro. Six logs of a pose each give offset and slope of
+    the accelerometer; a seventh, slanted pose checks them.
     """
     check_output(out, list(poses))
-    found = fit_six_positions(poses)
+    found = fit_procedure(poses[0]) if len(poses) == 1 else fit_six_positions(poses)
     print_lines(_six_lines(found))
     _write(out, found.calibration)
 
@@ -107,7 +110,7 @@ def ride(log: Path, phone: str | None, out: Path) -> None:
 
 def _write(out: Path, calibration: CalibrationFile) -> None:
     write_calibration(out, calibration)
-    click.echo(f"written: {out}")
+    echo(f"written: {out}")
 
 
 def _six_lines(found: SixPositions) -> Iterable[str]:
@@ -122,6 +125,13 @@ def _six_lines(found: SixPositions) -> Iterable[str]:
     yield "offset     " + _along_axes(found.calibration.accel_offset_g, "%+.4f g")
     yield "slope      " + _along_axes(found.calibration.accel_slope, "%.4f")
     yield "gyro bias  " + _along_axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
+    if found.turns:
+        matrix, sigma = found.calibration.gyro_matrix, found.calibration.gyro_sigma
+        scales, known = 100.0 * (1.0 / matrix.diagonal() - 1.0), 100.0 * sigma.diagonal()
+        yield f"gyro scale  {_along_axes(scales, '%+.2f %%')}, by {found.turns} turns, known to {max(known):.1f} %"
+        if found.turns < found.all_turns:
+            left_out = found.all_turns - found.turns
+            yield f"warning: {left_out} of {found.all_turns} turns left out, too quick or with a gap: turn it slower"
     if found.beyond_sheet:
         axes = ", ".join(found.beyond_sheet)
         yield f"warning: {axes} is beyond the data sheet (50 mg, z 80 mg, slope 3 %): used anyway"

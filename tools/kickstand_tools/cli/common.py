@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from kickstand.errors import Notice
 
+from ..errors import printable
 from ..refusals import sentence
 
 if TYPE_CHECKING:
@@ -127,11 +128,16 @@ def warn(log: Path | str, notices: Iterable[Notice]) -> None:
         warning(f"{log}: {words}")
 
 
+def echo(text: object = "", err: bool = False) -> None:
+    """Print text. Control characters, as in the name of a file in somebody's zip, would be commands to the terminal."""
+    click.echo(printable(str(text)), err=err)
+
+
 def warning(text: str) -> None:
     """A line on standard error."""
-    click.echo(f"warning: {text}", err=True)
+    echo(f"warning: {text}", err=True)
 
 
 def print_lines(lines: Iterable[str]) -> None:
     for line in lines:
-        click.echo(line)
+        echo(line)

@@ -7,7 +7,7 @@ import click
 from ..fleet.manifest import by_pattern, is_pattern, read_manifest
 from ..fleet.run import run_fleet
 from ..progress import Bar
-from .common import VEHICLES
+from .common import VEHICLES, echo
 
 
 @click.command()
@@ -43,24 +43,22 @@ def fleet_command(manifests: tuple[str, ...], out: str, vehicle: str, **how: Any
         with Bar("vehicles", lines_s=10.0, patience_s=0.0) as bar:
             found = run_fleet(periods, out, progress=bar.reach, **how)
     except KeyboardInterrupt:
-        click.echo("what is finished is kept, the same command goes on", err=True)
+        echo("what is finished is kept, the same command goes on", err=True)
         raise
     before = found.vehicles - found.new
     done = f", {before} of them finished before" if before else ""
-    click.echo(f"mounted sensors: {found.vehicles}{done}")
+    echo(f"mounted sensors: {found.vehicles}{done}")
     if found.damaged:
-        click.echo(f"{found.damaged} results of before were damaged, and are worked out again", err=True)
+        echo(f"{found.damaged} results of before were damaged, and are worked out again", err=True)
     seen = found.seen
     counts = seen.statuses
-    click.echo(f"aligned: {counts['aligned']}, refused: {counts['refused']}, errors: {counts['error']}")
+    echo(f"aligned: {counts['aligned']}, refused: {counts['refused']}, errors: {counts['error']}")
     for (status, reason), count in seen.reasons.most_common():
-        click.echo(f"{count:7}  {status}: {reason}")
+        echo(f"{count:7}  {status}: {reason}")
     tests = len(seen.decelerations[1])
-    click.echo(
-        f"mounts that seem to have moved: {seen.moved_vehicles}; brake tests: {tests}; rows of errors: {seen.errors}"
-    )
+    echo(f"mounts that seem to have moved: {seen.moved_vehicles}; brake tests: {tests}; rows of errors: {seen.errors}")
     for path, message in seen.first_errors:
-        click.echo(f"error: {message if path in message else f'{path}: {message}'}")
+        echo(f"error: {message if path in message else f'{path}: {message}'}")
     if seen.errors > len(seen.first_errors):
-        click.echo("more errors are in errors.parquet")
-    click.echo(f"written: {out}/index.html, alignments.parquet, moved.parquet, brake_tests.parquet, errors.parquet")
+        echo("more errors are in errors.parquet")
+    echo(f"written: {out}/index.html, alignments.parquet, moved.parquet, brake_tests.parquet, errors.parquet")

@@ -1,23 +1,27 @@
 """The `kickstand` command. What it refuses: one line on standard error, status 2, nothing written."""
 
-import functools
+import contextlib
 import importlib
 import os
-import pkgutil
+import signal
 import sys
+import threading
+from collections.abc import Iterator
 
 import click
 
-from ..errors import InputError, cause
+from ..errors import DISTRIBUTION, InputError, cause, printable
+from . import added
 
 # name: (the module of its function name_command, a line of help). Modules are imported when a command runs: most take
 # numpy, which takes its time
 COMMANDS = {
     "calibrate": (".calibrate", "Compute a calibration from recorded poses or drives."),
+    "check": (".board", "Measure a board and all that is wired to it, in two minutes."),
     "compare": (".ride", "Compare the leans of two devices on one bike."),
     "cut": (".ride", "Cut a stretch out of a log."),
     "demo": (".without_a_board", "The firmware on a simulated board, in the terminal."),
-    "emulate": (".without_a_board", "An emulated Pico that flash can deploy to."),
+    "emulate": (".without_a_board", "An emulated board that flash can deploy to."),
     "export": (".ride", "Write a ride for another program."),
     "flash": (".board", "Copy the firmware to a board, and start it."),
     "fleet": (".fleet", "Align many vehicles, find moved mounts, test their brakes."),
@@ -37,29 +41,23 @@ COMMANDS = {
 }
 
 
-@functools.cache
-def _commands() -> dict[str, tuple[str, str]]:
-    """COMMANDS, and those that other packages named kickstand_... add: their COMMANDS, in the same form."""
-    found = dict(COMMANDS)
-    for package in pkgutil.iter_modules():
-        if package.name.startswith("kickstand_") and package.name != __name__.partition(".")[0]:
-            found |= getattr(importlib.import_module(package.name), "COMMANDS", {})
-    return dict(sorted(found.items()))
-
-
 class Commands(click.Group):
-    """The commands of COMMANDS and of other packages."""
+    """The commands of COMMANDS, and those that other packages add: see added.py."""
 
     def list_commands(self, ctx: click.Context | None) -> list[str]:
-        return list(_commands())
+        return sorted(COMMANDS.keys() | added.entry_points().keys())
 
     def get_command(self, ctx: click.Context | None, cmd_name: str) -> click.Command | None:
-        module, _ = _commands().get(cmd_name, (None, None))
-        return getattr(importlib.import_module(module, __package__), f"{cmd_name}_command") if module else None
+        if cmd_name in COMMANDS:
+            return getattr(importlib.import_module(COMMANDS[cmd_name][0], __package__), f"{cmd_name}_command")
+        entry_point = added.entry_points().get(cmd_name)
+        return added.command(entry_point) if entry_point else None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        lines = {name: words for name, (_, words) in COMMANDS.items()}
+        others = {name: added.help_line(entry_point) for name, entry_point in added.entry_points().items()}
         with formatter.section("Commands"):
-            formatter.write_dl([(name, words) for name, (_, words) in _commands().items()])
+            formatter.write_dl(sorted((others | lines).items()))
 
 
 @click.group(
@@ -67,7 +65,7 @@ class Commands(click.Group):
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
 )
-@click.version_option(package_name="kickstand")
+@click.version_option(package_name=DISTRIBUTION)
 @click.pass_context
 def kickstand(context: click.Context) -> None:
     """Lean meter for any motorcycle: put it on a board, calibrate it, replay rides."""
@@ -80,7 +78,10 @@ def main(arguments: list[str] | None = None) -> None:
     # Before a command imports numpy. The matrices are small: more threads would take twice the processor for nothing
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        sys.exit(kickstand.main(arguments, prog_name="kickstand", standalone_mode=False))
+        with _ended_by_signals():
+            sys.exit(kickstand.main(arguments, prog_name="kickstand", standalone_mode=False))
+    except _Ended as ended:
+        _refuse("stopped", 128 + ended.number)
     except InputError as error:
         _refuse(str(error))
     except click.Abort:
@@ -96,18 +97,47 @@ def main(arguments: list[str] | None = None) -> None:
         _refuse(f"{about}{cause(error)}: check the disk, the file or the connection, then repeat this")
     except MemoryError:
         _refuse("this takes more memory than there is: give a part of it, or close other programs")
+    except RecursionError:
+        _refuse("a file has data within data, deeper than this program follows: it is damaged, or of no use here")
     except UnicodeError as error:
         _refuse(f"a name or a text is not in the letters that it should be in ({error}): rename the file")
     except Exception as error:
         if sys.flags.dev_mode:  # python -X dev: for whoever looks for the fault
             raise
-        _refuse(f"unexpected {type(error).__name__}: {error}: a fault in kickstand, please report it")
+        _refuse(f"unexpected {type(error).__name__}: {error}: a fault in {added.owner(error)}, please report it")
+
+
+class _Ended(BaseException):
+    """A signal asks this program to end. number: that of the signal."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
+
+
+@contextlib.contextmanager
+def _ended_by_signals() -> Iterator[None]:
+    """A context in which kill and a closed terminal raise _Ended, so that no temporary file is left."""
+
+    def end(number: int, _frame: object) -> None:
+        raise _Ended(number)
+
+    before = {}
+    if threading.current_thread() is threading.main_thread():
+        names = ("SIGTERM", "SIGHUP")  # the second is not on Windows, and is ignored after nohup
+        numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+        before = {n: signal.signal(n, end) for n in numbers if signal.getsignal(n) == signal.SIG_DFL}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _refuse(text: str, status: int = 2) -> None:
     """Leave with one printable line on standard error."""
     line = " ".join(text.split())
-    print("kickstand: " + "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line), file=sys.stderr)
+    print("kickstand: " + printable(line), file=sys.stderr)
     sys.exit(status)
 
 

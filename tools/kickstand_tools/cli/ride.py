@@ -16,7 +16,7 @@ from ..analysis.overview import Overview, overview
 from ..analysis.plot import plot
 from ..analysis.report import as_data, page
 from ..analysis.ride import Ride, open_ride
-from ..calibration.file import calibration_beside, calibration_path, read_calibration
+from ..calibration.file import CalibrationFile, calibration_beside, calibration_path, read_calibration
 from ..errors import InputError
 from ..estimation.alignment import fit_ride
 from ..estimation.smooth import smooth_to_csv
@@ -52,8 +52,9 @@ from . import common
 @common.from_to("Seconds from the start; negative: from the end.", "The same, for the end.")
 @common.RIGHT_HANDED
 @common.help_adds(
-    f"Known: {', '.join(NAMES)}. Any other table of accelerations (with gravity) and rates of rotation needs --columns "
-    "and --units."
+    f"Known: {', '.join(NAMES)}. Of any other table of accelerations (with gravity) and rates of rotation, columns and "
+    "units are found from its values; what is not certain is asked for, with the --columns and --units to type. "
+    "Raw counts of a sensor have the unit counts, or counts/131 for 131 counts per deg/s."
 )
 def import_command(
     source: Path, out: Path, columns: str | None, units: str | None, from_s: float | None, to_s: float | None
@@ -65,21 +66,24 @@ def import_command(
         found = import_recording(source, named, _pairs(units or "", "--units"), from_s, to_s)
         write_imported(out, found)
     Console().print(_import_table(found))
+    common.print_lines(f"{taken.quantity}: {taken.why}" for taken in found.taken if taken.why)
     common.warn(source, found.notices)
     t_s, gaps_s = found.log.t_s, found.gaps_s
     count = "1 gap" if len(gaps_s) == 1 else f"{len(gaps_s)} gaps"
     gaps = f", {count} of {gaps_s.sum():.1f} s in all" if len(gaps_s) else ""
-    click.echo(f"written: {out}, {len(t_s)} samples in {t_s[-1]:.1f} s, {found.rate_hz:.0f} a second{gaps}")
+    common.echo(f"written: {out}, {len(t_s)} samples in {t_s[-1]:.1f} s, {found.rate_hz:.0f} a second{gaps}")
     if found.vehicle_axes:
-        click.echo("x is left, y up, z forward, as far as the logger was mounted so")
+        common.echo("x is left, y up, z forward, as far as the logger was mounted so")
     beside = calibration_path(out)
     if beside.exists():
-        click.echo(f"{beside} belongs to an earlier ride.")
-        click.echo("If the sensor has been moved since, recalibrate: kickstand calibrate ride")
+        common.echo(f"{beside} belongs to an earlier ride.")
+        common.echo("If the sensor has been moved since, recalibrate: kickstand calibrate ride")
+    elif found.shortfalls:
+        common.warn(source, found.shortfalls)
     elif not any(notice.code in WRONG_AXES for notice in found.notices):
-        click.echo(f"next: kickstand calibrate ride {out} --out {beside}")
-        click.echo(f"      kickstand report {out}")
-        click.echo(f"      kickstand plot {out} --out plots")
+        common.echo(f"next: kickstand calibrate ride {out} --out {beside}")
+        common.echo(f"      kickstand report {out}")
+        common.echo(f"      kickstand plot {out} --out plots")
 
 
 @click.command()
@@ -101,9 +105,9 @@ def join_command(ride: Path, track: Path, out: Path) -> None:
     with Bar("writing") as bar:
         count = write_joined(out, joined, bar.reach)
     common.print_lines(_joined_lines(joined))
-    click.echo(f"written: {out}, {count} positions")
+    common.echo(f"written: {out}, {count} positions")
     if calibration_path(ride).is_file() and not calibration_path(out).exists():
-        click.echo(f"next: kickstand report {out} --calibration {calibration_path(ride)}")
+        common.echo(f"next: kickstand report {out} --calibration {calibration_path(ride)}")
 
 
 @click.command()
@@ -134,14 +138,14 @@ def compare_command(
         with whole_file(picture) as path:
             agreement.draw(path, found)
     if as_json:
-        click.echo(json.dumps(found.as_data()))
+        common.echo(json.dumps(found.as_data()))
     else:
         common.print_lines(agreement.words(found))
         common.print_lines([f"written: {picture}"] if picture is not None else [])
 
 
 @click.command()
-@common.file_argument("ride", "LOG.csv")
+@common.ride_or_export
 @common.CALIBRATION
 @common.STRETCH
 @click.option("--engine", type=click.Choice(["cpython", "micropython", "rp2040"]), default="cpython")
@@ -149,29 +153,30 @@ def compare_command(
 @common.RIGHT_HANDED
 def replay_command(ride: Path, calibration: Path | None, engine: str, out: Path, **stretch: float | None) -> None:
     """Run the firmware's own lean meter over a recorded log."""
-    calibration = _given_or_beside(ride, calibration, out)
-    parameters = read_calibration(calibration)
+    log, parameters = _log_of(ride, calibration, out)
     with Bar("replaying") as bar:
-        count, notices = replay_to_csv(_stretch(ride, **stretch), parameters, engine, out, bar.reach)
+        count, notices = replay_to_csv(_stretch(log, **stretch), parameters, engine, out, bar.reach)
     common.warn(ride, notices)
     if not parameters.aligned:
-        common.warning(f"{calibration} is not aligned: this is the lean of the sensor, not of the bike")
-    click.echo(f"written: {out}, {count} samples")
+        common.warning(
+            f"{calibration or calibration_path(ride)} is not aligned: this is the lean of the sensor, not of the bike"
+        )
+    common.echo(f"written: {out}, {count} samples")
 
 
 @click.command()
-@common.RIDE
+@common.ride_or_export
 @common.CALIBRATION
 @common.STRETCH
 @common.OUT
 @common.RIGHT_HANDED
 def smooth_command(ride: Path, calibration: Path | None, out: Path, **stretch: float | None) -> None:
     """Find the lean afterwards, from the whole ride, each sample with its standard deviation."""
-    parameters = read_calibration(_given_or_beside(ride, calibration, out))
+    log, parameters = _log_of(ride, calibration, out)
     with Bar("smoothing") as bar:
-        count, notices = smooth_to_csv(_stretch(ride, **stretch), parameters, out, bar.reach)
+        count, notices = smooth_to_csv(_stretch(log, **stretch), parameters, out, bar.reach)
     common.warn(ride, notices)
-    click.echo(f"written: {out}, {count} samples")
+    common.echo(f"written: {out}, {count} samples")
 
 
 @click.command()
@@ -188,7 +193,7 @@ def export_command(ride: Path, form: str, calibration: Path | None, live: bool, 
     with Bar("exporting") as bar:
         count = export(opened, form, out, bar.reach, notices)
     common.warn(ride, notices)
-    click.echo(f"written: {out}, {count} rows")
+    common.echo(f"written: {out}, {count} rows")
 
 
 @click.command()
@@ -202,7 +207,7 @@ def report_command(ride: Path, calibration: Path | None, live: bool, as_json: bo
     """Summarise a ride on one page: maxima, time at large leans, and each stop evaluated as a brake test."""
     seen = _overview(ride, calibration, live, **stretch)
     if as_json:
-        click.echo(json.dumps(as_data(seen)))
+        common.echo(json.dumps(as_data(seen)))
     else:
         Console().print(page(seen))
 
@@ -239,7 +244,7 @@ def cut_command(log: Path, from_s: float | None, to_s: float | None, out: Path) 
     with Bar("cutting") as bar:
         count, seconds = cut_log(log, out, from_s, to_s, bar.reach, notices)
     common.warn(log, notices)
-    click.echo(f"written: {out}, {count} samples, {seconds:.1f} s")
+    common.echo(f"written: {out}, {count} samples, {seconds:.1f} s")
 
 
 @click.command()
@@ -277,32 +282,56 @@ def overlay_command(
         made = overlay(ride, out, calibration, video, fps=rate, progress=bar.reach, **options)
     common.warn(ride, made.notices)
     if made.correlation is not None:
-        click.echo(
+        common.echo(
             f"the video begins at {made.offset_s:.2f} s of the ride, as the camera's gyro has it (correlation "
             f"{made.correlation:.2f}): --offset {made.offset_s:.2f}"
         )
-    click.echo(f"written: {out}, {made.pictures} frames, {made.end_s - made.begin_s:.1f} s, {made.fps:g} per second")
+    common.echo(f"written: {out}, {made.pictures} frames, {made.end_s - made.begin_s:.1f} s, {made.fps:g} per second")
 
 
-def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> tuple[Ride, list[Notice]]:
-    """A ride, and notices about its import. What an app has exported is imported and, where no calibration is given or
-    beside it, aligned by itself; a line says so."""
+def _from_export(source: Path, calibration: Path | None) -> tuple[Imported, CalibrationFile] | None:
+    """An app's export or a table, imported, with its calibration: the one given or beside it, else it is aligned by its
+    bends; a line says so. None for anything else, such as a log."""
     found = None
     if not is_log(source):
         with spinner("importing"):
             found = import_of_app(source)
     if found is None:
-        return open_ride(_stretch(source, **stretch), calibration, smoothed=not live), []
+        return None
     said = f"{source}: imported from {found.app}, {len(found.log.t_s)} samples, {found.rate_hz:.0f} a second"
     beside = calibration_path(source)
-    known = calibration or (beside if beside.exists() else None)
-    if known is None:
+    path = calibration or (beside if beside.exists() else None)
+    if path is not None:
+        known = read_calibration(path)
+    else:
         with Bar("aligning") as bar:
             fit = fit_ride(found.log, None, bar.reach)
         known = fit.calibration
         said += f"; aligned by its bends, {common.known_to(fit)}"
-    click.echo(said, err=True)
+    common.echo(said, err=True)
+    return found, known
+
+
+def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> tuple[Ride, list[Notice]]:
+    """A ride, and notices about its import. See _from_export()."""
+    taken = _from_export(source, calibration)
+    if taken is None:
+        return open_ride(_stretch(source, **stretch), calibration, smoothed=not live), []
+    found, known = taken
     return open_ride(_stretch(found.log, **stretch), known, smoothed=not live), found.notices
+
+
+def _log_of(source: Path, calibration: Path | None, out: Path) -> tuple[Path | Log, CalibrationFile]:
+    """A ride's log and its calibration; notices about its import are printed. See _from_export(). Raises InputError
+    without a calibration, and where writing out would fail or destroy an input."""
+    if is_log(source) or source.suffix.lower() == ".json":
+        return source, read_calibration(_given_or_beside(source, calibration, out))
+    check_output(out, [*_inputs(source), *([calibration] if calibration else [])])
+    taken = _from_export(source, calibration)
+    if taken is None:
+        return source, read_calibration(_given_or_beside(source, calibration, out))
+    common.warn(source, taken[0].notices)
+    return taken[0].log, taken[1]
 
 
 def _overview(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> Overview:

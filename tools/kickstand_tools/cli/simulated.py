@@ -12,7 +12,7 @@ from ..simulation.fleet.fleet import make_fleet
 from ..simulation.physics.mount import MOUNTS
 from ..simulation.physics.road import CLASSES
 from ..simulation.profiles import MAIN, PROFILES
-from .common import OUT_DIRECTORY, Command
+from .common import OUT_DIRECTORY, Command, echo
 
 LINES_S = 10.0  # between two lines of progress where there is no terminal for a bar
 PROFILE_NAMES = f"{', '.join(MAIN)}; hard ones: {', '.join(name for name in PROFILES if name not in MAIN)}."
@@ -65,7 +65,7 @@ def simulate_command(profile: str | None, seed: int, vehicles: int | None, out: 
         with Bar("making up vehicles", lines_s=LINES_S) as bar:
             fleet = make_fleet(out, vehicles, seed, progress=bar.reach)
         logs = sum(len(vehicle.paths) for vehicle in fleet)
-        click.echo(f"written: {out}/MANIFEST.csv and TRUTH.csv, {vehicles} vehicles, {logs} logs")
+        echo(f"written: {out}/MANIFEST.csv and TRUTH.csv, {vehicles} vehicles, {logs} logs")
         return
     if profile is None:
         raise click.UsageError("Missing option '--profile', or '--fleet' for a fleet.")
@@ -73,9 +73,9 @@ def simulate_command(profile: str | None, seed: int, vehicles: int | None, out: 
         raise InputError(f"{out} holds a fleet, whose truth would be lost: give --out another directory")
     with spinner("making up a ride"):
         made = simulate(profile, seed, out, **of_a_ride)
-    click.echo(f"written: {out / 'RIDE.csv'}, {len(made.time)} samples, with its poses and TRUTH.csv")
+    echo(f"written: {out / 'RIDE.csv'}, {len(made.time)} samples, with its poses and TRUTH.csv")
     begin = made.truth["lean_deg"][0]
-    click.echo(f"lean, > 0 to the right: {made.stand_deg:.1f} degrees in KICKSTAND.csv; RIDE.csv begins at {begin:.1f}")
+    echo(f"lean, > 0 to the right: {made.stand_deg:.1f} degrees in KICKSTAND.csv; RIDE.csv begins at {begin:.1f}")
 
 
 def _check_fleet(out: Path) -> None:

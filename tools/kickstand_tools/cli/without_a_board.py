@@ -13,7 +13,7 @@ from ..emulator import esp32_library, image, native
 from ..output import check_directory
 from ..progress import spinner
 from ..web import serve, site
-from .common import CHIP, PATH, file_argument
+from .common import CHIP, PATH, echo, file_argument
 
 _HAND = click.option("--hand", is_flag=True, help="Lean the bike and press the button yourself, with keys.")
 _CPYTHON = click.option("--cpython", is_flag=True, help="Run the firmware on CPython, not on MicroPython.")
@@ -45,7 +45,7 @@ def _demo(**chosen: Any) -> None:
     try:
         demo(**chosen)
     except DeviceStopped as error:
-        click.echo(str(error), err=True)
+        echo(str(error), err=True)
         sys.exit(1)
 
 
@@ -59,11 +59,11 @@ def web_command(out: Path | None) -> None:
         files = site.site_files()
     if out is not None:
         site.write_site(files, out)
-        click.echo(f"written: {out}, {len(files)} files for a web server: opened as files they do not run")
+        echo(f"written: {out}, {len(files)} files for a web server: opened as files they do not run")
         return
     with serve.server(files) as server:
         address = f"http://{serve.HOST}:{server.server_address[1]}/"
-        click.echo(f"Kickstand in the browser: {address} (Ctrl-C ends it)")
+        echo(f"Kickstand in the browser: {address} (Ctrl-C ends it)")
         webbrowser.open(address)
         with contextlib.suppress(KeyboardInterrupt):
             server.serve_forever()
@@ -75,6 +75,7 @@ def web_command(out: Path | None) -> None:
 @_DISPLAY
 def emulate_command(port: int, chip: str, display: str) -> None:
     """An emulated board on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
+    click.echo("starting: the emulator is being loaded, then the board is switched on, which takes some seconds")
     ready_emulator(chip)
     from ..emulator.emulate import emulate
 
@@ -82,11 +83,12 @@ def emulate_command(port: int, chip: str, display: str) -> None:
 
 
 def ready_emulator(chip: str) -> None:
-    """Find what the emulator of this chip needs, and compile it. To be called before anything of it is imported. Raises
-    InputError where something is missing."""
-    image.find()
+    """Find what this chip's emulator needs and nothing else; compile that of the Pico. Call it before importing the
+    emulator. Raises InputError if something is missing."""
     if chip == "esp32":
         esp32_library.find()
-    else:
-        with spinner("compiling the emulator, once"):
-            native.build()
+        return
+    with spinner(f"downloading {image.URL} into {image.path().parent}"):
+        image.find()
+    with spinner("compiling the emulator, once"):
+        native.build()

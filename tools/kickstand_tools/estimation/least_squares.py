@@ -12,7 +12,7 @@ from .first_guess import lean_and_speed, standing
 from .hypotheses import Hypotheses
 from .noise import BRIEF_S, LONG_S, Noise
 from .solver import RandomWalks, Reduced, covariances, posterior_covariance, reduce_windows, solve
-from .unknowns import BIAS, FORWARD, LEAN, LEFT, PARAMETERS, PITCH, ROTATION, STATES, UP, Prior
+from .unknowns import BIAS, CAMBER, FORWARD, LEAN, LEFT, PARAMETERS, PITCH, ROTATION, STATES, UP, Prior
 from .windows import Windows
 
 BLOCK = 50  # windows of a block; see solver.py
@@ -20,6 +20,7 @@ ROUNDS, PLAIN_ROUNDS = 20, 2  # most steps; the first PLAIN_ROUNDS of them do no
 # rad, a step's largest change of an angle: under NEAR the hypotheses are weighed, under CONVERGED it has converged
 NEAR, CONVERGED = np.radians([3.0, 0.02])
 WEIGHING_ROUNDS = 2  # steps that weigh the hypotheses anew
+CAMBERED = 0.5  # unbalance on roads with camber. Less of it shows roads that have less, because camber changes.
 MAX_LEAN = 0.5  # rad: largest change of an angle in one step. Beyond it the equations are not linear.
 MAX_PITCH = 1.2  # rad: as in the firmware
 START = np.array([1.0, 0.3, 1.0, 1.0, 20.0, 0.03, 0.03, 0.03])  # standard deviations of the first state's prior
@@ -117,8 +118,7 @@ class Estimate:
 
     def _learn_misfit(self) -> bool:
         """Are accelerations somewhere in the ride not the bike's?"""
-        off = self._residuals()
-        self.noise.estimate_misfit(off / self.noise.robust(self.noise.sigma(), off))
+        self.noise.estimate_misfit(self._residuals())
         return bool(np.max(self.noise.misfit) > 1.0)
 
     def _use_own_noise(self) -> None:
@@ -128,8 +128,10 @@ class Estimate:
         less weight to errors that the model lacks and that last long.
         """
         off = self._residuals()
+        self.noise.count_own_misfit()
         self.noise.estimate_roughness(off / self.noise.robust(self.noise.sigma(), off))
         self.noise.estimate_unbalance(off[:, BALANCED], LONG_S)
+        self.prior.sigma[CAMBER] *= min(1.0, self.noise.unbalance / CAMBERED)
 
     def _step(self, robust: bool, weigh: bool) -> None:
         """One Gauss-Newton step. robust: down-weight outliers. weigh: compute the hypotheses' posterior weights before.

@@ -52,15 +52,16 @@ ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
 # Accelerations that are not the bike's, as of a mount that resonates, are white noise only as far as they do not last.
 # Their size and correlation time show in CLIMBING: the upward velocity by integrated forces and that by pitch and speed
 # differ for seconds. The velocities' standard deviation grows with the square of this residual's rms, in means over
-# LASTING_MISFIT_S and times the root of their number of windows, over that of an ordinary ride, USUAL_MISFIT.
-LASTING_MISFIT_S, USUAL_MISFIT, MOST_MISFIT = 2.0, 0.3, 6.0
+# LASTING_MISFIT_S and times the root of their number of windows, over that of an ordinary ride, USUAL_MISFIT. Its unit
+# is CLIMBING's standard deviation at MISFIT_MPS at any speed: a mount errs by as many m/s in town as on a motorway.
+LASTING_MISFIT_S, MISFIT_MPS, USUAL_MISFIT, MOST_MISFIT = 2.0, 25.0, 0.25, 6.0
 # Where the misfit is over 1, roughness is at least this times the misfit, because residuals of lasting errors are small
 MISFIT_ROUGHNESS = 0.14
 # How far from balance a ride is, likewise: by the rms of BALANCED in means over some seconds, less its mean over
 # LASTS_S (that is unknowns.BESIDE), over its standard deviation. Longer means average out errors that change sign, such
 # as a rider's corrections: BRIEF_S overestimates the noise to be cautious, LONG_S does not.
 BRIEF_S, LONG_S, LASTS_S = 3.0, 10.0, 40.0
-LEAST_UNBALANCE, MOST_UNBALANCE = 0.25, 6.0
+LEAST_UNBALANCE, MOST_UNBALANCE = 0.12, 6.0
 LEAST_WINDOWS = 50  # with fewer windows of balanced riding unbalance stays 1
 
 
@@ -69,7 +70,8 @@ class Noise:
 
     lean, pitch (n, rad), speed (n, m/s): estimates, to be set before sigma(). riding (n): True where the bike rides, or
     may. roughness (n): 1 for a rough ride; multiplies the noise of vibration. misfit (n): factor on the velocities'
-    noise, 1 where the accelerations are the bike's. unbalance: 1 for an average ride; multiplies the noise of BALANCED.
+    noise, 1 where the accelerations are the bike's. doubtful (n): True where the bike rides and the misfit is bounded.
+    unbalance: 1 for an average ride; multiplies the noise of BALANCED.
     """
 
     def __init__(self, windows: Windows, still: Bools) -> None:
@@ -79,6 +81,7 @@ class Noise:
         self.riding = ~windows.gap & ~still & ~self._not_riding
         self.lean = self.pitch = self.speed = np.zeros(len(windows))
         self.roughness, self.misfit, self.unbalance = np.ones(len(windows)), np.ones(len(windows)), 1.0
+        self._own_misfit, self.doubtful = self.misfit, np.zeros(len(windows), dtype=bool)
         seconds = np.maximum(windows.seconds, 1e-4)
         self._root = np.sqrt(seconds)[:, None]
         self._lasting = np.ones((len(windows), eq.ROWS))  # factor on a window's sigma because its error lasts longer
@@ -105,7 +108,7 @@ class Noise:
         found[riding, eq.CLIMBING] = (roughness * np.hypot(DIVE_MPS, DIVE_RAD * speed))[riding]
         found[riding, eq.SLOPING] = np.hypot(SLOPE_MPS, SLOPE_RAD * speed)[riding]
         found[balanced, eq.BALANCED] = (self.unbalance * self._of_balance())[balanced]
-        found[:, eq.CLIMBING : eq.SLOPING + 1] *= (1.0 + (self.pitch / STEEP) ** 4)[:, None]
+        found[:, eq.CLIMBING : eq.SLOPING + 1] *= self._steep[:, None]
         found[riding, eq.ANY_SPEED] = ANY_MPS
         found *= self._lasting
         found[balanced, eq.BALANCED] = np.hypot(found[:, eq.BALANCED], BALANCE_ROLLING * self._rolling)[balanced]
@@ -130,16 +133,37 @@ class Noise:
         least = np.where(self.misfit > 1.0, MISFIT_ROUGHNESS * self.misfit, LEAST_ROUGHNESS)
         self.roughness = np.where(share > 0.02, np.clip(np.sqrt(found), least, MOST_ROUGHNESS), 1.0)
 
-    def estimate_misfit(self, residual: Array) -> None:
-        """How far accelerations are from the bike's, from the residuals over their standard deviations (n, ROWS)."""
+    def estimate_misfit(self, off: Array) -> None:
+        """How far accelerations are from the bike's, from the residuals off (n, ROWS).
+
+        For the states in units of CLIMBING's standard deviation, which grows with speed: slow rides are weighed less
+        than they deserve, at little cost. For the covariance, by count_own_misfit(), in m/s.
+        """
+        limit = OUTLIER / self._lasting[:, eq.CLIMBING]
+
+        def factor(sigma: Array) -> Array:
+            size = off[:, eq.CLIMBING] / sigma
+            return self._misfit(size / np.hypot(1.0, size / limit))
+
+        unit = np.hypot(DIVE_MPS, DIVE_RAD * MISFIT_MPS) * self._steep * self._lasting[:, eq.CLIMBING]
+        self._own_misfit = factor(unit)
+        self.misfit = factor(self.sigma()[:, eq.CLIMBING])
+        self.doubtful = self.riding & (self.misfit >= MOST_MISFIT)
+
+    def count_own_misfit(self) -> None:
+        """From here on sigma() has the misfit that was counted in m/s."""
+        self.misfit = self._own_misfit
+
+    def _misfit(self, residual: Array) -> Array:
+        """(n) misfit from the residual of CLIMBING in its unit (n)."""
         count = round(LASTING_MISFIT_S / WINDOW_S)
-        lasting = np.where(self.riding, residual[:, eq.CLIMBING], 0.0)
+        lasting = np.where(self.riding, residual, 0.0)
         # limited: on a wheelie the residual is large, but brief
         squares = np.minimum(count * moving_mean(lasting, count) ** 2, 2.0 * MOST_MISFIT * USUAL_MISFIT**2)
         share = averaged(self.riding.astype(float), ROUGHNESS_S)
         mean = averaged(np.where(self.riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
         found = np.where(share > 0.02, mean / USUAL_MISFIT**2, 1.0)
-        self.misfit = np.clip(found, 1.0, MOST_MISFIT)
+        return np.clip(found, 1.0, MOST_MISFIT)
 
     def estimate_unbalance(self, force: Array, over_s: float) -> None:
         """Set unbalance from the measurement BALANCED (n, g). over_s: BRIEF_S or LONG_S."""
@@ -156,9 +180,9 @@ class Noise:
         self.unbalance = float(np.clip(np.sqrt(np.mean(mean**2) / left), LEAST_UNBALANCE, MOST_UNBALANCE))
 
     @property
-    def doubtful(self) -> Bools:
-        """(n) True where the bike rides and its accelerations are so far from a bike's that the misfit is bounded."""
-        return self.riding & (self.misfit >= MOST_MISFIT)
+    def _steep(self) -> Array:
+        """(n) factor on the noise of what wheels do upwards: on a wheelie the chassis does not point along the road."""
+        return 1.0 + (self.pitch / STEEP) ** 4
 
     @property
     def _balanced(self) -> Bools:

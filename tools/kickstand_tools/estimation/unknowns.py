@@ -21,7 +21,7 @@ HEIGHT, AHEAD = 24, 25  # m: the sensor's height above the roll axis, and its di
 TYRES = 26  # ratio: force to the side over (sin(lean) force up), because tyres touch the road beside their middle
 BESIDE = 27  # g: level force to the side that lasts, by wind; see hypotheses.py
 DELAY = 28  # s: delay of the log's speed
-DIVE = 29  # rad per m/s^2: pitch of the nose in braking
+DIVE = 29  # rad per g: pitch of the nose in braking, the share of (8) in the firmware's kickstand.lean.dive
 CAMBER = 30  # g: force to the side on straights, where a cambered road meets the tyres beside their middle
 # temperature coefficients of the accelerometer's bias (g per C) and the gyro's (rad/s per C), see Windows.warm
 OFFSET_PER_C, BIAS_PER_C = slice(31, 34), slice(34, 37)
@@ -41,9 +41,9 @@ MEAN[HEIGHT], SIGMA[HEIGHT] = 0.5, 0.3
 MEAN[AHEAD], SIGMA[AHEAD] = 0.6, 0.5
 MEAN[TYRES], SIGMA[TYRES] = 0.07, 0.06
 SIGMA[BESIDE] = 0.001
-SIGMA[CAMBER] = 0.0055  # ordinary tyres, whose TYRES is 0.12, on a road that falls to the side by 2.6 degrees
+SIGMA[CAMBER] = 0.0035  # ordinary tyres, whose TYRES is 0.12, on a road that falls to the side by 3 %
 MEAN[DELAY], SIGMA[DELAY] = 0.4, 0.4
-MEAN[DIVE], SIGMA[DIVE] = np.radians([0.2, 0.2])
+MEAN[DIVE], SIGMA[DIVE] = 0.026, 0.035  # none or, as of anti-dive forks, below 0, to 6 degrees per g
 
 
 @dataclass

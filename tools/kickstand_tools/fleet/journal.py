@@ -37,8 +37,7 @@ class Journal:
 
     def __enter__(self) -> "Journal":
         try:
-            self._file = open(os.open(self._path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666), "r+b")
-            self._lock()
+            self._open()
             self._end = 0
             while line := self._file.readline(_LONGEST):
                 if not self._note(line) and line.strip():
@@ -50,6 +49,16 @@ class Journal:
         except OSError as error:
             raise InputError(f"{self._path} cannot be used: {cause(error)}: give --out another directory") from error
         return self
+
+    def _open(self) -> None:
+        """Open the file and lock it, again if the run before has removed it meanwhile."""
+        while True:
+            self._file = open(os.open(self._path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666), "r+b")
+            self._lock()
+            with contextlib.suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(self._file.fileno()), self._path.stat()):
+                    return
+            self._file.close()
 
     def _lock(self) -> None:
         """Lock the file against a second run that writes to it. Raises InputError."""
@@ -64,8 +73,11 @@ class Journal:
 
     def __exit__(self, *exception: object) -> None:
         with contextlib.suppress(OSError):
+            if not self._end and os.name != "nt":  # while it is locked: it may be another run's as soon as it is not
+                self._path.unlink()
+        with contextlib.suppress(OSError):
             self._file.close()
-            if not self._end:
+            if not self._end and os.name == "nt":  # which removes no open file
                 self._path.unlink()
 
     def __contains__(self, key: str) -> bool:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import IO
 
-from ..errors import InputError
+from ..errors import InputError, printable
 from ..logs.source import SUFFIXES, errors_of, open_input
 
 _EXCEL = b"\xd0\xcf\x11\xe0"  # first bytes of Excel's older files; the newer are zips
@@ -124,7 +124,7 @@ def _unzipped(path: Path) -> Iterator[tuple[str, bytes]]:
                 raise InputError(f"{path}: a table of Excel: export it as CSV")
             for entry in archive.infolist():
                 if not entry.is_dir() and _wanted(entry.filename):
-                    yield entry.filename.replace("\\", "/"), _unpacked(archive, entry, path)
+                    yield printable(entry.filename.replace("\\", "/")), _unpacked(archive, entry, path)
 
 
 def _unpacked(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, path: Path) -> bytes:

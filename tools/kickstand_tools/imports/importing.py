@@ -12,6 +12,7 @@ from kickstand.errors import Notice
 
 from ..checks.course import log_agrees
 from ..errors import InputError
+from ..estimation.first_guess import MIN_RIDING_S
 from ..logs.csv_lines import write_log
 from ..logs.log import Log
 from ..logs.reader import read_log
@@ -27,6 +28,7 @@ from .units import ACCELERATIONS, SPEEDS, factor, unit
 # read(files, name): such a list's Recording (see recording.py), or InputError. Each is asked about the files that none
 # before it has claimed: phyphox, which goes by names of columns, is last.
 _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
+LEAST_HZ = 19.5  # samples per second that a lean needs: 20, with the clock of a phone
 NAMES = [app.NAME for app in reversed(_APPS)]
 
 
@@ -52,6 +54,13 @@ class Imported:
         return 1.0 / float(np.median(np.diff(self.log.t_s)))
 
     @property
+    def shortfalls(self) -> list[Notice]:
+        """Why no alignment can be found from it: too few samples per second, too short."""
+        found = [Notice("import-slow", self.rate_hz)] if self.rate_hz < LEAST_HZ else []
+        lasts_s = float(self.log.t_s[-1])
+        return found + ([Notice("import-short", lasts_s, MIN_RIDING_S)] if lasts_s < MIN_RIDING_S else [])
+
+    @property
     def gaps_s(self) -> Array:
         """Duration of each gap, s."""
         steps = np.diff(self.log.t_s)
@@ -67,7 +76,8 @@ def import_recording(
 ) -> Imported:
     """Read a recording of another app or logger: a file, a folder or a zip.
 
-    Known are the exports of the apps that `kickstand import --help` names. Of any other table columns says which is
+    Known are the exports of the apps that `kickstand import --help` names. Of any other table the columns and units are
+    found from its values where these are certain. Else, or where they are given, columns says which is
     which ({"t": "time", "ax": "accX", ...}: t, ax, ay, az, gx, gy, gz, and speed, lat, lon, temp where there are), and
     units in which unit ({"a": "m/s2", "g": "rad/s", "speed": "km/h"}; a - before a unit reverses the sign). start_s,
     end_s: the stretch to take, from the recording's own start. Raises InputError.
@@ -91,7 +101,9 @@ def import_of_app(source: Path) -> Imported | None:
     be read, and as import_recording()."""
     try:
         files = read_files(source)
-        known = any(app is not own for app, _ in recordings(files))
+        of_apps = recordings(files)
+        table = None if of_apps else mapped.table_in(files)
+        known = any(app is not own for app, _ in of_apps) or (table is not None and table.findings.decided)
     except InputError:
         if source.is_dir() or is_zipfile(source):
             raise
@@ -127,13 +139,16 @@ def write_imported(path: Path | str, imported: Imported) -> None:
 def _recording(
     files: list[RecordingFile], name: str, columns: Mapping[str, str] | None, units: dict[str, str]
 ) -> Recording:
-    if columns is not None:
-        if len(files) > 1:
-            raise InputError(f"{name} holds {len(files)} files: give --columns with one, such as {files[0].name}")
-        return mapped.read_mapped(files[0], columns, units)
     found = recordings(files)
+    if columns is not None:
+        return mapped.read_mapped(mapped.sheet_of(files, name, columns), columns, units)
     if not found:
-        raise mapped.unknown(files, name)
+        table = mapped.table_in(files)
+        mapped.check_units(units)
+        recording = None if table is None else mapped.read_table(table, units)
+        if recording is None:
+            raise mapped.unknown(files, name, table)
+        return recording
     if len(found) > 1:
         which = ", ".join(group[0].folder or group[0].name for _, group in found[:4])
         more = ", ..." if len(found) > 4 else ""

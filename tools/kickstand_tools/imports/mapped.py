@@ -1,4 +1,4 @@
-"""Reads any other table: its columns are named by the user, or guessed for the command line that is suggested."""
+"""Reads a table of no app that is known: its columns are found from their values (findings.py) or named by the user."""
 
 import re
 import shlex
@@ -6,130 +6,174 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from kickstand.units import STANDARD_GRAVITY
+from kickstand.errors import Notice
 
 from ..errors import InputError
+from ..signals import Array
+from . import findings
 from .files import RecordingFile
-from .recording import Recording, Sensor, Sheet, Taken, names_in, plain, rate_hz, read_sheet, track_of, unit_in
-from .units import ACCELERATIONS, ANGLES, EPOCH_NS, RATES, SPEEDS, TIMES, Nanoseconds, factor, time_unit, unit
+from .findings import ACCEL, GYRO, OPTIONAL, REQUIRED, Findings
+from .layout import FEWEST_CELLS, joined_sheet, sheet_in
+from .rate_fit import fit_rates, turns_too_far
+from .recording import Recording, Sensor, Sheet, Taken, plain, rate_hz, track_of, unit_in
+from .speeds import unit_by_positions
+from .units import (
+    ACCELERATIONS,
+    ANGLES,
+    COUNTS_PER_DPS,
+    COUNTS_PER_G,
+    EPOCH_NS,
+    RATES,
+    REPEATED,
+    SPEEDS,
+    TIMES,
+    Nanoseconds,
+    counts_per,
+    factor,
+    time_unit,
+    unit,
+)
 
 NAME = "a table"
-ACCEL, GYRO = ("ax", "ay", "az"), ("gx", "gy", "gz")
-REQUIRED = ("t", *ACCEL, *GYRO)
-OPTIONAL = ("speed", "lat", "lon", "temp")
 WORDS = {"t": "time"} | {f"a{axis}": f"acceleration along {axis}" for axis in "xyz"}
 WORDS |= {f"g{axis}": f"rate about {axis}" for axis in "xyz"}
 WORDS |= {"speed": "speed", "lat": "latitude", "lon": "longitude", "temp": "temperature"}
 UNIT_KEYS = {"t": TIMES, "a": ACCELERATIONS, "g": RATES, "speed": SPEEDS, "lat": ANGLES, "lon": ANGLES}
 UNIT_KEYS |= dict.fromkeys(ACCEL, ACCELERATIONS) | dict.fromkeys(GYRO, RATES)
-_AXIS = r"(?:^|[^a-z]){0}(?:$|[^a-z])|{0}$"
-_ACCEL_NAME = re.compile(r"acc|gforce|^a_?[xyz]\b")
-_GYRO_NAME = re.compile(r"gyr|rotation|omega|angular|^[gw]_?[xyz]\b")
-_UNIT_END = re.compile(r"_(g|mps2|ms2|dps|rads?|rps)$")
-_NUMBER = re.compile(r"[+-]?[\d.,]+(?:[eE][+-]?\d+)?")
-# Nine tenths of a ride's readings are below these: 4 g, and 172 deg/s in rad/s
-_FORCES = {"g": 4.0, "m/s2": 4.0 * STANDARD_GRAVITY, "mg": np.inf}
-_TURNS = {"rad/s": 3.0, "deg/s": 500.0, "mdeg/s": np.inf}
-_HEADER_LINES = 60  # number of lines in which the line of names is searched
-FEWEST_NUMBERS = 4  # least numbers in a row, a time and three axes: text with commas in it has none
-
-
-def read_mapped(file: RecordingFile, columns: Mapping[str, str], units: Mapping[str, str]) -> Recording:
-    """A table with the columns named for t, ax to az, gx to gz and, as there are, speed, lat, lon and temp.
-
-    columns: by these, the name of each in the file, or #1, #2 ... for its number. units: of t, a (all of ax to az) or
-    ax, ay, az, g (of gx to gz) or gx, gy, gz, speed, lat, lon; a - before one turns the sign. A unit that is not given
-    is the one in brackets in the column's name. Raises InputError.
-    """
-    _check_keys(columns, units)
-    sheet = read_sheet(file, header_line(file, columns))
-    places = {key: _place(sheet, key, wanted) for key, wanted in columns.items()}
-    _check_units(sheet, places, units)
-    t_unit = units.get("t") or unit_in(sheet.columns[places["t"]])
-    t_unit = time_unit(sheet.cells[places["t"]], t_unit if unit(t_unit) in TIMES else "")
-    time_ns = sheet.times(places["t"], t_unit)
-    accel = _sensor(sheet, time_ns, places, units, "accelerometer")
-    accel.taken.insert(0, Taken("time", sheet.named([places["t"]]), t_unit))
-    gyro = _sensor(sheet, time_ns, places, units, "gyro")
-    lat, lon = (factor(units.get(key, "deg"), ANGLES, key) for key in ("lat", "lon"))
-    speed_unit = "m/s"
-    if "speed" in places:
-        speed_unit = unit(_unit(units, ("speed",), sheet.columns[places["speed"]]))
-    track = track_of(sheet, time_ns, places.get("speed"), places.get("lat"), places.get("lon"), speed_unit, (lat, lon))
-    temp_c = sheet.numbers(places["temp"]) if "temp" in places else None
-    utc_ns = 0 if len(time_ns) and int(np.median(time_ns)) > EPOCH_NS else None
-    return Recording(NAME, accel, gyro, track, temp_c, utc_ns=utc_ns, sign_known=_turned(units))
+COUNTS = "counts"  # raw counts whose number per g or per deg/s is found from the values
+_TIMES_OFF = 3.0  # a unit is refused if the turns of gravity show another one that differs by this factor
 
 
 @dataclass
 class Table:
-    """A table of sensors of an unknown app. columns: their names in it; found: the columns that seem to be those of
-    REQUIRED and OPTIONAL; units: their probable units, by UNIT_KEYS."""
+    """A table of sensors of an unknown app: its columns, and what they seem to be. joined: made of several files."""
 
     name: str
-    columns: list[str]
-    found: dict[str, str]
-    units: dict[str, str]
+    sheet: Sheet
+    findings: Findings
+    joined: bool = False
+
+    @property
+    def columns(self) -> list[str]:
+        return self.sheet.columns
+
+    @property
+    def found(self) -> dict[str, str]:
+        """The columns by the keys of REQUIRED and OPTIONAL."""
+        return self.findings.columns
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The probable units by UNIT_KEYS."""
+        return self.findings.units
 
     @property
     def missing(self) -> list[str]:
         """The columns of REQUIRED that are not found."""
         return [key for key in REQUIRED if key not in self.found]
 
+    def first_seconds(self, seconds: float = 10.0, points: int = 300) -> dict[str, list[float] | list[list[float]]]:
+        """The beginning of the time (t, s), accelerometer (a) and gyro (g) that are found, thinned out, as they are in
+        the table; empty without a time."""
+        found = self.findings.found
+        if "t" not in found:
+            return {}
+        place = self.columns.index(found["t"].columns[0])
+        since = _seconds(self.sheet.times(place, found["t"].unit))
+        shown = np.flatnonzero(since <= seconds)
+        shown = shown[:: max(1, len(shown) // points)]
+        picture: dict[str, list[float] | list[list[float]]] = {"t": since[shown].round(3).tolist()}
+        for key in ("a", "g"):
+            if key in found:
+                values = self.sheet.table([self.columns.index(name) for name in found[key].columns])[shown]
+                picture[key] = np.nan_to_num(values).round(5).T.tolist()
+        return picture
+
     @property
     def lacking(self) -> str:
         """The missing columns in words, "" for none."""
-        missing = self.missing
-        lacking = ["time"] if "t" in missing else []
-        lacking += [word for word, axes in (("acceleration", ACCEL), ("gyro", GYRO)) if set(axes) & set(missing)]
-        return f", and no {', '.join(lacking)} found in it" if lacking else ""
+        lacking = self.findings.lacking
+        return f", and no {', no '.join(lacking)} found in it" if lacking else ""
+
+
+def read_mapped(
+    sheet: Sheet, columns: Mapping[str, str], units: Mapping[str, str], why: Findings | None = None
+) -> Recording:
+    """A table with the columns named for t, ax to az, gx to gz and, as there are, speed, lat, lon and temp.
+
+    columns: by these, the name of each in the file, or #1, #2 ... for its number. units: of t, a (all of ax to az) or
+    ax, ay, az, g (of gx to gz) or gx, gy, gz, speed, lat, lon; a - before one turns the sign. A unit that is not given
+    is the one in brackets in the column's name. why: the findings that the columns come from. Raises InputError, also
+    for units in which the rates do not turn gravity.
+    """
+    check_keys(columns, units)
+    places = {key: _place(sheet, key, wanted) for key, wanted in columns.items()}
+    _check_apart(places, columns)
+    _check_units(sheet, places if why is None else {k: v for k, v in places.items() if k != "speed"}, units)
+    t_unit = units.get("t") or unit_in(sheet.columns[places["t"]])
+    t_unit = time_unit(sheet.cells[places["t"]], t_unit if unit(t_unit) in TIMES else "")
+    time_ns = sheet.times(places["t"], t_unit)
+    units = _with_counts(sheet, time_ns, places, dict(units))
+    force, rates = (_scaled(sheet, places, units, axes) for axes in (ACCEL, GYRO))
+    _check_rates(sheet.name, _seconds(time_ns), force, rates)
+    accel = _sensor(sheet, time_ns, places, units, "accelerometer", force)
+    accel.taken.insert(0, Taken("time", sheet.named([places["t"]]), t_unit))
+    gyro = _sensor(sheet, time_ns, places, units, "gyro", rates)
+    lat, lon = (factor(units.get(key, "deg"), ANGLES, key) for key in ("lat", "lon"))
+    speed, speed_unit, notices = _speed(sheet, time_ns, places, units, (lat, lon))
+    track = track_of(sheet, time_ns, speed, places.get("lat"), places.get("lon"), speed_unit, (lat, lon))
+    temp_c = sheet.numbers(places["temp"]) if "temp" in places else None
+    utc_ns = 0 if len(time_ns) and int(np.median(time_ns)) > EPOCH_NS else None
+    recording = Recording(NAME, accel, gyro, track, temp_c, notices, utc_ns=utc_ns, sign_known=_turned(units))
+    if why is not None:
+        for taken, key in zip(recording.taken, ("t", "a", "g")):
+            taken.why = why.found[key].why
+    return recording
 
 
 def table_in(files: list[RecordingFile]) -> Table | None:
-    """The largest of these files, None where that is no table of sensors."""
-    file = max(files, key=lambda file: len(file.text))
-    number = header_line(file, {})
-    lines = [line for line in file.text.split("\n", _HEADER_LINES + 3)[number:] if line.strip()]
-    columns = names_in(lines[0])
-    found = guessed(columns)
-    numbers = max((_numbers(names_in(line)) for line in lines[1:3]), default=0)
-    if numbers < (FEWEST_NUMBERS if found else len(REQUIRED)):
+    """The table in these files, the largest of several that do not belong together; None if that is no table of
+    sensors."""
+    largest = max(files, key=lambda file: len(file.text))
+    sheet = sheet_in(largest)
+    found = None if sheet is None else findings.find(sheet)
+    if len(files) > 1 and (found is None or found.lacking):
+        joined = joined_sheet(files)
+        of_all = None if joined is None else findings.find(joined)
+        if joined and of_all and (found is None or len(of_all.lacking) < len(found.lacking)):
+            return Table(joined.name, joined, of_all, True)
+    if sheet is None or found is None or not ({"a", "g"} & set(found.found) or len(sheet.columns) >= len(REQUIRED)):
         return None
-    units = {
-        "a": _seems_in(found.get("ax", ""), ACCELERATIONS, _by_size(file, number, found, ACCEL, _FORCES) or "m/s2")
-    }
-    units["g"] = _seems_in(found.get("gx", ""), RATES, _by_size(file, number, found, GYRO, _TURNS) or "rad/s")
-    if "speed" in found:
-        units["speed"] = _seems_in(found["speed"], SPEEDS, "km/h")
-    return Table(file.name, columns, found, units)
+    return Table(largest.name, sheet, found)
 
 
-def _seems_in(column: str, kinds: Mapping[str, float], usual: str) -> str:
-    """The unit, one of kinds, in brackets or behind the last _ of a column's name, else `usual`."""
-    stated = (unit(unit_in(column)), unit(column.rpartition("_")[2]))
-    return next((name for name in stated if name in kinds), usual)
+def sheet_of(files: list[RecordingFile], name: str, columns: Mapping[str, str]) -> Sheet:
+    """The table that has these columns: of one file, or of several that are joined. name: for messages. Raises
+    InputError."""
+    wanted = [column.strip() for column in columns.values() if not column.strip().startswith("#")]
+    sheet = sheet_in(files[0], wanted) if len(files) == 1 else joined_sheet(files)
+    if len(files) > 1 and (sheet is None or not set(wanted) <= set(sheet.columns)):
+        raise InputError(f"{name} holds {len(files)} files: give --columns with one, such as {files[0].name}")
+    if sheet is None:
+        raise InputError(f"{name}: no table of sensors: no two lines have {FEWEST_CELLS} numbers in as many cells")
+    return sheet
 
 
-def _by_size(
-    file: RecordingFile, header: int, found: Mapping[str, str], axes: tuple[str, ...], limits: Mapping[str, float]
-) -> str:
-    """The unit in which nine tenths of the readings of three axes are below its limit, "" where an axis is missing."""
-    if not set(axes) <= set(found):
-        return ""
-    try:
-        sheet = read_sheet(file, header)
-        with np.errstate(over="ignore"):
-            sizes = np.sqrt(sum(sheet.numbers(sheet.columns.index(found[axis])) ** 2 for axis in axes))
-    except (InputError, ValueError):
-        return ""
-    sizes = sizes[np.isfinite(sizes)]
-    most = float(np.percentile(sizes, 90.0)) if len(sizes) else np.nan
-    return next((name for name, limit in limits.items() if most < limit), "")
+def read_table(table: Table, units: Mapping[str, str]) -> Recording | None:
+    """The recording of a table whose columns and units are certain, or given in units; None if they are not.
+
+    Raises InputError.
+    """
+    found = table.findings
+    uncertain = {key for key in ("t", "a", "g") if key not in found.found or not found.found[key].certain}
+    if found.lacking or not uncertain <= set(units):
+        return None
+    return read_mapped(table.sheet, found.columns, found.units | dict(units), found)
 
 
-def unknown(files: list[RecordingFile], source: str) -> InputError:
+def unknown(files: list[RecordingFile], source: str, table: Table | None = None) -> InputError:
     """The error for a file of an unknown app: missing columns, its columns, and the command line to type."""
-    table = table_in(files)
+    table = table or table_in(files)
     if table is None:
         shown = next((line for file in files for line in file.first_lines(1)), "")[:60]
         return InputError(
@@ -138,71 +182,131 @@ def unknown(files: list[RecordingFile], source: str) -> InputError:
         )
     several = f" (of {len(files)} files, the largest is {table.name})" if len(files) > 1 else ""
     shown = ", ".join(table.columns[:40]) + (", ..." if len(table.columns) > 40 else "")
-    given = [f"{key}={table.found.get(key, '?')}" for key in REQUIRED]
-    given += [f"{key}={table.found[key]}" for key in OPTIONAL if key in table.found]
+    found = table.findings
+    if "gyro" in found.lacking and ("a" in found.found or found.remarks):
+        return InputError(
+            f"{source}: not a file of an app that is known{several}, and no gyro found in it: without one there is no "
+            f"lean. Record the gyroscope as well. Its columns are {shown}"
+        )
+    if found.remarks:
+        return InputError(f"{source}: not a file of an app that is known{several}{table.lacking}: {found.remarks[0]}")
+    if found.lacking == ["time"]:
+        return InputError(
+            f"{source}: not a file of an app that is known{several}, and no time found in it: write the time of each "
+            "row, such as millis(), or switch the time stamps of the serial monitor on"
+        )
+    given = [f"{key}={_typed(table, key)}" for key in (*REQUIRED, *OPTIONAL) if key in (*REQUIRED, *table.found)]
     units = ",".join(f"{key}={name}" for key, name in table.units.items())
-    where = source if len(files) == 1 else f"{source}/{table.name}"
+    where = source if len(files) == 1 or table.joined else f"{source}/{table.name}"
     ask = "Put in what the ? stand for" if table.missing else "Put in what is not right"
+    reasons = f" ({found.reasons})" if found.reasons else ""
     return InputError(
         f"{source}: not a file of an app that is known{several}{table.lacking}",
         "name_columns",
-        f"its columns are {shown}. {ask}, and type: kickstand import {shlex.quote(where)} --out RIDE.csv "
+        f"its columns are {shown}. {ask}{reasons}, and type: kickstand import {shlex.quote(where)} --out RIDE.csv "
         f"--columns {shlex.quote(','.join(given))} --units {units}",
     )
 
 
-def header_line(file: RecordingFile, columns: Mapping[str, str]) -> int:
-    """Number of the line of names: the first that holds all that are asked for, else the widest before the numbers."""
-    wanted = {name.strip() for name in columns.values() if not name.strip().startswith("#")}
-    widest, width = 0, 0
-    for number, line in enumerate(file.text.split("\n", _HEADER_LINES)[:_HEADER_LINES]):
-        cells = names_in(line)
-        if wanted and wanted <= set(cells):
-            return number
-        numbers = _numbers(cells)
-        if len(cells) > width and numbers < len(cells) / 2:
-            widest, width = number, len(cells)
-    return widest
+def _typed(table: Table, key: str) -> str:
+    """The column of a key as it is typed: by its number where its name would be misread; ? for none."""
+    name = table.found.get(key, "?")
+    if name != "?" and (any(mark in name for mark in ",=") or table.columns.count(name) > 1):
+        return f"#{table.columns.index(name) + 1}"
+    return name
 
 
-def _numbers(cells: list[str]) -> int:
-    return sum(bool(_NUMBER.fullmatch(cell)) for cell in cells)
-
-
-def guessed(columns: list[str]) -> dict[str, str]:
-    """The columns that seem to be those of REQUIRED and OPTIONAL, by these."""
-    found: dict[str, str] = {}
-    for column in columns:
-        low, bare = _UNIT_END.sub("", column.lower()), plain(column)
-        if any(mark in column for mark in ",="):
-            continue
-        sensor = "g" if _GYRO_NAME.search(low) else "a" if _ACCEL_NAME.search(low) else ""
-        axis = next((axis for axis in "xyz" if re.search(_AXIS.format(axis), re.sub(r"[(\[].*", "", low).strip())), "")
-        if sensor and axis:
-            found.setdefault(sensor + axis, column)
-        elif re.search(r"time|milli|micro|^(t|ts|ms|us|ns|s|sec|seconds)$|epoch|utc|clock", bare):
-            found.setdefault("t", column)
-        elif re.search(r"speed|velocity|kmh|kph", bare) and "accuracy" not in bare:
-            found.setdefault("speed", column)
-        elif bare.startswith("lat") and "acc" not in bare:
-            found.setdefault("lat", column)
-        elif bare.startswith("lon") and "acc" not in bare:
-            found.setdefault("lon", column)
-    return found
-
-
-def _check_keys(columns: Mapping[str, str], units: Mapping[str, str]) -> None:
+def check_keys(columns: Mapping[str, str], units: Mapping[str, str]) -> None:
+    """Raise InputError for a key or a unit that does not exist, and for a missing column."""
     strange = [key for key in columns if key not in (*REQUIRED, *OPTIONAL)]
     if strange:
         raise InputError(f"--columns: {strange[0]!a} is not one of {', '.join((*REQUIRED, *OPTIONAL))}")
     missing = [key for key in REQUIRED if key not in columns]
     if missing:
         raise InputError(f"--columns: {', '.join(missing)} is missing: three axes of both sensors are needed, and t")
+    check_units(units)
+
+
+def check_units(units: Mapping[str, str]) -> None:
+    """Raise InputError for a key or a unit of --units that does not exist."""
     strange = [key for key in units if key not in UNIT_KEYS]
     if strange:
         raise InputError(f"--units: {strange[0]!a} is not one of {', '.join(UNIT_KEYS)}")
     for key, text in units.items():
-        factor(text, UNIT_KEYS[key], key)  # raises for another unit
+        if not (_is_counts(text) and key[0] in "ag"):
+            factor(text, UNIT_KEYS[key], key)  # raises for another unit
+
+
+def _is_counts(text: str) -> bool:
+    return unit(text.strip().lstrip("-")) == COUNTS
+
+
+def _check_apart(places: Mapping[str, int], columns: Mapping[str, str]) -> None:
+    """Refuse one column for two axes."""
+    for key, place in places.items():
+        other = next((k for k in places if k != key and places[k] == place), None)
+        if other is not None:
+            raise InputError(f"--columns: {columns[key]!a} is given for {key} and for {other}: each has its own column")
+
+
+def _with_counts(
+    sheet: Sheet, time_ns: Nanoseconds, places: Mapping[str, int], units: dict[str, str]
+) -> dict[str, str]:
+    """The units with the number of counts in place of a bare "counts". Raises InputError where nothing shows it."""
+    if not any(map(_is_counts, units.values())):
+        return units
+    force, rates = (sheet.table([places[axis] for axis in axes]) for axes in (ACCEL, GYRO))
+    accel = findings.accelerometer(force, _seconds(time_ns))
+    found = {"a": accel.unit, "g": findings.gyro(force, rates, accel, _seconds(time_ns)).unit}
+    for key, text in units.items():
+        if _is_counts(text):
+            if not counts_per(found[key[0]]):
+                what, usual = ("g", COUNTS_PER_G) if key[0] == "a" else ("deg/s", COUNTS_PER_DPS)
+                raise InputError(
+                    f"{sheet.name}: nothing shows how many counts are 1 {what}: write {key}=counts/N, for an MPU6050 "
+                    f"with N one of {', '.join(f'{size:g}' for size in usual)}"
+                )
+            units[key] = ("-" if text.strip().startswith("-") else "") + found[key[0]]
+    return units
+
+
+def _seconds(time_ns: Nanoseconds) -> Array:
+    """(n) seconds from the first time; NaN where there is none."""
+    good = time_ns > REPEATED
+    return np.where(good, (time_ns - (time_ns[good][0] if np.any(good) else 0)) * 1e-9, np.nan)
+
+
+def _check_rates(name: str, seconds: Array, force: Array, rates: Array) -> None:
+    """Refuse rates that cannot turn gravity as it turns: another unit fits, or they turn it where it stands still."""
+    fit = fit_rates(seconds, force, rates)
+    shown = float(np.degrees(fit.factor))
+    if fit.decides and not 1.0 / _TIMES_OFF < shown < _TIMES_OFF:
+        much = f"{shown:.3g} times too little" if shown > 1.0 else f"{1.0 / shown:.3g} times too far"
+        raise InputError(f"{name}: in this unit the rates turn gravity {much}: check the unit of the gyro")
+    if turns_too_far(seconds, force, rates):
+        raise InputError(
+            f"{name}: gravity keeps its direction while the rates, in this unit, turn it round: check the unit of the "
+            "gyro"
+        )
+
+
+def _speed(
+    sheet: Sheet,
+    time_ns: Nanoseconds,
+    places: Mapping[str, int],
+    units: Mapping[str, str],
+    degrees: tuple[float, float],
+) -> tuple[int | None, str, list[Notice]]:
+    """(column of the speed, its unit, notices): without a unit, as positions show it, else left out."""
+    place = places.get("speed")
+    if place is None:
+        return None, "m/s", []
+    known = unit(_unit(units, ("speed",), sheet.columns[place]))
+    if known not in SPEEDS:
+        known = unit_by_positions(sheet, time_ns, place, places.get("lat"), places.get("lon"), degrees)
+    if not known:
+        return None, "m/s", [Notice("import-speed-unit", sheet.columns[place])]
+    return place, known, []
 
 
 def _place(sheet: Sheet, key: str, wanted: str) -> int:
@@ -218,26 +322,42 @@ def _place(sheet: Sheet, key: str, wanted: str) -> int:
     return place
 
 
+def _factors(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, str], axes: tuple[str, ...]) -> Array:
+    """(3) the factors of three axes to g or deg/s."""
+    kinds = UNIT_KEYS[axes[0]]
+    return np.array([factor(_unit(units, (axis, axis[0]), sheet.columns[places[axis]]), kinds, axis) for axis in axes])
+
+
+def _scaled(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, str], axes: tuple[str, ...]) -> Array:
+    """(n, 3) the readings of three axes in g or deg/s."""
+    return sheet.table([places[axis] for axis in axes]) * _factors(sheet, places, units, axes)
+
+
 def _sensor(
-    sheet: Sheet, time_ns: Nanoseconds, places: dict[str, int], units: Mapping[str, str], quantity: str
+    sheet: Sheet,
+    time_ns: Nanoseconds,
+    places: Mapping[str, int],
+    units: Mapping[str, str],
+    quantity: str,
+    values: Array,
 ) -> Sensor:
-    axes, all_of, kinds = (ACCEL, "a", ACCELERATIONS) if quantity == "accelerometer" else (GYRO, "g", RATES)
-    names = [_unit(units, (axis, all_of), sheet.columns[places[axis]]) for axis in axes]
-    scale = np.array([factor(text, kinds, axis) for text, axis in zip(names, axes)])
-    values = sheet.table([places[axis] for axis in axes]) * scale
+    axes = ACCEL if quantity == "accelerometer" else GYRO
+    names = [_unit(units, (axis, axis[0]), sheet.columns[places[axis]]) for axis in axes]
+    scale = _factors(sheet, places, units, axes)
     source = sheet.named([places[axis] for axis in axes])
     sign = "as it is" if np.all(scale > 0.0) else "turned" if np.all(scale < 0.0) else "turned in part"
     shown = ", ".join(dict.fromkeys(text.lstrip("-") for text in names))
-    return Sensor(quantity, time_ns, values, sheet.left_out, [Taken(quantity, source, shown, rate_hz(time_ns), sign)])
+    hz = rate_hz(time_ns[np.all(np.isfinite(values), axis=1)])
+    return Sensor(quantity, time_ns, values, sheet.left_out, [Taken(quantity, source, shown, hz, sign)])
 
 
 def _check_units(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, str]) -> None:
-    """Raise InputError naming every column whose unit is neither given nor in brackets in its name."""
+    """Raise InputError naming every column whose unit is neither given nor in its name."""
     unknown: dict[str, list[str]] = {}
     for key in (*ACCEL, *GYRO, "speed"):
         if key in places:
             column, all_of = sheet.columns[places[key]], key if key == "speed" else key[0]
-            if key not in units and all_of not in units and unit(unit_in(column)) not in UNIT_KEYS[key]:
+            if key not in units and all_of not in units and unit(_unit({}, (), column)) not in UNIT_KEYS[key]:
                 unknown.setdefault(all_of, []).append(column)
     if unknown:
         ask = ",".join(f"{key}={next(iter(UNIT_KEYS[key]))}" for key in unknown)
@@ -247,8 +367,8 @@ def _check_units(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, st
 
 
 def _unit(units: Mapping[str, str], keys: tuple[str, ...], column: str) -> str:
-    """The unit that is given for one of the keys, else the one in brackets in the column's name."""
-    return next((units[key] for key in keys if key in units), unit_in(column))
+    """The unit that is given for one of the keys, else the one in the column's name: in brackets or at its end."""
+    return next((units[key] for key in keys if key in units), unit_in(column) or findings.stated_unit(column))
 
 
 def _turned(units: Mapping[str, str]) -> bool:

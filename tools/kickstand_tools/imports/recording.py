@@ -99,15 +99,20 @@ def read_sheet(file: RecordingFile, header: int = 0, skipped: int = 0) -> Sheet:
         columns.pop()  # lines that end in a separator
     text, separator = lines[-1], separator_of(lines[header])
     if separator != "," and _DECIMAL_COMMA.search(text[:20000]):
-        text = text.replace(",", ".")
+        text = decimal_points(text)
     return Sheet(file.name, columns, *columns_of_text(text, separator, max(len(columns), 1)))
+
+
+def decimal_points(text: str) -> str:
+    """Text whose cells are not parted by commas, with decimal points in place of decimal commas."""
+    return text.replace(",", ".")
 
 
 @dataclass
 class Taken:
     """The source of a quantity: the file and the columns, their unit, and the change of sign.
 
-    rate_hz: samples per second, 0 for none.
+    rate_hz: samples per second, 0 for none. why: why it was taken for that, "" where the app's format says so.
     """
 
     quantity: str
@@ -115,6 +120,7 @@ class Taken:
     unit: str
     rate_hz: float = 0.0
     sign: str = ""
+    why: str = ""
 
 
 def rate_hz(time_ns: Nanoseconds) -> float:

@@ -15,15 +15,19 @@ from ..logs.csv_reader import Cells, as_text, filled, numbers_of
 from ..signals import Array, Ints
 
 ACCELERATIONS = {"g": 1.0, "m/s2": 1.0 / STANDARD_GRAVITY, "mg": 1e-3}
-RATES = {"deg/s": 1.0, "rad/s": math.degrees(1.0), "mdeg/s": 1e-3}
+RATES = {"deg/s": 1.0, "rad/s": math.degrees(1.0), "mdeg/s": 1e-3, "mrad/s": math.degrees(1e-3)}
 SPEEDS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704, "knots": 1852.0 / 3600.0}
 TIMES = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1000, "ns": 1}  # in ns
 ANGLES = {"deg": 1.0, "min": 1.0 / 60.0}
+# Counts (LSB) per g and per deg/s of an MPU6050 at its ranges: register map, registers 0x3B to 0x48
+COUNTS_PER_G = (16384.0, 8192.0, 4096.0, 2048.0)
+COUNTS_PER_DPS = (131.0, 65.5, 32.8, 16.4)
 _SPELLINGS = {
     "m/s2": "m/s/s m/sec2 mps2 ms2",
     "g": "gs",
     "deg/s": "dps °/s deg/sec degrees/s",
     "mdeg/s": "mdps",
+    "mrad/s": "mrads mrps",
     "rad/s": "radians/s rad/sec rps rads",
     "km/h": "kmh kph km/hr",
     "m/s": "mps",
@@ -34,6 +38,7 @@ _SPELLINGS = {
     "us": "µs μs",
     "deg": "° degrees",
     "min": "minutes",
+    "counts": "count lsb raw",
 }
 _SAME = {other: name for name, others in _SPELLINGS.items() for other in others.split()}
 Nanoseconds = Ints
@@ -44,7 +49,11 @@ DATES = "date or clock"
 EPOCH_NS = 10**17  # 1973: a later time counts from 1970
 DAY_NS = 86400 * 10**9
 _LATEST_NS = 4.0e18  # the year 2096; twice as much still fits into 64 bits
+_WRAP = 2**32  # micros() of a microcontroller begins again from 0 after 71.6 minutes, millis() after 49.7 days
+_DAY = re.compile(r"^(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})(?=[T ])")
+_THOUSANDTHS = re.compile(r"(:\d\d)[:,](\d{3})$")
 _BLANK = re.compile(r"\s+(?=[+-]\d\d:?\d\d$)")
+_COUNTS = re.compile(r"(?:counts?|lsb|raw)/(\d+(?:\.\d+)?)")
 _CLOCK = re.compile(r"^\s*(?:(\d+):)?(\d{1,2}):(\d{1,2}(?:\.\d+)?)\s*$")
 
 
@@ -57,13 +66,26 @@ def unit(text: str) -> str:
 def factor(text: str, kinds: dict[str, float], where: str) -> float:
     """The factor on a value in a unit; a - before the unit changes the sign. Raises InputError for another unit.
 
+    A unit of accelerations or rates may be counts/N, N counts per g or per deg/s.
+
     >>> factor("-m/s^2", {"g": 1.0, "m/s2": 0.102}, "ax")
     -0.102
+    >>> factor("counts/16384", {"g": 1.0}, "ax") * 16384
+    1.0
     """
     sign, bare = (-1.0, text.strip()[1:]) if text.strip().startswith("-") else (1.0, text)
-    if unit(bare) not in kinds:
-        raise InputError(f"{where}: unit {text!a} is not known: write one of {', '.join(kinds)}")
-    return sign * kinds[unit(bare)]
+    known = unit(bare)
+    if known in kinds:
+        return sign * kinds[known]
+    if counts_per(known) and ("g" in kinds or "deg/s" in kinds):
+        return sign / counts_per(known)
+    raise InputError(f"{where}: unit {text!a} is not known: write one of {', '.join(kinds)}")
+
+
+def counts_per(text: str) -> float:
+    """N of the unit counts/N; 0 for another one."""
+    found = _COUNTS.fullmatch(text.strip().lower().lstrip("-"))
+    return float(found[1]) if found and float(found[1]) > 0.0 else 0.0
 
 
 def times_ns(cells: Cells, unit_name: str = "", where: str = "the recording") -> Nanoseconds:
@@ -91,7 +113,9 @@ def times_ns(cells: Cells, unit_name: str = "", where: str = "the recording") ->
 def _date_ns(text: str) -> int:
     """Nanoseconds since 1970 of a date in ISO 8601, in UTC if it has no zone; there may be a blank before the zone."""
     try:
-        date = datetime.fromisoformat(_BLANK.sub("", text.strip()).replace(" UTC", "+00:00"))
+        plain = _DAY.sub(lambda day: f"{day[1]}-{int(day[2]):02d}-{int(day[3]):02d}", text.strip())
+        plain = _THOUSANDTHS.sub(r"\1.\2", plain)
+        date = datetime.fromisoformat(_BLANK.sub("", plain).replace(" UTC", "+00:00"))
     except ValueError:
         return NO_TIME
     since = (date if date.tzinfo else date.replace(tzinfo=UTC)) - datetime(1970, 1, 1, tzinfo=UTC)
@@ -131,10 +155,20 @@ def _of_numbers(values: NDArray[Any], unit_name: str, where: str) -> Nanoseconds
     if known not in TIMES:
         raise InputError(f"{where}: unit {unit_name!a} is not known: write one of {', '.join(TIMES)}")
     scale = TIMES[known]
+    values = unwrapped(values)
     if values.dtype.kind in "iu":
         good = np.abs(values.astype(float)) < _LATEST_NS / scale
         return np.where(good, values.astype(np.int64) * scale, NO_TIME)
     return _scaled(values, scale)
+
+
+def unwrapped(values: NDArray[Any]) -> NDArray[Any]:
+    """Counts of a clock (n) of 32 bits that has begun again from 0, continued."""
+    steps = np.diff(values)
+    back = steps < -0.9 * _WRAP
+    if not np.any(back) or np.nanmax(values) >= _WRAP or np.nanmin(values) < 0:
+        return values
+    return values + np.concatenate(([0], np.cumsum(back))).astype(values.dtype) * _WRAP
 
 
 def _scaled(values: Array, scale: int) -> Nanoseconds:
@@ -146,13 +180,13 @@ def _scaled(values: Array, scale: int) -> Nanoseconds:
 
 def _guessed(values: Array) -> str:
     """The unit of times without one: those from 1970 by their size, others by their steps."""
-    good = values[np.isfinite(values)]
+    good = unwrapped(values[np.isfinite(values)])
     size = float(np.median(np.abs(good)))
-    if size > 1e8 and size < 1e10:
+    steps = np.diff(good)
+    step = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
+    if size > 1e8 and size < 1e10 and step < 100.0:  # else a clock of microseconds that has run for minutes
         return "s"
     for name, from_1970 in (("ns", 1e17), ("us", 1e14), ("ms", 1e11)):
         if size > from_1970:
             return name
-    steps = np.diff(good)
-    step = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
     return "s" if step < 0.9 else "ms" if step < 600.0 else "us" if step < 600e3 else "ns"

@@ -10,6 +10,7 @@ import numpy as np
 from kickstand.errors import Notice
 
 from ..checks.log import Checks
+from ..checks.sensor import SensorHealth
 from ..checks.units import check_units
 from ..errors import InputError
 from ..signals import Array
@@ -78,7 +79,7 @@ def read_blocks(
     which take the most memory. Else see read_log()."""
     name, count = name_of(source), 0
     remarks: list[Notice] = []
-    checks, frozen = Checks(name), FrozenReadings()
+    checks, frozen, health = Checks(name), FrozenReadings(), SensorHealth()
     whole = source.source if isinstance(source, Stretch) else source
     total = len(whole.t_s) if isinstance(whole, Log) else total_bytes(whole)
     for block in _unchecked(source, remarks):
@@ -90,7 +91,7 @@ def read_blocks(
                 f"{name} has over {MOST_SAMPLES / 1e6:.0f} million samples: kickstand cut makes a part of it"
             )
         block.lines = block.lines if lines else []
-        block.frozen = frozen.mark(block.time_us, block.readings)
+        block.frozen = frozen.mark(block.time_us, block.readings) | health.mark(block.time_us, block.readings)
         checks.add(block.measured)
         yield block
         if progress:
@@ -99,7 +100,7 @@ def read_blocks(
         raise InputError(f"{name} is too short: {count} samples, at least {minimum} are needed")
     found = checks.remarks(axes and notices is not None, calibration)
     if notices is not None:
-        notices += remarks + frozen.notices() + found
+        notices += remarks + frozen.notices() + health.notices() + found
 
 
 def check_first_line(log: Path) -> None:

@@ -17,7 +17,7 @@ from .. import unix_port
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
 from ..logs.csv_lines import write_lean
-from ..logs.log import Block, Stretch, Table, within
+from ..logs.log import Block, Log, Stretch, Table, within
 from ..logs.reader import Source, apart, read_blocks, read_twice
 from ..logs.source import Progress, total_bytes
 from ..signals import Array
@@ -93,7 +93,8 @@ def replay_to_csv(
     notices: list[Notice] = []
     whole = log.source if isinstance(log, Stretch) else log
     # for the command alone: a second process imports the main program again, which may not allow that
-    run = "two processes" if engine == "cpython" and total_bytes(whole) > _LONG_BYTES else engine
+    long = not isinstance(whole, Log) and total_bytes(whole) > _LONG_BYTES
+    run = "two processes" if engine == "cpython" and long else engine
     rows = replay_blocks(log, calibration, run, progress, notices)
     return write_lean(out, replay_engine.COLUMNS, [5] * len(replay_engine.COLUMNS), rows), notices
 
@@ -209,7 +210,9 @@ def _last_words(traceback: bytes) -> str:
 
 def _records(blocks: Iterable[Block], calibration: CalibrationFile) -> Iterator[bytes]:
     """The bytes that replay_engine.run reads."""
-    yield struct.pack(replay_engine.CALIBRATION, *calibration.parameters(), calibration.delay_s())
+    yield struct.pack(
+        replay_engine.CALIBRATION, *calibration.parameters(), *calibration.matrices(), calibration.delay_s()
+    )
     for block in blocks:
         for time_us, reading, speed in block.measured.rows():
             given = speed if speed >= 0.0 else replay_engine.NO_SPEED  # NaN is not >= 0

@@ -2,8 +2,8 @@
 
     micropython replay_engine.py RECORDS > RESULTS
 
-RECORDS starts with the calibration (19 doubles, Calibration.parameters()) and the gyro's delay in seconds (a double),
-then one record a sample:
+RECORDS starts with the calibration (46 doubles, Calibration.parameters() and matrices()) and the gyro's delay in
+seconds (a double), then one record a sample:
 its time in microseconds (int64), seven readings in the chip's order (doubles; g, C, deg/s) and the speed in m/s,
 negative where there is no new one. RESULTS has the doubles of COLUMNS for each. Both are binary, because a number that
 is printed and read again may be another number.
@@ -17,7 +17,6 @@ from kickstand.calibration.parameters import Calibration
 from kickstand.lean.formula import static_lean_deg
 from kickstand.lean.lean_filter import DELAY_S
 from kickstand.lean.meter import LeanMeter
-from kickstand.rotation import rotate
 
 COLUMNS = (
     "lean_deg",
@@ -30,7 +29,7 @@ COLUMNS = (
     "roll_rate_dps",
     "lean_sigma_deg",
 )
-CALIBRATION = "<20d"
+CALIBRATION = "<47d"
 RECORD = "<q8d"
 RESULT = "<9d"
 NOT_SHOWN = -1.0  # lean_sigma_deg where the display shows no lean
@@ -41,15 +40,11 @@ class ReplayMeter(LeanMeter):
     """The firmware's meter for single readings in g and deg/s; on a board it takes sums of counts."""
 
     def use(self, calibration, posed=False):
-        """Take a calibration: see LeanMeter.use(). Nicolae's equations (18)-(20) and (15) are multiplied out here: 18
-        products a reading."""
+        """Take a calibration: see LeanMeter.use()."""
         LeanMeter.use(self, calibration, posed)
-        r, slope = calibration.vehicle_from_sensor, calibration.accel_slope
-        self._force_offset, self._rate_offset = [0.0] * 3, [0.0] * 3
-        rotate(self._force_offset, r, calibration.accel_offset)
-        rotate(self._rate_offset, r, [-radians(bias) for bias in calibration.gyro_bias])
-        self._force_matrix = [r[i] * slope[i % 3] for i in range(9)]
-        self._rate_matrix = [radians(value) for value in r]
+        self._force_matrix, self._force_offset, rate_matrix, rate_offset = calibration.in_vehicle()
+        self._rate_matrix = [radians(value) for value in rate_matrix]
+        self._rate_offset = [radians(value) for value in rate_offset]
 
     def update(self, reading, dt_us):
         """Take a reading: 7 numbers in the chip's order (g, C, deg/s). dt_us: microseconds since the one before, 0 for
@@ -126,8 +121,9 @@ class Replay:
 def run(source, sink):
     """Read records from source until its end and write results to sink, both binary files."""
     calibration = Calibration()
-    *parameters, delay_s = struct.unpack(CALIBRATION, source.read(struct.calcsize(CALIBRATION)))
-    calibration.set_parameters(parameters)
+    *numbers, delay_s = struct.unpack(CALIBRATION, source.read(struct.calcsize(CALIBRATION)))
+    calibration.set_parameters(numbers[:19])
+    calibration.set_matrices(numbers[19:])
     replay = Replay(calibration, delay_s=delay_s)
     size = struct.calcsize(RECORD)
     while True:

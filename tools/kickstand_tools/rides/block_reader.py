@@ -13,8 +13,8 @@ from kickstand.rides import block as block_format
 
 _HEAD_LENGTH = struct.calcsize(block_format.HEAD)
 _TAIL_LENGTH = struct.calcsize(block_format.TAIL)
+_START = _HEAD_LENGTH + store.BODY_LENGTH  # of the entries, where the calibration has no matrices
 _PLACE_LENGTH = struct.calcsize(block_format.PLACE)
-_START = _HEAD_LENGTH + store.BODY_LENGTH
 _LATE_PERIODS = 2  # a turn that is later by so many sample periods has lost samples, as in kickstand.imu.sensor
 _DEGREE = 60 * 100_000  # in the unit of positions, 0.00001 minutes
 _MOST = 1e4  # largest parameter of a calibration, far beyond those that a board stores
@@ -74,7 +74,12 @@ class Block:
 
     def calibration(self) -> Calibration:
         """The calibration that the lean on the display was computed with."""
-        return store.unpack(self.body, 0)[2]
+        return store.unpack(self.body)[2]
+
+    def numbers(self) -> list[float]:
+        """All numbers of the calibration."""
+        calibration = self.calibration()
+        return calibration.parameters() + calibration.matrices()
 
     def missing_s(self) -> list[float]:
         """The durations of all gaps in the readings, s: turns of the loop that came later than their samples
@@ -115,23 +120,24 @@ def parse(data: bytes) -> Block:
     if len(data) < _START + _TAIL_LENGTH:
         raise BadBlock(CUT_SHORT)
     _, version, length, *rest, firmware, places, delay = struct.unpack_from(block_format.HEAD, data)
-    if version != block_format.VERSION:
-        raise BadBlock(f"format {version}, this program reads {block_format.VERSION}")
-    if len(data) < length:
+    if version not in block_format.BODY_LENGTHS:
+        raise BadBlock(f"format {version}, this program reads {max(block_format.BODY_LENGTHS)}")
+    start = _HEAD_LENGTH + block_format.BODY_LENGTHS[version]
+    if len(data) < max(length, start + _TAIL_LENGTH):
         raise BadBlock(CUT_SHORT)
     count, crc = struct.unpack_from(block_format.TAIL, data, len(data) - _TAIL_LENGTH)
     if len(data) != length or crc != crc32(data[:-4]):
         raise BadBlock("damaged")
     firmware = firmware.rstrip(b"\0").decode("ascii", "replace")
-    fields: list[Any] = [*rest, firmware, delay, data[_HEAD_LENGTH:_START], crc]
+    fields: list[Any] = [*rest, firmware, delay, data[_HEAD_LENGTH:start], crc]
     block = Block(*fields)
     try:
         units = block.accel_lsb_per_g, block.gyro_lsb_tenths, block.sample_hz
-        if not all(units) or not all(abs(value) <= _MOST for value in block.calibration().parameters()):
+        if not all(units) or not all(abs(value) <= _MOST for value in block.numbers()):
             raise ValueError  # "not <=" also refuses not-a-number
         end = len(data) - _TAIL_LENGTH - places * _PLACE_LENGTH
         found = dict(_places(data[end : len(data) - _TAIL_LENGTH]))
-        block.turns = list(_turns(block, data[_START:end], count, found))
+        block.turns = list(_turns(block, data[start:end], count, found))
     except (ValueError, ZeroDivisionError) as error:  # the check sum is right: it was written like this
         raise BadBlock("not decodable") from error
     return block

@@ -2,7 +2,9 @@
 
 import binascii
 import contextlib
+import gzip
 import itertools
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -13,7 +15,7 @@ from mpremote.transport import TransportExecError
 from ..deploy.board_console import BrokenOff, lines
 from ..deploy.connection import Board, Port, Progress, connected, literal, printed, restart
 from ..errors import InputError
-from ..output import check_directory
+from ..output import check_directory, make_directory
 from . import ride_log
 from .block_reader import CUT_SHORT, Block, missing_note, read
 
@@ -35,15 +37,20 @@ else:
     for ride, part, size in ride_paths.parts(directory):
         print((ride, part, size, ride_paths.part_path(directory, ride, part)))
 """
+# Prints a file, and at last its length and CRC-32 as the board has read it
 _READ = """
-from binascii import b2a_base64
+from binascii import b2a_base64, crc32
+count, crc = 0, 0
 with open(PATH, "rb") as file:
     while True:
         piece = file.read(1536)
         if not piece:
             break
+        count, crc = count + len(piece), crc32(piece, crc)
         print(b2a_base64(piece).decode(), end="")
+print((count, crc))
 """
+_TRIES = 2  # to copy a file
 
 
 _Came = Callable[[str, int], None]  # called with the name of what is copied, and the number of further bytes
@@ -100,7 +107,7 @@ def pull(
         try:
             directory, vehicle, rides = _list(transport, name)
             if rides:
-                out.mkdir(exist_ok=True)
+                make_directory(out)
             result = PullResult(name, [])
             total, done = sum(part.size for parts in rides.values() for part in parts), 0
 
@@ -141,10 +148,16 @@ def _pull_ride(transport: Board, number: int, parts: list[_Part], vehicle: str, 
     blocks: list[Block] = []
     for part in parts:
         title = f"ride {number}, part {part.part}"
-        found, problems = read(_read(transport, part, title, came))
+        content, whole = _read(transport, part, title, came)
+        if not whole:
+            short = f"only {len(content)} of its {part.size} bytes came over"
+            wrong = short if len(content) < part.size else "other bytes came over than the board has"
+            ride.problems.append(f"{title}: {wrong}: try another cable, else its flash or card is damaged")
+            ride.whole = False
+        found, problems = read(content)
         blocks += found
         for problem in problems:
-            if problem == CUT_SHORT:
+            if problem == CUT_SHORT and whole and part is parts[-1]:
                 ride.problems.append(f"{title}: the last block is cut short, as by a power cut: left out")
             else:
                 ride.problems.append(f"{title}: {problem}: left out")
@@ -166,6 +179,10 @@ def _pull_ride(transport: Board, number: int, parts: list[_Part], vehicle: str, 
     ride.log = out / f"ride-{number:05}-{blocks[0].crc & 0xFFFF:04x}.csv.gz"
     if not ride.log.resolve().is_relative_to(out.resolve()):
         raise InputError(f"{ride.log} is a link to {ride.log.resolve()}: remove it, or give --out another directory")
+    if (earlier := _readings(ride.log)) > sum(len(block.turns) for block in blocks):
+        ride.problems.append(f"{ride.log} has more of this ride, {earlier} readings, and stays as it is")
+        ride.log = _free_name(ride.log)
+        ride.whole = False
     ride_log.write(ride.log, blocks)
     ride.seconds = (blocks[-1].turns[-1].time_us - blocks[0].time_us) / 1e6
     ride.readings = sum(len(block.turns) for block in blocks)
@@ -183,18 +200,53 @@ def _delete(transport: Board, directory: str, parts: list[_Part]) -> None:
             emptied = emptied.parent
 
 
-def _read(transport: Board, part: _Part, title: str, came: _Came) -> bytes:
-    """A file of the board."""
+def _readings(log: Path) -> int:
+    """Number of readings in a log that was pulled earlier; 0 if there is none, or none that can be read."""
+    try:
+        with gzip.open(log) as file:
+            return sum(1 for _ in file) - 1
+    except (OSError, EOFError, zlib.error):
+        return 0
+
+
+def _free_name(log: Path) -> Path:
+    """The first of NAME-2.csv.gz, NAME-3.csv.gz ... that is not there."""
+    stem = log.name.removesuffix(".csv.gz")
+    return next(path for n in itertools.count(2) if not (path := log.with_name(f"{stem}-{n}.csv.gz")).exists())
+
+
+def _read(transport: Board, part: _Part, title: str, came: _Came) -> tuple[bytes, bool]:
+    """A file of the board, and True if all that the board announced has come over as the board has read it."""
+    content, whole = b"", False
+    for attempt in range(_TRIES):
+        again, whole = _copied(transport, part, title, came if attempt == 0 else _nothing)
+        content = max(content, again, key=len) if not whole else again
+        if whole:
+            break
+    return content, whole
+
+
+def _nothing(_what: str, _count: int) -> None:
+    """The progress of a second try, which the bar has no room for."""
+
+
+def _copied(transport: Board, part: _Part, title: str, came: _Came) -> tuple[bytes, bool]:
+    """One try of _read()."""
     content = bytearray()
+    there = None
     came(f"pulling {title}", 0)
     try:
         # four characters are three bytes, and a line ends in two more; the ride that is recorded now may have grown
         for line in lines(
             transport, _READ.replace("PATH", repr(part.path)), _SILENT_S, most_bytes=2 * part.size + 9999
         ):
-            piece = binascii.a2b_base64(line)
-            content += piece
-            came(f"pulling {title}", len(piece))
-    except (BrokenOff, binascii.Error) as error:
+            if line.startswith(b"("):
+                there = literal(line, (int, int))
+                continue
+            with contextlib.suppress(binascii.Error):  # a byte was lost: the sum shows it
+                piece = binascii.a2b_base64(line)
+                content += piece
+                came(f"pulling {title}", len(piece))
+    except BrokenOff as error:
         raise InputError(f"{part.path} did not come over whole ({error}): try again, with another cable") from error
-    return bytes(content)
+    return bytes(content), len(content) >= part.size and there == (len(content), binascii.crc32(content))

@@ -2,6 +2,7 @@
 
 import contextlib
 import gzip
+import io
 import signal
 import sys
 import threading
@@ -17,6 +18,7 @@ from ..deploy.connection import connected, restart
 from ..errors import InputError
 from ..output import check_output, whole_file
 from . import ride_log
+from .block_reader import Block
 from .stream import LiveReading, Recording, blocks
 
 
@@ -58,16 +60,51 @@ def record(
             stopped = threading.Event()
             recorded = Recording(stopped, live)
             notes: list[str] = []
-            opened = gzip.open if out.suffix == ".gz" else open
-            with whole_file(out) as temporary, _signals(stopped):
-                with opened(temporary, "wt", encoding="ascii", newline="") as file:
-                    recorded.write(file, blocks(transport, name, notes, stopped), notes)
-            assert recorded.first
-            write_calibration(beside, ride_log.calibration(recorded.first))
+            # The calibration first: on a disk that is full at the end there would be no room for it
+            with whole_file(out) as temporary, whole_file(beside) as calibration, _signals(stopped):
+                with _Growing(temporary, out.suffix == ".gz") as file:
+                    made = _noting_first(blocks(transport, name, notes, stopped), calibration)
+                    recorded.write(file, made, notes)
         finally:
             with contextlib.suppress(Exception):  # the cable may be out
                 restart(transport)
     return RecordResult(out, beside, recorded.seconds, recorded.count, notes)
+
+
+def _noting_first(blocks: Iterator[Block], calibration: Path) -> Iterator[Block]:
+    """The blocks; the calibration of the first is written to that file before the block is used."""
+    for i, block in enumerate(blocks):
+        if i == 0:
+            write_calibration(calibration, ride_log.calibration(block))
+        yield block
+
+
+class _Growing(io.TextIOBase):
+    """A file of text that holds only whole writes: one that fails, on a full disk, leaves what was there before.
+
+    packed: each write becomes a gzip member of its own, because a gzip file that is cut off in a member is damaged.
+    """
+
+    def __init__(self, path: Path, packed: bool) -> None:
+        self._file, self._packed, self._length = open(path, "wb", buffering=0), packed, 0
+
+    def write(self, text: str) -> int:
+        """Raises OSError if not all of it could be written."""
+        data = memoryview(gzip.compress(text.encode("ascii"), mtime=0) if self._packed else text.encode("ascii"))
+        at = 0
+        try:
+            while at < len(data):
+                at += self._file.write(data[at:])
+        except OSError:
+            self._file.truncate(self._length)
+            self._file.seek(self._length)
+            raise
+        self._length += len(data)
+        return len(text)
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()
 
 
 @contextlib.contextmanager

@@ -63,6 +63,9 @@ def calibration(block: Block) -> CalibrationFile:
         c.trim_deg,
         "car" if block.vehicle == "car" else "",
         gyro_delay_s=block.delay_tenths_ms / 10_000 if block.delay_tenths_ms else None,
+        accel_matrix=np.array(c.accel_matrix),
+        gyro_matrix=np.array(c.gyro_matrix),
+        gyro_sigma=np.array(c.gyro_sigma),
     )
 
 

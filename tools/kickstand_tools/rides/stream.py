@@ -5,7 +5,7 @@ import contextlib
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import IO
+from io import TextIOBase
 
 from kickstand.lean.meter import FALLEN_DEG
 
@@ -62,44 +62,54 @@ class LiveReading:
 
 class Recording:
     """Writes blocks to a log. stopped: an event that is set where the log has to end, which ends the stream.  live:
-    called with each block's LiveReading.
+    called with each block's LiveReading.  A log that cannot be written any further ends there, with a note.
 
-    first: the first block; seconds, count: duration and number of readings so far."""
+    first: the first block; seconds, count: duration and number of readings so far; written: True once the log has a
+    block."""
 
     def __init__(self, stopped: threading.Event, live: Callable[[LiveReading], None] | None = None) -> None:
         self._stopped = stopped
         self.first: Block | None = None
         self.seconds = 0.0
         self.count = 0
+        self.written = False
         self._live = live
 
-    def write(self, file: IO[str], blocks: Iterator[Block], notes: list[str]) -> None:
+    def write(self, file: TextIOBase, blocks: Iterator[Block], notes: list[str]) -> None:
         """Write all blocks as they come. notes: gets a line for each gap. Raises InputError if there is no block."""
         missing, expected = 0, 0
         missing_s: list[float] = []
         replay = Replay(CalibrationFile().to_firmware())
-        aligned = car = changed = False
-        file.write(",".join(ride_log.header(TRACK)) + "\n")
+        aligned = car = ended = False
+        head = ",".join(ride_log.header(TRACK)) + "\n"
         for block in blocks:
-            if changed:  # until the board has stopped
+            if ended:  # until the board has stopped
                 continue
             if self.first is None or block.body != self.first.body:
                 if self.first:
                     notes.append(CHANGED)
                     self._stopped.set()
-                    changed = True
+                    ended = True
                     continue
                 self.first = block
                 calibration = ride_log.calibration(block)
                 car = calibration.vehicle == "car"
                 replay = Replay(calibration.to_firmware(), calibration.delay_s(), not car, block.time_us)
                 aligned = calibration.aligned
+            rows = list(ride_log.rows([block], TRACK, self.first.time_us))
+            try:  # a whole block: what is cut off within a line could not be read
+                file.write(head + "".join(",".join(row) + "\n" for row in rows))
+            except OSError as error:
+                notes.append(f"the log cannot be written any further ({cause(error)}): what came until then is kept")
+                self._stopped.set()
+                ended = True
+                continue
+            head, self.written = "", True
             missing += block.sequence - expected
             expected = block.sequence + 1
             missing_s += block.missing_s()
             moments = []
-            for row, turn in zip(ride_log.rows([block], TRACK, self.first.time_us), block.turns, strict=True):
-                file.write(",".join(row) + "\n")
+            for row, turn in zip(rows, block.turns, strict=True):
                 force, rate = ([float(cell) for cell in cells] for cells in (row[1:4], row[4:7]))
                 speed = NO_SPEED if turn.speed_mps is None else turn.speed_mps
                 meter = replay.take(turn.time_us, (*force, 0.0, *rate), speed)
@@ -121,7 +131,7 @@ class Recording:
                 most = meter.max_left_deg, meter.max_right_deg, meter.max_accel_g, meter.max_brake_g
                 most = most if aligned else (0.0, 0.0, 0.0, 0.0)
                 self._live(LiveReading(aligned, car, moments, *most, rate_hz, self.seconds))
-        if self.first is None:
+        if not self.written:
             raise InputError("; ".join(["nothing was recorded: does the display show readings?", *notes]))
         if missing:
             notes.append(f"{missing} blocks of half a second did not arrive: the log has gaps")

@@ -40,6 +40,7 @@ class Clock:
         self._events = []  # heap of (due, number, callable): the number keeps equal times in order
         self._number = 0
         self._deadline_us = NEVER_US
+        self._reset = False
         self.next_us = NEVER_US
         self._pace = 0
         self._pace_us = NEVER_US
@@ -72,7 +73,14 @@ class Clock:
     def set_deadline(self, due_us):
         """Let advance() raise PowerOff at each call from due_us on. None: never."""
         self._deadline_us = NEVER_US if due_us is None else due_us
+        self._reset = False
         self._plan()
+
+    def reset(self):
+        """Raise Reset now, and at each later advance() until the next set_deadline(): firmware may catch it."""
+        self._reset = True
+        self._plan()
+        raise Reset
 
     def set_pace(self, pace):
         """Set the pace from now on, see the class."""
@@ -82,13 +90,15 @@ class Clock:
         self._plan()
 
     def _plan(self):
-        due = min(self._deadline_us, self._pace_us)
+        due = min(self._deadline_us, self._pace_us) if not self._reset else 0
         if self._events and self._events[0][0] < due:
             due = self._events[0][0]
         self.next_us = due
 
     def _pass_to(self, target):
         while self.next_us <= target:
+            if self._reset:
+                raise Reset
             if self.next_us > self.now_us:
                 self.now_us = self.next_us
             if self._events and self._events[0][0] <= self.now_us:
@@ -143,7 +153,7 @@ class Watchdog:
         def check():
             if number == self._round:
                 if self._clock.now_us >= self._due_us:
-                    raise Reset
+                    self._clock.reset()
                 self._check_later(number)
 
         self._clock.at(self._due_us, check)

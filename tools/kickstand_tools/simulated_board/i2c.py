@@ -50,13 +50,17 @@ class TransferFault:
         return value ^ self.mask if self.kind == "corrupt" and number == self._byte else value
 
 
+GOOD, OPEN, LOW = "good", "open", "low"  # a wire; one that nothing pulls up; one that touches ground
+
+
 class Bus:
-    """sda, scl: numbers of the microcontroller's pins. open: True during a transfer."""
+    """sda, scl: numbers of the microcontroller's pins. open: True during a transfer. sda_wire, scl_wire: see above."""
 
     def __init__(self, clock, sda, scl):
         self.clock = clock
         self.sda = sda
         self.scl = scl
+        self.sda_wire = self.scl_wire = GOOD
         self.devices = {}  # by address
         self.transfers = {}  # by address: number of transfers that were begun
         self.faults = []  # a list of TransferFault
@@ -89,7 +93,7 @@ class Bus:
 
     def start(self, address, read):
         """START or repeated START, and address. True: acknowledged. False: not. None: a device holds SDA low."""
-        if self._stuck_bits > 0:
+        if self._stuck_bits > 0 or not self.sda_wire == self.scl_wire == GOOD:
             return None
         self._stuck_bits = -1  # START frees a device that waits for ACK
         if not self.open:
@@ -153,13 +157,17 @@ class Bus:
 
     # For pins
 
-    def scl_level(self):
-        """0 or 1."""
-        return self._driven_scl
+    def scl_level(self, pulled_up=False):
+        """0 or 1. pulled_up: the pin's own pull-up is on, which a wire without others needs."""
+        return self._level(self._driven_scl, self.scl_wire, pulled_up)
 
-    def sda_level(self):
-        """0 or 1: low if the controller or a device pulls it low."""
-        return 0 if self._stuck_bits > 0 else self._driven_sda
+    def sda_level(self, pulled_up=False):
+        """0 or 1: low if the controller or a device pulls it low. pulled_up: see scl_level()."""
+        return self._level(0 if self._stuck_bits > 0 else self._driven_sda, self.sda_wire, pulled_up)
+
+    @staticmethod
+    def _level(driven, wire, pulled_up):
+        return 0 if wire == LOW or (wire == OPEN and not pulled_up) else driven
 
     def set_scl(self, level):
         """Drive SCL low (0) or let it go (1)."""

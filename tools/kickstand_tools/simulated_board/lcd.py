@@ -1,7 +1,7 @@
 """Model of a 16x2 HD44780 character display on a PCF8574 backpack (HD44780U data sheet ADE-207-272).
 
-Wiring of the usual backpack: P0 RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7. D0..D3 are not connected: the
-controller reads them as ones. What is sent while it is busy is lost, as on the chip.
+Wiring of the usual backpack: P0 RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7; see WIRINGS. D0..D3 are not connected:
+the controller reads them as ones. What is sent while it is busy is lost, as on the chip.
 """
 
 import re
@@ -15,6 +15,9 @@ WAKE_US = (4100, 100)  # busy after the first and after the second "function set
 CLEAR_US = 1520  # "clear display" and "return home"
 COMMAND_US = 37
 DATA_US = 41  # 37 us, and 4 us for the address counter
+
+# The pins of other backpacks: of RS, R/W, E and backlight, the level that lights it, and of D4
+WIRINGS = {2: (6, 5, 4, 7, 0, 0), 3: (4, 5, 6, 7, 1, 0), 4: (0, 1, 2, 3, 0, 4)}
 
 COLUMNS = 16
 _LINE = 40  # characters of a line in display memory, of which 16 are visible
@@ -34,6 +37,7 @@ def shown_lean(lines):
 class Lcd:
     """One display. address: 0x20..0x27 (PCF8574) or 0x38..0x3F (PCF8574A).
 
+    wiring: of the backpack, 1 for the usual one, else a key of WIRINGS.
     changes: counts visible changes. lost: counts nibbles (bytes in 8-bit mode) that were sent while it was busy.
     """
 
@@ -42,6 +46,8 @@ class Lcd:
     def __init__(self, clock, address=0x27):
         self.address = address
         self.clock = clock
+        self.wiring = 1
+        self._raw = 0xFF  # the pins as they are, of another wiring
         self.changes = 0
         self.power_on()
 
@@ -53,7 +59,7 @@ class Lcd:
         self.lost = 0
         self.on = self.cursor = self.blink = False
         self.two_lines = False
-        self._port = 0xFF  # the outputs of a PCF8574 come up high
+        self._port = self._raw = 0xFF  # the outputs of a PCF8574 come up high
         self._eight_bit = True
         self._high = -1  # the first nibble of a byte until the second arrives, else -1
         self._low_next = False  # when reading: the low nibble comes next
@@ -107,6 +113,8 @@ class Lcd:
 
     def write_byte(self, value):
         """Set the levels of the eight pins. When E falls, the levels before it are taken. True: ACK."""
+        if self.wiring != 1:
+            self._raw, value = value, self._as_usual(value)
         before = self._port
         self._port = value
         if (before ^ value) & _LIGHT:
@@ -118,12 +126,19 @@ class Lcd:
     def read_byte(self):
         """The eight pins. While R/W and E are high D7..D4 give busy flag and address counter, high nibble first."""
         port = self._port
+        if self.wiring != 1:
+            return self._raw
         if not (port & _RW and port & _E) or port & _RS:
             return port
         status = self._ac | (0x80 if self.clock.now_us < self._busy_us else 0)
         if self._low_next and not self._eight_bit:
             status <<= 4
         return (port & 0x0F) | (status & 0xF0)
+
+    def _as_usual(self, value):
+        rs, rw, enable, light, level, data = WIRINGS[self.wiring]
+        bits = (value >> rs & 1) * _RS | (value >> rw & 1) * _RW | (value >> enable & 1) * _E
+        return bits | (_LIGHT if value >> light & 1 == level else 0) | (value >> data & 15) << 4
 
     # The controller
 

@@ -2,8 +2,8 @@
 PS-MPU-6000A rev 3.4; MPU-6500 RM rev 2.1; ICM-20689 and MPU-6886 data sheets.
 
 Where these leave room the model is strict: a status bit appears only if INT_ENABLE asks for it, and what is written
-during start-up is lost. Of the low-pass only the delay is modelled: world() gives values that are filtered already. Not
-modelled: self-test, DMP, auxiliary I2C.
+during start-up is lost. Of the low-pass only the delay is modelled: world() gives values that are filtered already. The
+self-test is that of the MPU6050, which the others lack here. Not modelled: DMP, auxiliary I2C.
 """
 
 from collections import namedtuple
@@ -11,6 +11,7 @@ from collections import namedtuple
 from .clock import NEVER_US
 
 SMPLRT_DIV, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, ACCEL_CONFIG2 = 0x19, 0x1A, 0x1B, 0x1C, 0x1D
+SELF_TEST_X, SELF_TEST_A = 0x0D, 0x10  # and those of y and z between them
 FIFO_EN, INT_ENABLE, INT_STATUS = 0x23, 0x38, 0x3A
 ACCEL_XOUT_H, GYRO_ZOUT_L = 0x3B, 0x48
 SIGNAL_PATH_RESET, USER_CTRL, PWR_MGMT_1 = 0x68, 0x6A, 0x6B
@@ -25,6 +26,8 @@ START_UP_US = 90_000  # after power-on and reset: the sheet's worst case is 100 
 WAKE_US = 30_000  # from sleep to the first sample: gyro start-up time, PS 6.1
 GYRO_LSB_PER_DPS = (131.0, 65.5, 32.8, 16.4)  # by range, GYRO_CONFIG bits 4 and 3
 DLPF_DELAY_US = (980, 1900, 2800, 4800, 8300, 13400, 18600, 980)  # delay of the gyro's low-pass, by DLPF_CFG
+
+ACCEL_TRIMS, GYRO_TRIMS = (13, 17, 22), (9, 14, 11)  # factory trim codes of x, y, z (RM pp. 9 to 11)
 
 # temperature in degrees C = counts / counts_per_c + zero_c.
 # temperature_in_fifo: it goes into the FIFO with accelerometer and with gyro, whatever FIFO_EN says.
@@ -82,6 +85,8 @@ class Mpu6050:
     clock: a Clock, of which the model reads now_us.
     world(t_s): (fx, fy, fz in g, wx, wy, wz in deg/s[, temp_c]) along the chip's axes, its offset and scale errors
     included.
+    self_test: what the self-test of each axis gives, as a share of its factory trim: three of the accelerometer, then
+    three of the gyro. 1.0 is right, 0.0 an axis that does not respond.
     clock_error: relative error of the chip's sample rate, > 0 for a faster one (0.01 = 1 %).
     """
 
@@ -90,6 +95,7 @@ class Mpu6050:
         self.clock = clock
         self.world = world
         self.clock_error = 0.0
+        self.self_test = [1.0] * 6
         self._override = None
         self.who_am_i = who_am_i
         self._variant = VARIANTS.get(who_am_i, VARIANTS[0x68])  # a chip unknown to the driver too
@@ -105,6 +111,10 @@ class Mpu6050:
         regs[:] = bytes(128)
         regs[PWR_MGMT_1] = self._variant.power_after_reset
         regs[WHO_AM_I] = self.who_am_i
+        if self.who_am_i == 0x68:
+            for k in range(3):
+                regs[SELF_TEST_X + k] = ACCEL_TRIMS[k] >> 2 << 5 | GYRO_TRIMS[k]
+                regs[SELF_TEST_A] |= (ACCEL_TRIMS[k] & 3) << (4 - 2 * k)
         self.fifo.clear()
         self._fifo_registers = ()
         self._accel_lsb, self._gyro_lsb = 16384, 131.0
@@ -284,6 +294,8 @@ class Mpu6050:
         if self._fast():  # the accelerometer stays at 1 kHz
             force = self.world((t_us - t_us % 1000) / 1e6)
         temp_c = values[6] if len(values) > 6 else 25.0
+        if (self._regs[GYRO_CONFIG] | self._regs[ACCEL_CONFIG]) & 0xE0 and self.who_am_i == 0x68:
+            values, force = self._with_self_test(values, force)
         self._put(0x3B, force[0] * self._accel_lsb)
         self._put(0x3D, force[1] * self._accel_lsb)
         self._put(0x3F, force[2] * self._accel_lsb)
@@ -291,6 +303,17 @@ class Mpu6050:
         self._put(0x43, values[3] * self._gyro_lsb)
         self._put(0x45, values[4] * self._gyro_lsb)
         self._put(0x47, values[5] * self._gyro_lsb)
+
+    def _with_self_test(self, values, force):
+        """The readings with what the axes in self-test add: their factory trims (RM p. 11)."""
+        force, values = list(force[:3]), list(values)
+        for k in range(3):
+            if self._regs[ACCEL_CONFIG] & 0x80 >> k:
+                force[k] += self.self_test[k] * 0.34 * (0.92 / 0.34) ** ((ACCEL_TRIMS[k] - 1) / 30)
+            if self._regs[GYRO_CONFIG] & 0x80 >> k:
+                trim_dps = 25 * 1.046 ** (GYRO_TRIMS[k] - 1)
+                values[3 + k] += self.self_test[3 + k] * (-trim_dps if k == 1 else trim_dps)
+        return values, force
 
     def _put(self, register, counts):
         counts = min(32767, max(-32768, round(counts)))

@@ -12,6 +12,8 @@ WIDTH, HEIGHT = 128, 64
 PAGES = HEIGHT // 8
 # By kind: columns of RAM, first visible one, low half of the status (as found on chips: no data sheet gives it)
 _KINDS = {"ssd1306": (128, 0, 0x03), "sh1106": (132, 2, 0x08)}
+# The other one's supply commands, which it ignores, but for those that are others of its own
+_IGNORED = {"ssd1306": (0xAD, 0x8B), "sh1106": (0x8D, 0x20, 0x2E)}
 # Commands with arguments, and how many
 _ARGUMENTS = {0x81: 1, 0xA8: 1, 0xD3: 1, 0xD5: 1, 0xD9: 1, 0xDA: 1, 0xDB: 1}
 _OWN_ARGUMENTS = {
@@ -25,6 +27,7 @@ _OFF = 0x40  # bit of the status
 class Oled:
     """One display. kind: "ssd1306" or "sh1106".
 
+    identity: low half of the status.  alternate: rows as on a panel of 64 rows, not in sequence as on one of 32.
     on: switched on.  pumped: has the voltage that pixels glow with.  inverted, contrast, start_line: as set.
     changes: counts visible changes.  unknown: counts commands that the controller does not have.
     """
@@ -35,7 +38,7 @@ class Oled:
         self.address = address
         self.clock = clock
         self.kind = kind
-        self._columns, self._first, self._identity = _KINDS[kind]
+        self._columns, self._first, self.identity = _KINDS[kind]
         self._arguments = dict(_ARGUMENTS)
         self._arguments.update(_OWN_ARGUMENTS[kind])
         self.changes = 0
@@ -50,7 +53,7 @@ class Oled:
         self.on = self.pumped = self.inverted = self._all_on = False
         self.contrast = 0x7F if self.kind == "ssd1306" else 0x80
         self.start_line = self._offset = 0
-        self._mux = 63
+        self._mux, self.alternate = 63, True
         self._flipped_columns = self._flipped_rows = False
         self._mode = 2  # of addressing: page by page
         self._page = self._column = 0
@@ -87,6 +90,11 @@ class Oled:
                     seen[(y * WIDTH + x) >> 3] |= 0x80 >> (x & 7)
         return seen
 
+    @property
+    def rows(self):
+        """The rows that are driven: 64 or fewer."""
+        return self._mux + 1
+
     def pages(self):
         """The visible part of the RAM: of each page 128 bytes."""
         starts = [page * self._columns + self._first for page in range(PAGES)]
@@ -121,7 +129,7 @@ class Oled:
 
     def read_byte(self):
         """The status."""
-        return self._identity | (0 if self.on else _OFF)
+        return self.identity | (0 if self.on else _OFF)
 
     # The controller
 
@@ -172,7 +180,9 @@ class Oled:
             self._mux = argument & 0x3F
         elif code == 0xD3:
             self._offset = argument & 0x3F
-        elif code in (0xD5, 0xD9, 0xDA, 0xDB, 0xE3):
+        elif code == 0xDA:
+            self.alternate = bool(argument & 0x10)
+        elif code in (0xD5, 0xD9, 0xDB, 0xE3) or code in _IGNORED[self.kind]:
             pass
         elif not (self._of_ssd1306(command) if self.kind == "ssd1306" else self._of_sh1106(command)):
             self.unknown += 1

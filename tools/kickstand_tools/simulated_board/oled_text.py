@@ -31,6 +31,8 @@ def lines(oled):
     if not oled.backlight:
         return [_BLANK, _BLANK]
     pages = oled.pages()
+    if oled.rows == 32:
+        return [_tall(pages, 0) or "?", _tall(pages, 2) or "?"]
     first, second = _tall(pages, 1), _tall(pages, 5)
     if first is not None and second is not None:
         return [first, second]

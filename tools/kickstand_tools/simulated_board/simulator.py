@@ -254,12 +254,12 @@ class Board:
 
     def pin_level(self, number):
         """Pin.value()."""
+        mode, pull, level, since_us = self._pins.get(number, (fake_machine.Pin.IN, -1, 0, 0))
         for bus in self.buses:
             if number == bus.sda:
-                return bus.sda_level()
+                return bus.sda_level(pull == fake_machine.Pin.PULL_UP)
             if number == bus.scl:
-                return bus.scl_level()
-        mode, pull, level, since_us = self._pins.get(number, (fake_machine.Pin.IN, -1, 0, 0))
+                return bus.scl_level(pull == fake_machine.Pin.PULL_UP)
         if number == self.button_pin and self.button.low(since_us):
             return 0
         if number == self.wheel_pin and self.wheel and self.wheel.closed:

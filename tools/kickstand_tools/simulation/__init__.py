@@ -2,7 +2,7 @@
 
     from kickstand_tools.simulation.files import simulate
     simulate("hills", seed=3, out_dir="ride")
-    # ride/POSE_1.csv to POSE_7.csv (the last one slanted), KICKSTAND.csv, UPRIGHT.csv, RIDE.csv, TRUTH.csv
+    # ride/POSE_1.csv to POSE_7.csv (the last one slanted), SIX.csv, KICKSTAND.csv, UPRIGHT.csv, RIDE.csv, TRUTH.csv
 
 The way of a sample: profiles (what the rider does) -> commands (as signals) -> physics/bike (how the bike leans and
 turns) -> physics/kinematics with road and engine (what a perfect sensor on it measures) -> physics/chip (what the

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..logs.cells import COLUMNS, TRACK
-from ..output import check_directory
+from ..output import check_directory, make_directory, whole_file
 from .profiles import check_profile
 from .ride import Ride, ride
 
@@ -33,19 +33,20 @@ def simulate(
 ) -> Ride:
     """Simulate a ride of exactly this length and write it to out_dir. conditions: see ride.ride. Raises InputError.
 
-    Logs: POSE_1.csv to POSE_7.csv (the last one slanted), KICKSTAND.csv, UPRIGHT.csv, RIDE.csv. TRUTH.csv has one row
-    for each row of RIDE.csv. A RIDE.cal.json in out_dir is removed. speed: RIDE.csv gets a speed and a position once a
-    second.
+    Logs: POSE_1.csv to POSE_7.csv (the last one slanted), SIX.csv (seven poses in one log, with the turns between
+    them), KICKSTAND.csv, UPRIGHT.csv, RIDE.csv. TRUTH.csv has one row for each row of RIDE.csv. A RIDE.cal.json in
+    out_dir is removed. speed: RIDE.csv gets a speed and a position once a second.
     """
     check_profile(profile)
     directory = Path(out_dir)
     check_directory(directory)
     made = _cut(ride(profile, seed, seconds, exact=True, **conditions), seconds)
     try:
-        directory.mkdir(parents=True, exist_ok=True)
+        make_directory(directory)
         # It belongs to an earlier ride and another sensor, but report, plot and export would use it for this one
         (directory / "RIDE.cal.json").unlink(missing_ok=True)
         write_poses(directory, made)
+        _write_readings(directory / "SIX.csv", made.procedure, made.rate_hz)
         write_ride(directory / "RIDE.csv", made, speed)
         _write_truth(directory / "TRUTH.csv", made)
     except OSError as error:
@@ -65,8 +66,12 @@ def write_poses(directory: Path, made: Ride) -> tuple[list[Path], Path, Path]:
     seven = [directory / f"POSE_{k}.csv" for k in range(1, 8)]
     pair = directory / "KICKSTAND.csv", directory / "UPRIGHT.csv"
     for path, readings in zip([*seven, *pair], [*made.poses, made.kickstand, made.upright]):
-        _write(path, _LOG, _FORMATS, _log(np.arange(len(readings)) / made.rate_hz, readings))
+        _write_readings(path, readings, made.rate_hz)
     return seven, *pair
+
+
+def _write_readings(path: Path, readings: NDArray, rate_hz: float) -> None:
+    _write(path, _LOG, _FORMATS, _log(np.arange(len(readings)) / rate_hz, readings))
 
 
 def positions(made: Ride) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
@@ -86,7 +91,7 @@ def _log(time: NDArray, readings: NDArray) -> NDArray:
 def _write(path: Path, names: Iterable[str], formats: list[str], table: NDArray, *texts: list[str]) -> None:
     """A CSV file of the table's columns, and of one of each of the texts."""
     form = ",".join(formats)
-    with path.open("w", encoding="ascii") as file:
+    with whole_file(path) as temporary, temporary.open("w", encoding="ascii") as file:
         print(*names, sep=",", file=file)
         for row, *more in zip(table, *texts):
             print(form % tuple(row), *more, sep=",", file=file)

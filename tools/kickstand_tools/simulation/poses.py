@@ -1,5 +1,7 @@
 """The poses that a calibration needs, as a rider captures them: six sides, a slanted one, kickstand, upright."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,20 +21,23 @@ def still(chance: np.random.Generator, chip: Chip, up: NDArray, temp_c: float) -
 
 
 def seven(chance: np.random.Generator, chip: Chip, temp_c: float) -> list[NDArray[np.float64]]:
-    """Readings of seven poses: each of the six sides up once, in random order and up to 4 degrees askew, then a slanted
-    pose."""
-    found = []
+    """Readings of the seven poses of ups()."""
+    return [still(chance, chip, up, temp_c) for up in ups(chance)]
+
+
+def ups(chance: np.random.Generator) -> Iterator[NDArray[np.float64]]:
+    """The unit vector upward (3) in the sensor's axes in seven poses: each of the six sides up once, in random order
+    and up to 4 degrees askew, then a slanted pose."""
     for side in chance.permutation(6):
         up = chance.standard_normal(3)
         axis = np.zeros(3)
         axis[side // 2] = 1.0 if side % 2 == 0 else -1.0
         off = up - axis * (up @ axis)
         askew = np.radians(chance.uniform(0.0, _ASKEW_DEG))
-        found.append(still(chance, chip, axis * np.cos(askew) + off / np.linalg.norm(off) * np.sin(askew), temp_c))
+        yield axis * np.cos(askew) + off / np.linalg.norm(off) * np.sin(askew)
     signs = chance.choice((-1.0, 1.0), 3)
     free = signs * chance.uniform(0.45, 0.75, 3)
-    found.append(still(chance, chip, free / np.linalg.norm(free), temp_c))
-    return found
+    yield free / np.linalg.norm(free)
 
 
 def up_seen(lean_deg: float | NDArray, pitch_deg: float) -> NDArray[np.float64]:

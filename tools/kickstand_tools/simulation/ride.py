@@ -1,12 +1,13 @@
 """Simulates a whole ride from plan, bike, road, engine and chip."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
-from . import poses
+from . import hands, poses
 from .commands import Commands, commands
 from .physics.bike import Bike, roll, weave
 from .physics.chip import DIVIDER, RATE_HZ, Chip
@@ -45,6 +46,14 @@ class Ride:
     chip: Chip
     bike: Bike
     stand_deg: float
+    seed: tuple[int, ...]  # of the procedure
+    home_c: float
+
+    @cached_property
+    def procedure(self) -> NDArray[np.float64]:
+        """(n, 7) at rate_hz: seven other poses, as for `poses`, taken in one go, with the turns between them."""
+        chance = np.random.default_rng(self.seed)
+        return hands.procedure(chance, self.chip, np.array(list(poses.ups(chance))), self.home_c)
 
 
 def ride(
@@ -132,6 +141,8 @@ def ride(
         chip,
         bike,
         lean,
+        (seed, *profile.encode(), 2),
+        home_c,
     )
 
 

@@ -1,4 +1,4 @@
-"""`kickstand flash` and `kickstand status` in the browser: their own code on CPython for WebAssembly.
+"""`kickstand flash`, `status` and `check` in the browser: their own code on CPython for WebAssembly.
 page/install/install.mjs runs it. What goes to it is JSON.
 """
 
@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from .. import firmware_path
-from ..deploy import bytecode, config_check, config_text, connection, flash
+from ..deploy import bytecode, check as board_check, config_check, config_text, connection, flash, others
 from ..deploy.firmware_files import CONFIG
 from ..errors import InputError
 from .serial_guest import BrowserBoard
@@ -29,15 +29,15 @@ class Installation:
         restarted.
 
         Returns {"refused": why} or {"board", "settings": {name: its value in config.py}, "usual": {name: the value that
-        is taken without one}, "by_hand": why a form cannot change this config.py, or null}.
+        is taken without one}, "by_hand": why a form cannot change this config.py, or null, "others": a line for each
+        file of another project that install() will give another name}.
         """
         try:
             with connection.connected(BrowserBoard(line, name)) as (transport, name):
                 try:
                     board = _describe(transport, name)
                     self._pose = transport.eval(_POSE)
-                    there = transport.fs_exists(CONFIG)
-                    own = bytes(transport.fs_readfile(CONFIG)) if there else None
+                    there = others.read(transport)
                 finally:
                     connection.restart(transport)
         except InputError as error:
@@ -47,6 +47,8 @@ class Installation:
         for module in [module for module in sys.modules if module.startswith("kickstand.")]:
             del sys.modules[module]  # of a board before: the firmware asks what it runs on as it is imported
         settings, self._by_hand, self._own = {}, None, None
+        found = others.find(there, lambda path: _judged(path, *self._pose), True)
+        own = None if CONFIG in found.moves else there.texts.get(CONFIG)
         try:
             self._own = None if own is None else config_text.decoded(own)
             settings = config_text.values(self._own or "")
@@ -56,7 +58,8 @@ class Installation:
             usual = {
                 name: _written(value) for name, value in vars(config_check.default_settings()).items() if name.isupper()
             }
-        return json.dumps({"board": board, "settings": settings, "usual": usual, "by_hand": self._by_hand})
+        said = {"board": board, "settings": settings, "usual": usual, "by_hand": self._by_hand}
+        return json.dumps(said | {"others": found.words()})
 
     def check(self, wanted):
         """The config.py with these settings, {name: value or null for the usual one}, by the firmware's own rules.
@@ -105,6 +108,16 @@ def status(line, name):
         return json.dumps({"text": connection.status(BrowserBoard(line, name))})
     except InputError as error:
         return json.dumps({"refused": str(error)})
+
+
+def check(line, name, say):
+    """`kickstand check` of the board at a SerialLine: {"text"} or {"refused": why}. say(text): each line."""
+    try:
+        checked = board_check.check(BrowserBoard(line, name), say)
+    except InputError as error:
+        return json.dumps({"refused": str(error)})
+    lines = [board_check.line(finding) for finding in checked.findings]
+    return json.dumps({"text": "\n".join([*lines, board_check.verdict(checked.findings)])})
 
 
 def _describe(transport, name):

@@ -57,7 +57,8 @@ def _install(kept: Path) -> None:
 
     try:
         kept.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=kept.parent) as directory:
+        # What has been renamed is no longer there to be removed
+        with tempfile.TemporaryDirectory(dir=kept.parent, ignore_cleanup_errors=True) as directory:
             for name in LISTS:
                 shutil.copy(NPM / name, directory)
             done = npm(
@@ -73,12 +74,20 @@ def _install(kept: Path) -> None:
             )
             if done.returncode != 0:
                 raise InputError(f"what the pages carry cannot be fetched: {_reason(str(done.stdout))}")
-            os.replace(directory, kept)
-            os.mkdir(directory)  # for TemporaryDirectory to remove
+            _rename(directory, kept)
     except subprocess.TimeoutExpired:
         raise InputError("what the pages carry cannot be fetched: npm took too long; is there a network?")
     except OSError as error:
         raise InputError(f"{kept.parent} cannot be written: {cause(error)}") from error
+
+
+def _rename(directory: str, kept: Path) -> None:
+    """Rename a complete directory to kept, unless another process was first."""
+    try:
+        os.rename(directory, kept)
+    except OSError:
+        if not kept.is_dir():
+            raise
 
 
 def _reason(said: str) -> str:

@@ -77,28 +77,35 @@ def sorted_out(names: list[str]) -> Given:
     return found
 
 
+def _in_folder(name: str, files: list[RecordingFile]) -> str:
+    """Put files into a folder of their own; returns its name."""
+    while Path(name).exists():
+        name += "_"
+    Path(name).mkdir()
+    for file in files:
+        Path(name, file.name).write_bytes(file.content)  # not a link: an import leaves out those that lead out
+    return name
+
+
 def _together(files: list[RecordingFile]) -> Iterator[tuple[str, list[RecordingFile]]]:
     """(name, its files) of each recording among single files: the name is that of a folder where they are several."""
     found = recordings(files)
     used = {id(file) for _, group in found for file in group}
     for app, group in found:
-        name = group[0].name
-        if len(group) > 1:
-            name = f"{app.NAME} recording"
-            while Path(name).exists():
-                name += "_"
-            Path(name).mkdir()
-            for file in group:
-                Path(name, file.name).write_bytes(file.content)  # not a link: an import leaves out those that lead out
-        yield name, group
-    yield from ((file.name, [file]) for file in files if id(file) not in used)
+        yield group[0].name if len(group) == 1 else _in_folder(f"{app.NAME} recording", group), group
+    left = [file for file in files if id(file) not in used]
+    table = mapped.table_in(left) if len(left) > 1 else None
+    if table is not None and table.joined and not table.findings.lacking:
+        yield _in_folder("recording", left), left
+    else:
+        yield from ((file.name, [file]) for file in left)
 
 
 def _add(found: Given, log: str, names: list[str], files: list[RecordingFile]) -> None:
     """A ride, or why these files are none."""
     known = recordings(files)
     table = None if known else mapped.table_in(files)
-    if not known and (table is None or len(table.columns) < len(mapped.REQUIRED) or len(files) > 1):
+    if not known and (table is None or len(table.columns) < len(mapped.REQUIRED)):
         found.refused |= dict.fromkeys(names, mapped.unknown(files, log))
         return
     found.rides.append(GivenRide(log, names, table=table))

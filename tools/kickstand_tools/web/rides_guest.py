@@ -79,15 +79,21 @@ def rides(given, names):
 
 def asked_for(table: mapped.Table) -> dict[str, Any]:
     """What the page asks about a table: {"columns": all, "keys": [[key, words, is it needed, column that seems to be
-    it or ""], ...], "units": [[key, words, [[unit, words], ...], the one that seems right], ...],
-    "lacking": what is not found, in words}."""
+    it or ""], ...], "units": [[key, words, [[unit, words], ...], the one that seems right, why], ...],
+    "lacking": what is not found, in words, "certain": nothing that is needed is uncertain, "picture":
+    Table.first_seconds()}."""
     keys = [[key, words, key in mapped.REQUIRED, table.found.get(key, "")] for key, words in mapped.WORDS.items()]
-    units = [
-        [key, f"unit of the {words}", [[unit, unit] for unit in mapped.UNIT_KEYS[key]], table.units.get(key, "")]
-        for key, words in (("a", "acceleration"), ("g", "rates"), ("speed", "speed"))
-    ]
-    units[0][2] += [[f"-{unit}", f"{unit}, all of the opposite sign"] for unit in mapped.UNIT_KEYS["a"]]
-    return {"columns": table.columns, "keys": keys, "units": units, "lacking": table.lacking}
+    found = table.findings
+    units = []
+    for key, words in (("t", "time"), ("a", "acceleration"), ("g", "rates"), ("speed", "speed")):
+        likely, why = table.units.get(key, ""), found.found[key].why if key in found.found else ""
+        choices = [*mapped.UNIT_KEYS[key], *([mapped.COUNTS] if key in "ag" else [])]
+        if likely and likely not in choices:
+            choices.insert(0, likely)
+        units.append([key, f"unit of the {words}", [[unit, unit] for unit in choices], likely, why])
+    units[1][2] += [[f"-{unit}", f"{unit}, all of the opposite sign"] for unit, _ in list(units[1][2])]
+    words = {"lacking": table.lacking, "certain": found.decided, "picture": table.first_seconds()}
+    return {"columns": table.columns, "keys": keys, "units": units} | words
 
 
 @in_json
@@ -102,7 +108,7 @@ def take(log, is_log, columns, units, track, progress):
         found = import_recording(log, json.loads(columns) or None, json.loads(units))
         out = str(_made(log, f"{log.partition('.')[0]}.csv"))
         write_imported(out, found)
-        warnings = [sentence(notice, PAGE) for notice in found.notices]
+        warnings = [sentence(notice, PAGE) for notice in [*found.notices, *found.shortfalls]]
     if track:
         try:
             joined = join_track(Path(out), Path(track), progress)

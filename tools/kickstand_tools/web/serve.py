@@ -13,7 +13,7 @@ from urllib.parse import unquote, urlsplit
 
 HOST = "127.0.0.1"
 MOST, PATIENCE_S = 64, 10.0  # connections at a time; for what a browser has to send
-FULL_S = 1.0  # a new connection waits for so long for another to end, then the oldest is ended
+FULL_S = 1.0  # a new connection waits for so long for another to end, then the oldest is ended; a silent one at once
 PORT = 8377  # the same each time, so that the browser finds what it has kept
 # Named here, because the registry of Windows may hold others, with which a browser runs no module
 TYPES = {
@@ -42,21 +42,32 @@ class Server(ThreadingHTTPServer):
     def __init__(self, *arguments: Any) -> None:
         self._free = BoundedSemaphore(MOST)
         self._open: dict[Any, None] = {}  # the oldest first
+        self.has_asked: set[Any] = set()
         super().__init__(*arguments)
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        if not self._free.acquire(timeout=FULL_S):
+        if not self._free.acquire(blocking=False) and not (
+            self._end_a_silent_one() or self._free.acquire(timeout=FULL_S)
+        ):
             with contextlib.suppress(OSError, StopIteration, RuntimeError):  # another may end meanwhile
                 next(iter(self._open)).shutdown(socket.SHUT_RDWR)
             self._free.acquire()
         self._open[request] = None
         super().process_request(request, client_address)
 
+    def _end_a_silent_one(self) -> bool:
+        """End the oldest connection that has asked for nothing yet, and take its place; False if there is none."""
+        with contextlib.suppress(OSError, StopIteration, RuntimeError):
+            next(one for one in list(self._open) if one not in self.has_asked).shutdown(socket.SHUT_RDWR)
+            return self._free.acquire(timeout=FULL_S)
+        return False
+
     def process_request_thread(self, request: Any, client_address: Any) -> None:
         try:
             super().process_request_thread(request, client_address)
         finally:
             self._open.pop(request, None)
+            self.has_asked.discard(request)
             self._free.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
@@ -78,6 +89,7 @@ def server(files: dict[str, bytes], port: int = PORT) -> Server:
             self._answer(False)
 
         def _answer(self, whole: bool) -> None:
+            self.server.has_asked.add(self.connection)  # pyright: ignore[reportAttributeAccessIssue]
             try:
                 name = unquote(urlsplit(self.path).path).lstrip("/") or "index.html"
             except ValueError:  # as of http://[::1/

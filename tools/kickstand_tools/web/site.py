@@ -8,6 +8,7 @@ from typing import Any
 
 from .. import firmware_path
 from ..analysis.plot import page
+from ..errors import DISTRIBUTION
 from ..output import check_directory, new_directory, whole_file
 from ..pictures import building, lcd, wiring
 from ..pictures.lcd_font import ROM
@@ -79,7 +80,7 @@ def wiring_tables() -> dict[str, tuple[str, list[tuple[str, str, str]]]]:
 def home() -> str:
     """The address of the project, "" where what is installed does not know it: see tools/hatch_build.py."""
     try:
-        named = metadata.metadata("kickstand").get_all("Project-URL") or []
+        named = metadata.metadata(DISTRIBUTION).get_all("Project-URL") or []
     except metadata.PackageNotFoundError:
         named = []
     return dict(one.split(", ", 1) for one in named).get("Homepage", "")

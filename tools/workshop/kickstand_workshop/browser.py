@@ -1,14 +1,14 @@
 """The site of `kickstand web` in a Chromium without a window."""
 
 import contextlib
+import shutil
 import threading
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from kickstand_tools.web import serve
 
-CHROMIUM = Path("/usr/bin/chromium")
+CHROMIUM = shutil.which("chromium")
 
 
 @contextlib.contextmanager

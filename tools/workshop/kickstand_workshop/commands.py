@@ -17,24 +17,41 @@ from kickstand_tools.simulation.physics.road import CLASSES
 from kickstand_tools.simulation.profiles import MAIN, check_profile
 from rich.console import Console
 
-from .evaluation import bands, picture, report, runs
+from .evaluation import bands, integrity, integrity_report, picture, report, runs
 from .evaluation.estimators import missing
 
+FAULTS_SECONDS = 120.0  # of riding with each fault, where no other length is given
 _WIDTH = 110  # columns of a table that is not printed to a terminal
 
 
 @click.command()
 @click.option("--profiles", default=",".join(MAIN), help=f"With commas between: {PROFILE_NAMES}")
-@click.option("--seeds", type=click.IntRange(min=1), default=3, help="Rides of each profile.")
+@click.option("--seeds", type=click.IntRange(min=1), default=3, help="Rides of each profile, or of each fault.")
 @seconds_option(60.0, "Of riding, each; start and stop come on top.")
 @pose_options(1.0, "Between the two poses, degrees.")
 @click.option("--recording", type=PATH, help="A recorded ride with speed to compare on too.")
-@click.option("--out", type=PATH, help="Write evaluation.json and lean.png to this directory.")
+@click.option("--out", type=PATH, help="Write evaluation.json and lean.png, or faults.json and faults.png, here.")
+@click.option("--faults", is_flag=True, help="Instead: is a wrong lean shown as good when the sensor is ill?")
+@click.option("--first-seed", type=click.IntRange(min=0), default=0, help="With --faults: other seeds, other rides.")
+@click.option("--whole-device", is_flag=True, help="With --faults: each ride on the simulated board, not some alone.")
 @JSON
 def evaluate_command(
-    profiles: str, recording: Path | None, out: Path | None, as_json: bool, **of_the_rides: Any
+    profiles: str,
+    recording: Path | None,
+    out: Path | None,
+    faults: bool,
+    first_seed: int,
+    whole_device: bool,
+    as_json: bool,
+    **of_the_rides: Any,
 ) -> None:
     """Compare the shown lean and other filters with the truth of simulated rides."""
+    if faults:
+        seconds = of_the_rides["seconds"] if _given("seconds") else FAULTS_SECONDS
+        _faults(integrity.jobs(of_the_rides["seeds"], first_seed, seconds, whole_device), out, as_json)
+        return
+    if _given("first_seed") or whole_device:
+        raise click.UsageError("--first-seed and --whole-device belong to --faults.")
     names = [name.strip() for name in profiles.split(",")]
     jobs = runs.jobs(names, traces=out is not None, **of_the_rides)
     if out is not None:
@@ -60,6 +77,30 @@ def evaluate_command(
                 console.print(report.real_table(found.recorded.scores, found.recorded.name))
         if out is not None:
             figures, drawing = report.write(found, out)
+            click.echo(f"written: {figures} and {drawing}", err=True)
+
+
+def _given(option: str) -> bool:
+    """True where the command line has it."""
+    return click.get_current_context().get_parameter_source(option) is click.core.ParameterSource.COMMANDLINE
+
+
+def _faults(jobs: list[integrity.Job], out: Path | None, as_json: bool) -> None:
+    """What `evaluate --faults` does."""
+    if out is not None:
+        picture.check()
+        check_directory(out)
+    with new_directory(out) if out is not None else contextlib.nullcontext():
+        with Bar("riding with faults", len(jobs), patience_s=0.0, lines_s=LINES_S) as bar:
+            found = integrity.evaluate(jobs, lambda: bar.advance(1))
+        if as_json:
+            click.echo(json.dumps(integrity_report.document(found), indent=2))
+        else:
+            console = _console()
+            console.print(integrity_report.fault_table(found))
+            console.print(integrity_report.diagram_table(found))
+        if out is not None:
+            figures, drawing = integrity_report.write(found, out)
             click.echo(f"written: {figures} and {drawing}", err=True)
 
 

@@ -1,5 +1,6 @@
 """The charts of a ride as one picture, by matplotlib."""
 
+import re
 import textwrap
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,10 @@ from ..overview import Overview
 from . import charts
 
 POINTS = 6000
+# Fonts with letters of other scripts, as far as they are installed
+_OTHER_LETTERS = re.compile(
+    r"CJK|Noto Sans|Gothic|Hei|Ming|Song|YaHei|Arial Unicode|Malgun|Droid|WenQuanYi|Symbola|IPA"
+)
 _CHARACTERS, _LINE = 180, 0.16  # of a line of warnings, and its height in inches
 _STYLE: Any = {
     "font.size": 9,
@@ -46,11 +51,12 @@ def figure_of(seen: Overview) -> Any:
     wanted = charts.charts(seen)
     said = [line for words in wanted.warnings for line in textwrap.wrap(words, _CHARACTERS)]
     heights = [chart.height for chart in wanted.over_time] + [wanted.below[0].height]
-    with rc_context(_STYLE):
+    families, title = _fonts(wanted.title)
+    with rc_context(_STYLE | {"font.family": families}):
         figure = Figure(figsize=(11, sum(heights) + _LINE * len(said)), layout="constrained")
         FigureCanvasAgg(figure)
         aside: Any = {"x": 0.01, "ha": "left", "parse_math": False}  # a name may have $ in it
-        figure.suptitle(wanted.title, fontsize=12, **aside)
+        figure.suptitle(title, fontsize=12, **aside)
         if said:
             figure.supxlabel("\n".join(said), fontsize=8, color=charts.BRAKE_COLOUR, **aside)
         rows = figure.add_gridspec(len(heights), len(wanted.below), height_ratios=heights)
@@ -64,6 +70,24 @@ def figure_of(seen: Overview) -> Any:
             draw_chart(figure.add_subplot(rows[-1, k]), chart)
         figure.canvas.draw()
     return figure
+
+
+def _fonts(text: str) -> tuple[list[str], str]:
+    """The families of fonts for a text, and the text with the code of each letter that none of them has."""
+    from matplotlib import font_manager
+
+    families = ["DejaVu Sans"]
+    here = {font.name: font.fname for font in font_manager.fontManager.ttflist}
+    fonts = [font_manager.get_font(here["DejaVu Sans"])]
+    for family in (name for name in sorted(here) if _OTHER_LETTERS.search(name)):
+        if all(any(font.get_char_index(ord(c)) for font in fonts) for c in text):
+            break
+        font = font_manager.get_font(here[family])
+        if any(font.get_char_index(ord(c)) and not any(f.get_char_index(ord(c)) for f in fonts) for c in text):
+            families.append(family)
+            fonts.append(font)
+    known = [any(font.get_char_index(ord(c)) for font in fonts) for c in text]
+    return families, "".join(c if there else ascii(c)[1:-1] for c, there in zip(text, known))
 
 
 def draw_chart(axes: Any, chart: charts.Chart) -> None:

@@ -5,18 +5,16 @@ GyroZ is positive in a left turn, is measured on the ride in its src/lib/__fixtu
 https://www.racebox.pro/products/mini-micro-protocol-documentation. The column Speed says no unit; the positions do.
 """
 
-import numpy as np
 from kickstand.errors import Notice
 
 from ...errors import InputError
-from ...signals import Array, distance_m
 from ..files import RecordingFile
-from ..recording import SECOND_NS, Recording, Sheet, names_in, plain, read_sheet, sensor_of, track_of, unit_in
-from ..units import SPEEDS, Nanoseconds, factor, unit
+from ..recording import Recording, names_in, plain, read_sheet, sensor_of, track_of, unit_in
+from ..speeds import unit_by_positions
+from ..units import SPEEDS, unit
 
 NAME = "RaceBox"
 _AXES = [f"{sensor}{axis}" for sensor in ("GForce", "Gyro") for axis in "YZX"]  # left, up, forward
-_NEAR = 1.25  # largest factor between the speed and that by positions: the units differ by 1.6 and more
 
 
 def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
@@ -40,7 +38,9 @@ def read(files: list[RecordingFile], name: str, speed_unit: str = "") -> Recordi
     lat, lon, speed = sheet.place("Latitude"), sheet.place("Longitude"), sheet.place("Speed", "KPH")
     notices: list[Notice] = []
     if speed is not None:
-        speed_unit = speed_unit or _said_unit(sheet.columns[speed]) or _measured_unit(sheet, time_ns, speed, lat, lon)
+        speed_unit = (
+            speed_unit or _said_unit(sheet.columns[speed]) or unit_by_positions(sheet, time_ns, speed, lat, lon)
+        )
         if not speed_unit:
             notices.append(Notice("import-speed-unit", sheet.columns[speed]))
             speed = None
@@ -60,28 +60,3 @@ def _header(file: RecordingFile) -> int | None:
 def _said_unit(column: str) -> str:
     said = "km/h" if plain(column) == "kph" else unit(unit_in(column))
     return said if said in SPEEDS else ""
-
-
-def _measured_unit(sheet: Sheet, time_ns: Nanoseconds, speed: int, lat: int | None, lon: int | None) -> str:
-    """The unit in which the speeds fit the changes of position; "" where that is not clear."""
-    if lat is None or lon is None:
-        return ""
-    moved = _moved_mps(time_ns, sheet.numbers(lat), sheet.numbers(lon))
-    said = sheet.numbers(speed)
-    fast = np.isfinite(moved) & np.isfinite(said) & (moved > 3.0)
-    if np.count_nonzero(fast) < 20:
-        return ""
-    ratio = float(np.median(said[fast] / moved[fast]))
-    near = {name: max(ratio * factor(name, SPEEDS, ""), 1.0 / (ratio * SPEEDS[name])) for name in SPEEDS if ratio > 0.0}
-    best = min(near, key=lambda name: near[name]) if near else ""
-    return best if best and near[best] < _NEAR else ""
-
-
-def _moved_mps(time_ns: Nanoseconds, lat: Array, lon: Array) -> Array:
-    """(n) mean speed by the positions over about a second before each row, NaN where unknown."""
-    steps = np.diff(time_ns)
-    back = max(1, round(SECOND_NS / max(float(np.median(steps)), 1.0))) if len(steps) else 1
-    apart_s = np.full(len(time_ns), np.nan)
-    apart_s[back:] = (time_ns[back:] - time_ns[:-back]) / SECOND_NS
-    east, north = distance_m(np.roll(lat, back), np.roll(lon, back), lat, lon)
-    return np.where((apart_s > 0.5) & (apart_s < 2.0), np.hypot(east, north) / np.maximum(apart_s, 0.5), np.nan)

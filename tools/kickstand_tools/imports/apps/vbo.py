@@ -26,6 +26,15 @@ _CHANNELS = {  # of the vehicle: along and about left, up, forward
     "YawRate": ("yawrate", "imuyawrate"),
     "RollRate": ("rollrate", "imurollrate"),
 }
+# RaceBox's names, of its box's x forward, y left, z up: in the order of _CHANNELS
+_BOX = (
+    ("LatAcc", "LateralAcc"),
+    ("VertAcc", "VerticalAcc"),
+    ("LongAcc", "LongitudinalAcc"),
+    ("y-rotation-gyroscope", "GyroY"),
+    ("z-rotation-gyroscope", "GyroZ"),
+    ("x-rotation-gyroscope", "GyroX"),
+)
 _RATE_SIGNS = np.array([-1.0, -1.0, 1.0])
 _VEHICLE = "x forward, y left, z up; +1 g up"
 _DEVICE = [f"{axis}{what}" for what in ("acc", "rateofrotation") for axis in "xyz"]  # as RaceChrono writes them
@@ -53,12 +62,17 @@ def read(files: list[RecordingFile], name: str) -> Recording:
     device = [place for place in (_first(sheet, axis) for axis in _DEVICE) if place is not None]
     of_device = len(device) == len(_DEVICE)
     places, missing = (device, []) if of_device else sheet.axes(*_CHANNELS.values())
+    of_box, lacking = sheet.axes(*_BOX)
+    if missing and not lacking:
+        places, missing = of_box, []
     if missing:
         named = ", ".join(name for name, names in _CHANNELS.items() if names[0] in missing)
         raise InputError(f"{name}: no channel {named}: {_LACKING}")
     up, turned = ("+1 g up", "right-handed") if of_device else (_VEHICLE, "yaw clockwise, pitch nose up: turned")
     accel_unit, rate_unit = units.get(places[0]) or "g", units.get(places[3]) or "deg/s"
     turn = 1.0 if of_device else _RATE_SIGNS
+    if places == of_box and not lacking:
+        up, turned, turn = "box's x forward, y left, z up; +1 g up", "right-handed", 1.0
     track = track_of(
         sheet,
         time_ns,

@@ -48,7 +48,7 @@ class Pin:
     def init(self, mode=-1, pull=-1, value=None):
         machine = board.machine
         if self.id in chips.flash_pins(machine):
-            raise Reset  # a crash: the next instruction cannot be read
+            board.clock.reset()  # a crash: the next instruction cannot be read
         if self.id in chips.inputs_only(machine):
             if mode in (Pin.OUT, Pin.OPEN_DRAIN):
                 raise ValueError("pin can only be input")
@@ -456,7 +456,7 @@ mem32 = _Mem32()
 
 
 def reset():
-    raise Reset
+    board.clock.reset()
 
 
 def reset_cause():

@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import InputError, cause, extra
 from ...logs.csv_lines import write_table
 from ...logs.log import Log
-from ...output import check_directory
+from ...output import check_directory, make_directory, whole_file
 from ...signals import Array, rotation_matrix
 from .route import random_route
 from .vehicle import HANDLING, Receiver, drive_log, random_sensor
@@ -86,7 +86,7 @@ def make_fleet(
         troubles = _shares(np.random.default_rng([seed, 1]), vehicles)
     made = []
     try:
-        (directory / "drives").mkdir(parents=True, exist_ok=True)
+        make_directory(directory / "drives")
         for k, trouble in enumerate(troubles):
             vehicle = _vehicle(np.random.default_rng([seed, 2, k]), directory / "drives", k, trouble, seconds, rate_hz)
             made.append(vehicle)
@@ -166,7 +166,8 @@ def _write(path: Path, log: Log, broken: str) -> None:
         content = bytes(range(128, 256)) * 20
     elif broken == "cut":
         content = content[: len(content) * 9 // 10]
-    path.write_bytes(content)
+    with whole_file(path) as temporary:
+        temporary.write_bytes(content)
 
 
 def log_bytes(log: Log) -> bytes:

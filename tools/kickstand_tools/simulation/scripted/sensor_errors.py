@@ -7,7 +7,7 @@ same reading at the same instant on both, whatever readings were computed before
     world(20.0)         # (fx, fy, fz, wx, wy, wz, temp_c): g and deg/s in the sensor's axes, errors included
 """
 
-from math import cos, pi, sin, sqrt
+from math import atan2, cos, degrees, pi, sin, sqrt
 
 # Tolerances, data sheet PS-MPU-6000A rev 3.4, sections 6.1 and 6.2
 MAX_OFFSET_G = (0.05, 0.05, 0.08)  # bias of the accelerometer along x, y, z
@@ -118,3 +118,36 @@ def resting(sensor, up):
     force = [(m[3 * i] * up[0] + m[3 * i + 1] * up[1] + m[3 * i + 2] * up[2]) / size for i in range(3)]
     still = (force[0], force[1], force[2], 0.0, 0.0, 0.0)
     return sensor.world(lambda t_s: still)
+
+
+def turning(sensor, before, after, begin_s, end_s):
+    """Returns the function world(t_s) of a sensor that a hand turns from one pose to the next, the shortest way, slowly
+    at both ends. before, after: up in its own axes, of any length."""
+    m = sensor.vehicle_from_sensor
+    a, b = _unit(before), _unit(after)
+    n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    size, along = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    angle = atan2(size, along)
+    if size < 1e-6:  # a half turn, about any axis across
+        n = [a[1] - a[2], a[2] - a[0], a[0] - a[1]]
+        if n[0] * n[0] + n[1] * n[1] + n[2] * n[2] < 0.1:
+            n = [a[1], -a[0], 0.0]
+    n = _unit(n)
+    across = [n[1] * a[2] - n[2] * a[1], n[2] * a[0] - n[0] * a[2], n[0] * a[1] - n[1] * a[0]]
+
+    def motion(t_s):
+        u = min(1.0, max(0.0, (t_s - begin_s) / (end_s - begin_s)))
+        at = angle * u * u * u * (10.0 + u * (6.0 * u - 15.0))
+        rate = angle * 30.0 * u * u * (1.0 - u) * (1.0 - u) / (end_s - begin_s)
+        up = [cos(at) * a[i] + sin(at) * across[i] for i in range(3)]
+        turn = [-degrees(rate) * n[i] for i in range(3)]  # the world turns in the sensor's axes as the sensor does not
+        return tuple(
+            [m[3 * i] * v[0] + m[3 * i + 1] * v[1] + m[3 * i + 2] * v[2] for v in (up, turn) for i in range(3)]
+        )
+
+    return sensor.world(motion)
+
+
+def _unit(vector):
+    size = sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
+    return [value / size for value in vector]

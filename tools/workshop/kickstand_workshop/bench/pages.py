@@ -51,8 +51,8 @@ def measure(browser: Any, address: str, files: dict[str, bytes], name: str) -> F
 
 def main() -> None:
     """Print the medians of RUNS."""
-    if not CHROMIUM.exists():
-        sys.exit(f"no {CHROMIUM}: on Debian the package chromium")
+    if CHROMIUM is None:
+        sys.exit("no Chromium: on Debian the package chromium")
     files = site.site_files()
     with opened(files) as (browser, address):
         for name in READY:

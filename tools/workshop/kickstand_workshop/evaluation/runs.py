@@ -94,8 +94,13 @@ def run(job: Job) -> Result:
 
 def run_all(jobs: list[Job]) -> Iterator[Result]:
     """Yield the result of run() for each job as it is ready."""
+    yield from on_all_processors(run, jobs, ordered=False)
+
+
+def on_all_processors(function: Callable, jobs: list, chunk: int = 1, ordered: bool = True) -> Iterator:
+    """Yield function(job) of each job. ordered: in the order of the jobs, else as each is ready."""
     with multiprocessing.Pool(min(len(jobs), os.cpu_count() or 1), _begin_worker) as pool:
-        yield from pool.imap_unordered(run, jobs)
+        yield from (pool.imap if ordered else pool.imap_unordered)(function, jobs, chunk)
 
 
 def calibrated_by_poses(made: Ride) -> CalibrationFile:

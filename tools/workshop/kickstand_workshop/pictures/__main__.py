@@ -12,7 +12,7 @@ def main() -> None:
     for name, svg in drawn().items():
         (directory / name).write_text(svg, encoding="utf-8")
     (directory / "ride.png").write_bytes(ride.draw())
-    if CHROMIUM.exists():
+    if CHROMIUM:
         (directory / page.NAME).write_bytes(page.draw())
     else:
         print(f"no Chromium: {page.NAME} stays as it is")

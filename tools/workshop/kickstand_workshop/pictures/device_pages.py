@@ -22,7 +22,7 @@ from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 PRESSES_S = (KICKSTAND_PRESS_S, UPRIGHT_PRESS_S, 48.0, 51.0)  # stand, upright, page of maxima, page of braking
 LONG_PRESS_AT_S = 58.0
 MOMENTS_S = {
-    "starting": 0.22,
+    "starting": 0.26,
     "on_stand": 3.0,
     "hold_still": 5.5,
     "upright": 9.0,

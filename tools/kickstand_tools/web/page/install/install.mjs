@@ -1,5 +1,5 @@
 // Puts the firmware and its config.py onto a board at the browser's serial port: `kickstand flash` itself, and what
-// `kickstand status` prints, on CPython for WebAssembly (web/install_guest.py).
+// `kickstand status` and `check` print, on CPython for WebAssembly (web/install_guest.py).
 
 import { ASKING, choosePort, inPages, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
@@ -33,7 +33,7 @@ async function look() {
   });
   atWork(false);
   if (!said) return;
-  const { refused, board: name, settings, usual, by_hand } = JSON.parse(said);
+  const { refused, board: name, settings, usual, by_hand, others } = JSON.parse(said);
   if (refused) return tell(`Not installed: ${inPages(refused)}.`);
   board = { port, guest };
   byHand = by_hand;
@@ -41,7 +41,8 @@ async function look() {
   byId("settings").hidden = Boolean(byHand);
   if (!byHand) fields.fill(settings, usual);
   byId("config").hidden = false;
-  tell(`${name} is there. ${byHand ? "Press" : "Look through its settings, then press"} Install.`);
+  const kept = others.map((line) => `${line}. `).join("");
+  tell(`${name} is there. ${kept}${byHand ? "Press" : "Look through its settings, then press"} Install.`);
   check();
 }
 
@@ -86,20 +87,21 @@ function showResult({ refused, board: name, copied, kept, config_kept }) {
   tell(`Done: ${name}. ${files}.${config} The board starts now. ${next}`);
 }
 
-/** What `kickstand status` prints, to read and to copy into an issue. */
-async function status() {
+/** Ask the board for a text, to read and to copy into an issue. asks(tools, line, name, say): promises JSON. */
+async function report(asks) {
   const say = (text) => (byId("status-said").textContent = text);
   const port = await choosePort(say);
   if (!port) return;
   atWork(true);
   byId("status-shown").hidden = true;
+  byId("status-text").textContent = "";
   say("Loading the tools, 6 MB the first time …");
   const tools = await guests(say);
   const said =
     tools &&
     (await overCable(port, say, (line, name) => {
       say(ASKING);
-      return tools.status.callPromising(line, name);
+      return asks(tools, line, name, say);
     }));
   atWork(false);
   if (!said) return;
@@ -109,18 +111,32 @@ async function status() {
   byId("status-shown").hidden = !text;
 }
 
+/** What `kickstand status` prints. */
+const status = () => report((tools, line, name) => tools.status.callPromising(line, name));
+
+/** `kickstand check`: its lines as they come, and what the rider has to do. */
+const checkBoard = () =>
+  report((tools, line, name, say) => {
+    byId("status-shown").hidden = false;
+    return tools.check.callPromising(line, name, (text) => {
+      if (text.startsWith("Press")) say(text);
+      else byId("status-text").textContent += `${text}\n`;
+    });
+  });
+
 async function copyStatus() {
   await navigator.clipboard.writeText(byId("status-text").textContent);
   byId("status-said").textContent = "Copied.";
 }
 
 function atWork(on) {
-  for (const id of ["look", "install", "fields", "image", "image-file", "status"]) byId(id).disabled = on;
+  for (const id of ["look", "install", "fields", "image", "image-file", "status", "check"]) byId(id).disabled = on;
 }
 
 byId("look").addEventListener("click", look);
 byId("install").addEventListener("click", install);
 byId("status").addEventListener("click", status);
+byId("check").addEventListener("click", checkBoard);
 byId("status-copy").addEventListener("click", copyStatus);
 byId("here").textContent = location.href;
 connectImage(atWork);

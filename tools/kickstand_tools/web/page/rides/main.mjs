@@ -89,7 +89,8 @@ async function look(ride) {
     if (ride.table && !ride.asked) {
       hideRide();
       ask(ride);
-      say(`${ride.given} is not of an app that is known${ride.table.lacking}: say what its columns are.`);
+      const asked = ride.table.certain ? "check what its columns are" : "say what its columns are";
+      say(`${ride.given} is not of an app that is known${ride.table.lacking}: ${asked}.`);
       return;
     }
     const { columns = {}, units = {} } = ride.asked ?? {};

@@ -10,9 +10,11 @@ export function askColumns(name, table, use) {
     const none = new Option(needed ? "choose" : "none", "");
     return choice(key, words, [none, ...table.columns.map((column) => new Option(column, column))], found, needed);
   });
-  const units = table.units.map(([key, words, choices, likely]) =>
-    choice(key, words, choices.map(([unit, said]) => new Option(said, unit)), likely, false),
-  );
+  const units = table.units.map(([key, words, choices, likely, why]) => {
+    const none = new Option("not known", "");
+    return choice(key, words, [none, ...choices.map(([unit, said]) => new Option(said, unit))], likely, false, why);
+  });
+  form.querySelector("#first-seconds").replaceChildren(...drawn(table.picture));
   form.querySelector("#columns").replaceChildren(...columns);
   form.querySelector("#units").replaceChildren(...units);
   form.onsubmit = (event) => {
@@ -29,7 +31,37 @@ export function askNothing() {
   form.hidden = true;
 }
 
-function choice(key, words, options, chosen, needed) {
+/** The first seconds of both sensors, a small chart each: so one sees what was taken for what. */
+function drawn({ t = [], ...sensors }) {
+  const words = { a: "acceleration", g: "rates" };
+  return Object.entries(sensors).map(([key, axes]) => {
+    const figure = document.createElement("figure");
+    const caption = document.createElement("figcaption");
+    caption.textContent = `${words[key]}, first ${Math.round(t.at(-1) ?? 0)} s`;
+    figure.append(caption, chart(t, axes));
+    return figure;
+  });
+}
+
+function chart(t, axes) {
+  const NS = "http://www.w3.org/2000/svg";
+  const svg = document.createElementNS(NS, "svg");
+  svg.setAttribute("viewBox", "0 0 300 80");
+  svg.setAttribute("role", "img");
+  const all = axes.flat();
+  const [low, high] = [Math.min(...all), Math.max(...all)];
+  svg.setAttribute("aria-label", `x, y and z between ${low.toPrecision(3)} and ${high.toPrecision(3)}`);
+  axes.forEach((values, axis) => {
+    const line = document.createElementNS(NS, "polyline");
+    const place = (value, k) => `${(300 * (t[k] - t[0])) / (t.at(-1) - t[0] || 1)},${76 - (72 * (value - low)) / (high - low || 1)}`;
+    line.setAttribute("points", values.map(place).join(" "));
+    line.setAttribute("class", `axis-${axis}`);
+    svg.append(line);
+  });
+  return svg;
+}
+
+function choice(key, words, options, chosen, needed, why = "") {
   const label = document.createElement("label");
   const select = document.createElement("select");
   select.name = key;
@@ -37,6 +69,11 @@ function choice(key, words, options, chosen, needed) {
   select.replaceChildren(...options);
   if (chosen) select.value = chosen;
   label.append(words, select);
+  if (why) {
+    const reason = document.createElement("small");
+    reason.textContent = why;
+    label.append(reason);
+  }
   return label;
 }
 

@@ -1,0 +1,268 @@
+"""The whole sensor from still poses and the turns between them: one least-squares problem of 18 unknowns.
+
+Accelerometer: force = (I + N) (slope * reading + offset), N symmetric with a diagonal of 0, 9 unknowns. Gyro: rate =
+(I + X) (reading - bias), 9 unknowns. Each pose asks that the force be 1 g long, each turn that the force of the pose
+before, turned, be the force of the pose after; the prior is the data sheet. Five Gauss-Newton steps, in 32-bit floats
+and little memory: the normal equations' lower triangle (171 numbers), factorised in its place (A.-L. Cholesky).
+"""
+
+from array import array
+from math import degrees
+
+from ..errors import GyroError
+from ..rotation import matrix
+from ..units import AXES
+from .turn import rotated
+
+UNKNOWNS = 18
+_GYRO = 9  # the first unknown of the gyro; before it offset (3), slope (3), N (3: yz, xz, xy)
+STEPS = 5
+SIGMA_FORCE = 0.0015  # g: of a pose's force; 1 sigma, as all that follow
+SIGMA_TURN = 0.0015  # rad: of a turn, by the poses at its ends
+# deg/s per sqrt(s): random walk of the gyro's bias during a turn. Between the poses at both ends, which measure it, the
+# angle's variance becomes walk^2 seconds^3 / 12.
+BIAS_WALK_DPS = 0.008
+# The priors: offset (g), slope, N, and of X its diagonal (scale) and the rest (cross-axis). The data sheet allows 0.03
+# and 0.02; the accelerometer's axes may also sit turned against the gyro's.
+SIGMA_OFFSET, SIGMA_SLOPE, SIGMA_SKEW = 0.1, 0.1, 0.012
+SIGMA_SCALE, SIGMA_CROSS = 0.03, 0.02
+# What is refused
+MAX_SCALE_ERROR = 0.10  # of the gyro: no working chip is as far off
+MAX_CROSS_ERROR = 0.06  # of its axes: twice the data sheet's, or one is late
+MAX_MISFIT = 0.012  # rad: of a turn after the fit
+GROSS_MISFIT = 0.25  # rad: of a turn before it; the sheet's errors add up to 0.2 in half a turn
+READS = (-1.0, 0.25, 0.5, 0.75, 1.3, 2.0, 4.0)  # what an axis reads of a rate of 1, to find one that alone is wrong
+DEAD_RAD = 0.2  # an axis that saw less than this in all turns is dead
+# largest standard error of a scale: else no turn about this axis has shown it, and it may be anything
+PROOF_SIGMA = 0.025
+
+
+def _triangle(i):
+    return i * (i + 1) // 2
+
+
+class SensorFit:
+    """A fit under way. poses: mean readings (3, g) in the order in which they were taken. turns: one fewer, each
+    Turn.packed() and its duration in seconds, or None where it cannot be used. offset (g), slope: the first guess.
+
+    run() does it. Then: offset (3, g), slope (3), accel_matrix (9), gyro_matrix (9), gyro_sigma (9: the standard error
+    of each entry of gyro_matrix), unproved (names of axes that no turn has measured).
+    """
+
+    def __init__(self, poses, turns, offset, slope):
+        self._poses, self._turns = poses, turns
+        self._p = list(offset) + list(slope) + [0.0] * 12
+        self._start = [0.0] * 3 + [1.0] * 3 + [0.0] * 12
+        self._sigma = [SIGMA_OFFSET] * 3 + [SIGMA_SLOPE] * 3 + [SIGMA_SKEW] * 3
+        self._sigma += [SIGMA_SCALE if i % 4 == 0 else SIGMA_CROSS for i in range(9)]
+        self._h = array("f", [0.0] * _triangle(UNKNOWNS))
+        self._g = [0.0] * UNKNOWNS
+
+    def run(self):
+        """A generator of short steps, because on a board the fit takes longer than the chip's FIFO lasts. Raises
+        GyroError where the turns are not those of a gyro."""
+        self._check_gross()
+        for _ in range(STEPS):
+            yield from self._accumulate()
+            self._factorise()
+            yield
+            step = self._solve()
+            for i in range(UNKNOWNS):
+                self._p[i] += step[i]
+            yield
+        self._finish()
+        self._check()
+
+    def finish(self):
+        """run() at once."""
+        for _ in self.run():
+            pass
+
+    def matrices(self):
+        """The 27 numbers of Calibration.matrices()."""
+        return list(self.accel_matrix) + list(self.gyro_matrix) + self.gyro_sigma
+
+    def force(self, k):
+        """The force (3, g) of pose k."""
+        m, p, a = self._accel(), self._p, self._poses[k]
+        g = [p[3 + i] * a[i] + p[i] for i in range(3)]
+        return [m[3 * i] * g[0] + m[3 * i + 1] * g[1] + m[3 * i + 2] * g[2] for i in range(3)]
+
+    def _accel(self):
+        yz, xz, xy = self._p[6:9]
+        return 1.0, xy, xz, xy, 1.0, yz, xz, yz, 1.0
+
+    def _misfit(self, k, x):
+        """(3, rad): the force before turn k, turned, less that after it, in the axes of the pose before. x: 9, row by
+        row of X; and the turned force."""
+        turn = self._turns[k][0]
+        turned = [0.0] * 3
+        for a in range(3):
+            for m in range(9):
+                turned[a] -= turn[9 + 9 * a + m] * x[m]
+        before, after = rotated(turned, self.force(k)), self.force(k + 1)
+        for a in range(3):
+            turned[a] = before[a] - turn[3 * a] * after[0] - turn[3 * a + 1] * after[1] - turn[3 * a + 2] * after[2]
+        return turned, before
+
+    def _accumulate(self):
+        h, g, p = self._h, self._g, self._p
+        for i in range(len(h)):
+            h[i] = 0.0
+        for i in range(UNKNOWNS):
+            weight = 1.0 / (self._sigma[i] * self._sigma[i])
+            h[_triangle(i) + i] = weight
+            g[i] = weight * (self._start[i] - p[i])
+        row = [0.0] * UNKNOWNS
+        for k in range(len(self._poses)):
+            force = self.force(k)
+            columns = self._force_columns(k)
+            for i in range(9):
+                row[i] = force[0] * columns[i] + force[1] * columns[9 + i] + force[2] * columns[18 + i]
+            square = force[0] * force[0] + force[1] * force[1] + force[2] * force[2]
+            self._add(row, 9, 0.5 * (1.0 - square), 1.0 / (SIGMA_FORCE * SIGMA_FORCE))
+            yield
+        for k in range(len(self._turns)):
+            if self._turns[k] is None:
+                continue
+            turn, seconds = self._turns[k]
+            walk = BIAS_WALK_DPS * 0.01745
+            weight = 1.0 / (SIGMA_TURN * SIGMA_TURN + walk * walk * seconds * seconds * seconds / 12)
+            misfit, before = self._misfit(k, p[_GYRO:])
+            first, second = self._force_columns(k), self._force_columns(k + 1)
+            yield
+            for a in range(3):
+                b, c = (a + 1) % 3, (a + 2) % 3
+                for i in range(9):
+                    row[i] = first[9 * a + i]
+                    for j in range(3):
+                        row[i] -= turn[3 * a + j] * second[9 * j + i]
+                    row[_GYRO + i] = before[b] * turn[9 + 9 * c + i] - before[c] * turn[9 + 9 * b + i]
+                self._add(row, UNKNOWNS, -misfit[a], weight)
+                yield
+
+    def _force_columns(self, k):
+        """d force / d (offset, slope, N) of pose k: 3 rows of 9."""
+        m, p, a = self._accel(), self._p, self._poses[k]
+        x, y, z = [p[3 + i] * a[i] + p[i] for i in range(3)]
+        out = []
+        for i in range(3):
+            one = m[3 * i : 3 * i + 3]
+            out += one
+            out += [one[j] * a[j] for j in range(3)]
+            out += ((0.0, z, y), (z, 0.0, x), (y, x, 0.0))[i]
+        return out
+
+    def _add(self, row, n, residual, weight):
+        """Add the measurement residual = row . change, whose row has n entries, to the normal equations."""
+        h, g = self._h, self._g
+        at = 0
+        for i in range(n):
+            value = weight * row[i]
+            g[i] += value * residual
+            for j in range(i + 1):
+                h[at] += value * row[j]
+                at += 1
+
+    def _factorise(self):
+        """h = L L^T, L in its place."""
+        h = self._h
+        for i in range(UNKNOWNS):
+            of_i = _triangle(i)
+            for j in range(i + 1):
+                of_j = _triangle(j)
+                total = h[of_i + j]
+                for k in range(j):
+                    total -= h[of_i + k] * h[of_j + k]
+                h[of_i + j] = total / h[of_j + j] if j < i else max(total, 1e-9) ** 0.5
+
+    def _solve(self):
+        """The change for g, by L L^T change = g."""
+        h, out = self._h, self._g[:]
+        for i in range(UNKNOWNS):
+            for k in range(i):
+                out[i] -= h[_triangle(i) + k] * out[k]
+            out[i] /= h[_triangle(i) + i]
+        for i in range(UNKNOWNS - 1, -1, -1):
+            for k in range(i + 1, UNKNOWNS):
+                out[i] -= h[_triangle(k) + i] * out[k]
+            out[i] /= h[_triangle(i) + i]
+        return out
+
+    def _finish(self):
+        """Set the results. The gyro's unknowns are the last, so that the last rows of L alone give their covariance:
+        its diagonal has the squared lengths of the columns of that block's inverse."""
+        h, p = self._h, self._p
+        self.offset, self.slope = p[0:3], p[3:6]
+        self.accel_matrix = matrix(self._accel())
+        self.gyro_matrix = matrix([p[_GYRO + i] + (1.0 if i % 4 == 0 else 0.0) for i in range(9)])
+        self.gyro_sigma = []
+        for m in range(_GYRO, UNKNOWNS):
+            column, square = [0.0] * UNKNOWNS, 0.0
+            for i in range(m, UNKNOWNS):
+                total = 1.0 if i == m else 0.0
+                for k in range(m, i):
+                    total -= h[_triangle(i) + k] * column[k]
+                column[i] = total / h[_triangle(i) + i]
+                square += column[i] * column[i]
+            self.gyro_sigma.append(square**0.5)
+        self.unproved = [AXES[i] for i in range(3) if self.gyro_sigma[4 * i] > PROOF_SIGMA]
+
+    def _check_gross(self):
+        """Raise GyroError if a turn by the gyro is not at all that by gravity."""
+        worst = self._cost([0.0] * 9)[1]
+        if worst > GROSS_MISFIT**2:
+            raise self._ill(worst)
+
+    def _ill(self, worst):
+        """The GyroError for turns that do not fit. It names the axis that alone explains them, if there is one."""
+        x = [0.0] * 9
+        best, found = self._cost(x)[0] / 4, None
+        for axis in range(3):
+            if self._turned(axis) < DEAD_RAD:
+                return GyroError("dead-gyro", AXES[axis])
+            for reads in READS:
+                x[4 * axis] = 1.0 / reads - 1.0
+                cost = self._cost(x)[0]
+                if cost < best:
+                    best, found = cost, (axis, reads)
+            x[4 * axis] = 0.0
+        if found is None:
+            return GyroError("gyro-misfit", degrees(worst**0.5))
+        axis, reads = found
+        if reads < 0.0:
+            return GyroError("gyro-reversed", AXES[axis])
+        return GyroError("gyro-scale", AXES[axis], 100.0 * (reads - 1.0))
+
+    def _turned(self, axis):
+        """The largest turn about an axis (rad) in all turns, by the gyro."""
+        most = 0.0
+        for turn in self._turns:
+            if turn is not None:
+                for a in range(3):
+                    most = max(most, abs(turn[0][9 + 9 * a + 4 * axis]))
+        return most
+
+    def _cost(self, x):
+        """Sum and largest of the turns' squared misfits."""
+        total = most = 0.0
+        for k in range(len(self._turns)):
+            if self._turns[k] is not None:
+                misfit = self._misfit(k, x)[0]
+                square = misfit[0] * misfit[0] + misfit[1] * misfit[1] + misfit[2] * misfit[2]
+                total += square
+                most = max(most, square)
+        return total, most
+
+    def _check(self):
+        """Raise GyroError if the gyro's errors are those of no working chip, or a turn does not fit."""
+        p = self._p
+        worst = self._cost(p[_GYRO:])[1]
+        if not worst < MAX_MISFIT**2:
+            raise self._ill(worst)
+        for i in range(9):
+            error = p[_GYRO + i]
+            if i % 4 == 0 and not abs(error) < MAX_SCALE_ERROR:
+                raise GyroError("gyro-scale", AXES[i // 4], -100.0 * error)
+            if not abs(error) < MAX_CROSS_ERROR + 2 * self.gyro_sigma[i]:
+                raise GyroError("gyro-misfit", degrees(abs(error)))

@@ -1,0 +1,144 @@
+"""How a sensor turned between two still poses, by its gyro: the attitude, and how the gyro's errors change it.
+
+Gravity in the pose before and in the pose after shows the same turn, so the two measure the gyro. Of a whole turn this
+keeps R (3x3), which takes vectors from the sensor's axes now to its axes at the start, and S (3x12): a true rate of
+(I + X) rate + c turns the sensor by exp([S x]) R, where x has row i of X, then c_i, in 4 i to 4 i + 3. D. Tedaldi, A.
+Pretto, E. Menegatti, "A robust and easy to implement method for IMU calibration", ICRA 2014, keeps all samples instead.
+"""
+
+from array import array
+from math import cos, radians, sin
+
+STEP_RAD = 0.02  # a step ends when the sensor has turned by so much about one axis. Larger: less exact
+STEP_US = 60_000  # or has taken so long
+QUICK = 31_000  # counts, 0.95 of the gyro's range: the chip's low-pass hides that single conversions were at its end
+
+
+class Turn:
+    """Integrates the gyro from start() to end(). Fixed memory.
+
+    lsb_per_dps: counts per deg/s. period_us: nominal time between two samples. quick: |counts| of a rate that is too
+    quick.
+    quick: the rate came near the end of the gyro's range since start(). lost: readings were missing since then.
+    seconds: duration of the turn, once end() was called.
+    """
+
+    def __init__(self, lsb_per_dps, period_us, quick=QUICK):
+        self._rad = radians(1.0 / lsb_per_dps) * 1e-6  # rad per count and microsecond
+        self._lsb = lsb_per_dps
+        self._period_us = period_us
+        self._quick = quick
+        self._step_counts = int(STEP_RAD / self._rad / period_us)  # a sum of counts: the angle of a step
+        self.running = False
+
+    def start(self, bias):
+        """Begin at a still pose. bias: 3, deg/s."""
+        self._bias = [value * self._lsb for value in bias]
+        self.r = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+        self.s = [0.0] * 36
+        self._sums = [0, 0, 0]
+        self._n = self._us = 0
+        self.seconds = 0.0
+        self.quick = self.lost = self._held = False
+        self.running = True
+
+    def add(self, sums, n, dt_us, hold=False):
+        """Take n samples: their sums (7, counts, the chip's order), and microseconds since the samples before. hold:
+        they belong to a still pose, after which the turn ends; or they count after all, if that pose is spoilt."""
+        if not self.running:
+            return
+        if hold and not self._held and self._n:
+            self._step()
+        self._held = hold
+        if dt_us > (n + 3) * self._period_us:
+            self.lost = True
+        quick, own = n * self._quick, self._sums
+        step = False
+        for i in range(3):
+            total = sums[4 + i]
+            if not -quick < total < quick:
+                self.quick = True
+            own[i] += total
+            if not -self._step_counts < own[i] < self._step_counts:
+                step = True
+        self._n += n
+        self._us += dt_us
+        if (step or self._us > STEP_US) and not hold:
+            self._step()
+
+    def end(self):
+        """End at a still pose."""
+        if self._n and not self._held:
+            self._step()
+        self.running = False
+
+    def attitude(self, bias, share):
+        """R as a list of 9, with another bias: of start()'s and this one (3, deg/s), the mean where share is 0.5."""
+        turned, out = [0.0] * 3, self.r[:]
+        for i in range(3):
+            error = radians(share * (self._bias[i] / self._lsb - bias[i]))
+            for a in range(3):
+                turned[a] += self.s[12 * a + 4 * i + 3] * error
+        for i in range(3):
+            column = rotated(turned, self.r[i::3])
+            for a in range(3):
+                out[3 * a + i] = column[a]
+        return out
+
+    def packed(self, bias):
+        """The turn as array('f', 36): R (9), then S (27) without the columns of the bias. bias: 3, deg/s, of the pose
+        at its end; the mean of both ends holds for the turn."""
+        out = array("f", self.attitude(bias, 0.5))
+        for i in range(36):
+            if i % 4 != 3:
+                out.append(self.s[i])
+        return out
+
+    def angle(self):
+        """Size of the turn by the gyro, rad."""
+        total = 0.0
+        for a in range(0, 36, 12):
+            turned = self.s[a] + self.s[a + 5] + self.s[a + 10]
+            total += turned * turned
+        return total**0.5
+
+    def _step(self):
+        """Turn R and S on by the sums of counts. A row of R times [w] is row x w, and half a step first makes it
+        second-order."""
+        share, own, bias, n = self._rad * self._us / self._n, self._sums, self._bias, self._n
+        x, y, z = [share * (own[i] - n * bias[i]) for i in range(3)]
+        seconds = self._us * 1e-6
+        self.seconds += seconds
+        own[0] = own[1] = own[2] = 0
+        self._n = self._us = 0
+        steps = (x, y, z, seconds)
+        small = 1.0 - (x * x + y * y + z * z) / 6  # so that the angle is right to the fifth order
+        x, y, z = small * x, small * y, small * z
+        r, s = self.r, self.s
+        for a in range(3):
+            p, q, t = r[3 * a], r[3 * a + 1], r[3 * a + 2]
+            half = p + 0.5 * (q * z - t * y), q + 0.5 * (t * x - p * z), t + 0.5 * (p * y - q * x)
+            r[3 * a] = p + half[1] * z - half[2] * y
+            r[3 * a + 1] = q + half[2] * x - half[0] * z
+            r[3 * a + 2] = t + half[0] * y - half[1] * x
+            at = 12 * a
+            for value in half:
+                for step in steps:
+                    s[at] += value * step
+                    at += 1
+
+
+def rotated(turned, vector):
+    """The vector (3) rotated by the rotation vector `turned` (3, rad), as a new list. O. Rodrigues' formula."""
+    x, y, z = turned
+    p, q, t = vector
+    square = x * x + y * y + z * z
+    if square < 1e-12:
+        return [p + y * t - z * q, q + z * p - x * t, t + x * q - y * p]
+    angle = square**0.5
+    across, along, by = sin(angle) / angle, (1.0 - cos(angle)) / square * (x * p + y * q + z * t), cos(angle)
+    return [
+        by * p + across * (y * t - z * q) + along * x,
+        by * q + across * (z * p - x * t) + along * y,
+        by * t + across * (x * q - y * p) + along * z,
+    ]

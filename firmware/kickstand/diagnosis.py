@@ -1,0 +1,181 @@
+"""Finds out why the sensor or the display cannot be used, and who answers on an I2C bus. Imported after a fault, and by
+kickstand.status() and kickstand check.
+
+sda, scl: GPIO numbers.  reopen: called to free the bus, returns it as a machine.I2C.  chip: an Mpu6050.
+"""
+
+from time import sleep_ms, sleep_us
+
+from machine import Pin, SoftI2C
+from micropython import const
+
+from .errors import Notice
+from .imu.fifo_frames import FRAME
+from .imu.mpu6050 import NotKept
+from .imu.other_chips import MOTION, OTHER, SUPPORTED, name_of, who_am_i
+
+SENSOR_ADDRESSES = (0x68, 0x69)
+MOTION_ADDRESSES = SENSOR_ADDRESSES + (0x6A, 0x6B)
+_NOTHING = (0x00, 0xFF, -1)  # no chip of the MPU6050's family has this WHO_AM_I
+_FIRST, _LAST = 0x08, 0x77  # addresses that the standard leaves to devices (UM10204, table 4)
+_SETTLE_US = 100  # an internal pull of 80 kOhm charges the 400 pF that a bus may have in 32 us
+_SLOW_HZ = 100_000
+_TIMEOUT_US = 1000
+_INT_ENABLE = const(0x38)  # register map p. 27: bit 0, a sample is ready
+_INT_STATUS = const(0x3A)  # p. 28
+_PERIODS = 4  # samples that the FIFO gets time for
+
+
+def wire_fault(sda, scl):
+    """None, or a Notice: a wire that stays low, or that nothing pulls up. The pull-ups are on the modules: without one
+    a wire is open, or the module has no power. Each pin's own weak pull-ups and pull-downs show it."""
+    wires = (("SDA", sda), ("SCL", scl))
+    fault = None
+    for name, pin in wires:
+        if not _level(pin, Pin.PULL_UP):
+            fault = fault or Notice("wire-low", name, pin)
+    open_wires = [wire for wire in wires if not _level(wire[1], Pin.PULL_DOWN)]
+    for _, pin in wires:
+        Pin(pin, Pin.IN, None)  # an ESP32 would keep the pull-down
+    if fault or not open_wires:
+        return fault
+    return Notice("no-pull-ups", sda, scl) if len(open_wires) == 2 else Notice("no-pull-up", *open_wires[0])
+
+
+def _level(pin, pull):
+    pin = Pin(pin, Pin.IN, pull)
+    sleep_us(_SETTLE_US)
+    return pin.value()
+
+
+def answering(i2c, addresses=range(_FIRST, _LAST + 1)):
+    """The addresses that answer on a machine.I2C, a list."""
+    status = bytearray(1)
+    found = []
+    for address in addresses:
+        try:
+            i2c.readfrom_into(address, status)
+        except OSError:
+            continue
+        found.append(address)
+    return found
+
+
+def exchanged(sda, scl, addresses):
+    """True if one of these addresses answers with SDA and SCL in each other's place."""
+    i2c = SoftI2C(Pin(sda), Pin(scl), freq=_SLOW_HZ, timeout=_TIMEOUT_US)  # its SCL comes first
+    return bool(answering(i2c, addresses))
+
+
+def scan(sda, scl, reopen, addresses):
+    """(notice, devices): what is wrong with the wires of a bus, a Notice or None; who answers there, a list of
+    (address, name, kind), see other_chips.name_of(). addresses: where the device that is missed would be.
+
+    Takes 0.1 s, and leaves the bus open. Raises what reopen() raises, except OSError."""
+    notice = wire_fault(sda, scl)
+    devices = []
+    try:
+        i2c = reopen()
+        if not notice:
+            devices = [(address,) + name_of(i2c, address) for address in answering(i2c)]
+            if not devices and exchanged(sda, scl, addresses):
+                notice = Notice("exchanged", sda, scl)
+            reopen()
+    except OSError:
+        notice = notice or Notice("wire-low", "SDA", sda)
+    return notice, devices
+
+
+def explain_sensor(sda, scl, reopen, chip, error):
+    """(notice, addresses): why the chip could not be set up, a Notice; the I2C addresses that answer on its bus.
+
+    error: the OSError or UnknownChip of the attempt. Raises what reopen() raises, except OSError."""
+    notice, devices = scan(sda, scl, reopen, MOTION_ADDRESSES)
+    if not notice:
+        kept = not isinstance(error, NotKept)
+        first = SENSOR_ADDRESSES if kept else (chip.address,)
+        devices.sort(key=lambda device: device[0] not in first)
+        notice = _judged(devices, reopen(), kept) or Notice("no-sensor", sda, scl)
+    return notice, sorted([device[0] for device in devices])
+
+
+def _judged(devices, i2c, kept):
+    """The Notice for what answers on the sensor's bus, None if nothing there concerns the sensor. kept: False if a chip
+    was found and does not keep its settings; it is the first of the devices."""
+    if not kept and devices and devices[0][2] != MOTION and devices[0][1] != "clock":
+        return Notice("not-kept", devices[0][0])
+    for address, name, kind in devices:
+        if kind == MOTION:
+            return Notice("other-chip", name, address)
+    for address, _, kind in devices:
+        if kind == SUPPORTED:
+            return Notice("bus-errors", address)
+    for address, name, _ in devices:
+        if address in SENSOR_ADDRESSES and not name:
+            number = who_am_i(i2c, address)
+            return Notice("no-chip", number & 0xFF, address) if number in _NOTHING else Notice("unknown-chip", number)
+    for address, name, kind in devices:
+        if kind == OTHER and name and name != "display":
+            return Notice("other-device", name, address)
+    return None
+
+
+def fifo_fault(chip):
+    """None, or the Notice "sensor-fifo": a chip that is set up measures, but its FIFO does not work. values[0]: how.
+
+    It takes up to 0.3 s, and leaves the FIFO empty. Raises OSError from the bus."""
+    chip.restart_fifo()
+    left = chip.waiting()  # not 0 if a sample came in between
+    chip.write_register(_INT_ENABLE, 1)
+    before = _reading(chip)
+    sleep_ms(_PERIODS * chip.period_ms)
+    waiting = chip.waiting()
+    measures = chip.read_register(_INT_STATUS) & 1 or _reading(chip) != before
+    chip.write_register(_INT_ENABLE, 0)
+    how = None
+    if left > FRAME * _PERIODS:
+        how = "stays full"
+    elif measures and waiting <= left:
+        how = "stays empty" if not left else "stands still"
+    elif measures and _repeats(chip):
+        how = "repeats"
+    chip.restart_fifo()
+    return Notice("sensor-fifo", how) if how else None
+
+
+def _reading(chip):
+    chip.read()
+    return tuple(chip.counts)
+
+
+def _repeats(chip):
+    """True if the FIFO gives the same frame again and again, though the data registers change."""
+    first = _reading(chip)
+    frames = set()
+    for _ in range(3):
+        sleep_ms(_PERIODS * chip.period_ms)
+        for k in range(chip.fetch()):
+            chip.take(k)
+            frames.add(tuple(chip.counts))
+    return len(frames) == 1 and _reading(chip) != first
+
+
+def bus_line(name, sda, scl, devices):
+    """The devices that scan() has found, as a line for people. name: of the bus."""
+    words = ", ".join([("0x%02x %s" % (address, found)).strip() for address, found, _ in devices])
+    return "%-13sSDA %d, SCL %d: %s" % (name + " bus", sda, scl, words or "nothing answers")
+
+
+def show_wirings(open_lcd, count, show_ms):
+    """Show the number of each wiring of a character display's backpack on it: the right one can be read.
+
+    open_lcd(number): returns a Display."""
+    for number in range(1, count + 1):
+        lcd = open_lcd(number)
+        lcd.show("This is readable", "LCD_WIRING = %d" % number)
+        lcd.flush()
+        print("%-13sLCD_WIRING = %d is shown for %d s" % ("", number, show_ms // 1000))
+        sleep_ms(show_ms)
+        lcd.show("", "")  # the next wiring may not be able to
+        lcd.flush()
+    print("%-13sput the line that it has shown into config.py; if it has shown none: its contrast, or 5 V" % "")

@@ -1,0 +1,121 @@
+"""Judges axes that may be ill, by what add_up() has noted: imported once one does not look well.
+
+An axis is ill if its counts have only two values or keep their lowest bit (it is dead, or its low byte is stuck), if
+they jump through 256 counts while their high byte stays (which is stuck), or if they equal those of another axis.
+"""
+
+from micropython import const
+
+from ..errors import Notice
+from ..units import AXES
+
+# Places in the notes, see fifo_frames.py, which keeps them to itself: a name that others import takes heap.
+_ENDS = const(5)
+_CLIPPED = const(6)
+_GYRO_CLIPPED = const(7)
+_DIFFER = const(8)
+_SHAKEN = const(11)
+_SEEN = const(19)
+_HIGH_BYTE = const(0x10000)
+_WRAPPED = const(0x20000)
+
+# Looks in which an axis must be quiet to be ill, by dlpf 1 to 6, for the gyro in rows from 250 deg/s up. With the noise
+# of the quietest chip (accelerometer 100 ug/sqrt(Hz), at 16 g; gyro 0.004 deg/s/sqrt(Hz)) a working axis at rest is
+# that quiet once in 1e12 looks. 0: its noise is so much less than a count that nobody can tell.
+_ACCEL_LOOKS = (1, 1, 1, 4, 15, 80)
+_GYRO_LOOKS = (
+    (1, 1, 1, 3, 5, 11),
+    (1, 1, 1, 3, 9, 37),
+    (1, 1, 2, 10, 62, 0),
+    (1, 2, 14, 0, 0, 0),
+)
+_COLUMNS = (0, 1, 2, 4, 5, 6)  # of the axes
+_WRAP_LOOKS = const(2)  # looks in which a stuck high byte must show
+_WELL_LOOKS = const(2)  # successive looks without a fault that end one
+_CLIP_LOOKS = const(2)  # successive looks with half of the samples at the end of the range that are a fault,
+_RAIL_LOOKS = const(5)  # and with all of them: not the vibration, but the axis
+_SETUP_LOOKS = const(25)  # looks from one set-up of a chip with an ill axis to the next
+_QUIET_LOOKS = const(150)  # looks until the same notice is shown again
+
+
+class AxisJudge:
+    """gyro_range: 0 (250 deg/s) to 3 (2000). dlpf: see Mpu6050."""
+
+    def __init__(self, gyro_range, dlpf):
+        self._limits = _ACCEL_LOOKS[dlpf - 1], _GYRO_LOOKS[gyro_range][dlpf - 1]
+        # For each column: successive looks in which it was quiet; looks in which it wrapped since its high byte changed
+        self._quiet, self._wrapped = bytearray(7), bytearray(7)
+        self._clips = self._well = self._ill = 0  # successive looks: clipped; without a fault; with an ill axis
+        self._noticed = {}  # number of the look at which a code was last shown
+
+    def look(self, watch, samples):
+        """AxisWatch.look() for so many samples: set the fault, notice and clipped of watch, an AxisWatch."""
+        notes = watch.notes
+        lost, gyro = notes[_CLIPPED], notes[_GYRO_CLIPPED]
+        watch.clipped += lost
+        enough = 2 * lost < samples  # good ones to judge by
+        shaken = 10 * notes[_SHAKEN] >= samples
+        if shaken or not enough:
+            self._clips += 1
+        elif 4 * lost < samples:
+            self._clips = 0
+        fault = self._ill_axes(notes)
+        if not enough:
+            fault = _ill(notes[_ENDS]) if lost == samples and self._clips >= _RAIL_LOOKS else None
+        self._ill = self._ill + 1 if fault else 0
+        if not fault and (shaken or 10 * lost >= samples):
+            clips = Notice("clips", "Gyro" if lost and 2 * gyro >= lost else "Accel")
+            self._show(watch, clips)
+            if self._clips >= _CLIP_LOOKS:
+                fault = clips
+        notes[_ENDS] = notes[_CLIPPED] = notes[_GYRO_CLIPPED] = notes[_DIFFER] = notes[_SHAKEN] = 0
+        if fault:
+            self._well = 0
+            watch.fault = fault
+            self._show(watch, fault)
+        elif watch.fault and enough:
+            self._well += 1
+            if self._well >= _WELL_LOOKS:
+                watch.fault = None
+        return self._ill % _SETUP_LOOKS == 1
+
+    def _ill_axes(self, notes):
+        """A Notice for axes that are ill, or None."""
+        quiet, wrapped = self._quiet, self._wrapped
+        dead = equal = 0
+        for i in _COLUMNS:
+            limit = self._limits[i > 3]
+            if limit == 1 and not notes[_DIFFER] >> i & 1:
+                equal |= 1 << i | 1 << (i - 1 if i & 3 else i + 2)
+            seen = notes[_SEEN + i]
+            values = seen & 0xFFFF
+            more = values & (values - 1)  # without its lowest 1: 0 if there was one value
+            if not (more & (more - 1) and values & 0x5555 and values & 0xAAAA):
+                if quiet[i] < 255:
+                    quiet[i] += 1
+                if quiet[i] < limit or not limit:
+                    continue  # the values of several looks are put together
+                dead |= 1 << i
+            else:
+                quiet[i] = 0
+                if seen & _HIGH_BYTE:
+                    wrapped[i] = 0
+                elif seen & _WRAPPED and wrapped[i] < _WRAP_LOOKS:
+                    wrapped[i] += 1
+                if wrapped[i] == _WRAP_LOOKS:
+                    dead |= 1 << i
+            notes[_SEEN + i] = 0
+        return _ill(dead) if dead else _ill(equal, "equal") if equal else None
+
+    def _show(self, watch, notice):
+        """Let a notice be shown for a moment, unless the same one was shown a minute ago."""
+        if watch.looks - self._noticed.get(notice.code, -_QUIET_LOOKS) >= _QUIET_LOOKS:
+            self._noticed[notice.code] = watch.looks
+            watch.notice = notice
+
+
+def _ill(axes, how=None):
+    """The Notice for these axes, a bit for each column: of the gyro, or if none of its is ill of the accelerometer."""
+    gyro = axes >> 4
+    names = "".join([AXES[i] for i in range(3) if (gyro or axes) >> i & 1])
+    return Notice("axis-ill", "Gyro" if gyro else "Accel", names, how or ("dead" if gyro else "stuck"))

@@ -1,0 +1,119 @@
+"""Names the chips that may be found on the sensor's bus. Imported after a fault, and by kickstand.status().
+
+Sources: the chips' data sheets and the register maps of their makers' drivers; registers are only read, because a write
+could set a clock or spoil another chip's calibration.
+"""
+
+from .mpu6050 import CHIPS
+
+_WHO_AM_I = 0x75
+_PWR_MGMT_1 = 0x6B
+_AS_AN_MPU = (0x40, 0x41, 0x01)  # PWR_MGMT_1 of the MPU6050's relatives after power-on, and as they are set up
+OTHER, MOTION, SUPPORTED = 0, 1, 2  # kinds of devices: MOTION is a sensor that this firmware does not know
+_TIME_BYTES = 10  # of a clock: the seven of its time, which may begin at register 0 or 3
+
+# addresses in hexadecimal, register, its content, name. Those with a register name themselves
+_MOTION = """
+68 69 75 47 ICM-42688
+68 69 75 db ICM-42688-V
+68 69 75 42 ICM-42605
+68 69 75 44 ICM-42686
+68 69 75 67 ICM-42670
+68 69 75 60 ICM-42607
+68 69 75 6f IIM-42652
+68 69 75 4e ICM-40627
+68 69 75 3b ICM-40609
+68 69 72 e9 ICM-45686
+68 69 72 e5 ICM-45605
+68 69 00 d1 BMI160
+68 69 00 24 BMI270
+68 69 00 27 BMI260
+68 69 00 0f BMI088
+68 69 00 ea ICM-20948
+68 69 00 e1 ICM-20649
+68 69 00 e0 ICM-20648
+6a 6b 0f 69 LSM6DS3
+6a 6b 0f 6a LSM6DSL
+6a 6b 0f 6b LSM6DSR
+6a 6b 0f 6c LSM6DSO
+6a 6b 0f 70 LSM6DSV
+6a 6b 0f 68 LSM9DS1
+6a 6b 0f d4 L3GD20
+6a 6b 0f d7 L3GD20H
+6a 6b 00 05 QMI8658
+28 29 00 a0 BNO055
+18 19 00 fa BMI055
+18 19 00 1e BMI088
+18 19 0f 33 LIS3DH
+1d 53 00 e5 ADXL345
+"""
+# addresses, name
+_OTHERS = """
+76 77 barometer
+1e 1e compass
+0c 0d compass
+2c 2c compass
+50 57 EEPROM
+51 51 clock
+6f 6f clock
+3c 3d display
+20 27 display
+38 3f display
+"""
+
+
+def name_of(i2c, address):
+    """(name, kind) of the device that answers at this address; ("", OTHER) for an unknown one. i2c: a machine.I2C."""
+    at_mpu = address & 0xFE == 0x68
+    # their register 0 holds any number
+    skipped = 0x00 if at_mpu and _reads(i2c, address, _PWR_MGMT_1) in _AS_AN_MPU else -1
+    mark = " %02x " % address
+    for line in _MOTION.split("\n"):
+        if mark in " %s " % line[:5]:
+            cells = line.split(" ")
+            register = int(cells[2], 16)
+            if register != skipped and _reads(i2c, address, register) == int(cells[3], 16):
+                return cells[4], MOTION
+    if at_mpu:
+        if is_clock(i2c, address):
+            return "clock", OTHER
+        chip = CHIPS.get(who_am_i(i2c, address))
+        return (chip[0], SUPPORTED) if chip else ("", OTHER)
+    for line in _OTHERS.split("\n"):
+        cells = line.split(" ")
+        if len(cells) == 3 and int(cells[0], 16) <= address <= int(cells[1], 16):
+            return cells[2], OTHER
+    return "", OTHER
+
+
+def who_am_i(i2c, address):
+    """What the MPU6050's register WHO_AM_I reads, -1 if it does not answer."""
+    return _reads(i2c, address, _WHO_AM_I)
+
+
+def is_clock(i2c, address):
+    """True if it is a clock by its first registers: a DS1307, DS3231 or PCF8523, which have the sensor's address."""
+    try:
+        time = i2c.readfrom_mem(address, 0, _TIME_BYTES)
+    except OSError:
+        return False
+    # seconds, minutes, hours, then day of the week, date, month; in a PCF8523 from register 3 on, date first
+    return _is_time(time, 0, 4, 3) or _is_time(time, 3, 6, 7)
+
+
+def _is_time(time, at, date_at, day_at):
+    limits = ((at, 0x7F, 0, 59), (at + 1, 0x7F, 0, 59), (at + 2, 0x3F, 0, 32), (date_at, 0x3F, 1, 31))
+    limits += ((day_at, 0xFF, 0, 7), (at + 5, 0x1F, 1, 12), (at + 6, 0xFF, 0, 99))
+    for place, mask, least, most in limits:
+        value = time[place] & mask
+        if value & 15 > 9 or not least <= (value >> 4) * 10 + (value & 15) <= most:
+            return False
+    return True
+
+
+def _reads(i2c, address, register):
+    """What a register reads, -1 if it does not answer."""
+    try:
+        return i2c.readfrom_mem(address, register, 1)[0]
+    except OSError:
+        return -1

@@ -1,0 +1,117 @@
+"""Whether the readings fit the model: the lean filter judges itself by its own innovations.
+
+A filter's covariance knows nothing of a sensor that has failed in part. Its innovations do. The square of one over
+the variance that the filter expects of it, the normalised innovation squared, is 1 on average where all fits (Y.
+Bar-Shalom and others, Estimation with Applications to Tracking and Navigation, section 5.4). Here the mean is of its
+root, with its sign: vibration and bumps, which a sound sensor has too, cancel in it. An axis that is dead, mirrored or
+of half its scale, a bias that has stepped and a mount that has slipped do not. Of the force to the left and of the
+force up there is a short mean, which sees much within a second or two, and a long one, which sees little after some
+seconds.
+
+Two more means are of what no road and no rider does for long: a force to the side, because a bike is in balance, and a
+steep pitch.
+
+What does not fit is doubted, and the lean hidden until all has fitted for a while. What does not fit again and again is
+a fault of the sensor.
+"""
+
+# Symbol = default  # unit: what it is. "Larger:" says what raising it does.
+SHORT_S = 3.0  # s: time constant of the short means. Larger: seen later, and less of what is sound is hidden.
+LONG_S = 10.0  # s: that of the others. Larger: as above.
+MOST = 4.0  # standard deviations: a larger innovation counts as this. Larger: a blow counts for more.
+# Limits of the means. Larger, each: less is hidden, also of what is wrong. On sound rides on good and bad roads and
+# mounts they reach .4, .25, .7, .25, .12 and 8 degrees.
+LEFT_SHORT, LEFT_LONG = 0.75, 0.5  # standard deviations
+UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations
+SIDEWAYS = 0.15  # ratio: force to the side over force up, less the trim
+STEEP = 0.21  # rad: pitch
+MOST_SIDEWAYS = 0.5  # ratio: more counts as this. Larger: a blow counts for more.
+STRICT = 0.85  # ratio: share of the limits after a doubt. Larger: a fault that is still there is seen later.
+FIT = 0.6  # ratio: share of the limits in which the means have to stay while doubted. Larger: shown again sooner.
+# s: for how long, after the first doubt, the second and so on. Larger: a fault that is over is hidden for longer.
+GAP_S = 4.5  # s: the same after a gap of the readings. Larger: as above.
+HOLDS_S = (3.0, 4.0, 4.0, 20.0, 60.0)
+MILD = 3  # doubts; after more of them it has to fit in turns, because on a straight nearly all does, and is called odd
+AGAIN_S = (
+    12.0  # s: then the next doubt comes no sooner, so that rest is found. Larger: what has changed is found later.
+)
+TURNING = 0.05  # rad/s: yaw rate of a turn. Larger: it takes longer.
+FORGET_S = 60.0  # s: fitting for so long takes one doubt back. Larger: a fault that comes again is hidden for longer.
+
+last_odd = None  # the last code of `odd`, for the status report
+
+
+class Consistency:
+    """Read only: doubt: the lean is not to be shown. doubts: how often it did not fit, less those that are forgotten.
+    odd: None, or the code of what did not fit again and again: "odd-left", "odd-up" (forces) or "odd-pitch"."""
+
+    def __init__(self):
+        self.doubt = False
+        self.odd = None
+        self.doubts = 0
+        self._fits_s = 0.0
+        self._since_s = 0.0  # since the last doubt
+        self._in_rest = True  # rest counts as fitting
+        self._forget_means()
+
+    def _forget_means(self):
+        self._left = self._left_long = self._up = self._up_long = self._side = self._pitch = 0.0
+
+    def gap(self, in_rest=True):
+        """Doubt until it has fitted for a while, because the filter has just begun. in_rest: rest counts as fitting."""
+        self.doubt = True
+        self._in_rest = in_rest
+        self._fits_s = 0.0
+        self._forget_means()
+
+    def add(self, left, up, sideways, pitch, yaw_rate, seconds):
+        """Take a window of `seconds` while riding. left, up: the normalised innovations of these forces. sideways:
+        force to the side over force up. pitch in rad, yaw_rate in rad/s. Returns True if just now it does not fit any
+        more."""
+        gain, long_gain = min(1.0, seconds / SHORT_S), min(1.0, seconds / LONG_S)
+        left, up = max(-MOST, min(MOST, left)), max(-MOST, min(MOST, up))
+        self._left += gain * (left - self._left)
+        self._up += gain * (up - self._up)
+        self._left_long += long_gain * (left - self._left_long)
+        self._up_long += long_gain * (up - self._up_long)
+        self._side += long_gain * (max(-MOST_SIDEWAYS, min(MOST_SIDEWAYS, sideways)) - self._side)
+        self._pitch += long_gain * (pitch - self._pitch)
+        left = max(abs(self._left) / LEFT_SHORT, abs(self._left_long) / LEFT_LONG, abs(self._side) / SIDEWAYS)
+        up = max(abs(self._up) / UP_SHORT, abs(self._up_long) / UP_LONG)
+        pitch = abs(self._pitch) / STEEP
+        worst = max(left, up, pitch)
+        self._since_s += seconds
+        if self.doubts > MILD and self._since_s < AGAIN_S:
+            if worst > FIT:
+                self._fits_s = 0.0
+        elif not worst <= (STRICT if self.doubts else 1.0):
+            self.fail("odd-left" if worst == left else "odd-up" if worst == up else "odd-pitch")
+            return True
+        elif self.doubt and worst > FIT:
+            self._fits_s = 0.0
+        elif self.doubts <= MILD or abs(yaw_rate) > TURNING:
+            self._fit(seconds)
+        return False
+
+    def rest(self, seconds):
+        """Take a window at rest. After a gap the force then shows the lean."""
+        if self.doubt and self._in_rest and self.doubts <= MILD:
+            self._fit(seconds if self.doubts else GAP_S)
+
+    def fail(self, code):
+        """Doubt, because it does not fit. code: see odd."""
+        global last_odd
+        self.gap()
+        self._since_s = 0.0
+        self.doubts = min(self.doubts + 1, len(HOLDS_S))
+        if self.doubts >= MILD:
+            self.odd = last_odd = code
+
+    def _fit(self, seconds):
+        self._fits_s += seconds
+        if self.doubt:
+            if self._fits_s >= (HOLDS_S[self.doubts - 1] if self.doubts else GAP_S):
+                self.doubt, self.odd, self._fits_s = False, None, 0.0
+        elif self.doubts and self._fits_s >= FORGET_S:
+            self.doubts -= 1
+            self._fits_s = 0.0

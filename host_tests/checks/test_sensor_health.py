@@ -1,0 +1,80 @@
+"""A dead axis and a gyro at the end of its range: said of a log, and never smoothed into a fine lean."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kickstand_tools.api import Log, replay, smooth
+from kickstand_tools.checks.sensor import NAMES, SensorHealth
+from kickstand_tools.refusals import sentence
+from kickstand_tools.signals import rotation_matrix
+from smoothed_rides import rms, simulated
+
+
+@pytest.fixture(scope="module")
+def street():
+    return simulated("street", 5, 100.0)
+
+
+def ill(known, change):
+    """The ride's log, its force and rates changed in place by change(time, force, rate)."""
+    force, rate = known.log.accel_g.copy(), known.log.gyro_dps.copy()
+    change(known.log.t_s, force, rate)
+    return Log(known.log.t_s, force, rate, temperature_c=known.log.temperature_c)
+
+
+@pytest.mark.parametrize("axis", range(6))
+def test_a_dead_axis_is_named_and_has_no_lean(street, axis):
+    def die(time, force, rate):
+        (force if axis < 3 else rate)[time > 50.0, axis % 3] = 0.25
+
+    log = ill(street, die)
+    for found in (smooth(log, street.calibration), replay(log, street.calibration)):
+        (notice,) = (n for n in found.notices if n.code == "axis-dead")
+        assert notice.values[0] == NAMES[axis]
+        assert notice.values[2] == pytest.approx(50.0, abs=2.0)
+        assert f"{NAMES[axis]} is dead" in sentence(notice)
+        dead = (log.t_s > 52.0) & (log.t_s < 95.0)
+        assert np.mean(np.isnan(found.lean_deg[dead])) > 0.9
+
+
+def test_a_saturated_gyro_is_said_and_the_rest_of_the_ride_is_good(street):
+    def saturate(time, force, rate):
+        rate[(time > 60.0) & (time < 60.5), 1] = 500.0
+
+    log = ill(street, saturate)
+    found = smooth(log, street.calibration)
+    (notice,) = (n for n in found.notices if n.code == "gyro-saturated")
+    assert notice.values[:2] == ("y", 1)
+    assert notice.values[2] == pytest.approx(0.5, abs=0.02)
+    there = street.riding & (np.abs(log.t_s - 60.0) > 2.0)
+    assert rms((found.lean_deg - street.lean_deg)[there]) < 0.4
+    assert np.all(np.isnan(found.lean_deg[(log.t_s > 60.01) & (log.t_s < 60.49)]))
+
+
+@pytest.mark.parametrize("scale", [(1.0, 1.0, 0.5), (1.0, 0.5, 1.0)])
+def test_a_gyro_of_half_the_scale_is_doubted(street, scale):
+    about = street.calibration.vehicle_from_sensor
+    log = replace(street.log, gyro_dps=street.log.gyro_dps @ about.T @ np.diag(scale) @ about)
+    found = smooth(log, street.calibration)
+    assert "sensor-odd" in [notice.code for notice in found.notices]
+    off = np.abs(found.lean_deg - street.lean_deg)[street.riding]
+    assert np.mean(off < 3.0 * found.lean_sigma_deg[street.riding]) > 0.8
+
+
+def test_sound_sensors_are_not_called_ill(street):
+    codes = {notice.code for notice in smooth(street.log, street.calibration).notices}
+    assert not codes & {"axis-dead", "gyro-saturated", "sensor-odd"}
+
+
+def test_rounding_and_a_standstill_are_no_dead_axis():
+    """Of a log with few digits, and of an ideal one without noise."""
+    time = np.arange(4000) / 100.0
+    turn = rotation_matrix(np.array([0.3, 0.1, 0.2]))
+    force = np.round(np.tile(turn[1], (4000, 1)) + 0.002 * np.random.default_rng(1).normal(size=(4000, 3)), 2)
+    rate = np.round(0.05 * np.random.default_rng(2).normal(size=(4000, 3)), 1)
+    ideal = np.column_stack((np.sin(time), np.zeros_like(time), np.zeros_like(time)))
+    for log in (Log(time, force, rate), Log(time, np.tile(turn[1], (4000, 1)), 10.0 * ideal)):
+        health = SensorHealth()
+        assert not np.any(health.mark((time * 1e6).astype(np.int64), log.readings))
+        assert not health.notices()

@@ -1,0 +1,71 @@
+"""However the firmware ends, the display says so and keeps no lean."""
+
+import devices
+import pytest
+from kickstand_tools.simulated_board import simulator
+
+LEAN = {"lean": [[0, 25]], "until": 10}
+STOPPED = ("Kickstand       ", "stopped         ")
+_USER = """
+class Enough(BaseException):
+    pass
+
+calls = []
+def on_lean(lean_deg, trusted, meter):
+    calls.append(trusted)
+    if len(calls) == 40:
+        raise {}
+"""
+
+
+@pytest.fixture
+def boards(tmp_path, monkeypatch):
+    """The simulated boards that ran, each with an alignment in its flash."""
+    devices.align(tmp_path)
+    made = []
+    install = simulator.Board.install
+    monkeypatch.setattr(simulator.Board, "install", lambda board: (made.append(board), install(board)))
+    return made
+
+
+@pytest.mark.parametrize("kind", ["KeyboardInterrupt", "GeneratorExit", "Enough"])
+def test_what_user_py_raises_leaves_no_lean(kind, boards, tmp_path, monkeypatch):
+    (tmp_path / "user.py").write_text(_USER.format(kind))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    try:
+        devices.run("cpython", tmp_path, LEAN)
+    except BaseException as error:
+        assert type(error).__name__ == kind
+    assert tuple(boards[-1].lcd.text()) == STOPPED
+
+
+@pytest.mark.parametrize("turn", [1, 2, 150, 300])
+def test_ctrl_c_in_a_transfer_leaves_no_lean(turn, boards, tmp_path, monkeypatch):
+    """In the middle of a line of the display, whose two halves of a byte are then out of step."""
+    from kickstand.board import hd44780
+
+    calls = []
+    send = hd44780.Lcd.tick
+
+    def interrupted(self, now_ms):
+        calls.append(1)
+        if len(calls) == turn:
+            self._i2c.writeto(0x27, b"\x1c\x18")
+            raise KeyboardInterrupt
+        send(self, now_ms)
+
+    monkeypatch.setattr(hd44780.Lcd, "tick", interrupted)
+    record = devices.run("cpython", tmp_path, LEAN)
+    assert record.ends == ["returned"]
+    assert record.last == STOPPED
+
+
+def test_a_ride_that_is_streamed_ends_without_a_lean(boards, tmp_path, monkeypatch):
+    """`kickstand record` starts the app itself."""
+    from kickstand import app
+
+    turn = app.App.turn
+    monkeypatch.setattr(app.App, "turn", lambda self: turn(self) if not self.meter.trusted else 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        devices.run("cpython", tmp_path, LEAN | {"stream": True})
+    assert tuple(boards[-1].lcd.text()) == STOPPED

@@ -1,0 +1,195 @@
+"""What the lean filter says of itself: innovations that do not fit, when it is believed again, and a name."""
+
+from math import radians
+
+from bike_motion import DT_US, force_and_rate, meter, near, ride, roll, speed_up
+from kickstand.lean import consistency
+from kickstand.lean.consistency import Consistency
+from kickstand.lean.lean_filter import LeanFilter
+
+WINDOW_S = 0.2
+
+
+def windows(judge, seconds, left=0.0, up=0.0, sideways=0.0, pitch=0.0, yaw_rate=0.0, shaken=0.0):
+    """How many of the windows of so many seconds were said not to fit any more. shaken: added to both forces, and taken
+    off in every other window."""
+    failed = 0
+    for _ in range(int(seconds / WINDOW_S + 0.5)):
+        failed += judge.add(left + shaken, up + shaken, sideways, pitch, yaw_rate, WINDOW_S)
+        shaken = -shaken
+    return failed
+
+
+def doubted(times=1):
+    judge = Consistency()
+    while times:
+        times -= windows(judge, WINDOW_S, left=4.0)
+    return judge
+
+
+def test_vibration_is_no_reason_to_doubt():
+    judge = Consistency()
+    assert windows(judge, 60.0, shaken=3.0) == 0
+    assert not judge.doubt
+
+
+def test_much_is_doubted_within_a_second_and_little_after_some():
+    for name in ("left", "up"):
+        for size, least_s, most_s in ((4.0, 0.4, 1.0), (1.5, 1.0, 3.2), (0.6, 5.0, 20.0)):
+            judge = Consistency()
+            assert not windows(judge, least_s, **{name: -size}), (name, size)
+            assert windows(judge, most_s - least_s, **{name: -size}), (name, size)
+
+
+def test_a_force_to_the_side_and_a_steep_pitch_do_not_last():
+    for name, value in (("sideways", 0.3), ("pitch", radians(-20.0))):
+        judge = Consistency()
+        assert not windows(judge, 3.0, **{name: value})
+        assert windows(judge, 8.0, **{name: value})
+
+
+def test_it_is_believed_again_when_it_has_fitted_for_a_while():
+    judge = doubted()
+    windows(judge, consistency.HOLDS_S[0] - WINDOW_S)
+    assert judge.doubt
+    windows(judge, 2 * WINDOW_S)
+    assert not judge.doubt
+
+
+def test_a_doubtful_fit_is_no_fit():
+    judge = doubted()
+    windows(judge, 2.0)
+    assert not windows(judge, 0.8, left=2.0)
+    windows(judge, consistency.HOLDS_S[0] - 0.4)
+    assert judge.doubt
+
+
+def test_what_does_not_fit_again_and_again_is_named():
+    assert doubted(2).odd is None
+    judge = doubted(3)
+    assert judge.odd == consistency.last_odd == "odd-left"
+    judge = Consistency()
+    while judge.odd is None:
+        windows(judge, 1.0, up=4.0)
+    assert judge.odd == "odd-up"
+
+
+def test_in_the_end_only_turns_show_that_it_fits_again():
+    judge = doubted(4)
+    windows(judge, 100.0)
+    assert judge.doubt
+    windows(judge, consistency.HOLDS_S[3] + 1.0, yaw_rate=0.1)
+    assert not judge.doubt
+    assert judge.odd is None
+
+
+def test_a_doubt_is_forgotten_after_a_minute_that_fits():
+    judge = doubted()
+    windows(judge, consistency.HOLDS_S[0] + 1.0)
+    assert judge.doubts == 1
+    windows(judge, consistency.FORGET_S + 1.0)
+    assert judge.doubts == 0
+
+
+def test_after_a_gap_it_has_to_fit_first_or_to_rest():
+    judge = Consistency()
+    judge.gap()
+    windows(judge, 3.0)
+    assert judge.doubt
+    judge.rest(WINDOW_S)
+    assert not judge.doubt
+    judge.gap(False)
+    judge.rest(60.0)
+    assert judge.doubt
+
+
+def weave(shown, seconds, bias_dps=0.0, gain=1.0, then=lambda lean_deg: None):
+    """Ride bends of 25 degrees to either side, 5 s each, at 15 m/s, the last 5 s upright, with an error of the roll
+    rate."""
+    lean_deg, target = 0.0, 25.0
+    for k in range(int(seconds / 0.01)):
+        if k % 500 == 0:
+            target = -target
+        if k >= (seconds - 5.0) / 0.01:
+            target = 0.0
+        rate_dps = max(-40.0, min(40.0, (target - lean_deg) / 0.01))
+        force, rate = force_and_rate(lean_deg, 15.0, rate_dps)
+        rate[2] = gain * rate[2] + radians(bias_dps)
+        shown.update_in_vehicle(force, rate, DT_US)
+        lean_deg += rate_dps * 0.01
+        then(lean_deg)
+
+
+def riding():
+    shown = ride(meter(), 3.0)
+    speed_up(shown, 0.0, 15.0, 5.0)
+    weave(shown, 40.0)
+    assert shown.trusted
+    return shown
+
+
+def longest_wrong_s(shown, **error):
+    """The longest time for which a lean over 8 degrees wrong is shown in 40 s of bends, and the share that is shown."""
+    seen = [0.0, 0.0, 0]
+
+    def look(lean_deg):
+        wrong = shown.trusted and abs(shown.lean_deg - lean_deg) > 8.0
+        seen[0] = seen[0] + 0.01 if wrong else 0.0
+        seen[1] = max(seen[1], seen[0])
+        seen[2] += shown.trusted
+
+    weave(shown, 40.0, then=look, **error)
+    return seen[1], seen[2] / 4000.0
+
+
+def test_a_bias_that_has_stepped_is_found_again():
+    shown = riding()
+    wrong_s, share = longest_wrong_s(shown, bias_dps=6.0)
+    assert wrong_s < 2.5
+    assert share > 0.3
+    weave(shown, 20.0, bias_dps=6.0, then=lambda lean_deg: near(shown.lean_deg, lean_deg, 6.0))
+    assert shown.trusted
+
+
+def test_a_mirrored_roll_rate_is_hidden_and_named():
+    shown = riding()
+    wrong_s, share = longest_wrong_s(shown, gain=-1.0)
+    assert wrong_s < 1.5
+    assert share < 0.3
+    assert shown.odd in ("odd-left", "odd-up", "odd-pitch")
+
+
+def test_a_lean_that_no_bike_has_does_not_stay():
+    """As after a blow that the gyro could not measure: 150 degrees, while the force says that the bike is upright."""
+    shown = riding()
+    shown.filter._x[0] += radians(150.0)
+    weave(shown, 3.0)
+    assert not shown.trusted
+    weave(shown, 15.0)
+    assert abs(shown.lean_deg) < 40.0
+
+
+def test_a_bike_that_has_fallen_stays_so():
+    shown = roll(ride(meter(), 5.0), 0.0, 85.0)
+    ride(shown, 10.0, lean_deg=85.0)
+    assert shown.fallen
+    assert shown.odd is None
+
+
+def test_a_measured_speed_vetoes_rest():
+    """A straight without a tremor at 20 m/s."""
+    for speed_mps, rests in ((20.0, False), (0.0, True)):
+        estimator = LeanFilter()
+        for k in range(1500):
+            if k % 100 == 0:
+                estimator.measure_speed(speed_mps)
+            estimator.update([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], DT_US if k else 0)
+        assert estimator.at_rest == rests
+
+
+def test_a_long_smooth_bend_at_power_on_shows_no_lean_of_a_stand():
+    shown = meter()
+    force, rate = force_and_rate(12.0, 25.0)
+    for _ in range(3000):
+        shown.update_in_vehicle(force, rate, DT_US)
+        assert not shown.trusted or abs(shown.lean_deg - 12.0) < 5.0

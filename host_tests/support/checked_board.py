@@ -1,0 +1,75 @@
+"""`kickstand check` on the simulated board: its programs run in this process."""
+
+import contextlib
+import gc
+import io
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+from kickstand_tools.deploy import check
+from kickstand_tools.deploy.check_limits import Finding
+from kickstand_tools.simulated_board.simulator import Board
+from kickstand_tools.simulation.scripted.sensor_errors import Sensor, resting
+
+PRESS_S = 0.5  # after the board is asked for
+
+
+def part(seed: int = 1, **more: float):
+    """world(t_s) of an ordinary part at rest, on some side."""
+    made = Sensor(seed=seed, **more)
+    return resting(made, (0.3, -0.5, 0.8))
+
+
+class CheckedBoard:
+    """world, fitted: see Board.  config: settings.  presses: [(at_s, for_s), ...]; None: one when it is asked for.
+
+    board: the Board, to plant a defect into before findings().  said: what the rider was told."""
+
+    def __init__(
+        self,
+        world: Callable | None = None,
+        config: dict | None = None,
+        presses: Sequence[tuple[float, float]] | None = None,
+        **fitted,
+    ):
+        self.board = Board(world or part(), **fitted)
+        self._config = type("Config", (), config or {})
+        self._presses = presses
+        self.said: list[str] = []
+        self.free_bytes = 90_000
+
+    def findings(self, folder: Path) -> list[Finding]:
+        """All of them. folder: its flash."""
+        found: list[Finding] = []
+        self.run(folder, lambda ask: found.extend(check.measured(ask, self.say)))
+        return found
+
+    def say(self, text: str) -> None:
+        """What check() calls: presses the button when it is asked for."""
+        self.said.append(text)
+        if text.startswith("Press") and self._presses is None:
+            self.board.press(self.board.clock.now_us / 1e6 + PRESS_S, 0.2)
+
+    def run(self, folder: Path, function: Callable[[check.Ask], object]) -> None:
+        """Call function(ask) with the power on."""
+        space: dict = {}
+        board = self.board
+        for press in self._presses or ():
+            board.press(*press)
+
+        def ask(code: str) -> str:
+            out = io.StringIO()
+            try:
+                with contextlib.redirect_stdout(out):
+                    exec(code, space)
+            except Exception as error:
+                raise check.GuestFailed(f"{type(error).__name__}: {error}") from error
+            return out.getvalue()
+
+        with contextlib.chdir(folder), board, pytest.MonkeyPatch.context() as patch:
+            from kickstand import settings
+
+            patch.setattr(settings, "load", lambda: settings.Settings(self._config))
+            patch.setattr(gc, "mem_free", lambda: self.free_bytes, raising=False)
+            assert board.run(lambda: function(ask), 1e6) == "returned"

@@ -1,0 +1,158 @@
+"""The six positions from one log: the still poses are found in it, and the turns between them calibrate the gyro."""
+
+from dataclasses import replace
+
+import numpy as np
+from kickstand.calibration import six_position
+from kickstand.calibration.sensor_fit import SensorFit
+from kickstand.calibration.six_position import SIDES
+from kickstand.calibration.turn import Turn
+from kickstand.errors import CalibrationError, GyroError
+
+from ..errors import InputError
+from ..logs.log import Log
+from ..logs.reader import Source, read_log
+from ..refusals import RefusedInput
+from .file import CalibrationFile
+from .poses import Pose, SixPositions, beyond_sheet, take_pose, wrong_number
+
+_WINDOW_S = 0.5  # stillness is looked for in windows of this length
+_LEAST_S = 1.0  # a shorter stretch of it is no pose
+_MARGIN_S = 0.1  # is left out at both ends of a pose
+_STILL_G, _STILL_DPS = 0.1, 6.0  # largest change of an axis in a window
+_STILL_SPREAD_G = 0.02  # largest standard deviation
+_STILL_DRIFT_G = 0.007  # largest difference of the means of both halves
+_ROUGH_TILT_DEG = 30.0  # a pose further from every axis is a slanted one
+_MICRO = 1_000_000  # Turn sums integers: millionths of deg/s
+_RANGES_DPS = (250.0, 500.0, 1000.0, 2000.0)  # of a gyro; a log does not say which one it was
+_AT_RANGE = 0.985, 1.01  # a largest rate that is so large a share of a range is taken for its end
+_QUICK = 0.95  # share of the range from which on a rate may have been clipped before the chip's low-pass
+
+
+def fit_procedure(source: Source) -> SixPositions:
+    """The whole sensor from one log of the six positions: still on each side once, in any order, and slanted at least
+    once, with the turns in between.
+
+    Offset, slope and cross-axis errors of the accelerometer, scale and cross-axis errors of the gyro, and its bias: see
+    kickstand.calibration.sensor_fit. Every still pose counts, and every turn. source: see read_log. Raises InputError;
+    RefusedInput, a subclass, where the firmware refuses a pose or the result.
+
+    >>> from kickstand_tools.api import Log, simulate_ride
+    >>> ride = simulate_ride("parked", seed=1, seconds=20.0)
+    >>> found = fit_procedure(Log.from_readings(ride.procedure, ride.rate_hz))
+    >>> found.calibration.gyro_matrix.shape, found.turns
+    ((3, 3), 6)
+    """
+    log = read_log(source)
+    stretches = _still(log)
+    if len(stretches) == 1:
+        raise wrong_number(1)
+    poses = [_pose(log, first, last) for first, last in stretches]
+    means = [pose.accel_g.tolist() for pose in poses]
+    sides = _sides(log, means)
+    turns = _turns(log, stretches, poses)
+    slanted = [k for k, mean in enumerate(means) if six_position.tilt_deg(mean) >= six_position.FREE_TILT_DEG]
+    free = [k for k in slanted if k not in sides]
+    try:
+        offset, slope = six_position.fit([means[k] for k in sides])
+        errors = [six_position.check_free_pose(offset, slope, means[k]) for k in free]
+        fit = SensorFit(means, turns, offset, slope)
+        fit.finish()
+        if fit.unproved:
+            raise GyroError("unproved-gyro", fit.unproved[0])
+    except (CalibrationError, GyroError) as error:
+        side = error.code == "side-tilted"
+        raise RefusedInput(error, poses[sides[SIDES.index(error.values[0])]].name if side else log.name) from error
+    bias = np.median([pose.gyro_dps for pose in poses], axis=0)
+    matrices = fit.accel_matrix, fit.gyro_matrix, np.array(fit.gyro_sigma)
+    calibration = replace(
+        CalibrationFile(np.array(fit.offset), np.array(fit.slope), bias, six_done=True),
+        **dict(zip(("accel_matrix", "gyro_matrix", "gyro_sigma"), matrices, strict=True)),
+    )
+    return SixPositions(
+        calibration,
+        [poses[k] for k in sides],
+        [six_position.tilt_deg(means[k]) for k in sides],
+        poses[free[0]] if free else None,
+        errors[0] if free else None,
+        beyond_sheet(fit.offset, fit.slope),
+        sum(turn is not None for turn in turns),
+        len(turns),
+    )
+
+
+def _still(log: Log) -> list[tuple[int, int]]:
+    """The stretches in which the sensor lay still: number of the first sample, and of that after the last."""
+    step_s = float(np.median(np.diff(log.t_s))) if len(log.t_s) > 1 else 1.0
+    n = max(4, round(_WINDOW_S / step_s))
+    if len(log.t_s) < n:
+        raise InputError(f"{log.name}: it is too short for the six positions")
+    starts = np.arange(0, len(log.t_s) - n + 1, max(1, n // 10))
+    within = starts[:, None] + np.arange(n)
+    accel = log.accel_g[within]
+    still = np.all(np.ptp(accel, axis=1) <= _STILL_G, axis=1) & np.all(np.std(accel, axis=1) <= _STILL_SPREAD_G, axis=1)
+    half = n // 2
+    drift = np.mean(accel[:, half:], axis=1) - np.mean(accel[:, :half], axis=1)
+    still &= np.all(np.abs(drift) <= _STILL_DRIFT_G, axis=1)
+    still &= np.all(np.ptp(log.gyro_dps[within], axis=1) <= _STILL_DPS, axis=1)
+    still &= log.t_s[within[:, -1]] - log.t_s[starts] < 2 * _WINDOW_S  # not across a gap
+    lies = np.zeros(len(log.t_s) + 2, dtype=int)
+    for start in starts[still]:
+        lies[start + 1 : start + 1 + n] = 1
+    edges = np.flatnonzero(np.diff(lies))
+    margin = round(_MARGIN_S / step_s)
+    found = [(first + margin, last - margin) for first, last in zip(edges[::2].tolist(), edges[1::2].tolist())]
+    return [(first, last) for first, last in found if (last - first) * step_s >= _LEAST_S]
+
+
+def _pose(log: Log, first: int, last: int) -> Pose:
+    """The mean of these samples. A hand that is put down slowly tilts a little for a long time: then of the calmest
+    half."""
+    name = f"{log.name}, {log.t_s[first]:.1f} to {log.t_s[last - 1]:.1f} s"
+    quarter = (last - first) // 4
+    problem = None
+    for begin, end in ((first, last), (first + quarter, last - quarter), (last - 2 * quarter, last)):
+        try:
+            return take_pose(name, log.readings[begin:end], "record the procedure again")
+        except RefusedInput as error:
+            problem = problem or error
+    assert problem is not None
+    raise problem
+
+
+def _sides(log: Log, means: list[list[float]]) -> list[int]:
+    """The number of the pose of each side, in the order of SIDES: of several the least tilted."""
+    best: dict[int, int] = {}
+    for k, mean in enumerate(means):
+        side = six_position.side_of(mean)
+        if six_position.tilt_deg(mean) <= _ROUGH_TILT_DEG and (
+            side not in best or six_position.tilt_deg(mean) < six_position.tilt_deg(means[best[side]])
+        ):
+            best[side] = k
+    missing = [name for side, name in enumerate(SIDES) if side not in best]
+    if missing:
+        raise InputError(
+            f"{log.name}: {len(means)} still poses, none with side {', '.join(missing)} up: one log has to have all "
+            "six sides, each held still for two seconds"
+        )
+    return [best[side] for side in range(6)]
+
+
+def _turns(log: Log, stretches: list[tuple[int, int]], poses: list[Pose]) -> list[tuple[list[float], float] | None]:
+    """The turns between the poses, as SensorFit takes them: None where readings are missing, or clipped."""
+    times_us = np.round(log.t_s * 1e6).astype(int)
+    steps_us = np.diff(times_us, prepend=times_us[0])
+    rates = np.round(log.gyro_dps * _MICRO).astype(int).tolist()
+    most = float(np.max(np.abs(log.gyro_dps)))
+    limit = next(
+        (_QUICK * end for end in _RANGES_DPS if _AT_RANGE[0] * end <= most <= _AT_RANGE[1] * end), 2 * most + 1
+    )
+    turn = Turn(_MICRO, int(np.median(steps_us[1:])), int(limit * _MICRO))
+    found: list[tuple[list[float], float] | None] = []
+    for (_, begin), (end, _), before, after in zip(stretches, stretches[1:], poses, poses[1:]):
+        turn.start(before.gyro_dps.tolist())
+        for k in range(begin, end):
+            turn.add((0, 0, 0, 0, *rates[k]), 1, int(steps_us[k]))
+        turn.end()
+        found.append(None if turn.lost or turn.quick else (list(turn.packed(after.gyro_dps.tolist())), turn.seconds))
+    return found

@@ -1,0 +1,104 @@
+"""Was the sensor ill? A dead axis, and a gyro at the end of its range.
+
+Noise changes every reading of a working axis within a second. An axis that stays the same to the last digit while the
+others of its sensor change was not measured. A rate of over SATURATED_DPS does not stay the same either: the gyro is at
+the end of its range, and how fast the bike rolled there is unknown. Lean must not be found from either of them.
+"""
+
+import numpy as np
+from kickstand.errors import Notice
+from kickstand.units import AXES
+
+from ..signals import Array, Bools, Ints, cell_numbers
+
+DEAD_S = 1.0  # an axis is judged in each stretch of this length
+LEAST_SAMPLES = 10  # of such a stretch
+# The other axes must change by this much, and by OTHER_STEPS of their last digits: rounding hides the noise of a phone
+OTHER_G, OTHER_DPS, OTHER_STEPS = 0.01, 0.3, 20.0
+# Least share of samples at which they turn round: those of noise are two thirds, those of a made log have no noise
+NOISY = 0.15
+DEAD_FROM_S = 2.0  # less is left in: rounding may hide the noise for a second
+SATURATED_DPS, SATURATED_S, SATURATED_SAMPLES = 100.0, 0.1, 5
+NAMES = tuple(f"{sensor} {axis}" for sensor in ("accelerometer", "gyro") for axis in AXES)
+
+_MOTION = [0, 1, 2, 4, 5, 6]  # of the chip's order: without the temperature
+_LEAST = np.repeat([OTHER_G, OTHER_DPS], 3)
+
+
+class SensorHealth:
+    """Finds sick readings. mark() takes a log part by part."""
+
+    def __init__(self) -> None:
+        self._step = np.full(6, np.inf)  # smallest change seen on each axis: the last digit
+        self._dead_s = np.zeros(6)
+        self._run_s = np.zeros(6)  # for how long an axis has been dead now
+        self._begin_s = np.full(6, np.nan)
+        self._saturated: list[list[float]] = [[], [], []]  # begin of the first time, number of times, seconds
+
+    def mark(self, time_us: Ints, readings: Array) -> Bools:
+        """(n) True where readings (n, 7), as in a Block, are sick. A part must not be longer than memory allows."""
+        time_s, values = time_us.astype(float) * 1e-6, readings[:, _MOTION]
+        sick = np.zeros(len(time_s), dtype=bool)
+        if len(time_s) < LEAST_SAMPLES:
+            return sick
+        change = np.abs(np.diff(values, axis=0))
+        self._step = np.minimum(self._step, np.min(np.where(change > 1e-9, change, np.inf), axis=0, initial=np.inf))
+        number = cell_numbers(time_s, DEAD_S)
+        begins = np.flatnonzero(np.append(True, np.diff(number) != 0))
+        ends = np.append(begins[1:], len(number))
+        spread = np.maximum.reduceat(values, begins) - np.minimum.reduceat(values, begins)
+        slope = np.diff(values, axis=0, append=values[-1:])
+        turns = np.add.reduceat(slope * np.roll(slope, 1, axis=0) < 0.0, begins, dtype=float)
+        noisy = turns >= NOISY * (ends - begins)[:, None]
+        before = 0  # begin of the stretch before: a first second of a dead axis is sick too
+        for begin, end, spreads, noise in zip(begins.tolist(), ends.tolist(), spread, noisy):
+            if end - begin >= LEAST_SAMPLES:
+                dead = self._dead(spreads, noise)
+                self._count(dead, float(time_s[begin]), float(time_s[end - 1] - time_s[begin]))
+                if np.any(dead & (self._run_s >= DEAD_FROM_S)):
+                    sick[before:end] = True
+            before = begin
+        for axis in range(3):
+            self._mark_saturated(axis, time_s, values[:, 3 + axis], sick)
+        return sick
+
+    def notices(self) -> list[Notice]:
+        """The notices about the log so far."""
+        found = [
+            Notice("axis-dead", name, float(seconds), float(begin))
+            for name, seconds, begin in zip(NAMES, self._dead_s, self._begin_s)
+            if seconds >= DEAD_FROM_S
+        ]
+        return found + [
+            Notice("gyro-saturated", name, int(at[1]), at[2], at[0]) for name, at in zip(AXES, self._saturated) if at
+        ]
+
+    def _dead(self, spread: Array, noisy: Bools) -> Bools:
+        """(6) True for the dead axes of a stretch in which the readings change by `spread` (6). noisy (6): True for
+        axes with noise."""
+        step = np.where(np.isfinite(self._step), self._step, 0.0)
+        moves = noisy & (spread >= np.maximum(_LEAST, OTHER_STEPS * step))
+        still = spread <= 0.0
+        for sensor, other in ((slice(0, 3), slice(3, 6)), (slice(3, 6), slice(0, 3))):
+            # where all three are the same the other sensor says whether the bike moves
+            still[sensor] &= np.any(moves[other] if np.all(still[sensor]) else moves[sensor])
+        return still
+
+    def _count(self, dead: Bools, begin_s: float, seconds: float) -> None:
+        first = dead & np.isnan(self._begin_s)
+        self._begin_s[first] = begin_s
+        self._run_s = np.where(dead, self._run_s + DEAD_S, 0.0)
+        self._begin_s[(self._run_s == 0.0) & (self._dead_s < DEAD_FROM_S)] = np.nan
+        self._dead_s = np.where(dead, self._dead_s + seconds, self._dead_s)
+
+    def _mark_saturated(self, axis: int, time_s: Array, rate: Array, sick: Bools) -> None:
+        begins = np.flatnonzero(np.append(True, np.diff(rate) != 0.0))
+        ends = np.append(begins[1:], len(rate))
+        long = (ends - begins >= SATURATED_SAMPLES) & (np.abs(rate[begins]) > SATURATED_DPS)
+        for begin, end in zip(begins[long].tolist(), ends[long].tolist()):
+            seconds = float(time_s[end - 1] - time_s[begin])
+            if seconds < SATURATED_S:
+                continue
+            sick[begin:end] = True
+            at = self._saturated[axis] or [float(time_s[begin]), 0.0, 0.0]
+            self._saturated[axis] = [at[0], at[1] + 1.0, at[2] + seconds]

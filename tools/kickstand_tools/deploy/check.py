@@ -1,0 +1,164 @@
+"""`kickstand check`: measures a board with all that is wired to it, and judges what was found."""
+
+import ast
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..errors import InputError
+from . import check_guest
+from .check_limits import BAD, GOOD, JUDGES, LOOK, SKIPPED, Finding
+from .connection import Port, connected, describe, last_line, refuse_unfit_firmware, restart
+
+TRANSFERS = 10_000  # to the sensor
+TEXTS = 20  # on the display
+PRESS_S = 30  # longest time until the press, and again until the release
+NOISE_S, CLOCK_S, LOOP_S = 3, 6, 15  # times of the measurements of these names
+_SILENT_S = 120  # longest time of one measurement
+_FIFO_MS = 365  # of an MPU6050 at 200 samples a second
+_LOAD_MS = 150  # a flash whose writes take longer is too slow to be the FIFO's load
+_GENUINE = 0x68  # the WHO_AM_I whose self-test is known
+
+# Called with a program for the board; returns what that printed. Raises GuestFailed
+Ask = Callable[[str], str]
+
+
+class GuestFailed(Exception):
+    """A program raised an exception on the board: its last line."""
+
+
+@dataclass
+class Checked:
+    """What was found. findings: a list of Finding.  port: name of the board's port."""
+
+    port: str
+    findings: list[Finding] = field(default_factory=list)
+
+    @property
+    def faults(self) -> list[Finding]:
+        """Those that are not as they should be."""
+        return [one for one in self.findings if one.verdict in (LOOK, BAD)]
+
+
+def line(finding: Finding) -> str:
+    """A Finding as a line of text."""
+    return f"{finding.verdict:5}{finding.what:29}{finding.words}"
+
+
+def verdict(findings: list[Finding]) -> str:
+    """The last line of a check."""
+    faults = [one.what for one in findings if one.verdict in (LOOK, BAD)]
+    count = sum(one.verdict != SKIPPED for one in findings)
+    if not faults:
+        return f"all {count} are as they should be"
+    return f"{len(faults)} of {count} are not as they should be: {', '.join(faults)}"
+
+
+def check(port: Port, say: Callable[[str], None] = lambda text: None) -> Checked:
+    """Check a board, which takes up to two minutes, and restart it. say(text): told each finding as a line, and what
+    to do. Raises InputError."""
+    with connected(port) as (transport, name):
+        describe(transport, name)
+
+        def ask(code: str) -> str:
+            output, error = transport.exec_raw(code, timeout=_SILENT_S)
+            if error:
+                raise GuestFailed(last_line(error.decode(errors="replace")))
+            return output.decode(errors="replace")
+
+        try:
+            return Checked(name, measured(ask, say, name))
+        finally:
+            restart(transport)
+
+
+def measured(ask: Ask, say: Callable[[str], None], name: str = "the board") -> list[Finding]:
+    """All findings of a board that ask() reaches. name: for messages. Raises InputError."""
+    try:
+        ask(inspect.getsource(check_guest.begin) + "\nparts = begin()\n")
+    except GuestFailed as failed:
+        refuse_unfit_firmware(str(failed), name)
+        if "SettingsError" in str(failed):
+            raise InputError(f"{name}: config.py cannot be used: kickstand status says why") from failed
+        raise InputError(
+            f"the board at {name} cannot be checked ({failed}): kickstand flash brings it up to date"
+        ) from None
+    found: list[Finding] = []
+    check = _Check(ask, say, found)
+    check.step("board")
+    say(f"Press the push button once, within {PRESS_S} s, and release it. Then leave sensor and board at rest.")
+    check.step("button", 1000 * PRESS_S)
+    sensor = check.step("sensor")
+    answers = bool(sensor and sensor[0])
+    if answers:
+        check.step("i2c", TRANSFERS)
+    flash = check.step("flash", judged_with=(check.lasts_ms,))
+    if sensor and answers:
+        _sensor(check, sensor[1], bool(flash and not flash[3] and max(flash[0]) < _LOAD_MS))
+    check.step("display", TEXTS)
+    check.step("speed")
+    check.step("loop", LOOP_S, judged_with=(check.lasts_ms,))
+    return found
+
+
+def _sensor(check: "_Check", who_am_i: int, writes: bool) -> None:
+    """The measurements of the sensor, those first without which others fail. writes: flash can be written meanwhile."""
+    fifo = check.step("fifo", int(writes))
+    if who_am_i == _GENUINE:
+        check.step("self_test")
+    else:
+        check.add([Finding("self-test", SKIPPED, "only an MPU6050 (0x68) has this factory trim")])
+    if fifo and not fifo[0]:
+        check.lasts_ms = fifo[2]
+        check.step("noise", NOISE_S, judged_with=(check.dlpf,))
+        check.step("clock", CLOCK_S)
+
+
+class _Check:
+    """dlpf: the setting.  lasts_ms: time in which the FIFO fills up."""
+
+    def __init__(self, ask: Ask, say: Callable[[str], None], found: list[Finding]) -> None:
+        self._ask, self._say, self._found = ask, say, found
+        self.lasts_ms = _FIFO_MS
+        self._dlpf: int | None = None
+
+    @property
+    def dlpf(self) -> int:
+        if self._dlpf is None:
+            self._dlpf = int(self._ask("print(parts.settings.DLPF)"))
+        return self._dlpf
+
+    def step(self, name: str, *arguments: int, judged_with: tuple[int, ...] = ()) -> tuple[Any, ...] | None:
+        """Measure and judge; return what was measured, None if that failed on the board."""
+        source = inspect.getsource(getattr(check_guest, name))
+        call = f"{name}({', '.join(['parts', *map(str, arguments)])})"
+        try:
+            said = self._ask(f"{source}\nprint(repr({call}))\ndel {name}\n")
+            values = ast.literal_eval(said.strip().rpartition("\n")[2].strip())
+            findings = JUDGES[name](*values, *judged_with)
+        except GuestFailed as failed:
+            self.add([Finding(_NAMES.get(name, name), BAD, f"broken off by {failed}")])
+            return None
+        except (SyntaxError, ValueError, TypeError, LookupError, ArithmeticError, AttributeError, RecursionError):
+            raise InputError(
+                f"the board's answer to {name} makes no sense: plug it in again, then repeat this"
+            ) from None
+        self.add(findings)
+        return values
+
+    def add(self, findings: list[Finding]) -> None:
+        for finding in findings:
+            self._say(line(finding))
+        self._found.extend(findings)
+
+
+_NAMES = {
+    "self_test": "self-test",
+    "clock": "sample clock",
+    "fifo": "FIFO under load",
+    "i2c": "I2C errors",
+    "loop": "longest turn",
+}
+
+__all__ = ["BAD", "GOOD", "LOOK", "SKIPPED", "Checked", "Finding", "check", "line", "measured", "verdict"]

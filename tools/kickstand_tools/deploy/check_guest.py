@@ -1,0 +1,362 @@
+"""What `kickstand check` runs on the board, one function after the other; check.py sends their source and judges what
+they return: numbers and text, which repr() writes. They measure and judge nothing.
+
+parts: what begin() returns. Times are in ms unless a name says otherwise.
+"""
+
+
+def begin():
+    """Open what all of them use. Without an app: sensor and display are free."""
+    import gc
+    import sys
+
+    from kickstand.devices import open_button, open_lcd, open_sensor
+    from kickstand.settings import load
+
+    class Parts:
+        settings = load()
+        lcd = open_lcd(settings)
+        button = open_button(settings)
+        sensor = open_sensor(settings)
+        version = sys.modules["kickstand"].__version__
+        errors = 0  # transfers that failed in fetch()
+
+        def show(self, line1, line2):
+            self.lcd.show(line1, line2)
+            self.lcd.flush()
+
+        def fetch(self):
+            """Samples of the FIFO that were read; 0 after an error, which starts the FIFO again."""
+            try:
+                return self.sensor.chip.fetch()
+            except OSError:
+                self.errors += 1
+            try:
+                self.sensor.chip.start()
+            except OSError:
+                self.errors += 1
+            return 0
+
+    for name in ("WATCHDOG", "RECORD", "LIVE"):
+        setattr(Parts.settings, name, False)
+    gc.collect()
+    return Parts()
+
+
+def board(parts):
+    """(Kickstand's version, board, MicroPython's version, settings in words, functions without machine code)."""
+    import sys
+
+    from kickstand.calibration.transform import products, products_python
+    from kickstand.imu.fifo_frames import add_up, add_up_python, decode, decode_python
+    from kickstand.rides.block import encode, encode_python
+
+    pairs = (decode, decode_python), (add_up, add_up_python), (products, products_python), (encode, encode_python)
+    has_it = sys.platform in ("rp2", "esp32")  # nothing else compiles for its chip
+    slow = ", ".join([plain.__name__ for used, plain in pairs if has_it and used is plain])
+    chosen = parts.settings
+    words = f"{chosen.SAMPLE_HZ} Hz, {chosen.ACCEL_RANGE_G} g, {chosen.GYRO_RANGE_DPS} deg/s, low-pass {chosen.DLPF}"
+    release = ".".join([str(n) for n in sys.implementation.version[:3]])
+    return parts.version, getattr(sys.implementation, "_machine", sys.platform), release, words, slow
+
+
+def button(parts, wait_ms):
+    """(pressed at first, pressed, released, how long it was pressed, edges of both changes, GPIO).
+
+    wait_ms: for the press, and again for the release."""
+    from time import sleep_ms, ticks_diff, ticks_ms
+
+    held = parts.button.held
+    quiet_ms = 60
+
+    def change(to, limit_ms):
+        """Wait until the button is steady at `to`: (is it, its edges)."""
+        begun = changed = ticks_ms()
+        last, edges = held(), 0
+        while ticks_diff(ticks_ms(), begun) < limit_ms:
+            now = held()
+            if now != last:
+                last, changed, edges = now, ticks_ms(), edges + 1
+            if last == to and edges and ticks_diff(ticks_ms(), changed) >= quiet_ms:
+                return True, edges
+            sleep_ms(1)
+        return last == to, edges
+
+    parts.show("Check: press", "the button")
+    at_first = held()
+    if at_first:
+        sleep_ms(200)  # a weak pull-up may have to charge a capacitor
+        at_first = held()
+    if at_first and not change(False, wait_ms)[0]:
+        return True, True, False, 0, 0, parts.settings.BUTTON_PIN
+    pressed, edges = change(True, wait_ms)
+    begun = ticks_ms()
+    released, more = change(False, wait_ms) if pressed else (True, 0)
+    took = ticks_diff(ticks_ms(), begun)
+    parts.show("Check: hold it", "still")
+    return at_first, pressed, released, took, edges + more, parts.settings.BUTTON_PIN
+
+
+def sensor(parts):
+    """(name, WHO_AM_I, address, address that is set, fault in words, register PWR_MGMT_2); no name if none works."""
+    from kickstand.console import sentence
+    from kickstand.imu.mpu6050 import UnknownChip
+
+    chip = parts.sensor.chip
+    try:
+        parts.sensor.set_up()
+        standby = chip.read_register(0x6C)
+    except (UnknownChip, OSError) as error:
+        fault = parts.sensor.explain(chip, error)[0]
+        return "", 0, 0, parts.settings.SENSOR_ADDRESS, sentence(fault), 0
+    return chip.name, chip.who_am_i, chip.address, parts.settings.SENSOR_ADDRESS, "", standby
+
+
+def self_test(parts):
+    """(registers 0x0D to 0x10, mean of six axes without and with self-test in counts), ranges +-8 g and +-250 deg/s."""
+    from time import sleep_ms
+
+    chip = parts.sensor.chip
+    trims = tuple([chip.read_register(0x0D + k) for k in range(4)])
+
+    def means(gyro_config, accel_config):
+        chip.write_register(0x1B, gyro_config)
+        chip.write_register(0x1C, accel_config)
+        sleep_ms(150)
+        sums = [0] * 6
+        count = 40
+        for _ in range(count):
+            chip.read()
+            for k in range(6):
+                sums[k] += chip.counts[k if k < 3 else k + 1]
+            sleep_ms(chip.period_ms)
+        return tuple([total / count for total in sums])
+
+    off = means(0x00, 0x10)
+    on = means(0xE0, 0xF0)
+    chip.setup()
+    return trims, off, on
+
+
+def noise(parts, seconds):
+    """(samples, mean, standard deviation, changes from sample to sample of seven channels in counts, counts per g,
+    counts per deg/s, temperature in C, samples lost)."""
+    from math import sqrt
+    from time import sleep_ms, ticks_diff, ticks_ms
+
+    chip = parts.sensor.chip
+    chip.start()
+    overflows = chip.overflows
+    first = last = None
+    sums, squares, changes = [0] * 7, [0] * 7, [0] * 7
+    count, begun = 0, ticks_ms()
+    while ticks_diff(ticks_ms(), begun) < 1000 * seconds:
+        for j in range(parts.fetch()):
+            chip.take(j)
+            now = list(chip.counts)
+            if first is None:
+                first = last = now
+            for k in range(7):
+                off = now[k] - first[k]
+                sums[k] += off
+                squares[k] += off * off
+                changes[k] += now[k] != last[k]
+            last = now
+            count += 1
+        sleep_ms(2)
+    if not count:
+        return 0, (), (), (), 1, 1.0, 0.0, 0
+    mean = tuple([first[k] + sums[k] / count for k in range(7)])
+    spread = tuple([sqrt(max(0, (squares[k] - sums[k] * sums[k] / count) / count)) for k in range(7)])
+    temperature = chip.temperature_c(mean[3])
+    lsb = chip.accel_lsb_per_g, chip.gyro_lsb_per_dps
+    return count, mean, spread, tuple(changes), lsb[0], lsb[1], temperature, chip.overflows - overflows
+
+
+def clock(parts, seconds):
+    """(samples, microseconds from an empty FIFO to an empty FIFO, samples a second that are set, overflows, errors)."""
+    from time import sleep_ms, ticks_diff, ticks_us
+
+    chip = parts.sensor.chip
+    chip.start()
+    overflows, errors = chip.overflows, parts.errors
+
+    def emptied():
+        """Read until no whole sample waits and one has just come: (how many, when)."""
+        count = 0
+        for _ in range(2000):
+            got = parts.fetch()
+            count += got
+            if got and not chip.frames_left:
+                break
+        return count, ticks_us()
+
+    _, begun = emptied()
+    count = 0
+    while ticks_diff(ticks_us(), begun) < 1_000_000 * seconds:
+        count += parts.fetch()
+        sleep_ms(10)
+    more, ended = emptied()
+    faults = chip.overflows - overflows, parts.errors - errors
+    return (count + more, ticks_diff(ended, begun), 1000 // chip.period_ms) + faults
+
+
+def flash(parts):
+    """(times of writing a block, differences read back, free KB, error in words)."""
+    import os
+    from time import ticks_diff, ticks_ms
+
+    name, times, wrong, error = "trial.tmp", [], 0, ""
+    try:
+        for k in range(8):
+            content = bytes([k * 31 + 7 & 0xFF]) * 4096
+            begun = ticks_ms()
+            with open(name, "wb") as file:
+                file.write(content)
+            times.append(ticks_diff(ticks_ms(), begun))
+            with open(name, "rb") as file:
+                wrong += file.read() != content
+    except OSError as fault:
+        error = str(fault)
+    try:
+        os.remove(name)
+    except OSError:
+        pass
+    space = os.statvfs("/")
+    return tuple(times), wrong, space[0] * space[3] // 1024, error
+
+
+def fifo(parts, writes):
+    """(how it fails or "", its bytes by the chip's name, most ms that may pass, bytes after 80 % of that, bytes that
+    were expected, is an overflow noticed, samples read after it).
+
+    writes: 1 for writing blocks of flash meanwhile, as a ride's recorder does."""
+    from time import sleep_ms, ticks_diff, ticks_ms, ticks_us
+
+    from kickstand.diagnosis import fifo_fault
+    from kickstand.imu.mpu6050 import CHIPS
+
+    chip = parts.sensor.chip
+    fault = fifo_fault(chip)
+    size = CHIPS.get(chip.who_am_i, CHIPS[0x70])[4]
+    lasts = size // 14 * chip.period_ms
+    if fault:
+        return fault.values[0], size, lasts, 0, 0, True, 1
+    chip.start()
+    begun, begun_us = ticks_ms(), ticks_us()
+    while writes and ticks_diff(ticks_ms(), begun) < lasts * 5 // 10:
+        with open("trial.tmp", "wb") as file:
+            file.write(bytes(512))
+        sleep_ms(1)
+    while ticks_diff(ticks_ms(), begun) < lasts * 8 // 10:
+        sleep_ms(1)
+    waiting = chip.waiting()
+    expected = ticks_diff(ticks_us(), begun_us) // (1000 * chip.period_ms) * 14
+    chip.start()
+    before = chip.overflows
+    sleep_ms(lasts + lasts // 4)
+    for _ in range(3):  # the first count may be odd, while a sample is being written
+        parts.fetch()
+    noticed = chip.overflows > before
+    sleep_ms(10 * chip.period_ms)
+    return "", size, lasts, waiting, expected, noticed, parts.fetch()
+
+
+def i2c(parts, transfers):
+    """(transfers to the sensor, errors, wrong answers, microseconds for all)."""
+    from time import ticks_diff, ticks_us
+
+    chip = parts.sensor.chip
+    bus = parts.sensor.reopen()
+    chip.connect(bus)
+    answer, address, right = bytearray(1), chip.address, chip.who_am_i
+    read = bus.readfrom_mem_into
+    errors = wrong = 0
+    begun = ticks_us()
+    for _ in range(transfers):
+        try:
+            read(address, 0x75, answer)
+            if answer[0] != right:
+                wrong += 1
+        except OSError:
+            errors += 1
+    return transfers, errors, wrong, ticks_diff(ticks_us(), begun)
+
+
+def display(parts, rounds):
+    """(address or 0, does it draw pictures, times that it was there, times that it was written to, wires in words)."""
+    from time import sleep_ms
+
+    from kickstand.console import sentence
+    from kickstand.devices import open_bus
+    from kickstand.diagnosis import scan
+
+    lcd, chosen = parts.lcd, parts.settings
+    there, address, draws = 0, 0, False
+    for k in range(rounds):
+        parts.show("Check: display", f"{k + 1} of {rounds}")
+        if lcd.address is not None:
+            there += 1
+            address, draws = lcd.address, lcd.draws
+        sleep_ms(20)
+    words = ""
+    if not there:
+        hz = chosen.LCD_BUS_HZ or 100_000
+        notice, _ = scan(chosen.LCD_SDA, chosen.LCD_SCL, lambda: open_bus(chosen, "LCD", hz), chosen.LCD_ADDRESSES)
+        words = sentence(notice) if notice else ""
+    return address, draws, there, rounds, words
+
+
+def speed(parts):
+    """(SPEED or "", fault in words, m/s or -1)."""
+    from time import sleep_ms, ticks_ms
+
+    if parts.settings.SPEED is None:
+        return "", "", -1
+    from kickstand.speed.source import open_speed
+    from kickstand.ui.messages import lines
+
+    source, heard = open_speed(parts.settings), -1
+    for _ in range(400):
+        new = source.poll(ticks_ms())
+        heard = heard if new is None else new
+        sleep_ms(10)
+    fault = source.source.fault(ticks_ms())
+    return parts.settings.SPEED, ", ".join(lines(fault)) if fault else "", heard
+
+
+def loop(parts, seconds):
+    """(longest turn of the app's loop in us, places left in the FIFO at the fewest, overflows, samples lost, set-ups
+    of the sensor, codes of its faults, turns, bytes of free heap)."""
+    import gc
+    from time import ticks_diff, ticks_ms
+
+    from kickstand import app as app_module
+    from kickstand.devices import open_sensor
+
+    gc.collect()
+    app = app_module.App(parts.settings, parts.lcd, open_sensor(parts.settings))
+    turn, begun, faults, turns = app.turn, ticks_ms(), [], [0]
+    overflows, restarts = app.sensor.chip.overflows, app.sensor.restarts
+
+    def watched():
+        turn()
+        turns[0] += 1
+        fault = app.sensor.fault
+        if fault is not None and fault.code != "starting" and fault.code not in faults:
+            faults.append(fault.code)
+        if ticks_diff(ticks_ms(), begun) > 1000 * seconds:
+            raise KeyboardInterrupt
+
+    app.turn = watched
+    try:
+        app.run()
+    except KeyboardInterrupt:
+        pass
+    longest_us, places = app_module.worst
+    gc.collect()
+    free = gc.mem_free() if hasattr(gc, "mem_free") else 1 << 20
+    lost = app.clock.lost
+    more = app.sensor.chip.overflows - overflows, lost, app.sensor.restarts - restarts
+    parts.show("Check", "done")
+    return (longest_us, places) + more + (", ".join(faults), turns[0], free)

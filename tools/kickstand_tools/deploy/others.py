@@ -1,0 +1,150 @@
+"""Files of another project on a used board: main.py, boot.py and config.py make way and are kept under another name."""
+
+import ast
+import hashlib
+import re
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from mpremote.transport_serial import SerialTransport
+
+from .. import firmware_path
+from ..errors import InputError
+from .board_files import BoardFiles, survey
+from .config_check import Judged
+from .config_text import cleaned
+from .firmware_files import CONFIG, MAIN, PACKAGE
+
+BOOT = "/boot.py"
+_KEPT = "-before-kickstand"
+_MANY = 3  # so many of Kickstand's settings are in no other project's file: others too may have a DISPLAY
+_ON_THE_BOARD = "config.py on the board"
+# The first digits of the SHA-256 of every main.py that Kickstand has had, with \n as the line's end
+_OWN_MAIN = {
+    "390e716171ec58a6",
+    "863631249d4a19b6",
+    "3ad59275b8eff314",
+    "caa779ca994cf25e",
+    "aafb0009cd771b00",
+    "1f8719131f69c51c",
+    "a53721c842ec6f79",
+    "4b6a95a0692ff2e4",
+    "7bf67c29fdfcfe88",
+    "441f1b005e130691",
+    "06436eea00d76f87",
+    "8744d5fdcd8f23fe",
+    "901754b7b5d06b9c",
+}
+
+
+@dataclass(frozen=True)
+class Others:
+    """What was on a board. files: its files and folders.  moves: the new name of each file that makes way, by its
+    path.  config: the content that the board's own config.py should have, None if there is none or it makes way.
+    mended: True if config is not what the board has now."""
+
+    files: BoardFiles
+    moves: dict[str, str]
+    config: bytes | None
+    mended: bool
+
+    def words(self) -> list[str]:
+        """A line for each file that makes way."""
+        return [f"{path[1:]} on the board is another project's: kept as {to[1:]}" for path, to in self.moves.items()]
+
+
+@dataclass(frozen=True)
+class Contents:
+    """files: the board's files and folders.  texts: content of MAIN, BOOT and CONFIG, as far as they are there."""
+
+    files: BoardFiles
+    texts: dict[str, bytes]
+
+
+def read(transport: SerialTransport) -> Contents:
+    """Look at the board. Changes nothing."""
+    files = survey(transport)
+    there = [path for path in (MAIN, BOOT, CONFIG) if path in files.files]
+    return Contents(files, {path: bytes(transport.fs_readfile(path)) for path in there})
+
+
+def find(there: Contents, judge: Callable[[Path], Judged], replace_config: bool) -> Others:
+    """Decide which files make way. judge: checks a config.py for this board.  replace_config: the rider's config.py is
+    to be replaced. Raises InputError for a config.py of the rider's that would stop the firmware."""
+    installed = PACKAGE in there.files.folders
+    leave = []
+    if MAIN in there.texts and not _is_own_main(there.texts[MAIN]):
+        leave.append(MAIN)
+    if not installed and _does_something(there.texts.get(BOOT, b"")):
+        leave.append(BOOT)
+    own, mended = there.texts.get(CONFIG), False
+    if own is not None and not (installed and replace_config):
+        config, fault = _judged(own, judge)
+        ours = _settings_named(config)
+        if installed:
+            foreign = fault and not ours
+        else:
+            foreign = not ours or (fault and ours < _MANY)
+        if foreign and _does_something(config):
+            leave.append(CONFIG)
+            own = None
+        elif fault and not replace_config:
+            raise InputError(f"{fault}, or replace that file with kickstand flash --config")
+        else:
+            own, mended = config, config != own
+    taken = set(there.files.files)
+    moves = {}
+    for path in leave:
+        moves[path] = _free_name(path, taken)
+        taken.add(moves[path])
+    return Others(_moved(there.files, moves), moves, own, mended)
+
+
+def _judged(content: bytes, judge: Callable[[Path], Judged]) -> tuple[bytes, str | None]:
+    """The content as MicroPython reads it, and its fault."""
+    try:
+        content = cleaned(content)
+    except InputError as error:
+        return content, str(error).replace("config.py", _ON_THE_BOARD, 1)
+    with tempfile.TemporaryDirectory() as directory:
+        path = Path(directory) / "config.py"
+        path.write_bytes(content)
+        fault = judge(path).fault
+    return content, fault and fault.replace(str(path), _ON_THE_BOARD)
+
+
+def _is_own_main(content: bytes) -> bool:
+    text = content.replace(b"\r\n", b"\n")
+    current = (firmware_path.directory() / "main.py").read_bytes().replace(b"\r\n", b"\n")
+    return text == current or hashlib.sha256(text).hexdigest()[:16] in _OWN_MAIN
+
+
+def _settings_named(content: bytes) -> int:
+    """Number of Kickstand's settings that a config.py sets, also behind a '#'."""
+    shipped = (firmware_path.directory() / "config.py").read_text(encoding="utf-8")
+    setting = r"^(?:# )?([A-Z][A-Z_0-9]+) = "
+    text = content.decode("utf-8", "replace").replace("\r\n", "\n")
+    return len({*re.findall(setting, shipped, re.M)}.intersection(re.findall(r"^#? *([A-Z][A-Z_0-9]+) *=", text, re.M)))
+
+
+def _does_something(content: bytes) -> bool:
+    """True if the file has more than comments and texts, as the boot.py that MicroPython makes on an ESP32 has."""
+    try:
+        body = ast.parse(content).body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return True
+    return not all(isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) for node in body)
+
+
+def _free_name(path: str, taken: set[str]) -> str:
+    """A name that no file has: main-before-kickstand.py, main-before-kickstand-2.py ..."""
+    stem = path.removesuffix(".py") + _KEPT
+    names = [f"{stem}.py", *(f"{stem}-{n}.py" for n in range(2, len(taken) + 3))]
+    return next(name for name in names if name not in taken)
+
+
+def _moved(files: BoardFiles, moves: dict[str, str]) -> BoardFiles:
+    renamed = {moves.get(path, path): mark for path, mark in files.files.items()}
+    return BoardFiles(renamed, files.folders, files.block, files.free_blocks, files.has_rides)

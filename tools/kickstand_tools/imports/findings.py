@@ -1,0 +1,489 @@
+"""Which columns of an unknown table are the time, the accelerometer and the gyro, and in which units: found from their
+names and, more than by these, from their values.
+
+* Three columns belong together if their names differ in the axis alone, or if they stand side by side without names.
+* The accelerometer's length is the same whenever it is calm: that of gravity, in some unit.
+* The gyro's unit is the one in which its rates turn gravity's direction in the sensor (rate_fit.py).
+* The time's unit gives a sensor's usual number of samples per second.
+
+A finding says why, and whether it is certain. What is not certain is proposed, and the user is asked.
+"""
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from kickstand.units import STANDARD_GRAVITY
+
+from ..errors import InputError
+from ..signals import Array, moving_mean, moving_spread
+from .rate_fit import RateFit, fit_rates
+from .recording import Sheet, plain, unit_in
+from .units import (
+    ACCELERATIONS,
+    COUNTS_PER_DPS,
+    COUNTS_PER_G,
+    DATES,
+    NO_TIME,
+    RATES,
+    SPEEDS,
+    counts_per,
+    time_unit,
+    unit,
+    unwrapped,
+)
+
+ACCEL, GYRO = ("ax", "ay", "az"), ("gx", "gy", "gz")
+REQUIRED = ("t", *ACCEL, *GYRO)
+OPTIONAL = ("speed", "lat", "lon", "temp")
+_KINDS = {  # of sensors, by the words that their columns' names are made of
+    "linear": r"lin|user|withoutgravity|nograv",
+    "gravity": r"grav",
+    "other": r"mag|compass|orient|euler|quat|angle|roll|pitch|yaw|azimuth|^[bmqh]$|^mg?$|press|baro",
+    "gyro": r"gyr|rot|omega|angular|angvel|^gy$|^as$|^[wr]$|rate$",
+    "accel": r"acc|force|^ac$|^gf$|^f$|^a$",
+    "either": r"^g$",
+}
+_TIME = re.compile(r"time|milli|micro|^(t|ts|ms|us|ns|s|sec|secs|seconds|elapsed\w*)$|epoch|utc|clock|stamp|^monitors$")
+_CLOCK = re.compile(r"\s*(\d{4}-\d\d-\d\d.)?\d{1,2}:\d\d")
+_COUNTER = re.compile(r"^(no|nr|n|i|index|count|counter|record|sample|frame|id|row)$")
+CALM_S = 0.5  # duration over which a length is calm
+CALMEST = 0.2  # share of the samples that are taken for calm
+NEAR = 1.3  # largest factor between a calm length and gravity's in a unit: clones and rough rides are that far off
+NOISE_DPS = 0.1  # of a gyro at rest, standard deviation
+LINEAR = 0.35  # of a length without gravity the mean vector is a smaller share
+_SLOWEST_S, _QUICKEST_S = 1.0, 1e-4  # between samples of a recording
+
+
+@dataclass
+class Finding:
+    """columns: the names in the table. unit: of them. why: in words. certain: False where the user should look."""
+
+    columns: list[str]
+    unit: str = ""
+    why: str = ""
+    certain: bool = True
+
+
+@dataclass
+class Findings:
+    """What each quantity is: "t", "a", "g", "speed", "lat", "lon", as far as it is found. lacking: the quantities that
+    are needed and missing, in words. single: columns of single axes, by the keys of REQUIRED, of a sensor that lacks
+    another axis. remarks: what is wrong with the columns that are there."""
+
+    found: dict[str, Finding] = field(default_factory=dict)
+    lacking: list[str] = field(default_factory=list)
+    single: dict[str, str] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+
+    @property
+    def decided(self) -> bool:
+        """True if nothing that is needed is missing or uncertain."""
+        return not self.lacking and all(self.found[key].certain for key in ("t", "a", "g"))
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """The columns by the keys of REQUIRED and OPTIONAL."""
+        pairs = dict(self.single)
+        for key, finding in self.found.items():
+            keys = ACCEL if key == "a" else GYRO if key == "g" else (key,)
+            pairs |= dict(zip(keys, finding.columns))
+        return pairs
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The units by "t", "a", "g" and "speed"."""
+        return {key: finding.unit for key, finding in self.found.items() if finding.unit}
+
+    @property
+    def reasons(self) -> str:
+        """Why, in one sentence per quantity."""
+        return "; ".join(f"{key}: {finding.why}" for key, finding in self.found.items() if finding.why)
+
+
+def find(sheet: Sheet) -> Findings:
+    """What the columns of a table are."""
+    findings = Findings()
+    time = _time(sheet)
+    if time is None:
+        findings.lacking.append("time")
+    else:
+        findings.found["t"] = time
+    seconds = _seconds(sheet, time)
+    _accel_and_gyro(sheet, seconds, findings)
+    for key, kind in (("a", "accel"), ("g", "gyro")):
+        if key not in findings.found:
+            findings.single |= _single(sheet, key, kind)
+    for key, places in (
+        ("speed", _speed(sheet)),
+        ("lat", _named(sheet, "^lat|latitude")),
+        ("lon", _named(sheet, "^lon|^lng|longitude")),
+    ):
+        if places is not None:
+            findings.found[key] = places
+    if ("lat" in findings.found) != ("lon" in findings.found):
+        findings.found.pop("lat", None)
+        findings.found.pop("lon", None)
+    return findings
+
+
+# Time
+
+
+def _time(sheet: Sheet) -> Finding | None:
+    """The column of the time: one that increases, by name if there are several; of these the finest."""
+    usable = []
+    for place, name in enumerate(sheet.columns):
+        named = bool(_TIME.search(plain(name.rpartition(":")[2])))
+        values = sheet.cells[place]
+        if not named and values.dtype.kind == "O" and not _CLOCK.match(str(values[0])):
+            continue
+        try:
+            text = time_unit(values) == DATES
+            ns = sheet.times(place, "")
+        except InputError:
+            continue
+        good = ns[ns != NO_TIME].astype(float)
+        steps = np.diff(good)
+        if len(steps) < 2 or np.mean(steps >= 0.0) < 0.95 or good[-1] <= good[0]:
+            continue
+        if not named and (_COUNTER.match(plain(name)) or np.all(np.diff(sheet.numbers(place)) == 1.0)):
+            continue  # a number of each row
+        usable.append((named, len(np.unique(good)) > 0.5 * len(good), not text, -place))
+    if not usable:
+        return None
+    place = -max(usable)[3]
+    name = sheet.columns[place]
+    stated = stated_unit(name)
+    numbers = sheet.numbers(place)
+    found = time_unit(sheet.cells[place])
+    if stated in ("s", "ms", "us", "ns") and _step_fits(numbers, stated):
+        return Finding([name], stated, f"{name} says {stated}")
+    if found == DATES:
+        return Finding([name], "", "dates or times of day")
+    hz = 1.0 / max(_mean_step(numbers) * _SECONDS[found], 1e-9)
+    return Finding([name], found, f"in {found} it is {hz:.3g} samples per second")
+
+
+_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+
+
+def _mean_step(numbers: Array) -> float:
+    good = unwrapped(numbers[np.isfinite(numbers)])
+    low, high = np.percentile(good, (10.0, 90.0))
+    return float(high - low) / max(0.8 * len(good), 1.0)
+
+
+def _step_fits(numbers: Array, name: str) -> bool:
+    return _QUICKEST_S / 2.0 < _mean_step(numbers) * _SECONDS[name] < _SLOWEST_S
+
+
+def _seconds(sheet: Sheet, time: Finding | None) -> Array | None:
+    """(n) times from the first, s; None without a time."""
+    if time is None:
+        return None
+    ns = sheet.times(sheet.columns.index(time.columns[0]), time.unit)
+    good = ns != NO_TIME
+    return np.where(good, (ns - ns[good][0]) * 1e-9, np.nan)
+
+
+# Groups of three
+
+
+@dataclass
+class _Three:
+    """Three columns, one per axis. kind: a key of _KINDS, "" if their names say nothing."""
+
+    stem: str
+    places: list[int]
+    kind: str
+    values: Array
+
+
+def _threes(sheet: Sheet) -> list[_Three]:
+    """The groups of three columns that belong together."""
+    stems: dict[str, dict[str, int]] = {}
+    for place, name in enumerate(sheet.columns):
+        for stem, axis in _stems(name):
+            stems.setdefault(stem, {}).setdefault(axis, place)
+    found, used = [], set()
+    for stem, axes in stems.items():
+        groups = ["xyz"] if set("xyz") <= set(axes) else _numbered(axes)
+        for axes_of_one in groups:
+            places = [axes[axis] for axis in axes_of_one]
+            if not used & set(places) and _numeric(sheet, places):
+                used |= set(places)
+                found.append(_Three(stem, places, _kind(stem), sheet.table(places)))
+    if not found:
+        found = _side_by_side(sheet)
+    return found
+
+
+def _single(sheet: Sheet, key: str, kind: str) -> dict[str, str]:
+    """The columns of single axes that are named as those of a sensor of this kind."""
+    named = [(stem, axis, name) for name in sheet.columns for stem, axis in _stems(name)]
+    return {key + axis: name for stem, axis, name in reversed(named) if axis in "xyz" and _kind(stem) == kind}
+
+
+def _numeric(sheet: Sheet, places: Sequence[int]) -> bool:
+    return all(np.mean(np.isfinite(sheet.numbers(place))) > 0.02 for place in places)
+
+
+def _numbered(axes: dict[str, int]) -> list[list[str]]:
+    """Axes that are numbers, three by three: data1 to data3, data4 to data6."""
+    numbers = sorted((axis for axis in axes if axis.isdigit()), key=int)
+    if len(numbers) % 3 or not numbers or int(numbers[-1]) - int(numbers[0]) != len(numbers) - 1:
+        return []
+    return [numbers[k : k + 3] for k in range(0, len(numbers), 3)]
+
+
+def _side_by_side(sheet: Sheet) -> list[_Three]:
+    """Without names that say anything: the first six columns side by side that are no time, three by three."""
+    numeric = [
+        place
+        for place in range(len(sheet.columns))
+        if _numeric(sheet, [place]) and not _TIME.search(plain(sheet.columns[place])) and not _increasing(sheet, place)
+    ]
+    runs = [numeric[k : k + 3] for k in range(0, len(numeric) - 2, 3)]
+    return [_Three("", run, "", sheet.table(run)) for run in runs if run[2] - run[0] == 2]
+
+
+def _increasing(sheet: Sheet, place: int) -> bool:
+    numbers = sheet.numbers(place)
+    steps = np.diff(numbers[np.isfinite(numbers)])
+    return len(steps) > 2 and bool(np.mean(steps >= 0.0) > 0.95 and np.any(steps > 0.0))
+
+
+def _stems(name: str) -> Iterable[tuple[str, str]]:
+    """(name without its axis, axis) for each way in which a name can name one."""
+    bare = _without_unit(name)
+    sensor, colon, bare = bare.rpartition(":")
+    words = re.sub(r"axis|[^a-z0-9]+", " ", bare.lower()).split()
+    sensor = plain(sensor) + (":" if colon else "")
+    for axis in "xyz":
+        if axis in words:
+            yield sensor + "".join(word for word in words if word != axis), axis
+            return
+    whole = "".join(words)
+    if len(whole) > 1 and whole[-1] in "xyz" and not (len(whole) > 6 and whole.endswith(("accuracy", "velocity"))):
+        yield sensor + whole[:-1], whole[-1]
+    elif len(whole) > 1 and whole[0] in "xyz":
+        yield sensor + whole[1:], whole[0]
+    elif match := re.fullmatch(r"(.*?)(\d{1,2})", whole):
+        yield sensor + match[1], match[2]
+
+
+def _without_unit(name: str) -> str:
+    """A name without its unit: in brackets at its end, or behind the last _."""
+    bare = re.sub(r"[(\[]([^)\]]*)[)\]]\s*$", lambda found: "" if _is_unit(found[1]) else " " + found[1], name)
+    head, mark, last = bare.rpartition("_")
+    return head if mark and _is_unit(last) and len(head) > 1 else bare
+
+
+def _is_unit(text: str) -> bool:
+    known = unit(text)
+    return known in (*ACCELERATIONS, *RATES, *SPEEDS, *_SECONDS, "counts") or bool(counts_per(text))
+
+
+def stated_unit(name: str) -> str:
+    """The unit that a column's name states, "" for none."""
+    in_brackets, last = unit(unit_in(name)), unit(name.rpartition("_")[2])
+    bare = plain(name)
+    if in_brackets and _is_unit(in_brackets):
+        return in_brackets
+    if "_" in name and _is_unit(last):
+        return last
+    for word, known in (("milli", "ms"), ("micro", "us"), ("nano", "ns")):
+        if word in bare:
+            return known
+    if bare.endswith("ms") or bare in _SECONDS:
+        return "ms" if bare.endswith("ms") else bare
+    return unit(bare) if unit(bare) in _SECONDS else ""
+
+
+def _kind(stem: str) -> str:
+    sensor, _, stem = stem.rpartition(":")
+    for text in (stem, sensor):
+        for kind, words in _KINDS.items():
+            if text and re.search(words, text):
+                return kind
+    return ""
+
+
+# Accelerometer and gyro
+
+
+def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> None:
+    """Find both, and what is missing."""
+    threes = _threes(sheet)
+    kinds = {kind: [three for three in threes if three.kind == kind] for kind in (*_KINDS, "")}
+    unnamed = [*kinds["either"], *kinds[""]]
+    accel = _first_with_gravity(
+        [*kinds["accel"], *kinds["either"], *(kinds[""] if not kinds["accel"] else [])], seconds
+    )
+    rates = next(iter(kinds["gyro"]), None) or next((three for three in unnamed if three is not accel), None)
+    without = kinds["linear"] or kinds["accel"]
+    if accel is None:
+        lost = "gravity in its acceleration" if without else "acceleration"
+        findings.lacking.append(lost)
+        if without:
+            findings.remarks.append("gravity has been taken off its acceleration: record the one with gravity")
+    else:
+        names = _names(sheet, accel)
+        findings.found["a"] = of_accel = accelerometer(accel.values, seconds, stated_unit(names[0]))
+        of_accel.columns = names
+    if rates is None:
+        findings.lacking.append("gyro")
+        return
+    names = _names(sheet, rates)
+    findings.found["g"] = Finding(names, stated_unit(names[0]), "by name", False)
+    if accel is not None:
+        found = gyro(accel.values, rates.values, findings.found["a"], seconds, stated_unit(names[0]))
+        found.columns = names
+        findings.found["g"] = found
+
+
+def _names(sheet: Sheet, three: _Three) -> list[str]:
+    return [sheet.columns[place] for place in three.places]
+
+
+def _first_with_gravity(threes: Sequence[_Three], seconds: Array | None) -> _Three | None:
+    """The first group whose length is gravity's in some unit, else the first that keeps its length."""
+    return next(
+        (three for three in threes if _has_gravity(three, seconds, near=True)),
+        next((three for three in threes if _has_gravity(three, seconds, near=False)), None),
+    )
+
+
+def _has_gravity(three: _Three, seconds: Array | None, near: bool) -> bool:
+    """True if gravity is in these values: they keep a length while they are calm, and hardly ever come near 0. near:
+    the length is that of gravity in some unit; else it must be kept more exactly."""
+    values = three.values[np.all(np.isfinite(three.values), axis=1)]
+    if len(values) < 3:
+        return False
+    means = np.linalg.norm(moving_mean(values, _rows_in(CALM_S, seconds, len(three.values))), axis=1)
+    length = float(np.median(np.linalg.norm(values, axis=1)))
+    if length <= 0.0 or float(np.percentile(means, 10.0)) < LINEAR * length:
+        return False
+    if near and not any(1.0 / NEAR < length / gravity < NEAR for gravity in _gravities().values()):
+        return False
+    return float(np.std(means)) / length < (0.25 if near else 0.02)
+
+
+def _rows_in(span_s: float, seconds: Array | None, count: int) -> int:
+    """Number of rows in span_s; of an unknown time a fiftieth of all."""
+    if seconds is None or not np.any(np.isfinite(seconds)):
+        return max(1, min(25, count // 10))
+    span = float(np.nanmax(seconds) - np.nanmin(seconds))
+    return max(1, min(count // 3, round(span_s * count / max(span, 1e-6))))
+
+
+def calm_length(values: Array, seconds: Array | None) -> float:
+    """Median length of vectors (n, 3) while they are calm: while their length changes least."""
+    values = values[np.all(np.isfinite(values), axis=1)]
+    lengths = np.linalg.norm(values, axis=1)
+    spread = moving_spread(lengths, _rows_in(CALM_S, seconds, len(values)))
+    return float(np.median(lengths[spread <= np.quantile(spread, CALMEST)]))
+
+
+def _gravities() -> dict[str, float]:
+    """Length of gravity in each unit of acceleration."""
+    gravities = {"g": 1.0, "m/s2": STANDARD_GRAVITY, "mg": 1000.0}
+    return gravities | {f"counts/{size:g}": size for size in COUNTS_PER_G}
+
+
+def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> Finding:
+    """The unit of accelerations (n, 3), by the length of gravity. stated: the unit in their names. columns: empty."""
+    length = calm_length(values, seconds)
+    whole = _are_whole(values)
+    gravities = {name: size for name, size in _gravities().items() if whole or not name.startswith("counts")}
+    near = min(gravities, key=lambda name: abs(np.log(length / gravities[name])))
+    off = max(length / gravities[near], gravities[near] / length)
+    why = f"gravity at rest is {length:.4g} long"
+    if stated in gravities and max(length / gravities[stated], gravities[stated] / length) < NEAR:
+        return Finding([], stated, f"{why}, as its name says")
+    if near.startswith("counts"):
+        why += f": raw counts of a sensor with {near.partition('/')[2]} counts (LSB) per g"
+    return Finding([], near, why, off < NEAR and stated in ("", near, "counts"))
+
+
+def _are_whole(values: Array) -> bool:
+    good = values[np.isfinite(values)]
+    return len(good) > 0 and bool(np.all(good == np.rint(good))) and float(np.max(np.abs(good))) > 20.0
+
+
+def gyro(force: Array, rates: Array, accel: Finding, seconds: Array | None, stated: str = "") -> Finding:
+    """The unit of rates (n, 3): by the turns of gravity, by their names, else by size. accel: the finding of the
+    accelerometer. columns: empty."""
+    fit = RateFit() if seconds is None else fit_rates(seconds, force, rates)
+    candidates = gyro_units(rates, accel)
+    by_fit = fit.unit_among(candidates)
+    if stated in RATES:
+        also = f", and so do the turns of gravity: {by_fit}" if by_fit == stated else ""
+        against = f", but gravity turns as by {by_fit}" if by_fit not in ("", stated) else ""
+        return Finding([], stated, f"its name says so{also}{against}", not against)
+    if by_fit:
+        return Finding([], by_fit, "in it the rates turn gravity as it turns")
+    if "deg/s" not in candidates:
+        usual = f"counts/{_usual_counts(accel):g}"
+        return Finding(
+            [], usual, "raw counts whose range nothing shows: the usual one with this accelerometer's", False
+        )
+    return Finding([], *_by_size(rates, force), certain=False)
+
+
+def gyro_units(rates: Array, accel: Finding) -> dict[str, float]:
+    """The units that rates (n, 3) can be in, with their factors to deg/s: counts beside those of an accelerometer."""
+    if counts_per(accel.unit) and _are_whole(rates):
+        return {f"counts/{size:g}": 1.0 / size for size in COUNTS_PER_DPS}
+    return dict(RATES)
+
+
+def _usual_counts(accel: Finding) -> float:
+    """Counts per deg/s of an MPU6050 whose accelerometer has this unit: both ranges are usually set alike."""
+    size = counts_per(accel.unit)
+    return COUNTS_PER_DPS[COUNTS_PER_G.index(size)] if size in COUNTS_PER_G else COUNTS_PER_DPS[0]
+
+
+def _by_size(rates: Array, force: Array) -> tuple[str, str]:
+    """A likely unit and why: by the largest rates of a ride, by the noise of a sensor at rest."""
+    good = rates[np.all(np.isfinite(rates), axis=1)]
+    length = np.linalg.norm(good - np.median(good, axis=0), axis=1)
+    most, noise = float(np.percentile(length, 90.0)), float(np.median(np.std(good, axis=0)))
+    whole = float(np.median(np.linalg.norm(force[np.all(np.isfinite(force), axis=1)], axis=1)))
+    moved = float(np.max(np.std(force[np.all(np.isfinite(force), axis=1)], axis=0))) / max(whole, 1e-9)
+    if moved < 0.02:  # at rest
+        near = min(RATES, key=lambda name: abs(np.log(max(noise, 1e-9) * RATES[name] / NOISE_DPS)))
+        return near, f"its noise at rest is {noise:.2g}"
+    if most > 1000.0:
+        return "mdeg/s", f"nine tenths of its rates are below {most:.3g}"
+    return ("rad/s" if most < 3.0 else "deg/s"), f"nine tenths of its rates are below {most:.3g}"
+
+
+# Speed and position
+
+
+def _speed(sheet: Sheet) -> Finding | None:
+    for place, name in enumerate(sheet.columns):
+        bare = plain(name)
+        if re.search(r"speed|velocity|kmh|kph", bare) and not re.search(
+            r"acc|ang|[xyz]$", bare.replace("speedkmh", "")
+        ):
+            if not np.any(np.isfinite(sheet.numbers(place))):
+                continue
+            stated = stated_unit(name)
+            stated = stated if stated in SPEEDS else next((u for w, u in _SPEED_WORDS if w in bare), "")
+            return Finding([name], stated, "by its name", bool(stated))
+    return None
+
+
+_SPEED_WORDS = (("kmh", "km/h"), ("kph", "km/h"), ("mph", "mph"), ("mps", "m/s"), ("knot", "knots"))
+
+
+def _named(sheet: Sheet, words: str) -> Finding | None:
+    for place, name in enumerate(sheet.columns):
+        bare = plain(name)
+        if re.search(words, bare) and "acc" not in bare and np.any(np.isfinite(sheet.numbers(place))):
+            return Finding([name], "", "by its name")
+    return None

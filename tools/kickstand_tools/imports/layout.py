@@ -1,0 +1,314 @@
+"""The layout of a table that no app's module knows: where its rows are, and which sensor each of its cells belongs to.
+
+Read are: cells between commas, semicolons, tabs or blanks, with a decimal point or comma; any lines before the rows;
+names above them, with or without units in a line below, or none; `label: value` texts of a serial monitor, with or
+without its time stamps, in one or several lines per sample; one row per event of a sensor; one file per sensor.
+"""
+
+import csv
+import itertools
+import re
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import PurePosixPath
+
+import numpy as np
+
+from ..logs.csv_reader import Cells, cells_of, columns_of, columns_of_text, filled, numbers_of, separator_of
+from .files import RecordingFile
+from .recording import Sheet, decimal_points
+from .units import ACCELERATIONS, RATES, SPEEDS, TIMES, unit
+
+LOOKED_AT = 400  # lines from which the layout is found
+SEPARATORS = "\t;, "  # of two that part the same lines into as many cells the first is taken
+FEWEST_CELLS = 4  # numbers in a row of a table of sensors: a time and three axes
+MOST_KINDS = 20  # names of sensors or events in one column
+EVENT = ":"  # between a sensor's name and a column's
+_UNITS = {**ACCELERATIONS, **RATES, **SPEEDS, **TIMES}
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_COMMA_NUMBER = re.compile(r"[+-]?\d+(?:,\d+)?(?:[eE][+-]?\d+)?")
+_WHEN = re.compile(r"(?:\d{4}-\d\d-\d\d[T ])?\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?(?:Z|[+-]\d\d:?\d\d)?")
+_MARKS = " \t#%/;*'\"!"  # begin a comment
+_SENSOR_ID = re.compile(r"sensor|type|kind|event|source|device")
+_STAMP = re.compile(r"^\s*(\d{1,2}:\d\d:\d\d[.,]\d+)\s*->\s*")
+_STAMPED = "monitor_s"  # the name of the serial monitor's time
+_PAIR = re.compile(
+    r"(?P<label>[A-Za-z_][A-Za-z0-9_. /()\[\]]{0,40}?)[\"']?\s*[:=]\s*(?P<value>[+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)"
+    r"(?![\d:])(?:\s*(?P<unit>[A-Za-zµ°][A-Za-z0-9/^²°]*)(?!\s*[:=]))?(?=[\s,;|}]|$)"
+)
+_SEVERAL = re.compile(r"([A-Za-z][\w/ ]*?)\s*[:=]\s*((?:[+-]?\d+(?:\.\d+)?[\s,;]+){2,}[+-]?\d+(?:\.\d+)?)")
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Rows of cells. names: the line of names, None without one; first: the line of the first row. separator: of the
+    cells, " " for any blanks. comma: decimal commas. width: cells in a row."""
+
+    names: int | None
+    first: int
+    separator: str
+    comma: bool
+    width: int
+
+
+def sheet_in(file: RecordingFile, wanted: Collection[str] = ()) -> Sheet | None:
+    """The table in a file; None if there is none. wanted: names that its line of names has. Raises InputError for a
+    table that is too large."""
+    text = without_stamps(file.text)
+    labelled = _labelled(file.name, text)
+    if labelled is not None:
+        return labelled
+    lines = text.split("\n", LOOKED_AT)[:LOOKED_AT]
+    grid = _grid_below(lines, wanted) or find_grid(lines)
+    return None if grid is None else _by_sensor(_read(file.name, text, lines, grid))
+
+
+def joined_sheet(files: list[RecordingFile]) -> Sheet | None:
+    """The tables of several files, one per sensor, as one: its columns are FILE:NAME, and each row is of one file. None
+    if two files have no times in common, or if one file is no table."""
+    sheets = [(PurePosixPath(file.name).name.partition(".")[0], sheet_in(file)) for file in files]
+    if len({name for name, _ in sheets}) < len(sheets):
+        return None
+    there = [(name, sheet) for name, sheet in sheets if sheet is not None and len(sheet.columns) >= FEWEST_CELLS]
+    if len(there) < 2:
+        return None
+    clocks = [sheet.columns[0] for _, sheet in there]
+    rows = [len(sheet.cells[0]) for _, sheet in there]
+    total, columns, cells = sum(rows), [clocks[0]], [np.concatenate([sheet.cells[0] for _, sheet in there])]
+    for k, (name, sheet) in enumerate(there):
+        begin = sum(rows[:k])
+        for column, values in zip(sheet.columns[1:], sheet.cells[1:]):
+            wide = np.full(total, np.nan)
+            wide[begin : begin + rows[k]] = numbers_of(values)
+            columns.append(f"{name}{EVENT}{column}")
+            cells.append(wide)
+    return Sheet(there[0][1].name, columns, cells, sum(sheet.left_out for _, sheet in there))
+
+
+def without_stamps(text: str) -> str:
+    """The text with the time stamps of a serial monitor, `12:30:05.250 -> `, as a first cell `monitor_time: ...`."""
+    head = [line for line in text[:20_000].split("\n") if line.strip()]
+    if not head or sum(bool(_STAMP.match(line)) for line in head) < 0.8 * len(head):
+        return text
+    first = _STAMP.sub("", head[0])
+    separator = next((mark for mark in SEPARATORS if mark in first.strip()), ",")
+    form = _STAMPED + ": {:.3f}; " if _PAIR.search(first) or _SEVERAL.search(first) else "{:.3f}" + separator
+    return "\n".join(_STAMP.sub(lambda stamp: form.format(_clock_s(stamp[1])), line) for line in text.split("\n"))
+
+
+def _clock_s(clock: str) -> float:
+    hours, minutes, seconds = clock.replace(",", ".").split(":")
+    return 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds)
+
+
+def split_row(line: str, separator: str) -> list[str]:
+    """The cells of a line, without blanks around them; none of a line that is no CSV."""
+    if separator == " ":
+        return line.split()
+    try:
+        return [cell.strip() for cell in cells_of(line.strip("\r\n"), separator)]
+    except csv.Error:
+        return []
+
+
+def find_grid(lines: Sequence[str]) -> Grid | None:
+    """The rows among some lines: those that most lines agree with; None where hardly a line holds numbers."""
+    best: tuple[int, int, Grid] | None = None
+    for separator in SEPARATORS:
+        for comma in (True, False):  # whole numbers beside a time with a decimal comma are both
+            if comma and separator == ",":
+                continue
+            found = _rows(lines, separator, comma)
+            if found is not None and (best is None or found[:2] > best[:2]):
+                best = found
+    return None if best is None else best[2]
+
+
+def _rows(lines: Sequence[str], separator: str, comma: bool) -> tuple[int, int, Grid] | None:
+    """(number of rows, of their numbers, the grid) if the cells are parted so."""
+    number = _COMMA_NUMBER if comma else _NUMBER
+    split = [split_row(line, separator) for line in lines]
+    counts = [sum(bool(number.fullmatch(cell) or _WHEN.fullmatch(cell)) for cell in cells) for cells in split]
+    if comma and not any("," in cell for cells in split[-20:] for cell in cells):
+        return None
+    widths = Counter(len(cells) for cells, count in zip(split, counts) if count >= FEWEST_CELLS)
+    if not widths:
+        return None
+    width = max(widths, key=lambda width: (widths[width], width))
+    rows = [k for k, count in enumerate(counts) if count >= FEWEST_CELLS and len(split[k]) == width]
+    numbers = int(np.median([counts[k] for k in rows]))
+    first = rows[0]
+    names = next((k for k in range(first - 1, -1, -1) if lines[k].strip()), None)
+    if names is not None and not _is_names(split_row(lines[names].lstrip(_MARKS), separator), width):
+        names = _names_by_commas(lines, names, width)
+    if names is not None and _all_units(split_row(lines[names].lstrip(_MARKS), separator)):
+        above = names - 1
+        if above >= 0 and _is_names(split_row(lines[above].lstrip(_MARKS), separator), width):
+            names = above
+    if len(rows) < 2 and names is None:
+        return None
+    return len(rows), numbers, Grid(names, first, separator, comma, width)
+
+
+def _names_by_commas(lines: Sequence[str], at: int, width: int) -> int | None:
+    """The line above the rows if its names are parted otherwise than the rows."""
+    return at if any(_is_names(split_row(lines[at].lstrip(_MARKS), mark), width) for mark in SEPARATORS) else None
+
+
+def _is_names(cells: list[str], width: int) -> bool:
+    """True for cells that can be the names of so many columns: hardly a number among them."""
+    there = [cell for cell in cells if cell]
+    numbers = sum(bool(_NUMBER.fullmatch(cell)) or bool(re.search(r"[{}=]|:$", cell)) for cell in there)
+    return max(2, width - 3) <= len(there) <= width + 1 and numbers <= len(there) / 4
+
+
+def _all_units(cells: list[str]) -> bool:
+    there = [cell.strip("[]()") for cell in cells if cell]
+    return len(there) > 2 and sum(unit(cell) in _UNITS for cell in there) > len(there) / 2
+
+
+def _grid_below(lines: Sequence[str], wanted: Collection[str]) -> Grid | None:
+    """The grid below a line that holds all the names that are asked for; None without such a line."""
+    if not wanted:
+        return None
+    for k, line in enumerate(lines[:-1]):
+        for separator in dict.fromkeys((separator_of(line), *SEPARATORS)):
+            cells = split_row(line.lstrip(_MARKS) if line.lstrip()[:1] in "#%/" else line, separator)
+            if set(wanted) <= set(cells):
+                below = find_grid(lines[k + 1 :])
+                if below is None:
+                    return Grid(k, k + 1, separator, False, len(cells))
+                return Grid(k, k + 1 + below.first, below.separator, below.comma, max(below.width, len(cells)))
+    return None
+
+
+def _read(name: str, text: str, lines: Sequence[str], grid: Grid) -> Sheet:
+    """The table of a grid."""
+    columns = _names(lines, grid)
+    body = text.split("\n", grid.first)[-1] if grid.first else text
+    if grid.comma:
+        body = decimal_points(body)
+    width = max(len(columns), grid.width)
+    if grid.separator == " ":
+        rows = (row for line in body.split("\n") if 0 < len(row := line.split()) <= width)
+        cells, left_out = columns_of(rows, width), 0
+    else:
+        cells, left_out = columns_of_text(body, grid.separator, width)
+    used = [k for k, values in enumerate(cells) if columns[k] or np.any(filled(values))]
+    return Sheet(name, [columns[k] or f"#{k + 1}" for k in used], [cells[k] for k in used], left_out)
+
+
+def _names(lines: Sequence[str], grid: Grid) -> list[str]:
+    """The columns' names, with the units of a line below them in brackets; "" for one without a name."""
+    if grid.names is None:
+        return [f"#{k + 1}" for k in range(grid.width)]
+    line = lines[grid.names]
+    line = line.lstrip(_MARKS) if line.lstrip()[:1] in ("#", "%", "/") else line
+    parts = [split_row(line, separator) for separator in dict.fromkeys((grid.separator, separator_of(line), " "))]
+    names = next((part for part in parts if len(part) >= grid.width - 3), parts[0])
+    if grid.first > grid.names + 1:
+        units = split_row(lines[grid.first - 1].lstrip("#%/ "), grid.separator)
+        if _all_units(units) and len(units) <= len(names):
+            names = [f"{name} ({mark.strip('[]()')})" if mark else name for name, mark in zip(names, units)] + names[
+                len(units) :
+            ]
+    return [*names, *[""] * (grid.width - len(names))]
+
+
+# One row per event
+
+
+def _by_sensor(sheet: Sheet) -> Sheet:
+    """The same table with columns of their own for each sensor, where a column names the sensor of each row."""
+    place = _sensor_column(sheet)
+    if place is None:
+        return sheet
+    kinds = np.array([str(cell).strip() for cell in sheet.cells[place].tolist()], dtype=object)
+    columns, cells = [], []
+    for k, (name, values) in enumerate(zip(sheet.columns, sheet.cells)):
+        if k == place:
+            continue
+        numbers = numbers_of(values)
+        own = bool(np.any(np.isfinite(numbers.astype(float)))) and not _increases(numbers)
+        per_kind = {kind: kinds == kind for kind in dict.fromkeys(kinds.tolist())} if own else {}
+        if not per_kind:
+            columns.append(name)
+            cells.append(values)
+        for kind, there in per_kind.items():
+            if np.any(np.isfinite(numbers[there].astype(float))):
+                columns.append(f"{kind}{EVENT}{name}")
+                cells.append(np.where(there, numbers.astype(float), np.nan))
+    return Sheet(sheet.name, columns, cells, sheet.left_out)
+
+
+def _sensor_column(sheet: Sheet) -> int | None:
+    """The column that names the sensor of each row: few texts, or numbers under such a name, that change again and
+    again."""
+    for place, (name, values) in enumerate(zip(sheet.columns, sheet.cells)):
+        if values.dtype.kind == "f" or (values.dtype.kind != "O" and not _SENSOR_ID.search(name.lower())):
+            continue
+        texts = [str(cell).strip() for cell in values.tolist()]
+        counts = Counter(texts)
+        named = values.dtype.kind != "O" or all(re.match(r"[A-Za-z]", kind) for kind in counts)
+        changes = sum(a != b for a, b in itertools.pairwise(texts))
+        if 2 <= len(counts) <= MOST_KINDS and named and changes > 0.01 * len(texts) + 2:
+            return place
+    return None
+
+
+def _increases(numbers: Cells) -> bool:
+    """True for a column that can be a time: it hardly ever decreases, and increases."""
+    good = numbers[np.isfinite(numbers.astype(float))].astype(float)
+    steps = np.diff(good)
+    return len(steps) > 2 and bool(np.mean(steps < 0.0) < 0.02 and np.mean(steps > 0.0) > 0.01 and good[-1] > good[0])
+
+
+# Labels before the values
+
+
+def _labelled(name: str, text: str) -> Sheet | None:
+    """The table in lines of `label: value`; None where there are none."""
+    head = [line for line in text[:20_000].split("\n") if line.strip()]
+    pairs = [len(list(_pairs(line))) for line in head]
+    if sum(count > 0 for count in pairs) < 0.7 * len(head) or sum(pairs) < max(FEWEST_CELLS, 1.5 * len(head)):
+        return None
+    rows: list[dict[str, str]] = []
+    row: dict[str, str] = {}
+    stamp = ""
+    for line in text.split("\n"):
+        for label, value in sorted(_pairs(line), key=lambda pair: pair[0] != _STAMPED):
+            if label in row and label != _STAMPED:  # a sample ends where its first label returns
+                rows.append(row)
+                row = {_STAMPED: stamp} if stamp else {}
+            if label == _STAMPED:
+                stamp = value
+            row.setdefault(label, value)
+    rows.append(row)
+    labels = [
+        label for label, count in Counter(label for row in rows for label in row).items() if count > len(rows) / 2
+    ]
+    if len(labels) < FEWEST_CELLS:
+        return None
+    cells = columns_of(([row.get(label, "") for label in labels] for row in rows), len(labels))
+    return Sheet(name, labels, cells)
+
+
+def _pairs(line: str) -> Iterator[tuple[str, str]]:
+    """(label, value) of each value in a line. A label of one letter gets the word before it, as in "Acceleration X:
+    0.1, Y: 0.2"; a unit after a value is in brackets behind its label."""
+    for several in _SEVERAL.finditer(line):
+        values = re.split(r"[\s,;]+", several[2])
+        for axis, value in zip("xyz" if len(values) == 3 else map(str, range(1, 10)), values):
+            yield f"{several[1]} {axis}", value
+    before, found = "", list(_PAIR.finditer(_SEVERAL.sub("", line)))
+    stated = next((pair["unit"] for pair in reversed(found) if pair["unit"] and unit(pair["unit"]) in _UNITS), "")
+    for pair in found:
+        label = re.sub(r"\s+", " ", pair["label"].strip(" ,;|-"))
+        words = label.split()
+        if len(words) > 1 and len(words[-1]) == 1:
+            before = " ".join(words[:-1])
+        elif len(label) == 1 and before:
+            label = f"{before} {label}"
+        own = pair["unit"] if pair["unit"] and unit(pair["unit"]) in _UNITS else stated
+        yield (f"{label} ({own})" if own and label[-1:].lower() in "xyz" else label), pair["value"]

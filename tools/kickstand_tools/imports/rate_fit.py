@@ -1,0 +1,167 @@
+"""In which unit the rates of a gyro turn gravity: the factor between the two, by least squares.
+
+At rest, and in a hand, the direction u of gravity turns in the sensor's axes as du/dt = u x rate. Over windows of
+WINDOW_S its change is therefore the integral of u x reading, times the unit's factor, plus that of a constant bias. In
+a vehicle the force is not gravity's alone, and the rates explain it less: then the factor comes out too small, or is
+not found at all. It is searched among the 48 signed permutations of the gyro's axes, because axes that are exchanged
+are another mistake, which is judged later.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..checks.handedness import EXCHANGES
+from ..signals import Array
+
+CELL_S = 0.05  # readings are averaged over cells of this length
+MOST_CELLS = 12_000  # ten minutes show a unit
+WINDOW_S = 0.4
+LEAST_TURN = 0.03  # rad, rms: a smaller turn of gravity in the windows shows nothing
+STRAIGHT = 0.25  # a cell's force is gravity's if its length is this close to the median
+EXPLAINED = 0.5  # share of the turns' variance that the rates explain: less decides nothing
+CLEARLY = 0.9  # a share with which units that differ by a factor of 2 are told apart, as the ranges of raw counts do
+FEWEST = 8  # windows
+# Over TURNED_S gravity's direction is kept if the mean of its unit vectors is as long as KEPT_DIRECTION. MOST_TURNED:
+# degrees that the mean rate across it may then turn it; the largest bias of the data sheet, 20 deg/s, is 80
+TURNED_S, KEPT_DIRECTION, MOST_TURNED = 2.0, 0.97, 120.0
+
+
+@dataclass
+class RateFit:
+    """factor: rad/s in one unit of the readings. explained: share of the turns' variance. turn: rad, rms of gravity's
+    turn in a window. unturned: rad, rms of the turn that the readings would make as they are in rad/s."""
+
+    factor: float = 0.0
+    explained: float = 0.0
+    turn: float = 0.0
+    unturned: float = 0.0
+
+    @property
+    def decides(self) -> bool:
+        """True if the factor is certain within a few times."""
+        return self.explained >= EXPLAINED and self.turn >= LEAST_TURN and self.factor > 0.0
+
+    def unit_among(self, units: Mapping[str, float]) -> str:
+        """The unit, of those with these factors to deg/s, that the fit shows; "" if it shows none."""
+        if not self.decides:
+            return ""
+        off = {name: np.log(np.degrees(self.factor) / size) for name, size in units.items()}
+        best = min(off, key=lambda name: abs(off[name]))
+        gaps = [abs(np.log(units[best] / size)) for name, size in units.items() if name != best]
+        near = min(gaps) / 2.0 if gaps else 1.0
+        certain = self.explained > CLEARLY or near > 1.5
+        return best if abs(off[best]) < min(near, 1.2) and certain else ""
+
+
+def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
+    """Fit rates to forces. seconds (n), force (n, 3, any unit), rates (n, 3, any unit); rows with NaN are interpolated
+    within each sensor, so both may come in rows of their own."""
+    cells = _in_cells(seconds, force, rates)
+    if cells is None:
+        return RateFit()
+    u, w = cells
+    length = np.linalg.norm(u, axis=1)
+    good = np.abs(length / np.median(length) - 1.0) < STRAIGHT
+    u = u / np.maximum(length, 1e-9)[:, None]
+    span = round(WINDOW_S / CELL_S)
+    begins = np.arange(0, len(u) - span, span // 2)
+    whole = np.array([bool(np.all(good[begin : begin + span + 1])) for begin in begins])
+    begins = begins[whole] if len(begins) else begins
+    if len(begins) < FEWEST:
+        return RateFit()
+    change = u[begins + span] - u[begins]
+    between = np.array([np.arange(begin, begin + span) for begin in begins])
+    mid = 0.5 * (u[between] + u[between + 1])
+    rate = 0.5 * (w[between] + w[between + 1])
+    rate = rate - np.mean(rate, axis=(0, 1)) if _steady(u) else rate
+    turn = float(np.sqrt(np.mean(np.sum(change**2, axis=1))))
+    best = RateFit(turn=turn)
+    if turn < 1e-6:
+        return best
+    # integral of u x (reading's axis j as axis i), for each pair: (windows, 3, 3, 3)
+    turned = np.einsum("ila,wnl,wnj->waij", _LEVI_CIVITA, mid, rate) * CELL_S
+    bias = np.einsum("ila,wnl->wai", _LEVI_CIVITA, mid) * CELL_S
+    flat = bias.reshape(-1, 3)
+    seen = change.ravel()
+    inverse = np.linalg.pinv(flat.T @ flat + 1e-9 * np.eye(3)) @ flat.T
+    rest = seen - flat @ (inverse @ seen)
+    for exchange in EXCHANGES:
+        column = np.einsum("waij,ij->wa", turned, exchange).ravel()
+        column = column - flat @ (inverse @ column)
+        size = float(column @ column)
+        if size <= 0.0:
+            continue
+        factor = float(column @ rest) / size
+        explained = 1.0 - float(np.sum((rest - factor * column) ** 2)) / max(float(np.sum(rest**2)), 1e-12)
+        preferred = explained + 0.02 if exchange is EXCHANGES[0] else explained
+        if factor > 0.0 and preferred > best.explained:
+            unturned = float(np.sqrt(np.mean(np.sum(column.reshape(-1, 3) ** 2, axis=1))))
+            best = RateFit(factor, explained, turn, unturned)
+    return best
+
+
+def turns_too_far(seconds: Array, force: Array, rates: Array) -> bool:
+    """True if rates (n, 3, deg/s) turn gravity right round again and again while it keeps its direction."""
+    cells = _in_cells(seconds, force, rates)
+    if cells is None:
+        return False
+    u, w = cells
+    u = u / np.maximum(np.linalg.norm(u, axis=1), 1e-9)[:, None]
+    span = round(TURNED_S / CELL_S)
+    begins = np.arange(0, len(u) - span + 1, span)
+    if not len(begins):
+        return False
+    kept, much = [], []
+    for begin in begins:
+        part = u[begin : begin + span]
+        mean = np.mean(part, axis=0)
+        across = np.mean(w[begin : begin + span], axis=0)
+        across = across - mean * (across @ mean) / max(float(mean @ mean), 1e-9)
+        kept.append(float(np.linalg.norm(mean)) > KEPT_DIRECTION)
+        much.append(float(np.linalg.norm(across)) * TURNED_S > MOST_TURNED)
+    return sum(k and m for k, m in zip(kept, much)) > 0.5 * len(begins)
+
+
+def _steady(u: Array) -> bool:
+    """True if gravity keeps its direction, so that the mean of the rates is bias."""
+    return float(np.max(np.std(u, axis=0))) < 0.02
+
+
+def _in_cells(seconds: Array, force: Array, rates: Array) -> tuple[Array, Array] | None:
+    """Force and rates (m, 3 each) in even cells; None if they are too short."""
+    there = np.isfinite(seconds)
+    seconds, force, rates = seconds[there], force[there], rates[there]
+    if len(seconds) < 4:
+        return None
+    begin, end = float(np.percentile(seconds, 1.0)), float(np.percentile(seconds, 99.0))
+    count = int(min((end - begin) / CELL_S, MOST_CELLS))
+    if count < 2 * WINDOW_S / CELL_S:
+        return None
+    edges = begin + CELL_S * np.arange(count + 1)
+    within = (seconds >= begin) & (seconds <= edges[-1])
+    seconds, force, rates = seconds[within], force[within], rates[within]
+    found = []
+    for values in (force, rates):
+        known = np.all(np.isfinite(values), axis=1)
+        order = np.argsort(seconds[known], kind="stable")
+        at, rows = seconds[known][order], values[known][order]
+        if len(at) < 4:
+            return None
+        sums = np.vstack((np.zeros(3), np.cumsum(0.5 * (rows[1:] + rows[:-1]) * np.diff(at)[:, None], axis=0)))
+        integral = np.column_stack([np.interp(edges, at, column) for column in sums.T])
+        found.append(np.diff(integral, axis=0) / CELL_S)
+    return found[0], found[1]
+
+
+def _levi_civita() -> Array:
+    """(3, 3, 3) e[i, l, a]: component a of (l x i), with l the direction of gravity, and i the axis of the rate."""
+    e = np.zeros((3, 3, 3))
+    for first, second, third in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        e[second, first, third] = 1.0
+        e[first, second, third] = -1.0
+    return e
+
+
+_LEVI_CIVITA = _levi_civita()

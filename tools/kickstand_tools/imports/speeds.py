@@ -1,0 +1,42 @@
+"""The unit of a speed that no name states, found by the positions beside it."""
+
+import numpy as np
+
+from ..signals import Array, distance_m
+from .recording import SECOND_NS, Sheet
+from .units import SPEEDS, Nanoseconds, factor
+
+_NEAR = 1.25  # largest factor between the speed and that by positions: the units differ by 1.6 and more
+
+
+def unit_by_positions(
+    sheet: Sheet,
+    time_ns: Nanoseconds,
+    speed: int,
+    lat: int | None,
+    lon: int | None,
+    per_degree: tuple[float, float] = (1.0, 1.0),
+) -> str:
+    """The unit in which the speeds fit the changes of position; "" where that is not clear. speed, lat, lon: numbers of
+    columns; per_degree: factors on latitude and longitude."""
+    if lat is None or lon is None:
+        return ""
+    moved = _moved_mps(time_ns, sheet.numbers(lat) * per_degree[0], sheet.numbers(lon) * per_degree[1])
+    said = sheet.numbers(speed)
+    fast = np.isfinite(moved) & np.isfinite(said) & (moved > 3.0)
+    if np.count_nonzero(fast) < 20:
+        return ""
+    ratio = float(np.median(said[fast] / moved[fast]))
+    near = {name: max(ratio * factor(name, SPEEDS, ""), 1.0 / (ratio * SPEEDS[name])) for name in SPEEDS if ratio > 0.0}
+    best = min(near, key=lambda name: near[name]) if near else ""
+    return best if best and near[best] < _NEAR else ""
+
+
+def _moved_mps(time_ns: Nanoseconds, lat: Array, lon: Array) -> Array:
+    """(n) mean speed by the positions over about a second before each row, NaN where unknown."""
+    steps = np.diff(time_ns)
+    back = max(1, round(SECOND_NS / max(float(np.median(steps)), 1.0))) if len(steps) else 1
+    apart_s = np.full(len(time_ns), np.nan)
+    apart_s[back:] = (time_ns[back:] - time_ns[:-back]) / SECOND_NS
+    east, north = distance_m(np.roll(lat, back), np.roll(lon, back), lat, lon)
+    return np.where((apart_s > 0.5) & (apart_s < 2.0), np.hypot(east, north) / np.maximum(apart_s, 0.5), np.nan)

@@ -1,0 +1,57 @@
+"""Models of devices that people find on the sensor's bus in place of it, or beside it."""
+
+
+class Registers:
+    """A device with registers whose pointer advances, which keeps no more of a write than it has to.
+
+    contents: {register: value}, others read 0.  writable: the registers that keep what is written.
+    """
+
+    SIZE = 128  # registers, after which the pointer begins again
+
+    def __init__(self, address, contents=(), writable=()):
+        self.address = address
+        self.registers = bytearray(self.SIZE)
+        for register, value in dict(contents).items():
+            self.registers[register] = value
+        self.writable = set(writable)
+        self.written = []  # the registers that were written to
+        self._pointer, self._first = 0, False
+
+    def start(self, address, read):
+        """START and address. True: acknowledged."""
+        self._first = not read
+        return True
+
+    def write_byte(self, value):
+        """The register's number, then what to write. True: ACK."""
+        if self._first:
+            self._pointer, self._first = value % self.SIZE, False
+            return True
+        self.written.append(self._pointer)
+        if self._pointer in self.writable:
+            self.registers[self._pointer] = value
+        self._pointer = (self._pointer + 1) % self.SIZE
+        return True
+
+    def read_byte(self):
+        """The content of the register that the pointer is at."""
+        value = self.registers[self._pointer]
+        self._pointer = (self._pointer + 1) % self.SIZE
+        return value
+
+
+class Ds3231(Registers):
+    """A clock with the MPU6050's address. clock: a Clock."""
+
+    SIZE = 19
+
+    def __init__(self, clock, address=0x68):
+        super().__init__(address, {3: 0x03, 4: 0x25, 5: 0x11, 6: 0x26, 0x0E: 0x1C}, range(0x0F))
+        self._clock = clock
+
+    def start(self, address, read):
+        seconds = self._clock.now_us // 1_000_000 + 42_015
+        for register, value in enumerate((seconds % 60, seconds // 60 % 60, seconds // 3600 % 24)):
+            self.registers[register] = value // 10 << 4 | value % 10
+        return super().start(address, read)

@@ -1,0 +1,101 @@
+"""The six positions in one go: a sensor that a hand puts on its sides, one after the other, and turns in between."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .physics.chip import RATE_HZ, Chip
+from .physics.signals import band_noise, smoothstep
+
+
+@dataclass(frozen=True)
+class Hand:
+    """How a hand turns a sensor. still_s, turn_s: least and most time that it holds still, and turns by 90 degrees; a
+    half turn takes 1.6 times as long. heading_deg: largest turn about the vertical on the way. detour_deg: how far the
+    way strays from the shortest. push_g: rms acceleration meanwhile."""
+
+    still_s: tuple[float, float] = (4.5, 6.0)
+    turn_s: tuple[float, float] = (0.9, 2.0)
+    heading_deg: float = 60.0
+    detour_deg: float = 15.0
+    push_g: float = 0.1
+
+
+def procedure(
+    chance: np.random.Generator, chip: Chip, ups: NDArray[np.float64], temp_c: float, hand: Hand | None = None
+) -> NDArray[np.float64]:
+    """Readings (n, 7), as those of Chip.read(), of still poses and the turns between them.
+
+    ups: (poses, 3), the unit vector upward in the sensor's axes in each pose.
+    """
+    hand = hand or Hand()
+    attitude = _turn_between(ups[0], np.array([0.0, 0.0, 1.0]))  # from the sensor's axes to the world's, z up
+    forces, rates = [], []
+
+    def hold() -> None:
+        n = int(chance.uniform(*hand.still_s) * RATE_HZ)
+        forces.append(np.tile(attitude[2], (n, 1)))
+        rates.append(np.zeros((n, 3)))
+
+    hold()
+    for before, after in pairwise(ups):
+        heading = np.radians(chance.uniform(-hand.heading_deg, hand.heading_deg))
+        after_attitude = _rotations(np.array([[0.0, 0.0, heading]]))[0] @ attitude @ _turn_between(after, before)
+        way = _rotation_vector(after_attitude @ attitude.T)
+        turned = np.linalg.norm(way)
+        n = max(2, int(chance.uniform(*hand.turn_s) * (0.25 + 0.75 * turned / (np.pi / 2)) ** 0.7 * RATE_HZ))
+        u = np.arange(n + 1) / n
+        # as hands do: slowly at both ends
+        detour = np.radians(hand.detour_deg) * chance.standard_normal(3) / np.sqrt(3.0)
+        share = u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
+        stray = np.sin(np.pi * smoothstep(u)) ** 2
+        path = _rotations(share[:, None] * way) @ _rotations(stray[:, None] * detour) @ attitude
+        steps = np.einsum("nji,njk->nik", path[:-1], path[1:])
+        skew = steps - np.swapaxes(steps, 1, 2)
+        spin = np.stack((skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]), axis=1)
+        rates.append(np.degrees(0.5 * spin * RATE_HZ))
+        push = np.stack([band_noise(chance, n, 0.5, 4.0, RATE_HZ) for _ in range(3)], axis=1)
+        forces.append(path[:-1, 2] + hand.push_g * (np.sin(np.pi * u[:-1]) ** 2)[:, None] * push)
+        attitude = path[-1]
+        hold()
+    force = np.concatenate(forces)
+    return chip.read(chance, force, np.concatenate(rates), np.full(len(force), temp_c))
+
+
+def _turn_between(a: NDArray, b: NDArray) -> NDArray:
+    """The smallest rotation that takes unit vector a to unit vector b."""
+    axis = np.cross(a, b)
+    size = np.linalg.norm(axis)
+    if size < 1e-9:
+        axis = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
+        size = np.linalg.norm(axis)
+        return _rotations((np.pi if a @ b < 0.0 else 0.0) * axis[None] / size)[0]
+    return _rotations(np.arctan2(size, a @ b) * axis[None] / size)[0]
+
+
+def _rotations(vectors: NDArray) -> NDArray:
+    """(n, 3, 3) rotation matrices of rotation vectors (n, 3), rad: O. Rodrigues' formula."""
+    angle = np.linalg.norm(vectors, axis=1)[:, None, None]
+    k = np.zeros((len(vectors), 3, 3))
+    k[:, 2, 1], k[:, 0, 2], k[:, 1, 0] = vectors.T
+    k[:, 1, 2], k[:, 2, 0], k[:, 0, 1] = -vectors.T
+    return np.eye(3) + np.sinc(angle / np.pi) * k + 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2 * (k @ k)
+
+
+def _rotation_vector(m: NDArray) -> NDArray:
+    """The rotation vector of a rotation matrix, by its quaternion."""
+    _, vectors = np.linalg.eigh(
+        np.array(
+            [
+                [m[0, 0] - m[1, 1] - m[2, 2], m[1, 0] + m[0, 1], m[2, 0] + m[0, 2], m[2, 1] - m[1, 2]],
+                [m[1, 0] + m[0, 1], m[1, 1] - m[0, 0] - m[2, 2], m[2, 1] + m[1, 2], m[0, 2] - m[2, 0]],
+                [m[2, 0] + m[0, 2], m[2, 1] + m[1, 2], m[2, 2] - m[0, 0] - m[1, 1], m[1, 0] - m[0, 1]],
+                [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], np.trace(m)],
+            ]
+        )
+    )
+    q = vectors[:, -1] * (1.0 if vectors[3, -1] >= 0.0 else -1.0)
+    size = np.linalg.norm(q[:3])
+    return q[:3] * (2.0 * np.arctan2(size, q[3]) / size if size > 1e-12 else 2.0)

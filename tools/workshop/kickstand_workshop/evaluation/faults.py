@@ -1,0 +1,244 @@
+"""What may be wrong with a sensor in a ride: the table of faults, each a function that changes readings.
+
+A fault is of one of three kinds: SEEN, what counts and registers show (an axis that is dead, in standby or at the end
+of its range); ILL, what only shows in whether the readings fit together; HARMLESS, what leaves the lean nearly right.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from kickstand_tools.signals import rotation_matrix
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+SEEN, ILL, HARMLESS = "seen", "ill", "harmless"
+ACCEL_RANGE_G, GYRO_RANGE_DPS = 16.0, 500.0  # the board's defaults
+
+
+@dataclass
+class Part:
+    """The readings while a fault lasts: force (n, 3, g) and rate (n, 3, deg/s) in the chip's axes, to be changed in
+    place; lost (n): True for readings that never arrive. rate_hz: of the readings. axis: the one that is ill, where it
+    is one; turned so that 0, 1, 2 may be the bike's left, up, forward. sign: 1 or -1."""
+
+    force: Array
+    rate: Array
+    lost: NDArray[np.bool_]
+    rate_hz: float
+    axis: int
+    sign: float
+    chance: np.random.Generator
+
+
+@dataclass(frozen=True)
+class Fault:
+    """change: makes a Part ill. seconds: how long it lasts, None to the end of the ride. from_start: it is there from
+    power-on, else it begins in mid-ride."""
+
+    name: str
+    kind: str
+    change: Callable[[Part], None]
+    seconds: float | None = None
+    from_start: bool = False
+
+    @property
+    def title(self) -> str:
+        """Its name and when it is there."""
+        if self.from_start:
+            return f"{self.name}, from power-on"
+        return self.name if self.seconds is None else f"{self.name}, {self.seconds:g} s"
+
+
+def _gyro_axis_dead(part: Part) -> None:
+    part.rate[:, part.axis] = part.rate[0, part.axis] if part.sign > 0 else 0.0
+
+
+def _gyro_dead(part: Part) -> None:
+    part.rate[:] = 0.0
+
+
+def _gyro_axis_at_rail(part: Part) -> None:
+    part.rate[:, part.axis] = part.sign * 2.0 * GYRO_RANGE_DPS
+
+
+def _accel_axis_dead(part: Part) -> None:
+    part.force[:, part.axis] = part.force[0, part.axis] if part.sign > 0 else 0.0
+
+
+def _accel_axis_at_rail(part: Part) -> None:
+    part.force[:, part.axis] = part.sign * 2.0 * ACCEL_RANGE_G
+
+
+def _accel_frozen(part: Part) -> None:
+    part.force[:] = part.force[0]
+
+
+def _gyro_scaled(part: Part, scale: float) -> None:
+    part.rate *= scale
+
+
+def _gyro_axis_scaled(part: Part, scale: float) -> None:
+    part.rate[:, part.axis] *= scale
+
+
+def _gyro_axes_swapped(part: Part) -> None:
+    others = [k for k in range(3) if k != part.axis]
+    part.rate[:, others] = part.rate[:, others[::-1]].copy()
+
+
+def _gyro_bias_steps(part: Part, dps: float) -> None:
+    part.rate[:, part.axis] += part.sign * dps
+
+
+def _gyro_bias_drifts(part: Part, dps: float) -> None:
+    part.rate[:, part.axis] += part.sign * dps * np.linspace(0.0, 1.0, len(part.rate))
+
+
+def _mount_slips(part: Part, degrees: float) -> None:
+    """About one of the bike's axes where the chip sits square, about one of the chip's where it does not."""
+    turned = rotation_matrix(np.radians(part.sign * degrees) * np.eye(3)[part.axis])
+    part.force[:] = part.force @ turned
+    part.rate[:] = part.rate @ turned
+
+
+def _accel_axis_steps(part: Part, g: float) -> None:
+    part.force[:, part.axis] += part.sign * g
+
+
+def _accel_axis_scaled(part: Part, scale: float) -> None:
+    part.force[:, part.axis] *= scale
+
+
+def _accel_axis_noisy(part: Part, g: float) -> None:
+    part.force[:, part.axis] += g * part.chance.standard_normal(len(part.force))
+
+
+def _accel_clipped(part: Part, g: float) -> None:
+    np.clip(part.force, -g, g, out=part.force)
+
+
+def _accel_clipped_now_and_then(part: Part) -> None:
+    """Blows of a tenth of a second that reach the end of a small range, once in five seconds."""
+    for start in range(0, len(part.force), round(5.0 * part.rate_hz)):
+        end = start + round(0.1 * part.rate_hz)
+        part.force[start:end] = (part.force[start:end] + 2.0 * part.chance.standard_normal(3)).clip(-2.0, 2.0)
+
+
+def _gyro_late(part: Part, seconds: float) -> None:
+    n = round(seconds * part.rate_hz)
+    part.rate[n:] = part.rate[:-n].copy()
+
+
+def _gyro_axis_noisy(part: Part, dps: float) -> None:
+    part.rate[:, part.axis] += dps * part.chance.standard_normal(len(part.rate))
+
+
+def _mount_swings(part: Part, degrees: float, hz: float) -> None:
+    """To and fro about one axis, as on a loose bracket."""
+    phase = 2.0 * np.pi * hz * np.arange(len(part.force)) / part.rate_hz
+    part.rate[:, part.axis] += degrees * 2.0 * np.pi * hz * np.cos(phase)
+    angle = np.radians(degrees) * np.sin(phase)
+    axis = np.eye(3)[part.axis]
+    part.force[:] -= np.cross(angle[:, None] * axis, part.force)
+
+
+def _readings_lost(part: Part) -> None:
+    part.lost[:] = True
+
+
+def _readings_lost_now_and_then(part: Part) -> None:
+    """For 0.3 s, once in ten seconds."""
+    every, n = round(10.0 * part.rate_hz), round(0.3 * part.rate_hz)
+    part.lost[np.arange(len(part.lost)) % every < n] = True
+
+
+def _all(name: str, kind: str, change: Callable[[Part], None]) -> Iterator[Fault]:
+    """From power-on, in mid-ride to the end, and for 5 s."""
+    yield Fault(name, kind, change, from_start=True)
+    yield Fault(name, kind, change)
+    yield Fault(name, kind, change, seconds=5.0)
+
+
+FAULTS: tuple[Fault, ...] = (
+    *_all("gyro axis dead", SEEN, _gyro_axis_dead),
+    *_all("gyro dead", SEEN, _gyro_dead),
+    Fault("gyro axis at the end of its range", SEEN, _gyro_axis_at_rail, seconds=0.3),
+    Fault("gyro axis at the end of its range", SEEN, _gyro_axis_at_rail, seconds=1.0),
+    Fault("gyro axis at the end of its range", SEEN, _gyro_axis_at_rail),
+    *_all("accelerometer axis dead", SEEN, _accel_axis_dead),
+    Fault("accelerometer axis at the end of its range", SEEN, _accel_axis_at_rail, seconds=1.0),
+    Fault("accelerometer axis at the end of its range", SEEN, _accel_axis_at_rail),
+    Fault("accelerometer frozen", SEEN, _accel_frozen),
+    *_all("gyro at half scale", ILL, partial(_gyro_scaled, scale=0.5)),
+    *_all("gyro axis at half scale", ILL, partial(_gyro_axis_scaled, scale=0.5)),
+    Fault("gyro axis at twice the scale", ILL, partial(_gyro_axis_scaled, scale=2.0)),
+    *_all("gyro axis mirrored", ILL, partial(_gyro_axis_scaled, scale=-1.0)),
+    Fault("two gyro axes swapped", ILL, _gyro_axes_swapped, from_start=True),
+    Fault("gyro bias steps by 2 deg/s", ILL, partial(_gyro_bias_steps, dps=2.0)),
+    Fault("gyro bias steps by 5 deg/s", ILL, partial(_gyro_bias_steps, dps=5.0)),
+    Fault("gyro bias steps by 10 deg/s", ILL, partial(_gyro_bias_steps, dps=10.0)),
+    Fault("gyro bias steps by 10 deg/s", ILL, partial(_gyro_bias_steps, dps=10.0), seconds=5.0),
+    Fault("gyro bias drifts by 10 deg/s", ILL, partial(_gyro_bias_drifts, dps=10.0)),
+    Fault("mount slips by 10 degrees", ILL, partial(_mount_slips, degrees=10.0)),
+    Fault("mount slips by 20 degrees", ILL, partial(_mount_slips, degrees=20.0)),
+    Fault("mount slips by 20 degrees", ILL, partial(_mount_slips, degrees=20.0), seconds=5.0),
+    Fault("accelerometer axis off by 0.3 g", ILL, partial(_accel_axis_steps, g=0.3)),
+    Fault("accelerometer axis off by 0.3 g", ILL, partial(_accel_axis_steps, g=0.3), seconds=5.0),
+    Fault("accelerometer axis at half scale", ILL, partial(_accel_axis_scaled, scale=0.5)),
+    Fault("accelerometer clipped at 1.2 g", ILL, partial(_accel_clipped, g=1.2)),
+    Fault("accelerometer axis noisy, 1 g", ILL, partial(_accel_axis_noisy, g=1.0)),
+    Fault("readings lost", ILL, _readings_lost, seconds=1.0),
+    Fault("readings lost", ILL, _readings_lost, seconds=5.0),
+    Fault("gyro 150 ms late", HARMLESS, partial(_gyro_late, seconds=0.15)),
+    Fault("gyro axis noisy, 20 deg/s", HARMLESS, partial(_gyro_axis_noisy, dps=20.0)),
+    Fault("mount swings by 1 degree at 8 Hz", HARMLESS, partial(_mount_swings, degrees=1.0, hz=8.0)),
+    Fault("accelerometer clipped now and then", HARMLESS, _accel_clipped_now_and_then),
+    Fault("readings lost for 0.3 s every 10 s", HARMLESS, _readings_lost_now_and_then),
+)
+
+
+@dataclass
+class Ill:
+    """Readings (n, 7) in the chip's order, lost (n), and first and end: the span in which the fault lasts."""
+
+    readings: Array
+    lost: NDArray[np.bool_]
+    first: int
+    end: int
+
+    @property
+    def saturated(self) -> NDArray[np.bool_]:
+        """(n) True where an axis is at the end of its range: the driver takes such a reading as lost."""
+        force, rate = np.abs(self.readings[:, :3]), np.abs(self.readings[:, 4:])
+        return np.any(np.hstack((force >= ACCEL_RANGE_G, rate >= GYRO_RANGE_DPS)), axis=1)
+
+
+def apply(fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: int, vehicle_from_sensor: Array) -> Ill:
+    """A copy of the readings with the fault in it. begin_s: when one begins that is not there from power-on.
+
+    The seed chooses the axis, the sign, and whether the chip sits square: then its axes are the bike's.
+    """
+    chance = np.random.default_rng([seed, *fault.title.encode()])
+    made = readings.copy()
+    lost = np.zeros(len(made), dtype=bool)
+    first = 0 if fault.from_start else round(begin_s * rate_hz)
+    end = len(made) if fault.seconds is None else min(len(made), first + round(fault.seconds * rate_hz))
+    span = slice(first, end)
+    # What counts show has to be in the chip's own axes
+    square = seed // 3 % 2 == 0 and fault.kind != SEEN
+    turned = vehicle_from_sensor if square else np.eye(3)
+    part = Part(
+        made[span, :3] @ turned.T,
+        made[span, 4:] @ turned.T,
+        lost[span],
+        rate_hz,
+        seed % 3,
+        (1.0, -1.0)[seed // 6 % 2],
+        chance,
+    )
+    fault.change(part)
+    made[span, :3] = (part.force @ turned).clip(-ACCEL_RANGE_G, ACCEL_RANGE_G)
+    made[span, 4:] = (part.rate @ turned).clip(-GYRO_RANGE_DPS, GYRO_RANGE_DPS)
+    return Ill(made, lost, first, end)

@@ -1,0 +1,255 @@
+"""Whether a wrong lean is ever shown as good: the firmware's meter over simulated rides with each of the faults.
+
+What a fault leaves is judged as in aviation: at each instant a lean is good (shown and right), hidden, or misleading.
+"Right" is within WRONG_DEG. A lean that is wrong for a moment misleads nobody: misleading is what stands for longer
+than STANDS_S.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+from kickstand.lean.meter import FALLEN_DEG
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.errors import InputError
+from kickstand_tools.replay.replay_engine import NO_SPEED, Replay
+from kickstand_tools.simulation.physics.mount import MOUNTS
+from kickstand_tools.simulation.physics.road import CLASSES
+from kickstand_tools.simulation.ride import Ride, ride
+from numpy.typing import NDArray
+
+from .faults import FAULTS, SEEN, Fault, Ill, apply
+from .runs import calibrated_by_poses, on_all_processors
+from .whole_device import display_of
+
+Array = NDArray[np.float64]
+
+WRONG_DEG = 8.0
+STANDS_S = 1.0
+RECOVERY_S = 10.0
+TURN = 2  # readings in a turn of the loop
+GPS_LATE_S = 0.4
+PROFILES = "street", "track", "hills", "city", "sweeper"
+SIGMA_EDGES = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0])  # degrees, claimed
+# What is claimed of a lean; a display gives no sigma
+CLAIMS = [f"{low:g}-{high:g}" for low, high in pairwise(SIGMA_EDGES)] + ["display", "hidden"]
+ERROR_EDGES = np.array([0.0, 1.0, 2.0, 3.0, 5.0, WRONG_DEG, 12.0, 20.0, 40.0, 180.0])  # degrees
+
+
+@dataclass(frozen=True)
+class Job:
+    """A ride of this seed with a fault, or with none. road, mount: as for simulation.ride.ride(). profile: None for the
+    seed's own of PROFILES. device: on the whole device, not on the meter alone."""
+
+    fault: Fault | None
+    seed: int
+    seconds: float = 120.0
+    road: str | None = None
+    mount: str | None = None
+    profile: str | None = None
+    device: bool = False
+
+    @property
+    def gps(self) -> bool:
+        """Every fourth ride has a speed that is measured once a second, late, as by GPS."""
+        return self.seed % 4 == 3
+
+    @property
+    def title(self) -> str:
+        if self.fault:
+            return self.fault.title
+        return "none" + (f", {self.mount}" if self.mount else "") + (f", road {self.road}" if self.road else "")
+
+
+@dataclass
+class Trace:
+    """A ride as it was shown, an entry for each turn of the loop (n): time (s), lean and sigma (degrees), shown, true
+    lean (degrees), speed (m/s). named_s: when a fault was named, or NaN. first_s, end_s: while the fault was there."""
+
+    time: Array
+    lean: Array
+    sigma: Array
+    shown: NDArray[np.bool_]
+    true: Array
+    speed: Array
+    named_s: float
+    first_s: float
+    end_s: float
+
+
+@dataclass
+class Outcome:
+    """What a rider saw. Seconds count from setting off.
+
+    misleading_s: see above. hidden, available: shares of the riding. hidden_after_s, named_after_s: from the fault's
+    begin, NaN where it never was. recovered: of a fault that ends, whether RECOVERY_S later the lean stands right;
+    None for the others. diagram: seconds, a row for each of CLAIMS, by ERROR_EDGES.
+    """
+
+    job: Job
+    misleading_s: float
+    longest_s: float
+    available: float
+    hidden_after_s: float
+    named_after_s: float
+    recovered: bool | None
+    diagram: Array
+
+
+def stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """(first, end) of each run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def judge(job: Job, trace: Trace) -> Outcome:
+    """What a rider saw of it."""
+    step = float(np.median(np.diff(trace.time)))
+    off = int(np.argmax(trace.speed > 0.5)) if (trace.speed > 0.5).any() else 0
+    error = np.abs(trace.lean - trace.true)
+    wrong = trace.shown & (error > WRONG_DEG)
+    wrong[:off] = False
+    times = [(end - first) * step for first, end in stretches(wrong) if (end - first) * step > STANDS_S]
+    riding = trace.speed > 0.5
+    there = trace.time >= max(trace.first_s, trace.time[off])
+    hidden_s = _first(trace.time, there & ~trace.shown) - trace.first_s
+    recovered = None
+    if trace.end_s < trace.time[-1] - RECOVERY_S:
+        stands = (trace.time > trace.end_s + RECOVERY_S - STANDS_S) & (trace.time <= trace.end_s + RECOVERY_S)
+        recovered = bool(np.all(trace.shown[stands] & (error[stands] <= WRONG_DEG)))
+    row = np.digitize(trace.sigma, SIGMA_EDGES[1:-1])
+    row[np.isnan(trace.sigma)] = len(CLAIMS) - 2
+    row[~trace.shown] = len(CLAIMS) - 1
+    column = np.digitize(error, ERROR_EDGES[1:-1])
+    diagram = np.zeros((len(CLAIMS), len(ERROR_EDGES) - 1))
+    np.add.at(diagram, (row[riding], column[riding]), step)
+    return Outcome(
+        job,
+        sum(times),
+        max(times, default=0.0),
+        float(np.mean(trace.shown[riding])) if riding.any() else 1.0,
+        hidden_s,
+        trace.named_s - trace.first_s,
+        recovered,
+        diagram,
+    )
+
+
+def _first(time: Array, mask: NDArray[np.bool_]) -> float:
+    return float(time[np.argmax(mask)]) if mask.any() else float("nan")
+
+
+@lru_cache(maxsize=4)
+def _made(profile: str, seed: int, seconds: float, road: str | None, mount: str | None) -> tuple[Ride, CalibrationFile]:
+    made = ride(profile, seed, seconds, road=road, mount=mount)
+    try:
+        return made, calibrated_by_poses(made)
+    except InputError:  # some sensors' cross-axis errors are more than the slanted pose may show
+        return made, calibrated_by_poses(replace(made, poses=made.poses[:6]))
+
+
+def follow(job: Job) -> Trace:
+    """The job's ride, as it was shown."""
+    made, calibration = _made(
+        job.profile or PROFILES[job.seed % len(PROFILES)], job.seed, job.seconds, job.road, job.mount
+    )
+    of = device_trace_of if job.device else trace_of
+    return of(job, made.readings, made.rate_hz, calibration, made.truth["lean_deg"], made.truth["speed_mps"])
+
+
+def _ill(job: Job, readings: Array, rate_hz: float, calibration: CalibrationFile) -> Ill:
+    """The readings with the job's fault in them."""
+    if not job.fault:
+        return Ill(readings, np.zeros(len(readings), dtype=bool), 0, len(readings))
+    begin_s = (0.35 + 0.2 * (job.seed * 0.618 % 1.0)) * len(readings) / rate_hz
+    return apply(job.fault, readings, rate_hz, begin_s, job.seed, calibration.vehicle_from_sensor)
+
+
+def device_trace_of(
+    job: Job, readings: Array, rate_hz: float, calibration: CalibrationFile, true: Array, speed: Array
+) -> Trace:
+    """trace_of() of the whole device, an entry for each tenth of a second; sigma is NaN."""
+    ill = _ill(job, readings, rate_hz, calibration)
+    end = len(readings) - 1
+
+    def known(t_s: float) -> float:
+        return float(speed[min(end, int(t_s * rate_hz))])
+
+    time, lean, named_s = display_of(ill.readings, rate_hz, calibration, ill.lost, known if job.gps else None)
+    at = np.minimum(end, (time * rate_hz).astype(int))
+    shown = ~np.isnan(lean)
+    nothing = np.full(len(time), np.nan)
+    lean = np.where(shown, lean, true[at])
+    return Trace(time, lean, nothing, shown, true[at], speed[at], named_s, ill.first / rate_hz, ill.end / rate_hz)
+
+
+def trace_of(
+    job: Job, readings: Array, rate_hz: float, calibration: CalibrationFile, true: Array, speed: Array
+) -> Trace:
+    """The firmware's meter alone, without the driver, over any ride: readings (n, 7) in the chip's order, true lean (n,
+    degrees) and speed (n, m/s)."""
+    ill = _ill(job, readings, rate_hz, calibration)
+    readings, lost, first, end = ill.readings, ill.lost | ill.saturated, ill.first, ill.end
+    force, rate = calibration.in_vehicle(readings)
+    turns = len(readings) // TURN
+    shape = (turns, TURN, 3)
+    force = force[: turns * TURN].reshape(shape).mean(axis=1).tolist()
+    rate = np.radians(rate[: turns * TURN]).reshape(shape).mean(axis=1).tolist()
+    lost = np.any(lost[: turns * TURN].reshape(turns, TURN), axis=1).tolist()
+    last = np.arange(1, turns + 1) * TURN - 1
+    late = round(GPS_LATE_S * rate_hz)
+    replay = Replay(calibration.to_firmware(), delay_s=calibration.delay_s())
+    lean, sigma, shown = np.zeros(turns), np.full(turns, 180.0), np.zeros(turns, dtype=bool)
+    named_s = float("nan")
+    meter = replay.meter
+    before = None
+    step_us = round(1e6 * TURN / rate_hz)
+    for k in range(turns):
+        if job.gps and k % round(rate_hz / TURN) == 0:
+            meter.measure_speed(float(speed[max(0, int(last[k]) - late)]) if k else NO_SPEED)
+        if lost[k]:
+            lean[k], sigma[k], shown[k] = lean[k - 1], sigma[k - 1], False
+            continue
+        meter.update_in_vehicle(force[k], rate[k], 0 if before is None else (k - before) * step_us)
+        before = k
+        lean[k] = meter.lean_deg
+        sigma[k] = np.degrees(np.sqrt(max(0.0, meter.filter.variance)))
+        shown[k] = meter.trusted and not meter.fallen and abs(meter.lean_deg) <= FALLEN_DEG
+        if named_s != named_s and meter.odd:
+            named_s = k * TURN / rate_hz
+    time = last / rate_hz
+    return Trace(time, lean, sigma, shown, true[last], speed[last], named_s, first / rate_hz, end / rate_hz)
+
+
+def run(job: Job) -> Outcome:
+    """follow() and judge()."""
+    return judge(job, follow(job))
+
+
+def jobs(seeds: int, first_seed: int = 0, seconds: float = 120.0, device: bool = False) -> list[Job]:
+    """A ride of each seed with no fault, on good and bad mounts and roads, and one with each fault. device: all on the
+    whole device; else those are whose fault the driver sees."""
+    numbers = range(first_seed, first_seed + seeds)
+    conditions: list[tuple[str | None, str | None]] = [(None, None), *[(None, road) for road in CLASSES]]
+    conditions += [(mount, None) for mount in MOUNTS]
+    sound = [Job(None, seed, seconds, road, mount, device=device) for mount, road in conditions for seed in numbers]
+    return sound + [
+        Job(fault, seed, seconds, device=device or fault.kind == SEEN) for fault in FAULTS for seed in numbers
+    ]
+
+
+def evaluate(jobs: list[Job], done: Callable[[], None] = lambda: None) -> list[Outcome]:
+    """run() for each job, on all processors, in the order of the jobs. done(): called after each."""
+
+    def ride_of(k: int) -> tuple[int | str, ...]:
+        job = jobs[k]
+        return (job.seed, str(job.profile), str(job.road), str(job.mount))
+
+    order = sorted(range(len(jobs)), key=ride_of)  # jobs of one ride one after the other: it is made once
+    found: dict[int, Outcome] = {}
+    for k, outcome in zip(order, on_all_processors(run, [jobs[k] for k in order], chunk=8), strict=True):
+        found[k] = outcome
+        done()
+    return [found[k] for k in range(len(jobs))]

@@ -1,0 +1,86 @@
+"""A ride with a fault on the whole device: the firmware on the simulated board, judged by what its display shows."""
+
+import contextlib
+import gc
+import io
+import os
+import re
+import tempfile
+from collections.abc import Callable
+
+import numpy as np
+from kickstand.calibration.store import Store
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.simulated_board.lcd import shown_lean
+from kickstand_tools.simulated_board.simulator import Board
+from numpy.typing import NDArray
+
+from .faults import ACCEL_RANGE_G
+
+LOOK_S = 0.1
+# What names a fault of the sensor; `Lean  --` and what is said of a speed source or a display do not
+NAMES = re.compile("Sensor|Gyro|Accel|No sensor", re.IGNORECASE)
+STARTED_S = 2.0  # before, the display says what it is doing
+WRITING = 2  # looks at a display that is just being written, in a row
+
+
+def display_of(
+    readings: NDArray[np.float64],
+    rate_hz: float,
+    calibration: CalibrationFile,
+    lost: NDArray[np.bool_],
+    speed: Callable[[float], float] | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """time (n, s), the lean on the display (n, degrees, NaN where it shows none), and when a fault was named, or NaN.
+
+    readings (m, 7): of the chip, in its order. lost (m): the sensor answers nothing then. speed(t_s): in m/s, of a GPS.
+    """
+    rows = readings[:, [0, 1, 2, 4, 5, 6, 3]].tolist()
+    last = len(rows) - 1
+    board = Board(lambda t_s: rows[min(last, max(0, int(t_s * rate_hz)))])
+    if speed:
+        board.fit_gps(speed)
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], lost.astype(int), [0]))))
+    for first, end in zip(edges[::2], edges[1::2], strict=True):
+        board.faults.nack_for(board.sensor.address, first / rate_hz, (end - first) / rate_hz)
+    times: list[float] = []
+    leans: list[float] = []
+    named: list[float] = []
+
+    def look() -> None:
+        now_s = board.clock.now_us / 1e6
+        text = board.lcd.text()
+        lean = shown_lean(text)
+        times.append(now_s)
+        leans.append(np.nan if lean is None else lean)
+        if any(NAMES.match(line) for line in text) and now_s > STARTED_S:
+            named.append(now_s)
+
+    board.every(LOOK_S, look)
+    config = {"SPEED": "gps"} if speed else {}
+    gc.freeze()  # the firmware collects all the time: not what was there before
+    try:
+        with tempfile.TemporaryDirectory() as flash, contextlib.chdir(flash):
+            with board, contextlib.redirect_stdout(io.StringIO()):
+                from kickstand import settings, start
+
+                load = settings.load
+                settings.load = lambda: settings.Settings(type("Config", (), config))
+                Store(board.sensor.who_am_i, int(ACCEL_RANGE_G), os.curdir).save(calibration.to_firmware())
+                try:
+                    board.run(start.main, (last + 1) / rate_hz)
+                finally:
+                    settings.load = load
+    finally:
+        gc.unfreeze()
+    return np.array(times), _read(leans), min(named, default=float("nan"))
+
+
+def _read(leans: list[float]) -> NDArray[np.float64]:
+    """The leans as a rider reads them, who sees a line that is half written for what it was."""
+    read = np.array(leans)
+    absent = np.isnan(read)
+    for k in range(1, len(read)):
+        if absent[k] and not absent[max(0, k - WRITING) : k].all() and not np.isnan(read[k - 1]):
+            read[k] = read[k - 1]
+    return read
