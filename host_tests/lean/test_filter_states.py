@@ -3,7 +3,7 @@
 from math import atan2, cos, degrees, pi, radians, sin, sqrt
 
 from bike_motion import DT_S, DT_US, GRAVITY_MPS2, force_and_rate, near
-from kickstand.lean.bike_model import SPEED
+from kickstand.lean.bike_model import LEAN, SPEED
 from kickstand.lean.lean_filter import LeanFilter
 
 LEVEL, NO_RATE = [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]
@@ -18,8 +18,8 @@ def hold(estimator, seconds, force=LEVEL, rate=NO_RATE, dt_us=DT_US):
 
 
 def sigma_deg(estimator):
-    """Of the lean without the trim."""
-    return degrees(sqrt(estimator.variance - estimator.trim.variance))
+    """Of the lean without the trim, as the covariance has it."""
+    return degrees(sqrt(estimator._p.rows[LEAN][LEAN] if estimator._p else pi * pi))
 
 
 def test_before_the_first_window_nothing_is_known():
@@ -46,11 +46,11 @@ def test_power_on_under_way_leaves_lean_and_speed_uncertain():
 
 
 def speed_sigma_mps(forward_g, before_mps, now_mps):
-    """1 sigma after two speeds, measured a second apart, with such a force forward."""
+    """1 sigma after ten speeds, measured a second apart, these two in turns, with such a force forward."""
     estimator = LeanFilter()
     force = [0.0, 1.0, forward_g]
     hold(estimator, 0.05, [0.0, 1.1, 0.0])
-    for speed_mps in (before_mps, now_mps):
+    for speed_mps in 5 * (before_mps, now_mps):
         hold(estimator, 1.0, force)
         estimator.measure_speed(speed_mps)
     hold(estimator, 0.5, force)
@@ -62,7 +62,7 @@ def test_a_measured_speed_may_be_late_while_the_measured_ones_change_whatever_th
     """A pitch error looks like a force forward, and the speed that would contradict it must not have less weight."""
     steady, changing = speed_sigma_mps(0.0, 12.0, 12.0), speed_sigma_mps(0.0, 6.0, 12.0)
     assert changing > steady + 0.2
-    near(speed_sigma_mps(0.3, 12.0, 12.0), steady, 0.05)
+    near(speed_sigma_mps(0.3, 12.0, 12.0), steady, 0.1)
 
 
 def test_coming_to_rest_the_force_is_the_vertical():

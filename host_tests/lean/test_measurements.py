@@ -93,11 +93,18 @@ def test_on_a_straight_the_bike_is_upright_and_elsewhere_its_speed_is_the_usual_
 
 
 def test_a_measured_speed_is_less_certain_while_it_changes():
-    row, innovation, steady = measurements.measured_speed(12.0, 10.0, 0.0)
+    row, innovation, steady = measurements.measured_speed(12.0, 10.0, 0.0, 1.0)
     assert row == ((SPEED, 1.0),)
     near(innovation, 2.0, 1e-6)
     for change in (6.0, -6.0):
-        assert measurements.measured_speed(1.0, 1.0, change)[2] > 2.0 * steady
+        assert measurements.measured_speed(12.0, 10.0, change, 1.0)[2] > 2.0 * steady
+
+
+def test_ten_measured_speeds_a_second_count_as_much_as_one():
+    """They share their errors: delay, the tyre's radius, the scale of the gyro's up axis."""
+    once, often = (measurements.measured_speed(20.0, 20.0, 0.0, seconds)[2] for seconds in (1.0, 0.4))
+    near(often, once / 0.4, 1e-3 * often)
+    assert measurements.measured_speed(40.0, 40.0, 0.0, 1.0)[2] > 2.0 * once  # errors of scale
 
 
 def test_at_rest_there_is_no_speed_the_rates_are_bias_and_the_force_is_the_vertical():

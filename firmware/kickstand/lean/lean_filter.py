@@ -86,9 +86,9 @@ class LeanFilter:
         self._upright = self.trim.angle  # LEAN of a bike that is upright
         self._rest = RestDetector(not self._kept)
         # _speed: the latest measured speed, until a window takes it; _last_speed: the one before; _speed_s: seconds
-        # since that
+        # since that; _straight_s: seconds since straight_or_prior_speed()
         self._speed = self._last_speed = None
-        self._speed_s = 0.0
+        self._speed_s = self._straight_s = 0.0
         self._work = None  # the generator of _process() while it is not finished
         self._steps = 1  # steps of it that each sample runs
         self._sums = [0.0] * 9  # see predict()
@@ -158,8 +158,10 @@ class LeanFilter:
 
     @property
     def variance(self):
-        """Variance of the lean, rad^2; that of no knowledge (pi^2) before the first window has ended."""
-        return self._p.rows[LEAN][LEAN] + self.trim.variance if self._p is not None else pi * pi
+        """Variance of the lean's error, rad^2; that of no knowledge (pi^2) before the first window has ended."""
+        if self._p is None:
+            return pi * pi
+        return measurements.SIGMA_SHARE**2 * (self._p.rows[LEAN][LEAN] + self.trim.variance)
 
     @property
     def at_rest(self):
@@ -314,7 +316,7 @@ class LeanFilter:
         self._inject(model)
 
     def _update_ride(self, model, means, seconds, roll_acceleration):
-        """A generator: update with the window's forces, the level road, and the measured speed; without one with
+        """A generator: update with the window's forces, the level road, and the measured speed; without a new one with
         straight_or_prior_speed(). Update the trim where speed and lean are certain enough."""
         p, x = self._p, self._x
         dive = self.dive.update(means[7] - model.sin_pitch, model.pitch_rate, model.speed, seconds)
@@ -331,13 +333,17 @@ class LeanFilter:
         yield from p.update(*measurements.level_road(model, x, seconds))
         lean, speed, measured = x[LEAN] - self._upright, x[SPEED], self._speed
         self._speed_s += seconds
-        if measured is not None:
+        self._straight_s = min(self._straight_s, seconds) + seconds
+        if measured is not None and (self._last_speed is None or self._speed_s > measurements.MEASURED_SPEED_EVERY_S):
             # From the measured speeds alone: a pitch error would bias the estimated acceleration.
-            acceleration = 0.0 if self._last_speed is None else (measured - self._last_speed) / self._speed_s
+            acceleration, since = 0.0, 2 * measurements.MEASURED_SPEED_S  # of the first: its errors count once
+            if self._last_speed is not None:
+                acceleration, since = (measured - self._last_speed) / self._speed_s, self._speed_s
             self._speed, self._last_speed, self._speed_s = None, measured, 0.0
-            yield from p.update(*measurements.measured_speed(measured, speed, acceleration))
+            yield from p.update(*measurements.measured_speed(measured, speed, acceleration, since))
         else:
-            yield from p.update(*measurements.straight_or_prior_speed(lean, speed, model.yaw_rate, seconds))
+            yield from p.update(*measurements.straight_or_prior_speed(lean, speed, model.yaw_rate, self._straight_s))
+            self._straight_s = 0.0
         certain = p.rows[SPEED][SPEED] < measurements.SIGMA_TRIM_SPEED**2
         certain = certain and p.rows[LEAN][LEAN] < measurements.SIGMA_TRIM_LEAN**2
         if certain and model.speed > measurements.STRAIGHT_MIN_SPEED:

@@ -6,11 +6,12 @@ from ..calibration.transform import Transform
 from ..units import GAP_US, LOST_US
 from .consistency import MILD
 from .lean_filter import DELAY_S, LeanFilter
-from .measurements import gyro_variances
+from .measurements import SIGMA_SHARE, gyro_variances
 
 SMOOTH_US = 300_000  # time constant of smooth_force
-MAX_VARIANCE = radians(3.0) ** 2  # a lean less certain than this is not shown
-DOUBTED_VARIANCE = radians(2.0) ** 2  # the same after they did not fit again and again
+# A lean less certain than this (1.4 degrees) is not shown. The share: of what the covariance says
+MAX_VARIANCE = (SIGMA_SHARE * radians(3.0)) ** 2
+DOUBTED_VARIANCE = (SIGMA_SHARE * radians(2.0)) ** 2  # the same after they did not fit again and again
 TRIM_MAX_VARIANCE = radians(0.5) ** 2  # a trim less certain than this is not kept
 TRIM_STEP_DEG = 0.3  # a smaller change of the trim is not saved: flash wears
 FALLEN_DEG = 65.0  # the bike has fallen after FALLEN_US of at least this lean

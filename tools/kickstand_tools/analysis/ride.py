@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 from kickstand.errors import Notice
-from kickstand.lean.meter import MAX_VARIANCE
 
 from ..calibration.file import CalibrationFile, calibration_beside, read_calibration
 from ..errors import InputError
@@ -17,6 +16,8 @@ from ..logs.source import File, Progress, log_stem, name_of
 from ..replay.meter_along import MeterAlong
 from ..signals import Array
 from .channels import Channels, channels, joined
+
+_MAX_SIGMA_DEG = 3.0  # a smoothed lean less certain than this counts as not sure
 
 
 @dataclass
@@ -59,7 +60,7 @@ class Ride:
             slow |= self.smoothed and found is None
             if found is not None:
                 lean_deg, sigma_deg, _, _, doubtful = found[~whole.frozen].T
-                sure = np.radians(sigma_deg) ** 2 <= MAX_VARIANCE  # NaN is not
+                sure = sigma_deg <= _MAX_SIGMA_DEG  # NaN is not
                 lean |= {"lean_deg": lean_deg, "lean_sigma_deg": sigma_deg, "doubtful": doubtful}
                 lean["sure"] = sure.astype(float)
             seen = channels(block, self.calibration, lean, self.car)
