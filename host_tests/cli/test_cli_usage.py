@@ -17,7 +17,7 @@ MISTAKES = {
     "calibrate six a.csv": "Missing option '--out'",
     "calibrate two a b c --out d": "unexpected extra argument (c)",
     "calibrate two a.csv b.csv --side up --out CAL.json": "'up' is not one of",
-    "replay": "Missing argument 'LOG.csv'",
+    "replay": "Missing argument 'RIDE.csv|EXPORT'",
     "status --port": "requires an argument",
 }
 

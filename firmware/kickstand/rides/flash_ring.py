@@ -14,8 +14,8 @@ _DIRECTORY = 0x4000  # in the mode of os.stat()
 ENOSPC = 28  # MicroPython's errno does not have it
 PART_BLOCKS = 16  # ride blocks in a part in flash
 CARD_PART_BLOCKS = 256  # ride blocks in a part on a card: a day's ride is 85 files, not 1300
-FIRMWARE = 97 * BLOCK  # compiled: each of its files takes whole blocks, each folder two
-RESERVE = 54 * BLOCK  # what an update of compiled firmware needs at most, with some to spare
+FIRMWARE = 103 * BLOCK  # compiled: each of its files takes whole blocks, each folder two
+RESERVE = 61 * BLOCK  # what an update of compiled firmware needs at most, with some to spare
 
 
 def free_bytes(path):

@@ -19,7 +19,7 @@ class SixWizard(Wizard):
     """See Wizard."""
 
     def _start(self):
-        self._sides = [None] * 6  # the number of each side's pose, once it is taken
+        self._sides = [-1] * 6  # the number of each side's pose, -1 until it is taken
         self._poses, self._turns = [], []  # for SensorFit
         self._bias = [0.0] * 3
         self._fitted = None  # offset and slope, once all six poses are taken
@@ -36,7 +36,7 @@ class SixWizard(Wizard):
         elif self._fitted:
             self._begin_pose("Check: slant it", "and hold still")
         else:
-            missing = [six_position.SIDES[k] for k in range(6) if self._sides[k] is None]
+            missing = [six_position.SIDES[k] for k in range(6) if self._sides[k] < 0]
             self._begin_pose("Side up, still:", "any of the six" if len(missing) == 6 else " ".join(missing))
 
     def _progress(self, done, total):
@@ -59,12 +59,12 @@ class SixWizard(Wizard):
         tilt = six_position.tilt_deg(accel)
         if tilt > ROUGH_TILT_DEG:
             self._notice(now_ms, "Not on a side:", "%d%s off" % (tilt, messages.DEGREE))
-        elif self._sides[self._side] is not None and not self._again():
+        elif self._sides[self._side] >= 0 and not self._again():
             self._side_done(now_ms, "Side %s is done")
 
     def _again(self):
         """True if a side may be taken again, to turn from there: the turn since the last pose cannot be used."""
-        return self._spoilt_turn and len(self._poses) + self._sides.count(None) + 1 < MAX_POSES
+        return self._spoilt_turn and len(self._poses) + self._sides.count(-1) + 1 < MAX_POSES
 
     @property
     def _spoilt_turn(self):
@@ -94,14 +94,14 @@ class SixWizard(Wizard):
         if self._fitted:
             self._prove(pose)
             return
-        if self._sides[self._side] is None:
+        if self._sides[self._side] < 0:
             self._sides[self._side] = len(self._poses) - 1
-        if None not in self._sides:
+        if -1 not in self._sides:
             self._fitted = six_position.fit([self._poses[k] for k in self._sides])
         self._side_done(now_ms, "Side %s done")
 
     def _side_done(self, now_ms, words):
-        done = 6 - self._sides.count(None)
+        done = 6 - self._sides.count(-1)
         self._notice(now_ms, words % six_position.SIDES[self._side], "%d/6, turn it" % done)
 
     def _prove(self, pose):

@@ -353,7 +353,7 @@ def loop(parts, seconds):
         app.run()
     except KeyboardInterrupt:
         pass
-    longest_us, places = app_module.worst
+    longest_us, places, _ = app_module.worst
     gc.collect()
     free = gc.mem_free() if hasattr(gc, "mem_free") else 1 << 20
     lost = app.clock.lost
