@@ -119,8 +119,8 @@ class Screen:
         return True
 
     def interrupt(self, now_ms):
-        """Cancel a calibration under way, because the sensor has failed."""
-        if self.wizard:
+        """Cancel a calibration under way, because the sensor has failed, unless the wizard goes on all the same."""
+        if self.wizard and not self.wizard.bears(self._sensor.fault, now_ms):
             self.wizard = None
             self._notice.show(("Calibration", "stopped: fault"), now_ms)
 

@@ -71,12 +71,20 @@ class SixWizard(Wizard):
         """True if the turn since the last pose cannot be used."""
         return self._turn.running and (self._turn.quick or self._turn.lost)
 
+    def bears(self, fault, now_ms):
+        """A turn that is too quick for the gyro's range is no defect."""
+        if fault is None or fault.code != "gyro-clips" or not self._turn.running:
+            return False
+        self._turn.quick = True
+        self._followed(now_ms)
+        return True
+
     def _followed(self, now_ms):
         if self._state == COMPUTING:
             if next(self._work, True):  # a yield gives None, the end gives True
                 self._computed(now_ms)
-        elif self._turn.running and self._turn.quick and not self._told and self._state in (TAKING, NOTICE):
-            self._told = True
+        elif self._spoilt_turn and not self._told and self._state in (TAKING, NOTICE):
+            self._told = True  # readings at the end of the range do not come, so lost ones count too
             self._notice(now_ms, "Turned too fast:", "turn it slower")
 
     def _pose_done(self, pose, now_ms):

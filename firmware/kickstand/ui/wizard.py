@@ -66,6 +66,10 @@ class Wizard:
         except Refusal as problem:
             self._refuse(problem)
 
+    def bears(self, fault, now_ms):
+        """True if the wizard goes on in spite of this fault of the sensor, a Notice."""
+        return False
+
     def _refuse(self, problem):
         """Show why, until a press. What is wrong with the gyro is printed, too: it calls for another sensor."""
         if isinstance(problem, GyroError):
