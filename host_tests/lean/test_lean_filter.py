@@ -191,12 +191,12 @@ def test_a_pose_that_was_not_upright_is_found_in_turns_without_a_straight():
 
 
 def test_a_measured_speed_makes_no_long_bend_worse():
-    """The scale of the gyro's up axis and that of a wheel are not known: together 5 % here, ten times a second."""
+    """The scale of the gyro's up axis and that of a wheel are not known: 3 and 5 % here, ten times a second."""
     lean, speed = held_from_side_to_side(190.0)
     force, rate = shaken(*balanced(190.0, lean, speed))
-    rate[:, 1] *= 1.025
+    rate[:, 1] *= 1.03
     force, rate = force.tolist(), rate.tolist()
-    measured = {k: 0.975 * speed[k] for k in range(0, len(speed), HZ // 10)}
+    measured = {k: 1.05 * speed[k] for k in range(0, len(speed), HZ // 10)}
     without, with_it = (leans(force, rate, speeds) - np.degrees(lean) for speeds in (None, measured))
     assert np.sqrt(np.mean(with_it**2)) < 1.03 * np.sqrt(np.mean(without**2))
 
