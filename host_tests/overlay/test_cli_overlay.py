@@ -63,8 +63,8 @@ def test_a_transparent_clip(tmp_path, ride, lean, left_s, form, fps):
     shares = filled(pictures, gauge)
     wanted = lean.at(begin + np.arange(8 * fps) / fps).lean_deg
     assert wanted.min() < -20.0 < 20.0 < wanted.max()
-    # 3 degrees are 0.05 s where the bike rolls fastest
-    assert np.abs(shares * np.abs(wanted).max() - wanted).max() < 3.0
+    # 3.5 degrees are 0.06 s where the bike rolls fastest
+    assert np.abs(shares * np.abs(wanted).max() - wanted).max() < 3.5
 
 
 def test_over_a_video(tmp_path, ride, left_s):
