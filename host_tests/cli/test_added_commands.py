@@ -56,7 +56,7 @@ def test_a_command_of_another_package(installed):
         ("lap_timer:laps_command", "", "AttributeError"),
         ("lap_timer:laps_command", "laps_command = 3", "is not a click command"),
         ("no_such_module", "", "ModuleNotFoundError"),
-        ("not an object!", "", "cannot be loaded")  # the error depends on Python's version,
+        ("not an object!", "", "cannot be loaded"),  # the error depends on Python's version,
     ],
 )
 def test_a_broken_command_is_one_line_with_its_package(installed, tmp_path, value, module, why):
