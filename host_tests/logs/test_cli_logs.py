@@ -72,7 +72,7 @@ def test_calibration_names_the_bad_one_of_its_captures(tmp_path):
     assert "pose2.csv" in line
 
 
-@pytest.mark.parametrize(("name", "words"), [(".", "is a directory"), ("none.csv", "there is no such file")])
+@pytest.mark.parametrize(("name", "words"), [(".", "holds no recording"), ("none.csv", "there is no such file")])
 def test_a_directory_and_a_log_that_is_not_there(tmp_path, name, words):
     cal, out = command.write_cal(tmp_path / "CAL.json"), tmp_path / "LEAN.csv"
     command.refused(tmp_path, "replay", tmp_path / name, "--calibration", cal, "--out", out, words=words)

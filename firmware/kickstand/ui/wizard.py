@@ -67,8 +67,8 @@ class Wizard:
             self._refuse(problem)
 
     def bears(self, fault, now_ms):
-        """True if the wizard goes on in spite of this fault of the sensor, a Notice."""
-        return False
+        """True if the wizard continues in spite of this fault of the sensor, a Notice; none does here."""
+        return fault is None
 
     def _refuse(self, problem):
         """Show why, until a press. What is wrong with the gyro is printed, too: it calls for another sensor."""
