@@ -19,7 +19,7 @@ from machine import mem32
 from uctypes import addressof
 class Source:
     def __init__(self):
-        self.buffer = bytearray(256)
+        self.buffer = bytearray(512)
         self.address = addressof(self.buffer)
         self.view = memoryview(self.buffer)
     def read(self, count):
