@@ -4,17 +4,19 @@ import math
 import queue
 import re
 import socket
+import subprocess
 import sys
 import threading
 import time
 import types
+from pathlib import Path
 from typing import Any
 
 import command
 import pytest
 from emulated import CHIPS, calibrated, firmware, need
 from kickstand_tools.deploy import bytecode, connection
-from kickstand_tools.emulator import esp32_library
+from kickstand_tools.emulator import esp32_library, image
 from mpremote import transport_serial
 from terminal import Terminal
 
@@ -48,6 +50,27 @@ def test_without_its_library_an_esp32_is_refused(words, tmp_path, monkeypatch):
     assert str(tmp_path) in said
 
 
+@pytest.mark.parametrize("chip", ["rp2040", "esp32"])
+def test_emulate_says_at_once_that_it_starts(tmp_path, monkeypatch, chip):
+    """Also if it then finds that something is missing, which it says with where to get it and where to put it."""
+    monkeypatch.setattr(Path, "home", lambda: tmp_path)
+    monkeypatch.setattr(image, "URL", "http://127.0.0.1:9/" + image.NAME)
+    monkeypatch.setenv(esp32_library.VARIABLE, str(tmp_path))
+    done = command.run("emulate", "--chip", chip)
+    assert done.status == 2
+    assert done.out.startswith("starting: ")
+    source = {"rp2040": f"http://127.0.0.1:9/{image.NAME}", "esp32": "micropython.org"}[chip]
+    assert source in done.err and str(tmp_path) in done.err
+
+
+def test_an_esp32_needs_no_emulator_of_the_pico():
+    """Its modules are imported without rp2040py."""
+    script = "import sys; sys.modules['rp2040py'] = None\nfrom kickstand_tools.emulator.emulate import device_class\n"
+    script += "import kickstand_workshop.bench.bench\nprint(device_class('esp32').NAME)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("ESP32\n", "")
+
+
 class Emulating(threading.Thread):
     """`kickstand emulate` beside the test, with these files on its board. It ends at end_s of its own time."""
 
@@ -56,7 +79,7 @@ class Emulating(threading.Thread):
         from kickstand_tools.emulator import emulate
 
         emulating = self
-        kind: Any = emulate.CHIPS[chip]
+        kind: Any = emulate.device_class(chip)
 
         class Limited(kind):
             def __init__(self, world, **fitted):
@@ -71,7 +94,7 @@ class Emulating(threading.Thread):
         self.device: Any = None
         self.end_s = math.inf
         self.said = queue.Queue()
-        patch.setitem(emulate.CHIPS, chip, Limited)
+        patch.setattr(emulate, "device_class", lambda _chip: Limited)
         self._emulate, self._chip = emulate.emulate, chip
 
     def run(self):

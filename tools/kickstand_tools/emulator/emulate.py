@@ -4,7 +4,7 @@ import contextlib
 import sys
 import time
 from collections.abc import Callable
-from typing import cast
+from typing import TYPE_CHECKING, TypeAlias, cast
 
 from rich.live import Live
 
@@ -16,16 +16,31 @@ from ..demo.screen import lcd_lines, screen
 from ..simulated_board.oled import Oled
 from ..simulation.scripted.script import Ride
 from ..simulation.scripted.sensor_errors import Sensor
-from .console import ConsoleServer
+from .console_server import ConsoleServer
 from .device import Device
-from .esp32 import Esp32
-from .pico import Pico
+
+if TYPE_CHECKING:
+    from .esp32 import Esp32
+    from .pico import Pico
+
+Kind: TypeAlias = "type[Pico] | type[Esp32]"
 
 _STEP_S = 0.02
 _BUTTON = {"b": 0.15, "B": LONG_PRESS_S, " ": LONG_PRESS_S}  # seconds of a press, by key
 _HELP = "b button   B long press   a/d lean   k kickstand   u upright   q quit"
 _NO_FIRMWARE = "No firmware on it yet, so the display is blank. In another terminal:\n  kickstand flash --port {}\n"
-CHIPS: dict[str, type[Pico] | type[Esp32]] = {"rp2040": Pico, "esp32": Esp32}
+
+
+def device_class(chip: str) -> Kind:
+    """The class of the emulated board with this chip, "rp2040" or "esp32". Each needs packages that the other does
+    not: only its own are imported."""
+    if chip == "esp32":
+        from .esp32 import Esp32
+
+        return Esp32
+    from .pico import Pico
+
+    return Pico
 
 
 class ScriptedBike:
@@ -55,7 +70,7 @@ def emulate(port: int, say: Callable[[str], None], chip: str = "rp2040", display
     """
     watched = sys.stdin.isatty() and sys.stdout.isatty()
     bike = HandBike() if watched else ScriptedBike()
-    device = CHIPS[chip](Sensor(seed=PART_SEED, share=PART_SHARE).world(bike.motion), display=display)
+    device = device_class(chip)(Sensor(seed=PART_SEED, share=PART_SHARE).world(bike.motion), display=display)
     server = ConsoleServer(device.send, port)
     device.heard = server.say
     address = f"socket://127.0.0.1:{server.port}"

@@ -9,7 +9,7 @@ import numpy as np
 from kickstand.calibration.parameters import Calibration
 from kickstand_tools.deploy.bytecode import architecture, cross_compiled
 from kickstand_tools.emulator import flash_image
-from kickstand_tools.emulator.emulate import CHIPS
+from kickstand_tools.emulator.emulate import device_class
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, upright
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 from rich.console import Group
@@ -50,7 +50,7 @@ def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
         else {},
         "modes": modes,
         "boot": {form: asdict(start(chip, form == "mpy")) for form in ("py", "mpy")},
-        "flash_bytes": {form: _size(form == "mpy", CHIPS[chip].MPY) for form in ("py", "mpy")},
+        "flash_bytes": {form: _size(form == "mpy", device_class(chip).MPY) for form in ("py", "mpy")},
     }
 
 
@@ -92,7 +92,7 @@ def _mode_text(mode: dict[str, Any]) -> str:
 
 def start(chip: str, compiled: bool = True) -> boot.Boot:
     """From power to the first lean, upright and at rest. compiled: the firmware as .mpy."""
-    return boot.boot(CHIPS[chip], _SENSOR.world(Ride([upright(100.0)]).motion), _calibration(), compiled)
+    return boot.boot(device_class(chip), _SENSOR.world(Ride([upright(100.0)]).motion), _calibration(), compiled)
 
 
 def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = None) -> dict[str, Any]:
@@ -122,7 +122,7 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
     Returns the figures and arrays of bench_guest, and how many samples were taken and lost.
     """
     chosen = chosen or {}
-    mpy = CHIPS[chip].MPY
+    mpy = device_class(chip).MPY
     files = flash_image.firmware(True, mpy) | _calibration()
     del files["/main.py"]
     here = Path(__file__).parent
@@ -130,7 +130,7 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
     arrays: list[np.ndarray] = []
     stages: list[np.ndarray] = []
     result: dict[str, Any] = {}
-    with CHIPS[chip](_SENSOR.world(Ride(_RIDE).motion), files, display=chosen.get("DISPLAY", "lcd")) as device:
+    with device_class(chip)(_SENSOR.world(Ride(_RIDE).motion), files, display=chosen.get("DISPLAY", "lcd")) as device:
         samples = SampleCount(device.board.sensor)
 
         def take(data: bytes) -> None:

@@ -8,11 +8,9 @@ from typing import Any
 
 from kickstand_tools import firmware_path
 from kickstand_tools.emulator import flash_image
-from kickstand_tools.emulator.esp32 import Esp32
-from kickstand_tools.emulator.pico import Pico
+from kickstand_tools.emulator.emulate import Kind
 from rich.table import Table
 
-Kind = type[Pico] | type[Esp32]
 _LIMIT_S = 10.0
 _ROWS = 10  # modules that the table names
 
