@@ -37,6 +37,7 @@ def installed(tmp_path, monkeypatch):
             monkeypatch.delitem(sys.modules, name, raising=False)
             (tmp_path / f"{name}.py").write_text(text)
 
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # a refusal leaves nothing behind in the folder
     monkeypatch.syspath_prepend(tmp_path)
     return install
 
