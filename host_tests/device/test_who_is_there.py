@@ -180,6 +180,30 @@ def test_exchanged_wires_are_named(port, tmp_path, monkeypatch):
     assert "SDA and SCL are exchanged" in status(tmp_path, monkeypatch, nothing_changed, **fitted)[2]
 
 
+def never_fills(board):
+    board.sensor._queue = lambda: None
+
+
+def always_full(board):
+    sensor, read = board.sensor, board.sensor.read_byte
+
+    def read_byte():
+        register, value = sensor._pointer, read()
+        return {0x72: 4, 0x73: 0}.get(register, value)
+
+    sensor.read_byte = read_byte
+
+
+@pytest.mark.parametrize(("fit", "how"), [(never_fills, "stays empty"), (always_full, "stays full")])
+def test_a_fifo_that_does_not_work_is_named_for_good_and_presses_count(fit, how, tmp_path, monkeypatch):
+    """The menu opens, though the sensor is set up again and again."""
+    times = [3 + 0.1 * k for k in range(40)]
+    seen = shows(tmp_path, monkeypatch, fit, noisy, [*times, 8.5], presses=[(7.5, 0.9)])
+    assert {lines for lines in seen[:40] if "---" not in lines[1]} == {("Sensor: its FIFO", how)}
+    assert "Align the bike" in seen[-1][0]
+    assert f"its FIFO {how}" in "".join(status(tmp_path, monkeypatch, fit))
+
+
 def wires(sda, scl):
     def fit(board):
         board.sensor_bus.sda_wire, board.sensor_bus.scl_wire = sda or "good", scl or "good"

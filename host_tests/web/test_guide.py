@@ -200,6 +200,8 @@ def test_a_disarmed_save_is_whole(drive):
 FIRST_MINUTE = (
     *("too-few", "moved", "vibration", "tilting", "saturated", "frozen-pose", "gyro-offset"),
     *("not-one-g", "same-pose", "tilt-small", "tilt-large", "not-written", "read-back"),
+    *("no-chip", "not-kept", "bus-errors", "other-chip", "other-device", "exchanged", "wire-low", "no-pull-ups"),
+    *("no-pull-up", "sensor-fifo"),
     *("no-sensor", "unknown-chip", "sensor-lost", "sensor-frozen", "sensor-silent", "sensor-reset", "readings-lost"),
     "starting",
 )

@@ -131,13 +131,18 @@ class Sensor:
     def _fail_again(self, code, now_ms):
         """Fail, and name the FIFO if set-ups do not help because that is broken."""
         self._fruitless = self._fruitless + 1 if ticks_diff(now_ms, self._started_ms) < SETTLED_MS else 1
-        fifo_fault = self._fifo_fault() if self._fruitless >= FRUITLESS else None
+        fault = self._fifo_fault() if self._fruitless % FRUITLESS == 0 else self._named_fifo()
         self._fail(code, now_ms)
-        if fifo_fault:
-            self.fault = fifo_fault
+        if fault:
+            self.fault = fault
+
+    def _named_fifo(self):
+        """The fault, if it is the FIFO's, which stays until a sample comes; else None."""
+        return self.fault if self.fault is not None and self.fault.code == "sensor-fifo" else None
 
     def _fifo_fault(self):
-        return self.explain(self.chip, None)[0] if self.explain else None
+        """None, or a Notice: the chip measures, but its FIFO does not work. To find out takes up to 0.3 s, once."""
+        return self._named_fifo() or (self.explain(self.chip, None)[0] if self.explain else None)
 
     def check(self, now_ms):
         """Make sure that the chip is still configured: a supply dip during a transfer leaves a sample that is half

@@ -6,7 +6,7 @@ const KINDS = [
   [/^Kickstand\|/, "starting", "starting"],
   [/^Safe mode/, "safe", "safe mode"],
   [/^(No sensor|No MPU6050|Unknown sensor|Sensor (lost|silent|reset)|Sensor frozen\|starting|Readings lost)/, "fault", "a fault"],
-  [/^(Sensor (keeps|answers)|Sensor: its FIFO|SDA |SCL )|\|not supported$/, "fault", "a fault"],
+  [/^(Sensor (keeps|answers)|Sensor: its FIFO|SDA and SCL|\w+ stays low)|\|not supported$/, "fault", "a fault"],
   [/^Calibration\|stopped/, "stopped", "a fault"],
   [/^→/, "menu", "the menu"],
   [/^Raw /, "unaligned", "not aligned"],

@@ -1,0 +1,122 @@
+"""`kickstand check` on the emulated boards: nothing on a good one, and each of many planted defects by its name."""
+
+import pytest
+from checked_board import part
+from emulated import CHIPS, modules
+from kickstand_tools.deploy import check
+from kickstand_tools.simulated_board.mpu6050 import Fifo
+from kickstand_tools.simulated_board.other_devices import Ds3231
+
+pytestmark = [pytest.mark.chip, pytest.mark.nightly, pytest.mark.long]
+REST = part(4, share=0.3)
+ESP32 = pytest.param("esp32", marks=pytest.mark.esp32)
+
+
+def checked(chip, world=REST, plant=None, press=True, files=None, **fitted):
+    """{what: line} of the findings that are not good."""
+    with CHIPS[chip](world, modules(chip) | (files or {}), **fitted) as device:
+        if plant:
+            plant(device.board)
+
+        def say(text):
+            if press and text.startswith("Press"):
+                device.board.press(device.time_s + 0.5, 0.2)
+
+        def ask(code):
+            try:
+                return device.exec(code, 150)
+            except Exception as error:
+                raise check.GuestFailed(str(error).strip().rpartition("\n")[2]) from error
+
+        found = check.measured(ask, say)
+    return {one.what: check.line(one) for one in found if one.verdict != check.GOOD}
+
+
+@pytest.mark.parametrize("chip", ["pico", ESP32])
+def test_a_good_board_is_good(chip):
+    assert checked(chip) == {}
+
+
+def spoilt(t_s):
+    """x of the accelerometer is dead and y noisy; x of the gyro is biased, y noisy and z dead; it is hot."""
+    force, rate = list(REST(t_s)[:3]), list(REST(t_s)[3:6])
+    hashed = int(t_s * 1e4) * 2654435761 % 65536 / 65536 - 0.5
+    force[0] = 0.3
+    force[1] += 0.1 * hashed
+    return (*force, rate[0] + 45, rate[1] + hashed, 0.5, 70.0)
+
+
+def many(board):
+    board.sensor.self_test = [1, 1, 0.7, 1.3, 1, 1]
+    board.sensor.clock_error = 0.05
+    board.remove_lcd()
+
+
+@pytest.mark.parametrize("chip", ["pico", ESP32])
+def test_defects_of_many_parts_are_found_at_once(chip):
+    found = checked(chip, spoilt, many, press=False)
+    wanted = {"noise, accelerometer x", "noise, accelerometer y", "noise, gyro y", "noise, gyro z", "bias, gyro x"}
+    wanted |= {"temperature", "self-test, accelerometer z", "self-test, gyro x", "sample clock", "display", "button"}
+    assert wanted <= set(found), found
+    beside = {"self-test, accelerometer x", "self-test, gyro z", "sensor while running", "bias, accelerometer"}
+    assert set(found) - wanted <= beside | {"noise, gyro x"}, found
+
+
+def always_full(board):
+    sensor, read = board.sensor, board.sensor.read_byte
+
+    def read_byte():
+        register, value = sensor._pointer, read()
+        return {0x72: 4, 0x73: 0}.get(register, value)
+
+    sensor.read_byte = read_byte
+    sensor.read_into = lambda buf: [buf.__setitem__(i, read_byte()) for i in range(len(buf))]
+
+
+def some_nacks(board):
+    count, start = [0], board.sensor.start
+
+    def started(address, read):
+        count[0] += 1
+        return count[0] % 150 != 0 and start(address, read)
+
+    board.sensor.start = started
+
+
+def a_clock(board):
+    board.remove_sensor()
+    board.sensor_bus.attach(Ds3231(board.clock))
+
+
+def wrong_answers(board):
+    sensor, read, count = board.sensor, board.sensor.read_byte, [0]
+
+    def read_byte():
+        register, value = sensor._pointer, read()
+        count[0] += register == 0x75
+        return value ^ 0x10 if register == 0x75 and count[0] % 300 == 299 else value
+
+    sensor.read_byte = read_byte
+    sensor.read_into = lambda buf: [buf.__setitem__(i, read_byte()) for i in range(len(buf))]
+
+
+SLOW_USER = b"from time import sleep_ms\ndef on_lean(lean_deg, trusted, meter):\n    sleep_ms(190)\n"
+PLANTED = {
+    "FIFO stays empty": ("FIFO", {"plant": lambda board: setattr(board.sensor, "_queue", lambda: None)}),
+    "FIFO stays full": ("FIFO", {"plant": always_full}),
+    "FIFO of half the size": ("FIFO under load", {"plant": lambda board: setattr(board.sensor, "fifo", Fifo(512))}),
+    "transfers fail": ("I2C errors", {"plant": some_nacks}),
+    "wrong answers": ("I2C errors", {"plant": wrong_answers}),
+    "no sensor": ("sensor", {"plant": lambda board: board.remove_sensor()}),
+    "a clock instead": ("sensor", {"plant": a_clock}),
+    "button stuck": ("button", {"plant": lambda board: setattr(board.button, "closed", True), "press": False}),
+    "slow user.py": ("longest turn", {"files": {"/user.py": SLOW_USER}}),
+}
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_a_defect_that_hides_others_is_found_by_its_name(name):
+    """Together with the eleven above: twenty."""
+    what, planted = PLANTED[name]
+    found = checked("pico", **planted)
+    assert next(iter(found), None) == what, found
