@@ -1,7 +1,8 @@
 """An emulated Pico at the pages Install and Live, one after the other."""
 
 import pytest
-from emulated import calibrated, firmware, leaning, pico, shows
+from checked_board import part
+from emulated import calibrated, firmware, leaning, modules, pico, shows
 from kept import recorded, saved, streamed
 from kickstand_tools.simulated_board.lcd import shown_lean
 from kickstand_tools.simulation.scripted.script import Ride, kickstand, upright
@@ -78,4 +79,20 @@ def test_from_a_broken_off_installation_to_the_lean(chromium, address):
         device.run_until(lambda: shown_lean(device.lcd()) is not None, 4.0)
         assert shown_lean(device.lcd()) == pytest.approx(LEAN_DEG, abs=2.0)
     assert line.rider.errors == []
+    line.rider.context.close()
+
+
+@pytest.mark.nightly
+@pytest.mark.chip
+def test_a_board_is_checked_on_the_page(chromium, address):
+    """What the command prints, line by line; the button is asked for."""
+    line = SerialLine(chromium, address + "install.html")
+    with pico(part(4, share=0.3), modules()) as device:
+        device.run(0.5)
+        line.plug_in(device)
+        for k in range(1, 5):  # one of them comes while it is asked for
+            device.board.press(device.time_s + 1.5 * k, 0.2)
+        shown = line.check().strip().split("\n")
+    assert shown[0].startswith("ok   board") and "Raspberry Pi Pico" in shown[0]
+    assert shown[-1] == "all 30 are as they should be"
     line.rider.context.close()

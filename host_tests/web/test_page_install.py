@@ -122,6 +122,13 @@ def test_a_cable_that_is_pulled_leaves_a_board_that_starts_nothing(line, board):
     assert board.path("main.py").exists()
 
 
+def test_a_check_of_a_board_without_the_firmware_is_refused(line, board):
+    """A board without the firmware is refused; the rest is tried with an emulated Pico, in test_page_board.py."""
+    line.plug_in(RawPrompt(board))
+    assert line.check().startswith("the firmware on the board at this port is of another version or not whole")
+    assert line.rider.page.is_visible("#check") and line.rider.axe() == []
+
+
 def test_the_status_is_what_the_command_prints(line, board, monkeypatch):
     """And it can be copied into an issue."""
     line.plug_in(RawPrompt(board))
