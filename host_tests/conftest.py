@@ -116,16 +116,16 @@ def pytest_runtest_setup() -> None:
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """One line: how many tests were skipped for want of what. Reasons are written "no X", "no X: how to have it"."""
     reasons = [str(report.longrepr[-1]) for report in terminalreporter.stats.get("skipped", ())]
-    wanted = Counter(_wanted(reason.removeprefix("Skipped: ")) for reason in reasons)
+    wanted = Counter(_why_skipped(reason.removeprefix("Skipped: ")) for reason in reasons)
     if wanted:
-        numbers = [f"{number} for want of {what}" for what, number in wanted.most_common()]
+        numbers = [f"{number} {why}" for why, number in wanted.most_common()]
         terminalreporter.write_line("skipped: " + ", ".join(numbers))
 
 
-def _wanted(reason: str) -> str:
-    """What is missing, by the reason for which a test was skipped."""
+def _why_skipped(reason: str) -> str:
+    """Why a test was skipped, for the line of all: "for want of" what is missing, as far as the reason says so."""
     missing = re.match(r"no (.+?)(?: for this system)?(?:: |$)|needs (.+)|could not import '([\w.]+)'", reason)
-    return next(filter(None, missing.groups())) if missing else reason
+    return "for want of " + next(filter(None, missing.groups())) if missing else f"because {reason}"
 
 
 @pytest.fixture(scope="session")

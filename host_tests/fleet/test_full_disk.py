@@ -34,7 +34,7 @@ def resize(path, kb):
     option = "remount," if os.path.ismount(path) else ""
     mount = ["mount", "-t", "tmpfs", "-o", f"{option}size={kb}k", "tmpfs", str(path)]
     if subprocess.run(mount, capture_output=True, check=False).returncode:
-        pytest.skip("no disk may be mounted here")
+        pytest.skip("no right to mount a disk")
 
 
 @pytest.fixture(scope="module")
