@@ -3,7 +3,6 @@
 import json
 from pathlib import Path
 
-import pytest
 import repeat
 from mpy import run_mpy
 
@@ -23,7 +22,6 @@ def run(kind, orders, flash):
     return json.loads(run_mpy(Path(repeat.__file__), kind, stdin=given, directory=flash).splitlines()[-1])
 
 
-@pytest.mark.xfail(reason="with the loop, the simulated display shows the end for 0.2 s after the supply is cut")
 def test_the_page_turns_the_loop_as_the_firmware_does(tmp_path):
     page = run("page", ORDERS, tmp_path / "page")
     loop = run("loop", page["orders"], tmp_path / "loop")

@@ -29,12 +29,11 @@ MOST_SIDEWAYS = 0.5  # ratio: more counts as this. Larger: a blow counts for mor
 STRICT = 0.85  # ratio: share of the limits after a doubt. Larger: a fault that is still there is seen later.
 FIT = 0.6  # ratio: share of the limits in which the means have to stay while doubted. Larger: shown again sooner.
 # s: for how long, after the first doubt, the second and so on. Larger: a fault that is over is hidden for longer.
-GAP_S = 4.5  # s: the same after a gap of the readings. Larger: as above.
 HOLDS_S = (3.0, 4.0, 4.0, 20.0, 60.0)
+GAP_S = 4.5  # s: the same after a gap of the readings. Larger: as above.
 MILD = 3  # doubts; after more of them it has to fit in turns, because on a straight nearly all does, and is called odd
-AGAIN_S = (
-    12.0  # s: then the next doubt comes no sooner, so that rest is found. Larger: what has changed is found later.
-)
+# s: then the next doubt comes no sooner, so that rest is found. Larger: what has changed is found later.
+AGAIN_S = 12.0
 TURNING = 0.05  # rad/s: yaw rate of a turn. Larger: it takes longer.
 FORGET_S = 60.0  # s: fitting for so long takes one doubt back. Larger: a fault that comes again is hidden for longer.
 

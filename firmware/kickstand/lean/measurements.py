@@ -39,9 +39,8 @@ REMEMBER_S = 10.0  # s. Larger: less of what came before the doubt is remembered
 SIGMA_GOOD_BIAS = radians(0.6)  # rad/s: of a bias that is remembered. Larger: one that has changed is found sooner.
 GOOD_SHARE = 0.7  # ratio: of SIGMA_START, for the other errors that are remembered. Larger: as above.
 SIGMA_GOOD_SPEED = 3.0  # m/s: added to the speed's standard deviation. Larger: less is kept of the speed.
-SIGMA_DOUBT_BIAS = radians(
-    2.5
-)  # rad/s: of a bias of which nothing is known. Larger: as SIGMA_START, a stepped one sooner.
+# rad/s: of a bias of which nothing is known. Larger: as SIGMA_START, a stepped one sooner.
+SIGMA_DOUBT_BIAS = radians(2.5)
 # rad: a lean that no bike has, where the force does not show it for so many seconds. Larger: a filter that has gone
 # astray restarts later.
 IMPOSSIBLE_LEAN = radians(80.0)
@@ -52,9 +51,8 @@ MOVING_S = 2.5  # s. Larger: a stop is detected later.
 # A bike is in balance above this speed, if it is known so well.
 BALANCE_SPEED = 2.0  # m/s. Larger: a mount that has slipped is seen at fewer speeds.
 SIGMA_BALANCE_SPEED = 12.0  # m/s. Larger: a bike that is pushed about is taken for one that rides.
-MOST_FORWARD = (
-    1.5  # ratio: force forward over force up of a bike. Larger: a board on a table is taken for one that is ill.
-)
+# ratio: force forward over force up of a bike. Larger: a board on a table is taken for one that is ill.
+MOST_FORWARD = 1.5
 # ratio: change of the gyro's errors with temperature since the six positions have measured them; the data sheet allows
 # 2 % from -40 to 85 C. Larger: what was measured counts for less.
 SIGMA_GYRO_DRIFT = 0.002

@@ -119,7 +119,7 @@ class Screen:
         return True
 
     def interrupt(self, now_ms):
-        """Cancel a calibration under way, because the sensor has failed, unless the wizard goes on all the same."""
+        """Cancel a calibration under way, because the sensor has failed, unless the wizard continues in spite of it."""
         if self.wizard and not self.wizard.bears(self._sensor.fault, now_ms):
             self.wizard = None
             self._notice.show(("Calibration", "stopped: fault"), now_ms)

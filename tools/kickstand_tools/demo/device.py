@@ -16,7 +16,7 @@ import time
 from kickstand_tools.demo.hand_bike import HandBike
 from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.oled import Oled
-from kickstand_tools.simulated_board.simulator import Board, PowerOff
+from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, brake, kickstand, straight, turn, upright, wait
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 
@@ -165,7 +165,7 @@ class Demo:
         elif command == "pause":
             self._paused = not self._paused
         elif command == "quit":
-            raise PowerOff
+            self.board.clock.power_off()
         elif command and self._steer:
             self._steer(command)
 

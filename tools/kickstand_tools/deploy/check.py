@@ -56,7 +56,7 @@ def verdict(findings: list[Finding]) -> str:
 
 
 def check(port: Port, say: Callable[[str], None] = lambda text: None) -> Checked:
-    """Check a board, which takes up to two minutes, and restart it. say(text): told each finding as a line, and what
+    """Check a board, which takes up to two minutes, and restart it. say(text): called with each finding as a line, and what
     to do. Raises InputError."""
     with connected(port) as (transport, name):
         describe(transport, name)

@@ -82,6 +82,11 @@ class Clock:
         self._plan()
         raise Reset
 
+    def power_off(self):
+        """Raise PowerOff now, and at each later advance() until the next set_deadline(): firmware may catch it."""
+        self.set_deadline(self.now_us)
+        raise PowerOff
+
     def set_pace(self, pace):
         """Set the pace from now on, see the class."""
         self._pace = pace

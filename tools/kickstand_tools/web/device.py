@@ -86,7 +86,7 @@ class Device:
             board.faults.restore("open")  # a save is cut once
             self.powered = True
         elif self.powered:
-            raise PowerOff
+            board.clock.power_off()
 
     def rest(self):
         """Let a step of time pass in which no firmware runs."""
