@@ -26,7 +26,8 @@ ARROWS = {
     "rides": {"board", "calibration", "console"},  # each block of a ride holds its calibration's record
     "live": {"calibration.transform"},  # the radio stands in live.radio, what is sent does not know it
     "ui": {"board.button", "lean", "calibration", "drive_alignment"},
-    "settings": {"board", "imu.mpu6050"},  # ranges and pins that can be chosen
+    "settings": set(),
+    "setting_table": {"board", "imu.mpu6050"},  # ranges and pins that can be chosen
     "devices": {"board", "imu"},
     "diagnosis": {"imu"},
     "status_report": {
@@ -47,6 +48,7 @@ ARROWS = {
 }
 # Imported only by a function that needs it, because it costs memory or words that most boards never need
 LATE = {
+    "settings": {"setting_table"},  # it is unloaded again
     "errors": {"console"},  # report() prints a refusal in words
     "status_report": {"rides"},  # is its machine code used?
     "app": {"user_code"},
