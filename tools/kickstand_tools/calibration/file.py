@@ -22,7 +22,6 @@ from kickstand.rotation import is_rotation
 from kickstand.units import AXES
 
 from ..errors import InputError, cause
-from ..logs.reader import check_first_line
 from ..logs.source import File, log_stem, name_of, open_input
 from ..output import whole_file
 from ..signals import Array, rotated
@@ -220,21 +219,6 @@ def calibration_path(log: Path) -> Path:
     if log.name in ("", ".."):  # the folder that one is in, or the one above: it lies beside that
         log = Path(os.path.abspath(log))
     return log.parent / f"{log_stem(log.name)}.cal.json"
-
-
-def calibration_beside(log: Path) -> Path:
-    """calibration_path() of a file that exists. Raises InputError without it, without the log, and if log is no log."""
-    if not log.is_file():
-        what = "is a directory: give the name of a ride in it" if log.is_dir() else "there is no such file"
-        raise InputError(f"{log}: {what}")
-    beside = calibration_path(log)
-    if not beside.exists():
-        check_first_line(log)
-        raise InputError(
-            f"{log}: no calibration {beside.name} beside it: give one with --calibration, or make it from a "
-            f"motorcycle's ride: kickstand calibrate ride {log} --out {beside}"
-        )
-    return beside
 
 
 def _list(name: str, data: dict[str, Any], entry: str) -> list[Any]:

@@ -15,8 +15,8 @@ from ..analysis.export.export import export
 from ..analysis.overview import Overview, overview
 from ..analysis.plot import plot
 from ..analysis.report import as_data, page
-from ..analysis.ride import Ride, open_ride
-from ..calibration.file import CalibrationFile, calibration_beside, calibration_path, read_calibration
+from ..analysis.ride import Ride, calibration_beside, open_ride
+from ..calibration.file import CalibrationFile, calibration_path, read_calibration
 from ..errors import InputError
 from ..estimation.alignment import fit_ride
 from ..estimation.smooth import smooth_to_csv
