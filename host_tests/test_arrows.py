@@ -7,7 +7,7 @@ wires them all, and nothing but start, which main.py runs, imports the app.
 import ast
 from graphlib import TopologicalSorter
 
-from kickstand_tools import firmware_path
+from kickstand_tools.common import firmware_path
 
 ROOT = {"errors", "units", "rotation"}  # modules above the folders that any folder may import
 

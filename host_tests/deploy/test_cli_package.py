@@ -10,9 +10,9 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from kickstand_tools import firmware_path
+from kickstand_tools.common import firmware_path
+from kickstand_tools.common.errors import extra
 from kickstand_tools.deploy import firmware_files
-from kickstand_tools.errors import extra
 
 ROOT = Path(__file__).resolve().parents[2]
 

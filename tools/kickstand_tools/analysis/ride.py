@@ -8,7 +8,7 @@ import numpy as np
 from kickstand.errors import Notice
 
 from ..calibration.file import CalibrationFile, calibration_path, read_calibration
-from ..errors import InputError
+from ..common.errors import InputError
 from ..estimation.smooth import smooth_blocks
 from ..logs.log import Block, Stretch
 from ..logs.reader import Source, apart, check_first_line, read_blocks

@@ -21,9 +21,9 @@ from kickstand.lean.lean_filter import DELAY_S
 from kickstand.rotation import is_rotation
 from kickstand.units import AXES
 
-from ..errors import InputError, cause
+from ..common.errors import InputError, cause
+from ..common.output import whole_file
 from ..logs.source import File, log_stem, name_of, open_input
-from ..output import whole_file
 from ..signals import Array, rotated
 
 VERSION = 1

@@ -11,7 +11,7 @@ import numpy as np
 from kickstand.errors import Notice
 
 from ..checks.course import log_agrees
-from ..errors import InputError
+from ..common.errors import InputError
 from ..estimation.first_guess import MIN_RIDING_S
 from ..logs.csv_lines import write_log
 from ..logs.log import Log

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..common.errors import InputError
 from ..signals import Array, Bools, Ints
 
 Cells = NDArray[Any]  # (n): int64; float64, NaN where there is no number; or str as objects, "" where there is nothing

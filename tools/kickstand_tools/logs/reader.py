@@ -13,7 +13,7 @@ from ..calibration.file import CalibrationFile
 from ..checks.log import Checks
 from ..checks.sensor import SensorHealth
 from ..checks.units import check_units
-from ..errors import InputError
+from ..common.errors import InputError
 from ..signals import Array
 from . import cells
 from .cells import COLUMNS, OPTIONAL, TRACK

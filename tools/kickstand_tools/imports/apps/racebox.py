@@ -7,7 +7,7 @@ https://www.racebox.pro/products/mini-micro-protocol-documentation. The column S
 
 from kickstand.errors import Notice
 
-from ...errors import InputError
+from ...common.errors import InputError
 from ..files import RecordingFile
 from ..recording import Recording, names_in, plain, read_sheet, sensor_of, track_of, unit_in
 from ..speeds import unit_by_positions
