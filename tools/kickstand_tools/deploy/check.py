@@ -56,8 +56,9 @@ def verdict(findings: list[Finding]) -> str:
 
 
 def check(port: Port, say: Callable[[str], None] = lambda text: None) -> Checked:
-    """Check a board, which takes up to two minutes, and restart it. say(text): called with each finding as a line, and what
-    to do. Raises InputError."""
+    """Check a board, which takes up to two minutes, and restart it. Raises InputError.
+
+    say(text): called with each finding as a line, and what to do."""
     with connected(port) as (transport, name):
         describe(transport, name)
 
