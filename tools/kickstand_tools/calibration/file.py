@@ -101,11 +101,12 @@ class CalibrationFile:
         return force, rate
 
     def in_sensor(self, accel_g: Array, gyro_dps: Array) -> tuple[Array, Array]:
-        """Force (n, 3, g) and rate (n, 3, deg/s) along the sensor's own axes, by (18)-(20) and the matrices. A gyro's
-        reading is its rate plus its bias."""
-        force, rate = accel_g * self.accel_slope + self.accel_offset_g, gyro_dps - self.gyro_bias_dps
-        (force,), (rate,) = rotated(self.accel_matrix, force), rotated(self.gyro_matrix, rate)
-        return force, rate
+        """Force (n, 3, g) and rate (n, 3, deg/s) along the sensor's own axes, by (18)-(20) and the matrices: the
+        firmware's Calibration.apply()."""
+        readings = [*accel_g.T, None, *gyro_dps.T]  # the firmware's function for one reading, with arrays as numbers
+        force, rate = [np.zeros(0)] * 3, [np.zeros(0)] * 3
+        self.to_firmware().apply(readings, force, rate)
+        return np.column_stack(force), np.column_stack(rate)
 
     def delay_s(self) -> float:
         """gyro_delay_s, or that of the default DLPF."""
