@@ -8,7 +8,7 @@ import sys
 import mpy
 import pytest
 from kickstand import errors
-from kickstand_tools import firmware_path
+from kickstand_tools.common import firmware_path
 from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted import sensor_errors
 

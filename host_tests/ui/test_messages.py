@@ -8,7 +8,8 @@ import pytest
 from kickstand import console, errors
 from kickstand.errors import AlignmentError, Notice, Refusal, SettingsError
 from kickstand.ui import messages
-from kickstand_tools import firmware_path, refusals
+from kickstand_tools import refusals
+from kickstand_tools.common import firmware_path
 
 CLASSES = {name for name in vars(errors) if name[0].isupper()}
 # Codes that a name or a call gives, not a text beside the class
