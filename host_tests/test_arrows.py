@@ -65,23 +65,20 @@ DRIVERS = {"board", "imu", "speed", "devices", "diagnosis", "start", "live.radio
 # For the tools: a folder or module of kickstand_tools, or another package: what else of the tools it may import
 LEAVES = {"kickstand_fleet", "kickstand_emulator", "kickstand_workshop"}
 TOOL_ARROWS = {
-    "remedies": set(),
-    "common": {"remedies"},
-    "refusals": {"common", "remedies"},
+    "common": set(),
     "signals": set(),  # numpy only: no log, no file
     "logs": {"common", "signals", "checks", "calibration.file"},  # a log is checked while it is read
-    "checks": {"common", "signals", "refusals", "logs.cells", "logs.log", "calibration.file"},
-    "calibration": {"common", "signals", "refusals", "logs"},
-    "estimation": {"common", "signals", "refusals", "logs", "calibration.file"},
+    "checks": {"common", "signals", "logs.cells", "logs.log", "calibration.file"},
+    "calibration": {"common", "signals", "logs", "checks.units"},
+    "estimation": {"common", "signals", "logs", "checks", "calibration.file"},
     "replay": {"common", "signals", "logs", "calibration.file"},
     "imports": {"common", "signals", "logs", "checks", "estimation.first_guess"},
-    "joining": {"common", "signals", "refusals", "logs", "calibration.file", "estimation", "replay"},
+    "joining": {"common", "signals", "logs", "calibration.file", "estimation", "replay"},
     "analysis": {
         "common",
         "signals",
-        "refusals",
-        "remedies",
         "logs",
+        "checks",
         "calibration.file",
         "estimation",
         "replay.meter_along",
@@ -95,8 +92,6 @@ TOOL_ARROWS = {
     "pictures": {"common", "simulated_board"},
     "web": {
         "common",
-        "refusals",
-        "remedies",
         "logs",
         "calibration",
         "estimation",
@@ -112,7 +107,6 @@ TOOL_ARROWS = {
     },
     "api": {
         "common",
-        "refusals",
         "logs",
         "calibration",
         "estimation",
@@ -126,7 +120,6 @@ TOOL_ARROWS = {
     },
     "cli": {
         "common",
-        "refusals",
         "logs",
         "checks",
         "calibration",
@@ -143,9 +136,9 @@ TOOL_ARROWS = {
         "web",
     },
     "kickstand_fleet": {
+        "checks.bends",
         "common",
         "signals",
-        "refusals",
         "logs",
         "calibration",
         "analysis",

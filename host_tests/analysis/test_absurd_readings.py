@@ -8,8 +8,8 @@ import pytest
 from kickstand_tools.analysis.channels import joined
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.common.messages import sentence
 from kickstand_tools.logs.log import Log
-from kickstand_tools.refusals import sentence
 
 
 def spinning(seed):

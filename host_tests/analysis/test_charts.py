@@ -8,7 +8,6 @@ from pathlib import Path
 import analysis_rides
 import numpy as np
 import pytest
-from kickstand.errors import Notice
 from kickstand_tools.analysis.alignment_quality import Quality
 from kickstand_tools.analysis.overview import Overview, overview
 from kickstand_tools.analysis.plot import interactive, page, picture
@@ -16,6 +15,8 @@ from kickstand_tools.analysis.plot.charts import Bars, Cells, Dots, Line, charts
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.summary import Peak
 from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.checks.mount import UpOff
+from kickstand_tools.estimation.smooth import NotTheBikes
 from kickstand_tools.simulation.scripted import script
 
 pytest.importorskip("matplotlib")
@@ -135,7 +136,7 @@ def test_in_a_narrow_window_the_charts_stand_below_each_other(seen):
 
 def test_what_is_not_known_is_not_drawn(seen):
     """As where nothing was sure enough; nor is an alignment that another mount's calibration cannot have."""
-    made = replace(seen, notices=[Notice("up-off", 20.0, False)], summary=replace(seen.summary))
+    made = replace(seen, notices=[UpOff(20.0, False)], summary=replace(seen.summary))
     made.summary.left_deg = made.summary.right_deg = made.summary.brake_g = made.summary.accel_g = Peak()
     assert title(made).endswith("lean as displayed -- left, -- right  ·  braking --, acceleration --")
     assert chart(made, "Lean").notes == []
@@ -172,7 +173,7 @@ def test_labels_of_the_share_of_each_lean_do_not_stand_on_one_another(seen, most
 
 def test_where_the_lean_is_doubtful_is_marked_and_warnings_are_drawn(seen, tmp_path):
     doubtful = ((seen.course.t_s > 5.0) & (seen.course.t_s < 9.0)).astype(float)
-    made = replace(seen, course=replace(seen.course, doubtful=doubtful), notices=[Notice("not-the-bikes", 80.0)])
+    made = replace(seen, course=replace(seen.course, doubtful=doubtful), notices=[NotTheBikes(80.0)])
     lean = chart(made, "Lean")
     assert "yellow: less exact" in lean.title and "yellow" not in chart(seen, "Lean").title
     _, line = lean.traces

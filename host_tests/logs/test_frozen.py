@@ -8,10 +8,10 @@ from kickstand_tools.analysis import report
 from kickstand_tools.api import Log, open_ride, overview, replay
 from kickstand_tools.calibration import drive
 from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.common.messages import sentence
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.frozen import without_frozen
 from kickstand_tools.logs.reader import read_blocks
-from kickstand_tools.refusals import sentence
 
 HZ = 100
 REST = np.array([0.012, 0.985, 0.171, 0.4, -1.1, 0.2])  # g, deg/s: at rest, with a gyro's bias

@@ -6,8 +6,8 @@ from pathlib import Path
 import firmware_calls
 import pytest
 from kickstand.errors import Refusal
+from kickstand_tools.calibration import drive_refusals, pose_refusals
 from kickstand_tools.common import unix_port
-from kickstand_tools.refusals import sentence
 from mpy import run_mpy
 
 SCRIPT = Path(firmware_calls.__file__)
@@ -30,4 +30,8 @@ def run(engine, calls):
 
 def words(answer):
     """What a terminal says of an answer that is a refusal."""
-    return sentence(Refusal(answer["refused"], *answer["values"]))
+    refusal = Refusal(answer["refused"], *answer["values"])
+    for of in (pose_refusals, drive_refusals):
+        if refusal.code in of.CODES:
+            return of.of_firmware(refusal).line()
+    raise AssertionError(f"no class for {refusal.code}")

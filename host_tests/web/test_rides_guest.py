@@ -6,16 +6,7 @@ import analysis_rides
 import app_exports
 import numpy as np
 import pytest
-from kickstand_tools import remedies
-from kickstand_tools.cli.main import kickstand
 from kickstand_tools.web import rides_guest
-
-
-def test_every_remedy_has_words_for_the_page():
-    assert remedies.PAGE.keys() == remedies.COMMANDS.keys()
-    for name, words in remedies.PAGE.items():
-        assert "--" not in words, name
-        assert not any(f"kickstand {command}" in words for command in kickstand.list_commands(None)), name
 
 
 def test_a_singular_matrix_is_told_though_webassembly_has_no_flags():

@@ -5,10 +5,12 @@ others of its sensor change was not measured. A rate of over SATURATED_DPS does 
 the end of its range, and how fast the bike rolled there is unknown. Lean must not be found from either of them.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
-from kickstand.errors import Notice
 from kickstand.units import AXES
 
+from ..common.messages import Message, Remedy
 from ..signals import Array, Bools, Ints, cell_numbers
 
 DEAD_S = 1.0  # an axis is judged in each stretch of this length
@@ -23,6 +25,39 @@ NAMES = tuple(f"{sensor} {axis}" for sensor in ("accelerometer", "gyro") for axi
 
 _MOTION = [0, 1, 2, 4, 5, 6]  # of the chip's order: without the temperature
 _LEAST = np.repeat([OTHER_G, OTHER_DPS], 3)
+
+
+@dataclass(frozen=True)
+class AxisDead(Message):
+    """An axis stays the same while others change. name: "gyro x"."""
+
+    name: str
+    seconds: float
+    begin_s: float
+
+    code = "axis-dead"
+    text = (
+        "{name} is dead: from {begin_s:.1f} s on it does not change for {seconds:.0f} s while others do; these "
+        "readings are left out, and the lean is not known there"
+    )
+    todo = Remedy("check the sensor and its solder joints, or replace it")
+
+
+@dataclass(frozen=True)
+class GyroSaturated(Message):
+    """The gyro was at the end of its range. begin_s: of the first time."""
+
+    axis: str
+    times: int
+    seconds: float
+    begin_s: float
+
+    code = "gyro-saturated"
+    text = (
+        "gyro {axis} is at the end of its range {times} times, {seconds:.1f} s in all, first at {begin_s:.1f} s: these "
+        "readings are left out"
+    )
+    todo = Remedy("fix the sensor firmly, or set a larger GYRO_RANGE_DPS")
 
 
 class SensorHealth:
@@ -62,16 +97,14 @@ class SensorHealth:
             self._mark_saturated(axis, time_s, values[:, 3 + axis], sick)
         return sick
 
-    def notices(self) -> list[Notice]:
+    def notices(self) -> list[Message]:
         """The notices about the log so far."""
-        found = [
-            Notice("axis-dead", name, float(seconds), float(begin))
+        found: list[Message] = [
+            AxisDead(name, float(seconds), float(begin))
             for name, seconds, begin in zip(NAMES, self._dead_s, self._begin_s)
             if seconds >= DEAD_FROM_S
         ]
-        return found + [
-            Notice("gyro-saturated", name, int(at[1]), at[2], at[0]) for name, at in zip(AXES, self._saturated) if at
-        ]
+        return found + [GyroSaturated(name, int(at[1]), at[2], at[0]) for name, at in zip(AXES, self._saturated) if at]
 
     def _dead(self, spread: Array, noisy: Bools) -> Bools:
         """(6) True for the dead axes of a stretch in which the readings change by `spread` (6). noisy (6): True for
