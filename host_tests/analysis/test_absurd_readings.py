@@ -32,6 +32,6 @@ def test_readings_that_make_the_lean_filter_diverge():
         assert len(said) == np.any(lost)
         if said:
             diverged_in += 1
-            found = re.match(r"readings that no vehicle gives, at (\S+) s up to 2\d\d\d deg/s and 1.0 g", said[0])
+            found = re.match(r"implausible readings at (\S+) s, up to 2\d\d\d deg/s and 1.0 g", said[0])
             assert found and float(found[1]) == pytest.approx(ride.t_s[np.argmax(lost)], abs=0.06)
     assert diverged_in
