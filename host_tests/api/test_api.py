@@ -12,6 +12,7 @@ import command
 import numpy as np
 import pytest
 from kickstand_tools import api
+from kickstand_tools.calibration.pose_refusals import SamePose
 from kickstand_tools.simulation.files import simulate
 
 FUNCTIONS = [name for name, public in vars(api).items() if inspect.isfunction(public)]
@@ -108,6 +109,7 @@ def test_a_refusal_has_its_code_and_fields(directory):
     with pytest.raises(api.RefusedInput) as raised:
         api.fit_two_positions(pose, api.read_log(pose))
     assert raised.value.code == "same-pose"
+    assert isinstance(raised.value.message, SamePose)
     assert raised.value.message.apart_deg == pytest.approx(0.0, abs=0.1)
     assert str(raised.value).startswith(f"{pose} and {pose}: both poses are the same")
 

@@ -256,7 +256,7 @@ def test_status_prints_what_the_board_says_and_restarts_it(board):
 
 @pytest.mark.parametrize(
     ("there", "words"),
-    [(False, "kickstand flash puts it there"), (True, "bring it up to date with kickstand flash")],
+    [(False, "kickstand flash puts it there"), (True, "kickstand flash brings it up to date")],
 )
 def test_status_of_a_board_without_kickstand_or_with_one_that_has_no_status(board, there, words):
     if there:
