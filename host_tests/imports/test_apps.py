@@ -22,7 +22,7 @@ from app_exports import PHONE, START_UTC_S, Riding
 from kickstand_tools import api
 from kickstand_tools.imports.importing import NAMES
 
-README = Path(__file__).resolve().parents[2] / "tools" / "README.md"
+PAGE = Path(__file__).resolve().parents[2] / "tools" / "docs" / "recordings.md"
 ON_PHONE = api.CalibrationFile(vehicle_from_sensor=PHONE.T, aligned=True)
 ON_BIKE = api.CalibrationFile(aligned=True)
 # rms of a replay against the true lean; the ride itself, not exported, has 0.28 at 100 samples a second
@@ -67,7 +67,7 @@ EXPORTS = {
 
 def test_each_app_is_tried_and_described():
     assert {name for name in NAMES if not any(key.startswith(name) for key in EXPORTS)} == {"Kickstand"}
-    table = README.read_text(encoding="utf-8")
+    table = PAGE.read_text(encoding="utf-8")
     assert [name for name in NAMES if f"\n| {name}" not in table] == []
 
 

@@ -1,5 +1,5 @@
 """The pages, which a short press turns. A page is a function in pages.py. To add one called load, add
-pages.load to MOTORCYCLE or CAR, and a row to the table of pages in firmware/README.md."""
+pages.load to MOTORCYCLE or CAR, and a row to the table of pages in firmware/docs/displays.md."""
 
 from ..board.button import SHORT
 from ..errors import attempt

@@ -47,7 +47,7 @@ CHIP = click.option(
     "--chip",
     type=click.Choice(["rp2040", "esp32"]),
     default="rp2040",
-    help="rp2040, a Pico, or esp32: it needs QEMU's library, see tools/README.md.",
+    help="rp2040, a Pico, or esp32: it needs QEMU's library, see tools/docs/simulation.md.",
 )
 JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 VEHICLES = click.Choice(["motorcycle", "car"])
