@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..errors import InputError
+from ..common.errors import InputError
 from . import check_guest
 from .check_limits import BAD, GOOD, JUDGES, LOOK, SKIPPED, Finding
 from .connection import Port, connected, describe, last_line, refuse_unfit_firmware, restart
@@ -56,8 +56,9 @@ def verdict(findings: list[Finding]) -> str:
 
 
 def check(port: Port, say: Callable[[str], None] = lambda text: None) -> Checked:
-    """Check a board, which takes up to two minutes, and restart it. say(text): called with each finding as a line, and what
-    to do. Raises InputError."""
+    """Check a board, which takes up to two minutes, and restart it. Raises InputError.
+
+    say(text): called with each finding as a line, and what to do."""
     with connected(port) as (transport, name):
         describe(transport, name)
 

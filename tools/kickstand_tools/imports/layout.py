@@ -65,8 +65,10 @@ def sheet_in(file: RecordingFile, wanted: Collection[str] = ()) -> Sheet | None:
 
 
 def joined_sheet(files: list[RecordingFile]) -> Sheet | None:
-    """The tables of several files, one per sensor, as one. Its columns are FILE:NAME, and each row is from one file. The
-    first column of each file is its time. None if fewer than two files are tables, or if two have the same name."""
+    """The tables of several files, one per sensor, as one. None if fewer than two files are tables, or if two have the
+    same name.
+
+    Its columns are FILE:NAME, and each row is from one file. The first column of each file is its time."""
     sheets = [(PurePosixPath(file.name).name.partition(".")[0], sheet_in(file)) for file in files]
     if len({name for name, _ in sheets}) < len(sheets):
         return None
@@ -87,8 +89,8 @@ def joined_sheet(files: list[RecordingFile]) -> Sheet | None:
 
 
 def without_stamps(text: str) -> str:
-    """The text with the time stamps of a serial monitor, `12:30:05.250 -> `, as a first cell, or as a first label if the
-    lines have labels."""
+    """The text with the time stamps of a serial monitor, `12:30:05.250 -> `, as a first cell. If the lines have labels,
+    as a first label."""
     head = [line for line in text[:20_000].split("\n") if line.strip()]
     if not head or sum(bool(_STAMP.match(line)) for line in head) < 0.8 * len(head):
         return text

@@ -5,8 +5,8 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from ... import firmware_path
-from ...templates import filled
+from ...common import firmware_path
+from ...common.templates import filled
 from .markdown import Document, converted
 
 FOLDER = "docs/"  # in the site

@@ -4,8 +4,11 @@ import io
 from math import cos, radians, sin, tan
 
 import numpy as np
-from kickstand_tools import api
+from kickstand_tools.calibration.poses import fit_six_positions, fit_two_positions
+from kickstand_tools.logs.log import Log
 from kickstand_tools.pictures.drawing import AMBER, BLUE, RED, Drawing
+from kickstand_tools.replay.replay import replay
+from kickstand_tools.simulation.ride import ride as simulate_ride
 
 _LEAN_DEG = 35.0
 _G = 150.0  # pixels
@@ -68,13 +71,13 @@ def lean_compared() -> bytes:
     from matplotlib.figure import Figure
     from PIL import Image
 
-    ride = api.simulate_ride(_PROFILE, _SEED, _SECONDS)
+    ride = simulate_ride(_PROFILE, _SEED, _SECONDS)
     kickstand, upright, *poses, log = (
-        api.Log.from_readings(readings, ride.rate_hz)
+        Log.from_readings(readings, ride.rate_hz)
         for readings in (ride.kickstand, ride.upright, *ride.poses, ride.readings)
     )
-    six = api.fit_six_positions(poses).calibration
-    found = api.replay(log, api.fit_two_positions(kickstand, upright, six).calibration)
+    six = fit_six_positions(poses).calibration
+    found = replay(log, fit_two_positions(kickstand, upright, six).calibration)
     figure = Figure(figsize=(9, 3.4), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
