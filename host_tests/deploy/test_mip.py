@@ -6,13 +6,12 @@ import threading
 import types
 from pathlib import Path
 
-import emulated_port
-import fake_board
 import pytest
-from emulated import CHIPS
 from kickstand_tools.deploy import firmware_files
 from mpremote import mip
 from mpremote.transport_serial import SerialTransport
+from support import emulated_port, fake_board
+from support.emulated import CHIPS
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -5,12 +5,12 @@ import os
 import subprocess
 import sys
 
-import mpy
 import pytest
 from kickstand import errors
 from kickstand_tools.common import firmware_path
 from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted import sensor_errors
+from support import mpy
 
 
 @pytest.fixture

@@ -1,5 +1,5 @@
 """Each app's export is imported and replays as the ride that it was made from. Nothing in an export is copied: the
-writers in support/app_exports.py follow what the makers have published.
+writers in support/recordings/app_exports.py follow what the makers have published.
 
 phyphox: https://github.com/phyphox/phyphox-ios, SimpleExperimentTemplete.swift and ExperimentExport.swift
 Sensor Logger: https://github.com/tszheichoi/awesome-sensor-logger, UNITS.md, COORDINATES.md and CROSSPLATFORM.md
@@ -15,12 +15,12 @@ AiM: a session in https://github.com/m3rlin45/libxrk, tests/test_data/SFJ
 from collections.abc import Callable
 from pathlib import Path
 
-import app_exports
 import numpy as np
 import pytest
-from app_exports import PHONE, START_UTC_S, Riding
 from kickstand_tools import api
 from kickstand_tools.imports.importing import NAMES
+from support.recordings import app_exports
+from support.recordings.app_exports import PHONE, START_UTC_S, Riding
 
 PAGE = Path(__file__).resolve().parents[2] / "tools" / "docs" / "recordings.md"
 ON_PHONE = api.CalibrationFile(vehicle_from_sensor=PHONE.T, aligned=True)

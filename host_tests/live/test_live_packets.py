@@ -4,7 +4,7 @@ import types
 
 import pytest
 from kickstand.live import packets
-from published import channels, own
+from support.radio_decoder import channels, own
 
 
 @pytest.fixture

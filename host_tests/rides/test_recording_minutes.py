@@ -5,9 +5,9 @@ import types
 from pathlib import Path
 
 import pytest
-import ride_writer
 from kickstand.rides import flash_ring, ride_paths
 from kickstand.rides.flash_ring import RideRing
+from support.recordings import ride_writer
 
 PAGE = Path(__file__).resolve().parents[2] / "firmware" / "docs" / "rides.md"
 BYTES_S = 1024  # what the recorder assumes until a block is measured

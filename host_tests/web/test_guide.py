@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from kickstand.errors import Refusal
 from kickstand.ui import messages, pages
-from mpy import run_mpy
+from support.mpy import run_mpy
 
 # Waits and presses of a rider, each a generator of (s, name, value); the names are those of Device.act()
 DRIVE = """

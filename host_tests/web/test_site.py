@@ -15,12 +15,12 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from command import refused, works
 from kickstand_tools.common import firmware_path
 from kickstand_tools.deploy.firmware_files import firmware_files
 from kickstand_tools.web import archives, npm_packages, serve, site
 from kickstand_tools.web.documents import documents
 from kickstand_workshop.bench import pages
+from support.command import refused, works
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = [path.lstrip("/") for path in firmware_files()]

@@ -9,7 +9,8 @@ from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
 from kickstand_tools.simulation.ride import ride
 from kickstand_workshop.evaluation.runs import as_log, calibrated_by_poses
-from other_bike import other_ride
+
+from support.recordings.other_bike import other_ride
 
 
 @dataclass
