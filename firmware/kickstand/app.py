@@ -126,16 +126,16 @@ class App:
         self._watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
         gc.threshold(-1)
         self._due_us = ticks_us()
-        self._turns = self._turns_to_collect()
+        self._turns_left = self._turns_to_collect()
 
     def step(self):
         """One pass of the loop, LOOP_US long: turn(), collect garbage if it is time, feed the watchdog, wait."""
         self.turn()
-        self._turns -= 1
-        if self._turns <= 0:  # here, not in the middle of a sample: the FIFO keeps the samples meanwhile
+        self._turns_left -= 1
+        if self._turns_left <= 0:  # here, not in the middle of a sample: the FIFO keeps the samples meanwhile
             gc.collect()
             fill_gaps(SINGLE_GAPS)
-            self._turns = self._turns_to_collect()
+            self._turns_left = self._turns_to_collect()
             if self.user:
                 self.user.check_memory()
         if self._watchdog:
