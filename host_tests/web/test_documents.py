@@ -7,7 +7,7 @@ from urllib.parse import urljoin
 import pytest
 from kickstand_tools.web.documents import documents
 from kickstand_tools.web.documents.markdown import converted
-from rider import LAPTOP, PHONE, Rider
+from support.web.rider import LAPTOP, PHONE, Rider
 
 ROOT = Path(__file__).resolve().parents[2]
 HOME = "https://an.example/kickstand"
