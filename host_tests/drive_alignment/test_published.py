@@ -1,7 +1,7 @@
 """ViriCiti's method against numbers computed by hand from the article, "Aligning the coordinate systems of
-accelerometer and vehicle" (S. Liem and E. Poeze): R = I + sin t (u.L) + (1 - cos t) (u.L)^2, u the direction of a x b, t the angle
-between a and b. The article has z down and x forward; here the axes are left, up, forward, so gravity's reading is
-(0, 1, 0) and braking's (0, 0, -1)."""
+accelerometer and vehicle" (S. Liem and E. Poeze): R = I + sin t (u.L) + (1 - cos t) (u.L)^2, u the direction of a x b,
+t the angle between a and b. The article has z down and x forward; here the axes are left, up, forward, so the reading
+of gravity is (0, 1, 0) and that of braking (0, 0, -1)."""
 
 import numpy as np
 import pytest
