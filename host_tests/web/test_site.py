@@ -207,7 +207,7 @@ def test_a_file_is_not_written_over(files, tmp_path):
 def test_every_page_has_a_policy_and_the_charts_have_a_frame_without_rights(files):
     """No script but the site's own runs; what a page frames reaches neither it nor what the browser keeps for it."""
     pages = {name: data.decode() for name, data in files.items() if name.endswith(".html")}
-    assert len(pages) == 4 + len(documents.PATHS)
+    assert len(pages) == 4 + len(documents.PATHS) + 1
     for name, text in pages.items():
         policy = re.findall('<meta http-equiv="Content-Security-Policy" content="([^"]+)">', text)[0]
         assert policy.startswith("default-src 'none'; base-uri 'none'; form-action 'none'; script-src 'self'"), name

@@ -7,9 +7,11 @@ from pathlib import Path
 
 from ...common import firmware_path
 from ...common.templates import filled
-from .markdown import Document, converted
+from .markdown import Document, Heading, converted
 
 FOLDER = "docs/"  # in the site
+ALL = "all.html"
+_BETWEEN = "--"  # the name of a document and an anchor in it, on the page with all of them
 _TEMPLATE = Path(__file__).with_name("document.html")
 # In the order in which one reads them: (title of the group, paths in the project)
 GROUPS = (
@@ -72,22 +74,37 @@ def page_of(path: str) -> str:
 
 
 def document_files(home: str) -> dict[str, bytes]:
-    """{path in the site: content} of all documents and their pictures. home: the address of the project, "" if it is
-    unknown: then links to its other files and to its issues are left out."""
+    """{path in the site: content} of all documents, of one page with all of them, and of their pictures. home: the
+    address of the project, "" if it is unknown: then links to its other files and to its issues are left out."""
     root = firmware_path.documents()
     made = {path: _converted(root, path, home) for path in PATHS}
     groups = [(title, [Entry(made[path].title, page_of(path), path) for path in paths]) for title, paths in GROUPS]
+    shown = {page_of(path): (document, path) for path, document in made.items()} | {ALL: (_on_one_page(root, home), "")}
     files = {
-        f"{FOLDER}{page_of(path)}": filled(
-            _TEMPLATE, document=document, path=path, groups=groups, home=home, start=page_of(PATHS[0])
+        f"{FOLDER}{page}": filled(
+            _TEMPLATE, document=document, path=path, groups=groups, home=home, start=page_of(PATHS[0]), all=ALL
         ).encode()
-        for path, document in made.items()
+        for page, (document, path) in shown.items()
     }
     pictures = (root / _PICTURES).iterdir()
     return files | {f"{FOLDER}pictures/{picture.name}": picture.read_bytes() for picture in sorted(pictures)}
 
 
-def _converted(root: Path, path: str, home: str) -> Document:
+def _on_one_page(root: Path, home: str) -> Document:
+    """All documents as one, whose anchors begin with their names: the browser finds a word in any of them."""
+    made = [(_name_of(path), _converted(root, path, home, together=True)) for path in PATHS]
+    headings = [Heading(2, name, document.title) for name, document in made]
+    html = "\n".join(f'<section id="{name}">\n{document.html}</section>' for name, document in made)
+    about = "Search them with your browser, or print them."
+    return Document("All on one page", about, headings, f"<h2>All on one page</h2>\n<p>{about}</p>\n{html}")
+
+
+def _name_of(path: str) -> str:
+    return page_of(path).removesuffix(".html")
+
+
+def _converted(root: Path, path: str, home: str, together: bool = False) -> Document:
+    """together: for the page with all documents."""
     here = posixpath.dirname(path)
 
     def link(target: str) -> str | None:
@@ -97,12 +114,14 @@ def _converted(root: Path, path: str, home: str) -> Document:
             if not outside[1].startswith("issues"):
                 return "../index.html"
             return f"{home}/{outside[1]}" if home else None
-        if target.startswith(("https:", "#")):
+        if target.startswith("https:"):
             return target
         name, mark, anchor = target.partition("#")
-        file = posixpath.normpath(posixpath.join(here, name))
+        file = posixpath.normpath(posixpath.join(here, name)) if name else path
         if file in PATHS:
-            return page_of(file) + mark + anchor
+            if together:
+                return f"#{_name_of(file)}{_BETWEEN if anchor else ''}{anchor}"
+            return (page_of(file) if name else "") + mark + anchor
         if file == _PICTURES or not home:
             return None
         return f"{home}/{'tree' if (root / file).is_dir() else 'blob'}/main/{file}"
@@ -110,4 +129,7 @@ def _converted(root: Path, path: str, home: str) -> Document:
     def picture(source: str) -> str:
         return f"pictures/{posixpath.basename(source)}"
 
-    return converted((root / path).read_text(encoding="utf-8"), link, picture)
+    text = (root / path).read_text(encoding="utf-8")
+    if together:
+        return converted(text, link, picture, deeper=2, name=_name_of(path) + _BETWEEN)
+    return converted(text, link, picture)

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from html import escape
 from typing import Any
 
 from markdown_it import MarkdownIt
@@ -26,7 +27,7 @@ class Heading:
 @dataclass
 class Document:
     """title: the text of the first heading. about: that of the first paragraph. headings: all but the title. html: the
-    whole document, in which a heading of level n is an <h(n+1)>, because the site has its own first heading."""
+    whole document."""
 
     title: str
     about: str
@@ -43,9 +44,10 @@ def anchor(text: str) -> str:
     return re.sub(r"[^\w\- ]", "", text.lower()).replace(" ", "-")
 
 
-def converted(text: str, link: Link, picture: Callable[[str], str]) -> Document:
+def converted(text: str, link: Link, picture: Callable[[str], str], deeper: int = 1, name: str = "") -> Document:
     """Convert a document. link(target): the address of a link, None to leave out the link and keep its words.
-    picture(source): the address of a picture."""
+    picture(source): the address of a picture. deeper: a heading of level n is an <h(n + deeper)>, because the site has
+    its own first heading. name: in front of all anchors, where several documents share a page."""
     markdown = MarkdownIt("commonmark", {"html": True}).enable("table")
     tokens = markdown.parse(text)
     headings, about, table = [], "", 0
@@ -53,7 +55,8 @@ def converted(text: str, link: Link, picture: Callable[[str], str]) -> Document:
         inside = tokens[at + 1] if at + 1 < len(tokens) else token
         if token.type == "heading_open":
             words = _words(inside)
-            headings.append(Heading(int(token.tag[1]), anchor(words), words))
+            same = sum(heading.text == words for heading in headings)  # GitHub numbers them
+            headings.append(Heading(int(token.tag[1]), name + anchor(words) + (f"-{same}" if same else ""), words))
             token.attrSet("id", headings[-1].name)
         elif token.type == "paragraph_open" and not about:
             about = _words(inside)
@@ -64,18 +67,18 @@ def converted(text: str, link: Link, picture: Callable[[str], str]) -> Document:
         elif token.type == "inline":
             token.children = _linked(token.children or [], link, picture)
         if token.type.startswith("heading_"):
-            token.tag = f"h{int(token.tag[1]) + 1}"
+            token.tag = f"h{int(token.tag[1]) + deeper}"
+    title, *rest = headings
     html = str(markdown.renderer.render(tokens, markdown.options, {}))
-    named = "".join(f' {name}="{value}"' for name, value in _SCROLLED.items())
+    named = "".join(f' {key}="{value}"' for key, value in _SCROLLED.items())
 
     def framed(found: re.Match[str]) -> str:
         nonlocal table
         table += 1
-        return f'<div class="wide"{named} aria-label="Table {table}"><table>'
+        return f'<div class="wide"{named} aria-label="{escape(title.text)}, table {table}"><table>'
 
     html = re.sub("<table>", framed, html).replace("</table>", "</table></div>")
     html = html.replace("<pre><code", '<pre tabindex="0"><code')
-    (title, *rest) = headings
     return Document(title.text, about, rest, html)
 
 

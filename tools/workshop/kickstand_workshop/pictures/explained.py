@@ -49,7 +49,7 @@ def forces() -> str:
     page.text(tip[0] + 14, tip[1], "the force that the sensor measures:", 15, "start", RED, True)
     page.text(tip[0] + 14, tip[1] + 22, "along the bike, 1 g / cos t", 15, "start", RED, True)
     page.text(40, 300, "lean t, > 0 to the right", 15, colour=_QUIET)
-    page.text(40, 322, f"here {_LEAN_DEG:.0f}°: s = tan t = {tan(lean):.2f} g", 15, colour=_QUIET)
+    page.text(40, 322, f"here {_LEAN_DEG:.0f}°: |s| = tan t = {tan(lean):.2f} g", 15, colour=_QUIET)
     return page.svg()
 
 
