@@ -1,13 +1,16 @@
-"""Who may import whom in the firmware: the architecture, written once and held.
+"""Who may import whom, in the firmware and in the tools: the architecture, written once and held.
 
 A sample goes one way, imu -> calibration -> lean -> ui. drive_alignment, speed and rides stand beside that way. The app
 wires them all, and nothing but start, which main.py runs, imports the app.
+
+In the tools kickstand_fleet, kickstand_emulator and the workshop are leaves: they import the core, kickstand_tools. It
+imports none of them and finds what they add by entry points. Their commands alone import cli, for shared options.
 """
 
 import ast
 from graphlib import TopologicalSorter
 
-from kickstand_tools import firmware_path
+from kickstand_tools.common import firmware_path
 
 ROOT = {"errors", "units", "rotation"}  # modules above the folders that any folder may import
 
@@ -26,7 +29,8 @@ ARROWS = {
     "rides": {"board", "calibration", "console"},  # each block of a ride holds its calibration's record
     "live": {"calibration.transform"},  # the radio stands in live.radio, what is sent does not know it
     "ui": {"board.button", "lean", "calibration", "drive_alignment"},
-    "settings": {"board", "imu.mpu6050"},  # ranges and pins that can be chosen
+    "settings": set(),
+    "setting_table": {"board", "imu.mpu6050"},  # ranges and pins that can be chosen
     "devices": {"board", "imu"},
     "diagnosis": {"imu"},
     "status_report": {
@@ -48,6 +52,7 @@ ARROWS = {
 }
 # Imported only by a function that needs it, because it costs memory or words that most boards never need
 LATE = {
+    "settings": {"setting_table"},  # it is unloaded again
     "errors": {"console"},  # report() prints a refusal in words
     "status_report": {"rides"},  # is its machine code used?
     "app": {"state", "user_code"},
@@ -57,6 +62,125 @@ LATE = {
 # What only drivers may import: modules of MicroPython that speak to hardware
 HARDWARE = {"machine", "micropython", "esp32", "rp2", "neopixel", "network", "bluetooth"}
 DRIVERS = {"board", "imu", "speed", "devices", "diagnosis", "start", "live.radio"}
+
+# For the tools: a folder or module of kickstand_tools, or another package: what else of the tools it may import
+LEAVES = {"kickstand_fleet", "kickstand_emulator", "kickstand_workshop"}
+TOOL_ARROWS = {
+    "remedies": set(),
+    "common": {"remedies"},
+    "refusals": {"common", "remedies"},
+    "signals": set(),  # numpy only: no log, no file
+    "logs": {"common", "signals", "checks", "calibration.file"},  # a log is checked while it is read
+    "checks": {"common", "signals", "refusals", "logs.cells", "logs.log", "calibration.file"},
+    "calibration": {"common", "signals", "refusals", "logs"},
+    "estimation": {"common", "signals", "refusals", "logs", "calibration.file"},
+    "replay": {"common", "signals", "logs", "calibration.file"},
+    "imports": {"common", "signals", "logs", "checks", "estimation.first_guess"},
+    "joining": {"common", "signals", "refusals", "logs", "calibration.file", "estimation", "replay"},
+    "analysis": {
+        "common",
+        "signals",
+        "refusals",
+        "remedies",
+        "logs",
+        "calibration.file",
+        "estimation",
+        "replay.meter_along",
+    },
+    "overlay": {"common", "signals", "logs", "calibration.file", "joining.motion", "analysis"},
+    "simulated_board": set(),
+    "simulation": {"common", "logs.cells"},
+    "demo": {"common", "simulated_board", "simulation.scripted"},
+    "deploy": {"common", "simulated_board"},  # config.py is tried on the simulated board
+    "rides": {"common", "logs", "calibration.file", "deploy", "replay.replay_engine"},
+    "pictures": {"common", "simulated_board"},
+    "web": {
+        "common",
+        "refusals",
+        "remedies",
+        "logs",
+        "calibration",
+        "estimation",
+        "imports",
+        "joining",
+        "analysis",
+        "simulated_board",
+        "simulation",
+        "demo.hand_bike",
+        "deploy",
+        "rides",
+        "pictures",
+    },
+    "api": {
+        "common",
+        "refusals",
+        "logs",
+        "calibration",
+        "estimation",
+        "replay",
+        "imports",
+        "joining",
+        "analysis",
+        "overlay",
+        "simulation",
+        "web.site",
+    },
+    "cli": {
+        "common",
+        "refusals",
+        "logs",
+        "checks",
+        "calibration",
+        "estimation",
+        "replay",
+        "imports",
+        "joining",
+        "analysis",
+        "overlay",
+        "simulation",
+        "demo",
+        "deploy",
+        "rides",
+        "web",
+    },
+    "kickstand_fleet": {
+        "common",
+        "signals",
+        "refusals",
+        "logs",
+        "calibration",
+        "analysis",
+        "simulation.ride",
+        "cli.common",
+    },
+    "kickstand_emulator": {
+        "common",
+        "logs.source",
+        "replay.replay_engine",
+        "simulated_board",
+        "simulation.scripted",
+        "demo",
+        "deploy",
+        "cli.common",
+    },
+    "kickstand_workshop": {
+        "common",
+        "signals",
+        "logs",
+        "checks",
+        "calibration",
+        "estimation",
+        "replay",
+        "simulated_board",
+        "simulation",
+        "demo",
+        "deploy",
+        "pictures",
+        "web",
+        "cli",
+        "kickstand_emulator",
+    },
+}
 
 
 def modules():
@@ -145,14 +269,6 @@ def test_no_module_imports_itself_by_way_of_others():
     graph.prepare()  # raises CycleError
 
 
-def test_joining_knows_no_analysis():
-    """Of the tools: both are results of the same rooms."""
-    tools = firmware_path.TOOLS / "kickstand_tools"
-    for path in sorted((tools / "joining").rglob("*.py")):
-        for target, _ in imports(path, tools):
-            assert target.partition(".")[0] != "analysis", f"{path.name} imports {target}"
-
-
 def test_mathematics_knows_no_hardware():
     for folder, path in modules():
         if not {folder, f"{folder}.{path.stem}"} & DRIVERS and not path.stem.endswith("_viper"):
@@ -160,3 +276,111 @@ def test_mathematics_knows_no_hardware():
                 names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
                 names += [node.module] if isinstance(node, ast.ImportFrom) and not node.level and node.module else []
                 assert not HARDWARE & set(names), f"{path.name} imports {names}"
+
+
+def tool_packages():
+    """{name: directory} of the packages of the tools."""
+    tools = firmware_path.TOOLS
+    found = {name: tools / name for name in ("kickstand_tools", "kickstand_fleet", "kickstand_emulator")}
+    return found | {"kickstand_workshop": tools / "workshop" / "kickstand_workshop"}
+
+
+def dotted(package, path):
+    """The name of a module, of a package that of its folder."""
+    parts = [package.name, *path.relative_to(package).with_suffix("").parts]
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def is_tool(name):
+    """True for the dotted name of a module or folder of the tools."""
+    package, *parts = name.split(".")
+    place = tool_packages()[package].joinpath(*parts)
+    return place.is_dir() or place.with_suffix(".py").exists()
+
+
+def tool_imports(text, within):
+    """The modules of the tools that a module imports, by their whole names: also within functions, and those for type
+    checking only. within: the parts of the name of its package."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            parts = within[: len(within) - node.level + 1] if node.level else []
+            base = ".".join([*parts, *([node.module] if node.module else [])])
+            if base.partition(".")[0] not in tool_packages():
+                continue
+            names = [f"{base}.{alias.name}" if is_tool(f"{base}.{alias.name}") else base for alias in node.names]
+        else:
+            continue
+        yield from (name for name in names if name.partition(".")[0] in tool_packages())
+
+
+def tool_modules():
+    """{whole name: the whole names of what it imports} of each module of the tools."""
+    found = {}
+    for package in tool_packages().values():
+        for path in sorted(package.rglob("*.py")):
+            within = [package.name, *path.relative_to(package).parts[:-1]]
+            name = dotted(package, path)
+            found[name] = set(tool_imports(path.read_text(encoding="utf-8"), within)) - {name}
+    return found
+
+
+def shortened(name):
+    """A whole name as TOOL_ARROWS has it: that of the core without kickstand_tools."""
+    return name.removeprefix("kickstand_tools.")
+
+
+def is_below(name, place):
+    return name == place or name.startswith(place + ".")
+
+
+def tool_arrows(modules):
+    """(folder, what it imports of others) of these modules."""
+    for name, targets in modules.items():
+        folder = shortened(name).partition(".")[0]
+        yield from ((folder, shortened(target)) for target in targets if not is_below(shortened(target), folder))
+
+
+def forbidden(modules):
+    arrows = tool_arrows(modules)
+    return [(a, b) for a, b in arrows if not any(is_below(b, place) for place in TOOL_ARROWS[a])]
+
+
+def test_no_tool_imports_what_it_may_not():
+    assert forbidden(tool_modules()) == []
+
+
+def test_each_folder_of_the_tools_has_its_arrows():
+    folders = {shortened(name).partition(".")[0] for name in tool_modules()}
+    assert folders - {"kickstand_tools"} == set(TOOL_ARROWS)
+
+
+def test_no_arrow_of_the_tools_is_left_over():
+    used = set(tool_arrows(tool_modules()))
+    for folder, places in TOOL_ARROWS.items():
+        for place in places:
+            assert any(a == folder and is_below(b, place) for a, b in used), f"{folder} no longer imports {place}"
+
+
+def test_the_core_may_import_no_leaf():
+    for folder, places in TOOL_ARROWS.items():
+        assert folder in LEAVES or not places & (LEAVES | {"cli"}), folder
+
+
+def test_no_tool_imports_itself_by_way_of_others():
+    """Not even within functions, or for type checking only."""
+    TopologicalSorter(tool_modules()).prepare()  # raises CycleError
+
+
+def test_a_wrong_arrow_of_the_tools_is_noticed():
+    lines = (
+        "from ..signals import Array",
+        "def f():\n    import kickstand_fleet.run",
+        "if TYPE_CHECKING:\n    from ..cli import common",
+        "from . import log",
+    )
+    found = set(tool_imports("\n".join(lines), ["kickstand_tools", "logs"]))
+    assert "kickstand_tools.logs.log" in found
+    wrong = {b for _, b in forbidden({"kickstand_tools.logs.reader": found})}
+    assert wrong == {"kickstand_fleet.run", "cli.common"}

@@ -23,7 +23,7 @@ LOG = os.path.join(VENV, "install.log")
 OLDEST = (3, 11)
 EXTRAS = ("", "test", "mutants")  # of pyproject.toml; each has all of those before it
 REPORT_S = 5  # a line this often while installing
-COMPILE = "from kickstand_tools.emulator import native; native.build()"  # the emulated Pico is then twice as fast
+COMPILE = "from kickstand_emulator import native; native.build()"  # the emulated Pico is then twice as fast
 
 
 class Stop(Exception):

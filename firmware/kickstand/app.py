@@ -23,17 +23,20 @@ from .imu.sensor import SampleClock
 from .lean.meter import LeanMeter
 from .rides.recording import Recording
 from .ui.screen import Screen
+from .units import const
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
-COLLECT_TURNS = 42  # turns between two garbage collections: they use 90 KB of heap, of 120 free while recording
-COLLECT_TURNS_DRIVING = 23  # the same while aligning by driving, with an OLED, a phone or user.py: 80 KB are free
+_COLLECT_TURNS = const(42)  # turns between two garbage collections: they use 90 KB of heap, of 120 free while recording
+# The same while aligning by driving, with an OLED, a phone or user.py: 80 KB are free
+_COLLECT_TURNS_DRIVING = const(23)
 SINGLE_GAPS = 300  # single free heap blocks that a collection leaves
-PAGE_MS = 100
+_PAGE_MS = const(100)
 # A page shows no lean if its own delay and the age of the readings still in the FIFO add up to more: so a lean on the
-# display is at most half a second old. A display that draws needs about DRAWING_MS more to send a picture (estimated).
-LATE_MS = 400
-DRAWING_MS = 200
-FIRST_PAGE_MS = 60  # time from the start of the sensor to the first page: the lean filter's first window is over then
+# display is at most half a second old. A display that draws needs about _DRAWING_MS more to send a picture (estimated).
+_LATE_MS = const(400)
+_DRAWING_MS = const(200)
+# Time from the start of the sensor to the first page: the lean filter's first window is over then
+_FIRST_PAGE_MS = const(60)
 
 
 def fill_gaps(n):
@@ -162,7 +165,7 @@ class App:
 
     def _turns_to_collect(self):
         few = self.drive or self.lcd.draws or self.live or self.user
-        return port.turns_to_collect(COLLECT_TURNS_DRIVING if few else COLLECT_TURNS)
+        return port.turns_to_collect(_COLLECT_TURNS_DRIVING if few else _COLLECT_TURNS)
 
     def turn(self):
         """Process the samples in the FIFO and one press, and do at most one transfer to the display. It waits for
@@ -220,9 +223,11 @@ class App:
         step of preparing a recording while the menu is open, and, at standstill only, saving the roll-misalignment
         correction."""
         waiting_ms = 1000 * self.sensor.chip.frames_left // self.settings.SAMPLE_HZ
-        self.screen.pages.late = ticks_diff(now_ms, self._page_ms) + waiting_ms > LATE_MS - DRAWING_MS * self.lcd.draws
+        self.screen.pages.late = (
+            ticks_diff(now_ms, self._page_ms) + waiting_ms > _LATE_MS - _DRAWING_MS * self.lcd.draws
+        )
         self.screen.pages.draws = self.lcd.draws
-        self._page_ms = ticks_add(now_ms, PAGE_MS)
+        self._page_ms = ticks_add(now_ms, _PAGE_MS)
         if self.screen.menu:  # a recording that is started there should begin at once
             self.rides.prepare()
         problem = self.rides.recorder.take_problem() or (self.drive and self.drive.speed.take_problem())
@@ -272,7 +277,7 @@ class App:
             if problem:
                 self.screen.notify(problem, ticks_ms())
         # the first page would only say that there is no lean yet
-        self._page_ms = ticks_add(ticks_ms(), FIRST_PAGE_MS)
+        self._page_ms = ticks_add(ticks_ms(), _FIRST_PAGE_MS)
 
     def _calibration_changed(self, replaced):
         self.rides.calibration_changed()

@@ -3,8 +3,11 @@
 Imported only when there is something to say: on most boards never.
 """
 
-SLOW_MS = 100  # a longer print is slow. Most take a few ms, but 500 if the USB host sleeps: the chip's FIFO overflows
-QUIET_MS = 60_000  # after a slow print no refusal is printed for this time
+from .units import const
+
+# a longer print is slow. Most take a few ms, but 500 if the USB host sleeps: the chip's FIFO overflows
+_SLOW_MS = const(100)
+_QUIET_MS = const(60_000)  # after a slow print no refusal is printed for this time
 
 _slow_ms = None  # ticks_ms() of the last slow print
 
@@ -73,21 +76,21 @@ def sentence(refusal):
 
 
 def say(text, end="\n"):
-    """Print text; return True if that took over SLOW_MS."""
+    """Print text; return True if that took over _SLOW_MS."""
     from time import ticks_diff, ticks_ms  # here, because the host's tools need the words only
 
     global _slow_ms
     begun_ms = ticks_ms()
     print(text, end=end)
-    if ticks_diff(ticks_ms(), begun_ms) < SLOW_MS:
+    if ticks_diff(ticks_ms(), begun_ms) < _SLOW_MS:
         return False
     _slow_ms = begun_ms
     return True
 
 
 def tell(refusal):
-    """Print a Refusal's sentence, unless a print was slow in the last QUIET_MS."""
+    """Print a Refusal's sentence, unless a print was slow in the last _QUIET_MS."""
     from time import ticks_diff, ticks_ms
 
-    if _slow_ms is None or not 0 <= ticks_diff(ticks_ms(), _slow_ms) < QUIET_MS:
+    if _slow_ms is None or not 0 <= ticks_diff(ticks_ms(), _slow_ms) < _QUIET_MS:
         say(sentence(refusal))

@@ -14,8 +14,8 @@ from .imu.fifo_frames import FRAME
 from .imu.mpu6050 import NotKept
 from .imu.other_chips import MOTION, OTHER, SUPPORTED, name_of, who_am_i
 
-SENSOR_ADDRESSES = (0x68, 0x69)
-MOTION_ADDRESSES = SENSOR_ADDRESSES + (0x6A, 0x6B)
+_SENSOR_ADDRESSES = const((0x68, 0x69))
+MOTION_ADDRESSES = _SENSOR_ADDRESSES + (0x6A, 0x6B)
 _NOTHING = (0x00, 0xFF, -1)  # no chip of the MPU6050's family has this WHO_AM_I
 _FIRST, _LAST = 0x08, 0x77  # addresses that the standard leaves to devices (UM10204, table 4)
 _SETTLE_US = 100  # an internal pull of 80 kOhm charges the 400 pF that a bus may have in 32 us
@@ -93,7 +93,7 @@ def explain_sensor(sda, scl, reopen, chip, error):
     notice, devices = scan(sda, scl, reopen, MOTION_ADDRESSES)
     if not notice:
         kept = not isinstance(error, NotKept)
-        first = SENSOR_ADDRESSES if kept else (chip.address,)
+        first = _SENSOR_ADDRESSES if kept else (chip.address,)
         devices.sort(key=lambda device: device[0] not in first)
         notice = _judged(devices, reopen(), kept) or Notice("no-sensor", sda, scl)
     return notice, sorted([device[0] for device in devices])
@@ -111,7 +111,7 @@ def _judged(devices, i2c, kept):
         if kind == SUPPORTED:
             return Notice("bus-errors", address)
     for address, name, _ in devices:
-        if address in SENSOR_ADDRESSES and not name:
+        if address in _SENSOR_ADDRESSES and not name:
             number = who_am_i(i2c, address)
             return Notice("no-chip", number & 0xFF, address) if number in _NOTHING else Notice("unknown-chip", number)
     for address, name, kind in devices:

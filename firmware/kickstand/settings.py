@@ -1,94 +1,9 @@
-"""The settings of config.py: each with its default, and checked.
-
-To add one: a line in _TABLE or _PINS here, and one in config.py that says what it is for.
-"""
+"""The settings of config.py, checked. Their defaults and checks are in setting_table.py."""
 
 import sys
 from io import StringIO
 
-from .board import port
-from .board.display import ADDRESSES, KINDS, LCD_HZ, OLED_HZ
 from .errors import SettingsError
-from .imu.mpu6050 import ACCEL_LSB_PER_G, GYRO_LSB_PER_DPS, MIN_DLPF
-
-
-def _one_of(*choices):
-    return lambda value: value in choices, "one of " + ", ".join(repr(choice) for choice in choices)
-
-
-def _whole(low, high):
-    words = "a whole number from %d to %d" % (low, high)
-    return lambda value: isinstance(value, int) and low <= value <= high, words
-
-
-def _addresses(value):
-    return isinstance(value, tuple) and bool(value) and all(isinstance(a, int) and 8 <= a <= 0x77 for a in value)
-
-
-def _or_none(check):
-    return lambda value: value is None or check[0](value), check[1]
-
-
-def _pulses(value):
-    return isinstance(value, (int, float)) and 0.1 <= value <= 100
-
-
-def _pin(value):
-    return isinstance(value, int) and 0 <= value <= 48 and value not in port.TAKEN_PINS
-
-
-_INPUT = _pin, "a number from 0 to 48, no pin of the chip's own USB, flash or console"
-# a button needs a pull-up, which pins that are inputs only have not
-_PIN = (lambda v: _pin(v) and v not in port.INPUT_PINS), _INPUT[1] + ", and none that is an input only"
-SD_PINS = ("SD_SCK", "SD_MOSI", "SD_MISO", "SD_CS")
-# The settings that name pins, for each speed source
-_SPEED_PINS = {None: (), "gps": ("GPS_TX", "GPS_RX"), "wheel": ("WHEEL_PIN",)}
-
-# name: default, (check, what is allowed in words)
-_TABLE = {
-    "SIDE": ("left", _one_of("left", "right")),
-    "SAMPLE_HZ": (200, (lambda v: isinstance(v, int) and v in MIN_DLPF, "50, 100, 125 or 200")),
-    "ACCEL_RANGE_G": (16, _one_of(*sorted(ACCEL_LSB_PER_G))),
-    "GYRO_RANGE_DPS": (500, _one_of(*sorted(GYRO_LSB_PER_DPS))),
-    "DLPF": (3, _whole(1, 6)),
-    "ACCEPT_WHO_AM_I": (None, _or_none(_whole(0x01, 0xFE))),
-    "SENSOR_ADDRESS": (0x68, _one_of(0x68, 0x69)),
-    "SENSOR_I2C": (0, _one_of(0, 1)),
-    "SENSOR_BUS_HZ": (400_000, _whole(100_000, 400_000)),
-    "DISPLAY": ("auto", _one_of(*KINDS)),
-    "OLED_CONTRAST": (255, _whole(0, 255)),
-    "OLED_INVERTED": (False, _one_of(True, False)),
-    "LCD_ADDRESSES": (ADDRESSES, (_addresses, "I2C addresses as (0x27, 0x3F)")),
-    "LCD_WIRING": (1, _whole(1, 4)),
-    "LCD_I2C": (1, _one_of(0, 1)),
-    "LCD_BUS_HZ": (None, _or_none(_whole(100_000, 400_000))),
-    "WATCHDOG": (True, _one_of(True, False)),
-    "RECORD": (False, _one_of(True, False)),
-    "LIVE": (False, _one_of(True, False)),
-    "LIVE_PIN": (None, _or_none(_whole(100_000, 999_999))),
-    "SD_SPI": (None, _or_none(_one_of(*port.SD_SPI))),
-    "VEHICLE": ("motorcycle", _one_of("motorcycle", "car")),
-    "SPEED": (None, _one_of(None, "gps", "wheel")),
-    "GPS_UART": (port.GPS_UART, _whole(0, 2)),
-    "GPS_BAUD": (9600, _whole(4800, 115_200)),
-    "PULSES_PER_METRE": (0.5, (_pulses, "pulses along a metre of road, from 0.1 to 100")),
-}
-# The same for pins: where one is wrong none is used, because the default pin may be connected to something else
-_PINS = {
-    "SENSOR_SDA": (port.SENSOR_PINS[0], _PIN),
-    "SENSOR_SCL": (port.SENSOR_PINS[1], _PIN),
-    "LCD_SDA": (port.LCD_PINS[0], _PIN),
-    "LCD_SCL": (port.LCD_PINS[1], _PIN),
-    "BUTTON_PIN": (port.BUTTON_PIN, _PIN),
-    "SD_SCK": (None, _or_none(_PIN)),
-    "SD_MOSI": (None, _or_none(_PIN)),
-    "SD_MISO": (None, _or_none(_INPUT)),
-    "SD_CS": (None, _or_none(_PIN)),
-    "GPS_TX": (port.GPS_PINS[0], _PIN),
-    "GPS_RX": (port.GPS_PINS[1], _INPUT),
-    "WHEEL_PIN": (port.WHEEL_PIN, _PIN),
-}
-_NAMES = set(_TABLE) | set(_PINS)
 
 
 def load():
@@ -114,53 +29,20 @@ def _line_of(error):
 
 
 class Settings:
-    """One attribute for each name in _TABLE and _PINS. config: the module config, or None for the defaults. refusal:
+    """One attribute for each name in setting_table.py. config: the module config, or None for the defaults. refusal:
     why there is no config. Raises SettingsError.
 
     one_bus: True if sensor and display share one I2C bus. leans: True if the vehicle leans (a motorcycle).
     """
 
     def __init__(self, config=None, refusal=None):
-        for table in (_TABLE, _PINS):
-            for name, (default, (check, allowed)) in table.items():
-                value = getattr(config, name, default)
-                if value is not default and not check(value):
-                    refusal = refusal or SettingsError("not-allowed", name, value, allowed)
-                    value = default if table is _TABLE else None
-                setattr(self, name, value)
-        self.leans = self.VEHICLE == "motorcycle"
-        self.one_bus = (self.SENSOR_SDA, self.SENSOR_SCL) == (self.LCD_SDA, self.LCD_SCL) != (None, None)
-        if self.one_bus:  # a PCF8574 is made for 100 kHz, and sets the speed of a bus that it shares
-            self.LCD_I2C = self.SENSOR_I2C
-            lcd_hz = self.LCD_BUS_HZ or (OLED_HZ if self.DISPLAY not in ("auto", "lcd") else LCD_HZ)
-            self.SENSOR_BUS_HZ = self.LCD_BUS_HZ = min(self.SENSOR_BUS_HZ, lcd_hz)
+        from .setting_table import fill
+
         try:
-            if refusal:
-                raise refusal
-            self._check(config)
+            fill(self, config, refusal)
         except SettingsError as error:
             error.settings = self
             raise
-
-    def _check(self, config):
-        for name in dir(config) if config else ():
-            if name not in _NAMES and (name.isupper() or name.upper() in _NAMES):
-                raise SettingsError("no-setting", name)
-        card = [getattr(self, name) for name in ("SD_SPI",) + SD_PINS]
-        if None in card and card != [None] * 5:
-            missing = SD_PINS[card.index(None) - 1] if card[0] is not None else "SD_SPI"
-            raise SettingsError("card-pins", missing, "SD_SPI, " + ", ".join(SD_PINS))
-        names = ("BUTTON_PIN", "SENSOR_SDA", "SENSOR_SCL") + (() if self.one_bus else ("LCD_SDA", "LCD_SCL"))
-        names += _SPEED_PINS[self.SPEED] + (() if None in card else SD_PINS)
-        missing = [name for name in names if getattr(self, name) is None]
-        if missing:
-            raise SettingsError("no-pins", missing[0], ", ".join(missing), port.MACHINE)
-        if len({getattr(self, name) for name in names}) != len(names):
-            raise SettingsError("pin-twice", "", ", ".join(names))
-        if port.I2C_NUMBERED and not self.one_bus and self.SENSOR_I2C == self.LCD_I2C:
-            raise SettingsError("one-i2c", "LCD_I2C", self.LCD_I2C)
-        if not self.leans and self.SPEED is None:
-            raise SettingsError("needs-speed", "SPEED")
-        fitting = MIN_DLPF[self.SAMPLE_HZ]
-        if self.DLPF < fitting:  # the engine's vibration would alias to a slow motion
-            raise SettingsError("aliasing", "DLPF", self.DLPF, self.SAMPLE_HZ, fitting)
+        finally:  # it takes 8 KB of heap
+            del sys.modules["kickstand.setting_table"]
+            del sys.modules["kickstand"].setting_table

@@ -14,9 +14,9 @@ from .board import port
 from .board.display import STOPPED
 from .devices import open_button, open_lcd, open_sensor
 from .errors import LiveError, SettingsError, report, tried
-from .units import __version__
+from .units import __version__, const
 
-CHARGE_MS = 100
+_CHARGE_MS = const(100)
 
 # The modules that the app imports, in this order: between two of them, display and chip are set up a step further. The
 # list repeats the import statements, because MicroPython has no hook between imports; a test compares both.
@@ -37,7 +37,7 @@ def _held(button):
     """True if the button is pressed, now and a moment later: the pin's weak pull-up first has to charge any capacitor
     between pin and ground, such as one against bouncing (1 uF through 80 kOhm takes 75 ms)."""
     if button.held():
-        sleep_ms(CHARGE_MS)
+        sleep_ms(_CHARGE_MS)
     return button.held()
 
 

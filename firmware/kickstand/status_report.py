@@ -14,14 +14,14 @@ from .errors import SettingsError
 from .imu.mpu6050 import UnknownChip
 from .settings import load
 from .ui import messages
-from .units import __version__
+from .units import __version__, const
 
-LISTEN_MS = 3500
+_LISTEN_MS = const(3500)
 # What did not fit, by the code of lean/consistency.py
 MEASURED = {"odd-left": "force to the left", "odd-up": "force up", "odd-pitch": "pitch"}
-WIRINGS = 4  # of LCD_WIRING
-WIRING_MS = 4000  # for each of them
-WATCH_MS = 1400  # for setting the sensor up and two looks at its axes
+_WIRINGS = const(4)  # of LCD_WIRING
+_WIRING_MS = const(4000)  # for each of them
+_WATCH_MS = const(1400)  # for setting the sensor up and two looks at its axes
 _TRIAL = "trial.tmp"  # a file that is written to measure the flash, then removed
 
 
@@ -44,7 +44,7 @@ def report(wirings=False):
             _axes(sensor)
         _display(open_lcd(settings), settings)
         if wirings:
-            show_wirings(lambda number: open_lcd(settings, number), WIRINGS, WIRING_MS)
+            show_wirings(lambda number: open_lcd(settings, number), _WIRINGS, _WIRING_MS)
         pressed = "pressed" if open_button(settings).held() else "not pressed"
         _print("Button", "GPIO %d, %s", settings.BUTTON_PIN, pressed)
         _speed(settings)
@@ -98,7 +98,7 @@ def _sensor(sensor, settings):
 
 def _axes(sensor):
     """Print what is wrong with the axes of a sensor that answers: their counts of a second show it."""
-    for _ in range(WATCH_MS // 10):
+    for _ in range(_WATCH_MS // 10):
         sensor.fetch(ticks_ms())
         sleep_ms(10)
     _print("Axes", "%s", ", ".join(messages.lines(sensor.fault)) if sensor.fault else "all six measure")
@@ -126,7 +126,7 @@ def _display(lcd, settings):
 
 
 def _speed(settings):
-    """Print the speed or the fault of the speed source after LISTEN_MS, in which it can detect each of its faults."""
+    """Print the speed or the fault of the speed source after _LISTEN_MS, in which it can detect each of its faults."""
     if settings.SPEED is None:
         _print("Speed", "no source: SPEED is not set, alignment by driving is off")
         return
@@ -138,7 +138,7 @@ def _speed(settings):
     else:
         _print("Speed", "wheel on GPIO %d, %.2f pulses a metre:", settings.WHEEL_PIN, settings.PULSES_PER_METRE)
     heard = None
-    for _ in range(LISTEN_MS // 10):
+    for _ in range(_LISTEN_MS // 10):
         new = speed.poll(ticks_ms())
         heard = heard if new is None else new
         sleep_ms(10)

@@ -10,3 +10,10 @@ GAP_US = 500_000  # after a longer time without a reading the estimators restart
 # A longer time between two readings means that some were lost: the loop takes at most eight at once, 160 ms at 50 a
 # second
 LOST_US = 170_000
+
+
+def const(value):
+    """Return value. MicroPython's compiler knows a constant by this name, _NAME = const(value) at a module's top level:
+    it puts the value into the code, and the name takes no heap. Computers have no module micropython to import it
+    from."""
+    return value

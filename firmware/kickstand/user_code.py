@@ -7,9 +7,9 @@ page(app), page_battery(app) ...    while this page is shown: two lines of 16 ch
 on_lean(lean_deg, trusted, meter)   ten times a second. trusted: False while the lean must not be used
 on_press(event)                     after each press: board.button.SHORT or LONG
 
-A function that raises, that takes longer than TOO_SLOW_MS, or longer than SLOW_MS for MOST_SLOW times in a row, is left
-out from then on; display and console say so. Importing user.py and setup() may take any time. A MemoryError anywhere
-leaves out all of it.
+A function that raises, that takes longer than _TOO_SLOW_MS, or longer than _SLOW_MS for _MOST_SLOW times in a row, is
+left out from then on; display and console say so. Importing user.py and setup() may take any time. A MemoryError
+anywhere leaves out all of it.
 Imported only where there is a user.py.
 """
 
@@ -18,11 +18,12 @@ import sys
 from time import ticks_diff, ticks_ms
 
 from .errors import Notice, report
+from .units import const
 
-SLOW_MS = 50  # a slower call is reported, once per function
-TOO_SLOW_MS = 300  # the sensor keeps its samples for no longer
-MOST_SLOW = 5  # calls in a row that take longer than SLOW_MS: the loop would never catch up with the samples
-LEAST_FREE = 20_000  # bytes of heap: below, the lean meter's own work would fail next
+_SLOW_MS = const(50)  # a slower call is reported, once per function
+_TOO_SLOW_MS = const(300)  # the sensor keeps its samples for no longer
+_MOST_SLOW = const(5)  # calls in a row that take longer than _SLOW_MS: the loop would never catch up with the samples
+_LEAST_FREE = const(20_000)  # bytes of heap: below, the lean meter's own work would fail next
 _CALLED = ("setup", "on_lean", "on_press")
 
 
@@ -69,7 +70,7 @@ class UserCode:
 
     def check_memory(self):
         """Leave all of it out when it has used up the heap. To be called after gc.collect()."""
-        if self._functions and gc.mem_free() < LEAST_FREE:
+        if self._functions and gc.mem_free() < _LEAST_FREE:
             self._forget("memory")
 
     def _call(self, name, *arguments):
@@ -88,14 +89,14 @@ class UserCode:
         took_ms = ticks_diff(ticks_ms(), begun_ms)
         if name in ("import", "setup"):
             return result
-        if took_ms <= SLOW_MS:
+        if took_ms <= _SLOW_MS:
             if name in self._slow:
                 self._slow[name] = 0
             return result
         if name not in self._slow:
             self._report(Notice("user-slow", name, took_ms))
         self._slow[name] = self._slow.get(name, 0) + 1
-        if took_ms > TOO_SLOW_MS or self._slow[name] >= MOST_SLOW:
+        if took_ms > _TOO_SLOW_MS or self._slow[name] >= _MOST_SLOW:
             return self._leave_out(name, "%d ms" % took_ms)
         return result
 

@@ -5,7 +5,7 @@ import pickle
 import pytest
 from kickstand.errors import Notice, Refusal
 from kickstand_tools import api, refusals
-from kickstand_tools.errors import InputError
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.refusals import RefusedInput
 from kickstand_tools.remedies import COMMANDS
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from kickstand.calibration.transform import Transform
 from kickstand_tools.calibration.file import CalibrationFile, read_calibration, write_calibration
-from kickstand_tools.errors import InputError
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.replay.replay_engine import ReplayMeter
 
 I = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]  # noqa: E741 - its name

@@ -7,7 +7,7 @@ from kickstand.calibration.sensor_fit import SensorFit
 from kickstand.calibration.turn import Turn
 from kickstand.errors import GyroError
 from kickstand_tools.calibration.procedure import fit_procedure
-from kickstand_tools.errors import InputError
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs.log import Log
 from kickstand_tools.refusals import RefusedInput
 from kickstand_tools.simulation import hands, poses

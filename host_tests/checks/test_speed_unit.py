@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from checked import cells_of, simulated, words
 from kickstand_tools.checks.units import speed_unit
-from kickstand_tools.errors import InputError
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log

@@ -56,7 +56,7 @@ def test_quicker_division_is_rp2040pys_own():
 
 # Without the finder that looks for the modules compiled for this Python
 _WHEELS_OWN = """
-import sys, kickstand_tools.emulator
+import sys, kickstand_emulator
 del sys.meta_path[0]
 import emulated
 print(emulated.begun(0.003))

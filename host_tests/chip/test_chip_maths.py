@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from emulated import PART, esp32, modules, pico
-from kickstand_tools import unix_port
+from kickstand_tools.common import unix_port
 from kickstand_tools.deploy import bytecode
 from kickstand_tools.replay import replay_engine
 from kickstand_tools.rides import block_reader
@@ -54,7 +54,7 @@ def on_host():
 def test_the_same_log_gives_the_same_lean(tmp_path):
     """On a Pico, on the unix port and on CPython."""
     pico()  # or skip
-    from kickstand_tools.replay.replay import rp2040
+    from kickstand_emulator.engine import rp2040
 
     with rp2040(iter([records()]), None) as results_of_chip:
         results = [on_host(), results_of_chip.read()]

@@ -15,8 +15,8 @@ from typing import Any
 import command
 import pytest
 from emulated import CHIPS, calibrated, firmware, need
+from kickstand_emulator import esp32_library, image
 from kickstand_tools.deploy import bytecode, connection
-from kickstand_tools.emulator import esp32_library, image
 from mpremote import transport_serial
 from terminal import Terminal
 
@@ -65,7 +65,7 @@ def test_emulate_says_at_once_that_it_starts(tmp_path, monkeypatch, chip):
 
 def test_an_esp32_needs_no_emulator_of_the_pico():
     """Its modules are imported without rp2040py."""
-    script = "import sys; sys.modules['rp2040py'] = None\nfrom kickstand_tools.emulator.emulate import device_class\n"
+    script = "import sys; sys.modules['rp2040py'] = None\nfrom kickstand_emulator.emulate import device_class\n"
     script += "import kickstand_workshop.bench.bench\nprint(device_class('esp32').NAME)"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert (done.stdout, done.stderr) == ("ESP32\n", "")
@@ -76,7 +76,7 @@ class Emulating(threading.Thread):
 
     def __init__(self, patch, files, chip):
         super().__init__(daemon=True)
-        from kickstand_tools.emulator import emulate
+        from kickstand_emulator import emulate
 
         emulating = self
         kind: Any = emulate.device_class(chip)

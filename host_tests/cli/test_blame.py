@@ -10,8 +10,8 @@ import zipfile
 import command
 import pytest
 from kickstand_tools.cli import main
-from kickstand_tools.errors import InputError, printable
-from kickstand_tools.output import check_output, whole_file
+from kickstand_tools.common.errors import InputError, printable
+from kickstand_tools.common.output import check_output, whole_file
 
 needs_links = pytest.mark.skipif(os.name == "nt", reason="needs symbolic links and /dev")
 
@@ -33,7 +33,10 @@ def test_a_file_that_the_shell_has_opened_is_not_replaced(name, tmp_path):
     (tmp_path / "link").symlink_to("/dev/stdout")
     (tmp_path / "log").write_text("before\n")
     out = name if name.startswith("/") else str(tmp_path / name)
-    code = f"from pathlib import Path; from kickstand_tools.output import check_output; check_output(Path({out!r}), [])"
+    code = (
+        "from pathlib import Path; from kickstand_tools.common.output import check_output; "
+        f"check_output(Path({out!r}), [])"
+    )
     with open(tmp_path / "log", "a") as log:
         done = subprocess.run([sys.executable, "-c", code], stdout=log, stderr=subprocess.PIPE, text=True)
     assert "this command's own input or output" in done.stderr

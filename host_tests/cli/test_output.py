@@ -1,8 +1,8 @@
 """Files are written whole or not at all."""
 
 import pytest
-from kickstand_tools.errors import InputError
-from kickstand_tools.output import whole_file
+from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.output import whole_file
 
 
 @pytest.mark.parametrize("error", [InputError("is the line cut?"), OSError(28, "no room"), KeyboardInterrupt()])

@@ -4,7 +4,7 @@ import contextlib
 
 import command
 import pytest
-from kickstand_tools import output, progress
+from kickstand_tools.common import output, progress
 from kickstand_workshop import commands
 from kickstand_workshop.evaluation import runs
 from watched import Watched, watched

@@ -10,7 +10,7 @@ import time
 
 import pytest
 from command import run
-from kickstand_tools import unix_port
+from kickstand_tools.common import unix_port
 from kickstand_tools.demo.demo import DeviceStopped, demo
 from kickstand_tools.demo.device_process import Device
 from kickstand_tools.simulated_board.lcd import shown_lean

@@ -10,9 +10,9 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from kickstand_tools import firmware_path
+from kickstand_tools.common import firmware_path
+from kickstand_tools.common.errors import extra
 from kickstand_tools.deploy import firmware_files
-from kickstand_tools.errors import extra
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -54,7 +54,9 @@ def test_the_wheel_carries_the_firmware(tmp_path):
     web = firmware_path.TOOLS / "kickstand_tools" / "web"
     pages = [path for name in ("npm", "page") for path in (web / name).rglob("*") if path.is_file()]
     assert {f"kickstand_tools/web/{path.relative_to(web).as_posix()}" for path in pages} <= names
-    assert {name.split("/")[0] for name in names} == {"kickstand", "kickstand_tools", "kickstand_lean-0.4.0.dist-info"}
+    packages = {"kickstand", "kickstand_tools", "kickstand_fleet", "kickstand_emulator"}
+    assert {name.split("/")[0] for name in names} == packages | {"kickstand_lean-0.4.0.dist-info"}
+    assert "fleet = kickstand_fleet." in commands and "emulate = kickstand_emulator." in commands
     assert "kickstand = " in commands and "workshop" not in commands  # whose modules are not in it
     assert not [name for name in names if "__pycache__" in name or name.endswith(".cal")]
 

@@ -4,7 +4,7 @@ import command
 import fake_board
 import mpy
 import pytest
-from kickstand_tools import errors, firmware_path
+from kickstand_tools.common import errors, firmware_path
 from kickstand_tools.simulated_board.fakes import chips
 
 

@@ -4,9 +4,9 @@ import ast
 import re
 
 import pytest
-from kickstand_tools import firmware_path
+from kickstand_tools.common import firmware_path
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.deploy import config_text
-from kickstand_tools.errors import InputError
 
 OWN = '''"""Mine."""
 SIDE = "right"   # as it stands

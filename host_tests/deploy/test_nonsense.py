@@ -8,8 +8,8 @@ import fake_board
 import mutations
 import pytest
 import ride_writer
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.deploy import connection
-from kickstand_tools.errors import InputError
 from kickstand_tools.rides.block_reader import BadBlock, parse, read
 from mpremote.transport import TransportError
 

@@ -5,7 +5,7 @@ import sys
 import command
 import fake_board
 import pytest
-from kickstand_tools import firmware_path
+from kickstand_tools.common import firmware_path
 from kickstand_tools.deploy import others
 
 WEATHER = b"# my weather station\nimport machine\nwhile True: pass\n"

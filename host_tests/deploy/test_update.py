@@ -9,10 +9,10 @@ import command
 import fake_board
 import pytest
 from kickstand.rides import flash_ring
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.deploy import bytecode, firmware_files, flash, others, update
 from kickstand_tools.deploy.board_files import BoardFiles, fingerprint, survey
 from kickstand_tools.deploy.update import needed_blocks, plan, refuse_without_room
-from kickstand_tools.errors import InputError
 from littlefs_board import BLOCK, PORTS, LittlefsBoard
 
 # The modules of version 0.2.0, all in one folder.

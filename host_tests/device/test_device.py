@@ -9,7 +9,7 @@ import engines
 import pytest
 from devices import ALIGNED, LEFT_S, PRESSES, RIDE, RIGHT_S, STRAIGHT_S
 from kickstand.calibration.store import Store
-from kickstand_tools import firmware_path
+from kickstand_tools.common import firmware_path
 from kickstand_tools.simulation.scripted import sensor_errors
 
 

@@ -7,7 +7,7 @@ import subprocess
 
 import emulated
 import pytest
-from kickstand_tools import firmware_path, unix_port
+from kickstand_tools.common import firmware_path, unix_port
 from kickstand_tools.deploy import bytecode
 
 # What is chosen of each pair: (function, the plain one's name)

@@ -8,7 +8,7 @@ import sys
 import mpy
 import pytest
 from kickstand import errors
-from kickstand_tools import firmware_path
+from kickstand_tools.common import firmware_path
 from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted import sensor_errors
 
@@ -220,3 +220,10 @@ def test_a_report_that_cannot_be_worded_gives_its_code(board, monkeypatch, capsy
     monkeypatch.setitem(sys.modules, "kickstand.console", None)
     errors.report(errors.StoreError("not-written", "EIO"))
     assert capsys.readouterr().out == "calibration not saved: EIO; the old one is kept\nnot-written\n"
+
+
+def test_the_table_of_settings_leaves_the_heap_again(board):
+    from kickstand.settings import load
+
+    assert load().SAMPLE_HZ == 200
+    assert "kickstand.setting_table" not in sys.modules and not hasattr(sys.modules["kickstand"], "setting_table")

@@ -70,7 +70,12 @@ def test_how_right_it_is_stands_in_both_places_alike():
     assert [[cell.strip() for cell in row] for row in shown] == whole
 
 
-PACKAGES = "firmware/kickstand", "tools/kickstand_tools", "tools/workshop/kickstand_workshop"
+PACKAGES = (
+    "firmware/kickstand",
+    "tools/kickstand_tools",
+    "tools/kickstand_fleet",
+    "tools/workshop/kickstand_workshop",
+)
 
 
 @pytest.mark.parametrize("package", PACKAGES)

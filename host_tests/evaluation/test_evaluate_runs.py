@@ -9,7 +9,7 @@ import pytest
 from command import refused, works
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.errors import InputError
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs.log import Log
 from kickstand_tools.simulation.ride import ride
 from kickstand_workshop.evaluation import estimators, real_ride, runs

@@ -2,7 +2,7 @@
 
 import made_fleet
 import pytest
-from kickstand_tools.fleet import run
+from kickstand_fleet import run
 
 
 @pytest.fixture(scope="session")

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from kickstand_tools.fleet.manifest import Period
-from kickstand_tools.fleet.period import work_on_period
+from kickstand_fleet.manifest import Period
+from kickstand_fleet.period import work_on_period
+from kickstand_fleet.simulation import fleet as made_up
+from kickstand_fleet.simulation.route import random_route
+from kickstand_fleet.simulation.vehicle import HANDLING, Receiver, drive_log, random_sensor
 from kickstand_tools.logs.csv_lines import write_log
 from kickstand_tools.signals import rotation_matrix
-from kickstand_tools.simulation.fleet import fleet as made_up
-from kickstand_tools.simulation.fleet.route import random_route
-from kickstand_tools.simulation.fleet.vehicle import HANDLING, Receiver, drive_log, random_sensor
 
 # what is wrong with each vehicle: a car, a bus and a motorcycle in turn
 TROUBLES = ["", "", "", "moved-between", "garbage", "moved-within", "km/h", "dead", "late"]

@@ -14,14 +14,14 @@ import mutations
 import pyarrow.parquet as parquet
 import pytest
 from fleet_tasks import task
-from kickstand_tools.errors import InputError
-from kickstand_tools.fleet import run
-from kickstand_tools.fleet.cluster import CRASHED, TIMED_OUT, Cluster
-from kickstand_tools.fleet.journal import Journal
-from kickstand_tools.fleet.manifest import Period, read_manifest
-from kickstand_tools.fleet.period import failed
-from kickstand_tools.fleet.run import run_fleet
-from kickstand_tools.fleet.tables import TABLES, schema
+from kickstand_fleet import run
+from kickstand_fleet.cluster import CRASHED, TIMED_OUT, Cluster
+from kickstand_fleet.journal import Journal
+from kickstand_fleet.manifest import Period, read_manifest
+from kickstand_fleet.period import failed
+from kickstand_fleet.run import run_fleet
+from kickstand_fleet.tables import TABLES, schema
+from kickstand_tools.common.errors import InputError
 
 
 @pytest.fixture(scope="module")
@@ -213,7 +213,7 @@ def test_a_damaged_line_of_a_journal_costs_that_line_and_is_counted_once(tmp_pat
 
 PROGRAM = """
 import signal, time
-from kickstand_tools.fleet.cluster import Cluster
+from kickstand_fleet.cluster import Cluster
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell ignores it for what runs in the background
     print("starting", flush=True)

@@ -14,13 +14,13 @@ import psutil
 import pyarrow.parquet as parquet
 import pytest
 from kickstand.errors import AlignmentError
-from kickstand_tools.errors import InputError
-from kickstand_tools.fleet import files, run
-from kickstand_tools.fleet.manifest import Period, by_pattern, read_manifest
-from kickstand_tools.fleet.period import failed, work_on_period
-from kickstand_tools.fleet.run import run_fleet
-from kickstand_tools.fleet.show import plot
-from kickstand_tools.output import whole_file
+from kickstand_fleet import files, run
+from kickstand_fleet.manifest import Period, by_pattern, read_manifest
+from kickstand_fleet.period import failed, work_on_period
+from kickstand_fleet.run import run_fleet
+from kickstand_fleet.show import plot
+from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.output import whole_file
 from kickstand_tools.refusals import sentence
 
 
@@ -116,7 +116,7 @@ def test_no_memory_and_no_disk_are_no_fault_of_kickstands(monkeypatch):
 
 PROGRAM = """
 import sys
-from kickstand_tools.fleet.cluster import Cluster
+from kickstand_fleet.cluster import Cluster
 if __name__ == "__main__":
     with Cluster(None, 2, 60.0) as cluster:
         print(cluster._client.scheduler.address, flush=True)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from kickstand_tools.fleet import evidence
+from kickstand_fleet import evidence
+from kickstand_fleet.simulation.vehicle import Sensor, random_sensor
 from kickstand_tools.logs.log import Log
-from kickstand_tools.simulation.fleet.vehicle import Sensor, random_sensor
 from made_fleet import drive
 
 

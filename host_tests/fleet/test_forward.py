@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 from kickstand.errors import AlignmentError
+from kickstand_fleet import evidence, forward, period
+from kickstand_fleet.forward import find_forward
 from kickstand_tools.calibration.drive import fit_logs, usable
-from kickstand_tools.fleet import evidence, forward, period
-from kickstand_tools.fleet.forward import find_forward
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.refusals import RefusedInput
 from kickstand_tools.signals import rotation_vector

@@ -8,12 +8,12 @@ import sys
 
 import pyarrow.parquet as parquet
 import pytest
-from kickstand_tools.errors import InputError
-from kickstand_tools.fleet import run
-from kickstand_tools.fleet.journal import Journal
-from kickstand_tools.fleet.manifest import read_manifest
-from kickstand_tools.fleet.period import DISK_FULL, work_on_period
-from kickstand_tools.fleet.run import run_fleet
+from kickstand_fleet import run
+from kickstand_fleet.journal import Journal
+from kickstand_fleet.manifest import read_manifest
+from kickstand_fleet.period import DISK_FULL, work_on_period
+from kickstand_fleet.run import run_fleet
+from kickstand_tools.common.errors import InputError
 
 FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
@@ -80,7 +80,7 @@ def test_a_picture_that_cannot_be_written_costs_no_row(results, alone, tmp_path,
         raise InputError("plots cannot be written: No space left on device")
 
     with monkeypatch.context() as patched, pytest.raises(InputError, match="plots cannot be written"):
-        patched.setattr("kickstand_tools.fleet.show.plot.write_plot", full)
+        patched.setattr("kickstand_fleet.show.plot.write_plot", full)
         run_fleet(periods, tmp_path)
     rows = parquet.read_table(tmp_path / "alignments.parquet").to_pylist()
     assert [(row["status"], row["plot"]) for row in rows] == [("aligned", "")]
@@ -94,7 +94,7 @@ def test_signals_that_do_not_fit_stop_the_run_and_are_written_by_the_next(result
         raise InputError(f"{path} cannot be written: {FULL.strerror}") from FULL
 
     with monkeypatch.context() as patched:
-        patched.setattr("kickstand_tools.fleet.signals.write_bytes", full)
+        patched.setattr("kickstand_fleet.signals.write_bytes", full)
         with pytest.raises(InputError, match="No space left on device; what is finished is kept, the same command"):
             run_fleet(periods[:2], tmp_path, with_signals=True)
     rows = parquet.read_table(tmp_path / "alignments.parquet").to_pylist()

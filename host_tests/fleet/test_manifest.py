@@ -2,8 +2,8 @@
 
 import command
 import pytest
-from kickstand_tools.errors import InputError
-from kickstand_tools.fleet.manifest import Period, by_pattern, is_pattern, read_manifest
+from kickstand_fleet.manifest import Period, by_pattern, is_pattern, read_manifest
+from kickstand_tools.common.errors import InputError
 from made_fleet import TROUBLES
 
 
@@ -56,7 +56,7 @@ def test_a_pattern_takes_each_file_for_a_vehicle(tmp_path):
 
 
 def test_the_command_refuses_in_one_line_and_writes_nothing(tmp_path, monkeypatch):
-    monkeypatch.setattr("kickstand_tools.fleet.cluster._REMOTE_PATIENCE_S", 0.5)
+    monkeypatch.setattr("kickstand_fleet.cluster._REMOTE_PATIENCE_S", 0.5)
     good = manifest(tmp_path, "vehicle,path,kind\n1,a.csv,car\n")
     (tmp_path / "file").touch()
     out = tmp_path / "out"

@@ -4,9 +4,9 @@ import copy
 
 import numpy as np
 import pytest
+from kickstand_fleet import evidence
+from kickstand_fleet.moved import compare, find_moves
 from kickstand_tools.calibration.drive import fit_logs, usable
-from kickstand_tools.fleet import evidence
-from kickstand_tools.fleet.moved import compare, find_moves
 from kickstand_tools.logs.reader import read_log
 from made_fleet import drive, turn_of
 

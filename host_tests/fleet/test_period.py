@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from kickstand_fleet.manifest import Period, read_manifest
+from kickstand_fleet.period import work_on_period
+from kickstand_tools.analysis.brake_tests import brake_tests
 from kickstand_tools.analysis.ride import vehicle_channels
 from kickstand_tools.analysis.stops.brake_test import find_stops
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.fleet.manifest import Period, read_manifest
-from kickstand_tools.fleet.period import brake_tests, work_on_period
 from made_fleet import drive, turn_of, worked_on, yaw_deg
 
 
@@ -64,7 +65,7 @@ def test_a_fault_of_ours_is_a_row_too(monkeypatch, fleet):
     def broken(*_):
         raise ZeroDivisionError("on purpose")
 
-    monkeypatch.setattr("kickstand_tools.fleet.period.fit_logs", broken)
+    monkeypatch.setattr("kickstand_fleet.period.fit_logs", broken)
     found = work_on_period(read_manifest(str(fleet.manifest))[0])
     assert (found.alignment["status"], found.alignment["reason"]) == ("error", "fault")
     assert "ZeroDivisionError: on purpose" in found.errors[0]["message"]

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pyarrow.parquet as parquet
 import pytest
-from kickstand_tools.errors import InputError
-from kickstand_tools.fleet import files, run
-from kickstand_tools.fleet.manifest import read_manifest
-from kickstand_tools.fleet.period import failed
-from kickstand_tools.fleet.run import run_fleet
-from kickstand_tools.fleet.tables import TABLES
+from kickstand_fleet import files, run
+from kickstand_fleet.manifest import read_manifest
+from kickstand_fleet.period import failed
+from kickstand_fleet.run import run_fleet
+from kickstand_fleet.tables import TABLES
+from kickstand_tools.common.errors import InputError
 
 WANTED = (0, 4)  # a car, and a bus with a log that is no text
 TABLE_FILES = [f"{name}.parquet" for name in TABLES]

@@ -9,7 +9,7 @@ import drawn_tables
 import numpy as np
 import pytest
 from kickstand_tools import api
-from kickstand_tools.errors import InputError
+from kickstand_tools.common.errors import InputError
 
 G, RAD = drawn_tables.GRAVITY, np.pi / 180.0
 HEAD = "t,ax,ay,az,gx,gy,gz"

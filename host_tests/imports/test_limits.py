@@ -11,7 +11,7 @@ from pathlib import Path
 
 import command
 import pytest
-from kickstand_tools.errors import InputError
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.imports import files
 from kickstand_tools.joining.track_files import read_track
 from kickstand_tools.logs import csv_reader, reader

@@ -9,7 +9,7 @@ import numpy as np
 import phone_tracks
 import pytest
 from kickstand_tools.calibration.file import read_calibration
-from kickstand_tools.errors import InputError
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.joining.track import Track
 from kickstand_tools.joining.track_files import read_track
 

@@ -6,7 +6,7 @@ import io
 import command
 import numpy as np
 import pytest
-from kickstand_tools.errors import InputError
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_blocks, read_log
 

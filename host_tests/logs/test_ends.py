@@ -6,7 +6,7 @@ import analysis_rides
 import command
 import numpy as np
 import pytest
-from kickstand_tools.errors import InputError
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.refusals import sentence

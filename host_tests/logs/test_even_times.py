@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 import pytest
-from kickstand_tools.errors import InputError
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs.even_times import even_times
 
 ROUND = {"down": lambda x: np.floor(x + 1e-9), "to nearest": np.rint}

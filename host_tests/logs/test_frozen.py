@@ -114,7 +114,7 @@ def test_the_commands_say_it(tmp_path):
 
 @pytest.mark.parametrize("engine", ["cpython", "micropython"])
 def test_every_engine_is_given_the_gap(engine):
-    from kickstand_tools import unix_port
+    from kickstand_tools.common import unix_port
 
     if engine == "micropython" and not unix_port.available():
         pytest.skip("no MicroPython for this system")

@@ -9,7 +9,7 @@ import command
 import numpy as np
 import pytest
 from kickstand_tools.calibration.file import calibration_path
-from kickstand_tools.errors import InputError
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import is_log, read_blocks, read_log, read_twice

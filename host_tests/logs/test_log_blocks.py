@@ -7,7 +7,7 @@ import command
 import numpy as np
 import pytest
 from kickstand_tools.checks import cells
-from kickstand_tools.errors import InputError
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.csv_reader import numbers_in
 

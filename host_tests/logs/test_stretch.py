@@ -9,7 +9,7 @@ import analysis_rides
 import command
 import pytest
 from kickstand_tools import api
-from kickstand_tools.errors import InputError
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.log import Stretch
 from kickstand_tools.logs.reader import read_blocks, read_log, read_twice

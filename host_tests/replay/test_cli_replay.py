@@ -8,8 +8,8 @@ import command
 import numpy as np
 import pytest
 from kickstand.calibration.two_position import two_position
-from kickstand_tools import unix_port
-from kickstand_tools.emulator import image
+from kickstand_emulator import image
+from kickstand_tools.common import unix_port
 from kickstand_tools.replay import replay, replay_engine
 
 

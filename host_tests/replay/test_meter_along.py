@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import smoothed_rides
-from kickstand_tools.errors import InputError
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.csv_lines import write_log
 from kickstand_tools.logs.reader import read_blocks, read_log

@@ -20,7 +20,7 @@ import fake_board
 import pytest
 import ride_writer
 from kickstand.rides import ride_paths
-from kickstand_tools import output
+from kickstand_tools.common import output
 from kickstand_tools.deploy import board_console
 from kickstand_tools.logs.reader import read_log
 from test_cli_pull import left, put

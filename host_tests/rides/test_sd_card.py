@@ -5,7 +5,7 @@ import base64
 
 import devices
 import pytest
-from kickstand_tools import unix_port
+from kickstand_tools.common import unix_port
 from kickstand_tools.rides import block_reader
 
 pytestmark = pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from kickstand_tools import unix_port
+from kickstand_tools.common import unix_port
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, brake, kickstand, turn, upright
 from kickstand_tools.simulation.scripted.sensor_errors import (
     ACCEL_NOISE_G,

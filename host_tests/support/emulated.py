@@ -9,8 +9,8 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.deploy import bytecode
-from kickstand_tools.errors import InputError
 from kickstand_tools.simulation.scripted.script import Ride, upright
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 
@@ -26,14 +26,14 @@ def need(chip: str) -> None:
 @functools.cache  # what is missing is not downloaded for each test
 def _lacking(chip: str) -> str:
     """Why this chip cannot be emulated, "" if it can."""
-    from kickstand_tools.emulator import esp32_library, image
+    from kickstand_emulator import esp32_library, image
 
     try:
         if chip == "esp32":
             esp32_library.find()
         else:
             image.find()
-            importlib.import_module("kickstand_tools.emulator.pico")
+            importlib.import_module("kickstand_emulator.pico")
     except InputError as reason:
         return str(reason)
     except ImportError as reason:
@@ -44,7 +44,7 @@ def _lacking(chip: str) -> str:
 def pico(world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any):
     """An emulator.pico.Pico, without power yet. Skips if emulator or image is missing."""
     need("pico")
-    from kickstand_tools.emulator.pico import Pico
+    from kickstand_emulator.pico import Pico
 
     return Pico(world, files, **fitted)
 
@@ -52,7 +52,7 @@ def pico(world: Callable[[float], tuple] | None = None, files: dict[str, bytes] 
 def esp32(world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any):
     """An emulator.esp32.Esp32, without power yet. Skips if QEMU's library is missing."""
     need("esp32")
-    from kickstand_tools.emulator.esp32 import Esp32
+    from kickstand_emulator.esp32 import Esp32
 
     return Esp32(world, files, **fitted)
 
@@ -64,7 +64,7 @@ MPY = {"pico": bytecode.PICO, "esp32": bytecode.ESP32}
 @functools.cache
 def firmware(chip: str = "pico") -> dict[str, bytes]:
     """The firmware's files, compiled: they start in half the time."""
-    from kickstand_tools.emulator import flash_image
+    from kickstand_emulator import flash_image
 
     return flash_image.firmware(True, MPY[chip])
 
@@ -78,7 +78,7 @@ def modules(chip: str = "pico") -> dict[str, bytes]:
 def calibrated(who_am_i: int = 0x68) -> dict[str, bytes]:
     """The calibration of PART, as its board keeps it: mounting, gyro bias and accelerometer."""
     from kickstand.calibration.parameters import Calibration
-    from kickstand_tools.emulator import flash_image
+    from kickstand_emulator import flash_image
 
     calibration = Calibration()
     calibration.six_done = calibration.aligned = True

@@ -6,7 +6,7 @@ from pathlib import Path
 import firmware_calls
 import pytest
 from kickstand.errors import Refusal
-from kickstand_tools import unix_port
+from kickstand_tools.common import unix_port
 from kickstand_tools.refusals import sentence
 from mpy import run_mpy
 

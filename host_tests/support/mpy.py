@@ -5,7 +5,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from kickstand_tools import unix_port
+from kickstand_tools.common import unix_port
 
 HERE = Path(__file__).resolve().parent
 # The models of a board fit. Each time that the app collects its garbage, all of the heap is looked through.

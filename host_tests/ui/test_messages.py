@@ -8,7 +8,8 @@ import pytest
 from kickstand import console, errors
 from kickstand.errors import AlignmentError, Notice, Refusal, SettingsError
 from kickstand.ui import messages
-from kickstand_tools import firmware_path, refusals
+from kickstand_tools import refusals
+from kickstand_tools.common import firmware_path
 
 CLASSES = {name for name in vars(errors) if name[0].isupper()}
 # Codes that a name or a call gives, not a text beside the class
@@ -99,7 +100,7 @@ def test_no_sentence_is_left_over():
 
 def test_the_limits_of_user_code_are_said_as_they_are():
     source = (firmware_path.PACKAGE / "user_code.py").read_text(encoding="utf-8")
-    limits = dict(re.findall(r"^([A-Z_]+) = (\d+)", source, re.MULTILINE))
+    limits = dict(re.findall(r"^_([A-Z_]+) = const\((\d+)", source, re.MULTILINE))
     words = "over {TOO_SLOW_MS} ms, or {MOST_SLOW} times over {SLOW_MS} ms in a row".format(**limits)
     assert words in refusals.sentence(Refusal("user-slow", "page", 60))
 

@@ -4,7 +4,7 @@ import threading
 
 import analysis_rides
 import pytest
-from kickstand_tools.errors import InputError
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.web import serve, site
 from rider import LAPTOP, Rider
 from rides_page import Rides

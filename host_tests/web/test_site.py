@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 from command import refused, works
-from kickstand_tools import firmware_path
+from kickstand_tools.common import firmware_path
 from kickstand_tools.deploy.firmware_files import firmware_files
 from kickstand_tools.web import archives, npm_packages, serve, site
 from kickstand_workshop.bench import pages

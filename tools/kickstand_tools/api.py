@@ -15,6 +15,7 @@ InputError says in one line what is wrong with what was given. Its subclass Refu
 a refusal of the firmware's (kickstand.errors). sentence() puts a notice or a refusal into words.
 """
 
+from .analysis.brake_tests import brake_tests as brake_tests
 from .analysis.channels import Channels as Channels
 from .analysis.export.export import export as export
 from .analysis.overview import Overview as Overview, overview as overview
@@ -35,12 +36,9 @@ from .calibration.poses import (
     fit_two_positions as fit_two_positions,
 )
 from .calibration.procedure import fit_procedure as fit_procedure
-from .errors import InputError as InputError
+from .common.errors import InputError as InputError
 from .estimation.alignment import RideFit as RideFit, fit_ride as fit_ride
 from .estimation.smooth import SmoothedRide as SmoothedRide, smooth as smooth
-from .fleet.manifest import Period as Period, by_pattern as by_pattern, read_manifest as read_manifest
-from .fleet.period import PeriodResult as PeriodResult, brake_tests as brake_tests, work_on_period as work_on_period
-from .fleet.run import FleetRun as FleetRun, run_fleet as run_fleet
 from .imports.importing import (
     Imported as Imported,
     import_recording as import_recording,

@@ -12,7 +12,7 @@ from kickstand import console
 from kickstand.errors import Notice, Refusal
 from kickstand.units import AXES
 
-from .errors import InputError
+from .common.errors import InputError
 from .remedies import COMMANDS, Remedies
 
 SWAPPED_DEG = 4.0  # an upright pose is hardly ever so far off; a pose on the kickstand taken for it is

@@ -6,11 +6,13 @@
 
 from time import ticks_diff
 
+from ..units import const
+
 SHORT = 1
 LONG = 2
 
-DEBOUNCE_MS = 20  # a change of the contact counts once it has lasted for this time
-LONG_MS = 800  # a press that lasts longer is a long one
+_DEBOUNCE_MS = const(20)  # a change of the contact counts once it has lasted for this time
+_LONG_MS = const(800)  # a press that lasts longer is a long one
 
 
 class Button:
@@ -34,7 +36,7 @@ class Button:
             self._raw = raw
             self._changed_ms = now_ms
             return 0
-        if raw != self._pressed and ticks_diff(now_ms, self._changed_ms) >= DEBOUNCE_MS:
+        if raw != self._pressed and ticks_diff(now_ms, self._changed_ms) >= _DEBOUNCE_MS:
             self._pressed = raw
             if raw:
                 self._pressed_ms = now_ms
@@ -42,7 +44,7 @@ class Button:
             elif not self._long_sent:
                 self._long_sent = True
                 return SHORT
-        if self._pressed and not self._long_sent and ticks_diff(now_ms, self._pressed_ms) >= LONG_MS:
+        if self._pressed and not self._long_sent and ticks_diff(now_ms, self._pressed_ms) >= _LONG_MS:
             self._long_sent = True
             return LONG
         return 0

@@ -24,19 +24,20 @@ from time import sleep_ms, ticks_diff, ticks_ms
 import micropython
 
 from ..errors import attempt
+from ..units import const
 
-OLED_ADDRESSES = (0x3C, 0x3D)
-ADDRESSES = (0x27, 0x3F) + OLED_ADDRESSES  # the backpack's PCF8574 and PCF8574A with all jumpers open
+_OLED_ADDRESSES = const((0x3C, 0x3D))
+ADDRESSES = (0x27, 0x3F) + _OLED_ADDRESSES  # the backpack's PCF8574 and PCF8574A with all jumpers open
 _FAMILY = tuple(range(0x20, 0x27)) + tuple(range(0x38, 0x3C)) + (0x3E,)  # a backpack's other addresses
 LCD_HZ, OLED_HZ = 100_000, 400_000  # the fastest clocks that a PCF8574 and the OLEDs allow
 STOPPED = "Kickstand", "stopped"  # what a display shows when the firmware has ended
 KINDS = ("auto", "lcd", "ssd1306", "sh1106", "ssd1306-32")
-PROBE_MS = 200  # time between two searches for a display, while there is none
+_PROBE_MS = const(200)  # time between two searches for a display, while there is none
 MOST_WAIT_MS = 60_000  # the longest, while a driver cannot be loaded: each is twice as long as the last
-REOPEN_PROBES = 5  # while there is no display the bus is freed once in so many probes
-POWER_UP_MS = 40  # a display that is found sooner after power-on may have got its power with the board
-FLUSH_STEPS = 60
-STEP_MS = 5
+_REOPEN_PROBES = const(5)  # while there is no display the bus is freed once in so many probes
+_POWER_UP_MS = const(40)  # a display that is found sooner after power-on may have got its power with the board
+_FLUSH_STEPS = const(60)
+_STEP_MS = const(5)
 
 
 class Display:
@@ -63,8 +64,8 @@ class Display:
         self.draws = False
         self._probes = 0  # successive probes that found nothing
         self._probed_ms = None
-        self._wait_ms = PROBE_MS
-        self._fresh = ticks_ms() < POWER_UP_MS
+        self._wait_ms = _PROBE_MS
+        self._fresh = ticks_ms() < _POWER_UP_MS
 
     def show(self, line1, line2, picture=None):
         """Set what to show, to be sent by tick()."""
@@ -90,11 +91,11 @@ class Display:
     def flush(self):
         """Send everything now, in about 0.1 s: for what is shown before the loop runs or after it has failed."""
         self._probed_ms = None
-        for _ in range(FLUSH_STEPS):
+        for _ in range(_FLUSH_STEPS):
             self.tick(ticks_ms())
             if self.address is None or not self._driver.busy:
                 return
-            sleep_ms(STEP_MS)
+            sleep_ms(_STEP_MS)
 
     def end(self, line1, line2):
         """Show two lines for good, because the firmware ends. Raises nothing, and Ctrl-C does not interrupt it.
@@ -117,7 +118,9 @@ class Display:
 
     def _probe(self):
         """Look for the display at each address."""
-        if self._probes % REOPEN_PROBES == 0:  # a stuck bus has to be freed, but to do so each time would take too long
+        if (
+            self._probes % _REOPEN_PROBES == 0
+        ):  # a stuck bus has to be freed, but to do so each time would take too long
             self._i2c = self._reopen(self._bus_hz or LCD_HZ)
         self._probes += 1
         for address in self._addresses:
@@ -128,7 +131,7 @@ class Display:
             return
         # Not found: if it answers later it was just powered, and may be another one
         self._fresh = True
-        self._wait_ms = PROBE_MS
+        self._wait_ms = _PROBE_MS
 
     def _answers(self, address):
         try:
@@ -139,11 +142,11 @@ class Display:
         if attempt(self._begin, address):  # its driver is missing, or has no memory
             self._wait_ms = min(2 * self._wait_ms, MOST_WAIT_MS)
         else:
-            self.address, self._wait_ms = address, PROBE_MS
+            self.address, self._wait_ms = address, _PROBE_MS
         return True
 
     def _begin(self, address):
-        oled = self._kind[0] == "s" or (self._kind == "auto" and address in OLED_ADDRESSES)
+        oled = self._kind[0] == "s" or (self._kind == "auto" and address in _OLED_ADDRESSES)
         if self._driver is None or self._oled != oled:
             self._driver = None
             if oled:

@@ -21,16 +21,17 @@ WIRINGS = (
 _LINE_ADDRESSES = (0x80, 0xC0)  # instruction "set DDRAM address" for the beginning of each line (table 6)
 _CGRAM_ADDRESS = const(0x40)  # instruction "set CGRAM address" (table 6)
 
-COLUMNS = 16
-_DASHES = b"-" * COLUMNS
+_COLUMNS = const(16)
+_DASHES = b"-" * _COLUMNS
 _NO_TEXT = "\n"
-_NEVER = b"\xfe" * COLUMNS  # a character code that no text uses: marks a line as not yet written
-REINIT_MS = 10_000  # time between initialisations: noise can put the nibbles out of step, and nothing else repairs that
-PROBE_MS = 200  # time between two checks whether the display is still connected
-STEP_MS = 5  # time between two steps: the longest wait that the initialisation requires is 4.1 ms
+_NEVER = b"\xfe" * _COLUMNS  # a character code that no text uses: marks a line as not yet written
+# Time between initialisations: noise can put the nibbles out of step, and nothing else repairs that
+_REINIT_MS = const(10_000)
+_PROBE_MS = const(200)  # time between two checks whether the display is still connected
+_STEP_MS = const(5)  # time between two steps: the longest wait that the initialisation requires is 4.1 ms
 _POWER_UP = const(-8)  # the first step after power-up, for 40 ms of which the display takes no instruction
 
-# Initialisation by instruction (data sheet, figure 24), one step a tick, STEP_MS apart, so that the loop never waits.
+# Initialisation by instruction (data sheet, figure 24), one step a tick, _STEP_MS apart, so that the loop never waits.
 # First single nibbles, which bring the display into 4-bit mode from whatever state it was in. Then whole bytes:
 # function set (4 bit, 2 lines); display on, no cursor; entry mode left to right; return home, which undoes a shift. The
 # first three take 37 us each, less than a transfer.
@@ -62,8 +63,8 @@ class Lcd:
     def __init__(self, wiring=1):
         """wiring: a number from 1 on, see WIRINGS."""
         self._rs, self._e, self._light, self._low = WIRINGS[wiring - 1]
-        self._wanted = [bytearray(b" " * COLUMNS), bytearray(b" " * COLUMNS)]
-        self._shown = [bytearray(COLUMNS), bytearray(COLUMNS)]
+        self._wanted = [bytearray(b" " * _COLUMNS), bytearray(b" " * _COLUMNS)]
+        self._shown = [bytearray(_COLUMNS), bytearray(_COLUMNS)]
         self._texts = [_NO_TEXT, _NO_TEXT]  # the text that each line showed last, if it was a str
         self._changed = True  # a line may have to be sent
         self._packed = bytearray(4 * (_BEHIND + 1))
@@ -91,7 +92,7 @@ class Lcd:
 
     def tick(self, now_ms):
         """At most one line, or one step of the initialisation."""
-        if ticks_diff(now_ms, self._acted_ms) < STEP_MS:
+        if ticks_diff(now_ms, self._acted_ms) < _STEP_MS:
             return
         if self._step < _STEPS:
             self._acted_ms = now_ms
@@ -103,11 +104,11 @@ class Lcd:
             self._init_ms = self._seen_ms = now_ms
         elif self._changed and self._refresh():  # first: what is shown may be too old to stay
             self._seen_ms = self._acted_ms = now_ms
-        elif ticks_diff(now_ms, self._seen_ms) >= PROBE_MS:
+        elif ticks_diff(now_ms, self._seen_ms) >= _PROBE_MS:
             self._seen_ms = self._acted_ms = now_ms
             if not self._kept_power():
                 self._step = _POWER_UP
-        elif ticks_diff(now_ms, self._init_ms) >= REINIT_MS:
+        elif ticks_diff(now_ms, self._init_ms) >= _REINIT_MS:
             self._step = 0
 
     def _put(self, number, text):
@@ -116,11 +117,11 @@ class Lcd:
             if text == self._texts[number]:  # mostly so; converting it would take 0.2 ms
                 return
             self._texts[number] = text
-            for i in range(COLUMNS):
+            for i in range(_COLUMNS):
                 line[i] = ord(text[i]) & 0xFF if i < len(text) else 0x20
         else:
             self._texts[number] = _NO_TEXT
-            for i in range(COLUMNS):
+            for i in range(_COLUMNS):
                 line[i] = text[i] if i < len(text) else 0x20
         self._changed = True
 
@@ -132,10 +133,10 @@ class Lcd:
             for command in _COMMANDS:
                 self._send(command, b"")
         elif step >= _STEPS - 2:
-            self._send(_LINE_ADDRESSES[step - _STEPS] + COLUMNS, b" " * _BEHIND)
+            self._send(_LINE_ADDRESSES[step - _STEPS] + _COLUMNS, b" " * _BEHIND)
         else:
-            quarter = (step - len(_NIBBLES) - 1) * COLUMNS
-            self._send(_CGRAM_ADDRESS + quarter, memoryview(self._glyphs)[quarter : quarter + COLUMNS])
+            quarter = (step - len(_NIBBLES) - 1) * _COLUMNS
+            self._send(_CGRAM_ADDRESS + quarter, memoryview(self._glyphs)[quarter : quarter + _COLUMNS])
             for shown in self._shown:  # both lines have to be written again
                 shown[:] = _NEVER
             self._changed = True
@@ -156,7 +157,7 @@ class Lcd:
                 if not self._kept_power():
                     self._step = _POWER_UP
                     return True
-                first, last = 0, COLUMNS - 1
+                first, last = 0, _COLUMNS - 1
                 while shown[first] == wanted[first]:
                     first += 1
                 while shown[last] == wanted[last]:

@@ -9,21 +9,23 @@ from time import ticks_add, ticks_diff, ticks_ms
 
 import framebuf
 
+from ..units import const
+
 WIDTH, HEIGHT = 128, 64
 # The picture is sent in parts of _PART columns of a page, each only if it has changed. A part takes 0.9 ms at 400 kHz,
 # 3.5 ms at 100 kHz; _PARTS of them are sent in one pass of the loop, _PARTS_SLOW on a bus slower than _SLOW_HZ.
 _PART = 32
 _PARTS, _PARTS_SLOW, _SLOW_HZ = 3, 2, 200_000
-PROBE_MS = 200  # time between two checks whether it has kept its power
-REFRESH_MS = 10_000  # send everything again so often: nothing else repairs what noise has changed
+_PROBE_MS = const(200)  # time between two checks whether it has kept its power
+_REFRESH_MS = const(10_000)  # send everything again so often: nothing else repairs what noise has changed
 _POWER_UP_MS = 40
 _OFF = 0x40  # bit of the status
 _SH1106_STATUS = (0x08, 0x00, 0x0C)  # low half of the status; of an SSD1306 it is 3 or 6, or that of a clone
 _SH1106_OFFSET = 2  # its first visible column
-# Rows by which the picture is shifted, each for SHIFT_REFRESHES: the same pixels must not glow for ever. The rows that
+# Rows by which the picture is shifted, each for _SHIFT_REFRESHES: the same pixels must not glow for ever. The rows that
 # leave at the top come back at the bottom, so pictures leave the first two blank.
 _SHIFTS = (0, 1, 2, 1)
-SHIFT_REFRESHES = 6
+_SHIFT_REFRESHES = const(6)
 # A panel of 32 rows has none to spare: its picture moves down, over the two blank rows below the letters.
 _SHIFTS_32 = (0, 63, 62, 63)
 # Control byte of a stream of commands, then: clock, rows - 1, no offset, columns and rows from the side opposite to the
@@ -121,7 +123,7 @@ class Oled:
             self._draw(self._wanted)
             self._set_up = True
             self._seen_ms = self._refresh_ms = now_ms
-        elif self._lit and ticks_diff(now_ms, self._seen_ms) >= PROBE_MS:
+        elif self._lit and ticks_diff(now_ms, self._seen_ms) >= _PROBE_MS:
             self._seen_ms = now_ms
             if self._state() & _OFF and self._reports_off:  # it has lost its power
                 self._restart()
@@ -131,7 +133,7 @@ class Oled:
             self._command(b"\x00\xaf")
             self._lit = True
             self._reports_off = not self._state() & _OFF  # some clones never report it
-        elif ticks_diff(now_ms, self._refresh_ms) >= REFRESH_MS:
+        elif ticks_diff(now_ms, self._refresh_ms) >= _REFRESH_MS:
             self._refresh_ms = now_ms
             self._refreshes += 1
             self._configure()
@@ -149,7 +151,7 @@ class Oled:
 
     def _configure(self):
         shifts = _SHIFTS if self.draws else _SHIFTS_32
-        shift = shifts[self._refreshes // SHIFT_REFRESHES % len(shifts)]
+        shift = shifts[self._refreshes // _SHIFT_REFRESHES % len(shifts)]
         self._command((_SET_UP if self.draws else _SET_UP_32) + _SUPPLY + self._look + bytes((0x40 | shift,)))
 
     def _send(self):

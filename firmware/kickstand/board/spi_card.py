@@ -9,8 +9,10 @@ from time import ticks_diff, ticks_ms
 
 from sdcard import SDCard  # type: ignore[import-not-found]
 
-CLOCK_HZ = 10_000_000  # at the driver's default of 1.32 MHz a block of a ride takes 25 ms
-BUSY_MS = 1000  # cards may take 250 to 500 ms (SD Physical Layer Simplified Specification, section 4.6.2.2)
+from ..units import const
+
+_CLOCK_HZ = const(10_000_000)  # at the driver's default of 1.32 MHz a block of a ride takes 25 ms
+_BUSY_MS = const(1000)  # cards may take 250 to 500 ms (SD Physical Layer Simplified Specification, section 4.6.2.2)
 _ACCEPTED = 0x05  # data response, section 7.3.3.1
 
 
@@ -20,7 +22,7 @@ class CheckedCard(SDCard):
     def __init__(self, spi, cs):
         self._byte = bytearray(1)
         self._fault = 0
-        super().__init__(spi, cs, baudrate=CLOCK_HZ)
+        super().__init__(spi, cs, baudrate=_CLOCK_HZ)
 
     def writeblocks(self, block_num, buf):
         """Write sectors for the file system. Raises OSError, also for data that the card rejects."""
@@ -61,7 +63,7 @@ class CheckedCard(SDCard):
     def _wait(self):
         begun_ms = ticks_ms()
         while self._receive() == 0:
-            if ticks_diff(ticks_ms(), begun_ms) > BUSY_MS:
+            if ticks_diff(ticks_ms(), begun_ms) > _BUSY_MS:
                 self._fault = ETIMEDOUT
                 return
 

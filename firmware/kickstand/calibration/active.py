@@ -3,9 +3,10 @@
 from time import ticks_add, ticks_diff, ticks_ms
 
 from ..errors import StoreError, report
+from ..units import const
 from .store import Store
 
-TRIM_MS = 60_000  # least time between two saves of the roll-misalignment correction, because flash wears
+_TRIM_MS = const(60_000)  # least time between two saves of the roll-misalignment correction, because flash wears
 
 
 class ActiveCalibration:
@@ -20,7 +21,7 @@ class ActiveCalibration:
         self._meter = meter
         self._changed = changed
         self._store = None  # a stored calibration belongs to one chip, and which one is known once it runs
-        self._trim_due_ms = ticks_add(ticks_ms(), TRIM_MS)
+        self._trim_due_ms = ticks_add(ticks_ms(), _TRIM_MS)
 
     @property
     def value(self):
@@ -58,10 +59,10 @@ class ActiveCalibration:
         self._meter.use(self.value)
 
     def keep_trim(self, now_ms):
-        """Save the trim that riding has found, if the bike stands and TRIM_MS are over. Call it about every 100 ms."""
+        """Save the trim that riding has found, if the bike stands and _TRIM_MS are over. Call it about every 100 ms."""
         if ticks_diff(now_ms, self._trim_due_ms) >= 0:
             saved = self.value.aligned and self._save_trim()
-            self._trim_due_ms = ticks_add(now_ms, TRIM_MS if saved else 0)
+            self._trim_due_ms = ticks_add(now_ms, _TRIM_MS if saved else 0)
 
     def _save_trim(self):
         """Save the trim if it has changed enough; return True if so."""

@@ -1,14 +1,15 @@
 """One pose taken while the loop runs: wait until the sensor is still, then average."""
 
 from ..errors import CaptureError
+from ..units import const
 from .still_pose import StillPose
 
-SETTLE_MS = 500
-GIVE_UP_MS = 10_000  # longest time to wait for stillness
+_SETTLE_MS = const(500)
+_GIVE_UP_MS = const(10_000)  # longest time to wait for stillness
 
 # What step() returns
 SETTLING = 0  # waiting for stillness
-SETTLED = 1  # for one sample: it has been still for SETTLE_MS, and averaging begins
+SETTLED = 1  # for one sample: it has been still for _SETTLE_MS, and averaging begins
 AVERAGING = 2
 DONE = 3  # for one sample: the pose is complete
 _ENDED = 4
@@ -24,8 +25,8 @@ class PoseTaker:
 
     def __init__(self, chip, rate_hz, seconds):
         self._chip = chip
-        self._settle_count = rate_hz * SETTLE_MS // 1000
-        self._give_up_count = rate_hz * GIVE_UP_MS // 1000
+        self._settle_count = rate_hz * _SETTLE_MS // 1000
+        self._give_up_count = rate_hz * _GIVE_UP_MS // 1000
         self._take_count = int(rate_hz * seconds)
         self.restart()
 

@@ -11,30 +11,31 @@ from math import degrees
 
 from ..errors import GyroError
 from ..rotation import matrix
-from ..units import AXES
+from ..units import AXES, const
 from .turn import rotated
 
-UNKNOWNS = 18
+_UNKNOWNS = const(18)
 _GYRO = 9  # the first unknown of the gyro; before it offset (3), slope (3), N (3: yz, xz, xy)
-STEPS = 5
-SIGMA_FORCE = 0.0015  # g: of a pose's force; 1 sigma, as all that follow
-SIGMA_TURN = 0.0015  # rad: of a turn, by the poses at its ends
+_STEPS = const(5)
+_SIGMA_FORCE = const(0.0015)  # g: of a pose's force; 1 sigma, as all that follow
+_SIGMA_TURN = const(0.0015)  # rad: of a turn, by the poses at its ends
 # deg/s per sqrt(s): random walk of the gyro's bias during a turn. Between the poses at both ends, which measure it, the
 # angle's variance becomes walk^2 seconds^3 / 12.
-BIAS_WALK_DPS = 0.008
+_BIAS_WALK_DPS = const(0.008)
 # The priors: offset (g), slope, N, and of X its diagonal (scale) and the rest (cross-axis). The data sheet allows 0.03
 # and 0.02; the accelerometer's axes may also sit turned against the gyro's.
 SIGMA_OFFSET, SIGMA_SLOPE, SIGMA_SKEW = 0.1, 0.1, 0.012
 SIGMA_SCALE, SIGMA_CROSS = 0.03, 0.02
 # What is refused
-MAX_SCALE_ERROR = 0.10  # of the gyro: no working chip is as far off
-MAX_CROSS_ERROR = 0.06  # of its axes: twice the data sheet's, or one is late
-MAX_MISFIT = 0.012  # rad: of a turn after the fit
-GROSS_MISFIT = 0.25  # rad: of a turn before it; the sheet's errors add up to 0.2 in half a turn
-READS = (-1.0, 0.25, 0.5, 0.75, 1.3, 2.0, 4.0)  # what an axis reads of a rate of 1, to find one that alone is wrong
-DEAD_RAD = 0.2  # an axis that saw less than this in all turns is dead
+_MAX_SCALE_ERROR = const(0.10)  # of the gyro: no working chip is as far off
+_MAX_CROSS_ERROR = const(0.06)  # of its axes: twice the data sheet's, or one is late
+_MAX_MISFIT = const(0.012)  # rad: of a turn after the fit
+_GROSS_MISFIT = const(0.25)  # rad: of a turn before it; the sheet's errors add up to 0.2 in half a turn
+# what an axis reads of a rate of 1, to find one that alone is wrong
+_READS = const((-1.0, 0.25, 0.5, 0.75, 1.3, 2.0, 4.0))
+_DEAD_RAD = const(0.2)  # an axis that saw less than this in all turns is dead
 # largest standard error of a scale: else no turn about this axis has shown it, and it may be anything
-PROOF_SIGMA = 0.025
+_PROOF_SIGMA = const(0.025)
 
 
 def _triangle(i):
@@ -55,19 +56,19 @@ class SensorFit:
         self._start = [0.0] * 3 + [1.0] * 3 + [0.0] * 12
         self._sigma = [SIGMA_OFFSET] * 3 + [SIGMA_SLOPE] * 3 + [SIGMA_SKEW] * 3
         self._sigma += [SIGMA_SCALE if i % 4 == 0 else SIGMA_CROSS for i in range(9)]
-        self._h = array("f", [0.0] * _triangle(UNKNOWNS))
-        self._g = [0.0] * UNKNOWNS
+        self._h = array("f", [0.0] * _triangle(_UNKNOWNS))
+        self._g = [0.0] * _UNKNOWNS
 
     def run(self):
         """A generator of short steps, because on a board the fit takes longer than the chip's FIFO lasts. Raises
         GyroError where the turns are not those of a gyro."""
         self._check_gross()
-        for _ in range(STEPS):
+        for _ in range(_STEPS):
             yield from self._accumulate()
             self._factorise()
             yield
             step = self._solve()
-            for i in range(UNKNOWNS):
+            for i in range(_UNKNOWNS):
                 self._p[i] += step[i]
             yield
         self._finish()
@@ -109,25 +110,25 @@ class SensorFit:
         h, g, p = self._h, self._g, self._p
         for i in range(len(h)):
             h[i] = 0.0
-        for i in range(UNKNOWNS):
+        for i in range(_UNKNOWNS):
             weight = 1.0 / (self._sigma[i] * self._sigma[i])
             h[_triangle(i) + i] = weight
             g[i] = weight * (self._start[i] - p[i])
-        row = [0.0] * UNKNOWNS
+        row = [0.0] * _UNKNOWNS
         for k in range(len(self._poses)):
             force = self.force(k)
             columns = self._force_columns(k)
             for i in range(9):
                 row[i] = force[0] * columns[i] + force[1] * columns[9 + i] + force[2] * columns[18 + i]
             square = force[0] * force[0] + force[1] * force[1] + force[2] * force[2]
-            self._add(row, 9, 0.5 * (1.0 - square), 1.0 / (SIGMA_FORCE * SIGMA_FORCE))
+            self._add(row, 9, 0.5 * (1.0 - square), 1.0 / (_SIGMA_FORCE * _SIGMA_FORCE))
             yield
         for k in range(len(self._turns)):
             if self._turns[k] is None:
                 continue
             turn, seconds = self._turns[k]
-            walk = BIAS_WALK_DPS * 0.01745
-            weight = 1.0 / (SIGMA_TURN * SIGMA_TURN + walk * walk * seconds * seconds * seconds / 12)
+            walk = _BIAS_WALK_DPS * 0.01745
+            weight = 1.0 / (_SIGMA_TURN * _SIGMA_TURN + walk * walk * seconds * seconds * seconds / 12)
             misfit, before = self._misfit(k, p[_GYRO:])
             first, second = self._force_columns(k), self._force_columns(k + 1)
             yield
@@ -138,7 +139,7 @@ class SensorFit:
                     for j in range(3):
                         row[i] -= turn[3 * a + j] * second[9 * j + i]
                     row[_GYRO + i] = before[b] * turn[9 + 9 * c + i] - before[c] * turn[9 + 9 * b + i]
-                self._add(row, UNKNOWNS, -misfit[a], weight)
+                self._add(row, _UNKNOWNS, -misfit[a], weight)
                 yield
 
     def _force_columns(self, k):
@@ -167,7 +168,7 @@ class SensorFit:
     def _factorise(self):
         """h = L L^T, L in its place."""
         h = self._h
-        for i in range(UNKNOWNS):
+        for i in range(_UNKNOWNS):
             of_i = _triangle(i)
             for j in range(i + 1):
                 of_j = _triangle(j)
@@ -179,12 +180,12 @@ class SensorFit:
     def _solve(self):
         """The change for g, by L L^T change = g."""
         h, out = self._h, self._g[:]
-        for i in range(UNKNOWNS):
+        for i in range(_UNKNOWNS):
             for k in range(i):
                 out[i] -= h[_triangle(i) + k] * out[k]
             out[i] /= h[_triangle(i) + i]
-        for i in range(UNKNOWNS - 1, -1, -1):
-            for k in range(i + 1, UNKNOWNS):
+        for i in range(_UNKNOWNS - 1, -1, -1):
+            for k in range(i + 1, _UNKNOWNS):
                 out[i] -= h[_triangle(k) + i] * out[k]
             out[i] /= h[_triangle(i) + i]
         return out
@@ -197,21 +198,21 @@ class SensorFit:
         self.accel_matrix = matrix(self._accel())
         self.gyro_matrix = matrix([p[_GYRO + i] + (1.0 if i % 4 == 0 else 0.0) for i in range(9)])
         self.gyro_sigma = []
-        for m in range(_GYRO, UNKNOWNS):
-            column, square = [0.0] * UNKNOWNS, 0.0
-            for i in range(m, UNKNOWNS):
+        for m in range(_GYRO, _UNKNOWNS):
+            column, square = [0.0] * _UNKNOWNS, 0.0
+            for i in range(m, _UNKNOWNS):
                 total = 1.0 if i == m else 0.0
                 for k in range(m, i):
                     total -= h[_triangle(i) + k] * column[k]
                 column[i] = total / h[_triangle(i) + i]
                 square += column[i] * column[i]
             self.gyro_sigma.append(square**0.5)
-        self.unproved = [AXES[i] for i in range(3) if self.gyro_sigma[4 * i] > PROOF_SIGMA]
+        self.unproved = [AXES[i] for i in range(3) if self.gyro_sigma[4 * i] > _PROOF_SIGMA]
 
     def _check_gross(self):
         """Raise GyroError if a turn by the gyro is not at all that by gravity."""
         worst = self._cost([0.0] * 9)[1]
-        if worst > GROSS_MISFIT**2:
+        if worst > _GROSS_MISFIT**2:
             raise self._ill(worst)
 
     def _ill(self, worst):
@@ -219,9 +220,9 @@ class SensorFit:
         x = [0.0] * 9
         best, found = self._cost(x)[0] / 4, None
         for axis in range(3):
-            if self._turned(axis) < DEAD_RAD:
+            if self._turned(axis) < _DEAD_RAD:
                 return GyroError("dead-gyro", AXES[axis])
-            for reads in READS:
+            for reads in _READS:
                 x[4 * axis] = 1.0 / reads - 1.0
                 cost = self._cost(x)[0]
                 if cost < best:
@@ -258,11 +259,11 @@ class SensorFit:
         """Raise GyroError if the gyro's errors are those of no working chip, or a turn does not fit."""
         p = self._p
         worst = self._cost(p[_GYRO:])[1]
-        if not worst < MAX_MISFIT**2:
+        if not worst < _MAX_MISFIT**2:
             raise self._ill(worst)
         for i in range(9):
             error = p[_GYRO + i]
-            if i % 4 == 0 and not abs(error) < MAX_SCALE_ERROR:
+            if i % 4 == 0 and not abs(error) < _MAX_SCALE_ERROR:
                 raise GyroError("gyro-scale", AXES[i // 4], -100.0 * error)
-            if not abs(error) < MAX_CROSS_ERROR + 2 * self.gyro_sigma[i]:
+            if not abs(error) < _MAX_CROSS_ERROR + 2 * self.gyro_sigma[i]:
                 raise GyroError("gyro-misfit", degrees(abs(error)))

@@ -9,13 +9,14 @@ Six poses determine six numbers exactly, so that their residual proves nothing. 
 from math import acos, degrees
 
 from ..errors import CalibrationError
-from ..units import AXES
+from ..units import AXES, const
 from .parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE
 
 SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")  # which axis points up, in the order of the six poses
-MAX_TILT_DEG = 20.0  # largest angle between a side's axis and the vertical
+_MAX_TILT_DEG = const(20.0)  # largest angle between a side's axis and the vertical
 FREE_TILT_DEG = 20.0  # a free pose nearer to one of the sides than this adds little information
-FREE_MAX_G = 0.028  # largest error of a free pose: six numbers cannot describe the 2 % of cross-axis sensitivity
+# Largest error of a free pose: six numbers cannot describe the 2 % of cross-axis sensitivity
+_FREE_MAX_G = const(0.028)
 
 
 def side_of(accel):
@@ -74,23 +75,23 @@ def fit(poses):
 
 
 def check_plausible(offset, slope, poses):
-    """Raise CalibrationError unless offset and slope are plausible, and the axis of every side was within MAX_TILT_DEG
+    """Raise CalibrationError unless offset and slope are plausible, and the axis of every side was within _MAX_TILT_DEG
     of the vertical."""
     for i in range(3):
         if not (abs(offset[i]) < MAX_OFFSET_G and MIN_SLOPE < slope[i] < MAX_SLOPE):
             raise CalibrationError("odd-axis", AXES[i], offset[i], slope[i])
     for k in range(6):
         tilt = tilt_deg([slope[i] * poses[k][i] + offset[i] for i in range(3)])
-        if tilt > MAX_TILT_DEG:
-            raise CalibrationError("side-tilted", SIDES[k], tilt, MAX_TILT_DEG)
+        if tilt > _MAX_TILT_DEG:
+            raise CalibrationError("side-tilted", SIDES[k], tilt, _MAX_TILT_DEG)
 
 
 def check_free_pose(offset, slope, accel):
     """Return by how many g the calibrated reading of a seventh, slanted pose differs from 1 g. accel: its mean reading
-    (3, g). Raises CalibrationError beyond FREE_MAX_G."""
+    (3, g). Raises CalibrationError beyond _FREE_MAX_G."""
     force = [slope[i] * accel[i] + offset[i] for i in range(3)]
     error = sum(f * f for f in force) ** 0.5 - 1.0
-    if not abs(error) <= FREE_MAX_G:
+    if not abs(error) <= _FREE_MAX_G:
         raise CalibrationError("free-pose-off", 1.0 + error)
     return error
 

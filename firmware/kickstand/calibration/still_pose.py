@@ -7,18 +7,18 @@ Sums are kept as integers until the end: 32-bit floats would lose the digits tha
 """
 
 from ..errors import CaptureError, SickSensor
-from ..units import AXES
+from ..units import AXES, const
 
 # Largest difference of a sample from the first one: more is a knock. Ten times the chip's noise with its widest filter.
-PEAK_G = 0.08
-PEAK_DPS = 5.0
+_PEAK_G = const(0.08)
+_PEAK_DPS = const(5.0)
 # Largest noise of a gyro axis, by the differences of samples that follow each other: a hand's sway has none. Fifteen
 # times the chip's with its usual filter.
-NOISE_DPS = 0.6
-SPREAD_G = 0.02  # largest standard deviation: being still matters more than the exact angle of a pose
-DRIFT_G = 0.007  # largest difference between the means of both halves: 0.4 degrees of slow tilt
-MAX_REST_RATE_DPS = 45.0  # the data sheet allows 20 deg/s of gyro offset, and as much again over temperature
-MIN_SAMPLES = 20
+_NOISE_DPS = const(0.6)
+_SPREAD_G = const(0.02)  # largest standard deviation: being still matters more than the exact angle of a pose
+_DRIFT_G = const(0.007)  # largest difference between the means of both halves: 0.4 degrees of slow tilt
+_MAX_REST_RATE_DPS = const(45.0)  # the data sheet allows 20 deg/s of gyro offset, and as much again over temperature
+_MIN_SAMPLES = const(20)
 
 _AXES = (0, 1, 2, 4, 5, 6)  # accelerometer and gyro in the chip's order; 3 is the temperature
 
@@ -37,8 +37,8 @@ class StillPose:
         self._gyro_lsb = gyro_lsb_per_dps
         self._limit = accel_limit
         self._half = expected // 2
-        accel_peak = int(PEAK_G * accel_lsb_per_g)
-        gyro_peak = int(PEAK_DPS * gyro_lsb_per_dps)
+        accel_peak = int(_PEAK_G * accel_lsb_per_g)
+        gyro_peak = int(_PEAK_DPS * gyro_lsb_per_dps)
         self._peaks = (accel_peak, accel_peak, accel_peak, 0, gyro_peak, gyro_peak, gyro_peak)
         self._first = [0] * 7
         self._sums = [0] * 7  # sums of the deviations from the first sample, so that they stay small integers
@@ -74,8 +74,8 @@ class StillPose:
     def finish(self):
         """Check the whole pose, and set accel and gyro. Raises CaptureError."""
         n = self.count
-        if n < MIN_SAMPLES:
-            raise CaptureError("too-few", n, MIN_SAMPLES)
+        if n < _MIN_SAMPLES:
+            raise CaptureError("too-few", n, _MIN_SAMPLES)
         if not any(self._squares):
             raise CaptureError("frozen-pose")
         for i in range(3):
@@ -83,19 +83,19 @@ class StillPose:
                 raise SickSensor("stuck-accel", AXES[i])
             if not self._squares[4 + i]:
                 raise SickSensor("dead-gyro", AXES[i])
-            if self._changes[4 + i] > 2 * n * (NOISE_DPS * self._gyro_lsb) ** 2:
+            if self._changes[4 + i] > 2 * n * (_NOISE_DPS * self._gyro_lsb) ** 2:
                 raise SickSensor("noisy-gyro", AXES[i])
         late = n - self._half
         for i in range(3):
             off = self._sums[i] / n
-            if self._squares[i] / n - off * off > (SPREAD_G * self._accel_lsb) ** 2:
+            if self._squares[i] / n - off * off > (_SPREAD_G * self._accel_lsb) ** 2:
                 raise CaptureError("vibration")
             drift = (self._sums[i] - self._early[i]) / late - self._early[i] / self._half
-            if abs(drift) > DRIFT_G * self._accel_lsb:
+            if abs(drift) > _DRIFT_G * self._accel_lsb:
                 raise CaptureError("tilting")
         mean = [self._first[i] + self._sums[i] / n for i in range(7)]
         accel = [mean[i] / self._accel_lsb for i in range(3)]
         gyro = [mean[i] / self._gyro_lsb for i in range(4, 7)]
-        if max(abs(rate) for rate in gyro) > MAX_REST_RATE_DPS:
-            raise CaptureError("gyro-offset", MAX_REST_RATE_DPS)
+        if max(abs(rate) for rate in gyro) > _MAX_REST_RATE_DPS:
+            raise CaptureError("gyro-offset", _MAX_REST_RATE_DPS)
         self.accel, self.gyro = accel, gyro

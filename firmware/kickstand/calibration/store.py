@@ -12,11 +12,12 @@ from errno import ENOENT
 
 from ..errors import StoreError
 from ..rotation import is_rotation
+from ..units import const
 from .parameters import MAX_GYRO_SIGMA, MAX_MATRIX_ERROR, MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE, Calibration
 
 FILES = ("kickstand_a.cal", "kickstand_b.cal")
-VERSION = 1
-WHOLE_VERSION = 2  # with the matrices
+_VERSION = const(1)
+_WHOLE_VERSION = const(2)  # with the matrices
 _MAGIC = b"KSTD"
 _HEAD = "<4sHHI"  # magic, version, length of the whole record in bytes, sequence number
 _BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, how aligned; offset, slope, gyro bias, matrix, trim
@@ -25,7 +26,7 @@ _WHOLE = "<27f"  # accel_matrix, gyro_matrix, gyro_sigma
 BODY_LENGTH = struct.calcsize(_BODY)
 WHOLE_BODY_LENGTH = BODY_LENGTH + struct.calcsize(_WHOLE)
 _HEAD_LENGTH = struct.calcsize(_HEAD)
-_LENGTHS = {VERSION: _HEAD_LENGTH + BODY_LENGTH + 4, WHOLE_VERSION: _HEAD_LENGTH + WHOLE_BODY_LENGTH + 4}
+_LENGTHS = {_VERSION: _HEAD_LENGTH + BODY_LENGTH + 4, _WHOLE_VERSION: _HEAD_LENGTH + WHOLE_BODY_LENGTH + 4}
 MAX_BIAS_DPS = 60.0  # deg/s of the gyro
 MAX_TRIM_DEG = 3.6  # the limit in lean/upright_trim.py plus a margin for rounding to 32 bits
 
@@ -85,7 +86,7 @@ class Store:
         for name in FILES:
             try:
                 with open(self._path(name), "rb") as file:
-                    record = file.read(_LENGTHS[WHOLE_VERSION] + 1)
+                    record = file.read(_LENGTHS[_WHOLE_VERSION] + 1)
             except OSError as error:
                 if error.args[0] != ENOENT:  # a missing file is normal: save() makes it
                     problems.append("%s unreadable" % name)
@@ -101,15 +102,15 @@ class Store:
         return self._directory + "/" + name if self._directory else name
 
     def _pack(self, calibration, sequence):
-        version = WHOLE_VERSION if calibration.whole else VERSION
+        version = _WHOLE_VERSION if calibration.whole else _VERSION
         record = struct.pack(_HEAD, _MAGIC, version, _LENGTHS[version], sequence) + pack(*self._chip, calibration)
         return record + struct.pack("<I", crc32(record))
 
     def _unpack(self, record):
         """(sequence, calibration, None) of a record's bytes, or (0, None, what is wrong in words)."""
         if len(record) not in _LENGTHS.values():
-            whole = len(record) >= 6 and record[4] == WHOLE_VERSION
-            length = _LENGTHS[WHOLE_VERSION if whole else VERSION]
+            whole = len(record) >= 6 and record[4] == _WHOLE_VERSION
+            length = _LENGTHS[_WHOLE_VERSION if whole else _VERSION]
             return 0, None, "empty" if not record else "cut short" if len(record) < length else "too long"
         magic, version, length, sequence = struct.unpack_from(_HEAD, record, 0)
         if struct.unpack_from("<I", record, len(record) - 4)[0] != crc32(record[:-4]):

@@ -11,8 +11,10 @@ from array import array
 from math import radians
 
 from ..errors import NO_MACHINE_CODE, checked
+from ..units import const
 
-ONE = 2048  # the integer that stands for the largest scale: times the sum of eight samples it still fits 32 bits
+# The integer that stands for the largest scale: times the sum of eight samples it still fits 32 bits
+_ONE = const(2048)
 
 
 def products_python(matrices, sums, n, out):
@@ -43,7 +45,7 @@ class Transform:
     def __init__(self, calibration):
         force, force_offset, rate, rate_offset = calibration.in_vehicle()
         scale, gyro_scale = calibration.scales()
-        force_unit, rate_unit = max(scale) / ONE, gyro_scale / ONE
+        force_unit, rate_unit = max(scale) / _ONE, gyro_scale / _ONE
         self._integers, self._products = array("i", [0] * 24), array("i", [0] * 6)
         for i in range(12):
             row, k = i // 4, i % 4

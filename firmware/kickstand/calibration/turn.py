@@ -9,9 +9,12 @@ Pretto, E. Menegatti, "A robust and easy to implement method for IMU calibration
 from array import array
 from math import cos, radians, sin
 
-STEP_RAD = 0.02  # a step ends when the sensor has turned by so much about one axis. Larger: less exact
-STEP_US = 60_000  # or has taken so long
-QUICK = 31_000  # counts, 0.95 of the gyro's range: the chip's low-pass hides that single conversions were at its end
+from ..units import const
+
+_STEP_RAD = const(0.02)  # a step ends when the sensor has turned by so much about one axis. Larger: less exact
+_STEP_US = const(60_000)  # or has taken so long
+# Counts, 0.95 of the gyro's range: the chip's low-pass hides that single conversions were at its end
+_QUICK = const(31_000)
 
 
 class Turn:
@@ -23,12 +26,12 @@ class Turn:
     seconds: duration of the turn, once end() was called.
     """
 
-    def __init__(self, lsb_per_dps, period_us, quick=QUICK):
+    def __init__(self, lsb_per_dps, period_us, quick=_QUICK):
         self._rad = radians(1.0 / lsb_per_dps) * 1e-6  # rad per count and microsecond
         self._lsb = lsb_per_dps
         self._period_us = period_us
         self._quick = quick
-        self._step_counts = int(STEP_RAD / self._rad / period_us)  # a sum of counts: the angle of a step
+        self._step_counts = int(_STEP_RAD / self._rad / period_us)  # a sum of counts: the angle of a step
         self.running = False
 
     def start(self, bias):
@@ -63,7 +66,7 @@ class Turn:
                 step = True
         self._n += n
         self._us += dt_us
-        if (step or self._us > STEP_US) and not hold:
+        if (step or self._us > _STEP_US) and not hold:
             self._step()
 
     def end(self):

@@ -9,16 +9,17 @@ from math import atan2, degrees
 
 from ..errors import AlignmentError, GyroError
 from ..rotation import cross, dot, frame, matrix, norm, normalize, rotate, vector
+from ..units import const
 
 # Least tilt between the poses. At 5 degrees, one degree of pitch between them makes a yaw error of 11 degrees; at 8, 7.
-MIN_TILT_DEG = 5.0
+_MIN_TILT_DEG = const(5.0)
 WARN_TILT_DEG = 8.0
-MAX_TILT_DEG = 60.0
-SAME_POSE_DEG = 1.0
+_MAX_TILT_DEG = const(60.0)
+_SAME_POSE_DEG = const(1.0)
 # Largest difference of a reading at rest from 1 g. The data sheet allows 80 mg of offset and 3 % of scale, plus drift;
 # after the six positions there remain 35 mg of drift over temperature.
-UNCALIBRATED_TOLERANCE_G = 0.15
-CALIBRATED_TOLERANCE_G = 0.05
+_UNCALIBRATED_TOLERANCE_G = const(0.15)
+_CALIBRATED_TOLERANCE_G = const(0.05)
 # By how much the turn between the poses, by the gyro, may differ from the tilt: a constant (rad); the share of the tilt
 # by which uncalibrated sensors and the gyro's scale change it; the share of another turn, as while the bike is pushed
 # about, that cross-axis errors add; drift (rad/s) and random walk (rad/s per sqrt(s), 3 sigma) of the gyro's bias
@@ -34,7 +35,7 @@ def check_one_g(force, tolerance_g, pose):
         raise AlignmentError("not-one-g", pose, size)
 
 
-def two_position(out, kickstand, upright, side="left", tolerance_g=UNCALIBRATED_TOLERANCE_G):
+def two_position(out, kickstand, upright, side="left", tolerance_g=_UNCALIBRATED_TOLERANCE_G):
     """Fill out (9, rows left, up, forward) with the rotation from sensor to vehicle axes; return the tilt between the
     poses in degrees. Equations 3-8.
 
@@ -49,12 +50,12 @@ def two_position(out, kickstand, upright, side="left", tolerance_g=UNCALIBRATED_
     z = vector()
     cross(z, y, tilted)
     tilt = degrees(atan2(norm(z), dot(y, tilted)))
-    if tilt < SAME_POSE_DEG:
+    if tilt < _SAME_POSE_DEG:
         raise AlignmentError("same-pose", tilt)
-    if tilt < MIN_TILT_DEG:
-        raise AlignmentError("tilt-small", tilt, MIN_TILT_DEG)
-    if tilt > MAX_TILT_DEG:
-        raise AlignmentError("tilt-large", tilt, MAX_TILT_DEG)
+    if tilt < _MIN_TILT_DEG:
+        raise AlignmentError("tilt-small", tilt, _MIN_TILT_DEG)
+    if tilt > _MAX_TILT_DEG:
+        raise AlignmentError("tilt-large", tilt, _MAX_TILT_DEG)
     if side == "right":
         z[0], z[1], z[2] = -z[0], -z[1], -z[2]
     frame(out, y, z)
@@ -69,7 +70,7 @@ def align(calibration, kickstand, upright, side):
     """
     vehicle_from_sensor = matrix()
     poses = calibration.correct(kickstand.accel), calibration.correct(upright.accel)
-    tolerance_g = CALIBRATED_TOLERANCE_G if calibration.six_done else UNCALIBRATED_TOLERANCE_G
+    tolerance_g = _CALIBRATED_TOLERANCE_G if calibration.six_done else _UNCALIBRATED_TOLERANCE_G
     tilt = two_position(vehicle_from_sensor, *poses, side, tolerance_g)
     return calibration.with_alignment(vehicle_from_sensor, kickstand.gyro), tilt
 

@@ -8,15 +8,16 @@ from time import ticks_add, ticks_diff
 
 from ..errors import Notice, StoreError
 from ..rotation import matrix
+from ..units import const
 from .alignment import BRAKING, CAR, MOTORCYCLE, TURNING, DriveAlignment
 from .quality import MIN_EVENTS_TO_CHECK_SPEED
 from .verdict import MOVED, REFINED, REVERSED, SAME, compare, turn_round
 
-FEED_TURNS = 2  # passes of the loop whose counts are summed as integers, because floats take time
-GAP_MS = 300  # a longer time between two readings means that some are missing
-LOOK_MS = 1000
-FRESH_MS = 3000  # an older speed does not show that the vehicle stands
-AWAY_MPS = 2.0  # at a higher speed the vehicle has driven off
+_FEED_TURNS = const(2)  # passes of the loop whose counts are summed as integers, because floats take time
+_GAP_MS = const(300)  # a longer time between two readings means that some are missing
+_LOOK_MS = const(1000)
+_FRESH_MS = const(3000)  # an older speed does not show that the vehicle stands
+_AWAY_MPS = const(2.0)  # at a higher speed the vehicle has driven off
 
 _KNOWN_BIAS = (0.0, 0.0, 0.0)  # the gyro's bias was measured with the alignment, and is subtracted already
 STAND_SIDE, MOUNT_MOVED = "other-side", "mount-moved"
@@ -86,16 +87,16 @@ class BackgroundAlignment:
             self.drive.measure_speed(speed, self.speed.age_us)
             speed = self._share(speed)
         if self._look_ms is None or ticks_diff(now_ms, self._look_ms) >= 0:
-            self._look_ms = ticks_add(now_ms, LOOK_MS)
+            self._look_ms = ticks_add(now_ms, _LOOK_MS)
             self.fresh_speed(now_ms)
-            if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > LOOK_MS:
+            if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > _LOOK_MS:
                 self._begin_again()  # now: after 6 days without a reading ticks_diff() is negative
             self._look(now_ms)
         return speed
 
     def fresh_speed(self, now_ms):
         """The speed measured last (m/s), or None if that was long ago."""
-        if self._speed_ms is not None and ticks_diff(now_ms, self._speed_ms) >= FRESH_MS:
+        if self._speed_ms is not None and ticks_diff(now_ms, self._speed_ms) >= _FRESH_MS:
             self._speed_ms = None  # kept, it would be fresh again after 6 days: then ticks_diff() is negative
         return self._speed_mps if self._speed_ms is not None else None
 
@@ -119,7 +120,7 @@ class BackgroundAlignment:
     def feed(self, sums, n, dt_us, now_ms):
         """Take the n samples of a pass of the loop. sums: 7, their sums in counts, in the chip's order. dt_us: the time
         that they cover. Call it once in each pass that has samples."""
-        if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > GAP_MS:
+        if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > _GAP_MS:
             self._begin_again()
         self._fed_ms = now_ms
         total = self._total
@@ -128,7 +129,7 @@ class BackgroundAlignment:
         self._n += n
         self._us += dt_us
         self._turns += 1
-        if self._turns >= FEED_TURNS:
+        if self._turns >= _FEED_TURNS:
             n = self._n
             self._calibration.apply([t / n for t in total], self._force, self._rate)
             self.drive.update(self._force, self._rate, self._us)
@@ -172,7 +173,7 @@ class BackgroundAlignment:
         """True while the vehicle drives. A faulty speed source may say zero for ever: then the lean filter's own
         estimate of the speed decides too."""
         faulty = self.drive.problem is not None or (self.message is not None and self.message.code not in _QUESTIONS)
-        return self._speed_mps > AWAY_MPS or (faulty and self._meter.speed_mps > AWAY_MPS)
+        return self._speed_mps > _AWAY_MPS or (faulty and self._meter.speed_mps > _AWAY_MPS)
 
     def _refuse(self, problem, aligned):
         """Report a problem and begin a new drive, which may not have it any more. Until an event has counted in that,
@@ -231,4 +232,4 @@ class BackgroundAlignment:
     def state(self):
         """The drive's state, but never TURNING at walking pace, where a bend cannot be recognised: BRAKING instead."""
         state = self.drive.state
-        return BRAKING if state == TURNING and self._speed_mps < AWAY_MPS else state
+        return BRAKING if state == TURNING and self._speed_mps < _AWAY_MPS else state

@@ -6,22 +6,22 @@ Each change of speed is compared with the force and yaw rate of the same interva
 from math import pi
 
 from ..rotation import norm
-from ..units import STANDARD_GRAVITY
+from ..units import STANDARD_GRAVITY, const
 from .history import COLUMNS, difference
 from .regression import LAG_STEP_US, LAGS, Fit, ForwardRegression
 
-# An event begins above BEGIN_MPS2, ends below END_MPS2, and changes the speed by at least CHANGE_MPS.
+# An event begins above BEGIN_MPS2, ends below END_MPS2, and changes the speed by at least _CHANGE_MPS.
 BEGIN_MPS2, END_MPS2 = 0.8, 0.4
-CHANGE_MPS = 1.5
-MAX_ACCELERATION_EVENTS = 2  # more than these do not count, because braking shows forward better
+_CHANGE_MPS = const(1.5)
+_MAX_ACCELERATION_EVENTS = const(2)  # more than these do not count, because braking shows forward better
 MIN_INTERVAL_US = 400_000  # a GPS at 10 Hz adds nothing to one at 2 Hz, and its differences are noisier
 MAX_INTERVAL_US = 2_200_000  # one value of a GPS at 1 Hz may be missing
-MAX_WAITING = 4  # intervals that wait while an earlier one is processed
+_MAX_WAITING = const(4)  # intervals that wait while an earlier one is processed
 # A larger yaw rate is a bend. At 10 m/s this one makes 0.036 g sideways, a fifth of the force of braking; the
 # regression removes most of it.
-STRAIGHT_DPS = 2.0
-MIN_SPEED_MPS = 1.0  # at lower speeds steering angles are large, and a stop ends with a jerk
-MAX_FORCE_G = 3.0  # an interval with a larger mean force has a knock
+_STRAIGHT_DPS = const(2.0)
+_MIN_SPEED_MPS = const(1.0)  # at lower speeds steering angles are large, and a stop ends with a jerk
+_MAX_FORCE_G = const(3.0)  # an interval with a larger mean force has a knock
 
 
 class EventFinder:
@@ -48,7 +48,7 @@ class EventFinder:
         acceleration = change_mps / seconds
         if self.going_on and (acceleration if self.change > 0.0 else -acceleration) < END_MPS2:
             self.going_on = False
-            if abs(self.change) >= CHANGE_MPS:
+            if abs(self.change) >= _CHANGE_MPS:
                 return True
         if not self.going_on and abs(acceleration) > BEGIN_MPS2:
             self.interrupt()
@@ -62,7 +62,7 @@ class EventFinder:
 
     def was_straight(self, lag):
         """True if the straight part of the event that ended last is large enough for an event."""
-        return abs(self._straight_change[lag]) >= CHANGE_MPS
+        return abs(self._straight_change[lag]) >= _CHANGE_MPS
 
 
 class LastEvent:
@@ -127,7 +127,7 @@ class DrivingEvents:
     @property
     def counted(self):
         """Number of events that count towards an alignment: all straight braking, and the first few accelerations."""
-        return self.braking_count + min(self.acceleration_count, MAX_ACCELERATION_EVENTS)
+        return self.braking_count + min(self.acceleration_count, _MAX_ACCELERATION_EVENTS)
 
     @property
     def braking(self):
@@ -153,7 +153,7 @@ class DrivingEvents:
     def measure_speed(self, speed_mps, time_us):
         """Take a new speed, and its time on the history's clock."""
         before = self._waiting[-1] if self._waiting else self._before
-        if len(self._waiting) < MAX_WAITING and difference(time_us, before[1]) >= MIN_INTERVAL_US:
+        if len(self._waiting) < _MAX_WAITING and difference(time_us, before[1]) >= MIN_INTERVAL_US:
             self._waiting.append((speed_mps, time_us))
 
     @property
@@ -173,7 +173,7 @@ class DrivingEvents:
         mean = 0.5 * (before + speed)
         change = speed - before
         change_g = change / STANDARD_GRAVITY
-        use = use and mean > MIN_SPEED_MPS
+        use = use and mean > _MIN_SPEED_MPS
         straight = self._straight
         force, best_force = [0.0] * 3, None
         end = self._end
@@ -185,10 +185,10 @@ class DrivingEvents:
                 for i in range(3):
                     force[i] = difference(end[i], begin[i]) * 1e-6
                 yaw_dps = difference(end[3], begin[3]) * 1e-5 / seconds
-                straight[lag] = abs(yaw_dps) <= STRAIGHT_DPS
+                straight[lag] = abs(yaw_dps) <= _STRAIGHT_DPS
                 if lag == self.lag:
                     best_force = list(force)
-                if straight[lag] and norm(force) < MAX_FORCE_G * seconds:
+                if straight[lag] and norm(force) < _MAX_FORCE_G * seconds:
                     curve_g = mean * yaw_dps * (pi / 180.0 / STANDARD_GRAVITY)
                     self.regression.add(lag, seconds, change_g, curve_g, force)
             for i in range(COLUMNS):

@@ -9,14 +9,15 @@ blocks give a poor sample variance: a prior of PRIOR_FREEDOM degrees of freedom 
 from array import array
 from math import atan2, degrees, pi, sqrt
 
+from ..units import const
 from .regression import BLOCKS
 
 PRIOR_DEG = 1.0  # prior of the standard deviation of forward, at a weight of 1 g^2 s
 PRIOR_FREEDOM = 4
 STRETCH_DEG = 1.5  # standard deviation of forward due to camber and wind on one stretch of road, whatever its weight
-MIN_WEIGHT = 0.1  # g^2 s: least weight of a part whose forward is compared
-MIN_S = 20.0  # least straight driving in a part whose vertical is compared
-MIN_BLOCKS = 4  # least number of blocks in the drive for a comparison of forward
+_MIN_WEIGHT = const(0.1)  # g^2 s: least weight of a part whose forward is compared
+_MIN_S = const(20.0)  # least straight driving in a part whose vertical is compared
+_MIN_BLOCKS = const(4)  # least number of blocks in the drive for a comparison of forward
 
 
 def angle_between(a, b):
@@ -63,10 +64,10 @@ class DriveParts:
             yield
             self._sum(two, split, self.count)
             yield
-            if one[5] >= MIN_S and two[5] >= MIN_S:
+            if one[5] >= _MIN_S and two[5] >= _MIN_S:
                 self.roll_deg = max(self.roll_deg, degrees(abs(one[2] / one[5] - two[2] / two[5])))
                 self.pitch_deg = max(self.pitch_deg, degrees(abs(one[3] / one[5] - two[3] / two[5])))
-            if self.count < MIN_BLOCKS or one[4] < MIN_WEIGHT or two[4] < MIN_WEIGHT:
+            if self.count < _MIN_BLOCKS or one[4] < _MIN_WEIGHT or two[4] < _MIN_WEIGHT:
                 continue
             angle_one, angle_two = atan2(one[0], one[1]), atan2(two[0], two[1])
             scatter = self._scatter(angle_one, 0, split)

@@ -9,6 +9,7 @@ from math import atan2, degrees, sqrt
 
 from ..errors import AlignmentError
 from ..rotation import angle_deg, cross, dot, norm, normalize, vector
+from ..units import const
 from .parts import DriveParts, angle_between, blend_prior
 from .regression import Fit
 from .speed_check import fit_problem
@@ -21,15 +22,15 @@ READY_DEG, STAY_READY_DEG = 1.5, 2.5  # standard error of forward; one drive in 
 AGREE_DEG, STAY_AGREE_DEG = 4.0, 6.0  # largest difference of forward between halves, and between parts
 AGREE_SIGMAS, STAY_AGREE_SIGMAS = 3.0, 4.0  # or, between parts, its largest number of standard deviations
 # A larger difference between two parts means that the mount moved
-MOVED_DEG = 30.0  # forward; a motorway's long banked curve, taken for straight, made 15
+_MOVED_DEG = const(30.0)  # forward; a motorway's long banked curve, taken for straight, made 15
 PITCH_DEG = 7.0  # 6 % uphill, then downhill, is within this
 ROLL_DEG = 7.0  # that banked curve made 6. Not used on a motorcycle, which leans
-# An event whose forward differs by over EVENT_OFF_DEG from the overall one means that the mount moved. Only events of
-# at least MIN_EVENT_WEIGHT are judged, whose force is at least MIN_EVENT_FORWARD times the one that the change of speed
-# requires: on recorded drives none of these ever differed by more than 40 degrees.
-EVENT_OFF_DEG = 80.0
-MIN_EVENT_WEIGHT = 0.012  # g^2 s
-MIN_EVENT_FORWARD = 0.5  # g per g
+# An event whose forward differs by over _EVENT_OFF_DEG from the overall one means that the mount moved. Only events of
+# at least _MIN_EVENT_WEIGHT are judged, whose force is at least _MIN_EVENT_FORWARD times the one that the change of
+# speed requires: on recorded drives none of these ever differed by more than 40 degrees.
+_EVENT_OFF_DEG = const(80.0)
+_MIN_EVENT_WEIGHT = const(0.012)  # g^2 s
+_MIN_EVENT_FORWARD = const(0.5)  # g per g
 
 
 class DrivingQuality:
@@ -129,13 +130,13 @@ class DrivingQuality:
             return problem
         if self._vertical.is_car and (parts.roll_deg > ROLL_DEG or parts.pitch_deg > PITCH_DEG):
             return AlignmentError("mount-moved", "parts")
-        if self._is_last_event_off() or (parts.forward_deg > MOVED_DEG and parts.sigmas > STAY_AGREE_SIGMAS):
+        if self._is_last_event_off() or (parts.forward_deg > _MOVED_DEG and parts.sigmas > STAY_AGREE_SIGMAS):
             return AlignmentError("mount-moved", "forward")
         return None
 
     def _is_last_event_off(self):
-        """True if forward by the latest event that can be judged differs from the overall one by over EVENT_OFF_DEG."""
+        """True if forward by the latest event that can be judged is over _EVENT_OFF_DEG from the overall one."""
         forward, last = vector(), self._events.last
-        if last.forward(forward, self.fit.level) > MIN_EVENT_WEIGHT and norm(forward) > MIN_EVENT_FORWARD:
-            self._event_off = angle_deg(forward, self.fit.forward) > EVENT_OFF_DEG
+        if last.forward(forward, self.fit.level) > _MIN_EVENT_WEIGHT and norm(forward) > _MIN_EVENT_FORWARD:
+            self._event_off = angle_deg(forward, self.fit.forward) > _EVENT_OFF_DEG
         return self._event_off

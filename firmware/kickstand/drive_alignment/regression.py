@@ -14,13 +14,15 @@ the blocks are in use from then on.
 
 from array import array
 
+from ..units import const
+
 BLOCKS = 8
 LAG_STEP_US = 250_000
 LAGS = 11
 # The sums of one regression block: time in s, and integrals of a, c, a a, a c, c c, f (3), a f (3), c f (3) over it
-TERMS = 15
+_TERMS = const(15)
 SECONDS, A, C, AA, AC, CC, F, AF, CF = 0, 1, 2, 3, 4, 5, 6, 9, 12
-RIDGE = 1e-6  # g^2: keeps the coefficient of c at zero where the drive had no curve at all
+_RIDGE = const(1e-6)  # g^2: keeps the coefficient of c at zero where the drive had no curve at all
 
 
 class Fit:
@@ -34,14 +36,14 @@ class Fit:
         self.level = [0.0] * 3
         self.weight = self.seconds = self.explained = 0.0
         self.found = False
-        self.total = [0.0] * TERMS  # each Fit has its own, so that one can be made while another is half done
+        self.total = [0.0] * _TERMS  # each Fit has its own, so that one can be made while another is half done
 
 
 class ForwardRegression:
     """blocks: number of regression blocks in use; the last one is still being filled."""
 
     def __init__(self):
-        self._sums = [array("f", [0.0] * (BLOCKS * TERMS)) for _ in range(LAGS)]
+        self._sums = [array("f", [0.0] * (BLOCKS * _TERMS)) for _ in range(LAGS)]
         self._events_per_block = 1
         self._events_in_last = 0
         self.blocks = 1
@@ -50,7 +52,7 @@ class ForwardRegression:
         """Add one interval for one lag. seconds: its length; change_g: change of speed over it (g s); curve_g: its mean
         c; force: integral of the force over it (3, g s)."""
         sums = self._sums[lag]
-        k = (self.blocks - 1) * TERMS
+        k = (self.blocks - 1) * _TERMS
         a = change_g / seconds
         sums[k] += seconds
         sums[k + A] += change_g
@@ -75,9 +77,9 @@ class ForwardRegression:
             return
         for sums in self._sums:
             for block in range(BLOCKS):
-                to, source = block * TERMS, 2 * block * TERMS
-                for k in range(TERMS):
-                    sums[to + k] = sums[source + k] + sums[source + TERMS + k] if 2 * block < BLOCKS else 0.0
+                to, source = block * _TERMS, 2 * block * _TERMS
+                for k in range(_TERMS):
+                    sums[to + k] = sums[source + k] + sums[source + _TERMS + k] if 2 * block < BLOCKS else 0.0
                 yield
         self._events_per_block *= 2
         self.blocks = BLOCKS // 2 + 1
@@ -98,13 +100,13 @@ class ForwardRegression:
         left out."""
         sums, total = self._sums[lag], out.total
         out.found = False
-        for k in range(TERMS):
+        for k in range(_TERMS):
             total[k] = 0.0
         gathered = 0
         for block in range(first, min(last, self.blocks)):
             if block != without:
-                start = block * TERMS
-                for k in range(TERMS):
+                start = block * _TERMS
+                for k in range(_TERMS):
                     total[k] += sums[start + k]
                 gathered += 1
                 if gathered % 3 == 0:
@@ -117,7 +119,7 @@ class ForwardRegression:
         # the normal equations, with the means of a and c subtracted
         a, c = total[A] / n, total[C] / n
         aa = total[AA] - n * a * a
-        cc = total[CC] - n * c * c + RIDGE * n
+        cc = total[CC] - n * c * c + _RIDGE * n
         ac = total[AC] - n * a * c
         determinant = aa * cc - ac * ac
         if determinant <= 1e-6 * aa * cc:

@@ -3,16 +3,17 @@
 from math import sqrt
 
 from ..errors import AlignmentError
+from ..units import const
 
-NEGATIVE_MPS = -0.5  # noise around zero does not count as negative
+_NEGATIVE_MPS = const(-0.5)  # noise around zero does not count as negative
 # A second is lively if its mean force differs from that of the second before by this much. At standstill no second is
 # lively, while driving most are.
-LIVELY_G = 0.03
-TURNING_DPS = 5.0  # seconds in a bend are left out: they are lively at a constant speed too
-# The speed is stuck if it has not changed during at least STUCK_S lively seconds (as many as four braking events have
-# at their beginnings and ends), and these are at least STUCK_SHARE of all seconds since its last change.
-STUCK_S = 8
-STUCK_SHARE = 0.15
+_LIVELY_G = const(0.03)
+_TURNING_DPS = const(5.0)  # seconds in a bend are left out: they are lively at a constant speed too
+# The speed is stuck if it has not changed during at least _STUCK_S lively seconds (as many as four braking events have
+# at their beginnings and ends), and these are at least _STUCK_SHARE of all seconds since its last change.
+_STUCK_S = const(8)
+_STUCK_SHARE = const(0.15)
 # Limits of the change of force per change of speed, which should be 1. The pitch of a braking vehicle and a coarsely
 # rounded speed shift it by 0.2.
 MIN_FORCE_RATIO, MAX_FORCE_RATIO = 0.75, 1.35
@@ -52,7 +53,7 @@ class SpeedCheck:
 
     def measure(self, speed_mps):
         """Take a new value of the speed source."""
-        if not speed_mps >= NEGATIVE_MPS:  # also not-a-number
+        if not speed_mps >= _NEGATIVE_MPS:  # also not-a-number
             self.problem = AlignmentError("speed-negative", speed_mps)
         if speed_mps != self._speed:
             self._speed = speed_mps
@@ -75,13 +76,13 @@ class SpeedCheck:
     def update_second(self, force, yaw_dps=0.0):
         """Take mean force (3, g) and mean absolute yaw rate (deg/s) over the last second."""
         before, self._force_before = self._force_before, list(force)
-        turning = max(yaw_dps, self._yaw_dps_before) > TURNING_DPS
+        turning = max(yaw_dps, self._yaw_dps_before) > _TURNING_DPS
         self._yaw_dps_before = yaw_dps
         if before is None or self._speed is None or turning:
             return
         d0, d1, d2 = force[0] - before[0], force[1] - before[1], force[2] - before[2]
         self._seconds += 1
-        if sqrt(d0 * d0 + d1 * d1 + d2 * d2) > LIVELY_G:
+        if sqrt(d0 * d0 + d1 * d1 + d2 * d2) > _LIVELY_G:
             self._lively_seconds += 1
-        if self._lively_seconds >= STUCK_S and self._lively_seconds >= STUCK_SHARE * self._seconds:
+        if self._lively_seconds >= _STUCK_S and self._lively_seconds >= _STUCK_SHARE * self._seconds:
             self.problem = AlignmentError("speed-stuck", self._speed)

@@ -8,6 +8,7 @@ events correct. Any other difference is a mount that has moved.
 from math import atan2, degrees
 
 from ..rotation import angle_deg, dot
+from ..units import const
 from .regression import Fit
 
 UNKNOWN = 0  # not enough events yet
@@ -16,30 +17,31 @@ REFINED = 2  # a yaw error of some degrees: use the DriveAlignment's matrix()
 REVERSED = 3  # forward is backward: turn_round()
 MOVED = 4  # the mount has moved: align again
 
-MIN_EVENTS_TO_REVERSE = 2  # least number of straight events, which have to agree
-SAME_DEG = 1.0
-REFINED_DEG = 30.0  # largest yaw error: 2 degrees of pitch at the smallest allowed tilt between two poses make 22
-REVERSED_DEG = 135.0
-UPRIGHT_DEG = 8.0  # largest difference of up, by an inexact upright pose and the road's camber
+_MIN_EVENTS_TO_REVERSE = const(2)  # least number of straight events, which have to agree
+_SAME_DEG = const(1.0)
+# Largest yaw error: 2 degrees of pitch at the smallest allowed tilt between two poses make 22
+_REFINED_DEG = const(30.0)
+_REVERSED_DEG = const(135.0)
+_UPRIGHT_DEG = const(8.0)  # largest difference of up, by an inexact upright pose and the road's camber
 
 
 def compare(drive, matrix):
     """UNKNOWN, SAME, REFINED, REVERSED or MOVED. drive: a DriveAlignment; matrix: 9, rows left, up, forward."""
     events, quality = drive.events, drive.quality
-    if quality.speed_problem is not None or events.straight_count < MIN_EVENTS_TO_REVERSE:
+    if quality.speed_problem is not None or events.straight_count < _MIN_EVENTS_TO_REVERSE:
         return UNKNOWN
     yaw = abs(yaw_deg(quality.fit, matrix))
-    if yaw > REVERSED_DEG and _all_backward(events, matrix):
+    if yaw > _REVERSED_DEG and _all_backward(events, matrix):
         return REVERSED
     if drive.counted < drive.needed:
         return UNKNOWN
-    if angle_deg(quality.fit.level, matrix[3:6]) > UPRIGHT_DEG:
+    if angle_deg(quality.fit.level, matrix[3:6]) > _UPRIGHT_DEG:
         return MOVED
     if not drive.ready:
         return UNKNOWN
-    if yaw > REFINED_DEG:
+    if yaw > _REFINED_DEG:
         return MOVED
-    return REFINED if yaw > max(SAME_DEG, quality.quality_deg) else SAME
+    return REFINED if yaw > max(_SAME_DEG, quality.quality_deg) else SAME
 
 
 def yaw_deg(fit, matrix):

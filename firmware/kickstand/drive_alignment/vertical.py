@@ -10,22 +10,24 @@ the road's camber and slope tilt both alike.
 
 from ..errors import AlignmentError
 from ..rotation import angle_deg, norm, normalize, vector
+from ..units import const
 
-STANDING_MPS = 0.5  # a lower speed is standing: a GPS at rest shows up to this
+_STANDING_MPS = const(0.5)  # a lower speed is standing: a GPS at rest shows up to this
 MOVED_MPS = 2.0  # a vehicle that was faster than this has driven: its next stop is another one
 SETTLE_S = 1.0  # a vehicle rocks back after braking
 COUNTS_S = 2.0  # after settling, a stop has to last this long to count
-# Largest difference at a stop of a mean over 0.1 s from a mean with the time constant AVERAGE_S. A diesel at idle, wind
-# and passengers make less.
-STILL_G = 0.06
-STILL_DPS = 3.0
-AVERAGE_S = 0.5
-SAME_STOP_DEG = 1.5  # doors and passengers tilt a standing vehicle by less
-TURNED_S = 6.0  # a sensor still for so long at another angle was rotated: a late speed of zero would be over by then
+# Largest difference at a stop of a mean over 0.1 s from a mean with the time constant _AVERAGE_S. A diesel at idle,
+# wind and passengers make less.
+_STILL_G = const(0.06)
+_STILL_DPS = const(3.0)
+_AVERAGE_S = const(0.5)
+_SAME_STOP_DEG = const(1.5)  # doors and passengers tilt a standing vehicle by less
+# a sensor still for so long at another angle was rotated: a late speed of zero would be over by then
+_TURNED_S = const(6.0)
 # A rate that differs by more from the bias at the last stop is a bend, and a speed of zero in it is wrong. Warming up
 # changes the bias by less.
 TURNING_DPS = 10.0
-MEAN_S = 60.0  # time constant of the mean force, which serves as the vertical until there is a better one
+_MEAN_S = const(60.0)  # time constant of the mean force, which serves as the vertical until there is a better one
 MAX_CHANGE_DEG = 8.0  # largest difference of two verticals by slopes of the road (14 %): beyond, the mount has moved
 
 
@@ -52,7 +54,7 @@ class StandingVertical:
         self._stop_bias = [0.0] * 3
         self._averaged_s = 0.0
         self._counted = False
-        self._force = None  # mean with the time constant AVERAGE_S
+        self._force = None  # mean with the time constant _AVERAGE_S
         self._still_s = 0.0
 
     def update(self, force, rate, speed_mps, seconds):
@@ -63,7 +65,7 @@ class StandingVertical:
                     self._sum[i] += self._direction[i]
             self._begin_stop()
         self.standing = False
-        if speed_mps > STANDING_MPS or not self._is_still(force, rate, seconds):
+        if speed_mps > _STANDING_MPS or not self._is_still(force, rate, seconds):
             self._still_s = 0.0
             return
         self._still_s += seconds
@@ -71,9 +73,9 @@ class StandingVertical:
             return
         if self._counted:
             apart_deg = angle_deg(self._force, self._stop_force)
-            if apart_deg > SAME_STOP_DEG:
+            if apart_deg > _SAME_STOP_DEG:
                 # Either the vehicle drives again while a late speed still says zero, or the sensor was rotated.
-                self.moved = self.moved or (apart_deg > MAX_CHANGE_DEG and self._still_s > TURNED_S)
+                self.moved = self.moved or (apart_deg > MAX_CHANGE_DEG and self._still_s > _TURNED_S)
                 return
         self.standing = True
         self._average(force, rate, seconds)
@@ -82,7 +84,7 @@ class StandingVertical:
         """True if force and rate are near their running means, and rate near the bias of the last stop."""
         if self._force is None:
             self._force, self._rate = list(force), list(rate)
-        gain = min(1.0, seconds / AVERAGE_S)
+        gain = min(1.0, seconds / _AVERAGE_S)
         from_force = from_rate = from_bias = 0.0  # squared differences
         for i in range(3):
             d = force[i] - self._force[i]
@@ -94,7 +96,7 @@ class StandingVertical:
             d = rate[i] - self.bias[i]
             from_bias += d * d
         turning = self.stops and from_bias > TURNING_DPS * TURNING_DPS
-        return not (turning or from_force > STILL_G * STILL_G or from_rate > STILL_DPS * STILL_DPS)
+        return not (turning or from_force > _STILL_G * _STILL_G or from_rate > _STILL_DPS * _STILL_DPS)
 
     def _average(self, force, rate, seconds):
         self._averaged_s += seconds
@@ -125,13 +127,13 @@ class Vertical:
         self.is_car = is_car
         self._from_pose = vector(from_pose[0], from_pose[1], from_pose[2]) if from_pose is not None else None
         self._standing = standing
-        self._mean = None  # mean force (3, g) with the time constant MEAN_S
+        self._mean = None  # mean force (3, g) with the time constant _MEAN_S
         self._mean_s = 0.0
 
     def update(self, force, seconds):
         """Take force (3, g): the mean over the last `seconds`."""
         self._mean = self._mean or vector()
-        self._mean_s = min(MEAN_S, self._mean_s + seconds)
+        self._mean_s = min(_MEAN_S, self._mean_s + seconds)
         gain = seconds / self._mean_s
         for i in range(3):
             self._mean[i] += gain * (force[i] - self._mean[i])

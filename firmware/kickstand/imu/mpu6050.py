@@ -68,9 +68,11 @@ _ZERO_C = const(2)
 _HAS_ACCEL_CONFIG2 = const(3)
 _FIFO_EN_BITS = const(5)
 
-MAX_FRAMES = 8  # most frames in one transfer, to catch up: 3 ms at 400 kHz
-FEW_FRAMES = 3  # most while fewer than MAX_FRAMES wait, so that one slow pass of the loop does not slow the next one
-FROZEN_MS = 100  # readings repeated for longer are a fault: noise changes those of a working chip in every sample
+_MAX_FRAMES = const(8)  # most frames in one transfer, to catch up: 3 ms at 400 kHz
+# Most while fewer than _MAX_FRAMES wait, so that one slow pass of the loop does not slow the next one
+_FEW_FRAMES = const(3)
+# Readings repeated for longer are a fault: noise changes those of a working chip in every sample
+_FROZEN_MS = const(100)
 
 
 class UnknownChip(Exception):
@@ -113,9 +115,9 @@ class Mpu6050:
         self._configuration = bytes((self.period_ms - 1, dlpf, gyro_bits, accel_bits, dlpf))  # SMPLRT_DIV and on
         self._one, self._two, self._three = bytearray(1), bytearray(2), bytearray(3)
         self._readback = bytearray(_FIFO_EN - _SMPLRT_DIV + 1)
-        self._frames = bytearray(FRAME * MAX_FRAMES)
+        self._frames = bytearray(FRAME * _MAX_FRAMES)
         # The first n frames, for each n: made once, because each slice takes heap.
-        self._some_frames = [memoryview(self._frames)[: FRAME * n] for n in range(MAX_FRAMES + 1)]
+        self._some_frames = [memoryview(self._frames)[: FRAME * n] for n in range(_MAX_FRAMES + 1)]
         self.frames_left = self.overflows = 0
         self._most = 0  # bytes that have waited in the FIFO
         self._odd = False  # the last fetch() found a frame that was not complete
@@ -123,7 +125,7 @@ class Mpu6050:
         self._started = False  # setup() has run to its end: the FIFO is filling
         self._full = 0  # with so many bytes in it the FIFO may have overflowed
         self.counts, self.sums = array("h", [0] * 7), array("i", [0] * 7)
-        self.axes = AxisWatch(rate_hz, accel_bits >> 3, gyro_bits >> 3, dlpf, rate_hz * FROZEN_MS // 1000)
+        self.axes = AxisWatch(rate_hz, accel_bits >> 3, gyro_bits >> 3, dlpf, rate_hz * _FROZEN_MS // 1000)
 
     @property
     def name(self):
@@ -205,8 +207,8 @@ class Mpu6050:
         self.take(0)
 
     def fetch(self):
-        """Read waiting samples from the FIFO and return their number: MAX_FRAMES if as many wait, else at most
-        FEW_FRAMES. Sets frames_left. Raises OSError from the bus, or as restart_fifo() does.
+        """Read waiting samples from the FIFO and return their number: _MAX_FRAMES if as many wait, else at most
+        _FEW_FRAMES. Sets frames_left. Raises OSError from the bus, or as restart_fifo() does.
 
         After an overflow the frames no longer begin at multiples of 14 bytes. Then the FIFO is emptied, overflows is
         incremented, and 0 is returned. 0 is also returned while the chip is writing a frame: see below.
@@ -226,7 +228,7 @@ class Mpu6050:
         if odd:  # the chip may be writing a frame; if the next count is odd as well, an overflow has cut one
             self.frames_left = n + 1
             return 0
-        taken = MAX_FRAMES if n >= MAX_FRAMES else FEW_FRAMES if n > FEW_FRAMES else n
+        taken = _MAX_FRAMES if n >= _MAX_FRAMES else _FEW_FRAMES if n > _FEW_FRAMES else n
         self.frames_left = n - taken
         if taken:
             self._i2c.readfrom_mem_into(self.address, _FIFO_R_W, self._some_frames[taken])
@@ -245,7 +247,7 @@ class Mpu6050:
 
         Samples at the end of the range are left out, and take() then finds only the others; axes.notes[LOST] is their
         number. It stops at a sample that only a dead chip sends: a force of all zeros or all ones, or the same reading
-        as for FROZEN_MS before it."""
+        as for _FROZEN_MS before it."""
         return add_up(self._frames, n, self.sums, self.axes.notes)
 
     def restart_fifo(self):

@@ -4,18 +4,19 @@ samples' times."""
 from time import ticks_add, ticks_diff, ticks_ms
 
 from ..errors import Notice
+from ..units import const
 from .fifo_frames import DUE, LOST
 from .mpu6050 import UnknownChip
 
-RETRY_MS = 50  # time between two attempts to set the chip up
-FAILURES = 3  # so many failed transfers in a row are a fault; a NACK or two are tolerated
-SILENT_MS = 100  # this long without a sample is a fault
-STALE_MS = 500  # and this long if all samples were lost in overflows, because the board had no time to read
-SETTLED_MS = 1000  # a fault sooner after a set-up than this has outlasted the set-up
-FRUITLESS = 3  # after so many of those in a row the FIFO is tried out
+_RETRY_MS = const(50)  # time between two attempts to set the chip up
+_FAILURES = const(3)  # so many failed transfers in a row are a fault; a NACK or two are tolerated
+_SILENT_MS = const(100)  # this long without a sample is a fault
+_STALE_MS = const(500)  # and this long if all samples were lost in overflows, because the board had no time to read
+_SETTLED_MS = const(1000)  # a fault sooner after a set-up than this has outlasted the set-up
+_FRUITLESS = const(3)  # after so many of those in a row the FIFO is tried out
 # Of set-ups in a row that fail: the first one that is explained, and each so many later, about once a second
 EXPLAINED, EXPLAINED_EVERY = 3, 20
-CORRECTION_SHIFT = 4  # SampleClock.emptied() corrects by 1/16 of the difference between the two clocks
+_CORRECTION_SHIFT = const(4)  # SampleClock.emptied() corrects by 1/16 of the difference between the two clocks
 
 
 class Sensor:
@@ -26,7 +27,7 @@ class Sensor:
     Notice or None. None: no such function.
     found: the addresses on the bus when it was last explained, a list.
     fault: None, or a Notice: what is wrong.  restarts: number of times that the chip was set up, that no sample could
-    be read for STALE_MS, or that an axis was ill. After each, samples do not follow on from those before.  clipped:
+    be read for _STALE_MS, or that an axis was ill. After each, samples do not follow on from those before.  clipped:
     samples that fetch() has left out, because an axis was at the end of its range; the caller sets it to 0.
     """
 
@@ -36,7 +37,7 @@ class Sensor:
         self.explain = explain
         self.found = []
         self._refused = 0  # set-ups that failed in a row
-        self._fruitless = 0  # set-ups in a row that a fault followed within SETTLED_MS
+        self._fruitless = 0  # set-ups in a row that a fault followed within _SETTLED_MS
         self._started_ms = 0
         self._failures = 0  # transfers that failed in a row
         self._overflows = 0  # the chip's overflows that have been dealt with
@@ -122,16 +123,16 @@ class Sensor:
                 self._read_ms = self._sample_ms
             # now_ms may be from before the long pause that led to the overflow
             self._sample_ms = self._emptied_ms = ticks_ms()
-            if ticks_diff(self._emptied_ms, self._read_ms) > STALE_MS:
+            if ticks_diff(self._emptied_ms, self._read_ms) > _STALE_MS:
                 self.fault = self._fifo_fault() or Notice("readings-lost")
                 self.restarts += 1
-        elif ticks_diff(now_ms, self._sample_ms) > SILENT_MS:
+        elif ticks_diff(now_ms, self._sample_ms) > _SILENT_MS:
             self._fail_again("sensor-silent", now_ms)
 
     def _fail_again(self, code, now_ms):
         """Fail, and name the FIFO if set-ups do not help because that is broken."""
-        self._fruitless = self._fruitless + 1 if ticks_diff(now_ms, self._started_ms) < SETTLED_MS else 1
-        fault = self._fifo_fault() if self._fruitless % FRUITLESS == 0 else self._named_fifo()
+        self._fruitless = self._fruitless + 1 if ticks_diff(now_ms, self._started_ms) < _SETTLED_MS else 1
+        fault = self._fifo_fault() if self._fruitless % _FRUITLESS == 0 else self._named_fifo()
         self._fail(code, now_ms)
         if fault:
             self.fault = fault
@@ -158,9 +159,9 @@ class Sensor:
             self._missed(now_ms)
 
     def _missed(self, now_ms):
-        """Count a failed transfer: FAILURES of them in a row are a fault."""
+        """Count a failed transfer: _FAILURES of them in a row are a fault."""
         self._failures += 1
-        if self._failures >= FAILURES:
+        if self._failures >= _FAILURES:
             self._fail("sensor-lost", now_ms)
 
     def _fail(self, code, now_ms):
@@ -173,7 +174,7 @@ class Sensor:
         Raises SettingsError for pins that cannot be used, and nothing else. now_ms: ticks_ms()."""
         if self._ready or ticks_diff(now_ms, self._due_ms) < 0:
             return
-        wait_ms = RETRY_MS
+        wait_ms = _RETRY_MS
         try:
             if self._steps is None:
                 self.chip.connect(self.reopen())
@@ -261,4 +262,4 @@ class SampleClock:
             self.lost += (late_us - self._pending_us) // self._period_us
             self._pending_us = late_us
         else:
-            self._pending_us = late_us >> CORRECTION_SHIFT
+            self._pending_us = late_us >> _CORRECTION_SHIFT

@@ -40,7 +40,7 @@ lean.
 
 from math import cos, radians, sin, sqrt
 
-from ..units import STANDARD_GRAVITY
+from ..units import STANDARD_GRAVITY, const
 
 STATES = 12
 LEAN, PITCH, SPEED = 0, 1, 2
@@ -53,13 +53,13 @@ MAX_PITCH = 1.2  # rad. No motorcycle reaches it, a sensor in the hand may; at 9
 MIN_PITCH = -MAX_PITCH  # once: in each sample a negation would take heap and time
 
 # Where the yaw rate of a bike in balance replaces the measured one. Comments in the form of measurements.py.
-BALANCE_MIN_SPEED = 4.0  # m/s. Larger: the balanced rate is not used in slow turns.
-# The balanced rate is used where the measured one is within BALANCE_RATE + BALANCE_SHARE x |balanced rate| of it.
-BALANCE_RATE = 0.1  # rad/s: constant part of that tolerance. Larger: used too where lean or speed are wrong.
-BALANCE_SHARE = 0.5  # ratio: part of that tolerance that grows with the rate. Larger: as above.
+_BALANCE_MIN_SPEED = const(4.0)  # m/s. Larger: the balanced rate is not used in slow turns.
+# The balanced rate is used where the measured one is within _BALANCE_RATE + _BALANCE_SHARE x |balanced rate| of it.
+_BALANCE_RATE = const(0.1)  # rad/s: constant part of that tolerance. Larger: used too where lean or speed are wrong.
+_BALANCE_SHARE = const(0.5)  # ratio: part of that tolerance that grows with the rate. Larger: as above.
 # rad: the lean's standard deviation has to be smaller. Larger: the balanced rate is used with a lean that is uncertain.
 BALANCE_SIGMA = radians(20.0)
-BALANCE_MIN_COS = 0.3  # ratio: lower bound of cos(lean). Larger: too little rate about left in deep leans.
+_BALANCE_MIN_COS = const(0.3)  # ratio: lower bound of cos(lean). Larger: too little rate about left in deep leans.
 
 
 def predict(x, force, rate, seconds, sums):
@@ -123,10 +123,10 @@ def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
     Noise of a measured rate would be squared in such products, and speed and lean would be estimated too small (the
     problem of errors in variables).
     """
-    if speed > BALANCE_MIN_SPEED:
+    if speed > _BALANCE_MIN_SPEED:
         balanced = -STANDARD_GRAVITY * cos_pitch * sin_lean / speed
-        if abs(rate_up - balanced) < BALANCE_SHARE * abs(balanced) + BALANCE_RATE:
-            return balanced * sin_lean / max(cos_lean, BALANCE_MIN_COS), balanced
+        if abs(rate_up - balanced) < _BALANCE_SHARE * abs(balanced) + _BALANCE_RATE:
+            return balanced * sin_lean / max(cos_lean, _BALANCE_MIN_COS), balanced
     return rate_left, rate_up
 
 

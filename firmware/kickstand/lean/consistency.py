@@ -15,26 +15,29 @@ What does not fit is doubted, and the lean hidden until all has fitted for a whi
 a fault of the sensor.
 """
 
+from ..units import const
+
 # Symbol = default  # unit: what it is. "Larger:" says what raising it does.
-SHORT_S = 3.0  # s: time constant of the short means. Larger: seen later, and less of what is sound is hidden.
-LONG_S = 10.0  # s: that of the others. Larger: as above.
-MOST = 4.0  # standard deviations: a larger innovation counts as this. Larger: a blow counts for more.
+_SHORT_S = const(3.0)  # s: time constant of the short means. Larger: seen later, and less of what is sound is hidden.
+_LONG_S = const(10.0)  # s: that of the others. Larger: as above.
+_MOST = const(4.0)  # standard deviations: a larger innovation counts as this. Larger: a blow counts for more.
 # Limits of the means. Larger, each: less is hidden, also of what is wrong. On sound rides on good and bad roads and
 # mounts they reach .4, .25, .7, .25, .12 and 8 degrees.
 LEFT_SHORT, LEFT_LONG = 0.75, 0.5  # standard deviations
 UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations
-SIDEWAYS = 0.15  # ratio: force to the side over force up, less the trim
-STEEP = 0.21  # rad: pitch
-MOST_SIDEWAYS = 0.5  # ratio: more counts as this. Larger: a blow counts for more.
-STRICT = 0.85  # ratio: share of the limits after a doubt. Larger: a fault that is still there is seen later.
-FIT = 0.6  # ratio: share of the limits in which the means have to stay while doubted. Larger: shown again sooner.
+_SIDEWAYS = const(0.15)  # ratio: force to the side over force up, less the trim
+_STEEP = const(0.21)  # rad: pitch
+_MOST_SIDEWAYS = const(0.5)  # ratio: more counts as this. Larger: a blow counts for more.
+_STRICT = const(0.85)  # ratio: share of the limits after a doubt. Larger: a fault that is still there is seen later.
+# ratio: share of the limits in which the means have to stay while doubted. Larger: shown again sooner.
+_FIT = const(0.6)
 # s: for how long, after the first doubt, the second and so on. Larger: a fault that is over is hidden for longer.
 HOLDS_S = (3.0, 4.0, 4.0, 20.0, 60.0)
-GAP_S = 4.5  # s: the same after a gap of the readings. Larger: as above.
+_GAP_S = const(4.5)  # s: the same after a gap of the readings. Larger: as above.
 MILD = 3  # doubts; after more of them it has to fit in turns, because on a straight nearly all does, and is called odd
 # s: then the next doubt comes no sooner, so that rest is found. Larger: what has changed is found later.
-AGAIN_S = 12.0
-TURNING = 0.05  # rad/s: yaw rate of a turn. Larger: it takes longer.
+_AGAIN_S = const(12.0)
+_TURNING = const(0.05)  # rad/s: yaw rate of a turn. Larger: it takes longer.
 FORGET_S = 60.0  # s: fitting for so long takes one doubt back. Larger: a fault that comes again is hidden for longer.
 
 last_odd = None  # the last code of `odd`, for the status report
@@ -67,35 +70,35 @@ class Consistency:
         """Take a window of `seconds` while riding. left, up: the normalised innovations of these forces. sideways:
         force to the side over force up. pitch in rad, yaw_rate in rad/s. Returns True if just now it does not fit any
         more."""
-        gain, long_gain = min(1.0, seconds / SHORT_S), min(1.0, seconds / LONG_S)
-        left, up = max(-MOST, min(MOST, left)), max(-MOST, min(MOST, up))
+        gain, long_gain = min(1.0, seconds / _SHORT_S), min(1.0, seconds / _LONG_S)
+        left, up = max(-_MOST, min(_MOST, left)), max(-_MOST, min(_MOST, up))
         self._left += gain * (left - self._left)
         self._up += gain * (up - self._up)
         self._left_long += long_gain * (left - self._left_long)
         self._up_long += long_gain * (up - self._up_long)
-        self._side += long_gain * (max(-MOST_SIDEWAYS, min(MOST_SIDEWAYS, sideways)) - self._side)
+        self._side += long_gain * (max(-_MOST_SIDEWAYS, min(_MOST_SIDEWAYS, sideways)) - self._side)
         self._pitch += long_gain * (pitch - self._pitch)
-        left = max(abs(self._left) / LEFT_SHORT, abs(self._left_long) / LEFT_LONG, abs(self._side) / SIDEWAYS)
+        left = max(abs(self._left) / LEFT_SHORT, abs(self._left_long) / LEFT_LONG, abs(self._side) / _SIDEWAYS)
         up = max(abs(self._up) / UP_SHORT, abs(self._up_long) / UP_LONG)
-        pitch = abs(self._pitch) / STEEP
+        pitch = abs(self._pitch) / _STEEP
         worst = max(left, up, pitch)
         self._since_s += seconds
-        if self.doubts > MILD and self._since_s < AGAIN_S:
-            if worst > FIT:
+        if self.doubts > MILD and self._since_s < _AGAIN_S:
+            if worst > _FIT:
                 self._fits_s = 0.0
-        elif not worst <= (STRICT if self.doubts else 1.0):
+        elif not worst <= (_STRICT if self.doubts else 1.0):
             self.fail("odd-left" if worst == left else "odd-up" if worst == up else "odd-pitch")
             return True
-        elif self.doubt and worst > FIT:
+        elif self.doubt and worst > _FIT:
             self._fits_s = 0.0
-        elif self.doubts <= MILD or abs(yaw_rate) > TURNING:
+        elif self.doubts <= MILD or abs(yaw_rate) > _TURNING:
             self._fit(seconds)
         return False
 
     def rest(self, seconds):
         """Take a window at rest. After a gap the force then shows the lean."""
         if self.doubt and self._in_rest and self.doubts <= MILD:
-            self._fit(seconds if self.doubts else GAP_S)
+            self._fit(seconds if self.doubts else _GAP_S)
 
     def fail(self, code):
         """Doubt, because it does not fit. code: see odd."""
@@ -109,7 +112,7 @@ class Consistency:
     def _fit(self, seconds):
         self._fits_s += seconds
         if self.doubt:
-            if self._fits_s >= (HOLDS_S[self.doubts - 1] if self.doubts else GAP_S):
+            if self._fits_s >= (HOLDS_S[self.doubts - 1] if self.doubts else _GAP_S):
                 self.doubt, self.odd, self._fits_s = False, None, 0.0
         elif self.doubts and self._fits_s >= FORGET_S:
             self.doubts -= 1

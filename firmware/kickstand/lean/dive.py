@@ -10,15 +10,16 @@ Where the road's slope changes and the bike does not brake, the pitch rate has n
 the pitch rate on a' finds the share: sum(a' pitch rate) / sum(a'^2), each sum with a prior.
 """
 
-from ..units import STANDARD_GRAVITY
+from ..units import STANDARD_GRAVITY, const
 
 # Symbol = default  # unit: what it is. "Larger:" says what raising it does.
 PRIOR_SHARE = 0.026  # rad per g: 1.5 degrees per g. Larger: before the share is found, more pitch counts as dive.
-PRIOR_SQUARE = 5.3  # (g/s)^2: weight of that prior in the sum of a'^2. Larger: the share is found later, and steadier.
-MIN_SHARE = -0.035  # rad per g: anti-dive forks lift the nose a little
-MAX_SHARE = 0.14  # rad per g: 8 degrees per g, as of soft long forks
-MIN_SPEED = 5.0  # m/s. Larger: braking to a stop tells less.
-MAX_JERK = 3.0  # g/s. Larger: bumps and lost readings count as braking.
+# (g/s)^2: weight of that prior in the sum of a'^2. Larger: the share is found later, and steadier.
+_PRIOR_SQUARE = const(5.3)
+_MIN_SHARE = const(-0.035)  # rad per g: anti-dive forks lift the nose a little
+_MAX_SHARE = const(0.14)  # rad per g: 8 degrees per g, as of soft long forks
+_MIN_SPEED = const(5.0)  # m/s. Larger: braking to a stop tells less.
+_MAX_JERK = const(3.0)  # g/s. Larger: bumps and lost readings count as braking.
 
 
 class Dive:
@@ -26,8 +27,8 @@ class Dive:
 
     def __init__(self):
         self.share = PRIOR_SHARE
-        self._product = PRIOR_SHARE * PRIOR_SQUARE  # sum of a' times the pitch rate
-        self._square = PRIOR_SQUARE  # sum of a'^2
+        self._product = PRIOR_SHARE * _PRIOR_SQUARE  # sum of a' times the pitch rate
+        self._square = _PRIOR_SQUARE  # sum of a'^2
         self.restart()
 
     def restart(self):
@@ -45,10 +46,10 @@ class Dive:
         if last_push is None:
             return 0.0
         jerk = (push - last_push) / seconds  # in g/s, from the middle of the last window to the middle of this one
-        if not -MAX_JERK < jerk < MAX_JERK:  # also not-a-number
+        if not -_MAX_JERK < jerk < _MAX_JERK:  # also not-a-number
             return 0.0
-        if speed > MIN_SPEED:
+        if speed > _MIN_SPEED:
             self._product += jerk * 0.5 * (pitch_rate + last_rate)
             self._square += jerk * jerk
-            self.share = max(MIN_SHARE, min(MAX_SHARE, self._product / self._square))
+            self.share = max(_MIN_SHARE, min(_MAX_SHARE, self._product / self._square))
         return speed * self.share * jerk / STANDARD_GRAVITY

@@ -7,11 +7,13 @@ are given as ((state, value), ...), because most of their values are zero.
 
 from math import sqrt
 
-MIN_VARIANCE = 1e-10  # rounding in 32-bit floats could make a variance negative
+from ..units import const
+
+_MIN_VARIANCE = const(1e-10)  # rounding in 32-bit floats could make a variance negative
 # How much is done between two yields: about a millisecond on an RP2040
-TERMS_PER_STEP = 3  # terms of a Jacobian's row
-ROWS_PER_STEP = 8  # rows of the covariance's triangle: the first eight of twelve are half of the work
-GATE = 25.0  # 5 sigma, squared. An innovation beyond it is not dropped, because the state may be what is wrong.
+_TERMS_PER_STEP = const(3)  # terms of a Jacobian's row
+_ROWS_PER_STEP = const(8)  # rows of the covariance's triangle: the first eight of twelve are half of the work
+_GATE = const(25.0)  # 5 sigma, squared. An innovation beyond it is not dropped, because the state may be what is wrong.
 
 
 class Covariance:
@@ -48,7 +50,7 @@ class Covariance:
         rows = self.rows
         row = rows[i]
         for m, (j, a) in enumerate(derivatives):
-            if m == TERMS_PER_STEP:
+            if m == _TERMS_PER_STEP:
                 yield
             a *= seconds
             source = rows[j]
@@ -66,7 +68,7 @@ class Covariance:
         """One scalar measurement: K = P H^T / (H P H^T + R), correction += K innovation, P -= K H P. A generator.
 
         derivatives: H, ((state, d measurement / d state), ...).  innovation: measured minus expected, for the states
-        before this window's corrections.  variance: R, in the measurement's unit squared. Beyond GATE the
+        before this window's corrections.  variance: R, in the measurement's unit squared. Beyond _GATE the
         innovation's variance is raised until it lies on it. misfit is then the innovation in standard deviations.
         """
         rows, column, correction = self.rows, self._column, self.correction
@@ -75,7 +77,7 @@ class Covariance:
         for i in range(n):
             column[i] = h * rows[j][i]
         for m in range(1, len(derivatives)):
-            if m == TERMS_PER_STEP:
+            if m == _TERMS_PER_STEP:
                 yield
             j, h = derivatives[m]
             row = rows[j]
@@ -87,8 +89,8 @@ class Covariance:
             innovation -= h * correction[j]
         square = innovation * innovation
         self.misfit = innovation / sqrt(expected)
-        if square > GATE * expected:
-            expected = square / GATE
+        if square > _GATE * expected:
+            expected = square / _GATE
         innovation /= expected
         for i in range(n):
             correction[i] += column[i] * innovation
@@ -98,9 +100,9 @@ class Covariance:
             row = rows[i]
             for j in range(i + 1):
                 rows[j][i] = row[j] = row[j] - gain * column[j]
-            if row[i] < MIN_VARIANCE:
-                row[i] = MIN_VARIANCE
-            if i == ROWS_PER_STEP - 1:
+            if row[i] < _MIN_VARIANCE:
+                row[i] = _MIN_VARIANCE
+            if i == _ROWS_PER_STEP - 1:
                 yield
         yield
 

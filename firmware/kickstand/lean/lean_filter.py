@@ -12,7 +12,7 @@ window: each of them runs it as far as its next yield. Forces are in g, speeds i
 
 from math import atan2, degrees, pi, sin, sqrt
 
-from ..units import STANDARD_GRAVITY
+from ..units import STANDARD_GRAVITY, const
 from . import measurements
 from .bike_model import (
     BIAS_LEFT,
@@ -32,14 +32,14 @@ from .kalman import Covariance
 from .rest import MAX_BIAS_RADPS, RestDetector
 from .upright_trim import UprightTrim
 
-WINDOW_US = 200_000
-FIRST_WINDOW_US = 50_000
+_WINDOW_US = const(200_000)
+_FIRST_WINDOW_US = const(50_000)
 WORK_STEPS = 21  # steps of the work on a window; a test counts them
-SLOW_STEP_US = 12_000  # samples that are further apart leave time for all steps at once
+_SLOW_STEP_US = const(12_000)  # samples that are further apart leave time for all steps at once
 DELAY_S = 0.0048  # delay of the MPU6050's gyro at DLPF 3
 # m/s: the filter restarts above it. A board that lies on its nose seems to accelerate, but its standstill is detected
 # before it gets there.
-MAX_SPEED = 250.0
+_MAX_SPEED = const(250.0)
 
 
 class LeanFilter:
@@ -186,7 +186,7 @@ class LeanFilter:
                 if next(self._work, True):  # a yield gives None, the end gives True
                     self._work = None
                     break
-        elif self._window_us >= (WINDOW_US if self._p is not None else FIRST_WINDOW_US):
+        elif self._window_us >= (_WINDOW_US if self._p is not None else _FIRST_WINDOW_US):
             self._end_window()
         if self._p is None:
             return degrees(atan2(sums[5], sums[6]))
@@ -200,13 +200,13 @@ class LeanFilter:
         seconds = self._window_us * 1e-6
         for i in range(9):
             self._sums[i] = 0.0
-        self._steps = WORK_STEPS if self._window_us > n * SLOW_STEP_US else 1
+        self._steps = WORK_STEPS if self._window_us > n * _SLOW_STEP_US else 1
         self._count = self._window_us = 0
         x = self._x
         if self._p is None:
             self._start(means)
             return
-        if not (abs(x[LEAN]) < 2 * pi and x[SPEED] < MAX_SPEED):  # also not-a-number
+        if not (abs(x[LEAN]) < 2 * pi and x[SPEED] < _MAX_SPEED):  # also not-a-number
             self.consistency.gap()
             self._forget()  # the sensor's errors may be no numbers either
             return

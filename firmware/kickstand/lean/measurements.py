@@ -10,7 +10,7 @@ Standing still and the trim have their own parameters in rest.py and upright_tri
 
 from math import radians
 
-from ..units import STANDARD_GRAVITY
+from ..units import STANDARD_GRAVITY, const
 from .bike_model import BIAS_LEFT, LEAN, PITCH, SCALE_LEFT, SPEED, YAW_ERROR
 
 # Symbol = default  # unit: what it is. "Larger:" says what raising it does.
@@ -55,7 +55,7 @@ SIGMA_BALANCE_SPEED = 12.0  # m/s. Larger: a bike that is pushed about is taken 
 MOST_FORWARD = 1.5
 # ratio: change of the gyro's errors with temperature since the six positions have measured them; the data sheet allows
 # 2 % from -40 to 85 C. Larger: what was measured counts for less.
-SIGMA_GYRO_DRIFT = 0.002
+_SIGMA_GYRO_DRIFT = const(0.002)
 # rad/s: the bias where the pose on the kickstand has just measured it. Larger: after it the lean is shown later.
 SIGMA_FRESH_BIAS = radians(0.2)
 # rad: the first lean's standard deviation where the bike moves. Larger: lean is shown later, and follows forces more.
@@ -74,22 +74,24 @@ SIGMA_LOST_RATE = radians(30.0)
 SIGMA_LOST_FORCE = 0.3  # g: likewise for the forward force. Larger, both: after a gap the lean is hidden longer.
 
 # Measurement noise while riding
-SIGMA_LEFT = 0.04  # g: force to the left. Larger: lean follows it less, and the gyro and level roads more.
-SIGMA_UP = 0.07  # g: upward force, which bumps disturb. Larger: in held turns scale errors are found later.
+_SIGMA_LEFT = const(0.04)  # g: force to the left. Larger: lean follows it less, and the gyro and level roads more.
+_SIGMA_UP = const(0.07)  # g: upward force, which bumps disturb. Larger: in held turns scale errors are found later.
 # times speed x pitch rate / g: noise of the upward force (1 sigma), and times sin(lean) that of the force to the left,
 # because the springs pitch the bike while its wheels do not rise. Larger: braking disturbs less.
-PITCHING_SHARE = 2.0
+_PITCHING_SHARE = const(2.0)
 # ratio: part of the samples' variance by vibration that stays in a window's mean, and is added to the noise of the
 # force to the left. Larger: forces count less on rough roads.
-SHAKEN_SHARE = 0.1
-ROLL_HEIGHT_M = 0.4  # m: h, the sensor's height above the roll axis. Larger: rolling explains more of the force.
-SIGMA_ROLL_HEIGHT_M = 0.4  # m: standard deviation of h. Larger: forces count less while the bike rolls quickly.
-SIGMA_MEASURED_SPEED = 1.0  # m/s: speed by a receiver or a wheel sensor. Larger: it counts for less.
+_SHAKEN_SHARE = const(0.1)
+# m: h, the sensor's height above the roll axis. Larger: rolling explains more of the force.
+_ROLL_HEIGHT_M = const(0.4)
+_SIGMA_ROLL_HEIGHT_M = const(0.4)  # m: standard deviation of h. Larger: forces count less while the bike rolls quickly.
+_SIGMA_MEASURED_SPEED = const(1.0)  # m/s: speed by a receiver or a wheel sensor. Larger: it counts for less.
 # ratio: scale error of that speed, by the tyre, which is smaller where the bike leans, by slip, and by the gyro's up
 # axis: speed x yaw rate has both errors. Larger: measured speeds count for less, most where the bike is fast.
-SIGMA_SPEED_SCALE = 0.05
+_SIGMA_SPEED_SCALE = const(0.05)
 MEASURED_SPEED_S = 4.0  # s: how long these errors last. Larger: measured speeds count for less.
-MEASURED_SPEED_LATE_S = 1.0  # s: delay that speed may have. Larger: it counts for less while speeding up and braking.
+# s: delay that speed may have. Larger: it counts for less while speeding up and braking.
+_MEASURED_SPEED_LATE_S = const(1.0)
 # s: shorter after one measured speed the next is not used, so that straights count between them. Larger: older speeds.
 MEASURED_SPEED_EVERY_S = 0.3
 
@@ -100,7 +102,7 @@ SIGMA_SHARE = 0.48
 
 # Assumptions that take the place of measurements
 SIGMA_SLOPE = radians(1.6)  # rad: slopes of roads. Larger: slopes are followed better, bends are found less well.
-SLOPE_S = 3.0  # s: how long a slope lasts; fitted, real ones last longer. Larger: as for SIGMA_SLOPE.
+_SLOPE_S = const(3.0)  # s: how long a slope lasts; fitted, real ones last longer. Larger: as for SIGMA_SLOPE.
 # rad: a pitch of this counts half as much as a level one, a pitch of twice this a fifth. Larger: wheelies are mistaken
 # for slopes.
 STEEP = radians(6.0)
@@ -109,14 +111,14 @@ STRAIGHT_MAX_LEAN = radians(8.0)  # rad. Larger: the lean of wide turns is drawn
 STRAIGHT_MAX_RATE = radians(2.5)  # rad/s, about the vertical. Larger: the lean of slow turns is drawn towards upright.
 STRAIGHT_MIN_SPEED = 4.0  # m/s. Larger: drift on slow straights is not taken off.
 SIGMA_STRAIGHT = radians(0.8)  # rad: lean on straights, by wind and camber. Larger: drift is taken off later.
-STRAIGHT_S = 3.0  # s: how long such a lean lasts. Larger: drift is taken off later.
-SIGMA_PRIOR_SPEED = 20.0  # m/s: speed less PRIOR_SPEED. Larger: less pull towards PRIOR_SPEED.
-PRIOR_SPEED_S = 60.0  # s: how long a speed lasts. Larger: less pull towards PRIOR_SPEED.
+_STRAIGHT_S = const(3.0)  # s: how long such a lean lasts. Larger: drift is taken off later.
+_SIGMA_PRIOR_SPEED = const(20.0)  # m/s: speed less PRIOR_SPEED. Larger: less pull towards PRIOR_SPEED.
+_PRIOR_SPEED_S = const(60.0)  # s: how long a speed lasts. Larger: less pull towards PRIOR_SPEED.
 
 # Standing still
 SIGMA_STAND = radians(0.5)  # rad: lean and pitch by the force on coming to rest. Larger: later forces count more.
 SIGMA_REST_RATE = radians(0.1)  # rad/s: rates of a bike that feet hold. Larger: bias is found later.
-SIGMA_REST_FORCE = 0.02  # g: force at rest, with the engine idling. Larger: lean settles later.
+_SIGMA_REST_FORCE = const(0.02)  # g: force at rest, with the engine idling. Larger: lean settles later.
 # ratio: weight of a window in the mean magnitude of the force at rest. Larger: it is found sooner, and less steady.
 REST_FORCE_SHARE = 0.1
 SIGMA_REST_SPEED = 0.02  # m/s: speed at rest, measured as 0. Larger: speed is drawn to 0 less.
@@ -143,7 +145,7 @@ def gyro_variances(sigma, r):
 
     def variance(i, j):
         """Of the reading of axis i of a rate about axis j, of the vehicle."""
-        total = SIGMA_GYRO_DRIFT**2
+        total = _SIGMA_GYRO_DRIFT**2
         for a in range(3):
             for b in range(3):
                 total += (r[3 * i + a] * r[3 * j + b] * sigma[3 * a + b]) ** 2
@@ -157,21 +159,24 @@ def forces(model, means, roll_acceleration, force_error, dive=0.0):
     """Two measurements: the force to the left, (4), and up, (5). roll_acceleration: rad/s^2. force_error:
     relative error of the accelerometer's magnitude, as found at rest. dive: see Dive.update(), in g."""
     rolling = roll_acceleration / STANDARD_GRAVITY  # g in a metre of height, as is square below
-    uncertain = SIGMA_ROLL_HEIGHT_M * rolling
+    uncertain = _SIGMA_ROLL_HEIGHT_M * rolling
     left = means[0]
     shaken = max(0.0, means[8] - left * left)
     # Where the springs pitch the bike its wheels do not rise: v times that pitch rate is no acceleration. dive is the
     # part of it that braking explains, (8); the rest is noise.
-    pitching = PITCHING_SHARE * model.pitching
+    pitching = _PITCHING_SHARE * model.pitching
     sideways = pitching * model.sin_lean
-    left_variance = SIGMA_LEFT**2 + SHAKEN_SHARE * shaken + uncertain**2 + sideways * sideways
-    left += ROLL_HEIGHT_M * rolling * model.cos_lean + dive * model.sin_lean
+    left_variance = _SIGMA_LEFT**2 + _SHAKEN_SHARE * shaken + uncertain**2 + sideways * sideways
+    left += _ROLL_HEIGHT_M * rolling * model.cos_lean + dive * model.sin_lean
     # In a held turn the upward force, 1 / cos(lean), makes the lean observable whatever the gyro's scale factor. One
     # window tells little, a minute tells much, as long as no error of this force keeps its sign.
     square = means[4] * means[4] / STANDARD_GRAVITY
-    up = means[1] + ROLL_HEIGHT_M * square - force_error * means[6] + dive * model.cos_lean
+    up = means[1] + _ROLL_HEIGHT_M * square - force_error * means[6] + dive * model.cos_lean
     up_variance = (
-        SIGMA_UP**2 + pitching * pitching + SIGMA_ROLL_HEIGHT_M**2 * square * square + (uncertain * model.sin_lean) ** 2
+        _SIGMA_UP**2
+        + pitching * pitching
+        + _SIGMA_ROLL_HEIGHT_M**2 * square * square
+        + (uncertain * model.sin_lean) ** 2
     )
     return (model.left_row, left, left_variance), (model.up_row, up, up_variance)
 
@@ -180,22 +185,22 @@ def level_road(model, x, seconds):
     """The measurement of (6): roads are level on average. Its noise grows with the pitch, which may be a wheelie."""
     innovation = -x[PITCH] - x[YAW_ERROR] * model.sin_lean
     steep = innovation / STEEP
-    return model.level_row, innovation, SIGMA_SLOPE**2 * (1.0 + steep * steep) * 2 * SLOPE_S / seconds
+    return model.level_row, innovation, SIGMA_SLOPE**2 * (1.0 + steep * steep) * 2 * _SLOPE_S / seconds
 
 
 def straight_or_prior_speed(lean, speed, yaw_rate, seconds):
     """The measurement of a lean of 0 where the bike rides straight, of PRIOR_SPEED elsewhere."""
     if abs(lean) < STRAIGHT_MAX_LEAN and abs(yaw_rate) < STRAIGHT_MAX_RATE and speed > STRAIGHT_MIN_SPEED:
-        return ((LEAN, 1.0),), -lean, SIGMA_STRAIGHT**2 * 2 * STRAIGHT_S / seconds
-    return ((SPEED, 1.0),), PRIOR_SPEED - speed, SIGMA_PRIOR_SPEED**2 * 2 * PRIOR_SPEED_S / seconds
+        return ((LEAN, 1.0),), -lean, SIGMA_STRAIGHT**2 * 2 * _STRAIGHT_S / seconds
+    return ((SPEED, 1.0),), PRIOR_SPEED - speed, _SIGMA_PRIOR_SPEED**2 * 2 * _PRIOR_SPEED_S / seconds
 
 
 def measured_speed(measured, speed, acceleration, seconds):
     """The measurement of speed by a receiver or a wheel sensor. acceleration: m/s^2; by the delay it adds noise.
     seconds: since the measured speed before: ten a second count as much as one."""
-    late = MEASURED_SPEED_LATE_S * acceleration
-    scale = SIGMA_SPEED_SCALE * measured
-    variance = SIGMA_MEASURED_SPEED**2 + late * late + scale * scale
+    late = _MEASURED_SPEED_LATE_S * acceleration
+    scale = _SIGMA_SPEED_SCALE * measured
+    variance = _SIGMA_MEASURED_SPEED**2 + late * late + scale * scale
     return ((SPEED, 1.0),), measured - speed, variance * max(1.0, 2 * MEASURED_SPEED_S / seconds)
 
 
@@ -205,6 +210,6 @@ def at_rest(model, means, speed, axis):
     return (
         (((SPEED, 1.0),), -speed, SIGMA_REST_SPEED**2),
         (((BIAS_LEFT + axis, 1.0),), means[2 + axis], SIGMA_REST_RATE**2),
-        (model.left_row[0:2], means[0] + model.sideways, SIGMA_REST_FORCE**2),  # only LEAN and PITCH
-        (((PITCH, model.cos_pitch),), means[7] - model.sin_pitch, SIGMA_REST_FORCE**2),
+        (model.left_row[0:2], means[0] + model.sideways, _SIGMA_REST_FORCE**2),  # only LEAN and PITCH
+        (((PITCH, model.cos_pitch),), means[7] - model.sin_pitch, _SIGMA_REST_FORCE**2),
     )

@@ -3,21 +3,21 @@
 from math import degrees, radians
 
 from ..calibration.transform import Transform
-from ..units import GAP_US, LOST_US
+from ..units import GAP_US, LOST_US, const
 from .consistency import MILD
 from .lean_filter import DELAY_S, LeanFilter
 from .measurements import SIGMA_SHARE, gyro_variances
 
-SMOOTH_US = 300_000  # time constant of smooth_force
+_SMOOTH_US = const(300_000)  # time constant of smooth_force
 # A lean less certain than this (1.4 degrees) is not shown. The share: of what the covariance says
 MAX_VARIANCE = (SIGMA_SHARE * radians(3.0)) ** 2
 DOUBTED_VARIANCE = (SIGMA_SHARE * radians(2.0)) ** 2  # the same after they did not fit again and again
 TRIM_MAX_VARIANCE = radians(0.5) ** 2  # a trim less certain than this is not kept
-TRIM_STEP_DEG = 0.3  # a smaller change of the trim is not saved: flash wears
-FALLEN_DEG = 65.0  # the bike has fallen after FALLEN_US of at least this lean
-FALLEN_US = 1_000_000
+_TRIM_STEP_DEG = const(0.3)  # a smaller change of the trim is not saved: flash wears
+FALLEN_DEG = 65.0  # the bike has fallen after _FALLEN_US of at least this lean
+_FALLEN_US = const(1_000_000)
 HELD_US = 75_000  # a maximum lasts twice as long: a pothole jerks the sensor for less
-WHEELIE_DEG = 20.0  # pitch: no road is as steep, and with a wheel in the air the filter's equations do not hold
+_WHEELIE_DEG = const(20.0)  # pitch: no road is as steep, and with a wheel in the air the filter's equations do not hold
 
 
 class LeanMeter:
@@ -102,7 +102,7 @@ class LeanMeter:
             return False
         lean = self.filter
         doubts = lean.consistency.doubts
-        if lean.consistency.doubt or abs(lean.pitch_deg) >= WHEELIE_DEG:
+        if lean.consistency.doubt or abs(lean.pitch_deg) >= _WHEELIE_DEG:
             return False
         return 0.0 <= lean.variance <= (MAX_VARIANCE if doubts < MILD else DOUBTED_VARIANCE)
 
@@ -111,7 +111,7 @@ class LeanMeter:
         True."""
         angle = self.trim_deg
         certain = self.at_rest and self.filter.trim.variance <= TRIM_MAX_VARIANCE
-        if not certain or abs(angle - self.calibration.trim_deg) < TRIM_STEP_DEG:
+        if not certain or abs(angle - self.calibration.trim_deg) < _TRIM_STEP_DEG:
             return False
         self.calibration.trim_deg = angle
         return True
@@ -152,7 +152,7 @@ class LeanMeter:
             self._fresh = False
             dt_us, gain = 0, 1.0  # nothing was before: the same on the board and in a replay
         else:
-            gain = dt_us / (SMOOTH_US + dt_us)
+            gain = dt_us / (_SMOOTH_US + dt_us)
         force, smooth = self.force, self.smooth_force
         smooth[2] += gain * (force[2] - smooth[2])
         if self._smooth_all:
@@ -161,7 +161,7 @@ class LeanMeter:
         self.lean_deg = lean = self.filter.update(force, self.rate, dt_us) if self._leans else 0.0
         if abs(lean) >= FALLEN_DEG:
             self._flat_us += dt_us
-            self.fallen = self._flat_us >= FALLEN_US
+            self.fallen = self._flat_us >= _FALLEN_US
             return
         if self._flat_us:
             self._flat_us = 0

@@ -1,21 +1,23 @@
 """Standstill detector for zero-velocity updates, on means over a fifth of a second, in which an idling engine averages
 out."""
 
+from ..units import const
+
 # Symbol = default  # unit: what it is. "Larger:" says what raising it does.
 # Deviation of a window's mean from the recent average: of forces, and of rates. Larger: smooth roads are mistaken for
 # rest.
-MAX_FORCE_G = 0.010  # g
-MAX_RATE_RADPS = 0.009  # rad/s (0.5 deg/s)
+_MAX_FORCE_G = const(0.010)  # g
+_MAX_RATE_RADPS = const(0.009)  # rad/s (0.5 deg/s)
 MAX_BIAS_RADPS = 0.02  # rad/s (1.2 deg/s): mean rate that may be bias. Larger: smooth turns are mistaken for rest.
 # rad/s: the same limit before the first rest, since the bias has drifted since the calibration. Larger: the same.
-MAX_FIRST_BIAS_RADPS = 0.1
-REST_S = 1.5  # s: stillness that is rest. Larger: rest is detected later, and more surely.
-REST_ROLLING_S = 10.0  # s: the same where the bike seems to move or to brake: no road is smooth for so long.
-AVERAGE_S = 0.5  # s: time constant of the recent average. Larger: rest is detected later after a movement.
+_MAX_FIRST_BIAS_RADPS = const(0.1)
+_REST_S = const(1.5)  # s: stillness that is rest. Larger: rest is detected later, and more surely.
+_REST_ROLLING_S = const(10.0)  # s: the same where the bike seems to move or to brake: no road is smooth for so long.
+_AVERAGE_S = const(0.5)  # s: time constant of the recent average. Larger: rest is detected later after a movement.
 
 
 class RestDetector:
-    """update() takes the means of each window. resting (read only): True after REST_S of stillness, or REST_ROLLING_S
+    """update() takes the means of each window. resting (read only): True after _REST_S of stillness, or _REST_ROLLING_S
     where the bike seems to move.
 
     first: no rest has been detected since power-on, so the bias may be far off.
@@ -26,7 +28,7 @@ class RestDetector:
         self._still_s = 0.0
         self._not_rolling_s = 0.0  # stillness without a sign of moving
         self._average = None  # rates without the estimated bias taken off, and forces
-        self._max_bias = MAX_FIRST_BIAS_RADPS if first else MAX_BIAS_RADPS
+        self._max_bias = _MAX_FIRST_BIAS_RADPS if first else MAX_BIAS_RADPS
 
     def update(self, rates, force, bias, seconds, rolling=False, moving=False):
         """Take the means over a window of `seconds`: rates (rad/s) less the estimated bias, that bias (rad/s), and
@@ -36,7 +38,7 @@ class RestDetector:
         if self._average is None:
             self._average = readings
         average = self._average
-        gain = min(1.0, seconds / AVERAGE_S)
+        gain = min(1.0, seconds / _AVERAGE_S)
         # The average rate must be small with the estimated bias taken off, or with the calibrated one alone: else an
         # estimate that went astray, as in the hand, would never be put right.
         still = near_estimate = near_calibration = True
@@ -44,15 +46,15 @@ class RestDetector:
             deviation = readings[i] - average[i]
             average[i] += gain * deviation
             if i < 3:
-                still = still and abs(deviation) < MAX_RATE_RADPS
+                still = still and abs(deviation) < _MAX_RATE_RADPS
                 near_estimate = near_estimate and abs(average[i] - bias[i]) < self._max_bias
                 near_calibration = near_calibration and abs(average[i]) < self._max_bias
             else:
-                still = still and abs(deviation) < MAX_FORCE_G
+                still = still and abs(deviation) < _MAX_FORCE_G
         still = still and (near_estimate or near_calibration) and not moving
         self._still_s = self._still_s + seconds if still else 0.0
         # A second timer: steady braking looks still, and must not count as rest the moment the estimated speed gets low
         self._not_rolling_s = self._not_rolling_s + seconds if still and not rolling else 0.0
-        self.resting = self._not_rolling_s >= REST_S or self._still_s >= REST_ROLLING_S
+        self.resting = self._not_rolling_s >= _REST_S or self._still_s >= _REST_ROLLING_S
         if self.resting:
             self._max_bias = MAX_BIAS_RADPS

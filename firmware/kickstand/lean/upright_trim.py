@@ -7,6 +7,8 @@ add to it; what turns to the left and to the right have in common is again the t
 
 from math import radians, sin
 
+from ..units import const
+
 MAX_TRIM = radians(3.5)  # rad: a pose off by 2 degrees, and the rest of the accelerometer's errors
 # Symbol = default  # unit: what it is. "Larger:" says what raising it does.
 SIGMA_START = radians(2.5)  # rad: prior of a new pose's trim. Larger: the trim is found sooner, and less steady.
@@ -14,14 +16,14 @@ SIGMA_KEPT = radians(0.7)  # rad: prior of a trim kept from an earlier, colder o
 SIGMA_STRAIGHT = radians(1.5)  # rad: force to the side over up on straights: rider, camber, wind. Larger: found later.
 # times sin(lean): prior of the bike's own force to the side in turns, by its tyres and rider. Larger: turns to one side
 # count less.
-SIGMA_LEAN_SHARE = 0.15
+_SIGMA_LEAN_SHARE = const(0.15)
 # times sin(lean): how much that force differs from turn to turn, because the rider hangs off or does not. Larger: turns
 # count less.
-SIGMA_TURN = 0.04
-SIGMA_YAW_S = 0.03  # rad per rad/s: further measurement noise, times the yaw rate. Larger: turns count less.
+_SIGMA_TURN = const(0.04)
+_SIGMA_YAW_S = const(0.03)  # rad per rad/s: further measurement noise, times the yaw rate. Larger: turns count less.
 # times the upward force: largest innovation. Larger: a sensor in a hand counts as a balanced bike.
-MAX_SIDEWAYS = 0.1
-DISTURBANCE_S = 2.0  # s: how long such a disturbance lasts. Larger: the trim is found later, and steadier.
+_MAX_SIDEWAYS = const(0.1)
+_DISTURBANCE_S = const(2.0)  # s: how long such a disturbance lasts. Larger: the trim is found later, and steadier.
 NOISE = radians(0.01)  # rad per square root of a second: process noise. Larger: changes are followed sooner.
 
 
@@ -37,7 +39,7 @@ class UprightTrim:
         self.variance = (SIGMA_START if angle == 0.0 else SIGMA_KEPT) ** 2
         # The second state: wide tyres and riders lean a bike more or less than balance would, alike to both sides
         self._lean_share = 0.0  # times sin(lean)
-        self._share_variance = SIGMA_LEAN_SHARE**2
+        self._share_variance = _SIGMA_LEAN_SHARE**2
         self._covariance = 0.0
 
     def update(self, sideways, lean, yaw_rate, seconds):
@@ -45,11 +47,11 @@ class UprightTrim:
         make its noise larger in bends. seconds: since the update before."""
         sine = sin(lean - self.angle)
         innovation = sideways - self.angle - sine * self._lean_share
-        if not -MAX_SIDEWAYS < innovation < MAX_SIDEWAYS:
+        if not -_MAX_SIDEWAYS < innovation < _MAX_SIDEWAYS:
             return
-        turn = SIGMA_TURN * sine
-        yaw = SIGMA_YAW_S * yaw_rate
-        noise = (SIGMA_STRAIGHT**2 + turn * turn + yaw * yaw) * 2.0 * DISTURBANCE_S / seconds
+        turn = _SIGMA_TURN * sine
+        yaw = _SIGMA_YAW_S * yaw_rate
+        noise = (SIGMA_STRAIGHT**2 + turn * turn + yaw * yaw) * 2.0 * _DISTURBANCE_S / seconds
         self.variance += NOISE**2 * seconds
         # P H^T of the measurement sideways = angle + lean_share sin(lean), H = (1, sin(lean))
         angle_gain = self.variance + sine * self._covariance

@@ -5,11 +5,13 @@ from math import degrees, sqrt
 from time import ticks_add, ticks_diff, ticks_ms
 
 from ..calibration.transform import Transform
+from ..units import const
 from . import packets
 from .packets import LEAN, MOTION, OWN, SPEED
 
-LOOK_MS = 1000
-IDLE_S = 60  # a phone that has asked for nothing for so long makes room for the next; typing a PIN takes half of it
+_LOOK_MS = const(1000)
+# A phone that has asked for nothing for so long makes room for the next; typing a PIN takes half of it
+_IDLE_S = const(60)
 _SAMPLES = 8  # as many as Transform takes at most
 
 
@@ -92,7 +94,7 @@ class Live:
 
     def _look(self, now_ms):
         """Once a second: everything that is not of this moment."""
-        self._look_ms = ticks_add(now_ms, LOOK_MS)
+        self._look_ms = ticks_add(now_ms, _LOOK_MS)
         self.per_second, self._sent = self._sent, 0
         radio, app = self.radio, self._app
         if radio.phone is None:
@@ -103,7 +105,7 @@ class Live:
         if self._intervals[OWN]:
             self._put(radio.ride, size)
         self._idle_s = 0 if self.period_ms else self._idle_s + 1
-        if self._idle_s > IDLE_S:
+        if self._idle_s > _IDLE_S:
             radio.drop()
         radio.save_bonds()
 

@@ -7,9 +7,11 @@ UNKNOWN.
 from math import floor
 from struct import pack_into, unpack_from
 
+from ..units import const
+
 VERSION = 1  # of our own packets
 LEAN, MOTION, SPEED, OWN = range(4)  # places in a list of intervals; RaceChrono's packet ids are one higher
-FASTEST_MS = 40  # 25 packets of each kind a second, whatever the phone asks for
+_FASTEST_MS = const(40)  # 25 packets of each kind a second, whatever the phone asks for
 UNKNOWN, UNKNOWN_SPEED, UNKNOWN_SIGMA = -0x8000, 0xFFFF, 0xFF
 
 ALIGNED, TRUSTED, AT_REST, FALLEN, RECORDING, CAR, NO_READINGS = (1 << bit for bit in range(7))  # bits of the state
@@ -65,7 +67,7 @@ def ride(buffer, state, meter, lost):
 
 
 def _interval(data, start, form):
-    return max(FASTEST_MS, unpack_from(form, data, start)[0])
+    return max(_FASTEST_MS, unpack_from(form, data, start)[0])
 
 
 def take_filter(data, intervals):

@@ -4,11 +4,11 @@ on it."""
 from binascii import unhexlify
 
 from ..errors import LiveError
-from ..units import __version__
+from ..units import __version__, const
 from . import packets
 
 SERVICE = "7b6f0000-3c1e-4d5a-9a55-6b69636b7374"  # our own; its characteristics have 1 to 4 in place of the 0
-ADVERTISE_US = 150_000
+_ADVERTISE_US = const(150_000)
 MOST_WRITES = 16  # that wait for the loop; a phone that writes more in a turn is not heard
 
 _CONNECTED, _DISCONNECTED, _WRITTEN, _GET_SECRET, _SET_SECRET, _PASSKEY = 1, 2, 3, 29, 30, 31
@@ -85,7 +85,7 @@ class Radio:
 
     def advertise(self):
         """Let the next phone find the board. True if that works now."""
-        return self._attempt(self._ble.gap_advertise, ADVERTISE_US, self._found, resp_data=self._named)
+        return self._attempt(self._ble.gap_advertise, _ADVERTISE_US, self._found, resp_data=self._named)
 
     def send(self, handle, data):
         """Queue a notification. False: the radio has no room for it, or the phone has just gone."""

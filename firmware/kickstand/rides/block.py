@@ -26,12 +26,12 @@ from binascii import crc32
 
 from ..calibration.store import BODY_LENGTH, WHOLE_BODY_LENGTH
 from ..errors import NO_MACHINE_CODE, checked
-from ..units import __version__
+from ..units import __version__, const
 
 MAGIC = b"KRID"
-VERSION = 1
-WHOLE_VERSION = 2  # the calibration has matrices
-BODY_LENGTHS = {VERSION: BODY_LENGTH, WHOLE_VERSION: WHOLE_BODY_LENGTH}
+_VERSION = const(1)
+_WHOLE_VERSION = const(2)  # the calibration has matrices
+BODY_LENGTHS = {_VERSION: BODY_LENGTH, _WHOLE_VERSION: WHOLE_BODY_LENGTH}
 HEAD = "<4sHHIIqhHHH10sBB"
 _TEMPERATURE_AT = struct.calcsize("<4sHHIIq")
 _PLACES_AT = struct.calcsize("<4sHHIIqhHHH10s")
@@ -149,7 +149,7 @@ class RideBlock:
         state[_PENDING] = state[_BITS] = 0
         state[_AT] = _HEAD_LENGTH + len(body)
         # the zeros, temperature and number of positions, are written by close()
-        numbers = MAGIC, WHOLE_VERSION if len(body) > BODY_LENGTH else VERSION, length, ride, sequence, time_us, 0
+        numbers = MAGIC, _WHOLE_VERSION if len(body) > BODY_LENGTH else _VERSION, length, ride, sequence, time_us, 0
         rates = chip.accel_lsb_per_g, int(10 * chip.gyro_lsb_per_dps + 0.5), sample_hz
         version, delay = __version__.encode()[:10], int(10_000 * chip.gyro_delay_s + 0.5)
         struct.pack_into(HEAD, self.buffer, 0, *numbers, *rates, version, 0, delay)

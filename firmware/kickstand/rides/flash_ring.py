@@ -7,13 +7,14 @@ flash always stay free, for the calibration and for new firmware.
 import os
 from errno import EEXIST
 
+from ..units import const
 from . import ride_paths
 from .block import BLOCK, block_length
 
 _DIRECTORY = 0x4000  # in the mode of os.stat()
-ENOSPC = 28  # MicroPython's errno does not have it
+_ENOSPC = const(28)  # MicroPython's errno does not have it
 PART_BLOCKS = 16  # ride blocks in a part in flash
-CARD_PART_BLOCKS = 256  # ride blocks in a part on a card: a day's ride is 85 files, not 1300
+_CARD_PART_BLOCKS = const(256)  # ride blocks in a part on a card: a day's ride is 85 files, not 1300
 FIRMWARE = 103 * BLOCK  # compiled: each of its files takes whole blocks, each folder two
 RESERVE = 61 * BLOCK  # what an update of compiled firmware needs at most, with some to spare
 
@@ -66,7 +67,7 @@ class RideRing:
     def __init__(self, settings):
         self._settings = settings
         self.stops_interrupts = settings.SD_SPI is None
-        self._part_blocks = PART_BLOCKS if settings.SD_SPI is None else CARD_PART_BLOCKS
+        self._part_blocks = PART_BLOCKS if settings.SD_SPI is None else _CARD_PART_BLOCKS
         self.needed = RESERVE + (self._part_blocks + 2) * BLOCK  # two blocks, because the directories grow as well
         self._file = None
         self.refused = None
@@ -144,7 +145,7 @@ class RideRing:
             else:
                 self._others -= size
         elif ride == self._ride:
-            raise OSError(ENOSPC)
+            raise OSError(_ENOSPC)
         else:
             _remove_emptied(path)
             self._free = free_bytes(self._directory)  # in flash a directory takes two blocks
@@ -156,7 +157,7 @@ class RideRing:
         groups = ride_paths.groups(self._directory)
         group = min((group for group in groups if size * (group + 1) - 1 > passed), default=None)
         if group is None:
-            raise OSError(ENOSPC)
+            raise OSError(_ENOSPC)
         oldest = min((ride for ride in ride_paths.rides(self._directory, group) if ride > passed), default=None)
         if oldest is None:
             _remove_emptied(ride_paths.group_path(self._directory, group))
@@ -166,7 +167,7 @@ class RideRing:
     def write(self, data):
         """Write the next bytes of the block. Raises OSError."""
         if self._file.write(data) != len(data):
-            raise OSError(ENOSPC)
+            raise OSError(_ENOSPC)
 
     def end_block(self):
         """End a block and flush the file: from here on a power cut does not lose the block. Raises OSError."""
@@ -195,6 +196,6 @@ class RideRing:
         """The code of the Notice for an OSError or MemoryError that this object raised."""
         if isinstance(error, MemoryError):
             return "out-of-memory"
-        if error.args and error.args[0] == ENOSPC:
+        if error.args and error.args[0] == _ENOSPC:
             return "out-of-room"
         return "flash-fault" if self._settings.SD_SPI is None else "card-fault"

@@ -10,11 +10,11 @@ from time import ticks_diff, ticks_ms
 
 from ..calibration.store import pack
 from ..errors import CardError, Notice, report
-from ..units import GAP_US
+from ..units import GAP_US, const
 from .block import MAX_DT_US, RideBlock
 
-PAGE = 256  # bytes in a page of the flash, the unit of writing
-STALL_MS = 10  # a write that took longer included an erase of the flash: a page alone takes 1 ms
+_PAGE = const(256)  # bytes in a page of the flash, the unit of writing
+_STALL_MS = const(10)  # a write that took longer included an erase of the flash: a page alone takes 1 ms
 
 
 class Recorder:
@@ -23,7 +23,7 @@ class Recorder:
 
     active: True while a ride is being recorded.
     problem: None, or a CardError or Notice: why the recording ended by itself; take_problem() clears it.
-    stalled: True if interrupts were off for longer than STALL_MS, so that GPS bytes or wheel pulses may be lost. The
+    stalled: True if interrupts were off for longer than _STALL_MS, so that GPS bytes or wheel pulses may be lost. The
     caller informs the speed source (after_stall()) and sets it to False.
     """
 
@@ -137,7 +137,7 @@ class Recorder:
 
     def _note_stall(self, begun_ms):
         """Set stalled if the write that began at begun_ms took so long that it erased flash."""
-        if ticks_diff(ticks_ms(), begun_ms) > STALL_MS and self.keeper.stops_interrupts:
+        if ticks_diff(ticks_ms(), begun_ms) > _STALL_MS and self.keeper.stops_interrupts:
             self.stalled = True
 
     def _write(self, waiting):
@@ -146,7 +146,7 @@ class Recorder:
             if not self.keeper.ready():
                 return
             if self._at < waiting.length:
-                end = min(self._at + PAGE, waiting.length)
+                end = min(self._at + _PAGE, waiting.length)
                 self.keeper.write(memoryview(waiting.buffer)[self._at : end])
                 self._at = end
             else:

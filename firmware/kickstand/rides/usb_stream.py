@@ -8,9 +8,10 @@ from errno import ETIMEDOUT
 from time import ticks_diff, ticks_ms
 
 from ..console import say
+from ..units import const
 
-LENGTH = 512  # bytes in a ride block: half a second
-SLOW_APART_MS = 60_000  # a slow print after a longer time counts as the first one again
+_LENGTH = const(512)  # bytes in a ride block: half a second
+_SLOW_APART_MS = const(60_000)  # a slow print after a longer time counts as the first one again
 
 
 class RideStream:
@@ -25,7 +26,7 @@ class RideStream:
 
     def next_length(self):
         """Length in bytes that the next block has to have."""
-        return LENGTH
+        return _LENGTH
 
     def room(self):
         """None: unlimited."""
@@ -46,7 +47,7 @@ class RideStream:
         if not say(text, ""):
             return
         before_ms, self._slow_ms = self._slow_ms, ticks_ms()
-        if before_ms is not None and 0 <= ticks_diff(self._slow_ms, before_ms) < SLOW_APART_MS:
+        if before_ms is not None and 0 <= ticks_diff(self._slow_ms, before_ms) < _SLOW_APART_MS:
             raise OSError(ETIMEDOUT)
 
     def end(self):

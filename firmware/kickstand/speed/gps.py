@@ -13,19 +13,20 @@ from array import array
 from time import ticks_add, ticks_diff
 
 from ..errors import Notice
+from ..units import const
 
-MAX_SENTENCE = 100  # bytes: the standard says 82, but receivers with many decimals exceed it
-MAX_CHUNK = 64  # bytes read in one pass of the loop: at 10 ms a pass, twice what 10 fixes a second need
-SILENT_MS = 3000  # after so long without a byte, a whole sentence or a fix, fault() reports which
-LATE_MS = 2000  # a fix that waited in the receiver for longer is dropped
-LOOK_MS = 1500  # after so long without a speed's sentence other kinds are looked at
-CARRY_MS = 60_000  # a time that is longer ago is kept as so long ago: after 6 days ticks_diff() is negative
-TIME_JUMP_MS = 5000  # a larger difference is not a delay: the receiver has corrected its clock
+_MAX_SENTENCE = const(100)  # bytes: the standard says 82, but receivers with many decimals exceed it
+_MAX_CHUNK = const(64)  # bytes read in one pass of the loop: at 10 ms a pass, twice what 10 fixes a second need
+_SILENT_MS = const(3000)  # after so long without a byte, a whole sentence or a fix, fault() reports which
+_LATE_MS = const(2000)  # a fix that waited in the receiver for longer is dropped
+_LOOK_MS = const(1500)  # after so long without a speed's sentence other kinds are looked at
+_CARRY_MS = const(60_000)  # a time that is longer ago is kept as so long ago: after 6 days ticks_diff() is negative
+_TIME_JUMP_MS = const(5000)  # a larger difference is not a delay: the receiver has corrected its clock
 # The delay of a fix is counted from a fix that was not late, the reference. When at least so many fixes over more than
-# TIME_JUMP_MS all came late, the one with the smallest delay becomes the reference: the receiver set its clock back.
-MIN_FIXES_FOR_NEW_REFERENCE = 4
-KNOT_MPS = 1852.0 / 3600.0  # one knot in m/s
-KMH_MPS = 1.0 / 3.6  # one km/h in m/s
+# _TIME_JUMP_MS all came late, the one with the smallest delay becomes the reference: the receiver set its clock back.
+_MIN_FIXES_FOR_NEW_REFERENCE = const(4)
+_KNOT_MPS = const(1852.0 / 3600.0)  # one knot in m/s
+_KMH_MPS = const(1.0 / 3.6)  # one km/h in m/s
 _DAY_MS = 86_401_000  # a day with a leap second
 _YEARS = (25, 79)  # since 2000: before the first a receiver has lost count of the weeks, or not heard the date yet
 _POSITIONS = (b"GGA", b"GLL", b"GNS")  # of the kinds without a speed these are named first
@@ -65,16 +66,16 @@ class Gps:
         heard_ms = self._heard_ms
         if heard_ms is None:
             self._begin(now_ms)
-        elif ticks_diff(now_ms, self._carried_ms) > CARRY_MS:
+        elif ticks_diff(now_ms, self._carried_ms) > _CARRY_MS:
             self._carry(now_ms)
         waiting = self._uart.any()
         if not waiting:
             return None
-        if heard_ms is not None and ticks_diff(now_ms, heard_ms) > SILENT_MS:
+        if heard_ms is not None and ticks_diff(now_ms, heard_ms) > _SILENT_MS:
             self._begin(now_ms)
         self._heard_ms = now_ms
-        chunk = self._uart.read(min(waiting, MAX_CHUNK)) or b""
-        looks = ticks_diff(now_ms, self._sentence_ms) > LOOK_MS
+        chunk = self._uart.read(min(waiting, _MAX_CHUNK)) or b""
+        looks = ticks_diff(now_ms, self._sentence_ms) > _LOOK_MS
         if looks and _has_ubx(self._line + chunk):
             self._other = self._other or b"UBX"
         speed = None
@@ -87,7 +88,7 @@ class Gps:
             chunk = chunk[end + 1 :]
             end = chunk.find(b"\n")
         self._line += chunk
-        beyond = len(self._line) - MAX_SENTENCE
+        beyond = len(self._line) - _MAX_SENTENCE
         if beyond > 0:  # the end of a line was lost: keep what may be the beginning of the next one
             self._line = self._line[max(beyond, self._line.rfind(b"$")) :]
         return speed
@@ -99,9 +100,9 @@ class Gps:
         self._other = b""
 
     def _carry(self, now_ms):
-        """Carry the times on that are longer ago than CARRY_MS."""
+        """Carry the times on that are longer ago than _CARRY_MS."""
         self._carried_ms = now_ms
-        oldest_ms = ticks_add(now_ms, -CARRY_MS)
+        oldest_ms = ticks_add(now_ms, -_CARRY_MS)
         for name in ("_heard_ms", "_sentence_ms", "_fix_ms", "_rmc_ms"):
             then_ms = getattr(self, name)
             if then_ms is not None and ticks_diff(oldest_ms, then_ms) > 0:
@@ -133,11 +134,11 @@ class Gps:
         """None, or a Notice: why there is no speed."""
         if self._heard_ms is None:
             return None
-        if ticks_diff(now_ms, self._heard_ms) > SILENT_MS:
+        if ticks_diff(now_ms, self._heard_ms) > _SILENT_MS:
             return Notice("gps-silent")
-        if ticks_diff(now_ms, self._sentence_ms) > SILENT_MS:
+        if ticks_diff(now_ms, self._sentence_ms) > _SILENT_MS:
             return Notice("gps-other", self._other.decode()) if self._other else Notice("gps-garbled")
-        if ticks_diff(now_ms, self._fix_ms) > SILENT_MS:
+        if ticks_diff(now_ms, self._fix_ms) > _SILENT_MS:
             return Notice("gps-no-fix")
         return None
 
@@ -146,7 +147,7 @@ class Gps:
         start = line.rfind(b"$")  # there may be noise in front of it
         kind = line[start + 3 : start + 6]
         if start < 0 or kind not in (b"RMC", b"VTG"):
-            if start >= 0 and ticks_diff(now_ms, self._sentence_ms) > LOOK_MS:
+            if start >= 0 and ticks_diff(now_ms, self._sentence_ms) > _LOOK_MS:
                 self._look_at(line[start:])
             return None
         star = line.rfind(b"*")
@@ -184,23 +185,23 @@ class Gps:
         self._time = fields[1]
         # mode E: estimated from the last fix (dead reckoning); N: not valid
         valid = fields[2] == b"A" and not (len(fields) > 12 and fields[12] in (b"E", b"N"))
-        if not valid or repeated or self._set_age(fields[1], now_ms) > LATE_MS:
+        if not valid or repeated or self._set_age(fields[1], now_ms) > _LATE_MS:
             return None
-        speed = float(fields[7]) * KNOT_MPS
+        speed = float(fields[7]) * _KNOT_MPS
         self._fix = fields
         return speed
 
     def _vtg(self, fields, now_ms):
         """The speed in the fields of $--VTG,course,T,course,M,knots,N,km/h,K[,mode], unless the receiver sends RMC."""
-        if self._rmc_ms is not None and ticks_diff(now_ms, self._rmc_ms) < SILENT_MS:
+        if self._rmc_ms is not None and ticks_diff(now_ms, self._rmc_ms) < _SILENT_MS:
             return None
         if len(fields) > 9 and fields[9] in (b"E", b"N"):
             return None
         self.age_ms = 0
         self._fix = None
         if fields[6] == b"N" and fields[5]:
-            return float(fields[5]) * KNOT_MPS
-        return float(fields[7]) * KMH_MPS if fields[8] == b"K" and fields[7] else None
+            return float(fields[5]) * _KNOT_MPS
+        return float(fields[7]) * _KMH_MPS if fields[8] == b"K" and fields[7] else None
 
     def _set_age(self, time, now_ms):
         """Set age_ms and _day_ms by a fix with this time of day, hhmmss.ss, and the reference if this shows a new one;
@@ -216,12 +217,12 @@ class Gps:
         if self._reference is not None:
             reference_ms, reference_day_ms = self._reference
             delay_ms = ticks_diff(now_ms, reference_ms) - (day_ms - reference_day_ms)
-            if 0 < delay_ms < TIME_JUMP_MS:
+            if 0 < delay_ms < _TIME_JUMP_MS:
                 self.age_ms = delay_ms
                 if not self._fixes or delay_ms <= self._earliest_delay_ms:
                     self._earliest, self._earliest_delay_ms = (now_ms, day_ms), delay_ms
                 self._fixes += 1
-                if self._fixes >= MIN_FIXES_FOR_NEW_REFERENCE and ticks_diff(now_ms, self._since_ms) > TIME_JUMP_MS:
+                if self._fixes >= _MIN_FIXES_FOR_NEW_REFERENCE and ticks_diff(now_ms, self._since_ms) > _TIME_JUMP_MS:
                     self._reference, self._fixes, self._since_ms = self._earliest, 0, now_ms
                 return delay_ms
         self._reference, self._fixes, self._since_ms = (now_ms, day_ms), 0, now_ms

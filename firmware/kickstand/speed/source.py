@@ -10,12 +10,13 @@ from machine import UART, Pin
 
 from ..board import port
 from ..errors import SettingsError
+from ..units import const
 
-MAX_MPS = 100.0
-MAX_CHANGE_MPS2 = 15.0  # no tyre has more grip
-NOISE_MPS = 2.0  # a speed may jump beyond that by so much
-GIVE_UP_MS = 3000  # after refusing speeds for so long, the last accepted one is taken as wrong
-RX_BUFFER = 512  # bytes, half a second at 9600 baud: the loop may write flash or set up the sensor meanwhile
+_MAX_MPS = const(100.0)
+_MAX_CHANGE_MPS2 = const(15.0)  # no tyre has more grip
+_NOISE_MPS = const(2.0)  # a speed may jump beyond that by so much
+_GIVE_UP_MS = const(3000)  # after refusing speeds for so long, the last accepted one is taken as wrong
+_RX_BUFFER = const(512)  # bytes, half a second at 9600 baud: the loop may write flash or set up the sensor meanwhile
 
 
 class Speed:
@@ -29,18 +30,19 @@ class Speed:
         self.age_us = 0
 
     def poll(self, now_ms):
-        """Return a new speed in m/s and set age_us, or return None: none has come, or it is refused. Refused is what is
-        not within 0 to MAX_MPS, and what no vehicle could have reached from the last accepted speed, but the latter for
-        GIVE_UP_MS only. Call it in each turn of the loop. now_ms: ticks_ms()."""
+        """Return a new speed in m/s and set age_us, or return None: none has come, or it is refused.
+
+        A speed outside 0 to _MAX_MPS is refused. So is one that no vehicle could have reached from the last accepted
+        speed, but only for _GIVE_UP_MS. Call it in each turn of the loop. now_ms: ticks_ms()."""
         speed = self.source.poll(now_ms)
         if self._last is not None:
             waited_ms = ticks_diff(now_ms, self._last_ms)
-            if waited_ms >= GIVE_UP_MS:  # without a new speed too: after 6 days ticks_diff() is negative
+            if waited_ms >= _GIVE_UP_MS:  # without a new speed too: after 6 days ticks_diff() is negative
                 self._last = None
-        if speed is None or not 0.0 <= speed <= MAX_MPS:
+        if speed is None or not 0.0 <= speed <= _MAX_MPS:
             return None
         if self._last is not None:
-            allowed = NOISE_MPS + MAX_CHANGE_MPS2 * ticks_diff(now_ms, self._last_ms) / 1000.0
+            allowed = _NOISE_MPS + _MAX_CHANGE_MPS2 * ticks_diff(now_ms, self._last_ms) / 1000.0
             if not -allowed <= speed - self._last <= allowed:
                 return None
         self._last = speed
@@ -69,7 +71,7 @@ def _open_uart(settings):
     pins = settings.GPS_TX, settings.GPS_RX
     try:  # nothing is sent, but a UART takes two pins: on rp2 its default is a pin of the sensor
         tx, rx = Pin(pins[0]), Pin(pins[1])
-        return UART(settings.GPS_UART, settings.GPS_BAUD, tx=tx, rx=rx, rxbuf=RX_BUFFER, timeout=0)
+        return UART(settings.GPS_UART, settings.GPS_BAUD, tx=tx, rx=rx, rxbuf=_RX_BUFFER, timeout=0)
     except ValueError as error:
         raise SettingsError("uart-pins", "GPS_TX / GPS_RX", *pins, settings.GPS_UART, str(error))
 

@@ -13,19 +13,21 @@ from time import ticks_add, ticks_diff, ticks_us
 from machine import Pin
 
 from ..errors import Notice
+from ..units import const
 
-MAX_MPS = 100.0  # pulses that would mean a higher speed are disturbances
-BOUNCE_US = 3000  # a contact that was open for less than this, or than a quarter of the shortest period, is bouncing
-STOPPED_MPS = 0.5  # a wheel slower than this counts as standing
+_MAX_MPS = const(100.0)  # pulses that would mean a higher speed are disturbances
+# a contact that was open for less than this, or than a quarter of the shortest period, is bouncing
+_BOUNCE_US = const(3000)
+_STOPPED_MPS = const(0.5)  # a wheel slower than this counts as standing
 MIN_STOP_MS, MAX_STOP_MS = 500, 1800  # limits of the time without a pulse that means standing
-REPORT_MS = 100  # least time between two speeds that poll() returns
-STANDING_MS = 200  # the same between two speeds of zero
+_REPORT_MS = const(100)  # least time between two speeds that poll() returns
+_STANDING_MS = const(200)  # the same between two speeds of zero
 # So many edges in less than STORM_US are a storm: over 8,000 a second. The interrupt takes 33 us on a Pico, so that at
 # 30,000 a second nothing else would run: for 2 ms before this ends it, less than the time-out of a transfer. 50 pulses
 # a metre at 70 m/s are allowed.
 STORM_EDGES, STORM_US = 64, 8_000
-STORM_PAUSE_MS = 5000  # the interrupt is off for so long after a storm, and again if the storm lasts
-SOFT_PERIOD_US = 3333  # at shorter periods soft interrupts, such as an ESP32's, lose over 2 % of the pulses
+_STORM_PAUSE_MS = const(5000)  # the interrupt is off for so long after a storm, and again if the storm lasts
+_SOFT_PERIOD_US = const(3333)  # at shorter periods soft interrupts, such as an ESP32's, lose over 2 % of the pulses
 # Counts and times wrap at 30 bits. The interrupt subtracts times with this mask and not by ticks_diff(), which would
 # give a negative time after nine minutes of standing.
 _TICKS = _COUNT = 0x3FFFFFFF
@@ -40,11 +42,11 @@ class Wheel:
     """
 
     def __init__(self, pin, pulses_per_metre, irq):
-        shortest_us = int(1e6 / (pulses_per_metre * MAX_MPS))
+        shortest_us = int(1e6 / (pulses_per_metre * _MAX_MPS))
         self._shortest_us = shortest_us
-        self._open_us = min(BOUNCE_US, shortest_us // 4)
+        self._open_us = min(_BOUNCE_US, shortest_us // 4)
         self._metre_us = 1e6 / pulses_per_metre  # the speed in m/s is this divided by the period in us
-        self._stop_ms = min(MAX_STOP_MS, max(MIN_STOP_MS, int(1000.0 / (pulses_per_metre * STOPPED_MPS))))
+        self._stop_ms = min(MAX_STOP_MS, max(MIN_STOP_MS, int(1000.0 / (pulses_per_metre * _STOPPED_MPS))))
         self.count = 0  # pulses, counted by the interrupt; _pulse_us: when the last one came
         self._pulse_us = ticks_us()
         self._opened_us = ticks_us()  # when the contact last opened
@@ -115,7 +117,7 @@ class Wheel:
         if self._report_ms is None:
             self._report_ms = now_ms
         waited_ms = ticks_diff(now_ms, self._report_ms)
-        if waited_ms < REPORT_MS:
+        if waited_ms < _REPORT_MS:
             return None
         count, pulse_us = self.count, self._pulse_us
         while count != self.count:  # a pulse came between the two reads
@@ -123,7 +125,7 @@ class Wheel:
         pulses = (count - self._seen) & _COUNT
         if pulses:
             return self._pulses(pulses, count, pulse_us, now_ms)
-        if self._moved_ms is None or ticks_diff(now_ms, self._moved_ms) < self._stop_ms or waited_ms < STANDING_MS:
+        if self._moved_ms is None or ticks_diff(now_ms, self._moved_ms) < self._stop_ms or waited_ms < _STANDING_MS:
             if waited_ms > MAX_STOP_MS:  # it never moved; carried on, because after 6 days ticks_diff() is negative
                 self._report_ms = ticks_add(now_ms, -MAX_STOP_MS)
             return None
@@ -136,12 +138,12 @@ class Wheel:
         return 0.0
 
     def _wait(self, now_ms):
-        """Turn the interrupt on again when STORM_PAUSE_MS are over. The pulses counted in the storm make no speed."""
+        """Turn the interrupt on again when _STORM_PAUSE_MS are over. The pulses counted in the storm make no speed."""
         if self._off_ms is None:
             self._off_ms = now_ms
             if not self._noisy:
                 self._noisy, self.problem = True, Notice("wheel-storm")
-        elif ticks_diff(now_ms, self._off_ms) >= STORM_PAUSE_MS:
+        elif ticks_diff(now_ms, self._off_ms) >= _STORM_PAUSE_MS:
             self._seen, self._seen_us = self.count, None
             if self._moved_ms is not None:
                 self._moved_ms = now_ms
@@ -157,7 +159,7 @@ class Wheel:
         self._noisy = False
         period_us = ticks_diff(pulse_us, before_us)
         self._usual_us = period_us // pulses
-        if self._soft and self._usual_us < SOFT_PERIOD_US:
+        if self._soft and self._usual_us < _SOFT_PERIOD_US:
             if self._too_quick is None:
                 self.problem = Notice("wheel-quick")
             self._too_quick = True

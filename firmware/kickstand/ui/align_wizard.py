@@ -3,12 +3,13 @@
 from time import ticks_diff
 
 from ..calibration.two_position import WARN_TILT_DEG, align, check_turn
+from ..units import const
 from . import messages, pages
 from .wizard import ASKING, RESULT, Wizard
 
-RESULT_MS = 4000
+_RESULT_MS = const(4000)
 # How long the gyro's bias that the pose on the kickstand has measured stays valid; then it may have drifted
-FRESH_MS = 90_000
+_FRESH_MS = const(90_000)
 _ASK = (("On the stand,", "press button"), ("Now upright:", "hold it, press"))
 _TAKING = ("Stand: hold", "Upright: hold")
 
@@ -58,6 +59,6 @@ class AlignWizard(Wizard):
         new, tilt = align(before, self._kickstand, pose, self._side)
         self._turn.end()
         check_turn(before, self._kickstand, pose, self._turn)
-        self._calibration.save(new, 0 <= ticks_diff(now_ms, self._kickstand_ms) < FRESH_MS)
+        self._calibration.save(new, 0 <= ticks_diff(now_ms, self._kickstand_ms) < _FRESH_MS)
         warning = "Little, 8%s best" % messages.DEGREE if tilt < WARN_TILT_DEG else "Ride safely"
-        self._show_for(RESULT_MS, RESULT, now_ms, "Aligned! %5.1f%s" % (tilt, messages.DEGREE), warning)
+        self._show_for(_RESULT_MS, RESULT, now_ms, "Aligned! %5.1f%s" % (tilt, messages.DEGREE), warning)

@@ -3,9 +3,10 @@
 from time import ticks_add, ticks_diff
 
 from ..board.button import SHORT
+from ..units import const
 from .pages import ARROW
 
-TIMEOUT_MS = 20_000
+_TIMEOUT_MS = const(20_000)
 
 
 class Menu:
@@ -16,7 +17,7 @@ class Menu:
     def __init__(self, entries, now_ms):
         self._entries = entries + (("Leave menu", None),)
         self._at = 0
-        self._until_ms = ticks_add(now_ms, TIMEOUT_MS)
+        self._until_ms = ticks_add(now_ms, _TIMEOUT_MS)
         self.ended = False
 
     @property
@@ -33,7 +34,7 @@ class Menu:
     def press(self, event, now_ms):
         if event == SHORT:
             self._at = (self._at + 1) % len(self._entries)
-            self._until_ms = ticks_add(now_ms, TIMEOUT_MS)
+            self._until_ms = ticks_add(now_ms, _TIMEOUT_MS)
             return True
         self.ended = True
         action = self._entries[self._at][1]

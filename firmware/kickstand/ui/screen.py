@@ -9,10 +9,11 @@ from time import ticks_add, ticks_diff
 
 from ..board.button import LONG, SHORT
 from ..errors import attempt
+from ..units import const
 from . import messages, pages
 from .page_ring import PageRing
 
-NOTICE_MS = 2000
+_NOTICE_MS = const(2000)
 
 
 class NoticeView:
@@ -26,10 +27,10 @@ class NoticeView:
         self._until_ms = 0
 
     def show(self, lines, now_ms, code=None):
-        """Show two lines for NOTICE_MS from now on."""
+        """Show two lines for _NOTICE_MS from now on."""
         self._lines = lines
         self.code = code
-        self._until_ms = ticks_add(now_ms, NOTICE_MS)
+        self._until_ms = ticks_add(now_ms, _NOTICE_MS)
 
     def lines(self, now_ms):
         if self._lines and ticks_diff(now_ms, self._until_ms) >= 0:

@@ -6,13 +6,14 @@ Between the poses the sensor is turned, and that calibrates the gyro: see calibr
 from ..calibration import six_position
 from ..calibration.parameters import six_position_calibration
 from ..errors import GyroError
+from ..units import const
 from . import messages, pages
 from .wizard import COMPUTING, NOTICE, RESULT, TAKING, Wizard
 
-NOTICE_MS = 1500
-RESULT_MS = 6000
-ROUGH_TILT_DEG = 30.0  # largest tilt of a side in uncalibrated readings; the fit has a stricter limit
-MAX_POSES = 12  # six sides, a slanted pose, and those that repeat a turn that could not be used
+_NOTICE_MS = const(1500)
+_RESULT_MS = const(6000)
+_ROUGH_TILT_DEG = const(30.0)  # largest tilt of a side in uncalibrated readings; the fit has a stricter limit
+_MAX_POSES = const(12)  # six sides, a slanted pose, and those that repeat a turn that could not be used
 
 
 class SixWizard(Wizard):
@@ -59,14 +60,14 @@ class SixWizard(Wizard):
             return
         self._side = six_position.side_of(accel)
         tilt = six_position.tilt_deg(accel)
-        if tilt > ROUGH_TILT_DEG:
+        if tilt > _ROUGH_TILT_DEG:
             self._notice(now_ms, "Not on a side:", "%d%s off" % (tilt, messages.DEGREE))
         elif self._sides[self._side] >= 0 and not self._again():
             self._side_done(now_ms, "Side %s is done")
 
     def _again(self):
         """True if a side may be taken again, to turn from there: the turn since the last pose cannot be used."""
-        return self._spoilt_turn and len(self._poses) + self._sides.count(-1) + 1 < MAX_POSES
+        return self._spoilt_turn and len(self._poses) + self._sides.count(-1) + 1 < _MAX_POSES
 
     @property
     def _spoilt_turn(self):
@@ -131,13 +132,13 @@ class SixWizard(Wizard):
         self._work = self._fit = None
         self._unproved = fit.unproved[0] if fit.unproved else None
         if self._unproved:
-            if len(self._poses) == MAX_POSES:
+            if len(self._poses) == _MAX_POSES:
                 raise GyroError("unproved-gyro", self._unproved)
             self._next_pose()
             return
         bias = [value / len(self._poses) for value in self._bias]
         self._calibration.save(six_position_calibration(fit.offset, fit.slope, bias, fit.matrices()))
-        self._show_for(RESULT_MS, RESULT, now_ms, "Saved, err %d mg" % round(abs(self._error) * 1000), "Now align it")
+        self._show_for(_RESULT_MS, RESULT, now_ms, "Saved, err %d mg" % round(abs(self._error) * 1000), "Now align it")
 
     def _notice(self, now_ms, *lines):
-        self._show_for(NOTICE_MS, NOTICE, now_ms, *lines)
+        self._show_for(_NOTICE_MS, NOTICE, now_ms, *lines)

@@ -7,15 +7,16 @@ from ..board.button import LONG
 from ..calibration.pose_taker import DONE, SETTLED, PoseTaker
 from ..calibration.turn import Turn
 from ..errors import CaptureError, GyroError, Refusal, SickSensor, report
+from ..units import const
 from . import messages
 
 # The states of a wizard
 ASKING = 0  # waiting for the press that begins a pose
 TAKING = 1  # each sample goes to the PoseTaker
 NOTICE = 2  # shows a notice for a moment, then asks for the next pose
-REFUSED = 3  # shows the reason until a press, then starts again
+_REFUSED = const(3)  # shows the reason until a press, then starts again
 RESULT = 4  # shows the result for some seconds, then ends
-ENDED = 5
+_ENDED = const(5)
 COMPUTING = 6  # step by step, with each pass of the main loop
 
 
@@ -39,7 +40,7 @@ class Wizard:
     @property
     def ended(self):
         """True once the wizard is over."""
-        return self.state == ENDED
+        return self.state == _ENDED
 
     def sample(self, counts, now_ms):
         """Take one sample: 7 counts, the chip's order."""
@@ -77,7 +78,7 @@ class Wizard:
         if isinstance(problem, GyroError):
             report(problem)
         self._turn.running = False
-        self._show(REFUSED, messages.lines(problem), problem)
+        self._show(_REFUSED, messages.lines(problem), problem)
 
     def _followed(self, now_ms):
         """Called with each pass of the main loop. May raise a Refusal, which is shown."""
@@ -105,15 +106,15 @@ class Wizard:
             if self.state == NOTICE:
                 self._next_pose()
             else:
-                self.state = ENDED
+                self.state = _ENDED
         return None if self.ended else self._lines
 
     def press(self, event, now_ms):
         if event == LONG or self.state == RESULT:
-            self.state = ENDED
+            self.state = _ENDED
         elif self.state == ASKING:
             self._next_pose()
-        elif self.state == REFUSED:
+        elif self.state == _REFUSED:
             self._start()
         return True
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..common.times import clock
 from ..refusals import CONTRADICTING, SWAPPED_DEG, as_data as remarks_as_data, sentence
 from ..remedies import COMMANDS, Remedies
-from ..times import clock
 from .alignment_quality import LeanCost, Quality, lean_cost
 from .overview import Overview
 from .stops.brake_test import Stop, stops_by_speed

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 from kickstand.errors import Notice
 
-from ..calibration.file import CalibrationFile, calibration_beside, read_calibration
-from ..errors import InputError
+from ..calibration.file import CalibrationFile, calibration_path, read_calibration
+from ..common.errors import InputError
 from ..estimation.smooth import smooth_blocks
 from ..logs.log import Block, Stretch
-from ..logs.reader import Source, apart, read_blocks
+from ..logs.reader import Source, apart, check_first_line, read_blocks
 from ..logs.source import File, Progress, log_stem, name_of
 from ..replay.meter_along import MeterAlong
 from ..signals import Array
@@ -85,6 +85,21 @@ class Ride:
             return smooth_blocks(log, self.calibration, progress, notices, lines=False)
         blocks = read_blocks(log, 2, progress, notices, lines=False, calibration=self.calibration)
         return ((block, None) for block in blocks)
+
+
+def calibration_beside(log: Path) -> Path:
+    """calibration_path() of a file that exists. Raises InputError without it, without the log, and if log is no log."""
+    if not log.is_file():
+        what = "is a directory: give the name of a ride in it" if log.is_dir() else "there is no such file"
+        raise InputError(f"{log}: {what}")
+    beside = calibration_path(log)
+    if not beside.exists():
+        check_first_line(log)
+        raise InputError(
+            f"{log}: no calibration {beside.name} beside it: give one with --calibration, or make it from a "
+            f"motorcycle's ride: kickstand calibrate ride {log} --out {beside}"
+        )
+    return beside
 
 
 def open_ride(log: Source, calibration: CalibrationFile | File | None = None, smoothed: bool = False) -> Ride:

@@ -10,7 +10,7 @@ from kickstand.drive_alignment import verdict
 from kickstand.drive_alignment.alignment import CAR, MOTORCYCLE, DriveAlignment
 from kickstand.errors import AlignmentError, Notice
 
-from ..errors import InputError
+from ..common.errors import InputError
 from ..logs.frozen import without_frozen
 from ..logs.reader import Log, Source, read_log
 from ..logs.source import Progress

@@ -15,7 +15,7 @@ from kickstand.drive_alignment.history import BIN_US
 from kickstand.drive_alignment.vertical import MOVED_MPS, StandingVertical
 from kickstand.units import GAP_US
 
-from ..errors import InputError
+from ..common.errors import InputError
 from ..logs.log import Log
 from ..logs.source import Progress
 from .drive_events import DriveWatch

@@ -21,10 +21,9 @@ from kickstand.lean.lean_filter import DELAY_S
 from kickstand.rotation import is_rotation
 from kickstand.units import AXES
 
-from ..errors import InputError, cause
-from ..logs.reader import check_first_line
+from ..common.errors import InputError, cause
+from ..common.output import whole_file
 from ..logs.source import File, log_stem, name_of, open_input
-from ..output import whole_file
 from ..signals import Array, rotated
 
 VERSION = 1
@@ -102,11 +101,12 @@ class CalibrationFile:
         return force, rate
 
     def in_sensor(self, accel_g: Array, gyro_dps: Array) -> tuple[Array, Array]:
-        """Force (n, 3, g) and rate (n, 3, deg/s) along the sensor's own axes, by (18)-(20) and the matrices. A gyro's
-        reading is its rate plus its bias."""
-        force, rate = accel_g * self.accel_slope + self.accel_offset_g, gyro_dps - self.gyro_bias_dps
-        (force,), (rate,) = rotated(self.accel_matrix, force), rotated(self.gyro_matrix, rate)
-        return force, rate
+        """Force (n, 3, g) and rate (n, 3, deg/s) along the sensor's own axes, by (18)-(20) and the matrices: the
+        firmware's Calibration.apply()."""
+        readings = [*accel_g.T, None, *gyro_dps.T]  # the firmware's function for one reading, with arrays as numbers
+        force, rate = [np.zeros(0)] * 3, [np.zeros(0)] * 3
+        self.to_firmware().apply(readings, force, rate)
+        return np.column_stack(force), np.column_stack(rate)
 
     def delay_s(self) -> float:
         """gyro_delay_s, or that of the default DLPF."""
@@ -220,21 +220,6 @@ def calibration_path(log: Path) -> Path:
     if log.name in ("", ".."):  # the folder that one is in, or the one above: it lies beside that
         log = Path(os.path.abspath(log))
     return log.parent / f"{log_stem(log.name)}.cal.json"
-
-
-def calibration_beside(log: Path) -> Path:
-    """calibration_path() of a file that exists. Raises InputError without it, without the log, and if log is no log."""
-    if not log.is_file():
-        what = "is a directory: give the name of a ride in it" if log.is_dir() else "there is no such file"
-        raise InputError(f"{log}: {what}")
-    beside = calibration_path(log)
-    if not beside.exists():
-        check_first_line(log)
-        raise InputError(
-            f"{log}: no calibration {beside.name} beside it: give one with --calibration, or make it from a "
-            f"motorcycle's ride: kickstand calibrate ride {log} --out {beside}"
-        )
-    return beside
 
 
 def _list(name: str, data: dict[str, Any], entry: str) -> list[Any]:

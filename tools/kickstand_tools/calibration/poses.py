@@ -12,7 +12,7 @@ from kickstand.calibration.still_pose import StillPose
 from kickstand.errors import AlignmentError, CalibrationError, CaptureError
 from kickstand.units import AXES
 
-from ..errors import InputError
+from ..common.errors import InputError
 from ..logs.log import ROOM_TEMP_C
 from ..logs.reader import Source, read_log
 from ..refusals import RefusedInput

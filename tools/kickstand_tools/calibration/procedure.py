@@ -9,7 +9,7 @@ from kickstand.calibration.six_position import SIDES
 from kickstand.calibration.turn import Turn
 from kickstand.errors import CalibrationError, GyroError
 
-from ..errors import InputError
+from ..common.errors import InputError
 from ..logs.log import Log
 from ..logs.reader import Source, read_log
 from ..refusals import RefusedInput

@@ -1,11 +1,11 @@
 """All remarks about a log, from one table of cells."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from kickstand.errors import Notice
 
+from ..calibration.file import CalibrationFile
 from ..logs.cells import MOST_DPS, MOST_G
+from ..logs.log import Block, Log
 from ..refusals import RefusedInput
 from . import mount
 from .bends import bends
@@ -13,10 +13,6 @@ from .cells import CellTable, LogCells
 from .course import course_agrees
 from .handedness import handedness
 from .units import speed_unit
-
-if TYPE_CHECKING:
-    from ..calibration.file import CalibrationFile
-    from ..logs.log import Block, Log
 
 _LIMITS = np.array(3 * [MOST_G] + [np.inf] + 3 * [MOST_DPS])  # of readings; a log made in Python may have larger ones
 _AGAIN_S = 20.0  # while a log is read, the unit of its speed is checked again after each such time of the log
@@ -30,7 +26,7 @@ class Checks:
         self._table = CellTable()
         self._judged_s = 0.0
 
-    def add(self, part: "Block | Log") -> None:
+    def add(self, part: Block | Log) -> None:
         """Take a part of the log without frozen readings. Raises RefusedInput as soon as it is sure that the speed is
         not in m/s."""
         there = ~np.any(np.abs(part.readings) > _LIMITS, axis=1)
@@ -41,7 +37,7 @@ class Checks:
             self._judged_s = float(part.t_s[-1])
             self._judge_speed(self._table.cells())
 
-    def remarks(self, axes: bool = True, calibration: "CalibrationFile | None" = None) -> list[Notice]:
+    def remarks(self, axes: bool = True, calibration: CalibrationFile | None = None) -> list[Notice]:
         """The remarks: at most one about the log's axes (only if `axes`), and one if the log contradicts the
         calibration. Raises RefusedInput if the speed is not in m/s."""
         cells = self._table.cells()
@@ -62,7 +58,7 @@ class Checks:
             raise RefusedInput(wrong, self._name)
 
 
-def remarks(log: "Log", calibration: "CalibrationFile | None" = None, axes: bool = True) -> list[Notice]:
+def remarks(log: Log, calibration: CalibrationFile | None = None, axes: bool = True) -> list[Notice]:
     """Checks.remarks() for a log in memory. Raises RefusedInput.
 
     >>> import numpy as np

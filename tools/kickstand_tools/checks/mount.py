@@ -11,17 +11,13 @@ do two poses that were swapped. The force alone does not show it, because brakin
 On simulated rides and recordings with a right calibration up is found within 8 degrees and forward within 5.
 """
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from kickstand.errors import Notice
 from kickstand.units import AXES, STANDARD_GRAVITY
 
+from ..calibration.file import CalibrationFile
 from ..signals import Array, Lag, best_lag, correlation, rotated, rotation_vector
 from .cells import CELL_S, LogCells
-
-if TYPE_CHECKING:
-    from ..calibration.file import CalibrationFile
 
 MEAN_S = 0.5  # up and the bends are judged by means over this
 UP_DEG, FORWARD_DEG = 15.0, 20.0  # a calibration whose up or forward differs by more is another mount's
@@ -41,7 +37,7 @@ UPSIDE_DOWN = 0.87  # cosine of the angle to straight down: within 30 degrees
 ANOTHER_MOUNT_DEG = 10.0  # two alignments that differ by more are of two mounts
 
 
-def contradiction(cells: LogCells, calibration: "CalibrationFile") -> Notice | None:
+def contradiction(cells: LogCells, calibration: CalibrationFile) -> Notice | None:
     """A notice that says what in a log contradicts a calibration; None if nothing does or it is not aligned."""
     if not calibration.aligned:
         return None
@@ -60,7 +56,7 @@ def contradiction(cells: LogCells, calibration: "CalibrationFile") -> Notice | N
     return None if found is None or abs(found) < FORWARD_DEG else Notice("forward-off", found, by, car)
 
 
-def of_calibration(found: "CalibrationFile", before: "CalibrationFile | None" = None) -> list[Notice]:
+def of_calibration(found: CalibrationFile, before: CalibrationFile | None = None) -> list[Notice]:
     """Notices about a new alignment `found`, and about the calibration `before` that it was to build on.
 
     upside-down: accelerations of the opposite sign look like a sensor upside down, and no log shows which it is. (A
@@ -82,7 +78,7 @@ def of_calibration(found: "CalibrationFile", before: "CalibrationFile | None" = 
 class _Ride:
     """A log in the axes of a calibration."""
 
-    def __init__(self, cells: LogCells, calibration: "CalibrationFile") -> None:
+    def __init__(self, cells: LogCells, calibration: CalibrationFile) -> None:
         def along(over_s: float) -> tuple[Array, Array, Array]:
             """Mean force (n, 3, g), mean rate (n, 3, deg/s) less its median, and first speed (n, m/s) of each
             over_s."""

@@ -12,7 +12,7 @@ from kickstand.drive_alignment.speed_check import speed_unit_problem
 from kickstand.errors import Refusal
 from kickstand.units import STANDARD_GRAVITY
 
-from ..errors import InputError
+from ..common.errors import InputError
 from ..signals import Array, Ints, best_lag
 from .cells import LogCells
 

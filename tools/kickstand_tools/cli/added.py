@@ -5,30 +5,24 @@ The name of an entry point is the command's name, its object a click.Command. In
     [project.entry-points."kickstand.commands"]
     laps = "my_package.laps:laps_command"
 
-Kickstand's own commands come first. A package is imported only when its command runs, or for its line in the help.
+Kickstand's own commands come first; its leaves add `fleet` and `emulate` in this way. A package is imported only when
+its command runs, or for its line in the help.
 """
 
 import traceback
-from importlib.metadata import EntryPoint, distributions
+from importlib.metadata import EntryPoint
 
 import click
 
-from ..errors import DISTRIBUTION, InputError, cause
+from ..common import plugins
+from ..common.errors import DISTRIBUTION, InputError, cause
 
 GROUP = "kickstand.commands"
 
 
 def entry_points() -> dict[str, EntryPoint]:
-    """The entry points of all installed packages, by the command's name; the first that is found has a name."""
-    found: dict[str, EntryPoint] = {}
-    for distribution in distributions():
-        try:
-            for entry_point in distribution.entry_points:
-                if entry_point.group == GROUP:
-                    found.setdefault(entry_point.name, entry_point)
-        except Exception:  # a package whose metadata cannot be read adds nothing
-            continue
-    return found
+    """The entry points of the commands of all installed packages, by the command's name."""
+    return plugins.entry_points(GROUP)
 
 
 def command(entry_point: EntryPoint) -> click.Command:

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import click
 
-from .. import firmware_path
+from ..common import firmware_path
+from ..common.errors import InputError
+from ..common.progress import Bar
 from ..deploy.check import check, verdict
 from ..deploy.connection import Progress, status
 from ..deploy.flash import flash
-from ..errors import InputError
-from ..progress import Bar
 from ..rides.pull import PulledRide, pull
 from ..rides.record import live_line, record
 from ..rides.stream import LiveReading

@@ -17,10 +17,10 @@ from ..calibration.poses import GOOD_FREE_POSE_G, SixPositions, TwoPositions, fi
 from ..calibration.procedure import fit_procedure
 from ..checks.log import remarks
 from ..checks.mount import of_calibration
+from ..common.output import check_output
+from ..common.progress import Bar
 from ..estimation.alignment import RideFit, fit_ride
 from ..logs.reader import read_log
-from ..output import check_output
-from ..progress import Bar
 from ..refusals import OPPOSITE_SIGN, sentence
 from .common import OUT, PATH, RIGHT_HANDED, VEHICLES, echo, file_argument, known_to, print_lines, warn
 

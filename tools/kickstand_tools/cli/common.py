@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from kickstand.errors import Notice
 
-from ..errors import printable
+from ..common.errors import printable
 from ..refusals import sentence
 
 if TYPE_CHECKING:
@@ -43,11 +43,8 @@ PATH = click.Path(path_type=Path)
 PORT = click.option(
     "--port", help="Serial port of the board, as COM3 or /dev/ttyACM0; found by itself if only one is there."
 )
-CHIP = click.option(
-    "--chip",
-    type=click.Choice(["rp2040", "esp32"]),
-    default="rp2040",
-    help="rp2040, a Pico, or esp32: it needs QEMU's library, see tools/README.md.",
+DISPLAY = click.option(
+    "--display", type=click.Choice(["lcd", "ssd1306", "sh1106"]), default="lcd", help="Which display it has."
 )
 JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 VEHICLES = click.Choice(["motorcycle", "car"])

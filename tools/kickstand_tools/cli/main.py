@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import click
 
-from ..errors import DISTRIBUTION, InputError, cause, printable
+from ..common.errors import DISTRIBUTION, InputError, cause, printable
 from . import added
 
 # name: (the module of its function name_command, a line of help). Modules are imported when a command runs: most take
@@ -21,10 +21,8 @@ COMMANDS = {
     "compare": (".ride", "Compare the leans of two devices on one bike."),
     "cut": (".ride", "Cut a stretch out of a log."),
     "demo": (".without_a_board", "The firmware on a simulated board, in the terminal."),
-    "emulate": (".without_a_board", "An emulated board that flash can deploy to."),
     "export": (".ride", "Write a ride for another program."),
     "flash": (".board", "Copy the firmware to a board, and start it."),
-    "fleet": (".fleet", "Align many vehicles, find moved mounts, test their brakes."),
     "import": (".ride", "Make a log of a recording of another app or logger."),
     "join": (".ride", "Put a phone's or a watch's track to a ride without GPS."),
     "overlay": (".ride", "Draw the lean over a video of the ride."),

@@ -15,9 +15,11 @@ from ..analysis.export.export import export
 from ..analysis.overview import Overview, overview
 from ..analysis.plot import plot
 from ..analysis.report import as_data, page
-from ..analysis.ride import Ride, open_ride
-from ..calibration.file import CalibrationFile, calibration_beside, calibration_path, read_calibration
-from ..errors import InputError
+from ..analysis.ride import Ride, calibration_beside, open_ride
+from ..calibration.file import CalibrationFile, calibration_path, read_calibration
+from ..common.errors import InputError
+from ..common.output import check_output, whole_file
+from ..common.progress import Bar, spinner
 from ..estimation.alignment import fit_ride
 from ..estimation.smooth import smooth_to_csv
 from ..imports.importing import NAMES, Imported, import_of_app, import_recording, write_imported
@@ -27,9 +29,7 @@ from ..joining.track_files import read_track
 from ..logs.csv_lines import cut_log
 from ..logs.log import Log, Stretch
 from ..logs.reader import Source, is_log
-from ..output import check_output, whole_file
 from ..overlay.overlay import overlay
-from ..progress import Bar, spinner
 from ..refusals import WRONG_AXES, sentence
 from ..replay.replay import replay_to_csv
 from . import common

@@ -5,10 +5,10 @@ from typing import Any
 
 import click
 
-from ..errors import InputError
-from ..progress import Bar, spinner
+from ..common import plugins
+from ..common.errors import InputError
+from ..common.progress import Bar, spinner
 from ..simulation.files import simulate
-from ..simulation.fleet.fleet import make_fleet
 from ..simulation.physics.mount import MOUNTS
 from ..simulation.physics.road import CLASSES
 from ..simulation.profiles import MAIN, PROFILES
@@ -63,7 +63,7 @@ def simulate_command(profile: str | None, seed: int, vehicles: int | None, out: 
     if vehicles is not None:
         _check_fleet(out)
         with Bar("making up vehicles", lines_s=LINES_S) as bar:
-            fleet = make_fleet(out, vehicles, seed, progress=bar.reach)
+            fleet = plugins.part(plugins.SIMULATIONS, "fleet")(out, vehicles, seed, progress=bar.reach)
         logs = sum(len(vehicle.paths) for vehicle in fleet)
         echo(f"written: {out}/MANIFEST.csv and TRUTH.csv, {vehicles} vehicles, {logs} logs")
         return

@@ -1,4 +1,4 @@
-"""The commands that run the firmware without a board: demo, try, web, emulate."""
+"""The commands that run the firmware without a board: demo, try, web."""
 
 import contextlib
 import sys
@@ -8,24 +8,20 @@ from typing import Any
 
 import click
 
+from ..common.output import check_directory
+from ..common.progress import spinner
 from ..demo.demo import DeviceStopped, demo
-from ..emulator import esp32_library, image, native
-from ..output import check_directory
-from ..progress import spinner
 from ..web import serve, site
-from .common import CHIP, PATH, echo, file_argument
+from .common import DISPLAY, PATH, echo, file_argument
 
 _HAND = click.option("--hand", is_flag=True, help="Lean the bike and press the button yourself, with keys.")
 _CPYTHON = click.option("--cpython", is_flag=True, help="Run the firmware on CPython, not on MicroPython.")
-_DISPLAY = click.option(
-    "--display", type=click.Choice(["lcd", "ssd1306", "sh1106"]), default="lcd", help="Which display it has."
-)
 
 
 @click.command()
 @_HAND
 @_CPYTHON
-@_DISPLAY
+@DISPLAY
 def demo_command(**chosen: Any) -> None:
     """Watch the firmware on a simulated board: kickstand press, upright press, a ride."""
     _demo(**chosen)
@@ -35,7 +31,7 @@ def demo_command(**chosen: Any) -> None:
 @file_argument("user", "FILE")
 @_HAND
 @_CPYTHON
-@_DISPLAY
+@DISPLAY
 def try_command(**chosen: Any) -> None:
     """Try your own code: FILE is the simulated board's user.py, in the demo's ride."""
     _demo(**chosen)
@@ -67,28 +63,3 @@ def web_command(out: Path | None) -> None:
         webbrowser.open(address)
         with contextlib.suppress(KeyboardInterrupt):
             server.serve_forever()
-
-
-@click.command()
-@click.option("--port", type=click.IntRange(1024, 65535), default=2040, help="On which mpremote finds it.")
-@CHIP
-@_DISPLAY
-def emulate_command(port: int, chip: str, display: str) -> None:
-    """An emulated board on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
-    click.echo("starting: the emulator is being loaded, then the board is switched on, which takes some seconds")
-    ready_emulator(chip)
-    from ..emulator.emulate import emulate
-
-    emulate(port, click.echo, chip, display)
-
-
-def ready_emulator(chip: str) -> None:
-    """Find what this chip's emulator needs and nothing else; compile that of the Pico. Call it before importing the
-    emulator. Raises InputError if something is missing."""
-    if chip == "esp32":
-        esp32_library.find()
-        return
-    with spinner(f"downloading {image.URL} into {image.path().parent}"):
-        image.find()
-    with spinner("compiling the emulator, once"):
-        native.build()

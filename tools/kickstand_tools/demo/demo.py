@@ -8,8 +8,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.live import Live
 
-from .. import unix_port
-from ..errors import InputError
+from ..common import unix_port
+from ..common.errors import InputError
 from .device_process import Device
 from .keyboard import BIKE_KEYS, keyboard
 from .score import Score, table

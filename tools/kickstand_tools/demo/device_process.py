@@ -10,7 +10,7 @@ import tempfile
 import threading
 from pathlib import Path
 
-from .. import firmware_path, unix_port
+from ..common import firmware_path, unix_port
 from .score import State
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..errors import InputError
+from ..common.errors import InputError
 from . import check_guest
 from .check_limits import BAD, GOOD, JUDGES, LOOK, SKIPPED, Finding
 from .connection import Port, connected, describe, last_line, refuse_unfit_firmware, restart

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import firmware_path
-from ..errors import InputError
+from ..common import firmware_path
+from ..common.errors import InputError
 from ..simulated_board.simulator import Board
 from . import bytecode
 from .config_text import cleaned

@@ -4,7 +4,7 @@ import ast
 import codecs
 import re
 
-from ..errors import InputError
+from ..common.errors import InputError
 
 
 def cleaned(data: bytes) -> bytes:

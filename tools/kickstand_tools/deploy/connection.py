@@ -14,7 +14,7 @@ from mpremote.transport import TransportError, TransportExecError
 from mpremote.transport_serial import SerialTransport
 from serial.tools import list_ports
 
-from ..errors import InputError, cause
+from ..common.errors import InputError, cause
 
 # Called with what is being done, the bytes that are done and the bytes in all.
 Progress = Callable[[str, int, int], None]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from kickstand import __version__
 
-from .. import firmware_path
+from ..common import firmware_path
 from . import bytecode
 
 PACKAGE = "/kickstand"

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from mpremote.transport_serial import SerialTransport
 
-from .. import firmware_path
-from ..errors import InputError
+from ..common import firmware_path
+from ..common.errors import InputError
 from . import bytecode, config_check, others
 from .board_files import fingerprint, survey
 from .config_text import cleaned

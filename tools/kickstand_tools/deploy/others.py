@@ -10,8 +10,8 @@ from pathlib import Path
 
 from mpremote.transport_serial import SerialTransport
 
-from .. import firmware_path
-from ..errors import InputError
+from ..common import firmware_path
+from ..common.errors import InputError
 from .board_files import BoardFiles, survey
 from .config_check import Judged
 from .config_text import cleaned

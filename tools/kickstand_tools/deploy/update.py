@@ -9,7 +9,7 @@ more when its entries outgrow them.
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
-from ..errors import InputError
+from ..common.errors import InputError
 from .board_files import BoardFiles, fingerprint
 from .firmware_files import CONFIG, MAIN, MODULE_ENDINGS, PACKAGE, unfinished
 

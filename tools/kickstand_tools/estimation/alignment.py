@@ -14,7 +14,7 @@ import numpy as np
 from kickstand.errors import Notice, Refusal
 
 from ..calibration.file import CalibrationFile
-from ..errors import InputError
+from ..common.errors import InputError
 from ..logs.cells import MOST_DPS, MOST_G
 from ..logs.frozen import without_frozen
 from ..logs.log import Log

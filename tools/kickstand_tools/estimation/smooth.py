@@ -8,7 +8,7 @@ import numpy as np
 from kickstand.errors import Notice
 
 from ..calibration.file import CalibrationFile
-from ..errors import InputError
+from ..common.errors import InputError
 from ..logs.csv_lines import write_lean
 from ..logs.log import Block, Table, within
 from ..logs.reader import Source, apart, read_blocks

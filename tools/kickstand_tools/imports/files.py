@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import IO
 
-from ..errors import InputError, printable
+from ..common.errors import InputError, printable
 from ..logs.source import SUFFIXES, errors_of, open_input
 
 _EXCEL = b"\xd0\xcf\x11\xe0"  # first bytes of Excel's older files; the newer are zips

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from ..errors import InputError
+from ..common.errors import InputError
 from ..signals import Array, moving_mean, moving_spread
 from .rate_fit import RateFit, fit_rates
 from .recording import Sheet, plain, unit_in

@@ -11,7 +11,7 @@ import numpy as np
 from kickstand.errors import Notice
 
 from ..checks.course import log_agrees
-from ..errors import InputError
+from ..common.errors import InputError
 from ..estimation.first_guess import MIN_RIDING_S
 from ..logs.csv_lines import write_log
 from ..logs.log import Log
@@ -22,11 +22,12 @@ from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, senso
 from .files import RecordingFile, read_files
 from .join import GAP_NS, join
 from .recording import Recording, Taken
-from .units import ACCELERATIONS, SPEEDS, factor, unit
+from .units import ACCELERATIONS, factor
 
 # Each is a module with NAME, the app's; finds(files): one list of files for each recording of this app among them; and
-# read(files, name): such a list's Recording (see recording.py), or InputError. Each is asked about the files that none
-# before it has claimed: phyphox, which goes by names of columns, is last.
+# read(files, name): such a list's Recording (see recording.py), or InputError. If it has ASKS, the quantities whose
+# unit the user may give, it is read(files, name, units). Each is asked about the files that none before it has claimed:
+# phyphox, which goes by names of columns, is last.
 _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
 LEAST_HZ = 19.5  # samples per second that a lean needs: 20, with the clock of a phone
 NAMES = [app.NAME for app in reversed(_APPS)]
@@ -154,11 +155,9 @@ def _recording(
         more = ", ..." if len(found) > 4 else ""
         raise InputError(f"{name} holds {len(found)} recordings ({which}{more}): give one of them")
     app, group = found[0]
-    said = units.get("speed", "") if app is racebox else ""
-    if said:
-        factor(said, SPEEDS, "speed")
-    recording = racebox.read(group, name, unit(said)) if app is racebox else app.read(group, name)
-    asked = {"speed"} if app is racebox else set() if recording.sign_known else {"a"}
+    asked = getattr(app, "ASKS", frozenset[str]())
+    recording = app.read(group, name, units) if asked else app.read(group, name)
+    asked = asked or (frozenset() if recording.sign_known else {"a"})
     if not set(units) <= asked:
         raise InputError(f"{name} is {app.NAME}'s, whose units are known: leave --units out, or add --columns, too")
     if "a" in units:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from kickstand.errors import Notice
 
-from ..errors import InputError
+from ..common.errors import InputError
 from ..signals import Array
 from . import findings
 from .files import RecordingFile

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from kickstand.errors import Notice
 
-from ..errors import InputError
+from ..common.errors import InputError
 from ..logs.csv_reader import Cells, cells_of, columns_of_text, numbers_of, separator_of
 from ..signals import Array, Bools
 from .files import RecordingFile

@@ -15,14 +15,14 @@ import numpy as np
 from kickstand.errors import Notice
 
 from ..calibration.file import CalibrationFile
-from ..errors import InputError, extra
+from ..common.errors import InputError, extra
+from ..common.times import clock, tick_s
 from ..estimation.smooth import SmoothedRide, smooth
 from ..logs.reader import Source, read_twice
 from ..logs.source import Progress, name_of
 from ..refusals import as_data
 from ..replay.replay import replay
 from ..signals import Array, Bools
-from ..times import clock, tick_s
 from .clocks import Clocks, clocks
 from .motion import motion
 

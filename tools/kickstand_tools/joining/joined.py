@@ -9,12 +9,12 @@ import numpy as np
 from kickstand.errors import Notice
 from kickstand.units import LOST_US
 
-from ..errors import InputError
+from ..common.errors import InputError
+from ..common.output import write_packed
 from ..logs.csv_lines import write_log
 from ..logs.log import Block, Log
 from ..logs.reader import Source, read_blocks, read_twice
 from ..logs.source import Progress, name_of
-from ..output import write_packed
 from ..signals import Array, Ints
 from .match import Match, match
 from .motion import motion

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from ..errors import InputError
+from ..common.errors import InputError
 from ..refusals import OPPOSITE_SIGN
 from ..signals import Array, Bools, correlations, log_likelihood_ratio, moving_mean, peaks
 from .fit import AROUND_S, Fit, apart, fitted

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from kickstand.errors import Notice
 
-from ..errors import InputError
+from ..common.errors import InputError
 from ..logs.reader import Source, read_blocks
 from ..logs.source import Progress, name_of
 from ..signals import Array, Bools, Cells

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, cause, extra
+from ..common.errors import InputError, cause, extra
 from ..logs.source import Progress, open_input
 from .track import FASTEST_MPS, Track
 

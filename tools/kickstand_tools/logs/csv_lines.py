@@ -12,7 +12,7 @@ import numpy as np
 from kickstand.errors import Notice
 from numpy.typing import NDArray
 
-from ..output import write_packed
+from ..common.output import write_packed
 from ..signals import Array
 from .cells import COLUMNS, OPTIONAL
 from .log import Block, Log, Stretch

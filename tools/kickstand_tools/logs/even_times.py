@@ -12,7 +12,7 @@ import numpy as np
 from kickstand.errors import Notice
 from numpy.typing import ArrayLike
 
-from ..errors import InputError
+from ..common.errors import InputError
 from ..signals import Array, Ints, window_means
 from .log import Block
 

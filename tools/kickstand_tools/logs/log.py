@@ -9,7 +9,7 @@ from kickstand.errors import Notice
 from kickstand.units import AXES
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError, extra
+from ..common.errors import InputError, extra
 from ..signals import Array, Bools, Ints
 from .cells import TRACK
 from .csv_reader import cells_of

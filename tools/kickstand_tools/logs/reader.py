@@ -4,15 +4,16 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from kickstand.errors import Notice
 
+from ..calibration.file import CalibrationFile
 from ..checks.log import Checks
 from ..checks.sensor import SensorHealth
 from ..checks.units import check_units
-from ..errors import InputError
+from ..common.errors import InputError
 from ..signals import Array
 from . import cells
 from .cells import COLUMNS, OPTIONAL, TRACK
@@ -21,9 +22,6 @@ from .even_times import even_blocks
 from .frozen import FrozenReadings
 from .log import Block, Log, Stretch
 from .source import File, Progress, chunks, name_of, total_bytes
-
-if TYPE_CHECKING:
-    from ..calibration.file import CalibrationFile
 
 BLOCK_BYTES = 1 << 20  # bytes of text in a block, some 15000 samples
 BLOCK_SAMPLES = 60_000  # samples in a block of a log in memory
@@ -72,7 +70,7 @@ def read_blocks(
     notices: list[Notice] | None = None,
     axes: bool = True,
     lines: bool = True,
-    calibration: "CalibrationFile | None" = None,
+    calibration: CalibrationFile | None = None,
 ) -> Iterator[Block]:
     """Read a log block by block, however long it is. Frozen readings are marked in each block. notices: at the end
     notices about the log, and about contradictions to `calibration`, are appended. lines: keep the rows as CSV too,

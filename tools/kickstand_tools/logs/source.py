@@ -12,7 +12,7 @@ from typing import IO, Any, cast
 
 from kickstand.errors import Notice
 
-from ..errors import InputError, cause
+from ..common.errors import InputError, cause
 
 # Most bytes of a line, or of NUL bytes at the end, which a file system may leave in a file that was not closed
 LONGEST_LINE = 16_000_000

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..errors import InputError
+from ..common.errors import InputError
 from ..joining.motion import STEP_S, Motion
 from ..signals import Array, correlations, log_likelihood_ratio, moving_mean, peak_offset, peaks
 from .gpmf import Telemetry

@@ -9,11 +9,11 @@ from kickstand.errors import Notice
 
 from ..analysis.ride import open_ride
 from ..calibration.file import CalibrationFile
-from ..errors import InputError
+from ..common.errors import InputError
+from ..common.output import whole_file
 from ..joining.motion import motion
 from ..logs.reader import Source, read_twice
 from ..logs.source import File, Progress, name_of
-from ..output import whole_file
 from .camera_match import camera_offset_s
 from .gpmf import telemetry
 from .shown import Shown, shown
@@ -73,7 +73,7 @@ def overlay(
 
     >>> overlay("ride.csv", "clip.avi")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
-    kickstand_tools.errors.InputError: clip.avi: the name of a transparent clip ends in .mov or .webm...
+    kickstand_tools.common.errors.InputError: clip.avi: the name of a transparent clip ends in .mov or .webm...
     """
     out = Path(out)
     filmed = _check(out, video, offset_s, height)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import InputError, extra
+from ..common.errors import InputError, extra
 
 _QUIET = ("-hide_banner", "-loglevel", "error", "-nostdin", "-y")
 _LARGEST, _FASTEST = 16_384, 1000.0  # limits of a side in pixels, and of pictures per second: beyond any camera's

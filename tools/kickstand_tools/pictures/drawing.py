@@ -2,7 +2,7 @@
 
 from markupsafe import Markup
 
-from ..svg import drawing, element, path
+from ..common.svg import drawing, element, path
 
 RED, BLACK, BLUE, AMBER = "#d1302a", "#2b2b2b", "#2460d8", "#d99000"  # of wires: supply, ground, SDA, SCL
 _FONT = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif"

@@ -1,6 +1,6 @@
 """A 16x2 character display drawn dot by dot as SVG, from what its controller holds in its memories."""
 
-from ..svg import drawing, element
+from ..common.svg import drawing, element
 from .lcd_font import ROM
 
 # In units of 0.1 mm, as on the usual module of 80 x 36 mm

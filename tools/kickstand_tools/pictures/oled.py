@@ -2,8 +2,8 @@
 
 from itertools import groupby
 
+from ..common.svg import drawing, element
 from ..simulated_board.oled import HEIGHT, WIDTH
-from ..svg import drawing, element
 
 # In pixels of the panel; the usual module is 27 mm wide, its panel 22
 _MARGIN, _FRAME = 4, 6

@@ -3,7 +3,7 @@
 import runpy
 from typing import NamedTuple
 
-from .. import firmware_path
+from ..common import firmware_path
 from ..simulated_board import simulator
 from .drawing import AMBER, BLACK, BLUE, RED, Drawing
 

@@ -1,11 +1,10 @@
 """Replays a recorded log with the firmware's own LeanMeter, by one of several engines, block by block."""
 
 import contextlib
-import io
 import struct
 import subprocess
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -13,9 +12,9 @@ from typing import IO
 import numpy as np
 from kickstand.errors import Notice
 
-from .. import unix_port
 from ..calibration.file import CalibrationFile
-from ..errors import InputError
+from ..common import plugins, unix_port
+from ..common.errors import InputError
 from ..logs.csv_lines import write_lean
 from ..logs.log import Block, Log, Stretch, Table, within
 from ..logs.reader import Source, apart, read_blocks, read_twice
@@ -24,12 +23,13 @@ from ..signals import Array
 from . import replay_engine
 from .meter_along import MeterAlong
 
-_CHUNK = 500  # samples between two calls of progress while an emulated Pico works
-
 _LONG_BYTES = 20 << 20  # a quarter of an hour at 200 Hz: for a smaller file a second process costs more than it saves
 
 _RESULT_BYTES = struct.calcsize(replay_engine.RESULT)
-_EMULATED_S = 1e6  # limit of the emulated time: practically none, because logs may be long
+
+# Runs replay_engine.run() on another Python: takes the records and the progress, and the context is the results' file.
+# May raise InputError
+Engine = Callable[[Iterator[bytes], Progress | None], contextlib.AbstractContextManager[IO[bytes]]]
 
 _SIGMA = replay_engine.COLUMNS.index("lean_sigma_deg")
 
@@ -129,7 +129,8 @@ def _replayed(
         from . import second_process  # a browser's Python cannot import it
 
         return second_process.columns_of(blocks, calibration)
-    return _by_records(_BY_RECORDS[engine](_records(read_blocks(log), calibration), progress), blocks)
+    run = _BY_RECORDS[engine] or plugins.part(plugins.ENGINES, engine)
+    return _by_records(run(_records(read_blocks(log), calibration), progress), blocks)
 
 
 def _with_frozen(block: Block, results: Array) -> Array:
@@ -169,38 +170,8 @@ def micropython(records: Iterator[bytes], _progress: Progress | None) -> Iterato
             yield process.stdout
 
 
-@contextlib.contextmanager
-def rp2040(records: Iterator[bytes], progress: Progress | None) -> Iterator[IO[bytes]]:
-    """The results of an emulated Pico: 32-bit floats and the board's own interpreter. Raises InputError, GuestError."""
-    from ..emulator import image, native
-
-    image.find()  # raises InputError for what is not installed, before an import below fails because of it
-    native.build()
-    from ..deploy.bytecode import cross_compiled
-    from ..emulator import flash_image
-    from ..emulator.host_link import GUEST, HostLink
-    from ..emulator.pico import Pico
-
-    content = b"".join(records)
-    results, total = io.BytesIO(), len(content) // struct.calcsize(replay_engine.RECORD)
-
-    def sink(result: bytes) -> None:
-        results.write(result)
-        if progress and results.tell() % (_CHUNK * _RESULT_BYTES) == 0:
-            progress(results.tell() // _RESULT_BYTES, total)
-
-    files = flash_image.firmware(compiled=True)
-    del files["/main.py"]
-    files["replay_engine.mpy"] = cross_compiled(Path(replay_engine.__file__))
-    with Pico(files=files) as pico:
-        HostLink(pico.chip, content, sink)
-        pico.exec(GUEST + "import replay_engine\nreplay_engine.run(Source(), Sink())\n", _EMULATED_S)
-    results.seek(0)
-    yield results
-
-
-# The board's interpreter; with its 32-bit floats, too
-_BY_RECORDS = {"micropython": micropython, "rp2040": rp2040}
+# By another Python; rp2040, a board's own interpreter on an emulated Pico, is a leaf's: see pyproject.toml
+_BY_RECORDS: dict[str, Engine | None] = {"micropython": micropython, "rp2040": None}
 
 
 def _last_words(traceback: bytes) -> str:

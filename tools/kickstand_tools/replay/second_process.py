@@ -10,7 +10,7 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 
 from ..calibration.file import CalibrationFile
-from ..errors import InputError
+from ..common.errors import InputError
 from ..logs.log import Block
 from ..signals import Array
 from .meter_along import MeterAlong

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 from mpremote.transport import TransportExecError
 
+from ..common.errors import InputError
+from ..common.output import check_directory, make_directory
 from ..deploy.board_console import BrokenOff, lines
 from ..deploy.connection import Board, Port, Progress, connected, literal, printed, restart
-from ..errors import InputError
-from ..output import check_directory, make_directory
 from . import ride_log
 from .block_reader import CUT_SHORT, Block, missing_note, read
 

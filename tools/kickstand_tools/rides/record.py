@@ -14,9 +14,9 @@ from rich.console import Console
 from rich.live import Live
 
 from ..calibration.file import write_calibration
+from ..common.errors import InputError
+from ..common.output import check_output, whole_file
 from ..deploy.connection import connected, restart
-from ..errors import InputError
-from ..output import check_output, whole_file
 from . import ride_log
 from .block_reader import Block
 from .stream import LiveReading, Recording, blocks

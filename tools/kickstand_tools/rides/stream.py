@@ -10,9 +10,9 @@ from io import TextIOBase
 from kickstand.lean.meter import FALLEN_DEG
 
 from ..calibration.file import CalibrationFile
+from ..common.errors import InputError, cause
 from ..deploy.board_console import BrokenOff, lines
 from ..deploy.connection import Board, refuse_unfit_firmware
-from ..errors import InputError, cause
 from ..logs.cells import TRACK
 from ..replay.replay_engine import NO_SPEED, Replay
 from . import ride_log

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..common.errors import InputError
+from ..common.output import check_directory, make_directory, whole_file
 from ..logs.cells import COLUMNS, TRACK
-from ..output import check_directory, make_directory, whole_file
 from .profiles import check_profile
 from .ride import Ride, ride
 

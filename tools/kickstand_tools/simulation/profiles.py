@@ -5,7 +5,7 @@ A profile adds its legs to a plan and returns the conditions of the ride.
 
 from collections.abc import Callable
 
-from ..errors import InputError
+from ..common.errors import InputError
 from .physics.road import CLASS_A, CLASS_B, CLASS_C
 from .plan import Conditions, Plan, lean_for
 

@@ -17,10 +17,10 @@ import jinja2
 import markupsafe
 import mpremote
 
-from .. import firmware_path
+from ..common import firmware_path
+from ..common.errors import InputError, extra
 from ..deploy import bytecode
 from ..deploy.firmware_files import firmware_files
-from ..errors import InputError, extra
 
 _DATE = (1980, 1, 1, 0, 0, 0)
 # Of Pico; of Pico 2; of ESP32-C3, C6 and H2 and of a Pico 2's other processor; of all other ESP32

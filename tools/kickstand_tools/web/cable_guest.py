@@ -11,8 +11,8 @@ from datetime import datetime
 from pathlib import Path
 
 from ..calibration.file import calibration_path, write_calibration
+from ..common.errors import InputError
 from ..deploy.connection import connected, describe, restart
-from ..errors import InputError
 from ..rides import pull as pulling, ride_log, stream
 from .serial_guest import BrowserBoard
 

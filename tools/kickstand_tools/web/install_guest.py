@@ -7,10 +7,10 @@ import re
 import sys
 from pathlib import Path
 
-from .. import firmware_path
+from ..common import firmware_path
+from ..common.errors import InputError
 from ..deploy import bytecode, check as board_check, config_check, config_text, connection, flash, others
 from ..deploy.firmware_files import CONFIG
-from ..errors import InputError
 from .serial_guest import BrowserBoard
 
 OLDEST = (1, 23)  # MicroPython

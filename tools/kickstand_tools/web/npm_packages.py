@@ -9,7 +9,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from ..errors import InputError, cause, extra
+from ..common.errors import InputError, cause, extra
 
 NPM = Path(__file__).resolve().parent / "npm"
 LISTS = ("package.json", "package-lock.json")

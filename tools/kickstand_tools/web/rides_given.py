@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from ..calibration.file import calibration_path, read_calibration
-from ..errors import InputError
+from ..common.errors import InputError
 from ..imports import mapped
 from ..imports.files import RecordingFile, read_files
 from ..imports.importing import recordings

@@ -21,7 +21,7 @@ from ..analysis.overview import overview
 from ..analysis.plot.page import page
 from ..analysis.ride import Ride, open_ride
 from ..calibration.file import calibration_path, write_calibration
-from ..errors import InputError
+from ..common.errors import InputError
 from ..estimation.alignment import fit_ride
 from ..estimation.smooth import COLUMNS, DIGITS, smooth_to_csv
 from ..imports import mapped

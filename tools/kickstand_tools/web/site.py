@@ -6,13 +6,13 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from .. import firmware_path
 from ..analysis.plot import page
-from ..errors import DISTRIBUTION
-from ..output import check_directory, new_directory, whole_file
+from ..common import firmware_path
+from ..common.errors import DISTRIBUTION
+from ..common.output import check_directory, new_directory, whole_file
+from ..common.templates import filled, source_hash
 from ..pictures import building, lcd, wiring
 from ..pictures.lcd_font import ROM
-from ..templates import filled, source_hash
 from . import archives, npm_packages, sample_ride
 
 PAGE = Path(__file__).resolve().parent / "page"

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import click
-from kickstand_tools.cli.common import CHIP, JSON, PATH, warn
+from kickstand_emulator.commands import CHIP, ready_emulator
+from kickstand_tools.cli.common import JSON, PATH, warn
 from kickstand_tools.cli.simulated import LINES_S, PROFILE_NAMES, pose_options, seconds_option
-from kickstand_tools.cli.without_a_board import ready_emulator
-from kickstand_tools.errors import extra
-from kickstand_tools.output import check_directory, new_directory
-from kickstand_tools.progress import Bar
+from kickstand_tools.common.errors import extra
+from kickstand_tools.common.output import check_directory, new_directory
+from kickstand_tools.common.progress import Bar
 from kickstand_tools.simulation.physics.mount import MOUNTS
 from kickstand_tools.simulation.physics.road import CLASSES
 from kickstand_tools.simulation.profiles import MAIN, check_profile

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from kickstand.errors import Notice
 
-from ...errors import InputError, extra
+from ...common.errors import InputError, extra
+from ...common.output import whole_file
 from ...logs.log import Stretch
 from ...logs.reader import Source, read_blocks, read_twice
 from ...logs.source import Progress
-from ...output import whole_file
 from ...signals import Array
 from ..channels import Channels, downsampled, rounded_to
 from ..ride import Ride

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...common.times import clock, tick_s
 from ...refusals import sentence
 from ...signals import Array, smoothed
-from ...times import clock, tick_s
 from ..channels import spacing_s
 from ..overview import Overview
 from ..report import angles, judged, peak_words

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from ...common.templates import filled, source_hash
 from ...signals import EARTH_M
-from ...templates import filled, source_hash
 from ..overview import Overview
 from . import interactive, track_map
 from .charts import charts

@@ -3,8 +3,8 @@
 from importlib.util import find_spec
 from pathlib import Path
 
-from ...errors import InputError, extra
-from ...output import check_directory, new_directory, whole_file
+from ...common.errors import InputError, extra
+from ...common.output import check_directory, new_directory, whole_file
 from ..overview import Overview
 from . import page, picture
 

@@ -8,7 +8,7 @@ treated the same.
 
 import numpy as np
 
-from ...errors import InputError
+from ...common.errors import InputError
 from ..files import RecordingFile
 from ..recording import Recording, names_in, plain, read_sheet, sensor_of, track_of, unit_in
 from ..units import SPEEDS, unit

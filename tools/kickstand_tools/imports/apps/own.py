@@ -8,7 +8,7 @@ import io
 
 import numpy as np
 
-from ...errors import InputError, extra
+from ...common.errors import InputError, extra
 from ...logs.cells import COLUMNS
 from ...logs.csv_reader import MOST_CELLS
 from ..files import RecordingFile

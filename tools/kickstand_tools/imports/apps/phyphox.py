@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...errors import InputError
+from ...common.errors import InputError
 from ...logs.csv_reader import as_text
 from ..files import RecordingFile
 from ..join import with_gravity

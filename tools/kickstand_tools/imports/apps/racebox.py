@@ -5,15 +5,18 @@ GyroZ is positive in a left turn, is measured on the ride in its src/lib/__fixtu
 https://www.racebox.pro/products/mini-micro-protocol-documentation. The column Speed says no unit; the positions do.
 """
 
+from collections.abc import Mapping
+
 from kickstand.errors import Notice
 
-from ...errors import InputError
+from ...common.errors import InputError
 from ..files import RecordingFile
 from ..recording import Recording, names_in, plain, read_sheet, sensor_of, track_of, unit_in
 from ..speeds import unit_by_positions
-from ..units import SPEEDS, unit
+from ..units import SPEEDS, factor, unit
 
 NAME = "RaceBox"
+ASKS = frozenset({"speed"})  # the quantities whose unit may be given: see importing.py
 _AXES = [f"{sensor}{axis}" for sensor in ("GForce", "Gyro") for axis in "YZX"]  # left, up, forward
 
 
@@ -22,9 +25,13 @@ def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     return [[file] for file in files if _header(file) is not None]
 
 
-def read(files: list[RecordingFile], name: str, speed_unit: str = "") -> Recording:
-    """Read a recording. Raises InputError for a missing column. speed_unit: unit of the column Speed, "" to find it by
-    the positions."""
+def read(files: list[RecordingFile], name: str, units: Mapping[str, str] = {}) -> Recording:
+    """Read a recording. units: "speed" is the unit of the column Speed; without it the positions show which it is.
+    Raises InputError for a missing column and for a unit that is not a speed's."""
+    said = units.get("speed", "")
+    if said:
+        factor(said, SPEEDS, "speed")
+    speed_unit = unit(said)
     sheet = read_sheet(files[0], _header(files[0]) or 0)
     places, missing = sheet.axes(*_AXES)
     if {"GForceY", "GForceZ"} & set(missing):

@@ -7,7 +7,7 @@ longitudinal_acc are calculated from positions and say nothing of gravity. The a
 that measured. Kickstand's own export has this form, too.
 """
 
-from ...errors import InputError
+from ...common.errors import InputError
 from ..files import RecordingFile
 from ..recording import Recording, names_in, plain, read_sheet, sensor_of, track_of
 

@@ -7,7 +7,7 @@ m/s2 and rad/s, at rest with the screen up +9.8 in z.
 
 import re
 
-from ...errors import InputError
+from ...common.errors import InputError
 from ..files import RecordingFile
 from ..join import with_gravity
 from ..recording import Recording, Sensor, names_in, read_sheet, sensor_of

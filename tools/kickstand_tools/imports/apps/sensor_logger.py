@@ -5,7 +5,7 @@ https://github.com/tszheichoi/awesome-sensor-logger. Accelerometer.csv has no gr
 and gravity have the opposite sign, and AccelerometerUncalibrated is in g, unless "Standardise Units & Frames" was on.
 """
 
-from ...errors import InputError
+from ...common.errors import InputError
 from ..files import RecordingFile
 from ..join import with_gravity
 from ..recording import Recording, Sensor, names_in, read_sheet, sensor_of, track_of

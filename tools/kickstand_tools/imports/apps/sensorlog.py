@@ -7,7 +7,7 @@ gravity and the user's acceleration, whose sum they are; rates in rad/s, right-h
 
 import numpy as np
 
-from ...errors import InputError
+from ...common.errors import InputError
 from ..files import RecordingFile
 from ..join import with_gravity
 from ..recording import Recording, Sensor, Sheet, Track, names_in, plain, read_sheet, sensor_of, track_of

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from ...errors import InputError
+from ...common.errors import InputError
 from ...logs.csv_reader import columns_of
 from ..files import RecordingFile
 from ..recording import Recording, Sheet, plain, sensor_of, track_of

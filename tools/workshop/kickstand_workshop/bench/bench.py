@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 from kickstand.calibration.parameters import Calibration
+from kickstand_emulator import flash_image
+from kickstand_emulator.emulate import device_class
 from kickstand_tools.deploy.bytecode import architecture, cross_compiled
-from kickstand_tools.emulator import flash_image
-from kickstand_tools.emulator.emulate import device_class
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, upright
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 from rich.console import Group

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from kickstand_tools import firmware_path
-from kickstand_tools.emulator import flash_image
-from kickstand_tools.emulator.emulate import Kind
+from kickstand_emulator import flash_image
+from kickstand_emulator.emulate import Kind
+from kickstand_tools.common import firmware_path
 from rich.table import Table
 
 _LIMIT_S = 10.0

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from kickstand.lean.meter import FALLEN_DEG
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.errors import InputError
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.replay.replay_engine import NO_SPEED, Replay
 from kickstand_tools.simulation.physics.mount import MOUNTS
 from kickstand_tools.simulation.physics.road import CLASSES

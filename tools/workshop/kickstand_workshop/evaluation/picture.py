@@ -4,7 +4,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-from kickstand_tools.errors import InputError, extra
+from kickstand_tools.common.errors import InputError, extra
 from kickstand_tools.signals import window_spreads
 from numpy.typing import NDArray
 

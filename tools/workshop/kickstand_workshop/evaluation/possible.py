@@ -28,9 +28,9 @@ GPS_MPS = 0.05  # noise of each component of a receiver's velocity, 1 sigma: dat
 _ORACLE = {
     "SIGMA_START": tuple(s if i < BIAS_LEFT else 1e-3 * s for i, s in enumerate(measurements.SIGMA_START)),
     "SIGMA_FRESH_BIAS": 1e-4,
-    "SIGMA_MEASURED_SPEED": 0.1,
-    "MEASURED_SPEED_LATE_S": 0.0,
-    "SIGMA_LEFT": 0.02,
+    "_SIGMA_MEASURED_SPEED": 0.1,
+    "_MEASURED_SPEED_LATE_S": 0.0,
+    "_SIGMA_LEFT": 0.02,
     "NOISE_ANGLE": radians(0.12),
     "NOISE_BIAS": radians(0.008),
 }

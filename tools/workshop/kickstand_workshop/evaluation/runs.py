@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.calibration.poses import fit_six_positions, fit_two_positions
-from kickstand_tools.errors import InputError
+from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs.log import Log
 from kickstand_tools.simulation.profiles import check_profile
 from kickstand_tools.simulation.ride import Ride, ride

@@ -1,6 +1,6 @@
 """Writes every picture to tools/pictures: .venv/bin/python -m kickstand_workshop.pictures"""
 
-from kickstand_tools import firmware_path
+from kickstand_tools.common import firmware_path
 
 from ..browser import CHROMIUM
 from . import page, ride

@@ -11,7 +11,7 @@ import sys
 import tempfile
 from typing import Any
 
-from kickstand_tools import firmware_path
+from kickstand_tools.common import firmware_path
 from kickstand_tools.demo.device import KICKSTAND_PRESS_S, LONG_PRESS_S, PART_SEED, PART_SHARE, SCRIPT, UPRIGHT_PRESS_S
 from kickstand_tools.simulated_board.oled import Oled
 from kickstand_tools.simulated_board.simulator import Board

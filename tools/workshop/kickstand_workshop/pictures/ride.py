@@ -7,7 +7,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from kickstand_tools import firmware_path
+from kickstand_tools.common import firmware_path
 from PIL import Image
 
 COLOURS = 64  # enough for a plot, and a third of the file

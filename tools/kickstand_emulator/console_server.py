@@ -1,0 +1,63 @@
+"""An emulated board's console as a socket, for mpremote and `kickstand flash --port socket://...`."""
+
+import contextlib
+import socket
+from collections.abc import Callable
+
+from kickstand_tools.common.errors import InputError, cause
+
+
+class ConsoleServer:
+    """Serves one client at a time, as a serial port does. Call poll() often. Port 0 takes a free one, see `port`.
+
+    send: takes what the client sends.
+    """
+
+    def __init__(self, send: Callable[[bytes], None], port: int) -> None:
+        self._send = send
+        self._client: socket.socket | None = None
+        try:
+            self._server = socket.create_server(("127.0.0.1", port))
+        except (OSError, OverflowError) as error:
+            raise InputError(f"port {port} cannot be opened: {cause(error)}; choose another") from error
+        self._server.setblocking(False)
+        self.port: int = self._server.getsockname()[1]
+
+    def close(self) -> None:
+        """Disconnect the client and stop listening."""
+        self._hang_up()
+        self._server.close()
+
+    def poll(self) -> None:
+        """Accept a client, or pass on what it has sent."""
+        if self._client is None:
+            with contextlib.suppress(BlockingIOError):
+                self._client = self._server.accept()[0]
+                self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                self._client.setblocking(False)
+            return
+        try:
+            data = self._client.recv(4096)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if data:
+            self._send(data)
+        else:
+            self._hang_up()
+
+    def say(self, data: bytes) -> None:
+        """Send what the board prints to the client; it is lost if there is none."""
+        if self._client:
+            try:
+                self._client.setblocking(True)
+                self._client.sendall(data)
+                self._client.setblocking(False)
+            except OSError:
+                self._hang_up()
+
+    def _hang_up(self) -> None:
+        if self._client:
+            self._client.close()
+            self._client = None

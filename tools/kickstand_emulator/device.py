@@ -1,0 +1,197 @@
+"""What the emulated boards have in common: power, time, the console, and the parts that are wired to them."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from kickstand_tools.simulated_board.simulator import Board
+
+from .flash_image import FileSystem
+
+LEVEL = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+_CTRL_A, _CTRL_B, _CTRL_C, _CTRL_D = b"\x01", b"\x02", b"\x03", b"\x04"
+_PROMPT = b"raw REPL; CTRL-B to exit\r\n>"
+
+
+class NotReached(Exception):
+    """A condition was not met in time."""
+
+
+class GuestError(Exception):
+    """The code that was given to exec() raised an exception. The text is the board's traceback."""
+
+
+class Device(ABC):
+    """Has no power until power_on(); `with` switches it on, and off at the end. Times are emulated seconds; they
+    continue through resets and power cycles.
+
+    Made with world: as for simulator.Board, level and at rest if None.  files: what its flash holds, see
+    flash_image.py.  fitted: other arguments of Board.
+
+    NAME: of the board.  FLASH: where its file system is.  MPY: the bytecode it takes, see bytecode.py.  SINK: code for
+    the board, a class Sink whose write() gives bytes to what listens here.
+    """
+
+    NAME: str
+    FLASH: FileSystem
+    MPY: int
+    SINK: str
+
+    def __init__(self, board: Board) -> None:
+        self.board = board
+        self.said = bytearray()  # what the board printed
+        self.heard: Callable[[bytes], None] | None = None  # called with each part of it
+        self.powered = False
+        self.resets = 0  # since it was made, without those by power
+        self._awaited = b""
+        self._raw = False  # True while its console is in the raw REPL
+        self._wire(board.button_pin)
+
+    def __enter__(self):
+        self.power_on()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.power_off()
+
+    # Power and time
+
+    @property
+    @abstractmethod
+    def time_s(self) -> float:
+        """Emulated seconds since it was made."""
+
+    @abstractmethod
+    def power_on(self) -> None:
+        """Start everything from power-on."""
+
+    @abstractmethod
+    def power_off(self) -> None:
+        """Cut the supply; only the content of the flash is kept."""
+
+    @abstractmethod
+    def run(self, seconds: float, between: Callable[[], None] | None = None) -> None:
+        """Let time pass. between: called every few ms of the host's time."""
+
+    @abstractmethod
+    def stop(self) -> None:
+        """End run() now."""
+
+    @property
+    @abstractmethod
+    def reading(self) -> bool:
+        """True while the sensor is sending."""
+
+    @abstractmethod
+    def reset(self) -> None:
+        """Reset the chip, while sensor and display keep their supply."""
+
+    @abstractmethod
+    def _set_pin(self, number: int, level: int) -> None:
+        """What is wired to this GPIO pulls it to ground (0), or does no more (1)."""
+
+    def _wire(self, number: int) -> None:
+        """To the part that simulator.Board has at this GPIO."""
+        self.board.watch_pin(number, partial(self._set_pin, number))
+
+    def fit_wheel(self, speed: Callable[[float], float], **kind: Any) -> None:
+        """Connect a wheel contact, as simulator.Board.fit_wheel() does."""
+        self.board.fit_wheel(speed, **kind)
+        self._wire(self.board.wheel_pin)
+
+    def power_cycle(self, off_s: float = 0.5) -> None:
+        """Switch it off, and on again after off_s."""
+        self.power_off()
+        self.run(off_s)
+        self.power_on()
+
+    def run_until(self, condition: Callable[[], Any], limit_s: float, step_s: float = 0.005) -> Any:
+        """Let time pass until condition() is true; return its value. It is called every step_s. Raises NotReached."""
+        end_s = self.time_s + limit_s
+        while not (reached := condition()):
+            if self.time_s >= end_s:
+                raise NotReached(f"not within {limit_s} s; the display says {self.lcd()}")
+            self.run(step_s)
+        return reached
+
+    # What a rider sees and does
+
+    def lcd(self) -> list[str]:
+        """The two lines of the display."""
+        return self.board.lcd.text()
+
+    def press(self, at_s: float | None = None, for_s: float = 0.15) -> None:
+        """Press the button at at_s (now, if None)."""
+        self.board.press(at_s, for_s)
+
+    # The flash
+
+    @property
+    @abstractmethod
+    def file_system(self) -> bytes:
+        """The part of the flash that holds the files. It can be assigned."""
+
+    @file_system.setter
+    @abstractmethod
+    def file_system(self, system: bytes) -> None: ...
+
+    def put_files(self, files: dict[str, bytes]) -> None:
+        """Replace the content of the file system with these files."""
+        self.file_system = self.FLASH.build(files)
+
+    def files(self) -> dict[str, bytes]:
+        """Every file in flash, by path."""
+        return self.FLASH.read(self.file_system)
+
+    # The console
+
+    @abstractmethod
+    def listen(self, sink: Callable[[bytes], Any]) -> None:
+        """Call sink() with what Sink.write() on the board is given."""
+
+    @abstractmethod
+    def send(self, data: bytes) -> None:
+        """Send data to the board's console as fast as it takes them."""
+
+    def exec(self, code: str, limit_s: float = 10.0) -> str:
+        """Interrupt what runs on the board, run code there as mpremote does, and return what it printed.
+
+        Raises GuestError with the board's traceback, and NotReached if it takes longer than limit_s.
+        """
+        if not self._raw:
+            self._until_it_reads()
+            self.send(_CTRL_C + _CTRL_C + _CTRL_A)
+            self._expect(_PROMPT, 2.0)
+            self._raw = True
+        del self.said[:]
+        self.send(code.encode() + _CTRL_D)
+        self._expect(_CTRL_D + b">", limit_s)
+        output, error = bytes(self.said).removeprefix(b"OK").split(_CTRL_D)[:2]
+        if error:
+            raise GuestError(error.decode(errors="replace"))
+        return output.decode(errors="replace").replace("\r\n", "\n")
+
+    def _until_it_reads(self) -> None:
+        """Let time pass until the board reads its console."""
+        self.run(0.1)
+
+    def soft_reset(self) -> None:
+        """What Ctrl-D does at the friendly prompt."""
+        self.send(_CTRL_B + _CTRL_D)
+        self._raw = False
+
+    def _expect(self, ending: bytes, limit_s: float) -> None:
+        self._awaited = ending
+        if not self.said.endswith(ending):
+            self.run(limit_s)
+        self._awaited = b""
+        if not self.said.endswith(ending):
+            raise NotReached(f"the board's console ends with {bytes(self.said[-80:])!r}")
+
+    def _received(self, data: bytes) -> None:
+        self.said += data
+        if self._awaited and self.said.endswith(self._awaited):
+            self.stop()
+        if self.heard:
+            self.heard(data)

@@ -1,0 +1,134 @@
+"""kickstand emulate: an emulated board with sensor, display and button on a simulated bike, for `kickstand flash`."""
+
+import contextlib
+import sys
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TypeAlias, cast
+
+from kickstand_tools.demo.device import (
+    KICKSTAND_PRESS_S,
+    LONG_PRESS_S,
+    PART_SEED,
+    PART_SHARE,
+    SCRIPT,
+    UPRIGHT_PRESS_S,
+    seen,
+)
+from kickstand_tools.demo.hand_bike import HandBike
+from kickstand_tools.demo.keyboard import BIKE_KEYS, keyboard
+from kickstand_tools.demo.score import State
+from kickstand_tools.demo.screen import lcd_lines, screen
+from kickstand_tools.simulated_board.oled import Oled
+from kickstand_tools.simulation.scripted.script import Ride
+from kickstand_tools.simulation.scripted.sensor_errors import Sensor
+from rich.live import Live
+
+from .console_server import ConsoleServer
+from .device import Device
+
+if TYPE_CHECKING:
+    from .esp32 import Esp32
+    from .pico import Pico
+
+Kind: TypeAlias = "type[Pico] | type[Esp32]"
+
+_STEP_S = 0.02
+_BUTTON = {"b": 0.15, "B": LONG_PRESS_S, " ": LONG_PRESS_S}  # seconds of a press, by key
+_HELP = "b button   B long press   a/d lean   k kickstand   u upright   q quit"
+_NO_FIRMWARE = "No firmware on it yet, so the display is blank. In another terminal:\n  kickstand flash --port {}\n"
+
+
+def device_class(chip: str) -> Kind:
+    """The class of the emulated board with this chip, "rp2040" or "esp32". Each needs packages that the other does
+    not: only its own are imported."""
+    if chip == "esp32":
+        from .esp32 import Esp32
+
+        return Esp32
+    from .pico import Pico
+
+    return Pico
+
+
+class ScriptedBike:
+    """The demo's ride. It begins when the display comes on, which shows that the firmware has started."""
+
+    def __init__(self) -> None:
+        self._ride = Ride(SCRIPT)
+        self.begun_s: float | None = None
+
+    def motion(self, t_s: float) -> tuple[float, ...]:
+        """See script.Ride.motion()."""
+        return self._ride.motion(0.0 if self.begun_s is None else t_s - self.begun_s)
+
+    def follow(self, device: Device) -> None:
+        """Begin the ride once the display is on, and have the button pressed where the script says."""
+        if self.begun_s is None and device.board.lcd.on:
+            self.begun_s = device.time_s
+            for press_s in (KICKSTAND_PRESS_S, UPRIGHT_PRESS_S):
+                device.press(self.begun_s + press_s)
+
+
+def emulate(port: int, say: Callable[[str], None], chip: str = "rp2040", display: str = "lcd") -> None:
+    """Serve an emulated board's console on socket://127.0.0.1:port until the user quits. Raises InputError.
+
+    In a terminal the bike is steered with keys. Elsewhere say() gets each new text of the display, and the bike goes
+    on the demo's ride once the firmware runs. display: "lcd", "ssd1306" or "sh1106".
+    """
+    watched = sys.stdin.isatty() and sys.stdout.isatty()
+    bike = HandBike() if watched else ScriptedBike()
+    device = device_class(chip)(Sensor(seed=PART_SEED, share=PART_SHARE).world(bike.motion), display=display)
+    server = ConsoleServer(device.send, port)
+    device.heard = server.say
+    address = f"socket://127.0.0.1:{server.port}"
+    say(f"an emulated {device.NAME} without firmware on {address}: kickstand flash --port {address}")
+    try:
+        with contextlib.suppress(KeyboardInterrupt), device:
+            if isinstance(bike, HandBike):
+                _watch(device, server, bike, address)
+            else:
+                _print(device, server, bike, say)
+    finally:
+        server.close()
+
+
+def _run(device: Device, server: ConsoleServer) -> None:
+    """Let a step of time pass, not faster than real time: the time-outs of mpremote go by the host's clock."""
+    begun, before = time.monotonic(), device.time_s
+    device.run(_STEP_S, server.poll)
+    time.sleep(max(0.0, device.time_s - before - (time.monotonic() - begun)))
+
+
+def _watch(device: Device, server: ConsoleServer, bike: HandBike, address: str) -> None:
+    with keyboard() as pressed, Live(screen=True, auto_refresh=False) as live:
+        while True:
+            for key in pressed(0.0):
+                if key == "q":
+                    return
+                if key in _BUTTON:
+                    device.press(for_s=_BUTTON[key])
+                elif key in BIKE_KEYS:
+                    bike.command(BIKE_KEYS[key])
+            _run(device, server)
+            state = cast(State, seen(device.board, bike))
+            if isinstance(device.board.lcd, Oled):
+                state["pixels"] = device.board.lcd.pixels().hex()
+            title = f"Kickstand on an emulated {device.NAME}, {address}"
+            live.update(screen(state, title, below(device.board.lcd.on, address), False), refresh=True)
+
+
+def below(on: bool, address: str) -> str:
+    """What stands below the picture. on: is the display switched on, which only the firmware does?"""
+    return _HELP if on else _NO_FIRMWARE.format(address) + _HELP
+
+
+def _print(device: Device, server: ConsoleServer, bike: ScriptedBike, say: Callable[[str], None]) -> None:
+    shown: list[str] = device.lcd()
+    while True:
+        _run(device, server)
+        bike.follow(device)
+        if device.lcd() != shown:
+            shown = device.lcd()
+            say(f"{device.time_s:8.2f} s")
+            say("\n".join(lcd_lines(shown)))

@@ -1,0 +1,45 @@
+"""The engine rp2040 of `kickstand replay`, which the entry point in pyproject.toml adds."""
+
+import contextlib
+import io
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO
+
+from kickstand_tools.deploy.bytecode import cross_compiled
+from kickstand_tools.logs.source import Progress
+from kickstand_tools.replay import replay_engine
+
+_CHUNK = 500  # samples between two calls of progress
+_RESULT_BYTES = struct.calcsize(replay_engine.RESULT)
+_EMULATED_S = 1e6  # limit of the emulated time: practically none, because logs may be long
+
+
+@contextlib.contextmanager
+def rp2040(records: Iterator[bytes], progress: Progress | None) -> Iterator[IO[bytes]]:
+    """The results of an emulated Pico: 32-bit floats and the board's own interpreter. Raises InputError, GuestError."""
+    from . import image, native
+
+    image.find()  # raises InputError for what is not installed, before an import below fails because of it
+    native.build()
+    from . import flash_image
+    from .host_link import GUEST, HostLink
+    from .pico import Pico
+
+    content = b"".join(records)
+    results, total = io.BytesIO(), len(content) // struct.calcsize(replay_engine.RECORD)
+
+    def sink(result: bytes) -> None:
+        results.write(result)
+        if progress and results.tell() % (_CHUNK * _RESULT_BYTES) == 0:
+            progress(results.tell() // _RESULT_BYTES, total)
+
+    files = flash_image.firmware(compiled=True)
+    del files["/main.py"]
+    files["replay_engine.mpy"] = cross_compiled(Path(replay_engine.__file__))
+    with Pico(files=files) as pico:
+        HostLink(pico.chip, content, sink)
+        pico.exec(GUEST + "import replay_engine\nreplay_engine.run(Source(), Sink())\n", _EMULATED_S)
+    results.seek(0)
+    yield results

@@ -1,0 +1,349 @@
+"""The process in which QEMU emulates an ESP32: its library can be begun only once in a process.
+
+python -m kickstand_emulator.esp32_machine SOCKET LIBRARY FLASH SDA,SCL... is started by esp32.py, which has the
+models of sensor and display, and exchanges messages with it over an inherited socket. The levels of the I2C wires are
+turned into bytes here, because a message for each of them would take too long.
+
+Time is counted in instructions, and passes only after a GO. Three things of QEMU would still make it depend on the
+host. Its main loop may run timers between the turns of the two processors, or set the clock forward before the last of
+them has fallen asleep: it has to wait until both sleep (_hold_main_loop). A timer of its scheduler begins at one of two
+moments: it is put off for ever (_calm_timers). And a reset, even of one processor, is done by the main loop,
+while the other processor goes on: it waits for the next full millisecond, and the processors wait for it (_guard), and
+it for their thread (_on_reset).
+"""
+
+import ctypes as c
+import os
+import socket
+import struct
+import sys
+import threading
+import time
+
+from kickstand_tools.simulated_board.i2c import Bus
+
+from .i2c_wires import Wires
+
+# To the process: kind, a, b, value; from it: nanoseconds, kind, a, b
+COMMAND, MESSAGE = struct.Struct("<BBHq"), struct.Struct("<qBBH")
+GO, PIN, UART, HANG, LEVEL, SYNC = range(6)
+START, WRITE, READ, STOP, PRINTED, STOPPED = range(6)
+
+_PINS = 40
+_VIRTUAL = 1  # QEMU_CLOCK_VIRTUAL
+_NEVER = 1 << 62
+_GUARD_NS = 1_000_000
+_SHORTEST_S, _LONGEST_S = 5e-5, 1e-3  # between two looks whether the processors sleep
+
+_PIN_CALL = c.CFUNCTYPE(None, c.c_int, c.c_int)
+_I2C_CALL = c.CFUNCTYPE(c.c_int, c.c_uint8, c.c_uint8, c.c_uint16)
+_SPI_CALL = c.CFUNCTYPE(c.c_uint8, c.c_uint8, c.c_uint16)
+_UART_CALL = c.CFUNCTYPE(None, c.c_uint8, c.c_uint8)
+_RMT_CALL = c.CFUNCTYPE(None, c.c_uint8, c.c_uint32, c.c_uint32)
+_CALL = c.CFUNCTYPE(None, c.c_void_p)
+_WORK_CALL = c.CFUNCTYPE(None, c.c_void_p, c.c_void_p)
+
+
+class _Callbacks(c.Structure):
+    _fields_ = [
+        ("write_pin", _PIN_CALL),
+        ("dir_pin", _PIN_CALL),
+        ("i2c", _I2C_CALL),
+        ("spi", _SPI_CALL),
+        ("uart_tx", _UART_CALL),
+        ("pinmap", c.POINTER(c.c_short)),
+        ("rmt", _RMT_CALL),
+    ]
+
+
+class _Timer(c.Structure):
+    """QEMUTimer."""
+
+
+_Timer._fields_ = [
+    ("expires", c.c_int64),
+    ("list", c.c_void_p),
+    ("call", c.c_void_p),
+    ("opaque", c.c_void_p),
+    ("next", c.POINTER(_Timer)),
+    ("attributes", c.c_int),
+    ("scale", c.c_int),
+]
+
+
+class _Poll(c.Structure):
+    """MainLoopPoll. state: 0 before the main loop waits for events."""
+
+    _fields_ = [("state", c.c_int), ("timeout", c.c_uint32)]
+
+
+_POLL_CALL = c.CFUNCTYPE(None, c.c_void_p, c.POINTER(_Poll))
+
+
+class _Notifier(c.Structure):
+    _fields_ = [("call", _POLL_CALL), ("next", c.c_void_p), ("previous", c.c_void_p)]
+
+
+class _RemoteBus(Bus):
+    """The bus, whose devices are in the other process. Here it is known only whether one of them holds SDA."""
+
+    def __init__(self, machine: "Machine", number: int, sda: int, scl: int) -> None:
+        super().__init__(None, sda, scl)
+        self._machine, self._number = machine, number
+
+    def start(self, address: int, read: bool) -> bool:
+        if self.stuck():
+            return False
+        self._stuck_bits = -1  # as in Bus.start()
+        return bool(self._machine.ask(START, self._number, address << 1 | read))
+
+    def write_byte(self, value: int) -> bool:
+        return bool(self._machine.ask(WRITE, self._number, value))
+
+    def read_byte(self) -> int:
+        return self._machine.ask(READ, self._number)
+
+    def stop(self) -> None:
+        self._machine.tell(STOP, self._number)
+
+
+class Machine:
+    """The emulated chip. run() does not return."""
+
+    def __init__(self, link: socket.socket, folder: str, flash: str, wires: list[tuple[int, int]]) -> None:
+        self._link = link
+        self._qemu = qemu = c.CDLL(f"{folder}/libqemu-xtensa.so", mode=c.RTLD_GLOBAL)
+        qemu.qemu_clock_get_ns.restype = c.c_int64
+        qemu.timer_mod_ns.argtypes = [c.c_void_p, c.c_int64]
+        qemu.qemu_get_cpu.restype = c.c_void_p
+        qemu.timer_del.argtypes = [c.c_void_p]
+        qemu.all_cpu_threads_idle.restype = qemu.runstate_is_running.restype = c.c_bool
+        self._folder, self._flash = folder, flash
+        self._inputs: dict[int, int] = {}  # levels that others than the chip give to pins
+        self._wires_of: dict[int, tuple[Wires, int, int]] = {}
+        self._driven = [1] * _PINS
+        self._stale: list[int] = []  # wires whose input QEMU has set to what the chip drives
+        self._may_reset = self._resetting = False  # the processors wait for a reset; the main loop does it
+        self._fuses: _Timer | None = None
+        self._state = -1  # file that says whether the thread of the processors sleeps
+        self._buses = [_RemoteBus(self, i, *pins) for i, pins in enumerate(wires)]
+        self._wires = [Wires(bus, self._setter(bus.sda), self._setter(bus.scl)) for bus in self._buses]
+        for bus, its in zip(self._buses, self._wires, strict=True):
+            self._wires_of[bus.sda] = self._wires_of[bus.scl] = (its, bus.sda, bus.scl)
+
+    # Messages
+
+    def tell(self, kind: int, a: int = 0, b: int = 0) -> None:
+        now_ns = self._qemu.qemu_clock_get_ns(_VIRTUAL)
+        self._link.sendall(MESSAGE.pack(now_ns, kind, a, b))
+
+    def ask(self, kind: int, a: int = 0, b: int = 0) -> int:
+        self.tell(kind, a, b)
+        answer = self._link.recv(1)
+        if not answer:
+            os._exit(0)  # the other process has ended, or cut the power
+        return answer[0]
+
+    def _receive(self, size: int) -> bytes:
+        data = self._link.recv(size, socket.MSG_WAITALL)
+        if len(data) < size:
+            os._exit(0)
+        return data
+
+    def _stopped(self, _: object = None) -> None:
+        """Do as the other process says until it lets time pass."""
+        if self._state < 0:
+            self._begun()
+        self.tell(STOPPED)
+        while True:
+            kind, a, b, value = COMMAND.unpack(self._receive(COMMAND.size))
+            if kind == GO:
+                self._qemu.timer_mod_ns(c.addressof(self._stop), value)
+                return
+            if kind == PIN:
+                self._set(a, b)
+            elif kind == UART:
+                self._qemu.qemu_picsimlab_uart_receive(a, self._receive(b), b)
+            elif kind == HANG:
+                self._buses[a].hang(b)
+                self._wires[a].show()
+            elif kind == LEVEL:
+                self._link.sendall(bytes([self._buses[a].sda_level()]))
+            elif kind == SYNC:
+                self._qemu.bdrv_drain_all()
+                self._link.sendall(b"\0")
+
+    # The pins
+
+    def _setter(self, pin: int):
+        self._inputs[pin] = 1
+
+        def set_level(level: int) -> None:
+            if self._inputs[pin] != level:
+                self._set(pin, level)
+
+        return set_level
+
+    def _set(self, pin: int, level: int) -> None:
+        self._inputs[pin] = level
+        if self._state >= 0:
+            self._qemu.qemu_picsimlab_set_pin(pin + 1, level)
+
+    def _write_pin(self, number: int, level: int) -> None:
+        pin = number - 1
+        wires = self._wires_of.get(pin)
+        if wires is not None and self._driven[pin] != level:
+            self._driven[pin] = level
+            self._stale.append(pin)
+            wires[0].driven(self._driven[wires[1]], self._driven[wires[2]])
+
+    def _sync(self, number: int, what: int) -> None:
+        """Called before each read of the inputs, and when a pin is set up."""
+        if what == -1 and self._stale:
+            for pin in self._stale:
+                self._qemu.qemu_picsimlab_set_pin(pin + 1, self._inputs[pin])
+            self._stale = []
+
+    def _transmitted(self, uart: int, value: int) -> None:
+        if uart == 0 and self.ask(PRINTED, value):
+            self._qemu.timer_mod_ns(c.addressof(self._stop), self._qemu.qemu_clock_get_ns(_VIRTUAL))
+
+    def _on_reset(self, _: object) -> None:
+        """In the main loop, with the processors stopped. Whether their thread has fallen asleep by then decides which
+        of them goes on first."""
+        if self._state >= 0:
+            while not self._sleeps(_SHORTEST_S):
+                pass
+            self._may_reset = self._resetting = False
+            self._stale = list(self._inputs)
+            self._guard_later()
+
+    # Time
+
+    def _begun(self) -> None:
+        """In the processors' thread, at its first instruction."""
+        c.pythonapi.PyGILState_Ensure()  # or each call from this thread would make a new state of it, which takes long
+        self._state = os.open(f"/proc/self/task/{threading.get_native_id()}/stat", os.O_RDONLY)
+        self._calm_timers()
+        self._guard_later()
+        self._stale = list(self._inputs)
+
+    def _calm_timers(self) -> None:
+        """Of the timers that are due after a tenth of a second, the one without owner is the scheduler's: with a scale
+        of its own it never is. The other ends a read of the eFuses, see _guard()."""
+        self._qemu.timer_mod_ns(c.addressof(self._stop), 0)
+        following = self._stop.next
+        while following:
+            timer = following.contents
+            following = timer.next
+            if timer.scale == 1 and timer.expires >= 99_999_000:
+                if timer.opaque:
+                    self._fuses = timer
+                else:
+                    timer.scale = 1_000_000
+                    self._qemu.timer_mod_ns(c.addressof(timer), _NEVER)
+        self._qemu.timer_del(c.addressof(self._stop))
+
+    def _hold_main_loop(self, _: object, poll) -> None:
+        """Called before the main loop waits for an event and after that, with QEMU's lock held."""
+        if poll.contents.state == 0 or self._state < 0:
+            return
+        qemu, wait_s = self._qemu, _SHORTEST_S
+        while qemu.runstate_is_running():
+            if qemu.qemu_reset_requested_get() and self._may_reset:
+                self._resetting = True
+                qemu.qemu_clock_enable(_VIRTUAL, False)  # or it would be set forward; the reset enables it
+                return
+            idle = qemu.all_cpu_threads_idle()
+            if self._sleeps(0.0 if idle else wait_s) and idle and qemu.all_cpu_threads_idle():
+                return
+            wait_s = min(2 * wait_s, _LONGEST_S)
+
+    def _sleeps(self, wait_s: float) -> bool:
+        """Does the processors' thread sleep, after wait_s in which QEMU's lock is free? The lock is held before and
+        after that."""
+        self._qemu.qemu_mutex_unlock_iothread()
+        time.sleep(wait_s)
+        os.lseek(self._state, 0, os.SEEK_SET)
+        sleeps = os.read(self._state, 256).rpartition(b")")[2][1:2] == b"S"
+        self._qemu.qemu_mutex_lock_iothread_impl(b"kickstand", 1)
+        return sleeps
+
+    def _guard_later(self) -> None:
+        now_ns = self._qemu.qemu_clock_get_ns(_VIRTUAL)
+        self._qemu.timer_mod_ns(c.addressof(self._guard_timer), (now_ns // _GUARD_NS + 1) * _GUARD_NS)
+
+    def _guard(self, _: object) -> None:
+        """Every millisecond, and between two turns of the processors: is one of them to be reset? And the ROM waits for
+        the eFuses three times, with a real chip microseconds, here 100 ms and as long as the rest of the start."""
+        now_ns = self._qemu.qemu_clock_get_ns(_VIRTUAL)
+        if self._fuses and self._fuses.expires > now_ns:
+            self._qemu.timer_mod_ns(c.addressof(self._fuses), now_ns)
+        if not self._qemu.qemu_reset_requested_get():
+            self._guard_later()
+            return
+        for number in (0, 1):
+            self._qemu.async_run_on_cpu(c.c_void_p(self._qemu.qemu_get_cpu(number)), self._calls[3], None)
+
+    def _await_reset(self, _cpu: object, _data: object) -> None:
+        """In the processors' thread, with QEMU's lock held: let the main loop take it."""
+        if not self._qemu.qemu_reset_requested_get():
+            return
+        self._may_reset = True
+        self._qemu.qemu_mutex_unlock_iothread()
+        while not self._resetting:
+            time.sleep(_SHORTEST_S)
+        self._qemu.qemu_mutex_lock_iothread_impl(b"kickstand", 1)
+
+    def run(self) -> None:
+        """Emulate the chip. Does not return."""
+        qemu = self._qemu
+        pinmap = (c.c_short * (_PINS + 1))(_PINS, *range(_PINS))
+        self._callbacks = _Callbacks(
+            _PIN_CALL(self._write_pin),
+            _PIN_CALL(self._sync),
+            _I2C_CALL(lambda *_: 0),
+            _SPI_CALL(lambda *_: 0),
+            _UART_CALL(self._transmitted),
+            pinmap,
+            _RMT_CALL(lambda *_: None),
+        )
+        qemu.qemu_picsimlab_register_callbacks(c.byref(self._callbacks))
+        uart = ["-serial", "file:/dev/null"]
+        drive = f"file={self._flash.replace(',', ',,')},if=mtd,format=raw,cache=unsafe"
+        options = ["qemu", "-L", self._folder, "-display", "none", "-monitor", "none", "-machine", "esp32-picsimlab"]
+        options += ["-drive", drive, "-icount", "shift=3,sleep=off", "-seed", "1", *uart, *uart, *uart]
+        qemu.qemu_init(len(options), (c.c_char_p * (len(options) + 1))(*map(os.fsencode, options), None))
+        self._calls = (
+            _CALL(self._stopped),
+            _CALL(self._on_reset),
+            _POLL_CALL(self._hold_main_loop),
+            _WORK_CALL(self._await_reset),
+            _CALL(self._guard),
+        )
+        self._notifier, self._stop, self._guard_timer = _Notifier(self._calls[2]), _Timer(), _Timer()
+        qemu.timer_init_full(c.byref(self._guard_timer), None, _VIRTUAL, 1, 0, self._calls[4], None)
+        qemu.timer_init_full(c.byref(self._stop), None, _VIRTUAL, 1, 0, self._calls[0], None)
+        qemu.timer_mod_ns(c.addressof(self._stop), 1000)
+        qemu.qemu_register_reset(self._calls[1], None)
+        qemu.main_loop_poll_add_notifier(c.byref(self._notifier))
+        qemu.qemu_main_loop()
+        os._exit(1)
+
+
+def _end(unraisable) -> None:
+    """An exception in a call from QEMU, which goes on otherwise."""
+    sys.__unraisablehook__(unraisable)
+    os._exit(1)
+
+
+def main() -> None:
+    sys.unraisablehook = _end  # also where the other process is gone
+    number, folder, flash, *wires = sys.argv[1:]
+    link = socket.socket(fileno=int(number))
+    pairs = [(int(sda), int(scl)) for sda, scl in (pair.split(",") for pair in wires)]
+    Machine(link, folder, flash, pairs).run()
+
+
+if __name__ == "__main__":
+    main()

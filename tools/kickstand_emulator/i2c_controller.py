@@ -1,0 +1,125 @@
+"""Corrects rp2040py's I2C controllers, and connects them to the models' buses.
+
+On the chip bits take time, an absent device causes EIO at once, and a controller that is disabled releases the wires.
+"""
+
+from collections.abc import Callable
+
+from kickstand_tools.simulated_board.i2c import Bus
+from rp2040py.peripherals.i2c import (
+    ENABLE,
+    IC_ENABLE,
+    IC_RAW_INTR_STAT,
+    IC_RXFLR,
+    IC_TX_ABRT_SOURCE,
+    R_TX_EMPTY,
+    RPI2C,
+    TX_EMPTY_CTRL,
+    I2CState,
+)
+from rp2040py.rp2040 import RP2040
+
+_CYCLE_NS = 8  # at 125 MHz
+_POLLED = (IC_RAW_INTR_STAT, IC_RXFLR, IC_TX_ABRT_SOURCE)
+
+
+class TimedI2C(RPI2C):
+    """rp2040py's controller on a bus of simulated_board; each bit takes as long as the SCL count registers say.
+
+    The SDK waits for the end of each byte by reading registers in a loop. Here the first such read lets the time pass
+    until the byte is over. The loop would do nothing else until then, and emulating it takes the host ten times as
+    long. Interrupts are therefore late by up to a byte.
+    """
+
+    def __init__(self, rp2040: RP2040, name: str, irq: int, bus: Bus) -> None:
+        super().__init__(rp2040, name, irq)
+        self.bus = bus
+        self._clock = rp2040.clock
+        self._alarm = self._clock.create_alarm(self._over)
+        self._due_ns = 0.0
+        self._then: Callable[[], None] | None = None  # called when the bits on the wire are over
+        self.on_start = lambda repeated: self._after(1, self.complete_start)
+        self.on_connect = lambda address, mode: self._after(9, lambda: self._connect(address, bool(mode)))
+        self.on_write_byte = lambda value: self._after(9, lambda: self._written(value))
+        self.on_read_byte = lambda ack: self._after(9, self._received)
+        self.on_stop = lambda: self._after(1, self._stopped)
+
+    def reading(self) -> bool:
+        """True while a device sends a byte."""
+        return self._then == self._received
+
+    def let_go(self) -> None:
+        """Abandon the transfer: the controller becomes idle and releases the wires."""
+        self._alarm.cancel()
+        self._then = None
+        self.bus.stop()
+        self._state = I2CState.IDLE
+        self._busy = self._stop = self._pending_restart = False
+
+    def reset(self) -> None:
+        """Reset with the chip. A device that was sending does not notice it, and holds SDA."""
+        if getattr(self, "_then", None) is not None:
+            reading = self.reading()
+            self.let_go()
+            if reading:
+                self.bus.hang()
+        super().reset()
+
+    # Registers
+
+    def read_uint32(self, offset: int) -> int:
+        """Read a register; some reads wait for the end of the byte, see the class."""
+        if self._then is not None and offset in _POLLED:
+            self._clock.tick(max(0.0, self._due_ns - self._clock.nanos))
+        return super().read_uint32(offset)
+
+    def write_uint32(self, offset: int, value: int) -> None:
+        """Write a register. Disabled in a transfer, as after a time-out, the controller releases the wires."""
+        if offset == IC_ENABLE and not value & ENABLE and self._busy and self._state != I2CState.STOP:
+            self.let_go()
+        super().write_uint32(offset, value)
+
+    # Interrupts: with TX_EMPTY_CTRL set, TX_EMPTY is raised at the end of the byte. An abort raises it too
+
+    def _set_interrupts(self, mask: int) -> None:
+        if mask == R_TX_EMPTY and self._busy and self.control & TX_EMPTY_CTRL:
+            return
+        super()._set_interrupts(mask)
+
+    def _abort(self, reason: int) -> None:
+        super()._abort(reason)
+        super()._set_interrupts(R_TX_EMPTY)
+
+    def _byte_over(self) -> None:
+        if self._tx_fifo.item_count <= self.tx_threshold:
+            super()._set_interrupts(R_TX_EMPTY)
+
+    # The bus
+
+    def _after(self, bits: int, then: Callable[[], None]) -> None:
+        self._then = then
+        bits_ns = bits * _CYCLE_NS * (self.scl_low_period + self.scl_high_period)
+        self._due_ns = self._clock.nanos + bits_ns
+        self._alarm.schedule(bits_ns)
+
+    def _over(self) -> None:
+        then, self._then = self._then, None
+        if then:
+            then()
+
+    def _connect(self, address: int, read: bool) -> None:
+        answer = self.bus.start(address, read)
+        if answer is not None:  # None: a device holds SDA, and the transfer lasts until the software gives up
+            self.complete_connect(answer)
+
+    def _written(self, value: int) -> None:
+        self.complete_write(self.bus.write_byte(value))
+        self._byte_over()
+
+    def _received(self) -> None:
+        self.complete_read(self.bus.read_byte())
+        self._byte_over()
+
+    def _stopped(self) -> None:
+        self.bus.stop()
+        self.complete_stop()

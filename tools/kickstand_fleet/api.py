@@ -1,0 +1,18 @@
+"""The fleet's functions for a notebook or a cluster, as kickstand_tools.api has those for single rides.
+
+    from kickstand_fleet import api
+
+    fleet = api.run_fleet(api.read_manifest("MANIFEST.csv"), "results")
+    print(fleet.seen.statuses)
+
+They return data and print nothing. InputError says in one line what is wrong with the input.
+"""
+
+from kickstand_tools.common.errors import InputError as InputError
+
+from .manifest import Period as Period, by_pattern as by_pattern, read_manifest as read_manifest
+from .period import PeriodResult as PeriodResult, work_on_period as work_on_period
+from .run import FleetRun as FleetRun, run_fleet as run_fleet
+
+# All of the above: without it pydoc leaves out what is imported
+__all__ = [name for name in dir() if not name.startswith("_")]  # pyright: ignore[reportUnsupportedDunderAll]

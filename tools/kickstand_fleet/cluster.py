@@ -1,0 +1,228 @@
+"""Runs a function on many items with Dask, on this computer or on a cluster.
+
+Workers on this computer and their scheduler talk over 127.0.0.1 by TLS, with keys that are made for the run and known
+to its processes alone: another user of the computer can connect, but neither read nor run anything. Dask has no Unix
+sockets, and a process pool of our own would need the same care for crashes a second time. Dask's web pages are left
+out.
+
+A task that kills its worker must cost no other task. Dask would give it to other workers, which it kills too, and
+compute again what these had finished. So no retries are allowed, only a few tasks are under way at a time, and Dask
+keeps no results. Tasks whose worker died are tried a second time, after all others and one at a time: if the worker
+dies then, the task itself has killed it.
+"""
+
+import contextlib
+import logging
+import queue
+import signal
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from multiprocessing import resource_tracker
+from typing import Any
+
+from kickstand_tools.common.errors import InputError, cause, extra
+
+CRASHED, TIMED_OUT = "crashed", "timed-out"
+_PER_WORKER = 2  # tasks under way per worker: one runs, one waits
+_LOOK_S = 0.5  # time between two checks for tasks that take too long
+_TOPIC = "kickstand-fleet"  # topic of the messages by which a worker announces that it begins a task
+Outcome = tuple[int, Any | None, str, str]
+_LOCAL_PATIENCE_S, _REMOTE_PATIENCE_S = 60.0, 20.0  # longest time to wait for workers
+
+
+def run_tasks(
+    function: Callable[..., Any],
+    items: Sequence[tuple[Any, ...]],
+    scheduler: str | None = None,
+    workers: int | None = None,
+    timeout_s: float = 600.0,
+) -> Iterator[Outcome]:
+    """Yield (index, result, "", "") of function(*item) for each item, in any order; without a result (index, None,
+    CRASHED or TIMED_OUT, what happened). Starts no workers if there are no items. See Cluster."""
+    if items:
+        with Cluster(scheduler, workers, timeout_s) as cluster:
+            yield from cluster.run(function, items)
+
+
+class Cluster:
+    """with Cluster(scheduler, workers, timeout_s) as cluster: for index, outcome in cluster.run(function, items).
+
+    scheduler: the address of a scheduler, None for workers on this computer. workers: their number there, None for one
+    per processor; then the number that there are. timeout_s: a task that takes longer is ended. Raises InputError where
+    there is no cluster.
+    """
+
+    def __init__(self, scheduler: str | None, workers: int | None, timeout_s: float) -> None:
+        self._address, self._wanted, self._timeout_s = scheduler, workers, timeout_s
+        self.workers = 0
+
+    def __enter__(self) -> "Cluster":
+        try:
+            from dask import config
+            from distributed import Client, LocalCluster, WorkerPlugin
+            from distributed.security import Security
+
+            keys = Security.temporary() if self._address is None else None
+        except ImportError as error:
+            raise InputError("a fleet needs Dask: " + extra("fleet")) from error
+
+        class Undisturbed(WorkerPlugin):
+            """Makes workers ignore a terminal's Ctrl-C: this process ends them."""
+
+            def setup(self, worker: Any) -> None:
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+        _silence()
+        self._stack = contextlib.ExitStack()
+        self._stack.enter_context(
+            config.set(
+                {
+                    "distributed.scheduler.allowed-failures": 0,
+                    "distributed.scheduler.worker-saturation": 1.0,
+                    "distributed.comm.timeouts.connect": "10s",
+                    "distributed.scheduler.http.routes": [],
+                    "distributed.worker.http.routes": [],
+                    # What _silence() is here: in workers, from their start on
+                    "distributed.nanny.pre-spawn-environ": {
+                        **config.get("distributed.nanny.pre-spawn-environ"),
+                        "DASK_LOGGING__DISTRIBUTED": "critical",
+                    },
+                }
+            )
+        )
+        try:
+            if self._address is None:
+                with _undisturbed():
+                    cluster = LocalCluster(
+                        n_workers=self._wanted,
+                        threads_per_worker=1,
+                        host="127.0.0.1",
+                        security=keys,
+                        dashboard_address="127.0.0.1:0",
+                    )
+                    self._stack.callback(lambda: cluster.close(timeout=5))
+                    self._client = Client(cluster)
+                    self._client.register_plugin(Undisturbed())
+            else:
+                self._client = Client(self._address, timeout=_REMOTE_PATIENCE_S)
+            self._stack.callback(lambda: self._client.close(timeout=2))
+            patience_s = _LOCAL_PATIENCE_S if self._address is None else _REMOTE_PATIENCE_S
+            self._client.wait_for_workers(1, timeout=patience_s)
+        except BaseException as error:  # Ctrl-C, too
+            self.__exit__()
+            if not isinstance(error, (OSError, TimeoutError, ValueError)):
+                raise
+            where = self._address or "this computer"
+            raise InputError(f"no workers at {where}: {cause(error)}") from error
+        self._started: dict[str, tuple[float, str]] = {}  # by key: when it began, and on which worker
+        self._client.subscribe_topic(_TOPIC, self._hear)
+        self.workers = len(self._client.scheduler_info(n_workers=-1)["workers"])
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        with contextlib.suppress(Exception):
+            self._stack.close()
+
+    def run(self, function: Callable[..., Any], items: Sequence[tuple[Any, ...]]) -> Iterator[Outcome]:
+        """Yield outcomes as run_tasks() does. function and items have to be picklable. Raises InputError if the
+        scheduler is lost."""
+        self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._under_way: dict[str, tuple[int, Any]] = {}
+        suspects: list[int] = []
+        waiting = deque(range(len(items)))
+        while waiting or self._under_way:
+            while waiting and len(self._under_way) < _PER_WORKER * max(1, self.workers):
+                self._submit(function, items, waiting.popleft())
+            yield from self._collect(suspects)
+        for index in suspects:
+            self._submit(function, items, index)
+            again: list[int] = []
+            while self._under_way:
+                yield from self._collect(again)
+            if again:
+                yield index, None, CRASHED, "its worker died twice: out of memory, or a crash of a library"
+
+    def _submit(self, function: Callable[..., Any], items: Sequence[tuple[Any, ...]], index: int) -> None:
+        key = f"fleet-{index}-{time.monotonic_ns()}"
+        future = self._client.submit(_announced, key, function, *items[index], key=key, pure=False)
+        self._under_way[key] = index, future
+        future.add_done_callback(self._ended.put)
+
+    def _collect(self, suspects: list[int]) -> Iterator[Outcome]:
+        """Yield the results that come within _LOOK_S. suspects: tasks whose worker died are appended to it."""
+        with contextlib.suppress(queue.Empty):
+            future = self._ended.get(timeout=_LOOK_S)
+            place = self._under_way.pop(future.key, None)
+            self._started.pop(future.key, None)
+            if place is None:
+                return
+            index, status = place[0], future.status
+            if status == "finished":
+                yield index, future.result(), "", ""
+            elif status == "error":
+                error = future.exception()
+                if type(error).__name__ == "KilledWorker":
+                    suspects.append(index)
+                else:
+                    yield index, None, CRASHED, f"{type(error).__name__}: {error}"
+            elif self._client.status == "running":
+                suspects.append(index)  # its worker was ended because of another task
+            else:
+                raise InputError(
+                    f"the cluster{f' at {self._address}' if self._address else ''} was lost; what is finished is kept, "
+                    "the same command goes on"
+                )
+            future.release()
+        yield from self._end_late_ones()
+
+    def _end_late_ones(self) -> Iterator[Outcome]:
+        now = time.monotonic()
+        for key, (began_s, worker) in list(self._started.items()):
+            if key not in self._under_way:
+                self._started.pop(key, None)
+            elif now - began_s > self._timeout_s:
+                index, future = self._under_way.pop(key)
+                self._started.pop(key, None)
+                future.cancel(force=True)
+                with contextlib.suppress(Exception):  # it may have died meanwhile
+                    self._client.restart_workers([worker], timeout=30, raise_for_error=False)
+                yield index, None, TIMED_OUT, f"took longer than {self._timeout_s:.0f} s, so it was ended"
+
+    def _hear(self, event: tuple[float, Any]) -> None:
+        _, (key, worker) = event
+        self._started[key] = time.monotonic(), worker
+
+
+@contextlib.contextmanager
+def _undisturbed() -> Iterator[None]:
+    """A context in which Ctrl-C is deferred to its end: stopped while it starts or connects, Dask prints pages of
+    errors.
+
+    Processes that are started within never receive it.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    resource_tracker.ensure_running()  # else Python would start it with the first process, and unblock Ctrl-C then
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _silence() -> None:
+    """Turn Dask's log messages off: results and InputErrors report what happens to workers and scheduler."""
+    for name in ("distributed", *logging.root.manager.loggerDict):
+        if name.split(".")[0] == "distributed":
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+
+
+def _announced(key: str, function: Callable[..., Any], *arguments: Any) -> Any:
+    """In a worker: announce that the task begins, then return function(*arguments)."""
+    from distributed import get_worker
+
+    worker = get_worker()
+    worker.log_event(_TOPIC, (key, worker.address))
+    return function(*arguments)

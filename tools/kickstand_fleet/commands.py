@@ -1,0 +1,64 @@
+"""The command `kickstand fleet`: many vehicles at once."""
+
+from typing import Any
+
+import click
+from kickstand_tools.cli.common import VEHICLES, echo
+from kickstand_tools.common.progress import Bar
+
+
+@click.command(short_help="Align many vehicles, find moved mounts, test their brakes.")
+@click.argument("manifests", nargs=-1, required=True, metavar="MANIFEST.csv|GLOB")
+@click.option("--out", required=True, metavar="DIR", help="The directory to write to, or a place like s3://...")
+@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, tcp://...; this computer if not given.")
+@click.option("--workers", type=click.IntRange(min=1), help="On this computer; one a processor if not given.")
+@click.option(
+    "--signals", "with_signals", is_flag=True, help="Also write each log's accelerations along the vehicle's axes."
+)
+@click.option(
+    "--timeout",
+    "timeout_s",
+    type=click.FloatRange(min=1.0),
+    default=600.0,
+    help="Seconds after which work on a vehicle is given up.",
+)
+@click.option(
+    "--vehicle", type=VEHICLES, default="car", help="What the logs of a GLOB are of; a manifest says it itself."
+)
+def fleet_command(manifests: tuple[str, ...], out: str, vehicle: str, **how: Any) -> None:
+    """Align a whole fleet, find mounts that moved, and measure its brake tests.
+
+    The manifest is CSV with the columns vehicle,path,kind and optionally mount: a line a log, in the order of time. A
+    GLOB takes each file that it matches for a vehicle of its own. Paths may be s3://. Run again, and only what is new
+    is done.
+    """
+    from .manifest import by_pattern, is_pattern, read_manifest  # only here: numpy takes its time
+    from .run import run_fleet
+
+    manifest = manifests[0]
+    if len(manifests) > 1:  # the shell has put names into the place of a pattern
+        raise click.UsageError("One manifest, or one pattern in quotation marks.")
+    periods = by_pattern(manifest, vehicle) if is_pattern(manifest) else read_manifest(manifest)
+    try:
+        with Bar("vehicles", lines_s=10.0, patience_s=0.0) as bar:
+            found = run_fleet(periods, out, progress=bar.reach, **how)
+    except KeyboardInterrupt:
+        echo("what is finished is kept, the same command goes on", err=True)
+        raise
+    before = found.vehicles - found.new
+    done = f", {before} of them finished before" if before else ""
+    echo(f"mounted sensors: {found.vehicles}{done}")
+    if found.damaged:
+        echo(f"{found.damaged} results of before were damaged, and are worked out again", err=True)
+    seen = found.seen
+    counts = seen.statuses
+    echo(f"aligned: {counts['aligned']}, refused: {counts['refused']}, errors: {counts['error']}")
+    for (status, reason), count in seen.reasons.most_common():
+        echo(f"{count:7}  {status}: {reason}")
+    tests = len(seen.decelerations[1])
+    echo(f"mounts that seem to have moved: {seen.moved_vehicles}; brake tests: {tests}; rows of errors: {seen.errors}")
+    for path, message in seen.first_errors:
+        echo(f"error: {message if path in message else f'{path}: {message}'}")
+    if seen.errors > len(seen.first_errors):
+        echo("more errors are in errors.parquet")
+    echo(f"written: {out}/index.html, alignments.parquet, moved.parquet, brake_tests.parquet, errors.parquet")

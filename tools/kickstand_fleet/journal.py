@@ -1,0 +1,197 @@
+"""Keeps each result as it comes, so that a run that was stopped, or whose disk filled up, can be continued.
+
+In a directory of this computer the journal is one file with a line of JSON per result; in a store such as S3, whose
+files cannot grow, one file per result. Each has a check sum: lines that were cut, by a loss of power or a full disk, or
+that were damaged are dropped when the journal is opened again, and their results are computed again.
+"""
+
+import contextlib
+import json
+import os
+import zlib
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from kickstand_tools.common.errors import InputError, cause
+
+from . import files
+from .period import PeriodResult
+
+_AT_ONCE = 200  # results that are fetched from a store together
+_LONGEST = 1 << 26  # longest line in bytes; one of a thousand logs has a hundredth of that
+
+
+class Journal:
+    """with Journal(path) as journal: journal.add(key, result); key in journal; journal.results(keys).
+
+    key: identifies the logs and the options of a result. Memory holds the place of each result in the file, which is
+    read again for results(). damaged: number of lines that could not be used.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._places: dict[str, int] = {}
+        self._again: set[str] = set()  # keys of results that another run should compute again
+        self.damaged = 0
+
+    def __enter__(self) -> "Journal":
+        try:
+            self._open()
+            self._end = 0
+            while line := self._file.readline(_LONGEST):
+                if not self._note(line) and line.strip():
+                    self.damaged += 1
+                    self._file.seek(self._end)
+                    self._file.write(b" " * (len(line) - 1) + b"\n")  # so that it is counted once
+                self._end += len(line)
+            self._file.flush()
+        except OSError as error:
+            raise InputError(f"{self._path} cannot be used: {cause(error)}: give --out another directory") from error
+        return self
+
+    def _open(self) -> None:
+        """Open the file and lock it, again if the run before has removed it meanwhile."""
+        while True:
+            self._file = open(os.open(self._path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666), "r+b")
+            self._lock()
+            with contextlib.suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(self._file.fileno()), self._path.stat()):
+                    return
+            self._file.close()
+
+    def _lock(self) -> None:
+        """Lock the file against a second run that writes to it. Raises InputError."""
+        with contextlib.suppress(ImportError):  # Windows
+            import fcntl
+
+            try:
+                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                self._file.close()
+                raise InputError(f"another run works in {self._path.parent}: wait for it, or end it") from error
+
+    def __exit__(self, *exception: object) -> None:
+        with contextlib.suppress(OSError):
+            if not self._end and os.name != "nt":  # while it is locked: it may be another run's as soon as it is not
+                self._path.unlink()
+        with contextlib.suppress(OSError):
+            self._file.close()
+            if not self._end and os.name == "nt":  # which removes no open file
+                self._path.unlink()
+
+    def __contains__(self, key: str) -> bool:
+        """True if there is a final result for this key."""
+        return key in self._places and key not in self._again
+
+    def add(self, key: str, result: PeriodResult, again: bool = False) -> None:
+        """Keep a result. again: another run should compute it again. Raises InputError; earlier results stay."""
+        line = _line(key, result, again) + b"\n"
+        try:
+            self._file.seek(self._end)
+            self._file.write(line)
+            self._file.flush()
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                self._file.truncate(self._end)
+            raise self._cannot(error) from error
+        self._note(line)
+        self._end += len(line)
+
+    def sync(self) -> None:
+        """Flush the results to the disk, so that they outlast a loss of power. Raises InputError."""
+        try:
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise self._cannot(error) from error
+
+    def results(self, keys: Iterable[str]) -> Iterator[PeriodResult]:
+        """The latest result of each of these keys that has one."""
+        with open(self._path, "rb") as file:
+            for key in keys:
+                if key in self._places:
+                    file.seek(self._places[key])
+                    if entry := _entry(file.readline()):
+                        yield entry[2]
+
+    def _cannot(self, error: OSError) -> InputError:
+        return InputError(
+            f"{self._path} cannot be written: {cause(error)}; what is finished is kept, the same command goes on"
+        )
+
+    def _note(self, line: bytes) -> bool:
+        """Note the place of a line's result; return False for a damaged line."""
+        if not (line.endswith(b"\n") and (entry := _entry(line))):
+            return False
+        key, again, _ = entry
+        self._places[key] = self._end
+        (self._again.add if again else self._again.discard)(key)
+        return True
+
+
+class StoreJournal:
+    """A Journal in a directory of a store: KEY.json is final, KEY.again.json should be computed again. All are read
+    when the journal is opened; those that are damaged are computed again."""
+
+    def __init__(self, directory: str) -> None:
+        self._directory = directory
+        self._kept: set[str] = set()
+        self._again: set[str] = set()
+        self.damaged = 0
+
+    def __enter__(self) -> "StoreJournal":
+        for path in files.listed(self._directory):
+            name = path.rpartition("/")[2]
+            (self._again if name.endswith(".again.json") else self._kept).add(name.partition(".")[0])
+        for _ in self.results(self._kept | self._again):
+            pass
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        pass
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._kept
+
+    def add(self, key: str, result: PeriodResult, again: bool = False) -> None:
+        files.write_bytes(self._path(key, again), _line(key, result, again))
+        (self._again if again else self._kept).add(key)
+
+    def sync(self) -> None:
+        pass
+
+    def results(self, keys: Iterable[str]) -> Iterator[PeriodResult]:
+        there = [self._path(key, key not in self._kept) for key in keys if key in self._kept or key in self._again]
+        for first in range(0, len(there), _AT_ONCE):
+            paths = there[first : first + _AT_ONCE]
+            for path, content in zip(paths, files.read_all(paths)):
+                if entry := _entry(content):
+                    yield entry[2]
+                else:
+                    self.damaged += 1
+                    (self._again if path.endswith(".again.json") else self._kept).discard(
+                        path.rpartition("/")[2].partition(".")[0]
+                    )
+
+    def _path(self, key: str, again: bool) -> str:
+        return f"{self._directory}/{key}{'.again' if again else ''}.json"
+
+
+def _line(key: str, result: PeriodResult, again: bool) -> bytes:
+    entry: dict[str, Any] = {"key": key, "again": again, "result": asdict(result) | {"picture": []}}
+    return json.dumps(entry | {"crc32": _sum(entry)}).encode()
+
+
+def _entry(line: bytes) -> tuple[str, bool, PeriodResult] | None:
+    """(key, again, result) of a line; None for a damaged one."""
+    try:
+        entry = json.loads(line)
+        sum_then = entry.pop("crc32")
+        return (entry["key"], entry["again"], PeriodResult(**entry["result"])) if sum_then == _sum(entry) else None
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def _sum(entry: dict[str, Any]) -> int:
+    return zlib.crc32(json.dumps(entry).encode())

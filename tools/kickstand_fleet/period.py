@@ -1,0 +1,276 @@
+"""One mount of one vehicle: its alignment, the moves of the mount, its brake tests. A plain function on files."""
+
+import errno
+import math
+import traceback
+from dataclasses import dataclass, field
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from kickstand.drive_alignment.quality import AGREE_DEG
+from kickstand.drive_alignment.speed_check import fit_problem
+from kickstand.errors import AlignmentError
+from kickstand_tools.analysis.brake_tests import brake_tests
+from kickstand_tools.analysis.stops.brake_test import Stop
+from kickstand_tools.calibration.drive import DriveFit, fit_logs, usable
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.common.errors import InputError, cause
+from kickstand_tools.logs.log import Log
+from kickstand_tools.refusals import RefusedInput, sentence
+
+from . import evidence, files, signals
+from .forward import Forward, find_forward
+from .manifest import Period
+from .moved import Move, find_moves
+
+UNREADABLE, CHANGED, NO_MEMORY, FAULT = "unreadable", "changed", "no-memory", "fault"
+NO_SPEED, MOVED, LEFT_HANDED = "no-speed", "mount-moved", "left-handed"
+# The vehicle is aligned, but brake tests or signals of this log are missing; because the disk for signals is full
+AFTERWARDS, DISK_FULL = "not-finished", "disk-full"
+_LEFT_OUT = ("cut-line", "cut-gzip", "nul-end", "frozen-readings")  # notices about parts of a log that are not used
+_SUSPECTS = (MOVED, "parts-differ", "uncertain")  # refusals of the firmware after which moves are looked for
+_PLOTTED = 160  # intervals in a picture
+_AGAINST = -0.5  # evidence.handedness() below this: the gyro or the axes are mirrored
+
+Row = dict[str, Any]
+
+
+@dataclass
+class PeriodResult:
+    """The rows of one mount of one vehicle in tables.TABLES, and the points of its picture: for each of some intervals
+    the change of speed, the force forward, the centripetal acceleration, the force to the left (4, g)."""
+
+    alignment: Row
+    moved: list[Row] = field(default_factory=list)
+    brake_tests: list[Row] = field(default_factory=list)
+    errors: list[Row] = field(default_factory=list)
+    picture: list[list[float]] = field(default_factory=list)
+
+
+def work_on_period(period: Period, signals_to: str | None = None) -> PeriodResult:
+    """Align a period of a manifest, look where its mount moved, and measure its brake tests.
+
+    signals_to: a directory for each log's accelerations along the vehicle's axes, None for none. What is wrong with
+    the data is part of the result: a log that cannot be used costs a row of errors, and where none is left the status
+    is "error" or "refused". Never raises, so that one vehicle cannot stop a fleet.
+
+    >>> found = work_on_period(Period("bus 12", "", "car", ("no-such-file.csv",)))
+    >>> found.alignment["status"], found.errors[0]["message"]
+    ('error', 'no-such-file.csv: there is no such file')
+    """
+    try:
+        return _printable(_result(period, signals_to))
+    except MemoryError:
+        return failed(period, NO_MEMORY, "its logs take more memory than there is")
+    except OSError as error:
+        return failed(period, UNREADABLE, cause(error))
+    except Exception as error:  # a fault of ours: it must not cost other vehicles
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        message = f"{type(error).__name__}: {error} ({Path(where.filename).name}, line {where.lineno})"
+        return failed(period, FAULT, message)
+
+
+def _printable(result: PeriodResult) -> PeriodResult:
+    """The result with names that are not UTF-8 made printable: tables and pages cannot hold them."""
+    for row in chain([result.alignment], result.moved, result.brake_tests, result.errors):
+        row |= {key: files.printable(value) for key, value in row.items() if isinstance(value, str)}
+    return result
+
+
+def failed(period: Period, reason: str, message: str) -> PeriodResult:
+    """The result for a period whose task failed."""
+    message = files.printable(message)
+    row = _alignment(period, "error", reason, message, [], len(period.paths))
+    return PeriodResult(row, errors=[_error(period, "", reason, message)])
+
+
+def _result(period: Period, signals_to: str | None) -> PeriodResult:
+    logs, errors = _logs(period)
+    if not logs:
+        refused = [row for row in errors if row["reason"] != UNREADABLE]
+        because = (refused or errors)[0]
+        status = "refused" if refused else "error"
+        row = _alignment(period, status, because["reason"], because["message"], [], len(errors))
+        return PeriodResult(row, errors=errors)
+    drive = _drive(period, logs)
+    reason, message = _refusal(drive, logs)
+    aligned = not reason
+    row = _alignment(period, "aligned" if aligned else "refused", reason, message, logs, len(errors), drive)
+    errors += [
+        _error(period, log.name, notice.code, sentence(notice))
+        for log in logs
+        for notice in log.notices
+        if notice.code in _LEFT_OUT
+    ]
+    moved = [_whose(period) | _moved_row(move, logs) for move in drive.moves]
+    result = PeriodResult(row, moved, [], errors, _picture(drive))
+    if aligned and drive.found:
+        known = CalibrationFile(
+            gyro_bias_dps=drive.fit.bias_dps, vehicle_from_sensor=drive.found.frame, aligned=True, vehicle=period.kind
+        )
+        for log in logs:
+            _use(result, period, log, known, signals_to)
+    return result
+
+
+@dataclass
+class _Drive:
+    """The alignment by the logs of a period: the firmware's own and, where needed, the intervals, the moves of the
+    mount and forward by all of them."""
+
+    fit: DriveFit
+    intervals: list[evidence.Intervals] = field(default_factory=list)
+    moves: list[Move] = field(default_factory=list)
+    found: Forward | None = None
+
+
+def _drive(period: Period, logs: list[Log]) -> _Drive:
+    fit = fit_logs(logs, None, period.kind)
+    if fit.refusal and fit.reason not in _SUSPECTS:
+        return _Drive(fit)
+    driven = [evidence.intervals(log, period.kind, fit.lag_s or 0.0, fit.bias_dps) for log in logs]
+    suspected = fit.reason in (MOVED, "parts-differ") or (fit.halves_deg or 0.0) > AGREE_DEG
+    return _Drive(fit, driven, find_moves(driven, suspected), find_forward(driven, None if fit.refusal else fit))
+
+
+def _refusal(drive: _Drive, logs: list[Log]) -> tuple[str, str]:
+    """Why there is no alignment: code and sentence; two empty texts if there is one."""
+    fit, found = drive.fit, drive.found
+    if drive.moves:
+        return MOVED, _moved_words(drive.moves, logs)
+    problem = None
+    if _mirrored(drive.intervals):
+        problem = AlignmentError(LEFT_HANDED)
+    elif fit.reason == MOVED:
+        problem = fit_problem(fit.lag_s or 0.0, 1.0)  # with a late speed braking looks like a stop on another slope
+    elif found and found.sure:
+        return "", ""
+    elif found and not fit.reason:
+        problem = AlignmentError("uncertain", found.sigma_deg, fit.used)
+    refusal = RefusedInput(problem) if problem else fit.refusal
+    return (refusal.code, str(refusal)) if refusal else ("", "")
+
+
+def _use(result: PeriodResult, period: Period, log: Log, known: CalibrationFile, signals_to: str | None) -> None:
+    """Add the brake tests of a log to the result, and write its signals."""
+    try:
+        tests = brake_tests(log, known)
+        result.brake_tests += [_whose(period) | {"log": log.name} | _stop_row(stop, log) for stop in tests]
+        if signals_to is not None:
+            signals.write(signals_to, period, log, known)
+    except (InputError, OSError) as error:
+        full = getattr(error.__cause__ or error, "errno", None) in (errno.ENOSPC, errno.EDQUOT)
+        result.errors.append(_error(period, log.name, DISK_FULL if full else AFTERWARDS, cause(error)))
+
+
+def _whose(period: Period) -> Row:
+    return {"vehicle": period.vehicle, "mount": period.mount}
+
+
+def _error(period: Period, log: str, reason: str, message: str) -> Row:
+    return _whose(period) | {"log": log, "reason": reason, "message": message}
+
+
+def _logs(period: Period) -> tuple[list[Log], list[Row]]:
+    """The logs that can be used, and a row of errors for each other one."""
+    logs, errors = [], []
+    for path in period.paths:
+        reason = UNREADABLE
+        try:
+            log = files.open_log(path)
+            if np.all(np.isnan(log.speed_mps)):
+                reason = NO_SPEED
+            logs.append(usable(log, False))
+        except RefusedInput as error:
+            errors.append(_error(period, path, error.code, str(error)))
+        except (InputError, OSError) as error:
+            errors.append(_error(period, path, reason, cause(error)))
+    return logs, errors
+
+
+def _alignment(
+    period: Period, status: str, reason: str, message: str, logs: list[Log], left_out: int, drive: _Drive | None = None
+) -> Row:
+    fit, found = (drive.fit, drive.found) if drive else (None, None)
+    known = found if status == "aligned" else None
+    return _whose(period) | {
+        "kind": period.kind,
+        "status": status,
+        "reason": reason,
+        "message": message,
+        "quality_deg": found.sigma_deg if found else None,
+        "attitude_deg": found.attitude_deg if found else None,
+        "halves_deg": found.halves_deg if found else None,
+        "vehicle_from_sensor": known.frame.ravel().tolist() if known else None,
+        "gyro_bias_dps": fit.bias_dps.tolist() if fit and known else None,
+        "speed_lag_s": fit.lag_s if fit else None,
+        "stops": fit.stops if fit else 0,
+        "events_used": fit.used if fit else 0,
+        "events_in_turns": fit.turned if fit else 0,
+        "logs": len(logs),
+        "logs_left_out": left_out,
+        "driven_s": float(sum(log.t_s[-1] for log in logs)),
+        "start_utc_s": _utc_s(logs[0], 0.0) if logs else None,
+        "plot": "",
+    }
+
+
+def _mirrored(driven: list[evidence.Intervals]) -> bool:
+    """True if the force in bends is on the opposite side to the one that the gyro's yaw rate requires."""
+    whole = evidence.blocks(driven)
+    if not len(whole.log):
+        return False
+    found, varied = evidence.fits(np.sum(whole.square, axis=0), np.sum(whole.product, axis=0))
+    return evidence.handedness(found, varied) <= _AGAINST
+
+
+def _moved_words(moves: list[Move], logs: list[Log]) -> str:
+    first = moves[0]
+    name = logs[first.log].name
+    more = f", and {len(moves) - 1} times more" if len(moves) > 1 else ""
+    turned = f"the mount was turned by {first.angle_deg:.0f} degrees"
+    if first.at_s is None:
+        return f"{turned} before {name}{more}: give {name} and the logs after it another mount in the manifest"
+    return (
+        f"{turned} in {name} at {first.at_s:.0f} s{more}: cut it there (kickstand cut), and give the second part and "
+        "the logs after it another mount in the manifest"
+    )
+
+
+def _moved_row(move: Move, logs: list[Log]) -> Row:
+    log = logs[move.log]
+    return {
+        "log": log.name,
+        "within_log": move.at_s is not None,
+        "at_s": move.at_s,
+        "utc_s": _utc_s(log, move.at_s or 0.0),
+        "turned_deg": move.angle_deg,
+        "turned_sigma_deg": move.angle_sigma_deg,
+        "sigmas": move.sigmas,
+        **dict(zip(("about_left_deg", "about_up_deg", "about_forward_deg"), move.turn_deg.tolist())),
+    }
+
+
+def _stop_row(stop: Stop, log: Log) -> Row:
+    names = ("start_s", "initial_speed_mps", "duration_s", "distance_m", "mfdd_mps2", "peak_mps2", "jerk_mps3")
+    row: Row = {name: float(getattr(stop, name)) for name in (*names, "side_m", "heading_deg")}
+    return row | {"utc_s": _utc_s(log, stop.start_s), "speed_from": stop.speed_from}
+
+
+def _utc_s(log: Log, at_s: float) -> float | None:
+    """Universal Time at at_s in the log; None where it has none."""
+    return None if log.start_utc_s is None else log.start_utc_s + at_s
+
+
+def _picture(drive: _Drive) -> list[list[float]]:
+    """The points of the picture (see PeriodResult). If the mount moved, the frame is a mean, and the points scatter."""
+    if not drive.found:
+        return []
+    used = [log.weight > 0.0 for log in drive.intervals]
+    terms = np.concatenate([log.terms[which] for log, which in zip(drive.intervals, used)])
+    force = np.concatenate([log.force[which] for log, which in zip(drive.intervals, used)]) @ drive.found.frame.T
+    table = np.column_stack((terms[:, 1], force[:, 2], terms[:, 2], force[:, 0]))
+    step = max(1, math.ceil(len(table) / _PLOTTED))
+    return table[::step].round(3).tolist()

@@ -1,0 +1,166 @@
+"""Processes a whole fleet: computes what is new, and writes all results to a directory, meanwhile and at the end."""
+
+import contextlib
+import hashlib
+import json
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from kickstand import __version__
+from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.output import check_directory, new_directory
+
+from . import files, tables
+from .cluster import run_tasks
+from .journal import Journal, StoreJournal
+from .manifest import Period
+from .period import AFTERWARDS, CHANGED, DISK_FULL, PeriodResult, failed, work_on_period
+from .show import plot
+from .show.page import Glance
+
+RESULTS_VERSION = 4  # a new number makes all earlier results obsolete
+PLOTS, SIGNALS = "plots", "signals"
+TIMEOUT_S = 600.0  # longest time for one mount of one vehicle
+_WRITE_S, _SHARE = 15.0, 20.0  # the tables are written again after the longer of 15 s and 20 times a writing
+
+
+@dataclass
+class FleetRun:
+    """vehicles: number of mounts of vehicles; new: number of those computed in this run, the others were finished
+    before. damaged: number of earlier results that could not be read, and are computed again. seen: a summary of all
+    results."""
+
+    vehicles: int
+    new: int
+    damaged: int
+    seen: Glance
+
+
+def run_fleet(
+    periods: list[Period],
+    out: Path | str,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    with_signals: bool = False,
+    timeout_s: float = TIMEOUT_S,
+    progress: Callable[[int, int], None] | None = None,
+) -> FleetRun:
+    """Work on all periods (see read_manifest), and write tables (see tables.TABLES), pictures and index.html to out, a
+    directory or a place in a store (s3://...).
+
+    scheduler: the address of a Dask cluster, None for workers on this computer: `workers`, or one per processor.
+    with_signals: also write each log's accelerations along the vehicle's axes, to out/signals. timeout_s: for one
+    period. progress: called with (done, all). What an earlier run into the same directory has finished is not done
+    again, as long as its logs have not changed. Raises InputError; what is finished is kept and shown then, too.
+
+    A script has to call it below `if __name__ == "__main__":`, because workers on this computer import the script.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     run = run_fleet([], directory)
+    ...     run.new, run.seen.count, sorted(path.name for path in Path(directory).glob("*.parquet"))
+    (0, 0, ['alignments.parquet', 'brake_tests.parquet', 'errors.parquet', 'moved.parquet'])
+    """
+    tables.check()
+    with contextlib.ExitStack() as opened:
+        if files.is_remote(str(out)):
+            directory = str(out).rstrip("/")
+            journal = opened.enter_context(StoreJournal(files.join(directory, "journal")))
+        else:
+            check_directory(Path(out))
+            directory = str(Path(out).resolve())  # workers may run elsewhere
+            opened.enter_context(new_directory(Path(directory) / PLOTS))
+            journal = opened.enter_context(Journal(Path(directory) / "journal.jsonl"))
+        marks = _marks(periods)
+        keys = _keys(periods, marks, with_signals)
+        signals_to = files.join(directory, SIGNALS) if with_signals else None
+        todo = [k for k, key in enumerate(keys) if key not in journal]
+        done = len(keys) - len(todo)
+        if progress:
+            progress(done, len(keys))
+        last_s, pause_s = time.monotonic(), _WRITE_S
+        try:
+            items = [(periods[k], signals_to) for k in todo]
+            for index, result, reason, message in run_tasks(work_on_period, items, scheduler, workers, timeout_s):
+                k = todo[index]
+                kept = result or failed(periods[k], reason, message)
+                changed = _note_changed(periods[k], marks, kept)
+                _keep(directory, journal, keys[k], kept, again=result is None or changed)
+                done += 1
+                if progress:
+                    progress(done, len(keys))
+                if time.monotonic() - last_s > pause_s:
+                    journal.sync()
+                    before_s = time.monotonic()
+                    write_results(directory, journal.results(keys), len(keys))
+                    last_s = time.monotonic()
+                    pause_s = max(_WRITE_S, _SHARE * (last_s - before_s))
+        except BaseException:  # also when it is stopped
+            with contextlib.suppress(InputError):  # a full disk is said already
+                if next(journal.results(keys), None):
+                    write_results(directory, journal.results(keys), len(keys))
+            raise
+        seen = write_results(directory, journal.results(keys), len(keys))
+        return FleetRun(len(keys), len(todo), journal.damaged, seen)
+
+
+def write_results(directory: str, results: Iterable[PeriodResult], expected: int) -> Glance:
+    """Write the tables and the page of the results so far. expected: how many there will be. Raises InputError."""
+    glance = Glance()
+
+    def seen() -> Iterator[PeriodResult]:
+        for result in results:
+            glance.add(result)
+            yield result
+
+    tables.write_tables(directory, seen())
+    files.write_bytes(files.join(directory, "index.html"), glance.page(expected).encode())
+    return glance
+
+
+def _note_changed(period: Period, marks: dict[str, str], result: PeriodResult) -> bool:
+    """True if a log on this computer was replaced since the run began, so that the result may be from either version.
+    The result then gets a row of errors. (A file that is read from a store is always one whole version.)"""
+    now = files.identities(path for path in period.paths if not files.is_remote(path))
+    changed = [path for path, mark in now.items() if mark != marks[path]]
+    for path in map(files.printable, changed):
+        whose = {"vehicle": period.vehicle, "mount": period.mount, "log": path, "reason": CHANGED}
+        result.errors.append(whose | {"message": f"{path} has changed during the run: run the command again"})
+    return bool(changed)
+
+
+def _keep(directory: str, journal: Journal | StoreJournal, key: str, kept: PeriodResult, again: bool) -> None:
+    """Keep a result in the journal at once. again: another run should compute it again. Raises InputError."""
+    missing = [row for row in kept.errors if row["reason"] in (AFTERWARDS, DISK_FULL)]
+    unshown = None
+    if kept.picture:
+        path = f"{PLOTS}/{plot.file_name(kept.alignment['vehicle'], kept.alignment['mount'])}"
+        try:
+            plot.write_plot(files.join(directory, path), kept)
+            kept.alignment["plot"] = path
+        except InputError as error:
+            unshown = error
+    journal.add(key, kept, again or bool(missing) or unshown is not None)
+    if unshown:
+        raise unshown
+    full = next((row for row in missing if row["reason"] == DISK_FULL), None)
+    if full:
+        raise InputError(f"{full['message']}; what is finished is kept, the same command goes on")
+
+
+def _marks(periods: list[Period]) -> dict[str, str]:
+    """See files.identities()."""
+    return files.identities(dict.fromkeys(path for period in periods for path in period.paths))
+
+
+def _keys(periods: list[Period], marks: dict[str, str], with_signals: bool) -> list[str]:
+    """What distinguishes the result of each period from that of other logs, other options and other versions."""
+    keys = []
+    for period in periods:
+        logs = [(path, marks[path]) for path in period.paths]
+        version = [RESULTS_VERSION, __version__, with_signals]
+        exact = json.dumps([*version, period.vehicle, period.mount, period.kind, logs])
+        keys.append(hashlib.sha256(exact.encode()).hexdigest()[:32])
+    return keys

@@ -1,0 +1,62 @@
+"""Accelerations along the vehicle's axes as Parquet, in directories by vehicle and day as data frames read them."""
+
+import datetime
+import io
+
+import numpy as np
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.logs.log import Log, float_schema
+from kickstand_tools.logs.source import log_stem
+
+from .files import file_stem, folder_value, printable, write_bytes
+from .manifest import Period
+
+UNKNOWN_DAY = "unknown"
+_FINE = ("t_s", "utc_s")  # columns for which 32-bit floats are too coarse
+# column: unit
+COLUMNS = {
+    "t_s": "s since the log's first sample",
+    "utc_s": "s since 1970",
+    "left_g": "g",
+    "up_g": "g",
+    "forward_g": "g",
+    "about_left_dps": "deg/s",
+    "about_up_dps": "deg/s",
+    "about_forward_dps": "deg/s",
+    "speed_mps": "m/s",
+}
+
+
+def write(directory: str, period: Period, log: Log, calibration: CalibrationFile) -> list[str]:
+    """Write a log to DIRECTORY/vehicle=.../day=.../NAME.parquet, one file for each day of Universal Time in it (day
+    "unknown" where the log has none). NAME is made of the mount and the log's name, with a hash of its path: no two
+    logs share a file, and another run writes the same ones. Returns the paths. calibration: an aligned one. Raises
+    InputError."""
+    import pyarrow
+    from pyarrow import parquet
+
+    force, rate = calibration.in_vehicle(log.readings)
+    utc_s = log.t_s + (np.nan if log.start_utc_s is None else log.start_utc_s)
+    values = dict(zip(COLUMNS, (log.t_s, utc_s, *force.T, *rate.T, log.speed_mps), strict=True))
+    whole = {"made_by": "kickstand fleet", "vehicle": period.vehicle, "mount": period.mount}
+    schema = float_schema(
+        COLUMNS, _FINE, whole | {"log": printable(log.name), "axes": "left, up, forward of the vehicle"}
+    )
+    readable = f"{period.mount} {log_stem(log.name)}".strip()
+    name = file_stem(readable, period.vehicle, period.mount, log.name) + ".parquet"
+    days = np.floor(utc_s / 86_400.0) if log.start_utc_s is not None else np.zeros(len(log.t_s))
+    paths = []
+    for day in np.unique(days):
+        date = _date(day) if log.start_utc_s is not None else UNKNOWN_DAY
+        rows = days == day
+        arrays = [pyarrow.array(values[f.name][rows], type=f.type, from_pandas=True) for f in schema]
+        file = io.BytesIO()
+        parquet.write_table(pyarrow.table(arrays, schema=schema), file, compression="zstd")
+        path = f"{directory}/vehicle={folder_value(period.vehicle)}/day={date}/{name}"
+        write_bytes(path, file.getvalue())
+        paths.append(path)
+    return paths
+
+
+def _date(day: float) -> str:
+    return (datetime.date(1970, 1, 1) + datetime.timedelta(days=int(day))).isoformat()

@@ -1,0 +1,196 @@
+"""Writes a simulated fleet: logs, MANIFEST.csv, and TRUTH.csv, which says what a run over it has to find."""
+
+import gzip
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from kickstand_tools.common.errors import InputError, cause, extra
+from kickstand_tools.common.output import check_directory, make_directory, whole_file
+from kickstand_tools.logs.csv_lines import write_table
+from kickstand_tools.logs.log import Log
+from kickstand_tools.signals import Array, rotation_matrix
+
+from .route import random_route
+from .vehicle import HANDLING, Receiver, drive_log, random_sensor
+
+# What is wrong with a vehicle, and in which share of the fleet; nothing is wrong with the others
+TROUBLES = {
+    "moved-between": 0.06,  # the mount was turned between two logs
+    "moved-within": 0.06,  # the mount was turned during a log
+    "late": 0.03,  # the speed comes 2.6 s late
+    "dead": 0.03,  # there is no speed at all
+    "dies": 0.02,  # the receiver dies in the second log
+    "km/h": 0.03,
+    "circles": 0.02,  # it drives in circles: no straight braking
+    "garbage": 0.02,  # the first log is not text
+    "empty": 0.02,  # the first log has no byte
+    "cut": 0.02,  # the end of the first log is missing
+    "missing": 0.02,  # the first log is not there
+}
+# The expected codes of the refusal where the alignment cannot be known; any one of them is right
+_REASONS = {
+    "moved-between": "mount-moved",
+    "moved-within": "mount-moved",
+    "late": "speed-late speed-unit",
+    "dead": "no-speed",
+    "km/h": "speed-unit",
+    "circles": "few-events parts-differ uncertain",
+}
+_LEAST_TURN_DEG, _LARGEST_TURN_DEG = 5.0, 40.0
+_DAY_S, _START_UTC_S = 86_400.0, 1_790_000_000.0  # in September 2026
+_COLUMNS = ("vehicle", "kind", "trouble", "status", "reasons", "moved_deg", "moved_log", "moved_s")
+MATRIX = tuple(f"{row}_{axis}" for row in ("left", "up", "forward") for axis in "xyz")
+
+
+@dataclass
+class MadeVehicle:
+    """A vehicle of the fleet. trouble: a key of TROUBLES, or "". mounts: rotation from sensor to vehicle axes (3, 3):
+    one, or two if the mount moved. It then moved by moved_deg, moved_s after the start of the log with the index
+    moved_log (NaN: between that log and the one before)."""
+
+    name: str
+    kind: str
+    trouble: str
+    paths: list[Path]
+    mounts: list[Array]
+    moved_deg: float = 0.0
+    moved_log: int | None = None
+    moved_s: float = float("nan")
+
+    @property
+    def reasons(self) -> str:
+        """Codes, separated by spaces, of which the refusal has to carry one; "" where it has to be aligned."""
+        return _REASONS.get(self.trouble, "")
+
+
+def make_fleet(
+    out: Path | str,
+    vehicles: int,
+    seed: int = 0,
+    seconds: float = 240.0,
+    rate_hz: float = 50.0,
+    troubles: list[str] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[MadeVehicle]:
+    """Simulate a fleet and write it to a directory: drives/*.csv.gz, MANIFEST.csv, TRUTH.csv. Raises InputError.
+
+    A third each of cars, buses and motorcycles with one to three drives of about `seconds` each. troubles: one for each
+    vehicle, "" for none; at random in the shares of TROUBLES if None. progress: called with (done, vehicles). A seed
+    always gives the same fleet.
+    """
+    directory = Path(out)
+    check_directory(directory)
+    if troubles is None:
+        troubles = _shares(np.random.default_rng([seed, 1]), vehicles)
+    made = []
+    try:
+        make_directory(directory / "drives")
+        for k, trouble in enumerate(troubles):
+            vehicle = _vehicle(np.random.default_rng([seed, 2, k]), directory / "drives", k, trouble, seconds, rate_hz)
+            made.append(vehicle)
+            if progress:
+                progress(k + 1, len(troubles))
+        kinds = {"motorcycle": "motorcycle", "car": "car", "bus": "car"}  # in a manifest
+        rows = [(v.name, path.relative_to(directory), kinds[v.kind]) for v in made for path in v.paths]
+        write_table(directory / "MANIFEST.csv", ("vehicle", "path", "kind"), rows)
+        write_table(directory / "TRUTH.csv", (*_COLUMNS, *MATRIX), (list(_truth(v)) for v in made))
+    except OSError as error:
+        raise InputError(f"{directory} cannot be written: {cause(error)}") from error
+    return made
+
+
+def _shares(chance: np.random.Generator, vehicles: int) -> list[str]:
+    troubles = [name for name, share in TROUBLES.items() for _ in range(round(share * vehicles))]
+    troubles = (troubles + [""] * vehicles)[:vehicles]
+    return [troubles[k] for k in chance.permutation(vehicles)]
+
+
+def _vehicle(
+    chance: np.random.Generator, directory: Path, k: int, trouble: str, seconds: float, rate_hz: float
+) -> MadeVehicle:
+    kind = ("car", "bus", "motorcycle")[k % 3]
+    name = f"{kind}-{k:04d}"
+    several = trouble in ("moved-between", "dies") or (trouble in ("", "garbage", "empty", "missing"))
+    drives = int(chance.integers(2, 4)) if several and (trouble or chance.random() < 0.5) else 1
+    sensor = random_sensor(chance)
+    receiver = Receiver(float(chance.choice([0.2, 0.5, 1.0])), float(chance.uniform(0.0, 1.2)))
+    if trouble == "late":
+        receiver.late_s = 2.6
+    elif trouble == "dead":
+        receiver.until_s = -1.0
+    elif trouble == "km/h":
+        receiver.factor = 3.6
+    suffix = ".csv" if k % 5 == 0 else ".csv.gz"
+    made = MadeVehicle(name, kind, trouble, [], [sensor.mount])
+    if trouble.startswith("moved"):
+        made.moved_deg = float(np.exp(chance.uniform(np.log(_LEAST_TURN_DEG), np.log(_LARGEST_TURN_DEG))))
+        made.mounts.append(_turn(chance, made.moved_deg) @ sensor.mount)
+        made.moved_log = int(chance.integers(1, drives)) if trouble == "moved-between" else 0
+    first_utc_s = _START_UTC_S + _DAY_S * float(chance.integers(0, 60))
+    for drive in range(drives):
+        route = random_route(chance, HANDLING[kind], seconds * chance.uniform(0.85, 1.2), rate_hz, trouble != "circles")
+        moved = None
+        if trouble == "moved-between":
+            sensor.mount = made.mounts[drive >= (made.moved_log or 0)]
+        elif trouble == "moved-within":
+            made.moved_s = round(float(route.time[-1] * chance.uniform(0.4, 0.6)), 1)
+            moved = made.moved_s, made.mounts[1]
+        if trouble == "dies":
+            receiver.until_s = float("inf") if drive == 0 else 60.0
+        broken = trouble if drive == 0 and trouble in ("garbage", "empty", "cut", "missing") else ""
+        start_s = first_utc_s + drive * _DAY_S * chance.uniform(0.1, 1.5)
+        made.paths.append(directory / f"{name}-{drive + 1}{suffix}")
+        _write(made.paths[-1], drive_log(chance, kind, route, sensor, receiver, start_s, moved), broken)
+    return made
+
+
+def _turn(chance: np.random.Generator, degrees: float) -> Array:
+    """(3, 3): a rotation by so many degrees about a random axis."""
+    axis = chance.standard_normal(3)
+    return rotation_matrix(np.radians(degrees) * axis / np.linalg.norm(axis))
+
+
+def _write(path: Path, log: Log, broken: str) -> None:
+    """broken: what is wrong with the file, a key of TROUBLES, or ""."""
+    content = log_bytes(log)
+    if path.suffix == ".gz":
+        content = gzip.compress(content, 1, mtime=0)
+    if broken == "missing":
+        path.unlink(missing_ok=True)
+        return
+    if broken == "empty":
+        content = b""
+    elif broken == "garbage":
+        content = bytes(range(128, 256)) * 20
+    elif broken == "cut":
+        content = content[: len(content) * 9 // 10]
+    with whole_file(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def log_bytes(log: Log) -> bytes:
+    """The bytes of a log as a CSV file."""
+    try:
+        import pyarrow
+        from pyarrow import csv
+    except ImportError as error:
+        raise InputError("a fleet needs pyarrow: " + extra("fleet")) from error
+    values = [log.t_s.round(3), *log.accel_g.T.round(5), *log.gyro_dps.T.round(4)]
+    names = ["t_s", "ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps"]
+    columns = [pyarrow.array(column) for column in values]
+    for name in ("speed_mps", "utc_s"):
+        names.append(name)
+        columns.append(pyarrow.array(getattr(log, name), from_pandas=True))
+    sink = pyarrow.BufferOutputStream()
+    csv.write_csv(pyarrow.table(columns, names=names), sink, csv.WriteOptions(quoting_style="none"))
+    return sink.getvalue().to_pybytes()
+
+
+def _truth(made: MadeVehicle) -> Iterator[object]:
+    yield from (made.name, made.kind, made.trouble, "refused" if made.reasons else "aligned", made.reasons)
+    yield round(made.moved_deg, 3)
+    yield "" if made.moved_log is None else made.moved_log
+    yield "" if np.isnan(made.moved_s) else made.moved_s
+    yield from (round(float(value), 6) for value in made.mounts[-1].ravel())

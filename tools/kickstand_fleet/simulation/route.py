@@ -1,0 +1,134 @@
+"""A random route of a few minutes: speed, yaw rate and slope as the driver and the road make them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from kickstand.units import STANDARD_GRAVITY
+from kickstand_tools.signals import Array, moving_mean
+
+_SMOOTH_S = 0.6  # a driver changes the pedal and the steering wheel within about this
+_SLOPE_M, _SLOPE_DEG, _CAMBER_DEG = 120.0, 1.2, 0.7  # slope and camber have new values each 120 m, with these 1 sigma
+_FASTEST_LATERAL_MPS2 = 3.0
+
+
+@dataclass
+class Handling:
+    """How a kind of vehicle is driven: (least, most) of cruising speed, speeding up, braking, lateral acceleration."""
+
+    cruise_mps: tuple[float, float]
+    speed_up_mps2: tuple[float, float]
+    brake_mps2: tuple[float, float]
+    lateral_mps2: tuple[float, float]
+
+
+@dataclass
+class Route:
+    """n samples. time (s), speed (m/s), acceleration (m/s2), yaw_rate (rad/s, > 0 to the left), slope (rad, > 0
+    uphill), camber (rad, > 0 falling to the right)."""
+
+    time: Array
+    speed: Array
+    acceleration: Array
+    yaw_rate: Array
+    slope: Array
+    camber: Array
+
+
+def random_route(
+    chance: np.random.Generator, handling: Handling, seconds: float, rate_hz: float, straight: bool = True
+) -> Route:
+    """A route with stops, bends and braking in straight lines. straight False: in circles all the time, as in a car
+    park, so without straight braking."""
+    legs = _Legs(chance, handling)
+    legs.stand(chance.uniform(7.0, 14.0))
+    while legs.seconds < seconds - 12.0:
+        if straight:
+            legs.in_traffic()
+        else:
+            legs.in_circles()
+    legs.stop()
+    knots = np.array(legs.knots)
+    time = np.arange(round(knots[-1, 0] * rate_hz)) / rate_hz
+    width = max(2, round(_SMOOTH_S * rate_hz))
+    speed = moving_mean(np.interp(time, knots[:, 0], knots[:, 1]), width)
+    place = np.searchsorted(knots[:, 0], time, side="right").clip(1, len(knots) - 1)
+    lateral = moving_mean(knots[place, 2], 2 * width)  # a leg's lateral acceleration stands in the knot at its end
+    yaw_rate = np.where(speed > 0.3, lateral / np.maximum(speed, 1.5), 0.0)
+    distance = np.cumsum(speed) / rate_hz
+    return Route(
+        time,
+        speed,
+        np.gradient(speed, 1.0 / rate_hz),
+        moving_mean(yaw_rate, width),
+        np.radians(_along(chance, distance, 0.0, _SLOPE_DEG, width)),
+        np.radians(_along(chance, distance, chance.uniform(0.0, 1.5), _CAMBER_DEG, width)),
+    )
+
+
+class _Legs:
+    """Collects the legs of a route. knots: (time, speed, lateral acceleration since the knot before), one at the end of
+    each leg."""
+
+    def __init__(self, chance: np.random.Generator, handling: Handling) -> None:
+        self.chance, self._handling = chance, handling
+        self.seconds = self.speed = 0.0
+        self.knots = [(0.0, 0.0, 0.0)]
+
+    def leg(self, seconds: float, speed: float | None = None, lateral_mps2: float = 0.0) -> None:
+        self.seconds += seconds
+        self.speed = self.speed if speed is None else speed
+        self.knots.append((self.seconds, self.speed, lateral_mps2))
+
+    def stand(self, seconds: float) -> None:
+        self.leg(seconds)
+
+    def to(self, speed: float) -> None:
+        """Speed up or brake in a straight line."""
+        limits = self._handling.speed_up_mps2 if speed > self.speed else self._handling.brake_mps2
+        self.leg(abs(speed - self.speed) / self.chance.uniform(*limits), speed)
+
+    def stop(self) -> None:
+        self.to(0.0)
+        self.stand(self.chance.uniform(4.5, 11.0))
+
+    def cruise(self) -> None:
+        self.to(self.chance.uniform(*self._handling.cruise_mps))
+
+    def turn(self, heading_deg: float) -> None:
+        lateral = self.chance.uniform(*self._handling.lateral_mps2)
+        seconds = np.radians(heading_deg) * self.speed / lateral
+        self.leg(seconds, None, lateral if self.chance.random() < 0.5 else -lateral)
+
+    def in_traffic(self) -> None:
+        what = self.chance.random()
+        if self.speed < 1.0:
+            self.cruise()
+        elif what < 0.5:
+            self.leg(self.chance.uniform(1.5, 6.0))
+            self.stop()
+        elif what < 0.75:  # a junction
+            self.to(self.chance.uniform(4.0, 7.0))
+            self.leg(1.0)
+            self.turn(self.chance.uniform(60.0, 100.0))
+            self.leg(1.0)
+            self.cruise()
+        else:  # a bend of the road
+            self.turn(self.chance.uniform(10.0, 40.0))
+            self.leg(self.chance.uniform(1.0, 5.0))
+
+    def in_circles(self) -> None:
+        before = self.speed
+        after = self.chance.uniform(2.0, 6.0) if before > 4.0 else self.chance.uniform(5.0, 8.0)
+        side = 1.0 if self.chance.random() < 0.5 else -1.0
+        for speed in (after, after):
+            self.leg(self.chance.uniform(2.5, 6.0), speed, side * min(_FASTEST_LATERAL_MPS2, 0.35 * max(speed, 3.0)))
+
+
+def _along(chance: np.random.Generator, distance: Array, mean: float, sigma: float, width: int) -> Array:
+    knots = np.arange(0.0, distance[-1] + 2.0 * _SLOPE_M, _SLOPE_M)
+    return moving_mean(np.interp(distance, knots, chance.normal(mean, sigma, len(knots))), width)
+
+
+def balance_lean(route: Route) -> Array:
+    """(n) rad, > 0 to the right: the lean of a motorcycle in balance on this route."""
+    return -np.arctan(route.speed * route.yaw_rate / STANDARD_GRAVITY)

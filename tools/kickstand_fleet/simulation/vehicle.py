@@ -1,0 +1,112 @@
+"""What a sensor in a car, a bus or on a motorcycle reads on a route."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from kickstand.units import STANDARD_GRAVITY
+from kickstand_tools.logs.log import Log
+from kickstand_tools.signals import Array, rotation_vector
+from kickstand_tools.simulation.ride import random_rotation
+
+from .route import Handling, Route, balance_lean
+
+HANDLING = {
+    "car": Handling((8.0, 19.0), (1.0, 2.4), (1.3, 3.4), (1.0, 3.0)),
+    "bus": Handling((7.0, 14.0), (0.7, 1.3), (1.0, 2.0), (0.7, 1.6)),
+    "motorcycle": Handling((9.0, 22.0), (1.5, 3.2), (1.6, 4.5), (1.5, 4.0)),
+}
+# degrees per g: how far the body rolls outwards by lateral acceleration, and how far it dives by braking
+_ROLL_DEG, _DIVE_DEG = {"car": 4.0, "bus": 5.5, "motorcycle": 0.0}, {"car": 2.5, "bus": 2.0, "motorcycle": 4.0}
+_COUNT_G, _COUNT_DPS = 1.0 / 16384.0, 1.0 / 131.0
+
+
+@dataclass
+class Sensor:
+    """mount (3, 3): vehicle from sensor, rows left, up, forward; offset_g, slope, bias_dps (3): its errors."""
+
+    mount: Array
+    offset_g: Array
+    slope: Array
+    bias_dps: Array
+
+
+@dataclass
+class Receiver:
+    """The speed source: a value every every_s seconds, delayed by late_s, multiplied by factor (3.6 for km/h). After
+    until_s there are no more values."""
+
+    every_s: float = 1.0
+    late_s: float = 0.3
+    factor: float = 1.0
+    until_s: float = float("inf")
+
+
+def random_sensor(chance: np.random.Generator) -> Sensor:
+    """A sensor at a random mounting, with random errors of an ordinary MPU6050 without calibration."""
+    errors = (chance.normal(mean, sigma, 3) for mean, sigma in ((0.0, 0.01), (1.0, 0.01), (0.0, 1.0)))
+    return Sensor(random_rotation(chance), *errors)
+
+
+def drive_log(
+    chance: np.random.Generator,
+    kind: str,
+    route: Route,
+    sensor: Sensor,
+    receiver: Receiver,
+    start_utc_s: float,
+    moved: tuple[float, Array] | None = None,
+    name: str = "the log",
+) -> Log:
+    """The log of a drive. moved: (time in s, matrix (3, 3) of the new mount); the mount rotates to that within 0.3
+    s."""
+    force, rate = _readings(chance, kind, route)
+    mount = np.broadcast_to(sensor.mount, (len(force), 3, 3))
+    if moved is not None:
+        at_s, other = moved
+        mount = np.where((route.time >= at_s)[:, None, None], other, mount)
+        rate = rate + _knock(route.time, at_s, other @ sensor.mount.T)
+    force = np.einsum("nij,ni->nj", mount, force)
+    rate = np.einsum("nij,ni->nj", mount, rate)
+    force = np.round((force / STANDARD_GRAVITY - sensor.offset_g) / sensor.slope / _COUNT_G) * _COUNT_G
+    rate = np.round((np.degrees(rate) + sensor.bias_dps) / _COUNT_DPS) * _COUNT_DPS
+    speed, utc_s = (np.full(len(force), np.nan) for _ in range(2))
+    step_s = route.time[1]
+    shown = np.arange(0, len(force), max(1, round(receiver.every_s / step_s)))
+    shown = shown[route.time[shown] <= receiver.until_s]
+    seen = np.interp(route.time[shown] - receiver.late_s, route.time, route.speed)
+    seen = np.where(seen > 0.2, np.maximum(0.0, seen + chance.normal(0.0, 0.05, len(seen))), 0.0)
+    speed[shown] = np.round(seen * receiver.factor, 2)
+    utc_s[shown] = np.round(start_utc_s + route.time[shown], 1)
+    return Log(route.time, force, rate, speed, utc_s=utc_s, name=name)
+
+
+def _readings(chance: np.random.Generator, kind: str, route: Route) -> tuple[Array, Array]:
+    """(n, 3) specific force (m/s2) and (n, 3) rate (rad/s) along the vehicle's left, up, forward.
+
+    To first order in pitch and slope, which are under 5 degrees, and for a sensor on the axis about which the body
+    rolls: hundreds of vehicles are simulated in the time that physics/ takes for one.
+    """
+    step_s = route.time[1]
+    lateral = route.speed * route.yaw_rate
+    if kind == "motorcycle":
+        lean = balance_lean(route)
+    else:
+        lean = route.camber + np.radians(_ROLL_DEG[kind]) * lateral / STANDARD_GRAVITY
+    pitch = route.slope + np.radians(_DIVE_DEG[kind]) * route.acceleration / STANDARD_GRAVITY
+    c, s = np.cos(lean), np.sin(lean)
+    up = STANDARD_GRAVITY * np.cos(pitch)
+    force = np.column_stack(
+        (lateral * c + up * s, up * c - lateral * s, route.acceleration + STANDARD_GRAVITY * np.sin(pitch))
+    )
+    w_left, w_up = -np.gradient(pitch, step_s), route.yaw_rate
+    rate = np.column_stack((w_left * c + w_up * s, w_up * c - w_left * s, np.gradient(lean, step_s)))
+    moving = np.minimum(1.0, route.speed / 10.0)[:, None]
+    force += chance.normal(0.0, 1.0, force.shape) * (0.06 + np.array([0.25, 0.5, 0.25]) * moving)
+    rate += np.radians(chance.normal(0.0, 1.0, rate.shape) * (0.1 + np.array([1.2, 0.5, 0.8]) * moving))
+    return force, rate
+
+
+def _knock(time: Array, at_s: float, turn: Array, seconds: float = 0.3) -> Array:
+    """(n, 3) rad/s about the vehicle's axes: the rates of a mount that rotates by `turn` (3, 3) around at_s."""
+    turning = (time >= at_s - seconds / 2) & (time < at_s + seconds / 2)
+    return np.outer(turning, rotation_vector(turn) / seconds)

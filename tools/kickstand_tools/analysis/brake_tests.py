@@ -1,0 +1,41 @@
+"""The brake tests of a log: its stops, as UN Regulation No. 13 measures them."""
+
+import numpy as np
+
+from ..calibration.file import CalibrationFile
+from ..logs.reader import Source, read_blocks
+from ..signals import Array
+from .channels import Channels, channels, downsampled, joined
+from .ride import Ride
+from .stops.brake_test import RATE_S, Stop, find_stops
+
+
+def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
+    """Every stop of a log from over 10 km/h, as UN Regulation No. 13 measures it (see find_stops). Raises InputError.
+
+    calibration: an aligned one. A car has no lean, so the firmware's lean filter, which takes most of the time, is run
+    for motorcycles only.
+
+    >>> from kickstand_tools.api import Log, fit_two_positions, simulate_ride
+    >>> ride = simulate_ride("street", seed=1, seconds=60.0)
+    >>> poses = [Log.from_readings(pose, ride.rate_hz) for pose in (ride.kickstand, ride.upright)]
+    >>> log = Log.from_readings(ride.readings, ride.rate_hz)
+    >>> log.speed_mps[::200] = ride.truth["speed_mps"][::200]  # once a second
+    >>> stops = brake_tests(log, fit_two_positions(*poses).calibration)
+    >>> stops[-1].initial_speed_mps > 3.0, stops[-1].mfdd_mps2 > 1.0
+    (True, True)
+    """
+    ride = Ride(log, calibration)
+    blocks = car_channels(log, calibration) if ride.car else list(ride.blocks())
+    return find_stops(joined(list(downsampled(blocks, RATE_S))))
+
+
+def car_channels(log: Source, calibration: CalibrationFile) -> list[Channels]:
+    """The channels of a car's log, block by block: in the vehicle's axes, without a lean."""
+    found = []
+    for whole in read_blocks(log):
+        block = whole.measured
+        if len(block.time_us):
+            lean: dict[str, Array] = {name: np.zeros(len(block.time_us)) for name in ("shown_g", "resting", "sure")}
+            found.append(channels(block, calibration, lean, car=True))
+    return found

@@ -1,0 +1,1 @@
+"""What all parts of the tools use: errors, files written whole, progress, templates, SVG, places of files."""

@@ -1,0 +1,38 @@
+"""Where the firmware's files are: in a checkout or in an installed wheel."""
+
+import os
+from pathlib import Path
+
+import kickstand
+
+TOOLS = Path(__file__).resolve().parents[2]  # the directory kickstand_tools is imported from
+PACKAGE = Path(kickstand.__file__).resolve().parent  # the firmware's package, which the host imports too
+
+
+def directory() -> Path:
+    """The directory that holds main.py and config.py."""
+    return _packaged() if installed() else TOOLS.parent / "firmware"
+
+
+def _packaged() -> Path:
+    return TOOLS / "kickstand_tools" / "firmware"  # in a wheel
+
+
+def installed() -> bool:
+    """True if these tools were installed as a package: they are no checkout, whose files a rider may edit."""
+    return _packaged().is_dir()
+
+
+def config() -> Path:
+    """The rider's config.py: that of the checkout in the current directory, for an installed package also the one in
+    the current directory itself; else the one beside these tools."""
+    here = Path("firmware").resolve()
+    if (here / "kickstand").is_dir() and (here / "config.py").is_file():
+        return here / "config.py"
+    own = Path("config.py").resolve()
+    return own if installed() and own.is_file() else directory() / "config.py"
+
+
+def search_path() -> str:
+    """The search path with which another Python process can import the firmware and these tools."""
+    return os.pathsep.join((str(TOOLS), str(PACKAGE.parent)))

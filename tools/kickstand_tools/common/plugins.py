@@ -1,0 +1,35 @@
+"""Parts that other packages add to the tools, by entry points of a group.
+
+The leaves of this project, kickstand_fleet and kickstand_emulator, add theirs in pyproject.toml. So the core works
+without them and imports none of them.
+"""
+
+from importlib.metadata import EntryPoint, distributions
+from typing import Any
+
+from .errors import DISTRIBUTION, InputError
+
+ENGINES = "kickstand.engines"  # see replay.Engine
+SIMULATIONS = "kickstand.simulations"  # simulation.files.simulate's siblings, for more than one ride
+
+
+def entry_points(group: str) -> dict[str, EntryPoint]:
+    """The entry points of a group, by name. Of two with one name that of this project counts, else the first found."""
+    found: dict[str, EntryPoint] = {}
+    for distribution in distributions():
+        try:
+            ours = distribution.name == DISTRIBUTION
+            for entry_point in distribution.entry_points:
+                if entry_point.group == group and (ours or entry_point.name not in found):
+                    found[entry_point.name] = entry_point
+        except Exception:  # a package whose metadata cannot be read adds nothing
+            continue
+    return found
+
+
+def part(group: str, name: str) -> Any:
+    """The object of an entry point. Raises InputError if no installed package has it."""
+    entry_point = entry_points(group).get(name)
+    if entry_point is None:
+        raise InputError(f"the part {name} of {DISTRIBUTION} is not installed: install {DISTRIBUTION} again")
+    return entry_point.load()
