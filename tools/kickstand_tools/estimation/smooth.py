@@ -11,7 +11,7 @@ from ..calibration.file import CalibrationFile
 from ..common.errors import InputError
 from ..logs.csv_lines import write_lean
 from ..logs.log import Block, Table, within
-from ..logs.reader import Source, apart, read_blocks
+from ..logs.reader import Source, read_blocks, split_stretch
 from ..logs.source import Progress, name_of
 from ..refusals import WRONG_AXES, WRONG_MOUNT
 from ..signals import Array, Bools
@@ -95,7 +95,7 @@ def _checked_blocks(
 ) -> Iterator[tuple[Block, Array]]:
     """smooth_blocks() of the stretch that `log` names. Raises InputError, also for under SLOWEST_HZ samples a
     second."""
-    whole, stretch = apart(log)
+    whole, stretch = split_stretch(log)
     for block, found in smooth_blocks(whole, calibration, progress, notices):
         if found is None:
             raise InputError(f"{name_of(log)}: under {SLOWEST_HZ:.0f} samples a second: too few to smooth the lean")

@@ -17,7 +17,7 @@ from ..common import plugins, unix_port
 from ..common.errors import InputError
 from ..logs.csv_lines import write_lean
 from ..logs.log import Block, Log, Stretch, Table, within
-from ..logs.reader import Source, apart, read_blocks, read_twice
+from ..logs.reader import Source, read_blocks, read_twice, split_stretch
 from ..logs.source import Progress, total_bytes
 from ..signals import Array
 from . import replay_engine
@@ -106,7 +106,7 @@ def replay_blocks(
     engine gets a gap. A car's display shows no lean, so lean_sigma_deg is NaN throughout. notices is appended to
     at the end."""
     car = calibration.vehicle == "car"
-    whole, stretch = apart(log)
+    whole, stretch = split_stretch(log)
     for block, results in _replayed(whole, calibration, engine, progress, notices):
         found = _with_frozen(block, results)
         if car:
