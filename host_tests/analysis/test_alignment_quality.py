@@ -4,8 +4,6 @@ it is known how far off it is."""
 import dataclasses
 import re
 
-import analysis_rides
-import command
 import numpy as np
 import pytest
 from kickstand_tools.analysis import report
@@ -18,6 +16,8 @@ from kickstand_tools.checks.mount import ForwardExchanged
 from kickstand_tools.estimation.smooth import PoseOff
 from kickstand_tools.signals import rotation_matrix
 from kickstand_tools.simulation.scripted import script
+from support import command
+from support.recordings import analysis_rides
 
 NONE = np.zeros(1)
 # "up" leans to the right of the bike's own; "forward" points up; "forward" points to the right

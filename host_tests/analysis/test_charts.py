@@ -5,7 +5,6 @@ import itertools
 from dataclasses import replace
 from pathlib import Path
 
-import analysis_rides
 import numpy as np
 import pytest
 from kickstand_tools.analysis.alignment_quality import Quality
@@ -18,6 +17,7 @@ from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.checks.mount import UpOff
 from kickstand_tools.estimation.smooth import NotTheBikes
 from kickstand_tools.simulation.scripted import script
+from support.recordings import analysis_rides
 
 pytest.importorskip("matplotlib")
 pytest.importorskip("plotly")

@@ -8,12 +8,12 @@ import pydoc
 import re
 import sys
 
-import command
 import numpy as np
 import pytest
 from kickstand_tools import api
 from kickstand_tools.calibration.pose_refusals import SamePose
 from kickstand_tools.simulation.files import simulate
+from support import command
 
 FUNCTIONS = [name for name, public in vars(api).items() if inspect.isfunction(public)]
 

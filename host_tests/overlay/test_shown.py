@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 
-import analysis_rides
 import numpy as np
 import pytest
 from kickstand_tools import api
 from kickstand_tools.overlay.shown import shown
+from support.recordings import analysis_rides
 
 
 @pytest.fixture(scope="module")

@@ -2,11 +2,10 @@
 
 import json
 
-import analysis_rides
-import app_exports
 import numpy as np
 import pytest
 from kickstand_tools.web import rides_guest
+from support.recordings import analysis_rides, app_exports
 
 
 def test_a_singular_matrix_is_told_though_webassembly_has_no_flags():

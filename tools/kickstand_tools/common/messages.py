@@ -113,6 +113,10 @@ def sentence(message: Message, page: bool = False) -> str:
     """One line, without the full stop at its end: what is wrong, and where it helps what to do.
 
     page: in the words of a page, which has no commands.
+
+    >>> from kickstand_tools.calibration.pose_refusals import SamePose
+    >>> sentence(SamePose(0.4))
+    'both poses are the same (0.4 degrees apart): one on the kickstand, one upright'
     """
     return message.line(page)
 
