@@ -41,7 +41,7 @@ class AbsurdReadings(Message):
 
     code = "absurd-readings"
     text = (
-        "implausible readings at {at_s:.1f} s, up to {rate_dps:.0f} deg/s and {force_g:.2f} g, where the lean is not "
+        "implausible readings at {at_s:.1f} s, up to {rate_dps:.0f} deg/s and {force_g:.1f} g, where the lean is not "
         "known"
     )
     todo = Remedy("check the sensor, and the units in the log")
