@@ -149,7 +149,7 @@ def test_a_journal_whose_end_was_cut_or_whose_disk_is_full_loses_no_line(tmp_pat
         full = Journal(tmp_path / "full.jsonl")
         with full:
             full.add("a", result)
-            with monkeypatch.context() as patched, pytest.raises(InputError, match="the same command goes on"):
+            with monkeypatch.context() as patched, pytest.raises(InputError, match="run the same command again"):
                 patched.setattr(full, "_file", open("/dev/full", "wb"))
                 full.add("b", result)
         with Journal(tmp_path / "full.jsonl") as again:

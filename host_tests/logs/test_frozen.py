@@ -52,7 +52,7 @@ def test_a_freeze_is_marked_to_the_sample(monkeypatch, blocks_of):
     list(read_blocks(log_of(readings), notices=notices))
     (notice,) = notices
     assert sentence(notice).startswith("the readings froze from 3.")
-    assert sentence(notice).endswith("to 5.0 s: they are left out, and the lean begins anew after each")
+    assert sentence(notice).endswith("to 5.0 s: they are left out, and the lean filter restarts after each")
 
 
 def test_at_each_end_and_twice():

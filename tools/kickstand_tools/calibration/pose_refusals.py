@@ -191,7 +191,7 @@ class OddAxis(Message):
     slope: float
 
     code = "odd-axis"
-    text = "axis {axis}: offset {offset_g:.3f} g, slope {slope:.3f} is past any real sensor"
+    text = "axis {axis}: offset {offset_g:.3f} g, slope {slope:.3f} is out of range for a real sensor"
     todo = Remedy("repeat the six poses")
 
 

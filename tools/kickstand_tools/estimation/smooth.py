@@ -49,10 +49,10 @@ class SensorOdd(Message):
 
     code = "sensor-odd"
     text = (
-        "no sound gyro fits this ride: its error of scale or axes comes out at {sigmas:.0f} standard deviations, so "
+        "no sound gyro fits this ride: its scale or axis error would be {sigmas:.0f} standard deviations, so "
         "the smoothed lean is not certain, and its standard deviation says so"
     )
-    todo = Remedy("is an axis of the gyro ill?")
+    todo = Remedy("is an axis of the gyro faulty?")
 
 
 @dataclass(frozen=True)
@@ -81,9 +81,9 @@ class PoseOff(Message):
         """See Message."""
         side = "right" if self.angle_deg > 0.0 else "left"
         return (
-            f"on straights the bike is in balance {abs(self.angle_deg):.1f} degrees to the {side} of what the "
-            "calibration takes for upright, and the smoothed lean counts from there: a pose that was not upright does "
-            "that, and a sensor without its six positions; if it is luggage on one side, the lean is that much off"
+            f"on straights the bike is in balance {abs(self.angle_deg):.1f} degrees to the {side} of the "
+            "calibration's upright, and the smoothed lean counts from there. Causes are a pose that was not upright, "
+            "and a sensor without six positions; with luggage on one side the lean is wrong by that much"
         )
 
 

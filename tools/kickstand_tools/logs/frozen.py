@@ -37,7 +37,7 @@ class FrozenReadings(Message):
         line = f"the readings froze from {self.begin_s:.1f} to {self.end_s:.1f} s"
         if self.stretches > 1:
             line += f" and {self.stretches - 1} times more, {self.seconds:.1f} s in all"
-        return line + ": they are left out, and the lean begins anew after each"
+        return line + ": they are left out, and the lean filter restarts after each"
 
 
 class FrozenFinder:
