@@ -57,7 +57,7 @@ _SLOWEST_S, _QUICKEST_S = 1.0, 1e-4  # between samples of a recording
 
 
 @dataclass
-class Finding:
+class ColumnFinding:
     """columns: the names in the table. unit: of them. why: in words. certain: False where the user should look."""
 
     columns: list[str]
@@ -72,7 +72,7 @@ class Findings:
     are needed and missing, in words. single: columns of single axes, by the keys of REQUIRED, of a sensor that lacks
     another axis. remarks: what is wrong with the columns that are there."""
 
-    found: dict[str, Finding] = field(default_factory=dict)
+    found: dict[str, ColumnFinding] = field(default_factory=dict)
     lacking: list[str] = field(default_factory=list)
     single: dict[str, str] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
@@ -131,7 +131,7 @@ def find(sheet: Sheet) -> Findings:
 # Time
 
 
-def _time(sheet: Sheet) -> Finding | None:
+def _time(sheet: Sheet) -> ColumnFinding | None:
     """The column of the time: one that increases, by name if there are several; of these the finest."""
     usable = []
     for place, name in enumerate(sheet.columns):
@@ -159,11 +159,11 @@ def _time(sheet: Sheet) -> Finding | None:
     numbers = sheet.numbers(place)
     found = time_unit(sheet.cells[place])
     if stated in ("s", "ms", "us", "ns") and _step_fits(numbers, stated):
-        return Finding([name], stated, f"{name} says {stated}")
+        return ColumnFinding([name], stated, f"{name} says {stated}")
     if found == DATES:
-        return Finding([name], "", "dates or times of day")
+        return ColumnFinding([name], "", "dates or times of day")
     hz = 1.0 / max(_mean_step(numbers) * _SECONDS[found], 1e-9)
-    return Finding([name], found, f"in {found} it is {hz:.3g} samples per second")
+    return ColumnFinding([name], found, f"in {found} it is {hz:.3g} samples per second")
 
 
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -179,7 +179,7 @@ def _step_fits(numbers: Array, name: str) -> bool:
     return _QUICKEST_S / 2.0 < _mean_step(numbers) * _SECONDS[name] < _SLOWEST_S
 
 
-def _seconds(sheet: Sheet, time: Finding | None) -> Array | None:
+def _seconds(sheet: Sheet, time: ColumnFinding | None) -> Array | None:
     """(n) times from the first, s; None without a time."""
     if time is None:
         return None
@@ -337,7 +337,7 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
         findings.lacking.append("gyro")
         return
     names = _names(sheet, rates)
-    findings.found["g"] = Finding(names, stated_unit(names[0]), "by name", False)
+    findings.found["g"] = ColumnFinding(names, stated_unit(names[0]), "by name", False)
     if accel is not None:
         found = gyro(accel.values, rates.values, findings.found["a"], seconds, stated_unit(names[0]))
         found.columns = names
@@ -393,7 +393,7 @@ def _gravities() -> dict[str, float]:
     return gravities | {f"counts/{size:g}": size for size in COUNTS_PER_G}
 
 
-def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> Finding:
+def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> ColumnFinding:
     """The unit of accelerations (n, 3), by the length of gravity. stated: the unit in their names. columns: empty."""
     length = calm_length(values, seconds)
     whole = _are_whole(values)
@@ -402,10 +402,10 @@ def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> Fin
     off = max(length / gravities[near], gravities[near] / length)
     why = f"gravity at rest is {length:.4g} long"
     if stated in gravities and max(length / gravities[stated], gravities[stated] / length) < NEAR:
-        return Finding([], stated, f"{why}, as its name says")
+        return ColumnFinding([], stated, f"{why}, as its name says")
     if near.startswith("counts"):
         why += f": raw counts of a sensor with {near.partition('/')[2]} counts (LSB) per g"
-    return Finding([], near, why, off < NEAR and stated in ("", near, "counts"))
+    return ColumnFinding([], near, why, off < NEAR and stated in ("", near, "counts"))
 
 
 def _are_whole(values: Array) -> bool:
@@ -413,7 +413,7 @@ def _are_whole(values: Array) -> bool:
     return len(good) > 0 and bool(np.all(good == np.rint(good))) and float(np.max(np.abs(good))) > 20.0
 
 
-def gyro(force: Array, rates: Array, accel: Finding, seconds: Array | None, stated: str = "") -> Finding:
+def gyro(force: Array, rates: Array, accel: ColumnFinding, seconds: Array | None, stated: str = "") -> ColumnFinding:
     """The unit of rates (n, 3): by the turns of gravity, by their names, else by size. accel: the finding of the
     accelerometer. columns: empty."""
     fit = RateFit() if seconds is None else fit_rates(seconds, force, rates)
@@ -422,25 +422,25 @@ def gyro(force: Array, rates: Array, accel: Finding, seconds: Array | None, stat
     if stated in RATES:
         also = f", and so do the turns of gravity: {by_fit}" if by_fit == stated else ""
         against = f", but gravity turns as by {by_fit}" if by_fit not in ("", stated) else ""
-        return Finding([], stated, f"its name says so{also}{against}", not against)
+        return ColumnFinding([], stated, f"its name says so{also}{against}", not against)
     if by_fit:
-        return Finding([], by_fit, "in it the rates turn gravity as it turns")
+        return ColumnFinding([], by_fit, "in it the rates turn gravity as it turns")
     if "deg/s" not in candidates:
         usual = f"counts/{_usual_counts(accel):g}"
-        return Finding(
+        return ColumnFinding(
             [], usual, "raw counts whose range nothing shows: the usual one with this accelerometer's", False
         )
-    return Finding([], *_by_size(rates, force), certain=False)
+    return ColumnFinding([], *_by_size(rates, force), certain=False)
 
 
-def gyro_units(rates: Array, accel: Finding) -> dict[str, float]:
+def gyro_units(rates: Array, accel: ColumnFinding) -> dict[str, float]:
     """The units that rates (n, 3) can be in, with their factors to deg/s: counts beside those of an accelerometer."""
     if counts_per(accel.unit) and _are_whole(rates):
         return {f"counts/{size:g}": 1.0 / size for size in COUNTS_PER_DPS}
     return dict(RATES)
 
 
-def _usual_counts(accel: Finding) -> float:
+def _usual_counts(accel: ColumnFinding) -> float:
     """Counts per deg/s of an MPU6050 whose accelerometer has this unit: both ranges are usually set alike."""
     size = counts_per(accel.unit)
     return COUNTS_PER_DPS[COUNTS_PER_G.index(size)] if size in COUNTS_PER_G else COUNTS_PER_DPS[0]
@@ -464,7 +464,7 @@ def _by_size(rates: Array, force: Array) -> tuple[str, str]:
 # Speed and position
 
 
-def _speed(sheet: Sheet) -> Finding | None:
+def _speed(sheet: Sheet) -> ColumnFinding | None:
     for place, name in enumerate(sheet.columns):
         bare = plain(name)
         if re.search(r"speed|velocity|kmh|kph", bare) and not re.search(
@@ -474,16 +474,16 @@ def _speed(sheet: Sheet) -> Finding | None:
                 continue
             stated = stated_unit(name)
             stated = stated if stated in SPEEDS else next((u for w, u in _SPEED_WORDS if w in bare), "")
-            return Finding([name], stated, "by its name", bool(stated))
+            return ColumnFinding([name], stated, "by its name", bool(stated))
     return None
 
 
 _SPEED_WORDS = (("kmh", "km/h"), ("kph", "km/h"), ("mph", "mph"), ("mps", "m/s"), ("knot", "knots"))
 
 
-def _named(sheet: Sheet, words: str) -> Finding | None:
+def _named(sheet: Sheet, words: str) -> ColumnFinding | None:
     for place, name in enumerate(sheet.columns):
         bare = plain(name)
         if re.search(words, bare) and "acc" not in bare and np.any(np.isfinite(sheet.numbers(place))):
-            return Finding([name], "", "by its name")
+            return ColumnFinding([name], "", "by its name")
     return None

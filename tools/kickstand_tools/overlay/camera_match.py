@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..common.errors import InputError
-from ..joining.motion import STEP_S, Motion
+from ..joining.motion import STEP_S, CellMotion
 from ..signals import Array, correlations, log_likelihood_ratio, moving_mean, peak_offset, peaks
 from .gpmf import Telemetry
 
@@ -15,7 +15,7 @@ _LEAST_EVIDENCE, _LEAST_LEAD, _LEAST_CORRELATION = 15.0, 6.0, 0.5
 _APART_S = 2.0
 
 
-def camera_offset_s(ride: Motion, camera: Telemetry) -> tuple[float, float]:
+def camera_offset_s(ride: CellMotion, camera: Telemetry) -> tuple[float, float]:
     """The ride's time at the video's first picture, s since the ride's first sample, and the correlation there.
 
     A camera on the bike turns as the bike does; on a helmet it turns with the head, too, and may not match. Raises

@@ -12,11 +12,11 @@ from kickstand.lean.meter import FALLEN_DEG
 from ..calibration.file import CalibrationFile
 from ..common.errors import InputError, cause
 from ..deploy.board_console import BrokenOff, lines
-from ..deploy.connection import Board, refuse_unfit_firmware
+from ..deploy.connection import ConnectedBoard, refuse_unfit_firmware
 from ..logs.cells import TRACK
 from ..replay.replay_engine import NO_SPEED, Replay
 from . import ride_log
-from .block_reader import BadBlock, Block, missing_note, parse
+from .block_reader import BadBlock, StoredBlock, missing_note, parse
 
 # The app with its turns sent over USB, its display and button alive; Ctrl-C ends it.
 _START = """
@@ -60,7 +60,7 @@ class LiveReading:
     seconds: float
 
 
-class Recording:
+class StreamLog:
     """Writes blocks to a log. stopped: an event that is set where the log has to end, which ends the stream.  live:
     called with each block's LiveReading.  A log that cannot be written any further ends there, with a note.
 
@@ -69,13 +69,13 @@ class Recording:
 
     def __init__(self, stopped: threading.Event, live: Callable[[LiveReading], None] | None = None) -> None:
         self._stopped = stopped
-        self.first: Block | None = None
+        self.first: StoredBlock | None = None
         self.seconds = 0.0
         self.count = 0
         self.written = False
         self._live = live
 
-    def write(self, file: TextIOBase, blocks: Iterator[Block], notes: list[str]) -> None:
+    def write(self, file: TextIOBase, blocks: Iterator[StoredBlock], notes: list[str]) -> None:
         """Write all blocks as they come. notes: gets a line for each gap. Raises InputError if there is no block."""
         missing, expected = 0, 0
         missing_s: list[float] = []
@@ -139,7 +139,7 @@ class Recording:
             notes.append(missing_note(missing_s))
 
 
-def blocks(transport: Board, name: str, notes: list[str], stopped: threading.Event) -> Iterator[Block]:
+def blocks(transport: ConnectedBoard, name: str, notes: list[str], stopped: threading.Event) -> Iterator[StoredBlock]:
     """Yield the whole blocks that the board sends, until `stopped` is set or the connection is lost. name: the port's.
     notes: gets a line with the reason for the end. Raises InputError."""
     parts: list[bytes] = []
@@ -158,7 +158,7 @@ def blocks(transport: Board, name: str, notes: list[str], stopped: threading.Eve
         parts = []
 
 
-def _lines(transport: Board, name: str, notes: list[str], stopped: threading.Event) -> Iterator[bytes]:
+def _lines(transport: ConnectedBoard, name: str, notes: list[str], stopped: threading.Event) -> Iterator[bytes]:
     """Yield the lines that the app on the board prints."""
     try:
         yield from lines(transport, _START, _SILENT_S, stopped)
