@@ -25,7 +25,7 @@ from .recording import AppRecording, Taken
 from .units import ACCELERATIONS, factor
 
 # Each is a module with NAME, the app's; finds(files): one list of files for each recording of this app among them; and
-# read(files, name): such a list's Recording (see recording.py), or InputError. If it has ASKS, the quantities whose
+# read(files, name): such a list's AppRecording (see recording.py), or InputError. If it has ASKS, the quantities whose
 # unit the user may give, it is read(files, name, units). Each is asked about the files that none before it has claimed:
 # phyphox, which goes by names of columns, is last.
 _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
