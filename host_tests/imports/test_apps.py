@@ -25,8 +25,9 @@ from support.recordings.app_exports import PHONE, START_UTC_S, Riding
 README = Path(__file__).resolve().parents[2] / "tools" / "README.md"
 ON_PHONE = api.CalibrationFile(vehicle_from_sensor=PHONE.T, aligned=True)
 ON_BIKE = api.CalibrationFile(aligned=True)
-# Apps whose axes are those of the bike, not of a phone on it; whose exports have no date; that have no satellite receiver
-ON_THE_BIKE, WITHOUT_DATE, WITHOUT_SPEED = ("RaceBox", "VBO", "AiM"), ("AiM", "Sensor Kinetics"), ("Sensor Kinetics",)
+ON_THE_BIKE = ("RaceBox", "VBO", "AiM")  # apps whose axes are those of the bike, not of a phone on it
+WITHOUT_DATE = ("AiM", "Sensor Kinetics")  # whose times do not say which day it was
+WITHOUT_SPEED = ("Sensor Kinetics",)  # without a satellite receiver
 # rms of a replay against the true lean; the ride itself, not exported, has 0.28 at 100 samples a second
 WITHIN_DEG = 0.5
 
