@@ -14,11 +14,11 @@ from kickstand_tools.calibration.poses import fit_six_positions, fit_two_positio
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs.log import Log
 from kickstand_tools.simulation.profiles import check_profile
-from kickstand_tools.simulation.ride import Ride, ride
+from kickstand_tools.simulation.ride import SimulatedRide, ride
 from numpy.typing import NDArray
 
 from . import estimators, possible, real_ride
-from .metrics import Score, score
+from .metrics import LeanScore, score
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Result:
     """
 
     job: Job
-    scores: dict[str, Score] = field(default_factory=dict)
+    scores: dict[str, LeanScore] = field(default_factory=dict)
     traces: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     refusal: str | None = None
 
@@ -59,7 +59,7 @@ class Evaluation:
     """results: of the simulated rides, by profile, then by seed. recorded: of the recorded ride, None without one."""
 
     results: list[Result]
-    recorded: real_ride.Comparison | None
+    recorded: real_ride.RecordingScores | None
 
 
 def evaluate(jobs: list[Job], recording: Path | None = None, done: Callable[[], None] = lambda: None) -> Evaluation:
@@ -103,7 +103,7 @@ def on_all_processors(function: Callable, jobs: list, chunk: int = 1, ordered: b
         yield from (pool.imap if ordered else pool.imap_unordered)(function, jobs, chunk)
 
 
-def calibrated_by_poses(made: Ride) -> CalibrationFile:
+def calibrated_by_poses(made: SimulatedRide) -> CalibrationFile:
     """`kickstand calibrate six` and `two` over the ride's poses. Raises InputError."""
     seven = [Log.from_readings(pose, made.rate_hz, f"POSE_{k}.csv") for k, pose in enumerate(made.poses, 1)]
     kickstand = Log.from_readings(made.kickstand, made.rate_hz, "KICKSTAND.csv")
@@ -111,7 +111,7 @@ def calibrated_by_poses(made: Ride) -> CalibrationFile:
     return fit_two_positions(kickstand, upright, fit_six_positions(seven).calibration).calibration
 
 
-def as_log(made: Ride) -> Log:
+def as_log(made: SimulatedRide) -> Log:
     """The ride as if read from its file."""
     readings = made.readings
     return Log(made.time, readings[:, :3], readings[:, 4:], temperature_c=readings[:, 3], name="RIDE.csv")
