@@ -4,15 +4,14 @@ the six positions, the upright pose 1.5 degrees off, bikes of any dive, with and
 On both simulators. Parameters are fitted with even seeds only, and figures are reported of odd ones. As a program: a
 line per simulator, profile and mount, in 20 s per ride on one processor:
 
-    PYTHONPATH=host_tests/support:host_tests/support/recordings python host_tests/support/recordings/limit_rides.py odd 4
+    PYTHONPATH=host_tests/support:host_tests/support/recordings python -m limit_rides odd 4
 """
 
 import sys
 from dataclasses import dataclass, replace
 
 import numpy as np
-from drawn_rides import MOUNTS as DRAWN_MOUNTS
-from drawn_rides import drawn_ride
+from drawn_rides import MOUNTS as DRAWN_MOUNTS, drawn_ride
 from kickstand_tools.api import replay, smooth
 from kickstand_tools.calibration.poses import fit_two_positions
 from kickstand_tools.calibration.procedure import fit_procedure
@@ -65,7 +64,9 @@ def limit_ride(simulator, profile, seed, mount=None, seconds=SECONDS):
         )
     chance = np.random.default_rng([seed, 27])
     dive = chance.uniform(0.0, 6.0), chance.uniform(0.0, 3.0)
-    made = ride(profile, seed, seconds, 1.5 * (1, -1)[seed // 2 % 2], 1.0 * (1, -1)[seed // 4 % 2], mount=mount, dive=dive)
+    made = ride(
+        profile, seed, seconds, 1.5 * (1, -1)[seed // 2 % 2], 1.0 * (1, -1)[seed // 4 % 2], mount=mount, dive=dive
+    )
     six = fit_procedure(Log.from_readings(made.procedure, made.rate_hz, "SIX.csv")).calibration
     two = (
         Log.from_readings(pose, made.rate_hz, name)
@@ -73,7 +74,11 @@ def limit_ride(simulator, profile, seed, mount=None, seconds=SECONDS):
     )
     speed = made.truth["speed_mps"]
     return Measured(
-        as_log(made), fit_two_positions(*two, six).calibration, made.truth["lean_deg"], np.cumsum(speed > 0.5) > 0, speed
+        as_log(made),
+        fit_two_positions(*two, six).calibration,
+        made.truth["lean_deg"],
+        np.cumsum(speed > 0.5) > 0,
+        speed,
     )
 
 
@@ -134,9 +139,7 @@ def line(name, rides):
     return text
 
 
-HEAD = (
-    " " * 24 + " rides live worst shown  1 s  2 s   smooth worst 1 s  2 s worse  with " + ", ".join(SPEEDS)
-)
+HEAD = " " * 24 + " rides live worst shown  1 s  2 s   smooth worst 1 s  2 s worse  with " + ", ".join(SPEEDS)
 
 
 def main(which, count, *mounts):

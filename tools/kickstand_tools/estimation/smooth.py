@@ -183,9 +183,10 @@ class Smoother:
             warm = np.interp(t_s, t_s[there], readings[there, 3]) - self._start_c
         force, rate = self._calibration.in_vehicle(readings)
         rate = np.radians(rate)
-        windows = windows_of(t_s, force, rate, speed, warm)
+        windows = windows_of(t_s, force, rate, speed, warm, aligned=True)
         try:
-            estimate = Estimate(windows, Prior.of_pose(self._calibration.six_done), ALL)
+            prior = Prior.of_pose(self._calibration.six_done, self._calibration.gyro_sigma_in_vehicle())
+            estimate = Estimate(windows, prior, ALL)
         except np.linalg.LinAlgError:
             return nothing  # readings that are not a ride's
         noise, mine = estimate.noise, np.unique(windows.number[own])
