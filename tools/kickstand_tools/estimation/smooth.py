@@ -27,8 +27,8 @@ SEGMENT_S = 120.0  # a log is cut into segments of this length
 TOGETHER = 8  # so many segments are estimated together, with one before and one after them
 # Further standard deviations of the lean: times the lean, for errors that the model leaves out, such as the gyro's
 # sensitivity to acceleration; times the roll rate, for the delay of the gyro's low-pass and the samples' times
-LEANED_SHARE = 0.004
-TIMING_S = 0.004  # s
+LEANED_SHARE = 0.001
+TIMING_S = 0.002  # s
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps", "doubtful")
 DIGITS = 3, 3, 3, 3, 0
 DOUBTFUL = 0.2  # share of the riding; more is remarked
