@@ -1,10 +1,10 @@
 """Rides whose road, bike, rider, mount and sensor are drawn at random, each from what is real: a second opinion.
 
-On the second simulator (other_bike.py), so that nothing is shared with kickstand_tools.simulation but the sensor of the
-data sheet and its six positions, where a test asks for them. Parameters of the
-estimators are fitted with even seeds only, and figures are reported of odd ones:
+On the second simulator (other_bike.py), so that nothing is shared with kickstand_tools.simulation, but the sensor of the
+data sheet and its six positions where a caller asks for them. Parameters of the estimators are fitted with even seeds
+only, and figures are reported of odd ones:
 
-    OMP_NUM_THREADS=1 python host_tests/support/recordings/drawn_rides.py odd 100
+    OMP_NUM_THREADS=1 .venv/bin/python -m support.recordings.drawn_rides odd 100
 """
 
 import sys
@@ -18,8 +18,9 @@ from kickstand_tools.logs.log import Log
 from kickstand_tools.simulation import hands, poses
 from kickstand_tools.simulation.hands import Hand
 from kickstand_tools.simulation.physics.chip import GYRO_DPS_PER_G, Chip
-from other_bike import FINE_HZ, KINDS, G, _about, _course, _mounting, _noise, _readings, _tolerances
-from smoothed_rides import Known, rms
+
+from support.recordings.other_bike import FINE_HZ, KINDS, G, _about, _course, _mounting, _noise, _readings, _tolerances
+from support.recordings.smoothed_rides import Known, rms
 
 # And how often. "foreign": accelerations that are not the bike's, of whatever shakes or bends the mount
 MOUNTS = {"firm": 0.5, "holder": 0.1, "aliasing": 0.1, "clipping": 0.1, "drifting": 0.1, "foreign": 0.1}

@@ -4,14 +4,13 @@ the six positions, the upright pose 1.5 degrees off, bikes of any dive, with and
 On both simulators. Parameters are fitted with even seeds only, and figures are reported of odd ones. As a program: a
 line per simulator, profile and mount, in 20 s per ride on one processor:
 
-    PYTHONPATH=host_tests/support:host_tests/support/recordings python -m limit_rides odd 4
+    OMP_NUM_THREADS=1 .venv/bin/python -m support.recordings.limit_rides odd 4
 """
 
 import sys
 from dataclasses import dataclass, replace
 
 import numpy as np
-from drawn_rides import MOUNTS as DRAWN_MOUNTS, drawn_ride
 from kickstand_tools.api import replay, smooth
 from kickstand_tools.calibration.poses import fit_two_positions
 from kickstand_tools.calibration.procedure import fit_procedure
@@ -19,7 +18,9 @@ from kickstand_tools.logs.log import Log
 from kickstand_tools.simulation.physics.mount import MOUNTS as SIMULATED_MOUNTS
 from kickstand_tools.simulation.ride import ride
 from kickstand_workshop.evaluation.runs import as_log
-from smoothed_rides import Known, rms
+
+from support.recordings.drawn_rides import MOUNTS as DRAWN_MOUNTS, drawn_ride
+from support.recordings.smoothed_rides import Known, rms
 
 # degrees rms of the live lean
 TARGETS = {"street": 0.35, "track": 0.50, "sweeper": 0.38, "city": 0.28, "hills": 0.34}

@@ -1,9 +1,9 @@
 """How often the gyro check of the two presses refuses a sound sensor, and how often it misses an ill one.
 
-Sensors with all errors of the data sheet, calibrated by the six positions or not, mounted at any angle; hands that raise
-the bike from its stand at once or after a while, that shake it and turn it about the vertical. As a program:
+Sensors with all errors of the data sheet, calibrated by the six positions or not, mounted at any angle. Hands raise the
+bike from its stand at once or after a while, shake it and turn it about the vertical. As a program:
 
-    PYTHONPATH=host_tests/support:host_tests/support/recordings python -m press_check 1000
+    OMP_NUM_THREADS=1 .venv/bin/python -m support.recordings.press_check 1000
 """
 
 import sys
