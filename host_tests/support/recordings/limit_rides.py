@@ -12,12 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from kickstand_tools.api import replay, smooth
-from kickstand_tools.calibration.poses import fit_two_positions
-from kickstand_tools.calibration.procedure import fit_procedure
-from kickstand_tools.logs.log import Log
 from kickstand_tools.simulation.physics.mount import MOUNTS as SIMULATED_MOUNTS
 from kickstand_tools.simulation.ride import ride
-from kickstand_workshop.evaluation.runs import as_log
+from kickstand_workshop.evaluation.runs import as_log, calibrated_by_log
 
 from support.recordings.drawn_rides import MOUNTS as DRAWN_MOUNTS, drawn_ride
 from support.recordings.smoothed_rides import Known, rms
@@ -68,19 +65,9 @@ def limit_ride(simulator, profile, seed, mount=None, seconds=SECONDS):
     made = ride(
         profile, seed, seconds, 1.5 * (1, -1)[seed // 2 % 2], 1.0 * (1, -1)[seed // 4 % 2], mount=mount, dive=dive
     )
-    six = fit_procedure(Log.from_readings(made.procedure, made.rate_hz, "SIX.csv")).calibration
-    two = (
-        Log.from_readings(pose, made.rate_hz, name)
-        for pose, name in ((made.kickstand, "KICKSTAND.csv"), (made.upright, "UPRIGHT.csv"))
-    )
     speed = made.truth["speed_mps"]
-    return Measured(
-        as_log(made),
-        fit_two_positions(*two, six).calibration,
-        made.truth["lean_deg"],
-        np.cumsum(speed > 0.5) > 0,
-        speed,
-    )
+    riding = np.cumsum(speed > 0.5) > 0
+    return Measured(as_log(made), calibrated_by_log(made), made.truth["lean_deg"], riding, speed)
 
 
 @dataclass
