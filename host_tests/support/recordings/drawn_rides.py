@@ -1,10 +1,10 @@
 """Rides whose road, bike, rider, mount and sensor are drawn at random, each from what is real: a second opinion.
 
-On the second simulator (other_bike.py), so that nothing is shared with kickstand_tools.simulation. The one exception are
-the sensor of the data sheet and its six positions, where a caller asks for them. Parameters of the estimators are fitted
-with even seeds only, and figures are reported of odd ones:
+On the second simulator (other_bike.py), so that nothing is shared with kickstand_tools.simulation. The one exception is
+the data sheet's sensor with its six positions, where a caller asks for it. Parameters of the estimators are fitted with
+even seeds only, and figures are reported of odd ones:
 
-    OMP_NUM_THREADS=1 .venv/bin/python -m support.recordings.drawn_rides odd 100
+    OMP_NUM_THREADS=1 PYTHONPATH=host_tests .venv/bin/python -m support.recordings.drawn_rides odd 100
 """
 
 import sys

@@ -4,7 +4,7 @@ the six positions, the upright pose 1.5 degrees off, bikes of any dive, with and
 On both simulators. Parameters are fitted with even seeds only, and figures are reported of odd ones. As a program: a
 line per simulator, profile and mount, in 20 s per ride on one processor:
 
-    OMP_NUM_THREADS=1 .venv/bin/python -m support.recordings.limit_rides odd 4
+    OMP_NUM_THREADS=1 PYTHONPATH=host_tests .venv/bin/python -m support.recordings.limit_rides odd 4
 """
 
 import sys

@@ -3,7 +3,7 @@
 Sensors with all errors of the data sheet, calibrated by the six positions or not, mounted at any angle. Hands raise the
 bike from its stand at once or after a while, shake it and turn it about the vertical. As a program:
 
-    OMP_NUM_THREADS=1 .venv/bin/python -m support.recordings.press_check 1000
+    OMP_NUM_THREADS=1 PYTHONPATH=host_tests .venv/bin/python -m support.recordings.press_check 1000
 """
 
 import sys
