@@ -56,10 +56,15 @@ class Prior:
     posed: bool
 
     @classmethod
-    def of_pose(cls, six_done: bool) -> "Prior":
-        """The prior for a sensor that was aligned by poses. six_done: its accelerometer was calibrated by six
-        positions."""
+    def of_pose(cls, six_done: bool, gyro_sigma: Array | None = None) -> "Prior":
+        """The prior for a sensor that was aligned by poses.
+
+        six_done: its accelerometer was calibrated by six positions. gyro_sigma (3, 3): standard errors that they left
+        in the gyro's scale and axes, along left, up, forward; None or zeros where the gyro was not measured.
+        """
         sigma = SIGMA.copy()
+        if gyro_sigma is not None and np.any(gyro_sigma):
+            sigma[GYRO] = np.minimum(np.hypot(gyro_sigma, GYRO_DRIFT).ravel(), sigma[GYRO])
         if not six_done:
             sigma[OFFSET], sigma[UP_SCALE] = WITHOUT_SIX_G, WITHOUT_SIX_SCALE
         return cls(MEAN, sigma, True)
