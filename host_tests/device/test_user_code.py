@@ -66,7 +66,7 @@ def test_its_pages_are_behind_the_others_and_before_alignment_in_the_menu(run):
     assert record.at(9.8)[0].startswith("My page")
     assert record.at(10.8)[0].startswith("Page two")
     assert "press" in record.at(12.9)[1] or "Not aligned" in record.at(12.9)[1]
-    presses = [*devices.PRESSES, [26, 0.15]]
+    presses = [*device_plans.PRESSES, [26, 0.15]]
     record = run(WHOLE, POSES | {"presses": presses, "turn_to": [[20, "own"]], "until": 28})
     assert record.at(25.8)[0].startswith("My page") and record.at(25.8)[1].strip().isdigit()
     assert record.at(27)[0].startswith("Page two")

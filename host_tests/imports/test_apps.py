@@ -73,7 +73,7 @@ def test_each_app_is_tried_and_described():
     assert untried == ["Kickstand"], f"add to EXPORTS above an export of each but Kickstand: {untried}"
     table = PAGE.read_text(encoding="utf-8")
     undescribed = [name for name in NAMES if f"\n| {name}" not in table]
-    assert undescribed == [], f"add a line for each to the table of apps in {README}"
+    assert undescribed == [], f"add a line for each to the table of apps in {PAGE}"
 
 
 @pytest.mark.parametrize("name", EXPORTS)

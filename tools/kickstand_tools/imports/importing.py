@@ -25,7 +25,8 @@ from .recording import AppRecording, Taken
 from .units import ACCELERATIONS, factor
 
 # Each is a module with NAME, the app's name; find_recordings(files), which returns one list of files per recording of
-# this app; and read(files, name), which returns the AppRecording of such a list (see recording.py) or raises InputError.
+# this app; and read(files, name), which returns the AppRecording of such a list (see recording.py) or raises
+# InputError.
 # If the module has ASKS, the quantities whose unit the user may give, its function is read(files, name, units). Each
 # module gets the files that no earlier module has claimed. phyphox is last, because it only looks at names of columns.
 _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)

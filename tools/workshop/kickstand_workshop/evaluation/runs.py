@@ -110,13 +110,13 @@ def calibrated_by_poses(made: SimulatedRide) -> CalibrationFile:
     return _aligned(made, fit_six_positions(seven).calibration)
 
 
-def calibrated_by_log(made: Ride) -> CalibrationFile:
+def calibrated_by_log(made: SimulatedRide) -> CalibrationFile:
     """`kickstand calibrate six` over one log of the whole procedure, as the board does it, and `two`. Raises
     InputError."""
     return _aligned(made, fit_procedure(Log.from_readings(made.procedure, made.rate_hz, "SIX.csv")).calibration)
 
 
-def _aligned(made: Ride, six: CalibrationFile) -> CalibrationFile:
+def _aligned(made: SimulatedRide, six: CalibrationFile) -> CalibrationFile:
     kickstand = Log.from_readings(made.kickstand, made.rate_hz, "KICKSTAND.csv")
     upright = Log.from_readings(made.upright, made.rate_hz, "UPRIGHT.csv")
     return fit_two_positions(kickstand, upright, six).calibration
