@@ -61,7 +61,7 @@ def test_a_new_board_gets_the_firmware_and_its_settings(line, board):
     choose(line, "BUTTON_PIN", "5")
     assert "a pin is used twice" in line.rider.text("#config")
     choose(line, "BUTTON_PIN", "fifteen")
-    assert "fifteen is no value" in line.rider.text("#fault-BUTTON_PIN")
+    assert "fifteen is not a value" in line.rider.text("#fault-BUTTON_PIN")
     choose(line, "BUTTON_PIN", "14")
     said = line.install()
     assert said.startswith("Done: Imagined Pico with RP2040, MicroPython 1.26.1.")
