@@ -22,7 +22,7 @@ from kickstand_tools.imports.importing import NAMES
 from support.recordings import app_exports
 from support.recordings.app_exports import PHONE, START_UTC_S, Riding
 
-README = Path(__file__).resolve().parents[2] / "tools" / "README.md"
+PAGE = Path(__file__).resolve().parents[2] / "tools" / "docs" / "recordings.md"
 ON_PHONE = api.CalibrationFile(vehicle_from_sensor=PHONE.T, aligned=True)
 ON_BIKE = api.CalibrationFile(aligned=True)
 ON_THE_BIKE = ("RaceBox", "VBO", "AiM")  # apps whose axes are those of the bike, not of a phone on it
@@ -71,9 +71,9 @@ EXPORTS = {
 def test_each_app_is_tried_and_described():
     untried = [name for name in NAMES if not any(key.startswith(name) for key in EXPORTS)]
     assert untried == ["Kickstand"], f"add to EXPORTS above an export of each but Kickstand: {untried}"
-    table = README.read_text(encoding="utf-8")
+    table = PAGE.read_text(encoding="utf-8")
     undescribed = [name for name in NAMES if f"\n| {name}" not in table]
-    assert undescribed == [], f"add a line for each to the table of apps in {README}"
+    assert undescribed == [], f"add a line for each to the table of apps in {PAGE}"
 
 
 @pytest.mark.parametrize("name", EXPORTS)

@@ -1,4 +1,4 @@
-"""The whole device sends its lean to a phone beside the simulated board. Decoded by the README alone."""
+"""The whole device sends its lean to a phone beside the simulated board. Decoded by firmware/docs/live.md alone."""
 
 import collections
 import itertools

@@ -1,5 +1,5 @@
 """Rides of both simulators with sloppy calibrations, with what the display shows of them. As a program: the table of
-tools/README.md, errors of the shown and of the smoothed lean."""
+tools/docs/accuracy.md, errors of the shown and of the smoothed lean."""
 
 from dataclasses import dataclass
 
