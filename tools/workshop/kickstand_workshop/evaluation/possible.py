@@ -29,6 +29,7 @@ _ORACLE = {
     "SIGMA_START": tuple(s if i < BIAS_LEFT else 1e-3 * s for i, s in enumerate(measurements.SIGMA_START)),
     "SIGMA_FRESH_BIAS": 1e-4,
     "_SIGMA_MEASURED_SPEED": 0.1,
+    "_SIGMA_SPEED_SCALE": 0.016,
     "_MEASURED_SPEED_LATE_S": 0.0,
     "_SIGMA_LEFT": 0.02,
     "NOISE_ANGLE": radians(0.12),
