@@ -29,7 +29,8 @@ UNREADABLE, CHANGED, NO_MEMORY, FAULT = "unreadable", "changed", "no-memory", "f
 NO_SPEED, MOVED, LEFT_HANDED = "no-speed", "mount-moved", "left-handed"
 # The vehicle is aligned, but brake tests or signals of this log are missing; because the disk for signals is full
 AFTERWARDS, DISK_FULL = "not-finished", "disk-full"
-_LEFT_OUT = ("cut-line", "cut-gzip", "nul-end", "frozen-readings")  # notices about parts of a log that are not used
+# Notices about parts of a log that are not used, or of a sensor that is ill
+_LEFT_OUT = ("cut-line", "cut-gzip", "nul-end", "frozen-readings", "axis-dead", "gyro-saturated", "accel-clipped")
 _SUSPECTS = (MOVED, "parts-differ", "uncertain")  # refusals of the firmware after which moves are looked for
 _PLOTTED = 160  # intervals in a picture
 _AGAINST = -0.5  # evidence.handedness() below this: the gyro or the axes are mirrored
