@@ -41,8 +41,8 @@ _STEEP = const(0.21)  # rad: pitch
 # The limits of left and up grow with the spread, the root of this mean square: half the square of the change between
 # windows. Larger: more is hidden on the roughest roads.
 _SPREAD = const(0.4)  # standard deviations, squared
-# rad: mean lean after a doubt, and a larger one that the force up confirms for a while. Larger, the first, and smaller, the second:
-# less is hidden in long bends, and on straights that are taken for bends.
+# rad: mean lean after a doubt, and a larger one that the force up confirms for a while. Larger, the first, and
+# smaller, the second: less is hidden in long bends, and on straights that are taken for bends.
 _ONE_SIDE = const(0.13)
 _SURE_LEAN = const(0.3)
 # ratio: of the mean square of the lean, above which it has been steady. Larger: as _ONE_SIDE.
