@@ -74,7 +74,7 @@ TOOL_ARROWS = {
     "checks": {"common", "signals", "refusals", "logs.cells", "logs.log", "calibration.file"},
     "calibration": {"common", "signals", "refusals", "logs"},
     "estimation": {"common", "signals", "refusals", "logs", "calibration.file"},
-    "replay": {"common", "signals", "logs", "calibration.file"},
+    "replay": {"common", "signals", "refusals", "logs", "calibration.file"},
     "imports": {"common", "signals", "logs", "checks", "estimation.first_guess"},
     "joining": {"common", "signals", "refusals", "logs", "calibration.file", "estimation", "replay"},
     "analysis": {

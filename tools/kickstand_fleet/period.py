@@ -30,7 +30,8 @@ NO_SPEED, MOVED, LEFT_HANDED = "no-speed", "mount-moved", "left-handed"
 # AFTERWARDS: the vehicle is aligned, but brake tests or signals of this log are missing. DISK_FULL: no space for
 # signals
 AFTERWARDS, DISK_FULL = "not-finished", "disk-full"
-_LEFT_OUT = ("cut-line", "cut-gzip", "nul-end", "frozen-readings")  # notices about parts of a log that are not used
+# Notices about parts of a log that are not used, or of a sensor that is ill
+_LEFT_OUT = ("cut-line", "cut-gzip", "nul-end", "frozen-readings", "axis-dead", "gyro-saturated", "accel-clipped")
 _SUSPECTS = (MOVED, "parts-differ", "uncertain")  # refusals of the firmware after which moves are searched
 _PLOTTED = 160  # intervals in a picture
 _AGAINST = -0.5  # evidence.handedness() below this, the gyro or the axes are mirrored

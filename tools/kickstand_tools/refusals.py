@@ -151,6 +151,10 @@ _OTHERS: _Table = {
     "left out, and the lean is not known there: check the sensor and its solder joints, or replace it",
     "gyro-saturated": "gyro {0} is at the end of its range {1} times, {2:.1f} s in all, first at {3:.1f} s: these "
     "readings are left out: fix the sensor firmly, or set a larger GYRO_RANGE_DPS",
+    "accel-clipped": "accelerometer {0} is at the end of its range ({1:.1f} g) in {2} samples, first at {3:.1f} s: "
+    "what it averages to is wrong there: mount the sensor more softly, or set a larger ACCEL_RANGE_G",
+    "readings-misfit": "the readings do not fit together again and again, first at {1:.0f} s, {0:.0f} s in all; the "
+    "board shows no lean there: is the sensor's mount loose, or the sensor ill?",
     "sensor-odd": "no sound gyro fits this ride: its error of scale or axes comes out at {0:.0f} standard deviations, "
     "so the smoothed lean is not certain, and its standard deviation says so: is an axis of the gyro ill?",
     "moved": "moved or knocked",

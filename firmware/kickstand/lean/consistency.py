@@ -41,8 +41,8 @@ _STEEP = const(0.21)  # rad: pitch
 # The limits of left and up grow with the spread, the root of this mean square: half the square of the change between
 # windows. Larger: more is hidden on the roughest roads.
 _SPREAD = const(0.4)  # standard deviations, squared
-# rad: mean lean after a doubt, and a larger one that the force up confirms. Larger, the first, and smaller, the second:
-# less is hidden in long bends, and on straights that are taken for bends.
+# rad: mean lean after a doubt, and a larger one that the force up confirms for a while. Larger, the first, and
+# smaller, the second: less is hidden in long bends, and on straights that are taken for bends.
 _ONE_SIDE = const(0.13)
 _SURE_LEAN = const(0.3)
 # ratio: of the mean square of the lean, above which it has been steady. Larger: as _ONE_SIDE.
@@ -93,13 +93,13 @@ class Consistency:
 
     @property
     def one_sided(self):
-        """True where it did not fit lately, and the lean has been on one side: steadily, or after a second doubt for
+        """True where it did not fit lately, and the lean has been on one side: steadily, or after a second doubt, for
         long."""
         lean = abs(self._lean)
         if not self.doubts or lean <= _ONE_SIDE:
             return False
-        steady = lean < _SURE_LEAN and lean * lean > _STEADY * self._lean_square
-        return steady or (self.doubts > 1 and self._mean_s >= _LONG_S)
+        steady, long = lean * lean > _STEADY * self._lean_square, self._mean_s >= _LONG_S
+        return (steady and (long or lean < _SURE_LEAN)) or (long and self.doubts > 1)
 
     def add(self, left, up, sideways, pitch, lean, yaw_rate, seconds):
         """Take a window of `seconds` while riding. left, up: the normalised innovations of these forces. sideways:
