@@ -1,6 +1,6 @@
-"""`kickstand web`: pages in which the firmware runs on the simulated board, from which it is put onto a real one, which
-watch and fetch what a board records, and which look at a ride.
+"""`kickstand web`: pages that run the firmware on the simulated board, install it on a real one, watch a board and
+fetch its recordings, and show a ride.
 
-page/ is what the browser gets of ours. device.py runs in it on MicroPython, the modules *_guest.py on CPython; npm/
-names both packages and what else is fetched. The other modules put the site together and serve it.
+page/ contains our files for the browser. In the browser, device.py runs on MicroPython, the modules *_guest.py on
+CPython. npm/ names both packages and the others to download. The other modules build the site and serve it.
 """
