@@ -133,7 +133,7 @@ def test_in_a_narrow_window_the_charts_stand_below_each_other(seen):
                 assert x[0] >= other_x[1] or x[1] <= other_x[0] or y[1] <= other_y[0]
 
 
-def test_what_is_not_known_is_not_drawn(seen):
+def test_unknown_values_are_not_drawn(seen):
     """As where nothing was sure enough; nor is an alignment that another mount's calibration cannot have."""
     made = replace(seen, notices=[Notice("up-off", 20.0, False)], summary=replace(seen.summary))
     made.summary.left_deg = made.summary.right_deg = made.summary.brake_g = made.summary.accel_g = Peak()

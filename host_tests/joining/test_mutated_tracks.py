@@ -22,7 +22,7 @@ def some_track():
 
 
 def flipped(content, number):
-    """Some bytes or a part of a binary file changed."""
+    """The binary content with some bytes or a part changed."""
     chance = random.Random(number)
     change = (mutations.flip_bytes, mutations.cut_end, mutations.cut_a_piece, mutations.put_nul_bytes)[number % 4]
     return change(content, chance)
