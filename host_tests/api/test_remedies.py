@@ -1,4 +1,4 @@
-"""What to do about a refusal, said by others than the command in their own words."""
+"""The remedy of a refusal in the words of other programs than the command."""
 
 import pickle
 

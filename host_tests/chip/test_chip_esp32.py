@@ -1,4 +1,4 @@
-"""Features of the emulated ESP32, and tests that need a separate board. Tests on both chips are in test_chip_device.py."""
+"""Features of the emulated ESP32, and tests that need a separate board. Tests for both chips: test_chip_device.py."""
 
 import math
 import re

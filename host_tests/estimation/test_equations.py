@@ -1,4 +1,4 @@
-"""The process model and the measurement model, against motions whose readings follow from geometry."""
+"""The process model and the measurement model, compared with motions whose readings follow from geometry."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def found(rate, force, states=(), parameters=(), speed=np.nan, warm=0.0):
 
 @pytest.mark.parametrize("lean", [-0.9, 0.0, 0.6])
 @pytest.mark.parametrize("yaw_rate", [-0.4, 0.5])
-def test_a_steady_turn_stays_as_it_is(lean, yaw_rate):
+def test_steady_turn_is_constant(lean, yaw_rate):
     """Nicolae's (22) and (23): the force of a turn at any lean, balanced or not."""
     speed, s, c = 17.0, np.sin(lean), np.cos(lean)
     across = speed * yaw_rate / G
@@ -37,7 +37,7 @@ def test_a_steady_turn_stays_as_it_is(lean, yaw_rate):
 
 @pytest.mark.parametrize("braking", [0.0, -0.5])
 @pytest.mark.parametrize("pitch", [-0.1, 0.0, 0.15])
-def test_at_rest_on_a_slope_and_braking_on_it(pitch, braking):
+def test_rest_and_braking_on_a_slope_fit_the_model(pitch, braking):
     lean = 0.2
     force = np.array([np.cos(pitch) * np.sin(lean), np.cos(pitch) * np.cos(lean), np.sin(pitch)])
     level = np.array([-np.sin(lean) * np.sin(pitch), -np.cos(lean) * np.sin(pitch), np.cos(pitch)])
@@ -47,7 +47,7 @@ def test_at_rest_on_a_slope_and_braking_on_it(pitch, braking):
 
 
 @pytest.mark.parametrize("lean", [-0.5, 0.0, 0.8])
-def test_a_sensor_above_the_roll_axis_moves_while_the_wheels_do_not_slide(lean):
+def test_sensor_above_the_roll_axis_moves_with_the_roll(lean):
     """It is 0.6 m above it and 0.7 m in front of the rear wheel, while the bike rolls and turns."""
     height, ahead, speed, roll, yaw = 0.6, 0.7, 15.0, 1.2, -0.3
     s, c = np.sin(lean), np.cos(lean)
@@ -69,7 +69,7 @@ def test_a_sensor_above_the_roll_axis_moves_while_the_wheels_do_not_slide(lean):
         (0.0, 0.5, {of.CAMBER: 0.01}),
     ],
 )
-def test_a_balanced_bike_has_a_force_to_the_side_by(force, lean, parameters):
+def test_balanced_bike_has_the_modelled_side_force(force, lean, parameters):
     assert abs(found([0.0] * 3, [force, 1.2, 0.0], {LEAN: lean}, parameters)[eq.BALANCED]) < 5e-5
 
 
@@ -96,7 +96,7 @@ def test_the_jacobian_is_that_of_the_equations():
 
 
 def test_the_upright_pose_determines_the_sum_of_rotation_and_offset():
-    """A sensor whose offset the pose has taken for a tilt is right at rest, whatever the offset."""
+    """If the pose has treated a sensor's offset as a tilt, the reading at rest is right for any offset."""
     prior, p = Prior.of_pose(six_done=False), np.zeros(PARAMETERS)
     p[of.ROTATION.stop - 1] = p[of.OFFSET.start] = 0.03  # to the side
     p[of.ROTATION.start], p[of.OFFSET.stop - 1] = 0.02, -0.02  # forward
@@ -109,7 +109,7 @@ def test_the_upright_pose_determines_the_sum_of_rotation_and_offset():
     assert np.all(np.linalg.eigvalsh(information) > 0.0)
 
 
-def test_windows_hold_the_integrals_and_gaps_are_windows_of_their_own():
+def test_windows_hold_integrals_and_gaps_are_own_windows():
     rng = np.random.default_rng(2)
     t = np.cumsum(rng.uniform(0.005, 0.015, 300))
     t[150:] += 5.0

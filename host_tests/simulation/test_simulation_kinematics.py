@@ -105,7 +105,7 @@ def test_the_moments_about_the_contact_point_balance():
     assert np.arctan2(right, up) == pytest.approx(b)
 
 
-def test_hanging_off_to_the_inside_spares_lean():
+def test_hanging_off_to_the_inside_reduces_the_lean():
     hung, k = held_turn(30.0, Bike(), hang_m=0.04)
     plain, _ = held_turn(30.0, Bike())
     assert 3.0 < np.degrees(plain.lean[k] - hung.lean[k]) < 5.0
