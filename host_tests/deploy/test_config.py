@@ -1,11 +1,9 @@
 """The rider's own config.py: the one that is flashed, and how host and board name a mistake in it."""
 
-import command
-import fake_board
-import mpy
 import pytest
 from kickstand_tools.common import errors, firmware_path
 from kickstand_tools.simulated_board.fakes import chips
+from support import command, fake_board, mpy
 
 
 @pytest.fixture

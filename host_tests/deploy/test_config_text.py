@@ -26,7 +26,7 @@ def settings_of(text):
     return {name: value for name, value in made.items() if name.isupper()}
 
 
-def test_each_setting_of_the_firmware_s_own_file_can_be_set_and_unset():
+def test_each_setting_can_be_set_and_unset():
     text = (firmware_path.PACKAGE.parent / "config.py").read_text()
     names = re.findall(r"(?m)^# ([A-Z_0-9]+) = ", text)
     assert len(names) > 30 and config_text.values(text) == {}

@@ -95,7 +95,7 @@ def test_the_jacobian_is_that_of_the_equations():
         assert np.allclose(derivative, (after - before) / 2e-5, rtol=1e-4, atol=1e-4), row
 
 
-def test_the_upright_pose_determines_the_sum_of_rotation_and_offset():
+def test_upright_pose_determines_rotation_plus_offset():
     """If the pose has treated a sensor's offset as a tilt, the reading at rest is right for any offset."""
     prior, p = Prior.of_pose(six_done=False), np.zeros(PARAMETERS)
     p[of.ROTATION.stop - 1] = p[of.OFFSET.start] = 0.03  # to the side

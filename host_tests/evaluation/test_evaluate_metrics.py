@@ -60,7 +60,7 @@ def test_lag_is_found_between_samples(late_ms):
     assert lag_ms(lean(TIME - late_ms / 1000.0) + noise, lean(TIME), RATE) == pytest.approx(late_ms, abs=1.0)
 
 
-def test_what_happens_before_setting_off_does_not_count():
+def test_time_before_setting_off_does_not_count():
     true = truth()
     shown = true["lean_deg"] + np.where(TIME < 4.9, 60.0, 0.0)
     assert score(shown, true, RATE).worst_deg == 0.0

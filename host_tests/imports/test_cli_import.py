@@ -2,13 +2,13 @@
 
 import json
 
-import app_exports
-import command
 import numpy as np
 import pytest
-from app_exports import riding
 from kickstand_tools import api
 from kickstand_tools.imports import importing
+from support import command
+from support.recordings import app_exports
+from support.recordings.app_exports import riding
 
 
 def test_import_reports_its_choices_and_the_next_step(tmp_path):

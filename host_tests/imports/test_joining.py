@@ -1,13 +1,13 @@
 """Sensors with different rates on one clock: no values across a gap, or if one of them is missing."""
 
-import app_exports
-import command
 import numpy as np
 import pytest
-from app_exports import riding
 from kickstand_tools import api
 from kickstand_tools.imports.join import join, on_clock
 from kickstand_tools.imports.recording import Recording, Sensor, Track
+from support import command
+from support.recordings import app_exports
+from support.recordings.app_exports import riding
 
 MS = 10**6
 

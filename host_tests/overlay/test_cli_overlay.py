@@ -4,22 +4,22 @@ import os
 import subprocess
 from typing import Any
 
-import analysis_rides
-import command
 import numpy as np
 import pytest
 from kickstand_tools import api
+from support import command
+from support.recordings import analysis_rides
 
 pytest.importorskip("imageio_ffmpeg")
 pytest.importorskip("PIL")
 
-import gopro
 import imageio_ffmpeg
 from kickstand_tools.overlay.gauge import Gauge
 from kickstand_tools.overlay.gpmf import telemetry
 from kickstand_tools.overlay.overlay import MARGIN
 from kickstand_tools.overlay.shown import shown
 from kickstand_tools.overlay.video import open_video
+from support.recordings import gopro
 
 
 @pytest.fixture(scope="module")
@@ -199,7 +199,7 @@ def test_gopro_readings_are_in_deg_s_on_the_videos_time(tmp_path):
     assert telemetry(open_video(gopro.film(tmp_path / "plain.mp4", 1.0))) is None
 
 
-def test_live_shows_what_the_display_showed(tmp_path, ride):
+def test_live_option_shows_the_displayed_lean(tmp_path, ride):
     """At the first lean the two differ: the display did not have the later readings."""
     for more in ((), ("--live",)):
         part = "--from", 6, "--to", 9, "--height", 240

@@ -31,7 +31,7 @@ def test_the_profile_has_the_standards_density():
         assert np.mean(displacement * (waves[near] / 0.1) ** 2) == pytest.approx(road.CLASS_B, rel=0.25)
 
 
-def test_an_ordinary_road_at_90_shakes_with_peaks_of_0_3_to_0_5_g():
+def test_ordinary_road_at_90_has_peaks_of_0_3_to_0_5_g():
     heave = over(25.0, road.CLASS_B).heave / STANDARD_GRAVITY
     assert 0.3 < np.percentile(np.abs(heave), 99.9) < 0.6
 

@@ -3,15 +3,14 @@
 import re
 import types
 
-import command
-import fake_board
 import pytest
-from fake_board import FakeBoard
 from kickstand_tools.deploy import firmware_files
 from kickstand_tools.deploy.bytecode import PICO
-from raw_prompt import RawPrompt
-from rider import Rider
-from serial_line import SerialLine
+from support import command, fake_board
+from support.fake_board import FakeBoard
+from support.web.raw_prompt import RawPrompt
+from support.web.rider import Rider
+from support.web.serial_line import SerialLine
 
 FIRMWARE = firmware_files.contents(PICO)
 
@@ -98,7 +97,7 @@ def test_each_board_has_its_own_default_pins(line, board):
     assert "no pin of the chip" in line.rider.text("#fault-BUTTON_PIN")
 
 
-def test_a_config_that_is_more_than_settings_is_left_to_the_rider(line, board):
+def test_config_with_more_than_settings_stays_with_the_rider(line, board):
     own = b"import sys\nRECORD = sys.platform == 'rp2'\n"
     board.path("config.py").write_bytes(own)
     line.plug_in(RawPrompt(board))

@@ -6,15 +6,15 @@ import json
 import types
 
 import pytest
-import ride_writer
-from fake_board import FakeBoard
-from kept import recorded, saved
 from kickstand.rides import ride_paths
 from kickstand_tools.deploy import connection
 from kickstand_tools.rides.pull import pull
-from raw_prompt import RawPrompt
-from rider import LAPTOP, MISSING, PHONE, Rider
-from serial_line import SerialLine
+from support.fake_board import FakeBoard
+from support.recordings import ride_writer
+from support.web.raw_prompt import RawPrompt
+from support.web.rider import LAPTOP, MISSING, PHONE, Rider
+from support.web.saved_by_page import recorded, saved
+from support.web.serial_line import SerialLine
 
 PLAYED = """async () => {
   const player = new (await import("./live/player.mjs")).Player();
@@ -233,7 +233,7 @@ def test_line_continues_after_a_disturbed_byte(line):
     assert line.rider.page.evaluate(script) == [[1, 2], True]
 
 
-def test_a_board_without_the_firmware_is_told_of_the_page_install(line, rider, board):
+def test_board_without_firmware_is_sent_to_page_install(line, rider, board):
     line.plug_in(RawPrompt(board))
     rider.page.click("#pull")
     rider.page.wait_for_selector("#pull:enabled:visible")

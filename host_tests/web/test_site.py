@@ -15,11 +15,12 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from command import refused, works
 from kickstand_tools.common import firmware_path
 from kickstand_tools.deploy.firmware_files import firmware_files
 from kickstand_tools.web import archives, npm_packages, serve, site
+from kickstand_tools.web.documents import documents
 from kickstand_workshop.bench import pages
+from support.command import refused, works
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = [path.lstrip("/") for path in firmware_files()]
@@ -102,7 +103,9 @@ def test_every_page_leads_home(files, monkeypatch):
     made = site.site_files()
     assert made["service_worker.js"] != files["service_worker.js"]
     pages = {name: data.decode() for name, data in made.items() if name.endswith(".html")}
-    assert all('<h1><a href="./">' in text and text.count(f'href="{home}"') == 1 for text in pages.values())
+    for name, text in pages.items():
+        to_the_first = "../" if name.startswith(documents.FOLDER) else "./"
+        assert f'<h1><a href="{to_the_first}">' in text and text.count(f'href="{home}"') == 1, name
     assert f'href="{home}/issues/new/choose"' in pages["install.html"]
     assert home not in "".join(data.decode() for name, data in files.items() if name.endswith(".html"))
 
@@ -112,17 +115,17 @@ def test_every_file_is_kept_for_offline_use(files):
     listed = re.search(r"const FILES = (\[.*?\]);", worker)
     assert listed
     large = "esptool/", "firmware.zip", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip", "sample/"
-    later = {name for name in files if name.startswith(large)}
+    later = {name for name in files if name.startswith((*large, documents.FOLDER))}
     assert set(json.loads(listed[1])) == {"./", *files} - {"service_worker.js", "index.html"} - later
     assert "{{" not in worker
 
 
 def test_site_is_small(files):
-    first = [data for name, data in files.items() if not name.startswith(site.LATER)]
+    first = [data for name, data in files.items() if not name.startswith((*site.LATER, documents.FOLDER))]
     assert sum(len(gzip.compress(data)) for data in first) < 1_000_000
 
 
-def test_a_browser_without_serial_ports_offers_the_firmware_itself(files):
+def test_browser_without_serial_ports_offers_the_firmware(files):
     """As a folder that mpremote copies."""
     archive = zipfile.ZipFile(io.BytesIO(files["firmware.zip"]))
     there = {name.removeprefix("kickstand-firmware/"): archive.read(name) for name in archive.namelist()}
@@ -204,7 +207,7 @@ def test_existing_file_is_not_overwritten_by_the_site(files, tmp_path):
 def test_every_page_has_a_policy_and_charts_no_rights(files):
     """Only the site's own scripts run. A framed page has access neither to it nor to its stored data."""
     pages = {name: data.decode() for name, data in files.items() if name.endswith(".html")}
-    assert len(pages) == 4
+    assert len(pages) == 4 + len(documents.PATHS) + 1
     for name, text in pages.items():
         policy = re.findall('<meta http-equiv="Content-Security-Policy" content="([^"]+)">', text)[0]
         assert policy.startswith("default-src 'none'; base-uri 'none'; form-action 'none'; script-src 'self'"), name

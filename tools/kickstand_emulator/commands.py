@@ -8,7 +8,7 @@ CHIP = click.option(
     "--chip",
     type=click.Choice(["rp2040", "esp32"]),
     default="rp2040",
-    help="rp2040, a Pico, or esp32: it needs QEMU's library, see tools/README.md.",
+    help="rp2040, a Pico, or esp32: it needs QEMU's library, see tools/docs/simulation.md.",
 )
 
 

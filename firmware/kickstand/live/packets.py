@@ -1,4 +1,4 @@
-"""What goes to a phone, as bytes, and what a phone may ask for. The same tables are in firmware/README.md.
+"""What goes to a phone, as bytes, and what a phone may ask for. The same tables are in firmware/docs/live.md.
 
 Whatever is not known is never sent as a number that could pass for one: RaceChrono gets no packet then, our own page
 UNKNOWN.

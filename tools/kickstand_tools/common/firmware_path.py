@@ -33,6 +33,11 @@ def config() -> Path:
     return own if installed() and own.is_file() else directory() / "config.py"
 
 
+def documents() -> Path:
+    """The directory that holds README.md and the folders of the other documents, as in a checkout."""
+    return TOOLS / "kickstand_tools" / "documents" if installed() else TOOLS.parent
+
+
 def search_path() -> str:
     """The search path with which another Python process can import the firmware and these tools."""
     return os.pathsep.join((str(TOOLS), str(PACKAGE.parent)))
