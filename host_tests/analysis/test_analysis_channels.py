@@ -32,7 +32,7 @@ def test_smoothed_ride_differs_only_in_its_lean(ride, course):
 
 
 def test_maxima_are_those_of_the_display(ride):
-    """Block by block, in whatever blocks."""
+    """For any division into blocks."""
     log = reader.read_log(ride.log)
     engine = replay_engine.Replay(ride.calibration.to_firmware())
     for row in log.rows():

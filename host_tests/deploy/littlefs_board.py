@@ -13,7 +13,7 @@ from littlefs.errors import LittleFSError
 from support import fake_board
 
 BLOCK = 4096
-# Bytes: what is programmed at once, and the cache, as MicroPython's ports mount it.
+# Bytes programmed at once, and size of the cache, as MicroPython's ports mount it.
 PORTS = {"rp2": (256, 1024), "esp32": (32, 128)}
 
 

@@ -81,7 +81,7 @@ def test_mistake_in_config_is_refused_before_copying(slip, board, config):
     config.write_text(text)
     words = f"{config}, line {line}: {reason}" if line else f"{config}: {reason}"
     command.refused(board.root, "flash", "--config", words=words)
-    assert board.resets == 1  # what was there before runs on
+    assert board.resets == 1  # the earlier program runs again
 
 
 def test_a_new_board_gets_no_faulty_config_either(board, config):

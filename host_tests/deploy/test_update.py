@@ -75,7 +75,7 @@ def fresh(port="rp2", ending=".mpy") -> Any:
 def test_flat_modules_of_old_versions_are_removed(plugged, ending):
     board = plugged(fresh())
     board.put(before("flat " + ending) | NOTES | {"/kickstand/lean/old/older.py": b"pass", "/kickstand/own/a.txt": b""})
-    board.system.makedirs("/kickstand/errors")  # it would be imported in place of errors.mpy
+    board.system.makedirs("/kickstand/errors")  # it would be imported instead of errors.mpy
     result = command.works("flash")
     expected = wanted(".mpy") | NOTES | {"/kickstand/own/a.txt": b"", "/config.py": before("flat .py")["/config.py"]}
     assert board.files() == expected
@@ -180,7 +180,7 @@ def test_reported_free_space_is_enough(plugged, port, ending, which):
     assert advice in result.err
     assert result.err.count("\n") == 1
     assert board.files() == files
-    assert board.resets == 1  # what was on it goes on
+    assert board.resets == 1  # the earlier program runs again
 
     board.fill("/rides/000/01/00001.rid", blocks)
     command.works("flash")
@@ -198,7 +198,7 @@ def on_board(files, free_blocks=0):
 
 @pytest.mark.parametrize("which", ["flat .mpy", "flat .py", "nested .mpy", "nested .py"])
 def test_a_board_full_of_rides_has_room_for_an_update(which):
-    """The ring of rides leaves RESERVE free: compiled firmware never has to wait for rides to be pulled."""
+    """The ring of rides leaves RESERVE free: compiled firmware never requires rides to be pulled first."""
     board = on_board(before(which))
     assert needed_blocks(plan(wanted(".mpy"), board, True), board) * BLOCK <= flash_ring.RESERVE
 

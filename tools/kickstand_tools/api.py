@@ -59,5 +59,5 @@ from .web.site import site_files as site_files, write_site as write_site
 
 SimulatedRide, simulate_ride = _simulation.Ride, _simulation.ride
 
-# All of the above: without it pydoc leaves out what is imported
+# All names above: without it pydoc leaves out imported names
 __all__ = [name for name in dir() if not name.startswith("_")]  # pyright: ignore[reportUnsupportedDunderAll]

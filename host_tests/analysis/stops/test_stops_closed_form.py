@@ -147,12 +147,12 @@ class TestStandstill:
         right = self.disturbed(9.0, 9.0)
         assert right == pytest.approx(5.0, rel=0.002)
         assert self.disturbed(2.56, 4.0) == pytest.approx(right, rel=1e-4)
-        # in between it is taken for the slope: 0.1 g for 1 of 2 s, 0.49 m/s2
+        # in between it counts as slope: 0.1 g for 1 of 2 s, 0.49 m/s2
         assert self.disturbed(0.5, 1.5) == pytest.approx(right + 0.49, rel=0.02)
         assert self.disturbed(1.5, 2.5) == pytest.approx(right + 0.49, rel=0.02)
 
     def test_rebound_of_the_fork_is_not_part_of_the_slope(self):
-        """Zero in the mean, so that it changes no speed, but only in the first half second."""
+        """Its mean is zero, so it changes no speed, and it is only in the first half second."""
         road = braking(20.0, 5.0)
         ride = road.channels()
         after = road.t_s - 18.0
@@ -233,7 +233,7 @@ def test_deviation_from_the_straight_line_is_right():
 
 
 def test_each_stop_begins_after_the_previous_standstill():
-    """Its initial speed and start are its own, in whatever order of hardness."""
+    """Its initial speed and start are its own, for any order of hard and soft stops."""
     legs = []
     for mps, mps2 in (20.0, 6.0), (12.0, 3.0), (25.0, 8.0):
         legs += [(3.0, 0.0), (mps / 4.0, 4.0), (3.0, 0.0), (mps / mps2, -mps2), (3.0, 0.0)]

@@ -116,7 +116,7 @@ class _Ended(BaseException):
 
 @contextlib.contextmanager
 def _ended_by_signals() -> Iterator[None]:
-    """A context in which kill and a closed terminal raise _Ended, so that no temporary file is left."""
+    """A context in which kill and a closed terminal raise _Ended: then no temporary file is left."""
 
     def end(number: int, _frame: object) -> None:
         raise _Ended(number)

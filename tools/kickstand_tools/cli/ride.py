@@ -346,7 +346,7 @@ def _overview(source: Path, calibration: Path | None, live: bool, **stretch: flo
 
 
 def _inputs(source: Path) -> list[Path]:
-    """The files that writing must not destroy: the source, or what is in it."""
+    """The files that writing must not destroy: the source or its content."""
     return sorted(source.rglob("*")) if source.is_dir() else [source]
 
 
@@ -395,7 +395,7 @@ def _joined_lines(joined: Joined) -> Iterator[str]:
         "track's first point"
     )
     yield f"match: correlation {found.correlation:.2f} over {found.common_s / 60.0:.1f} minutes"
-    if abs(found.drift) * found.common_s > 3.0 * found.sigma_s:  # less is not known from a ride of this length
+    if abs(found.drift) * found.common_s > 3.0 * found.sigma_s:  # a smaller drift is uncertain
         yield f"the ride's clock is {abs(found.drift) * 1e6:.0f} ppm {'slow' if found.drift > 0.0 else 'fast'}"
     if joined.own_speed:
         yield "the log's own speed is kept"

@@ -45,7 +45,7 @@ class Installation:
         self._path = firmware_path.config()
         self._template = self._path.read_text(encoding="utf-8")
         for module in [module for module in sys.modules if module.startswith("kickstand.")]:
-            del sys.modules[module]  # of a board before: the firmware asks what it runs on as it is imported
+            del sys.modules[module]  # of an earlier board: the firmware identifies its board on import
         settings, self._by_hand, self._own = {}, None, None
         found = others.find(there, lambda path: _judged(path, *self._pose), True)
         own = None if CONFIG in found.moves else there.texts.get(CONFIG)

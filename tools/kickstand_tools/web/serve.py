@@ -13,7 +13,7 @@ from urllib.parse import unquote, urlsplit
 
 HOST = "127.0.0.1"
 MOST, PATIENCE_S = 64, 10.0  # most connections at a time; longest wait for a browser's data
-FULL_S = 1.0  # a new connection waits for so long for another to end, then the oldest is ended; a silent one at once
+FULL_S = 1.0  # wait of a new connection for a free place; then the oldest is ended, a silent one at once
 PORT = 8377  # always the same, because the browser keeps files by address
 # Defined here, because the registry of Windows may have others, and then a browser does not run modules
 TYPES = {

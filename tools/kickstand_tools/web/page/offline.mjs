@@ -7,7 +7,7 @@ let registered = null;
  */
 export async function keepOffline() {
   if (!navigator.serviceWorker || !isSecureContext) return false;
-  registered = navigator.serviceWorker.register("./service_worker.js").catch(() => null); // a browser may be set to keep nothing
+  registered = navigator.serviceWorker.register("./service_worker.js").catch(() => null); // the settings may forbid it
   if (!(await registered)) return false;
   await navigator.serviceWorker.ready;
   return true;
