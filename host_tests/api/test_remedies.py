@@ -1,4 +1,4 @@
-"""What to do about a refusal, said by others than the command in their own words."""
+"""The remedy of a refusal in the words of other programs than the command."""
 
 import pickle
 
@@ -25,7 +25,7 @@ OTHERS = {name: f"<{name}>" for name in COMMANDS} | {"name_units": "<{0}>", "oth
         ),
     ],
 )
-def test_a_refusal_says_what_to_do_in_the_words_that_are_given(error, command, other):
+def test_refusal_gives_the_remedy_in_the_given_words(error, command, other):
     for one in (error, pickle.loads(pickle.dumps(error))):
         assert str(one).endswith(command)
         assert one.said(OTHERS).endswith(other)
@@ -39,7 +39,7 @@ def test_notices_too():
     assert "exchanged: <--side right>" in refusals.sentence(Notice("forward-exchanged", False, "left", 0.0), OTHERS)
 
 
-def test_a_calibration_that_is_none_is_refused_so(tmp_path):
+def test_invalid_calibration_is_refused_in_the_given_words(tmp_path):
     path = tmp_path / "A.cal.json"
     path.write_text("[]")
     with pytest.raises(InputError) as caught:

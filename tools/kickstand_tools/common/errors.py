@@ -9,7 +9,7 @@ DISTRIBUTION = "kickstand-lean"  # as in pyproject.toml; the package "kickstand"
 
 
 class InputError(Exception):
-    """Something that the user has given cannot be used. Its text is one line: what is wrong, and what to do.
+    """Input from the user that cannot be used. The text is one line: the fault, and what to do.
 
     what: what is wrong, and what to do about it if the command line and the pages say that in the same words. If not,
     remedy: the name in remedies.py of what to do, and values: what is put into its words for {0}, {1} ...

@@ -1,4 +1,4 @@
-"""The packages whose tests are judged by mutants: the code of each, and the tests that ought to notice its changes."""
+"""The packages whose tests are judged by mutants: the code of each, and the tests that should notice its changes."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -7,8 +7,8 @@ UNTESTABLE = ("_viper.py", "_guest.py")  # they run on a board or on MicroPython
 
 
 class Package(NamedTuple):
-    """sources: patterns of files, from the project's root. tests: patterns in host_tests, in the order in which they
-    run, so those that notice most in least time first; before them all those of the same name as the code."""
+    """sources: patterns of files, from the project's root. tests: patterns in host_tests, in running order: the fastest
+    and most sensitive first. Tests of the same name as the code run before them."""
 
     sources: tuple[str, ...]
     tests: tuple[str, ...]
