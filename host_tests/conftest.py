@@ -49,7 +49,13 @@ bytecode.cross_compiled = _compiled_once  # before a module of the tools or a te
 ROOT = Path(__file__).resolve().parent.parent
 # What differs between machines: fixtures, markers, and modules whose programs, boards and pages depend on what is there
 ASKED_FOR = {"chromium", "files", "shared_data"}
-OF_THE_MACHINE = ("subprocess", "emulated", "kickstand_tools.deploy", "kickstand_emulator", "kickstand_tools.web")
+OF_THE_MACHINE = (
+    "subprocess",
+    "support.emulated",
+    "kickstand_tools.deploy",
+    "kickstand_emulator",
+    "kickstand_tools.web",
+)
 
 
 def pytest_configure(config: pytest.Config) -> None:

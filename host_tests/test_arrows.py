@@ -45,6 +45,7 @@ ARROWS = {
         "settings",
     },
     "app": {"board", "imu", "calibration", "lean", "drive_alignment", "speed", "rides", "ui", "devices"},
+    "state": set(),
     "user_code": set(),
     "start": {"board", "devices", "settings"},
     "__init__": {"status_report"},
@@ -54,7 +55,7 @@ LATE = {
     "settings": {"setting_table"},  # it is unloaded again
     "errors": {"console"},  # report() prints a refusal in words
     "status_report": {"rides"},  # is its machine code used?
-    "app": {"user_code"},
+    "app": {"state", "user_code"},
     "devices": {"diagnosis"},  # why no sensor answers
     "start": {"app", "console", "ui.messages", "live"},  # the display says "starting" meanwhile
 }

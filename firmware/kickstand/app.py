@@ -1,11 +1,12 @@
 """The device: wires sensor, mathematics, button, flash and display, and owns the loop.
 
 sensor -> calibration and alignment -> lean -> page -> display, in one direction. The chip samples at SAMPLE_HZ by
-itself, and one pass of the loop ("a turn", App.turn()) takes the samples that have come in.
+itself, and one pass of the loop ("a turn", App.turn()) takes the samples that have come in. App.step() is a turn with
+what belongs to its time: garbage collection, watchdog, and the wait for the next one.
 
-The methods that last for most of a turn (turn, _pass_on, LeanMeter.update_sum, Sensor.fetch) need at most eleven words
-for locals and stack. MicroPython puts a larger frame on the heap. Freeing it moves the start of the allocator's next
-search back, in front of all garbage since the last collection: up to 1 ms a turn.
+The methods that last for most of a turn (step, turn, _pass_on, LeanMeter.update_sum, Sensor.fetch) need at most eleven
+words for locals and stack. MicroPython puts a larger frame on the heap. Freeing it moves the start of the allocator's
+next search back, in front of all garbage since the last collection: up to 1 ms a turn.
 """
 
 import gc
@@ -101,7 +102,9 @@ class App:
     def run(self):
         """Loop until Ctrl-C, LOOP_US a turn. Whatever ends it, the display then says so: it must not keep a lean."""
         try:
-            self._loop()
+            self.begin()
+            while True:
+                self.step()
         except BaseException as error:
             if isinstance(error, KeyboardInterrupt):
                 # It is not fed from here on. This comes first, because a second Ctrl-C may interrupt the rest.
@@ -117,42 +120,56 @@ class App:
                     self.live.stop()
             raise
 
-    def _loop(self):
+    def begin(self):
+        """Prepare the loop: read the SD card, start the watchdog. Then call step() again and again."""
         if self.rides.on_card:
             self.lcd.show("SD card", "is being read")
             self.lcd.flush()
             self.rides.try_out_card()
-        watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
+        self._watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
         gc.threshold(-1)
-        due_us = ticks_us()
-        turns = self._turns_to_collect()
-        while True:
-            self.turn()
-            turns -= 1
-            if turns <= 0:  # here, not in the middle of a sample: the FIFO keeps the samples meanwhile
-                gc.collect()
-                fill_gaps(SINGLE_GAPS)
-                turns = self._turns_to_collect()
-                if self.user:
-                    self.user.check_memory()
-            if watchdog:
-                watchdog.feed()
-            due_us = ticks_add(due_us, LOOP_US)
-            wait_us = ticks_diff(due_us, ticks_us())
-            if wait_us < self._least_wait_us:
-                self._least_wait_us = wait_us
-            if wait_us > 0:
-                sleep_us(wait_us)
-            else:  # late, as after writing to flash: count from here instead of racing to catch up
-                due_us = ticks_us()
+        self._due_us = ticks_us()
+        self._turns_left = self._turns_to_collect()
+
+    def step(self):
+        """One pass of the loop, LOOP_US long: turn(), collect garbage if it is time, feed the watchdog, wait."""
+        self.turn()
+        self._turns_left -= 1
+        if self._turns_left <= 0:  # here, not in the middle of a sample: the FIFO keeps the samples meanwhile
+            gc.collect()
+            fill_gaps(SINGLE_GAPS)
+            self._turns_left = self._turns_to_collect()
+            if self.user:
+                self.user.check_memory()
+        if self._watchdog:
+            self._watchdog.feed()
+        self._due_us = ticks_add(self._due_us, LOOP_US)
+        wait_us = ticks_diff(self._due_us, ticks_us())
+        if wait_us < self._least_wait_us:
+            self._least_wait_us = wait_us
+        if wait_us > 0:
+            sleep_us(wait_us)
+        else:  # late, as after writing to flash: count from here instead of racing to catch up
+            self._due_us = ticks_us()
+
+    @property
+    def trusted(self):
+        """True if there is a lean that may be shown."""
+        return self.settings.leans and self.sensor.fault is None and self.screen.pages.trusted
+
+    def state(self):
+        """What the app shows and knows, as data: see state.py."""
+        from .state import state  # only for programs that ask
+
+        return state(self)
 
     def _turns_to_collect(self):
         few = self.drive or self.lcd.draws or self.live or self.user
         return port.turns_to_collect(_COLLECT_TURNS_DRIVING if few else _COLLECT_TURNS)
 
     def turn(self):
-        """One pass of the loop: process the samples in the FIFO and one press, and do at most one transfer to the
-        display. It waits for nothing."""
+        """Process the samples in the FIFO and one press, and do at most one transfer to the display. It waits for
+        nothing."""
         now_us, now_ms = ticks_us(), ticks_ms()
         n = self.sensor.fetch(now_ms)
         if self.sensor.clipped:
@@ -219,7 +236,7 @@ class App:
             report(axes.notice)
             problem, axes.notice = problem or axes.notice, None
         if self.user:
-            self.user.lean(self.settings.leans and self.sensor.fault is None and self.screen.pages.trusted)
+            self.user.lean(self.trusted)
             problem = problem or self.user.take_problem()
         if problem:
             self.screen.notify(problem, now_ms)

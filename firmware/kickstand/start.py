@@ -41,8 +41,9 @@ def _held(button):
     return button.held()
 
 
-def main():
-    """Run until Ctrl-C, power-off or a reset."""
+def main(loop=None):
+    """Run until Ctrl-C, power-off or a reset. loop: called with the App in place of App.run(), for a simulation that
+    calls App.begin() and App.step() later."""
     lcd = None
     try:
         chosen = settings.load()
@@ -52,7 +53,7 @@ def main():
             _show(lcd, "Safe mode", "Ready for USB")
             return
         lcd.show("Kickstand", "starting")  # replaces a lean shown before a reset
-        run(chosen, lcd)
+        run(chosen, lcd, loop)
     except SettingsError as error:
         port.rest_watchdog()  # it may be running: the app may find wrong pins only when it opens them
         from .console import sentence
@@ -99,8 +100,9 @@ def _attach(opened, app):
         raise
 
 
-def run(chosen, lcd):
-    """Run the app. An exception in it is reported on display and console, then the board restarts."""
+def run(chosen, lcd, loop=None):
+    """Run the app, or call loop with it: see main(). An exception in it is reported on display and console, then the
+    board restarts."""
     radio = []
     try:
         # First, because an ESP32-C3 may crash when its radio is switched on after 40 KB are allocated
@@ -119,7 +121,7 @@ def run(chosen, lcd):
             problem = problem or _live(_attach, radio, app)
             if problem:
                 app.screen.notify(problem, ticks_ms())
-        app.run()
+        (loop or App.run)(app)
     except SettingsError:
         raise
     except ImportError as error:  # an interrupted update: a restart would not help

@@ -4,8 +4,6 @@ it is known how far off it is."""
 import dataclasses
 import re
 
-import analysis_rides
-import command
 import numpy as np
 import pytest
 from kickstand.errors import Notice
@@ -16,6 +14,8 @@ from kickstand_tools.analysis.report import angles
 from kickstand_tools.api import Log, fit_drive, fit_two_positions, open_ride, overview, simulate_ride, vehicle_channels
 from kickstand_tools.signals import rotation_matrix
 from kickstand_tools.simulation.scripted import script
+from support import command
+from support.recordings import analysis_rides
 
 NONE = np.zeros(1)
 # "up" leans to the right of the bike's own; "forward" points up; "forward" points to the right

@@ -2,7 +2,6 @@
 
 from dataclasses import fields
 
-import analysis_rides
 import numpy as np
 import pytest
 from kickstand_tools.analysis.channels import Channels, downsampled, joined
@@ -10,6 +9,7 @@ from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.summary import Summary
 from kickstand_tools.logs import reader
 from kickstand_tools.replay import replay_engine
+from support.recordings import analysis_rides
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,6 @@ import itertools
 from dataclasses import replace
 from pathlib import Path
 
-import analysis_rides
 import numpy as np
 import pytest
 from kickstand.errors import Notice
@@ -17,6 +16,7 @@ from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.summary import Peak
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.simulation.scripted import script
+from support.recordings import analysis_rides
 
 pytest.importorskip("matplotlib")
 pytest.importorskip("plotly")

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-import analysis_rides
-import command
 import numpy as np
 import pytest
+from support import command
+from support.recordings import analysis_rides
 
 pandas = pytest.importorskip("pandas")
 pytest.importorskip("pyarrow")

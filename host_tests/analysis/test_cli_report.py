@@ -5,8 +5,6 @@ import json
 import re
 import struct
 
-import analysis_rides
-import command
 import pytest
 from kickstand_tools.analysis import report
 from kickstand_tools.analysis.overview import overview
@@ -15,6 +13,8 @@ from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.summary import Peak
 from kickstand_tools.simulation.scripted import script
 from rich.console import Console
+from support import command
+from support.recordings import analysis_rides
 
 pytest.importorskip("matplotlib")
 pytest.importorskip("plotly")

@@ -8,8 +8,6 @@ import time
 from dataclasses import fields
 from pathlib import Path
 
-import analysis_rides
-import command
 import numpy as np
 import pytest
 from kickstand_tools.analysis.channels import Channels
@@ -19,6 +17,8 @@ from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.log import Log
+from support import command
+from support.recordings import analysis_rides
 
 EVENING_S = 1_700_000_000.0  # 22:13:20 UTC on 14/11/2023
 VALUES = {

@@ -5,8 +5,6 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-import app_exports
-import command
 import numpy as np
 import pytest
 from kickstand_tools import api
@@ -14,6 +12,8 @@ from kickstand_tools.analysis.channels import downsampled
 from kickstand_tools.analysis.export import export_gpx
 from kickstand_tools.analysis.track import Track
 from kickstand_tools.logs.csv_lines import write_log
+from support import command
+from support.recordings import app_exports
 
 gpxpy = pytest.importorskip("gpxpy")
 pandas = pytest.importorskip("pandas")

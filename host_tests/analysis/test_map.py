@@ -6,13 +6,13 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-import app_exports
 import numpy as np
 import pytest
 from kickstand_tools import api
 from kickstand_tools.analysis.overview import Overview, overview
 from kickstand_tools.analysis.plot import page, track_map
 from kickstand_tools.analysis.summary import Peak
+from support.recordings import app_exports
 
 pytest.importorskip("plotly")
 EARTH_M = 6_371_000.0

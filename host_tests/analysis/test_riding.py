@@ -1,7 +1,5 @@
 """How long a ride was ridden, and a log that holds too little of one."""
 
-import analysis_rides
-import command
 import numpy as np
 import pytest
 from kickstand_tools.analysis import report
@@ -10,6 +8,8 @@ from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log, Stretch
 from kickstand_tools.logs.reader import read_log
+from support import command
+from support.recordings import analysis_rides
 
 
 def standing(seconds, shake_g, shake_dps, speed_mps=np.nan, bias_dps=0.0):

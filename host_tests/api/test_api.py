@@ -8,11 +8,11 @@ import pydoc
 import re
 import sys
 
-import command
 import numpy as np
 import pytest
 from kickstand_tools import api
 from kickstand_tools.simulation.files import simulate
+from support import command
 
 FUNCTIONS = [name for name, public in vars(api).items() if inspect.isfunction(public)]
 

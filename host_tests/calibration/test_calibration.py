@@ -1,6 +1,5 @@
 """Counts to g, the pose capture, the six-position fit."""
 
-import engines
 import numpy as np
 import pytest
 from kickstand.calibration import six_position
@@ -8,6 +7,7 @@ from kickstand.calibration.parameters import Calibration, six_position_calibrati
 from kickstand.errors import CalibrationError
 from numpy.testing import assert_allclose
 from numpy.typing import ArrayLike
+from support import engines
 from test_rotation import random_rotation
 
 AXES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)

@@ -3,10 +3,10 @@
 import json
 import shutil
 
-import command
 import numpy as np
 import pytest
 from kickstand_tools.calibration.file import read_calibration
+from support import command
 from test_calibration import tipped
 from test_rotation import random_rotation
 

@@ -4,13 +4,13 @@ import json
 import os
 from array import array
 
-import command
 import numpy as np
 import pytest
 from kickstand.calibration.transform import Transform
 from kickstand_tools.calibration.file import CalibrationFile, read_calibration, write_calibration
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.replay.replay_engine import ReplayMeter
+from support import command
 
 I = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]  # noqa: E741 - its name
 

@@ -1,10 +1,10 @@
 """Vectors and matrices against numpy, on both engines."""
 
-import engines
 import numpy as np
 import pytest
 from kickstand import rotation
 from numpy.testing import assert_allclose
+from support import engines
 
 FLOAT32 = {"rtol": 0, "atol": 1e-6}
 

@@ -12,7 +12,7 @@ from kickstand_tools.logs.log import Log
 from kickstand_tools.refusals import RefusedInput
 from kickstand_tools.simulation import hands, poses
 from kickstand_tools.simulation.physics.chip import Chip
-from mpy import run_mpy
+from support.mpy import run_mpy
 
 HZ = 200.0
 DIAGONAL = np.eye(3, dtype=bool)

@@ -2,13 +2,13 @@
 
 import itertools
 
-import engines
 import numpy as np
 import pytest
 from kickstand.calibration.parameters import Calibration
 from kickstand.calibration.two_position import align
 from kickstand.errors import AlignmentError
 from numpy.testing import assert_allclose
+from support import engines
 from test_rotation import random_rotation
 
 

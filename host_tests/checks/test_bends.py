@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from checked import cells_of, simulated, words
-from drawn_rides import drawn_ride
 from kickstand_tools.checks.bends import bends
 from kickstand_tools.checks.handedness import handedness
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.simulation.profiles import PROFILES
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
+from support.recordings.drawn_rides import drawn_ride
 
 
 def judged(log, scale=1.0):

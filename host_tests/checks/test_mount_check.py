@@ -4,8 +4,6 @@ import json
 import re
 from dataclasses import replace
 
-import analysis_rides
-import command
 import numpy as np
 import pytest
 from checked import cells_of, made_up, simulated, words
@@ -21,6 +19,8 @@ from kickstand_tools.signals import rotation_matrix
 from kickstand_tools.simulation.profiles import PROFILES
 from kickstand_tools.simulation.scripted import script
 from kickstand_workshop.evaluation.runs import calibrated_by_poses
+from support import command
+from support.recordings import analysis_rides
 
 G = 9.80665
 

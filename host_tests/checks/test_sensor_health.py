@@ -8,7 +8,7 @@ from kickstand_tools.api import Log, replay, smooth
 from kickstand_tools.checks.sensor import NAMES, SensorHealth
 from kickstand_tools.refusals import sentence
 from kickstand_tools.signals import rotation_matrix
-from smoothed_rides import rms, simulated
+from support.recordings.smoothed_rides import rms, simulated
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 import functools
 
-import driving_runs
 import numpy as np
 import pytest
 from checked import cells_of, simulated, words
@@ -13,6 +12,7 @@ from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.simulation.profiles import PROFILES
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
+from support import driving_runs
 
 MOUNT = random_mounting(3)
 

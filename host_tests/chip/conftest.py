@@ -5,8 +5,8 @@ import os
 import traceback
 
 import pytest
-from emulated import CHIPS, calibrated, firmware, leaning, modules, pico
 from kickstand_tools.simulated_board.lcd import shown_lean
+from support.emulated import CHIPS, calibrated, firmware, leaning, modules, pico
 
 COPIED = {"riding", "at_prompt"}
 

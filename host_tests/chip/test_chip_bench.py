@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from emulated import pico
+from support.emulated import pico
 
 pytestmark = pytest.mark.chip
 

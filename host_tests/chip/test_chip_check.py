@@ -1,11 +1,11 @@
 """`kickstand check` on the emulated boards: nothing on a good one, and each of many planted defects by its name."""
 
 import pytest
-from checked_board import part
-from emulated import CHIPS, modules
 from kickstand_tools.deploy import check
 from kickstand_tools.simulated_board.mpu6050 import Fifo
 from kickstand_tools.simulated_board.other_devices import Ds3231
+from support.checked_board import part
+from support.emulated import CHIPS, modules
 
 pytestmark = [pytest.mark.chip, pytest.mark.nightly, pytest.mark.long]
 REST = part(4, share=0.3)

@@ -4,9 +4,9 @@ import os
 import subprocess
 import sys
 
-import emulated
 import pytest
-from emulated import pico
+from support import emulated
+from support.emulated import pico
 
 pytestmark = pytest.mark.chip
 
@@ -58,7 +58,7 @@ def test_quicker_division_is_rp2040pys_own():
 _WHEELS_OWN = """
 import sys, kickstand_emulator
 del sys.meta_path[0]
-import emulated
+from support import emulated
 print(emulated.begun(0.003))
 """
 

@@ -5,11 +5,11 @@ import re
 from typing import Any
 
 import pytest
-from emulated import CHIPS, calibrated, firmware, leaning, reset_in_a_read, shows
 from kickstand_tools.simulated_board.lcd import shown_lean
 from kickstand_tools.simulation.scripted.script import Ride, kickstand, upright
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 from kickstand_workshop.bench.sample_count import SampleCount
+from support.emulated import CHIPS, calibrated, firmware, leaning, reset_in_a_read, shows
 
 pytestmark = pytest.mark.chip
 

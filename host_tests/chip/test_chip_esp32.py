@@ -5,14 +5,14 @@ in test_chip_device.py.
 import math
 import re
 
-import device_runs
 import pytest
-from emulated import PART, calibrated, esp32, firmware, leaning, modules, shows
 from kickstand.calibration.store import Store
 from kickstand.rides.block import BLOCK
 from kickstand.rides.flash_ring import PART_BLOCKS
 from kickstand.rides.ride_paths import part_path
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, wait
+from support import device_runs
+from support.emulated import PART, calibrated, esp32, firmware, leaning, modules, shows
 from test_chip_recorder import FEED, rides
 
 pytestmark = [pytest.mark.chip, pytest.mark.esp32]

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from emulated import PART, esp32, modules, pico
 from kickstand_tools.common import unix_port
 from kickstand_tools.deploy import bytecode
 from kickstand_tools.replay import replay_engine
 from kickstand_tools.rides import block_reader
 from kickstand_tools.simulated_board.gps import sentence
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn
+from support.emulated import PART, esp32, modules, pico
 
 pytestmark = pytest.mark.chip
 

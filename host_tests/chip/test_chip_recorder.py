@@ -6,17 +6,16 @@ import signal
 from itertools import pairwise
 from typing import Any
 
-import command
-import emulated_port
 import numpy as np
 import pytest
-from emulated import CHIPS, PART, calibrated, firmware
 from kickstand_tools.calibration.file import read_calibration
 from kickstand_tools.logs.reader import read_blocks, read_log
 from kickstand_tools.replay import replay_engine
 from kickstand_tools.rides import block_reader, ride_log
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, wait
 from kickstand_workshop.bench.sample_count import SampleCount
+from support import command, emulated_port
+from support.emulated import CHIPS, PART, calibrated, firmware
 from test_chip_power_cut import torn
 
 pytestmark = pytest.mark.chip

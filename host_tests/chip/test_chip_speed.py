@@ -4,7 +4,7 @@ import json
 from typing import Any
 
 import pytest
-from emulated import CHIPS, modules
+from support.emulated import CHIPS, modules
 
 pytestmark = pytest.mark.chip
 

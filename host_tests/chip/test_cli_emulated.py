@@ -12,13 +12,13 @@ import types
 from pathlib import Path
 from typing import Any
 
-import command
 import pytest
-from emulated import CHIPS, calibrated, firmware, need
 from kickstand_emulator import esp32_library, image
 from kickstand_tools.deploy import bytecode, connection
 from mpremote import transport_serial
-from terminal import Terminal
+from support import command
+from support.emulated import CHIPS, calibrated, firmware, need
+from support.terminal import Terminal
 
 pytestmark = pytest.mark.chip
 

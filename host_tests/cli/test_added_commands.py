@@ -3,9 +3,9 @@
 import subprocess
 import sys
 
-import command
 import pytest
 from kickstand_tools.cli import main
+from support import command
 
 LAPS = '''
 import click

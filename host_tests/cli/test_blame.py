@@ -7,11 +7,11 @@ import sys
 import time
 import zipfile
 
-import command
 import pytest
 from kickstand_tools.cli import main
 from kickstand_tools.common.errors import InputError, printable
 from kickstand_tools.common.output import check_output, whole_file
+from support import command
 
 needs_links = pytest.mark.skipif(os.name == "nt", reason="needs symbolic links and /dev")
 

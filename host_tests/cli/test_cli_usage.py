@@ -5,10 +5,10 @@ import subprocess
 import sys
 
 import click
-import command
 import pytest
 from kickstand_tools.cli.common import TIME
 from kickstand_tools.logs import reader
+from support import command
 
 MISTAKES = {
     "fly": "No such command 'fly'",

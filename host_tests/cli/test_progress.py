@@ -2,12 +2,12 @@
 
 import contextlib
 
-import command
 import pytest
 from kickstand_tools.common import output, progress
 from kickstand_workshop import commands
 from kickstand_workshop.evaluation import runs
-from watched import Watched, watched
+from support import command
+from support.watched_stderr import Watched, watched
 
 
 @pytest.mark.parametrize(("patience_s", "seen"), [(0.0, True), (9.0, False)])

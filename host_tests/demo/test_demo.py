@@ -9,12 +9,12 @@ import sys
 import time
 
 import pytest
-from command import run
 from kickstand_tools.common import unix_port
 from kickstand_tools.demo.demo import DeviceStopped, demo
 from kickstand_tools.demo.device_process import Device
 from kickstand_tools.simulated_board.lcd import shown_lean
-from terminal import Terminal
+from support.command import run
+from support.terminal import Terminal
 
 HUNG_S = 300  # only a process that hangs takes as long, whatever else the machine does
 

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import fake_board
 from kickstand_tools.deploy import bytecode
 from littlefs import LittleFS, UserContext
 from littlefs.errors import LittleFSError
+from support import fake_board
 
 BLOCK = 4096
 # Bytes: what is programmed at once, and the cache, as MicroPython's ports mount it.

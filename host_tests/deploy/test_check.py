@@ -2,14 +2,14 @@
 
 import contextlib
 
-import command
 import pytest
-from checked_board import CheckedBoard, part
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.deploy import check, check_limits
 from kickstand_tools.simulated_board.i2c import OPEN
 from kickstand_tools.simulated_board.mpu6050 import FIFO_COUNTH, FIFO_COUNTL, PWR_MGMT_1, Fifo
 from kickstand_tools.simulated_board.other_devices import Ds3231, Registers
+from support import command
+from support.checked_board import CheckedBoard, part
 
 PWR_MGMT_2 = 0x6C
 REST = part(4, share=0.3)

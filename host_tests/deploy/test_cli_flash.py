@@ -7,13 +7,12 @@ import re
 import sys
 import types
 
-import command
-import fake_board
 import pytest
 import serial
 from kickstand_tools.deploy import bytecode, connection, firmware_files
 from mpremote import transport_serial
 from serial.tools import list_ports
+from support import command, fake_board
 
 PICO = fake_board.PICO_PORT
 ESP32 = types.SimpleNamespace(device="/dev/ttyUSB0", vid=0x10C4, pid=0xEA60)

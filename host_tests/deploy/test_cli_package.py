@@ -13,6 +13,7 @@ import pytest
 from kickstand_tools.common import firmware_path
 from kickstand_tools.common.errors import extra
 from kickstand_tools.deploy import firmware_files
+from kickstand_tools.web.documents import documents
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -54,6 +55,8 @@ def test_the_wheel_carries_the_firmware(tmp_path):
     web = firmware_path.TOOLS / "kickstand_tools" / "web"
     pages = [path for name in ("npm", "page") for path in (web / name).rglob("*") if path.is_file()]
     assert {f"kickstand_tools/web/{path.relative_to(web).as_posix()}" for path in pages} <= names
+    texts = [*documents.PATHS, *(f"tools/pictures/{path.name}" for path in (ROOT / "tools" / "pictures").iterdir())]
+    assert {f"kickstand_tools/documents/{path}" for path in texts} <= names
     packages = {"kickstand", "kickstand_tools", "kickstand_fleet", "kickstand_emulator"}
     assert {name.split("/")[0] for name in names} == packages | {"kickstand_lean-0.4.0.dist-info"}
     assert "fleet = kickstand_fleet." in commands and "emulate = kickstand_emulator." in commands
@@ -63,7 +66,7 @@ def test_the_wheel_carries_the_firmware(tmp_path):
 
 def test_an_installation_stays_that_of_the_checkout():
     """Without -e `flash --config` would copy a config.py that the rider has never edited."""
-    pages = [*ROOT.glob("*.md"), *ROOT.glob("*/README.md"), ROOT / ".github" / "CONTRIBUTING.md"]
+    pages = [path for found in ("*.md", "*/README.md", "*/docs/*.md", ".github/*.md") for path in ROOT.glob(found)]
     text = "\n".join(path.read_text(encoding="utf-8") for path in pages)
     lines = re.findall(r"pip install\b(?! esptool).*", text) + [extra("rides")]
     assert len(lines) >= 4

@@ -1,11 +1,9 @@
 """A config.py of the rider's own: which one is flashed, and how the host and the board name a slip in it."""
 
-import command
-import fake_board
-import mpy
 import pytest
 from kickstand_tools.common import errors, firmware_path
 from kickstand_tools.simulated_board.fakes import chips
+from support import command, fake_board, mpy
 
 
 @pytest.fixture

@@ -6,13 +6,12 @@ import threading
 import types
 from pathlib import Path
 
-import emulated_port
-import fake_board
 import pytest
-from emulated import CHIPS
 from kickstand_tools.deploy import firmware_files
 from mpremote import mip
 from mpremote.transport_serial import SerialTransport
+from support import emulated_port, fake_board
+from support.emulated import CHIPS
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -56,7 +55,7 @@ def test_mip_installs_from_a_local_server(package, tmp_path):
 @pytest.mark.nightly  # 500 kB through the console
 @pytest.mark.chip
 def test_what_mip_has_installed_starts_on_the_emulated_pico(package, monkeypatch):
-    """With main.py and config.py beside it, as firmware/README.md says."""
+    """With main.py and config.py beside it, as firmware/docs/settings.md says."""
     with CHIPS["pico"]() as device:
         emulated_port.plug_in(monkeypatch, device)
         device.run(1.0)

@@ -3,15 +3,13 @@
 import binascii
 import contextlib
 
-import command
-import fake_board
-import mutations
 import pytest
-import ride_writer
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.deploy import connection
 from kickstand_tools.rides.block_reader import BadBlock, parse, read
 from mpremote.transport import TransportError
+from support import command, fake_board
+from support.recordings import broken_logs, ride_writer
 
 NONSENSE = {
     "nothing": b"",
@@ -89,7 +87,7 @@ def test_nonsense_is_one_line_and_writes_nothing(tmp_path, plug_in, name, conten
 def test_a_mutated_answer_is_one_line(tmp_path, plug_in, name):
     good = b"('/rides', 'motorcycle')\n(1, 0, 700, '/rides/000/01/00000.rid')\n('micropython', '1.26.1', 'Pico')\n"
     for number in range(30):
-        plug_in(Nonsense(tmp_path / "flash", mutations.broken([good], number)[1], number % 3))
+        plug_in(Nonsense(tmp_path / "flash", broken_logs.broken([good], number)[1], number % 3))
         one_line(command.run(*COMMANDS[name]))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["flash", "out"]
 
@@ -162,11 +160,11 @@ def test_a_mutated_ride_gives_blocks_or_problems():
     blocks = ride_writer.blocks(6, ride=1)[0]
     content = b"".join(blocks)
     for number in range(150):
-        mutated = mutations.broken([content], number)[1]
+        mutated = broken_logs.broken([content], number)[1]
         found, problems = read(mutated)
         assert found or problems or not mutated
         with contextlib.suppress(BadBlock):
-            parse(mutations.broken([blocks[0]], number)[1])
+            parse(broken_logs.broken([blocks[0]], number)[1])
 
 
 def test_what_an_answer_may_be():

@@ -2,11 +2,10 @@
 
 import sys
 
-import command
-import fake_board
 import pytest
 from kickstand_tools.common import firmware_path
 from kickstand_tools.deploy import others
+from support import command, fake_board
 
 WEATHER = b"# my weather station\nimport machine\nwhile True: pass\n"
 WIFI = b'SSID = "home"\nPASSWORD = "secret"\n'

@@ -12,9 +12,9 @@ import tempfile
 import tomllib
 from pathlib import Path
 
-import devices
 import pytest
 from kickstand_tools.deploy import bytecode, firmware_files
+from support import device_plans
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
@@ -126,7 +126,7 @@ def test_a_device_on_an_esp32(tmp_path):
     """Its pins, and its number for a device that does not answer, which is not the Pico's."""
     faults = [["unplug_sensor", [2.0, 1.0]], ["unplug_lcd", [4.0, 0.5]]]
     plan = {"lean": [[0, 25]], "board": {"machine": "esp32"}, "faults": faults, "until": 6}
-    record = devices.run("cpython", tmp_path, plan)
+    record = device_plans.run("cpython", tmp_path, plan)
     assert record.at(1.9)[0].startswith("Raw   25°")
     assert record.first("No sensor", 2.0) < 2.5
     assert record.at(3.6)[0].startswith("Raw   25°")

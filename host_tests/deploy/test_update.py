@@ -5,8 +5,6 @@ import hashlib
 from pathlib import PurePosixPath
 from typing import Any
 
-import command
-import fake_board
 import pytest
 from kickstand.rides import flash_ring
 from kickstand_tools.common.errors import InputError
@@ -14,6 +12,7 @@ from kickstand_tools.deploy import bytecode, firmware_files, flash, others, upda
 from kickstand_tools.deploy.board_files import BoardFiles, fingerprint, survey
 from kickstand_tools.deploy.update import needed_blocks, plan, refuse_without_room
 from littlefs_board import BLOCK, PORTS, LittlefsBoard
+from support import command, fake_board
 
 # The modules of version 0.2.0, all in one folder.
 FLAT = """

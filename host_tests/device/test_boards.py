@@ -2,11 +2,10 @@
 
 import sys
 
-import device_runs
-import devices
 import pytest
 from kickstand_tools.simulated_board.fakes import chips
 from kickstand_tools.simulated_board.simulator import Board
+from support import device_plans, device_runs
 
 PINS = {"SENSOR_SDA": 4, "SENSOR_SCL": 5, "LCD_SDA": 6, "LCD_SCL": 7, "BUTTON_PIN": 10}
 WIRED = {"sensor_pins": [4, 5], "lcd_pins": [6, 7], "button_pin": 10}
@@ -36,7 +35,7 @@ ESP32_PINS = [4, 18, 19, 21, 22]
 def test_it_measures(machine, board, config, touched, tmp_path):
     """With the board's usual pins or others, either driver of an ESP32, one bus or two. It touches no other pin."""
     plan = {"lean": LEANING, "board": {"machine": machine, **board}, "config": config, "until": 3}
-    record = devices.run("cpython", tmp_path, plan)
+    record = device_plans.run("cpython", tmp_path, plan)
     assert record.last[0].startswith("Raw   25°")
     assert not record.too_fast
     assert touched in (None, record.touched)
@@ -46,7 +45,7 @@ def test_it_measures(machine, board, config, touched, tmp_path):
 def test_a_board_without_usual_pins_touches_none(machine, tmp_path, capsys):
     """It names what is missing, in safe mode too: the button is held at power-on."""
     plan = {"board": {"machine": machine, **WIRED}, "presses": [[0, 2]], "until": 3}
-    record = devices.run("cpython", tmp_path, plan, capsys)
+    record = device_plans.run("cpython", tmp_path, plan, capsys)
     assert record.ends == ["returned"]
     assert record.touched == []
     names = "BUTTON_PIN, SENSOR_SDA, SENSOR_SCL, LCD_SDA, LCD_SCL"
@@ -64,7 +63,7 @@ def test_a_board_without_usual_pins_touches_none(machine, tmp_path, capsys):
 )
 def test_the_refusal_is_shown_where_the_display_s_pins_are_set(config, lines, tmp_path):
     config = {"LCD_SDA": 6, "LCD_SCL": 7, **config}
-    record = devices.run("cpython", tmp_path, {"board": {"machine": "c3", **WIRED}, "config": config, "until": 3})
+    record = device_plans.run("cpython", tmp_path, {"board": {"machine": "c3", **WIRED}, "config": config, "until": 3})
     assert list(record.last) == lines
     assert record.touched == [6, 7]
 
@@ -83,7 +82,9 @@ def test_a_classic_esp32_keeps_its_flash_and_its_console(machine, name, pin, tmp
     config = {**(CARD if name == "SD_CS" else {}), **({"SPEED": "wheel"} if name == "WHEEL_PIN" else {}), name: pin}
     if name == "GPS_TX":
         config = {**SPEED, **config}
-    record = devices.run("cpython", tmp_path, {"board": {"machine": machine}, "config": config, "until": 3}, capsys)
+    record = device_plans.run(
+        "cpython", tmp_path, {"board": {"machine": machine}, "config": config, "until": 3}, capsys
+    )
     assert record.ends == ["returned"]
     assert record.last == ("config.py: wrong", f"{name:16}")
     assert f"{name} = {pin}, but it must be a number from 0 to 48, no pin of the chip's own" in record.console
@@ -93,11 +94,11 @@ def test_a_classic_esp32_keeps_its_flash_and_its_console(machine, name, pin, tmp
 def test_a_board_with_psram_has_no_usual_pins_for_a_gps_receiver(tmp_path, capsys):
     """Its PSRAM takes them. So config.py has to name others, and the display says so."""
     plan = {"lean": LEANING, "board": {"machine": "esp32 spiram"}, "config": {"SPEED": "gps"}, "until": 3}
-    record = devices.run("cpython", tmp_path, plan, capsys)
+    record = device_plans.run("cpython", tmp_path, plan, capsys)
     assert record.ends == ["returned"]
     assert record.last == ("config.py: set  ", "GPS_TX          ")
     assert "set GPS_TX, GPS_RX" in record.console
-    record = devices.run("cpython", tmp_path, {**plan, "config": SPEED})
+    record = device_plans.run("cpython", tmp_path, {**plan, "config": SPEED})
     assert record.last[0].startswith("Raw   25°")
 
 
@@ -112,7 +113,7 @@ def test_a_display_with_wrong_pins_leaves_the_usual_and_all_others_alone(
     machine, config, wrong, touched, tmp_path, capsys
 ):
     plan = {"board": {"machine": machine, **WIRED}, "config": {**config, **wrong}, "until": 3}
-    record = devices.run("cpython", tmp_path, plan, capsys)
+    record = device_plans.run("cpython", tmp_path, plan, capsys)
     assert record.ends == ["returned"]
     assert "Kickstand stopped. config.py: LCD_S" in record.console
     assert set(record.touched) <= touched
@@ -124,7 +125,7 @@ def test_a_bus_that_stalls_never_stops_the_loop_of_an_esp32(driver, tmp_path):
     faults = [["timeout_for", [SENSOR, 3.0, 1.0]], ["timeout_for", [LCD, 6.0, 0.05]], ["stuck_sda", [7.0]]]
     board = {"machine": "esp32", "i2c_driver": driver}
     plan = {"lean": [[0, 25], [6, 30]], "board": board, "faults": faults, "until": 9}
-    record = devices.run("cpython", tmp_path, plan)
+    record = device_plans.run("cpython", tmp_path, plan)
     assert record.ends == ["off"]
     assert record.first("No sensor|Sensor lost", 3.0) < 3.3
     assert record.first("Raw   25°", 3.5) < 4.8
@@ -137,7 +138,7 @@ def test_a_device_that_hangs_on_an_esp32_is_freed(bits, tmp_path):
     """SoftI2C does not notice that SDA is held. Its own clocks free the device, or what it reads is not believed."""
     faults = [["stuck_sda", [3.0, bits]], ["stuck_sda", [3.0, bits, True]]]
     plan = {"lean": [[0, 25], [3.2, 35]], "board": {"machine": "esp32"}, "faults": faults, "until": 5}
-    record = devices.run("cpython", tmp_path, plan)
+    record = device_plans.run("cpython", tmp_path, plan)
     assert record.ends == ["off"]
     assert record.first("Raw   3[1-5]°", 3.2) < 4.0
     shown = {int(line[5:8]) for t_s, line, _ in record.frames if t_s > 1.0 and line.startswith("Raw")}

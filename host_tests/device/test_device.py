@@ -4,20 +4,19 @@ cannot go wrong."""
 import math
 import re
 
-import devices
-import engines
 import pytest
-from devices import ALIGNED, LEFT_S, PRESSES, RIDE, RIGHT_S, STRAIGHT_S
 from kickstand.calibration.store import Store
 from kickstand_tools.common import firmware_path
 from kickstand_tools.simulation.scripted import sensor_errors
+from support import device_plans, engines
+from support.device_plans import ALIGNED, LEFT_S, PRESSES, RIDE, RIGHT_S, STRAIGHT_S
 
 
 @pytest.mark.parametrize(("engine", "seed"), [("cpython", None), ("micropython", 3)])
 def test_press_press_ride(engine, seed, tmp_path):
     """seed None is a perfect part mounted straight; 3 has the data sheet's errors and any mounting, here not
     calibrated."""
-    record = devices.run(engine, tmp_path, {**ALIGNED, "seed": seed})
+    record = device_plans.run(engine, tmp_path, {**ALIGNED, "seed": seed})
     assert record.at(1.9)[0].startswith("Raw")
     assert record.first("On stand: press") < 2.5
     assert record.at(6)[0] == "Now upright:    "
@@ -38,8 +37,8 @@ def test_press_press_ride(engine, seed, tmp_path):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_the_calibration_outlives_the_power(engine, tmp_path):
-    devices.align(tmp_path)
-    again = devices.run(engine, tmp_path, {"lean": [[0, 25]], "until": 3})
+    device_plans.align(tmp_path)
+    again = device_plans.run(engine, tmp_path, {"lean": [[0, 25]], "until": 3})
     assert again.lean_at(2.5) == 25
     assert again.first("Lean +25") < 1.5  # the first reading after power-on
     assert again.first("Not aligned") == math.inf
@@ -47,7 +46,7 @@ def test_the_calibration_outlives_the_power(engine, tmp_path):
 
 def test_a_kickstand_on_the_right(tmp_path):
     ride = [["kickstand", 8.0, 12.0], *RIDE[1:]]
-    record = devices.run("cpython", tmp_path, {**ALIGNED, "ride": ride, "config": {"SIDE": "right"}})
+    record = device_plans.run("cpython", tmp_path, {**ALIGNED, "ride": ride, "config": {"SIDE": "right"}})
     assert record.lean_at(LEFT_S) == pytest.approx(-30, abs=2)
     assert record.lean_at(RIGHT_S) == pytest.approx(40, abs=2)
 
@@ -57,7 +56,7 @@ def test_a_kickstand_on_the_right(tmp_path):
     [([[0, -3], [8, 0]], "Tilt only 3.0°"), ([[0, -65], [8, 0]], "Tilt 65°: over"), ([[0, 0]], "Same pose twice")],
 )
 def test_poses_that_do_not_serve_are_refused_and_asked_for_again(lean, complaint, tmp_path):
-    record = devices.run(
+    record = device_plans.run(
         "cpython", tmp_path, {"lean": lean, "presses": [[2, 0.15], [9, 0.15], [14, 0.15]], "until": 16}
     )
     assert record.at(13.5)[0].startswith(complaint)
@@ -67,7 +66,7 @@ def test_poses_that_do_not_serve_are_refused_and_asked_for_again(lean, complaint
 
 def test_a_knock_during_the_pose(tmp_path):
     lean = [[0, -12], [4, -20], [4.1, -12], [16, 0]]
-    record = devices.run(
+    record = device_plans.run(
         "cpython", tmp_path, {"lean": lean, "presses": [[2, 0.15], [9, 0.15], [17, 0.15]], "until": 24}
     )
     assert record.at(7)[0].startswith("Moved!")
@@ -76,10 +75,12 @@ def test_a_knock_during_the_pose(tmp_path):
 
 
 def test_a_refused_alignment_leaves_the_old_one(tmp_path):
-    devices.align(tmp_path)
+    device_plans.align(tmp_path)
     files = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     menu_align = [[2, 1.2], [4, 1.2], [6, 0.15], [11, 0.15]]
-    record = devices.run("cpython", tmp_path, {"lean": [[0, 20]], "presses": [*menu_align, [17, 1.2]], "until": 20})
+    record = device_plans.run(
+        "cpython", tmp_path, {"lean": [[0, 20]], "presses": [*menu_align, [17, 1.2]], "until": 20}
+    )
     assert record.at(16)[0].startswith("Same pose twice")
     assert record.lean_at(19.5) == 20  # with the old alignment
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == files
@@ -93,7 +94,7 @@ def test_pages_and_menu(tmp_path):
     short = [*turns_s, *(menu_s + after_s for after_s in (2, 3, 7.5, 11, 12, 13, 19))]
     long = [menu_s + after_s for after_s in (0, 4, 9, 14)]
     presses = [*PRESSES, *([t_s, 0.15] for t_s in short), *([t_s, 1.2] for t_s in long)]
-    record = devices.run("cpython", tmp_path, {**ALIGNED, "presses": presses, "until": menu_s + 21})
+    record = device_plans.run("cpython", tmp_path, {**ALIGNED, "presses": presses, "until": menu_s + 21})
 
     def shows(page):
         return record.at(45.7 + ring.index(page))
@@ -129,18 +130,18 @@ def six_positions(free, repeat=False):
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
 def test_six_positions_then_alignment_of_a_part_with_errors(engine, tmp_path):
     """The main job end to end: calibrated by both wizards, the lean is right, errors of the part and all."""
-    record = devices.run(engine, tmp_path, {**six_positions([0.5, 0.6, -0.7]), "seed": 3})
+    record = device_plans.run(engine, tmp_path, {**six_positions([0.5, 0.6, -0.7]), "seed": 3})
     assert record.first("any of the six") < math.inf
     assert record.first(r"Side \+x done") < 12
     assert record.first("Saved, err") < math.inf
-    ride = devices.run(engine, tmp_path, {**ALIGNED, "seed": 3})
+    ride = device_plans.run(engine, tmp_path, {**ALIGNED, "seed": 3})
     assert ride.first("Aligned! +12.0°") < math.inf
     for t_s, lean in ((LEFT_S, -30), (RIGHT_S, 40), (STRAIGHT_S, 0)):
         assert ride.lean_at(t_s) == pytest.approx(lean, abs=2.5)
 
 
 def test_the_six_positions_calibrate_the_gyro_too(tmp_path):
-    devices.run("cpython", tmp_path, {**six_positions([0.5, 0.6, -0.7]), "seed": 3})
+    device_plans.run("cpython", tmp_path, {**six_positions([0.5, 0.6, -0.7]), "seed": 3})
     gyro = sensor_errors.Sensor(seed=3).gyro_scale
     stored = Store(0x68, 8, str(tmp_path)).load()
     assert [stored.gyro_matrix[i] for i in (0, 4, 8)] == pytest.approx([1 / scale for scale in gyro], abs=0.004)
@@ -153,7 +154,7 @@ def test_a_quick_turn_is_complained_of_and_another_pose_asked_for(tmp_path):
     steps = plan["poses"]
     for i in range(2, len(steps) - 1, 2):
         steps[i][0] = steps[i + 1][0] - 0.15
-    record = devices.run("cpython", tmp_path, {**plan, "seed": 3})
+    record = device_plans.run("cpython", tmp_path, {**plan, "seed": 3})
     assert record.first("Turned too fast") < 20
     assert record.first("turn it slower") < 20
     assert record.first("Slant it again") < math.inf
@@ -183,7 +184,7 @@ def ill(monkeypatch, change):
 )
 def test_the_six_positions_refuse_an_ill_gyro(tmp_path, monkeypatch, capsys, change, words):
     ill(monkeypatch, change)
-    record = devices.run("cpython", tmp_path, {**six_positions([0.5, 0.6, -0.7]), "seed": 3}, capsys)
+    record = device_plans.run("cpython", tmp_path, {**six_positions([0.5, 0.6, -0.7]), "seed": 3}, capsys)
     assert record.first(words) < math.inf
     assert "another sensor" in record.console or "dead" in record.console
     assert list(tmp_path.iterdir()) == []
@@ -200,14 +201,14 @@ def test_the_two_presses_refuse_a_gyro_that_is_ill(tmp_path, monkeypatch, capsys
         return tuple(values)
 
     monkeypatch.setattr(sensor_errors.Sensor, "read", changed)
-    record = devices.run("cpython", tmp_path, {**ALIGNED, "until": 18}, capsys)
+    record = device_plans.run("cpython", tmp_path, {**ALIGNED, "until": 18}, capsys)
     assert (record.first("Aligned!") < math.inf) == aligned
     assert (record.first("Tilt 12°, gyro") == math.inf) == aligned
     assert ("not aligned: between the poses are 12.0 degrees" in record.console) != aligned
 
 
 def test_six_positions_says_what_it_wants(tmp_path):
-    record = devices.run("cpython", tmp_path, {**six_positions([0.1, 0.1, 1.0], repeat=True), "seed": 3})
+    record = device_plans.run("cpython", tmp_path, {**six_positions([0.1, 0.1, 1.0], repeat=True), "seed": 3})
     assert record.first(r"Side \+x is done") < math.inf
     assert record.first("Slant it more") < math.inf
     assert list(tmp_path.iterdir()) == []
@@ -219,8 +220,8 @@ def test_an_upright_pose_that_was_not_upright_is_trimmed_on_the_road_and_stays_s
     for _ in range(3):
         ride += [["turn", -25.0, 3.0], ["straight", 25.0], ["turn", 25.0, 3.0], ["straight", 25.0]]
     plan = {**ALIGNED, "ride": [*ride, ["brake", 0.0, 6.0], ["wait", 10.0]], "until": 230}
-    record = devices.run("cpython", tmp_path, plan)
+    record = device_plans.run("cpython", tmp_path, plan)
     assert record.lean_at(20.2) == 0  # of a bike that leans by 2 degrees: so it was aligned
     assert record.last[0].startswith("Lean   0°")
-    again = devices.run("cpython", tmp_path, {"ride": [["upright", 5.0]], "until": 4})
+    again = device_plans.run("cpython", tmp_path, {"ride": [["upright", 5.0]], "until": 4})
     assert again.lean_at(3.5) == 0

@@ -2,9 +2,9 @@
 
 import math
 
-import devices
 import pytest
 from kickstand_tools.simulated_board import simulator
+from support import device_plans
 
 STATIC = 25
 FAULT_S, END_S = 5.0, 8.0
@@ -13,7 +13,7 @@ FAULT_S, END_S = 5.0, 8.0
 @pytest.fixture
 def aligned(tmp_path):
     """A flash with an alignment in it, of the part with seed None."""
-    devices.align(tmp_path)
+    device_plans.align(tmp_path)
     return tmp_path
 
 
@@ -46,7 +46,7 @@ def spoilt(monkeypatch):
 )
 def test_an_ill_axis_is_named_and_the_lean_comes_back_with_it(column, value, said, spoilt, aligned, capsys):
     spoilt(column, value, FAULT_S, END_S)
-    record = devices.run("cpython", aligned, {"lean": [[0, STATIC]], "until": 12}, capsys)
+    record = device_plans.run("cpython", aligned, {"lean": [[0, STATIC]], "until": 12}, capsys)
     assert record.lean_at(FAULT_S - 0.1) == STATIC
     assert FAULT_S < record.first(said, FAULT_S) < FAULT_S + 1.0
     assert record.leans(FAULT_S + 1.0, END_S) == []
@@ -57,17 +57,17 @@ def test_an_ill_axis_is_named_and_the_lean_comes_back_with_it(column, value, sai
 
 def test_with_a_dead_axis_no_pose_is_taken(spoilt, tmp_path):
     spoilt(3, 0.0, 0.0, 100.0)
-    plan = {"ride": devices.RIDE, "presses": devices.PRESSES, "until": 20}
-    record = devices.run("cpython", tmp_path, plan)
+    plan = {"ride": device_plans.RIDE, "presses": device_plans.PRESSES, "until": 20}
+    record = device_plans.run("cpython", tmp_path, plan)
     assert record.first("hold|Aligned") == math.inf
     assert record.last[0].startswith("Gyro x dead")
 
 
 def test_an_axis_that_dies_in_a_pose_ends_it(spoilt, tmp_path):
-    first_s = devices.PRESSES[0][0]
+    first_s = device_plans.PRESSES[0][0]
     spoilt(3, 0.0, first_s + 1.0, 100.0)
-    plan = {"ride": devices.RIDE, "presses": devices.PRESSES, "until": 20}
-    record = devices.run("cpython", tmp_path, plan)
+    plan = {"ride": device_plans.RIDE, "presses": device_plans.PRESSES, "until": 20}
+    record = device_plans.run("cpython", tmp_path, plan)
     assert record.first("hold") < first_s + 1.0
     assert record.first("Now upright|Aligned") == math.inf
 
@@ -75,7 +75,7 @@ def test_an_axis_that_dies_in_a_pose_ends_it(spoilt, tmp_path):
 def test_a_moment_at_the_end_of_the_range_hides_nothing_for_long(spoilt, aligned):
     """Named, and right again at once: the bike stands."""
     spoilt(3, 600.0, FAULT_S, FAULT_S + 0.3)
-    record = devices.run("cpython", aligned, {"lean": [[0, STATIC]], "until": 10})
+    record = device_plans.run("cpython", aligned, {"lean": [[0, STATIC]], "until": 10})
     assert record.first("Gyro clips", FAULT_S) < FAULT_S + 0.5
     assert record.first("Lean +25", FAULT_S + 0.5) < FAULT_S + 3.0
     assert set(record.leans(0, 10)) == {STATIC}
@@ -90,6 +90,6 @@ def test_a_gyro_in_standby_is_set_up_again(aligned, monkeypatch):
         install(board)
 
     monkeypatch.setattr(simulator.Board, "install", installed)
-    record = devices.run("cpython", aligned, {"lean": [[0, STATIC]], "until": 8})
+    record = device_plans.run("cpython", aligned, {"lean": [[0, STATIC]], "until": 8})
     assert record.first("Sensor reset", FAULT_S) < FAULT_S + 0.3
     assert record.lean_at(7.9) == STATIC

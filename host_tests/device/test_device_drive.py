@@ -4,14 +4,13 @@ refined, and speed sources that cannot be used."""
 import math
 import re
 
-import devices
-import engines
 import pytest
-from board_access import level
 from kickstand.calibration.parameters import Calibration
 from kickstand.calibration.store import Store
 from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted import sensor_errors
+from support import device_plans, engines
+from support.board_access import level
 
 SHORT, LONG = 0.15, 1.2
 POSES = [[2, SHORT], [12, SHORT]]
@@ -63,7 +62,7 @@ def forward_error_deg(calibration, seed=None):
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
 def test_a_car_finds_its_alignment_and_says_what_it_waits_for(engine, tmp_path):
     """On MicroPython, with its floats and its heap: the other drives are CPython's."""
-    record = devices.run(engine, tmp_path, car("gps", 5, presses=[[60, SHORT], [65, SHORT]]))
+    record = device_plans.run(engine, tmp_path, car("gps", 5, presses=[[60, SHORT], [65, SHORT]]))
     assert record.at(3.0) == ["Brakings   0/5  ", "stop needed     "]
     assert record.first("brake straight") < 8.0
     assert record.first("braking...") < 30.0
@@ -79,7 +78,7 @@ def test_a_car_finds_its_alignment_and_says_what_it_waits_for(engine, tmp_path):
     bias = sensor_errors.Sensor(seed=3).gyro_bias_dps
     assert list(calibration.gyro_bias) == pytest.approx(bias, abs=0.1)
     assert all(len(line) == 16 for frame in record.frames for line in frame[1:])
-    again = devices.run(engine, tmp_path, car("gps", 1))
+    again = device_plans.run(engine, tmp_path, car("gps", 1))
     assert again.at(2.0)[0].startswith(("Accel", "Brake")) and again.at(25.0)[0].startswith("Brake    0.")
 
 
@@ -89,9 +88,9 @@ def test_a_car_by_its_wheel_stores_at_standstill_only(tmp_path):
     moving = [["brake", 4.0, 3.0], ["straight", 2.0], ["accelerate", 15.0, 6.0], ["straight", 5.0]]
     plan["ride"] += [["accelerate", 15.0, 6.0], ["straight", 5.0], *moving * 4, ["brake", 0.0, 5.0], ["wait", 8.0]]
     end = 66.0 + 11.0 + 4 * 16.0 + 13.0
-    devices.run("cpython", tmp_path, {**plan, "until": end - 9.0})
+    device_plans.run("cpython", tmp_path, {**plan, "until": end - 9.0})
     assert list(tmp_path.iterdir()) == []
-    record = devices.run("cpython", tmp_path, {**plan, "until": end})
+    record = device_plans.run("cpython", tmp_path, {**plan, "until": end})
     assert record.first("Ready:") < end - 20.0 and record.first("Aligned by drive") > end - 9.0
     assert forward_error_deg(stored(tmp_path), 3) < 1.5
 
@@ -99,7 +98,7 @@ def test_a_car_by_its_wheel_stores_at_standstill_only(tmp_path):
 def test_a_car_whose_sensor_is_mounted_anew_finds_it_out(tmp_path):
     before = Calibration().with_alignment(sensor_errors.Sensor(seed=3).vehicle_from_sensor, [0.0] * 3, 0.0, True)
     Store(0x68, 8, str(tmp_path)).save(before)
-    record = devices.run("cpython", tmp_path, car("wheel", 7, remount=[20.0, 8]))
+    record = device_plans.run("cpython", tmp_path, car("wheel", 7, remount=[20.0, 8]))
     assert record.first("Aligned by drive") < math.inf
     after, true = stored(tmp_path).vehicle_from_sensor, sensor_errors.random_mounting(8)
     assert max(abs(a - b) for a, b in zip(after, true, strict=True)) < 0.12  # the sensor's own errors make 4 degrees
@@ -113,7 +112,7 @@ TURN_S = POSES_S + 30.0 * 2 + 9.0  # in a right turn of 20 degrees
 @pytest.fixture(scope="module")
 def unanswered(tmp_path_factory):
     """The Record of a ride with the poses on the wrong side, in which nobody answers the question."""
-    return devices.run("cpython", tmp_path_factory.mktemp("asked"), bike("gps", 3, kickstand=(12.0,)))
+    return device_plans.run("cpython", tmp_path_factory.mktemp("asked"), bike("gps", 3, kickstand=(12.0,)))
 
 
 @pytest.fixture
@@ -132,7 +131,9 @@ def test_a_wrong_kickstand_side_is_noticed(unanswered, asked):
 
 
 def test_a_wrong_kickstand_side_is_corrected(asked, tmp_path):
-    fixed = devices.run("cpython", tmp_path, bike("gps", 3, kickstand=(12.0,), presses=[*POSES, [asked + 1, LONG]]))
+    fixed = device_plans.run(
+        "cpython", tmp_path, bike("gps", 3, kickstand=(12.0,), presses=[*POSES, [asked + 1, LONG]])
+    )
     assert fixed.first("Side corrected") < asked + 3.0
     assert fixed.lean_at(TURN_S) == pytest.approx(20, abs=4)
     assert fixed.first(QUESTION, asked + 3.0) == math.inf
@@ -140,7 +141,9 @@ def test_a_wrong_kickstand_side_is_corrected(asked, tmp_path):
 
 
 def test_a_side_that_the_rider_confirms_is_not_asked_for_again(asked, tmp_path):
-    record = devices.run("cpython", tmp_path, bike("gps", 3, kickstand=(12.0,), presses=[*POSES, [asked + 1, SHORT]]))
+    record = device_plans.run(
+        "cpython", tmp_path, bike("gps", 3, kickstand=(12.0,), presses=[*POSES, [asked + 1, SHORT]])
+    )
     assert record.first(QUESTION, asked + 2.0) == math.inf
     assert not stored(tmp_path).by_drive
 
@@ -150,7 +153,7 @@ def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
     """A wire that breaks during the ride reads as standing still, a second magnet as twice the speed. The display says
     so at a stop."""
     plan = bike("wheel", 6, wheel=model, config={"SPEED": "wheel", **config})
-    record = devices.run("cpython", tmp_path, plan)
+    record = device_plans.run("cpython", tmp_path, plan)
     for town_round in range(6):
         shown = record.lean_at(POSES_S + 30.0 * town_round + 9.0)
         assert shown == pytest.approx(-25 if town_round % 2 else 20, abs=4)
@@ -164,10 +167,10 @@ def test_what_was_wrong_with_both_poses_is_found_while_riding(tmp_path):
     1.5 are left. The upright pose was 2 degrees off: that trim outlives the new alignment. The maxima are kept."""
     plan = bike("wheel", 8, kickstand=(-12.0, 2.0))
     plan["ride"][1] = ["upright", 10.0, 2.0, 0.0]
-    first = devices.run("cpython", tmp_path, {**plan, "until": 19.0})
+    first = device_plans.run("cpython", tmp_path, {**plan, "until": 19.0})
     assert first.first("Aligned!") < 19.0
     assert forward_error_deg(stored(tmp_path)) > 7.0
-    record = devices.run("cpython", tmp_path, {**plan, "presses": [[POSES_S + 232.0, SHORT]]})
+    record = device_plans.run("cpython", tmp_path, {**plan, "presses": [[POSES_S + 232.0, SHORT]]})
     assert forward_error_deg(stored(tmp_path)) < 1.5
     assert stored(tmp_path).by_drive
     for town_round in range(3, 7):
@@ -177,7 +180,9 @@ def test_what_was_wrong_with_both_poses_is_found_while_riding(tmp_path):
 
 def test_the_display_says_that_the_mount_has_moved_and_another_message_does_not_bring_the_lean_back(tmp_path):
     """The wheel's wire breaks later, and nobody has answered the first message."""
-    record = devices.run("cpython", tmp_path, bike("wheel", 6, remount=[POSES_S + 60.0, 8], wheel={"until_s": 130.0}))
+    record = device_plans.run(
+        "cpython", tmp_path, bike("wheel", 6, remount=[POSES_S + 60.0, 8], wheel={"until_s": 130.0})
+    )
     moved = record.first("Mount has moved")
     assert moved > POSES_S + 60.0 and stops(moved, POSES_S)
     assert moved < record.first("Speed stuck") < math.inf
@@ -187,14 +192,14 @@ def test_the_display_says_that_the_mount_has_moved_and_another_message_does_not_
 def test_asked_for_on_a_motorcycle_it_keeps_the_old_alignment_until_the_new_one_is_ready(tmp_path):
     """The rider asks for it in the menu, for a sensor that was mounted anew. A fault of the sensor during the drive
     does no harm."""
-    devices.align(tmp_path)
+    device_plans.align(tmp_path)
     old = list(stored(tmp_path).vehicle_from_sensor)
     menu = [[2, LONG], *([4 + t, SHORT] for t in range(4)), [9, LONG]]
     plan = {"ride": [["upright", 18.0], *town(5)], "seed": 8, "config": {"SPEED": "gps"}, "gps": {"hz": 5}}
     plan |= {"presses": menu, "faults": [["nack_for", [0x68, 70.0, 2.0]]]}
-    devices.run("cpython", tmp_path, {**plan, "until": 60.0})
+    device_plans.run("cpython", tmp_path, {**plan, "until": 60.0})
     assert list(stored(tmp_path).vehicle_from_sensor) == old
-    record = devices.run("cpython", tmp_path, {**plan, "until": 170.0})
+    record = device_plans.run("cpython", tmp_path, {**plan, "until": 170.0})
     assert record.at(8.5)[0] == "→Align by drive "
     assert record.first("Brakings") < 12.0
     assert record.first("Aligned by drive") < math.inf
@@ -212,14 +217,14 @@ def test_asked_for_on_a_motorcycle_it_keeps_the_old_alignment_until_the_new_one_
     ],
 )
 def test_a_speed_that_cannot_be_used_is_reported_and_nothing_is_stored(source, model, config, blocks, said, tmp_path):
-    record = devices.run("cpython", tmp_path, {**car(source, blocks, config=config), source: model})
+    record = device_plans.run("cpython", tmp_path, {**car(source, blocks, config=config), source: model})
     assert record.first(said) < math.inf, {tuple(f[1:]) for f in record.frames}
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_speed_that_fails_for_a_while_is_reported_and_does_no_harm(tmp_path):
     faults = [["unplugged", 15, 30], ["garbled", 45, 62]]
-    record = devices.run("cpython", tmp_path, car("gps", 6, gps={"faults": faults}))
+    record = device_plans.run("cpython", tmp_path, car("gps", 6, gps={"faults": faults}))
     assert record.first("GPS silent") == pytest.approx(21.0, abs=3.0)
     assert record.first("GPS garbled") == pytest.approx(51.0, abs=4.0)
     assert record.first("Aligned by drive") < math.inf
@@ -312,7 +317,7 @@ def test_a_press_for_another_page_does_not_answer_a_hidden_question(asked, tmp_p
     plan = bike("gps", 3, kickstand=(12.0,))
     to_info = [[asked - 14.0, LONG], *([asked - 12.0 + t, SHORT] for t in range(3)), [asked - 9.0, LONG]]
     presses = [*POSES, *to_info, [asked + 2.0, LONG]]
-    record = devices.run("cpython", tmp_path, {**plan, "presses": presses, "until": asked + 4.0})
+    record = device_plans.run("cpython", tmp_path, {**plan, "presses": presses, "until": asked + 4.0})
     assert record.at(asked + 1.0)[0].startswith("MPU6050")
     assert record.at(asked + 3.5)[1].startswith("next")  # the menu
     assert not stored(tmp_path).by_drive

@@ -1,8 +1,8 @@
 """However the firmware ends, the display says so and keeps no lean."""
 
-import devices
 import pytest
 from kickstand_tools.simulated_board import simulator
+from support import device_plans
 
 LEAN = {"lean": [[0, 25]], "until": 10}
 STOPPED = ("Kickstand       ", "stopped         ")
@@ -21,7 +21,7 @@ def on_lean(lean_deg, trusted, meter):
 @pytest.fixture
 def boards(tmp_path, monkeypatch):
     """The simulated boards that ran, each with an alignment in its flash."""
-    devices.align(tmp_path)
+    device_plans.align(tmp_path)
     made = []
     install = simulator.Board.install
     monkeypatch.setattr(simulator.Board, "install", lambda board: (made.append(board), install(board)))
@@ -33,7 +33,7 @@ def test_what_user_py_raises_leaves_no_lean(kind, boards, tmp_path, monkeypatch)
     (tmp_path / "user.py").write_text(_USER.format(kind))
     monkeypatch.syspath_prepend(str(tmp_path))
     try:
-        devices.run("cpython", tmp_path, LEAN)
+        device_plans.run("cpython", tmp_path, LEAN)
     except BaseException as error:
         assert type(error).__name__ == kind
     assert tuple(boards[-1].lcd.text()) == STOPPED
@@ -55,7 +55,7 @@ def test_ctrl_c_in_a_transfer_leaves_no_lean(turn, boards, tmp_path, monkeypatch
         send(self, now_ms)
 
     monkeypatch.setattr(hd44780.Lcd, "tick", interrupted)
-    record = devices.run("cpython", tmp_path, LEAN)
+    record = device_plans.run("cpython", tmp_path, LEAN)
     assert record.ends == ["returned"]
     assert record.last == STOPPED
 
@@ -67,5 +67,5 @@ def test_a_ride_that_is_streamed_ends_without_a_lean(boards, tmp_path, monkeypat
     turn = app.App.turn
     monkeypatch.setattr(app.App, "turn", lambda self: turn(self) if not self.meter.trusted else 1 / 0)
     with pytest.raises(ZeroDivisionError):
-        devices.run("cpython", tmp_path, LEAN | {"stream": True})
+        device_plans.run("cpython", tmp_path, LEAN | {"stream": True})
     assert tuple(boards[-1].lcd.text()) == STOPPED

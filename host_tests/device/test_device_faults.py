@@ -4,9 +4,9 @@ nothing wrong shown as good."""
 import math
 import time
 
-import devices
 import pytest
 from kickstand_tools.simulated_board import simulator
+from support import device_plans
 
 STATIC = 25
 FAULT_S, LASTS_S, END_S = 5.0, 2.0, 7.0
@@ -16,7 +16,7 @@ RECOVERY_S = 0.5
 @pytest.fixture
 def aligned(tmp_path):
     """A flash with an alignment in it, of the part with seed None."""
-    devices.align(tmp_path)
+    device_plans.align(tmp_path)
     return tmp_path
 
 
@@ -37,7 +37,7 @@ def standing(faults, until=10, **more):
     ],
 )
 def test_a_fault_that_lasts(faults, said, aligned):
-    record = devices.run("cpython", aligned, standing(faults))
+    record = device_plans.run("cpython", aligned, standing(faults))
     assert record.lean_at(FAULT_S - 0.1) == STATIC
     assert record.first(said, FAULT_S) < FAULT_S + 0.4
     back = record.first("Lean +25° right", END_S)
@@ -58,7 +58,7 @@ def test_a_fault_that_lasts(faults, said, aligned):
     ids=str,
 )
 def test_a_fault_of_a_moment(engine, fault, aligned):
-    record = devices.run(engine, aligned, standing([fault], until=8))
+    record = device_plans.run(engine, aligned, standing([fault], until=8))
     assert record.lean_at(FAULT_S + 0.1 + RECOVERY_S + 0.1) == STATIC
     assert set(record.leans(0, 8)) == {STATIC}
     assert record.ends == ["off"]
@@ -66,37 +66,37 @@ def test_a_fault_of_a_moment(engine, fault, aligned):
 
 def test_a_sample_that_a_supply_dip_has_torn_is_not_shown(aligned):
     dips = [["supply_dip", [FAULT_S + 1.013 * k, "torn"]] for k in range(20)]
-    record = devices.run("cpython", aligned, standing(dips, until=30))
+    record = device_plans.run("cpython", aligned, standing(dips, until=30))
     assert set(record.leans(0, 30)) == {STATIC}
     assert record.first("Sensor reset", FAULT_S) < FAULT_S + 0.3
 
 
 @pytest.mark.parametrize("mask", [0x01, 0x80])
 def test_a_flipped_bit_passes_in_a_moment(mask, aligned):
-    record = devices.run("cpython", aligned, standing([["corrupt", [0x68, 400, 0, mask]]], until=10))
+    record = device_plans.run("cpython", aligned, standing([["corrupt", [0x68, 400, 0, mask]]], until=10))
     assert record.last[0].startswith("Lean  25° right")
 
 
 def test_no_sensor_at_power_up_and_then_there_is_one(aligned):
-    record = devices.run("cpython", aligned, standing([["unplug_sensor", [0, 4.0]]], until=6))
+    record = device_plans.run("cpython", aligned, standing([["unplug_sensor", [0, 4.0]]], until=6))
     assert record.at(1.0) == ["No sensor       ", "check wiring    "]
     assert record.lean_at(4.0 + RECOVERY_S + 0.1) == STATIC
 
 
 def test_an_unknown_chip_is_named_and_refused_unless_accepted(tmp_path):
     plan = {"lean": [[0, STATIC]], "board": {"who_am_i": 0x75}, "until": 3}
-    assert devices.run("cpython", tmp_path, plan).last == ("Unknown sensor  ", "WHO_AM_I 0x75   ")
+    assert device_plans.run("cpython", tmp_path, plan).last == ("Unknown sensor  ", "WHO_AM_I 0x75   ")
     accepted = {**plan, "config": {"ACCEPT_WHO_AM_I": 0x75}}
-    assert devices.run("cpython", tmp_path, accepted).last[0].startswith("Raw   25°")
+    assert device_plans.run("cpython", tmp_path, accepted).last[0].startswith("Raw   25°")
 
 
 @pytest.mark.parametrize("fault", ["file_error", "file_empty"])
 def test_a_sagging_supply_while_the_calibration_is_read(fault, aligned):
     files = {path.name: path.read_bytes() for path in aligned.iterdir()}
-    record = devices.run("cpython", aligned, standing([[fault, [".cal", 0, 2]]], until=4))
+    record = device_plans.run("cpython", aligned, standing([[fault, [".cal", 0, 2]]], until=4))
     assert record.first("Not aligned") < math.inf
     assert {path.name: path.read_bytes() for path in aligned.iterdir()} == files  # nothing rewritten
-    assert devices.run("cpython", aligned, standing([], until=3)).lean_at(2.5) == STATIC
+    assert device_plans.run("cpython", aligned, standing([], until=3)).lean_at(2.5) == STATIC
 
 
 @pytest.fixture
@@ -119,7 +119,7 @@ def in_turn_300(monkeypatch):
 def test_an_exception_is_said_and_the_board_restarts(aligned, in_turn_300, capsys):
     in_turn_300(lambda: 1 / 0)
     held = {"presses": [[3.0, 5.0]]}  # the button, all that time: no safe mode, which is for power-up
-    record = devices.run("cpython", aligned, standing([], until=12, **held), capsys)
+    record = device_plans.run("cpython", aligned, standing([], until=12, **held), capsys)
     assert record.first("Error, restarts") < math.inf
     assert record.first("ZeroDivisionErro") < math.inf
     assert record.ends == ["reset", "off"]
@@ -132,7 +132,7 @@ def test_a_loop_that_hangs_is_restarted_by_the_watchdog(aligned, in_turn_300):
             time.sleep_ms(10)  # pyright: ignore[reportAttributeAccessIssue]
 
     in_turn_300(hang)
-    record = devices.run("cpython", aligned, standing([], until=16))
+    record = device_plans.run("cpython", aligned, standing([], until=16))
     assert record.ends == ["reset", "off"]
     assert record.lean_at(15) == STATIC
 
@@ -142,7 +142,7 @@ def test_a_sensor_lost_in_a_turn(lean, off_s, tmp_path):
     """A turn is as calm as standing and has no force to the side: coming back, it must not be taken for upright."""
     ride = [["kickstand", 8.0], ["upright", 8.0], ["accelerate", 20.0, 8.0], ["turn", 25.0, 3.0], ["turn", lean, 20.0]]
     plan = {"ride": ride, "presses": [[2, 0.15], [12, 0.15]], "until": 53}
-    record = devices.run("cpython", tmp_path, {**plan, "faults": [["unplug_sensor", [40.0, off_s]]]})
+    record = device_plans.run("cpython", tmp_path, {**plan, "faults": [["unplug_sensor", [40.0, off_s]]]})
     assert record.lean_at(39.5) == pytest.approx(lean, abs=2)
     assert record.first("No sensor|Sensor", 40) < 40.5
     assert all(abs(shown - lean) <= 7 for shown in record.leans(40.6, 52))  # "not sure yet" at first
@@ -158,7 +158,7 @@ def test_a_fifo_out_of_step_is_noticed(aligned, monkeypatch):
         install(board)
 
     monkeypatch.setattr(simulator.Board, "install", with_stray_bytes)
-    record = devices.run("cpython", aligned, standing([], until=8))
+    record = device_plans.run("cpython", aligned, standing([], until=8))
     assert record.lean_at(FAULT_S + 0.3) == STATIC
     assert record.last[0].startswith("Lean  25° right")
 
@@ -178,7 +178,7 @@ def test_a_range_that_changed_by_itself_is_put_right(aligned, monkeypatch):
         install(board)
 
     monkeypatch.setattr(simulator.Board, "install", installed)
-    record = devices.run("cpython", aligned, standing([], until=8))
+    record = device_plans.run("cpython", aligned, standing([], until=8))
     assert record.first("Sensor", FAULT_S) < FAULT_S + 0.3
     assert boards[0].sensor.peek(0x1C) != 0x00
     assert record.lean_at(FAULT_S + 0.1 + RECOVERY_S + 0.1) == STATIC

@@ -1,15 +1,14 @@
 """What takes the board's time away: an erase of the flash, slow USB, a storm of wheel pulses; and a display that fails
 in the middle of a line. No lean stands that is over half a second old, and none is ever half old and half new."""
 
-import devices
-import engines
 import pytest
 from kickstand_tools.simulation.scripted import script
+from support import device_plans, engines
 
 FROM_S = 32.0
 # From FROM_S on the bike rolls from side to side, so quickly that the lean that is shown shows how old it is
 RIDE = [
-    *devices.RIDE[:3],
+    *device_plans.RIDE[:3],
     ["turn", -30.0, 2.0],
     ["turn", 40.0, 0.0],
     *[["turn", 40.0 * (-1) ** k, 0.3] for k in range(8)],
@@ -30,8 +29,8 @@ STARVED = {
 
 
 def run(engine, flash, faults, config, **more):
-    plan = {"ride": RIDE, "presses": devices.PRESSES, "until": FROM_S + 8.0, "faults": faults, "config": config}
-    return devices.run(engine, flash, {**plan, **more})
+    plan = {"ride": RIDE, "presses": device_plans.PRESSES, "until": FROM_S + 8.0, "faults": faults, "config": config}
+    return device_plans.run(engine, flash, {**plan, **more})
 
 
 def too_old(record, from_s=FROM_S - 5.0):

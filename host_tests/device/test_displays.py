@@ -2,8 +2,8 @@
 
 import random
 
-import devices
 import pytest
+from support import device_plans
 
 SHOTS = 200
 
@@ -12,12 +12,12 @@ SHOTS = 200
     ("engine", "display", "one_bus"), [("micropython", "ssd1306", False), ("cpython", "sh1106", True)]
 )
 def test_the_lean_is_that_of_the_character_display(engine, display, one_bus, tmp_path, capsys):
-    plan = devices.ALIGNED | {"board": {"display": display, "one_bus": one_bus}}
+    plan = device_plans.ALIGNED | {"board": {"display": display, "one_bus": one_bus}}
     plan["config"] = {"LCD_SDA": 4, "LCD_SCL": 5} if one_bus else {}
-    seen = devices.run(engine, tmp_path, plan, capsys)
+    seen = device_plans.run(engine, tmp_path, plan, capsys)
     assert not seen.too_fast and seen.ends == ["off"]
     assert seen.first("Aligned!") < 17
-    for t_s, lean_deg in ((devices.LEFT_S, -30), (devices.RIGHT_S, 40)):
+    for t_s, lean_deg in ((device_plans.LEFT_S, -30), (device_plans.RIGHT_S, 40)):
         leans = seen.leans(t_s - 0.5, t_s)
         assert leans and all(abs(lean - lean_deg) < 4 for lean in leans)
 
@@ -34,7 +34,13 @@ def test_presses_and_unplugs_at_random(engine, display, tmp_path):
         else:
             faults.append(["unplug_lcd", [at_s, chance.choice((0.001, 0.05, 0.25))]])
     until_s = 18.0 + 0.2 * SHOTS + 45.0  # so long that each menu and wizard has ended
-    plan = {"ride": devices.RIDE, "presses": presses, "until": until_s, "board": {"display": display}, "faults": faults}
-    seen = devices.run(engine, tmp_path, plan)
+    plan = {
+        "ride": device_plans.RIDE,
+        "presses": presses,
+        "until": until_s,
+        "board": {"display": display},
+        "faults": faults,
+    }
+    seen = device_plans.run(engine, tmp_path, plan)
     assert seen.ends == ["off"]
     assert seen.last[0].strip() not in ("", "?")

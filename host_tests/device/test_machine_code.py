@@ -5,10 +5,10 @@ import re
 import shutil
 import subprocess
 
-import emulated
 import pytest
 from kickstand_tools.common import firmware_path, unix_port
 from kickstand_tools.deploy import bytecode
+from support import emulated
 
 # What is chosen of each pair: (function, the plain one's name)
 _CHOSEN = """

@@ -6,7 +6,7 @@ models of the parts are on it too, so what a turn uses is measured first."""
 import json
 
 import pytest
-from mpy import run_mpy
+from support.mpy import run_mpy
 
 _SCRIPT = """
 import gc, json, sys

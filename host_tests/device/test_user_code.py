@@ -3,11 +3,10 @@
 import re
 import sys
 
-import devices
-import engines
 import pytest
+from support import device_plans, engines
 
-POSES = {"ride": devices.RIDE, "presses": devices.PRESSES, "until": devices.LEFT_S + 0.5}
+POSES = {"ride": device_plans.RIDE, "presses": device_plans.PRESSES, "until": device_plans.LEFT_S + 0.5}
 # With an alignment in flash: a turn to the left; presses through all pages, back to the first
 PLAN = {"ride": [["upright", 2.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 6.0]], "until": 14.0}
 PLAN["presses"] = [[3 + k, 0.15] for k in range(5)]
@@ -35,10 +34,10 @@ def run(tmp_path, monkeypatch, capsys):
 
     def run(source, plan=PLAN, engine="micropython"):
         if plan["ride"] == PLAN["ride"]:
-            devices.align(tmp_path)
+            device_plans.align(tmp_path)
         (tmp_path / "user.py").write_text(source)
         monkeypatch.syspath_prepend(str(tmp_path))
-        return devices.run(engine, tmp_path, plan, capsys)
+        return device_plans.run(engine, tmp_path, plan, capsys)
 
     return run
 
@@ -56,7 +55,7 @@ def test_each_function_is_called(run, engine):
     assert "setup left" in console and console.count("press 1") == 2
     assert "lean 100 False" in console  # not aligned yet
     assert re.search(r"lean 280 True -\d\d? True", console)
-    assert goes_on(record, devices.LEFT_S)
+    assert goes_on(record, device_plans.LEFT_S)
 
 
 def test_its_pages_are_behind_the_others_and_before_alignment_in_the_menu(run):
@@ -125,7 +124,7 @@ def test_what_allocates_without_end_is_forgotten_before_the_lean_meter_runs_out(
 def test_without_a_user_py_its_module_is_not_loaded(run, tmp_path):
     """On a board it would take 3 KB of heap."""
     sys.modules.pop("kickstand.user_code", None)
-    devices.run("cpython", tmp_path, PLAN | {"until": 1.0})
+    device_plans.run("cpython", tmp_path, PLAN | {"until": 1.0})
     assert "kickstand.user_code" not in sys.modules
     run("", PLAN | {"until": 1.0}, "cpython")
     assert "kickstand.user_code" in sys.modules

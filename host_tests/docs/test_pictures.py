@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kickstand_workshop.pictures import drawn, page, ride
+from kickstand_workshop.pictures import drawn, explained, page, ride
 from PIL import Image, ImageSequence
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -28,12 +28,13 @@ def test_no_drawing_is_stale(pictures):
     assert not stale, f"{', '.join(stale)}: {STALE}"
 
 
-@pytest.mark.nightly  # draws a whole ride; what a plot shows is tested in host_tests/analysis
-def test_the_plot_of_the_ride_is_not_stale():
+@pytest.mark.nightly  # each draws a whole ride; what a plot shows is tested in host_tests/analysis
+@pytest.mark.parametrize(("name", "draw"), [("ride.png", ride.draw), ("lean_compared.png", explained.lean_compared)])
+def test_no_plot_of_a_ride_is_stale(name, draw):
     """By its look: matplotlib's files differ from version to version."""
     fresh, kept = (
         np.asarray(Image.open(io.BytesIO(data)).convert("L"), dtype=float)
-        for data in (ride.draw(), (PICTURES / "ride.png").read_bytes())
+        for data in (draw(), (PICTURES / name).read_bytes())
     )
     assert fresh.shape == kept.shape, STALE
     difference = float(np.mean(np.abs(fresh - kept)))

@@ -11,8 +11,13 @@ ROOT = Path(__file__).resolve().parents[2]
 FIRST, DEVICE, TOOLS, CONTRIBUTING = (
     ROOT / name for name in ("README.md", "firmware/README.md", "tools/README.md", ".github/CONTRIBUTING.md")
 )
-PAGES = [FIRST, DEVICE, TOOLS, CONTRIBUTING, ROOT / "firmware/FAQ.md", ROOT / "CHANGELOG.md"]
-OF_THE_REPOSITORY = "../../"  # in PAGES of its root: issues, releases, the site, wherever it is hosted
+BEHIND = sorted(path for folder in ("firmware", "tools") for path in (ROOT / folder / "docs").glob("*.md"))
+DISPLAYS, HOW = (ROOT / "firmware" / "docs" / name for name in ("displays.md", "how-it-works.md"))
+PAGES = [FIRST, DEVICE, TOOLS, CONTRIBUTING, ROOT / "firmware/FAQ.md", ROOT / "CHANGELOG.md", *BEHIND]
+MOST_LINES = {FIRST: 130, DEVICE: 250, TOOLS: 200}
+WIDEST = 120  # but for tables, pictures and commands
+# Issues, releases, the site, wherever the project is hosted
+OF_THE_REPOSITORY = re.compile(r"(\.\./){2,}(issues|releases|deployments)\b")
 LINK = re.compile(r'\]\(([^)\s]+)\)|src="([^"]+)"')
 
 
@@ -31,7 +36,7 @@ def anchors(path):
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_every_link_leads_somewhere(page):
-    found = [link for link in links(page) if not link.startswith(("https://", OF_THE_REPOSITORY))]
+    found = [link for link in links(page) if not (link.startswith("https://") or OF_THE_REPOSITORY.match(link))]
     assert found or page.name == "CHANGELOG.md"
     for link in found:
         name, _, anchor = link.partition("#")
@@ -40,8 +45,29 @@ def test_every_link_leads_somewhere(page):
         assert not anchor or anchor in anchors(target), link
 
 
-def test_every_page_is_linked_from_the_first():
-    assert {(ROOT / link.partition("#")[0]).resolve() for link in links(FIRST)} >= set(PAGES) - {FIRST}
+def test_a_link_out_of_the_checkout_has_its_depth():
+    """GitHub shows a file at OWNER/NAME/blob/BRANCH/ and the first page at OWNER/NAME too."""
+    for page in PAGES:
+        for link in filter(OF_THE_REPOSITORY.match, links(page)):
+            assert link.count("../") == 1 + len(page.relative_to(ROOT).parts), link
+
+
+def leads_to(page):
+    return {(page.parent / link.partition("#")[0]).resolve() for link in links(page)}
+
+
+def test_every_page_is_linked_from_the_first_or_its_own():
+    assert leads_to(FIRST) >= set(PAGES) - {FIRST} - set(BEHIND)
+    for page in DEVICE, TOOLS:
+        assert leads_to(page) >= {behind for behind in BEHIND if behind.is_relative_to(page.parent)}
+
+
+@pytest.mark.parametrize("page", [*MOST_LINES, *BEHIND], ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_a_page_has_a_readable_length(page):
+    lines = text_of(page).splitlines()
+    assert len(lines) <= MOST_LINES.get(page, 200)
+    prose = [line for line in lines if not line.startswith(("|", "    ", "![", "<img", "`"))]
+    assert [line for line in prose if len(line) > WIDEST] == []
 
 
 def test_every_picture_is_shown():
@@ -51,17 +77,16 @@ def test_every_picture_is_shown():
 
 def test_the_first_page_is_short_and_begins_with_a_moving_picture():
     text = text_of(FIRST)
-    assert len(text.splitlines()) < 150
     assert re.findall(r'src="([^"]+)"', text)[0].endswith(".webp")
     assert "    python3 tools/dev.py demo\n" in text
     assert "    python3 tools/dev.py test\n" in text_of(CONTRIBUTING)
 
 
 def test_how_right_it_is_stands_in_both_places_alike():
-    """The first page's table is a part of the device's."""
+    """The first page's table is a part of the whole one."""
     heads, *rows = [
         [cell.strip() for cell in line.strip("|").split("|")]
-        for line in text_of(DEVICE).partition("| profile | shown")[2].partition("\n\n")[0].splitlines()
+        for line in text_of(HOW).partition("| profile | shown")[2].partition("\n\n")[0].splitlines()
     ]
     whole = [[row[1], row[3], row[4], row[6]] for row in rows[1:]]
     assert "complementary" in heads[5]
@@ -107,5 +132,5 @@ def test_every_menu_entry_is_described():
     tuples = [node for node in ast.walk(listed) if isinstance(node, ast.Tuple) and node.elts]
     entries = {tuple_.elts[0].value for tuple_ in tuples if isinstance(tuple_.elts[0], ast.Constant)}
     assert len(entries) == 9
-    text = text_of(DEVICE)
+    text = text_of(DISPLAYS)
     assert not [entry for entry in entries if f"`{entry}`" not in text]

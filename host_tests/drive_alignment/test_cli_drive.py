@@ -4,15 +4,14 @@ import csv
 import gzip
 import json
 
-import command
-import driving_runs
 import numpy as np
 import pytest
-from driving_runs import RATE_HZ, STAND, around, mounted
 from kickstand_tools.calibration.drive import fit_drive
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.simulation.files import simulate
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
+from support import command, driving_runs
+from support.driving_runs import RATE_HZ, STAND, around, mounted
 
 # vehicle from sensor, rows left, up, forward, from the recording's own receiver: good to 1 to 2 degrees
 RECORDED = {

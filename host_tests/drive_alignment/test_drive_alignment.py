@@ -1,13 +1,12 @@
 """Alignment by driving on made-up drives: what it finds, what it refuses and why; on CPython and MicroPython."""
 
-import driving_runs
-import engines
 import numpy as np
 import pytest
-from driving_runs import STAND, around
-from engines import ENGINES, run
 from kickstand.drive_alignment import alignment, quality, speed_check, verdict
 from kickstand_tools.signals import rotation_vector
+from support import driving_runs, engines
+from support.driving_runs import STAND, around
+from support.engines import ENGINES, run
 
 MOUNT = [0.48, 0.36, 0.8, -0.6, 0.8, 0.0, -0.64, -0.48, 0.6]  # no axis of the sensor near one of the vehicle
 PLAIN = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]

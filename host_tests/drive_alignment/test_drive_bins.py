@@ -2,7 +2,6 @@
 
 from array import array
 
-import driving_runs
 import numpy as np
 import pytest
 from kickstand.drive_alignment.alignment import DriveAlignment
@@ -12,6 +11,7 @@ from kickstand_tools.calibration.drive_feed import drive_bins
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
+from support import driving_runs
 
 CALIBRATION = CalibrationFile(accel_offset_g=np.array([0.02, -0.01, 0.03]), accel_slope=np.array([1.01, 0.99, 1.0]))
 

@@ -4,13 +4,13 @@ import types
 
 import numpy as np
 import pytest
-from engines import ENGINES, run
 from kickstand.drive_alignment import parts, vertical
 from kickstand.drive_alignment.history import BIN_US, MASK, SIZE, ForceHistory
 from kickstand.drive_alignment.regression import Fit, ForwardRegression
 from kickstand.drive_alignment.speed_check import SpeedCheck
 from kickstand.drive_alignment.vertical import StandingVertical, Vertical
 from kickstand_tools.calibration import published
+from support.engines import ENGINES, run
 
 UP = [0.0, 1.0, 0.0]
 

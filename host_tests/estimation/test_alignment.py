@@ -8,7 +8,6 @@ import itertools
 import json
 from dataclasses import replace
 
-import command
 import numpy as np
 import pytest
 from kickstand_tools import api
@@ -16,6 +15,7 @@ from kickstand_tools.estimation import first_guess
 from kickstand_tools.estimation.alignment import PHONES, mounted_windows
 from kickstand_tools.logs.log import Log
 from kickstand_tools.signals import rotation_matrix, rotation_vector
+from support import command
 
 RATE_HZ = 200
 SIGNS = list(itertools.product((1.0, -1.0), repeat=3))

@@ -2,15 +2,15 @@
 
 import json
 
-import analysis_rides
-import command
 import numpy as np
 import pytest
-from command import refused, works
-from drawn_rides import drawn_ride
 from kickstand_tools.calibration.file import CalibrationFile, write_calibration
 from kickstand_tools.logs.csv_lines import write_table
-from smoothed_rides import simulated
+from support import command
+from support.command import refused, works
+from support.recordings import analysis_rides
+from support.recordings.drawn_rides import drawn_ride
+from support.recordings.smoothed_rides import simulated
 
 
 @pytest.fixture(scope="module")

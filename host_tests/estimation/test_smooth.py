@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn_rides import drawn_ride, judged
 from kickstand_tools.api import Log, smooth
 from kickstand_tools.estimation import smooth as module
 from kickstand_tools.estimation.least_squares import Estimate
@@ -13,7 +12,8 @@ from kickstand_tools.estimation.unknowns import DIVE
 from kickstand_tools.refusals import sentence
 from kickstand_tools.signals import rotation_matrix
 from kickstand_tools.simulation.physics.bike import Bike
-from smoothed_rides import Known, other, rms, simulated
+from support.recordings.drawn_rides import drawn_ride, judged
+from support.recordings.smoothed_rides import Known, other, rms, simulated
 
 RIDES = {
     "street": lambda: simulated("street", 3, 130.0),

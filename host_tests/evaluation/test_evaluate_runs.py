@@ -6,7 +6,6 @@ import re
 
 import numpy as np
 import pytest
-from command import refused, works
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.common.errors import InputError
@@ -14,6 +13,7 @@ from kickstand_tools.logs.log import Log
 from kickstand_tools.simulation.ride import ride
 from kickstand_workshop.evaluation import estimators, real_ride, runs
 from kickstand_workshop.evaluation.estimators import Samples
+from support.command import refused, works
 
 THERE = [name for name in estimators.OTHERS if estimators.PACKAGES.get(name) not in estimators.missing()]
 

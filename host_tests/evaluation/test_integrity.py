@@ -4,10 +4,10 @@ import json
 
 import numpy as np
 import pytest
-from command import refused, works
 from kickstand_workshop.evaluation import faults, integrity
 from kickstand_workshop.evaluation.faults import FAULTS, Fault
 from kickstand_workshop.evaluation.integrity import Job, Trace
+from support.command import refused, works
 
 STEP_S = 0.1
 NAMED = {fault.title: fault for fault in FAULTS}

@@ -4,9 +4,9 @@ import json
 import re
 from pathlib import Path
 
-import command
 import pytest
-from mpy import BOARD_HEAP, run_mpy
+from support import command
+from support.mpy import BOARD_HEAP, run_mpy
 
 SCRIPT = Path(__file__).resolve().with_name("example_run.py")
 EXAMPLES = SCRIPT.parents[2] / "firmware" / "examples"

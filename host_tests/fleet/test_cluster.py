@@ -10,7 +10,6 @@ import time
 from collections import Counter
 from pathlib import Path
 
-import mutations
 import pyarrow.parquet as parquet
 import pytest
 from fleet_tasks import task
@@ -22,6 +21,7 @@ from kickstand_fleet.period import failed
 from kickstand_fleet.run import run_fleet
 from kickstand_fleet.tables import TABLES, schema
 from kickstand_tools.common.errors import InputError
+from support.recordings import broken_logs
 
 
 @pytest.fixture(scope="module")
@@ -197,7 +197,7 @@ def test_a_damaged_line_of_a_journal_costs_that_line_and_is_counted_once(tmp_pat
     wrong = [
         entry | {"result": value} for value in (None, [], "x", {}, {"alignment": 1}, entry["result"] | {"more": 1})
     ]
-    lines = [mutations.broken([whole[1]], number)[1] for number in range(300)]
+    lines = [broken_logs.broken([whole[1]], number)[1] for number in range(300)]
     lines += [json.dumps(one).encode() + b"\n" for one in wrong]
     for line in (*lines, b"nonsense\n", b"[]\n", b'{"key": 1}\n', b"\0" * 400 + b"\n", 5000 * b"[" + b"\n"):
         path.write_bytes(whole[0] + line + whole[2])

@@ -8,8 +8,6 @@ import urllib.error
 import urllib.request
 from pathlib import Path
 
-import command
-import mutations
 import psutil
 import pyarrow.parquet as parquet
 import pytest
@@ -22,6 +20,8 @@ from kickstand_fleet.show import plot
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.common.output import whole_file
 from kickstand_tools.refusals import sentence
+from support import command
+from support.recordings import broken_logs
 
 
 @pytest.fixture
@@ -206,7 +206,7 @@ def test_a_mutated_manifest_is_read_or_refused_in_one_line(tmp_path):
     content = b"vehicle,path,kind,mount\n" + b"".join(b"v%d,logs/%d.csv,car,m\n" % (k, k) for k in range(20))
     seen = set()
     for number in range(100):
-        path.write_bytes(mutations.broken([content], number)[1])
+        path.write_bytes(broken_logs.broken([content], number)[1])
         try:
             seen.add(bool(read_manifest(str(path))))
         except InputError as error:

@@ -1,10 +1,10 @@
 """What a manifest may say, and what `kickstand fleet` and `simulate --fleet` refuse."""
 
-import command
 import pytest
 from kickstand_fleet.manifest import Period, by_pattern, is_pattern, read_manifest
 from kickstand_tools.common.errors import InputError
 from made_fleet import TROUBLES
+from support import command
 
 
 def manifest(tmp_path, text):

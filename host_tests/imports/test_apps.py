@@ -1,5 +1,5 @@
 """Each app's export is imported and replays as the ride that it was made from. Nothing in an export is copied: the
-writers in support/app_exports.py follow what the makers have published.
+writers in support/recordings/app_exports.py follow what the makers have published.
 
 phyphox: https://github.com/phyphox/phyphox-ios, SimpleExperimentTemplete.swift and ExperimentExport.swift
 Sensor Logger: https://github.com/tszheichoi/awesome-sensor-logger, UNITS.md, COORDINATES.md and CROSSPLATFORM.md
@@ -15,14 +15,14 @@ AiM: a session in https://github.com/m3rlin45/libxrk, tests/test_data/SFJ
 from collections.abc import Callable
 from pathlib import Path
 
-import app_exports
 import numpy as np
 import pytest
-from app_exports import PHONE, START_UTC_S, Riding
 from kickstand_tools import api
 from kickstand_tools.imports.importing import NAMES
+from support.recordings import app_exports
+from support.recordings.app_exports import PHONE, START_UTC_S, Riding
 
-README = Path(__file__).resolve().parents[2] / "tools" / "README.md"
+PAGE = Path(__file__).resolve().parents[2] / "tools" / "docs" / "recordings.md"
 ON_PHONE = api.CalibrationFile(vehicle_from_sensor=PHONE.T, aligned=True)
 ON_BIKE = api.CalibrationFile(aligned=True)
 # rms of a replay against the true lean; the ride itself, not exported, has 0.28 at 100 samples a second
@@ -67,7 +67,7 @@ EXPORTS = {
 
 def test_each_app_is_tried_and_described():
     assert {name for name in NAMES if not any(key.startswith(name) for key in EXPORTS)} == {"Kickstand"}
-    table = README.read_text(encoding="utf-8")
+    table = PAGE.read_text(encoding="utf-8")
     assert [name for name in NAMES if f"\n| {name}" not in table] == []
 
 

@@ -2,13 +2,13 @@
 
 import json
 
-import app_exports
-import command
 import numpy as np
 import pytest
-from app_exports import riding
 from kickstand_tools import api
 from kickstand_tools.imports import importing
+from support import command
+from support.recordings import app_exports
+from support.recordings.app_exports import riding
 
 
 def test_it_says_what_it_took_for_what_and_what_to_do_next(tmp_path):

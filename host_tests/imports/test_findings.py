@@ -4,12 +4,12 @@ import functools
 import re
 import shlex
 
-import command
-import drawn_tables
 import numpy as np
 import pytest
 from kickstand_tools import api
 from kickstand_tools.common.errors import InputError
+from support import command
+from support.recordings import drawn_tables
 
 G, RAD = drawn_tables.GRAVITY, np.pi / 180.0
 HEAD = "t,ax,ay,az,gx,gy,gz"

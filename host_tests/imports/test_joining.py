@@ -1,13 +1,13 @@
 """Sensors at rates of their own on one clock: nothing across a gap, nothing where one of them is missing."""
 
-import app_exports
-import command
 import numpy as np
 import pytest
-from app_exports import riding
 from kickstand_tools import api
 from kickstand_tools.imports.join import join, on_clock
 from kickstand_tools.imports.recording import Recording, Sensor, Track
+from support import command
+from support.recordings import app_exports
+from support.recordings.app_exports import riding
 
 MS = 10**6
 

@@ -9,12 +9,12 @@ import sys
 import zipfile
 from pathlib import Path
 
-import command
 import pytest
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.imports import files
 from kickstand_tools.joining.track_files import read_track
 from kickstand_tools.logs import csv_reader, reader
+from support import command
 
 NAMES = "t=t,ax=ax,ay=ay,az=az,gx=gx,gy=gy,gz=gz"
 UNITS = "t=ms,a=m/s2,g=rad/s"

@@ -2,14 +2,14 @@
 
 import zipfile
 
-import app_exports
-import command
 import numpy as np
 import pytest
-from app_exports import riding
 from kickstand_tools import api
 from kickstand_tools.imports.importing import NAMES
 from kickstand_tools.replay import replay_engine
+from support import command
+from support.recordings import app_exports
+from support.recordings.app_exports import riding
 
 
 @pytest.fixture

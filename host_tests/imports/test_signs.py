@@ -1,12 +1,12 @@
 """At rest the axis that points up reads +1 g, whatever the app writes; and gravity is never missing."""
 
-import app_exports
-import command
 import numpy as np
 import pytest
-from app_exports import PHONE, riding
 from kickstand_tools import api
 from kickstand_tools.checks.course import log_agrees
+from support import command
+from support.recordings import app_exports
+from support.recordings.app_exports import PHONE, riding
 
 
 def up_at_rest(found: api.Imported) -> np.ndarray:

@@ -2,15 +2,15 @@
 
 import shlex
 
-import app_exports
-import command
 import numpy as np
 import pytest
-from app_exports import riding
 from kickstand_tools import api
 from kickstand_tools.imports import findings, layout, units
 from kickstand_tools.imports.files import RecordingFile
 from kickstand_tools.logs import csv_reader
+from support import command
+from support.recordings import app_exports
+from support.recordings.app_exports import riding
 
 NAMES = app_exports.ANY_NAMES
 UNITS = {"a": "m/s2", "g": "rad/s", "speed": "km/h"}

@@ -1,9 +1,9 @@
 """The samples of one turn of the loop, added up and transformed together: against numpy on CPython and MicroPython, and
 machine code against Python."""
 
-import engines
 import numpy as np
 import pytest
+from support import engines
 
 LIMIT = 5
 

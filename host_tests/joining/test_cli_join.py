@@ -2,13 +2,12 @@
 
 import gzip
 
-import analysis_rides
-import command
 import numpy as np
-import phone_tracks
 import pytest
 from kickstand_tools import api
 from kickstand_tools.joining import joined
+from support import command
+from support.recordings import analysis_rides, phone_tracks
 
 pytest.importorskip("fitdecode")
 

@@ -3,13 +3,13 @@
 import json
 from dataclasses import replace
 
-import command
 import numpy as np
 import pytest
-from drawn_rides import drawn_ride
 from kickstand_tools import api
 from kickstand_tools.calibration.file import write_calibration
 from kickstand_tools.joining import agreement
+from support import command
+from support.recordings.drawn_rides import drawn_ride
 
 LATER_S, SLOW = 7.3, 80e-6
 

@@ -1,13 +1,13 @@
 """Where a track belongs in a ride: found within 0.2 s in every profile; a track that does not belong is refused."""
 
 import numpy as np
-import phone_tracks
 import pytest
 from kickstand_tools import api
 from kickstand_tools.joining.compare import Comparison
 from kickstand_tools.joining.motion import motion
 from kickstand_tools.joining.track import course, segments
 from kickstand_tools.signals import EARTH_M
+from support.recordings import phone_tracks
 
 PROFILES = ("street", "track", "sweeper", "city", "hills")
 SECONDS = {"sweeper": 450.0, "city": 300.0, "street": 300.0}  # of a ride that has few bends for its length

@@ -3,15 +3,14 @@
 import json
 import random
 
-import command
-import mutations
 import numpy as np
-import phone_tracks
 import pytest
 from kickstand_tools.calibration.file import read_calibration
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.joining.track import Track
 from kickstand_tools.joining.track_files import read_track
+from support import command
+from support.recordings import broken_logs, phone_tracks
 
 COUNT = 150
 
@@ -24,7 +23,9 @@ def some_track():
 def flipped(content, number):
     """Some bytes or a part of a binary file changed."""
     chance = random.Random(number)
-    change = (mutations.flip_bytes, mutations.cut_end, mutations.cut_a_piece, mutations.put_nul_bytes)[number % 4]
+    change = (broken_logs.flip_bytes, broken_logs.cut_end, broken_logs.cut_a_piece, broken_logs.put_nul_bytes)[
+        number % 4
+    ]
     return change(content, chance)
 
 
@@ -45,7 +46,7 @@ def test_a_mutated_track_is_read_or_refused(tmp_path, kind):
     content = path.read_bytes()
     seen = set()
     for number in range(COUNT):
-        broken = mutations.broken([content], number)[1] if kind == "gpx" else flipped(content, number)
+        broken = broken_logs.broken([content], number)[1] if kind == "gpx" else flipped(content, number)
         path.write_bytes(broken)
         seen.add(outcome(read_track, path))
     assert seen == {"read", "refused"}
@@ -56,7 +57,7 @@ def test_a_mutated_calibration_is_read_or_refused(tmp_path):
     values = (None, True, "x", -1, 1e308, [], {}, [[]], [None] * 3, ["1"] * 3, [1e400] * 3, [10**400] * 3)
     wrong = [json.dumps(json.loads(content) | {key: value}) for key in json.loads(content) for value in values]
     seen = set()
-    for broken in [mutations.broken([content], k)[1] for k in range(COUNT)] + [one.encode() for one in wrong]:
+    for broken in [broken_logs.broken([content], k)[1] for k in range(COUNT)] + [one.encode() for one in wrong]:
         (tmp_path / "CAL.json").write_bytes(broken)
         seen.add(outcome(read_calibration, tmp_path / "CAL.json"))
     assert seen == {"read", "refused"}

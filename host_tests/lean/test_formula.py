@@ -1,11 +1,11 @@
 """Lean from forces: equations 21-26 against numpy."""
 
-import engines
 import numpy as np
 import pytest
 from bike_motion import force_and_rate
 from hypothesis import given, strategies as st
 from numpy.testing import assert_allclose
+from support import engines
 
 
 def formula(left, up, yaw_rate):

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from mpy import run_tests
+from support.mpy import run_tests
 
 MODULES = (
     "test_meter",

@@ -5,12 +5,12 @@ import asyncio
 import collections
 import functools
 
-import devices
 import pytest
-from device_runs import Device, _world
-from published import SERVICE, channels
+from support import device_plans
+from support.device_runs import Device, _world
+from support.radio_decoder import SERVICE, channels
 
-bumble_air = pytest.importorskip("bumble_air", reason="no bumble", exc_type=ImportError)
+virtual_radio = pytest.importorskip("support.virtual_radio", reason="no bumble", exc_type=ImportError)
 
 CHRONO = 0x1FF8
 RATE, NOW, RIDE, BOARD = (SERVICE.replace("0000", f"000{number}", 1) for number in (2, 3, 4, 1))
@@ -25,15 +25,15 @@ def on_air(tmp_path, monkeypatch, capsys):
     asyncio._set_running_loop(None)
 
     def run(until_s, visits, machine="pico w", **config):
-        world, _ = _world(devices.ALIGNED)
+        world, _ = _world(device_plans.ALIGNED)
         device = Device(world, machine=machine)
-        for press in devices.PRESSES:
+        for press in device_plans.PRESSES:
             device.board.press(*press)
-        air = bumble_air.Air(device.board)
+        air = virtual_radio.Air(device.board)
         made.append(air)
-        centrals = [bumble_air.Central(air, pin).at(at_s, visit) for at_s, visit, pin in visits]
+        centrals = [virtual_radio.Central(air, pin).at(at_s, visit) for at_s, visit, pin in visits]
         device.run({"LIVE": True, **config}, [until_s])
-        return centrals, devices.Record(device.record(), capsys.readouterr().out)
+        return centrals, device_plans.Record(device.record(), capsys.readouterr().out)
 
     yield run
     for air in made:
@@ -60,7 +60,7 @@ def test_racechrono_finds_it_filters_and_decodes(on_air):
     assert central.done.result() == 0  # denied all, it sent nothing
     counts = collections.Counter(data[0] for _, _, data in central.heard)
     assert counts.keys() == {1, 2} and 198 <= counts[1] <= 202 and 496 <= counts[2] <= 503
-    for t_s in (devices.LEFT_S, devices.RIGHT_S):
+    for t_s in (device_plans.LEFT_S, device_plans.RIGHT_S):
         leans = [channels(data) for sent_s, _, data in central.heard if data[0] == 1 and sent_s <= t_s]
         assert abs(leans[-1]["lean angle"] - record.lean_at(t_s)) <= 1
     assert record.ends == ["off"]

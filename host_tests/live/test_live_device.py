@@ -1,14 +1,14 @@
-"""The whole device sends its lean to a phone beside the simulated board. Decoded by the README alone."""
+"""The whole device sends its lean to a phone beside the simulated board. Decoded by firmware/docs/live.md alone."""
 
 import collections
 import itertools
 import sys
 
-import devices
 import pytest
-from device_runs import Device, _world
-from engines import ENGINES
-from published import channels, own
+from support import device_plans
+from support.device_runs import Device, _world
+from support.engines import ENGINES
+from support.radio_decoder import channels, own
 
 LIVE = {"config": {"LIVE": True, "RECORD": True}, "board": {"machine": "pico w"}}
 ASK = [[20.0, "connect"], [20.1, "write", "rate", [40, 0]]]
@@ -28,7 +28,7 @@ def last(phone, name, t_s):
 
 @pytest.fixture
 def run(request, tmp_path, capsys):
-    return lambda plan: devices.run(getattr(request, "param", "cpython"), tmp_path, plan, capsys)
+    return lambda plan: device_plans.run(getattr(request, "param", "cpython"), tmp_path, plan, capsys)
 
 
 def test_racechrono_gets_what_it_asks_for(run):
@@ -36,7 +36,7 @@ def test_racechrono_gets_what_it_asks_for(run):
     acts = [[20.0, "connect"], [20.1, "write", "filter", [0]], [20.1, "write", "filter", [2, 0, 100, 0, 0, 0, 1]]]
     acts += [[20.2, "write", "filter", [2, 0, 40, 0, 0, 0, 2]], [20.2, "write", "filter", [2, 0, 40, 0, 0, 0, 77]]]
     acts += [[40.0, "write", "filter", [0]], [42.0, "write", "filter", [1, 0, 100]]]
-    record = run({**devices.ALIGNED, **LIVE, "phones": [acts]})
+    record = run({**device_plans.ALIGNED, **LIVE, "phones": [acts]})
     (phone,) = record.phones
     sent = of(phone, "chrono")
     counts = collections.Counter(data[0] for t_s, data in sent if t_s < 40)
@@ -44,7 +44,7 @@ def test_racechrono_gets_what_it_asks_for(run):
     assert not [t_s for t_s, _ in sent if 40.1 < t_s < 42]
     again = collections.Counter(data[0] for t_s, data in sent if t_s >= 42)
     assert 38 <= again[1] <= 41 and again[1] == again[2]
-    for t_s in (devices.LEFT_S, devices.RIGHT_S, 43.9):
+    for t_s in (device_plans.LEFT_S, device_plans.RIGHT_S, 43.9):
         heard = {}
         for sent_s, data in sent:
             if sent_s <= t_s:
@@ -53,7 +53,7 @@ def test_racechrono_gets_what_it_asks_for(run):
         assert 0 < heard["its standard deviation"] < 3 and heard["1 while the lean is trusted"] == 1
     right = {}
     for sent_s, data in sent:
-        if sent_s <= devices.RIGHT_S:
+        if sent_s <= device_plans.RIGHT_S:
             right.update(channels(data))
     assert -40 < right["yaw rate"] < -15 and 1.1 < right["vertical acceleration (specific force)"] < 1.5
     assert abs(right["roll rate"]) < 8 and abs(right["longitudinal acceleration"]) < 0.2
@@ -61,7 +61,7 @@ def test_racechrono_gets_what_it_asks_for(run):
 
 @pytest.mark.parametrize("run", ENGINES, indirect=True)
 def test_our_page_gets_it_all_and_nothing_else_suffers(run):
-    record = run({**devices.ALIGNED, **LIVE, "phones": [ASK + [[21.5, "read", "board"], [21.5, "read", "ride"]]]})
+    record = run({**device_plans.ALIGNED, **LIVE, "phones": [ASK + [[21.5, "read", "board"], [21.5, "read", "ride"]]]})
     (phone,) = record.phones
     assert record.ends == ["off"]
     board, ride = answers(phone, "read")
@@ -71,7 +71,7 @@ def test_our_page_gets_it_all_and_nothing_else_suffers(run):
     assert len(now) > 600
     steps = [(b["time of the board"] - a["time of the board"]) % 65536 for a, b in itertools.pairwise(now)]
     assert 30 <= min(steps) and max(steps) <= 130  # longer while a page of flash is erased
-    for t_s in (devices.LEFT_S, devices.RIGHT_S, devices.STRAIGHT_S):
+    for t_s in (device_plans.LEFT_S, device_plans.RIGHT_S, device_plans.STRAIGHT_S):
         seen = own("now", last(phone, "now", t_s))
         assert abs(seen["lean"] / 100 - record.lean_at(t_s)) <= 1
         assert seen["state"] == 1 + 2 + 16 and seen["speed"] is None
@@ -84,7 +84,7 @@ def test_a_lean_that_is_not_trusted_is_never_a_number(run):
     """Without an alignment, then without a sensor; RaceChrono gets no lean either."""
     acts = [[3.0, "connect"], [3.1, "write", "rate", [40, 0]], [3.1, "write", "filter", [1, 0, 40]]]
     faults = [["unplug_sensor", [30.0, 4.0]]]
-    plan = {**devices.ALIGNED, **LIVE, "phones": [acts], "until": 40}
+    plan = {**device_plans.ALIGNED, **LIVE, "phones": [acts], "until": 40}
     record = run({**plan, "faults": faults})
     (phone,) = record.phones
     aligned_s = record.first("Aligned")
@@ -114,8 +114,8 @@ def test_phones_in_turn(run):
     first = [[22.0, "connect", 1], [22.1, "write", "filter", [1, 0, 100]], [26.0, "leave"]]
     second = [[24.0, "connect", 2], [27.5, "connect", 2], [30.0, "write", "rate", [100, 0]], [33.0, "leave"]]
     third = [[35.0, "connect", 3]]
-    presses = devices.PRESSES + [[19.8 + 0.4 * k, 0.15] for k in range(5)]
-    plan = {**devices.ALIGNED, **LIVE, "phones": [first, second, third], "presses": presses, "until": 100}
+    presses = device_plans.PRESSES + [[19.8 + 0.4 * k, 0.15] for k in range(5)]
+    plan = {**device_plans.ALIGNED, **LIVE, "phones": [first, second, third], "presses": presses, "until": 100}
     record = run(plan)
     one, two, three = record.phones
     assert 70 <= len(of(one, "chrono")) <= 80 and not of(one, "now")
@@ -132,7 +132,7 @@ def test_phones_in_turn(run):
 def test_out_of_reach_the_loop_goes_on(run):
     """The queue of an ESP32 is full then, which costs packets and nothing else."""
     acts = ASK + [[25.0, "away", True], [29.0, "away", False]]
-    plan = {**devices.ALIGNED, **LIVE, "board": {"machine": "esp32"}, "phones": [acts]}
+    plan = {**device_plans.ALIGNED, **LIVE, "board": {"machine": "esp32"}, "phones": [acts]}
     record = run(plan)
     (phone,) = record.phones
     assert not of(phone, "now", 25.1, 28.9)
@@ -143,15 +143,15 @@ def test_out_of_reach_the_loop_goes_on(run):
 
 def test_the_menu_ends_it(run):
     """Reset maxima, and the entries behind it, to the last but one."""
-    presses = devices.PRESSES + [[22.0, 1.0]] + [[23.5 + 0.4 * k, 0.15] for k in range(5)] + [[26.0, 1.0]]
+    presses = device_plans.PRESSES + [[22.0, 1.0]] + [[23.5 + 0.4 * k, 0.15] for k in range(5)] + [[26.0, 1.0]]
     record = run(
-        {**devices.ALIGNED, **LIVE, "phones": [ASK + [[40.0, "found"], [41.0, "connect"]]], "presses": presses}
+        {**device_plans.ALIGNED, **LIVE, "phones": [ASK + [[40.0, "found"], [41.0, "connect"]]], "presses": presses}
     )
     (phone,) = record.phones
     assert [did for _, did, _ in phone["said"]].count("dropped") == 1
     assert not of(phone, "now", 28) and answers(phone, "found") == [None]
     assert answers(phone, "connect") == [True, False]
-    assert abs(record.lean_at(devices.RIGHT_S) - 40) <= 1
+    assert abs(record.lean_at(device_plans.RIGHT_S) - 40) <= 1
 
 
 def test_a_car_has_no_lean_and_its_speed(run):
@@ -175,11 +175,11 @@ def test_a_car_has_no_lean_and_its_speed(run):
     ],
 )
 def test_a_board_that_cannot_says_so_and_the_lean_goes_on(run, machine, config, shown, said):
-    plan = {**devices.ALIGNED, "config": {"LIVE": True, **config}, "board": {"machine": machine}}
+    plan = {**device_plans.ALIGNED, "config": {"LIVE": True, **config}, "board": {"machine": machine}}
     record = run({**plan, "until": 32})
     assert shown in [frame[1:] for frame in record.frames]
     assert record.console.count(said) == 1
-    assert abs(record.lean_at(devices.LEFT_S) + 30) <= 1
+    assert abs(record.lean_at(device_plans.LEFT_S) + 30) <= 1
 
 
 def test_a_pin_keeps_strangers_out_and_is_asked_for_once(run):
@@ -188,7 +188,7 @@ def test_a_pin_keeps_strangers_out_and_is_asked_for_once(run):
     stranger += [[20.4, "give_pin", 314159], [20.5, "write", "filter", [1, 0, 40]], [22, "leave"]]
     owner = [[24.0, "connect", 2], [24.1, "give_pin", 271828], [24.2, "write", "rate", [40, 0]], [28.0, "leave"]]
     owner += [[40.0, "connect", 2], [40.1, "write", "rate", [40, 0]]]
-    plan = {**devices.ALIGNED, **LIVE, "phones": [stranger, owner], "board": {"machine": "esp32"}, "power": [30]}
+    plan = {**device_plans.ALIGNED, **LIVE, "phones": [stranger, owner], "board": {"machine": "esp32"}, "power": [30]}
     plan["config"] = {"LIVE": True, "LIVE_PIN": 271828}
     record = run(plan)
     outside, inside = record.phones
@@ -202,7 +202,7 @@ def test_a_pin_keeps_strangers_out_and_is_asked_for_once(run):
 
 def test_switched_off_nothing_more_is_imported(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    device = Device(_world(devices.ALIGNED)[0], machine="pico w")
+    device = Device(_world(device_plans.ALIGNED)[0], machine="pico w")
     seen = set()
     device.board.at(8.0, lambda: seen.update(sys.modules))
     device.run({}, [9.0])

@@ -4,11 +4,11 @@ MicroPython, its memory as it was: test_live_micropython.py runs this there."""
 import gc
 import random
 
-from device_runs import standing
 from kickstand_tools.simulated_board.radio import Radio
 from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
-from phones import PLACES, Phone
+from support.device_runs import standing
+from support.simulated_phones import PLACES, Phone
 
 WARM = 200  # acts until everything has been imported and every buffer has its size
 ACTS = 400

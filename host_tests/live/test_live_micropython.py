@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from mpy import BOARD_HEAP, run_tests
+from support.mpy import BOARD_HEAP, run_tests
 
 
 def test_the_same_on_micropython():

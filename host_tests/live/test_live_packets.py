@@ -1,10 +1,10 @@
-"""Each field of each packet against the README's tables, at its limits too."""
+"""Each field of each packet against the tables of firmware/docs/live.md, at its limits too."""
 
 import types
 
 import pytest
 from kickstand.live import packets
-from published import channels, own
+from support.radio_decoder import channels, own
 
 
 @pytest.fixture

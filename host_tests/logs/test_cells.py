@@ -3,12 +3,12 @@
 import contextlib
 import io
 
-import command
 import numpy as np
 import pytest
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_blocks, read_log
+from support import command
 
 HEADER = command.HEADER + ",speed_mps,temp_c,lat_deg,lon_deg,utc_s"
 # The widest ranges of the chips are 16 g and 2000 deg/s, of which more is another unit; their data sheets end at 85 C.

@@ -2,8 +2,8 @@
 
 import gzip
 
-import command
 import pytest
+from support import command
 
 ROW = "0.00,0,0,1,0,0,0"
 GOOD = [f"{k / 100:.2f},0.01,-0.02,1.01,0.5,-0.5,0.1" for k in range(20)]

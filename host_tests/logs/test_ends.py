@@ -2,14 +2,14 @@
 
 import gzip
 
-import analysis_rides
-import command
 import numpy as np
 import pytest
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.refusals import sentence
+from support import command
+from support.recordings import analysis_rides
 
 ROWS = [f"{k / 100:.2f},0.{k % 9}1,-0.02,1.01,0.5,-0.5,0.1{k % 7}" for k in range(400)]
 WHOLE = ("\n".join([command.HEADER, *ROWS]) + "\n").encode()

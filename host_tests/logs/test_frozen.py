@@ -1,7 +1,5 @@
 """Readings that froze are a gap, not a standstill; a quiet sensor at rest is no frozen one."""
 
-import analysis_rides
-import command
 import numpy as np
 import pytest
 from kickstand_tools.analysis import report
@@ -12,6 +10,8 @@ from kickstand_tools.logs import reader
 from kickstand_tools.logs.frozen import without_frozen
 from kickstand_tools.logs.reader import read_blocks
 from kickstand_tools.refusals import sentence
+from support import command
+from support.recordings import analysis_rides
 
 HZ = 100
 REST = np.array([0.012, 0.985, 0.171, 0.4, -1.1, 0.2])  # g, deg/s: at rest, with a gyro's bias

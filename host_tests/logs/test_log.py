@@ -5,7 +5,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-import command
 import numpy as np
 import pytest
 from kickstand_tools.calibration.file import calibration_path
@@ -14,6 +13,7 @@ from kickstand_tools.logs import reader
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import is_log, read_blocks, read_log, read_twice
 from kickstand_tools.logs.source import log_stem, name_of, total_bytes
+from support import command
 
 FORCE, RATE = [0.1, 0.2, 0.9], [1.0, 2.0, 3.0]
 

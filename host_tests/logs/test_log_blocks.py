@@ -3,13 +3,13 @@
 import gzip
 import tracemalloc
 
-import command
 import numpy as np
 import pytest
 from kickstand_tools.checks import cells
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.csv_reader import numbers_in
+from support import command
 
 HEADER = command.HEADER + ",temp_c,speed_mps"
 

@@ -5,8 +5,6 @@ import json
 import warnings
 from pathlib import Path
 
-import command
-import mutations
 import numpy as np
 import pytest
 from kickstand_tools.analysis import report
@@ -24,6 +22,8 @@ from kickstand_tools.logs.csv_lines import cut_log
 from kickstand_tools.replay.replay import replay_to_csv
 from kickstand_tools.simulation.scripted import script
 from rich.console import Console
+from support import command
+from support.recordings import broken_logs
 
 COUNT = 1000
 CALIBRATION = CalibrationFile(aligned=True)
@@ -77,10 +77,10 @@ def test_each_ends_in_a_result_or_in_one_line(bases, tmp_path):
     results, lines = 0, set()
     use_of = list(USES)
     for number in range(COUNT):
-        name, content, ways = mutations.broken(bases, number)
+        name, content, ways = broken_logs.broken(bases, number)
         log, out = tmp_path / name, tmp_path / "OUT"
         log.write_bytes(content)
-        uses = [use_of[(number // len(mutations.WAYS) + k) % len(use_of)] for k in (0, 3)]
+        uses = [use_of[(number // len(broken_logs.WAYS) + k) % len(use_of)] for k in (0, 3)]
         for use in uses:
             where = f"number {number} ({ways}) in {use}"
             try:

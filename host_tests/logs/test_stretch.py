@@ -5,14 +5,14 @@ import io
 import json
 import os
 
-import analysis_rides
-import command
 import pytest
 from kickstand_tools import api
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.log import Stretch
 from kickstand_tools.logs.reader import read_blocks, read_log, read_twice
+from support import command
+from support.recordings import analysis_rides
 
 ROWS = [f"{7 + k / 100:.2f}, 0.{k % 9}1,-0.02,1.01,0.5,-0.5,0.1{k % 7},note {k}" for k in range(1000)]
 HEADER = command.HEADER + ",note"

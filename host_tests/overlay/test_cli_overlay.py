@@ -4,22 +4,22 @@ import os
 import subprocess
 from typing import Any
 
-import analysis_rides
-import command
 import numpy as np
 import pytest
 from kickstand_tools import api
+from support import command
+from support.recordings import analysis_rides
 
 pytest.importorskip("imageio_ffmpeg")
 pytest.importorskip("PIL")
 
-import gopro
 import imageio_ffmpeg
 from kickstand_tools.overlay.gauge import Gauge
 from kickstand_tools.overlay.gpmf import telemetry
 from kickstand_tools.overlay.overlay import MARGIN
 from kickstand_tools.overlay.shown import shown
 from kickstand_tools.overlay.video import open_video
+from support.recordings import gopro
 
 
 @pytest.fixture(scope="module")

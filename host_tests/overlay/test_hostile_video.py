@@ -4,9 +4,9 @@ import random
 import struct
 from pathlib import Path
 
-import mutations
 import numpy as np
 from kickstand_tools.overlay import gpmf, video
+from support.recordings import broken_logs
 
 
 def item(name, kind, size, count, body):
@@ -22,7 +22,7 @@ def test_mutated_readings_of_a_camera_are_numbers_or_nothing():
     for number in range(500):
         chance = random.Random(number)
         change = chance.choice(
-            (mutations.flip_bytes, mutations.cut_end, mutations.cut_a_piece, mutations.put_nul_bytes)
+            (broken_logs.flip_bytes, broken_logs.cut_end, broken_logs.cut_a_piece, broken_logs.put_nul_bytes)
         )
         for values in gpmf.streams(change(packet, chance), b"GYRO"):
             assert values.ndim == 2 and values.shape[1] == 3

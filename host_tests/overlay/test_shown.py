@@ -2,12 +2,12 @@
 
 from dataclasses import replace
 
-import analysis_rides
 import numpy as np
 import pytest
 from kickstand.errors import Notice
 from kickstand_tools import api
 from kickstand_tools.overlay.shown import shown
+from support.recordings import analysis_rides
 
 
 @pytest.fixture(scope="module")

@@ -3,14 +3,14 @@
 import csv
 import json
 
-import analysis_rides
-import command
 import numpy as np
 import pytest
 from kickstand.calibration.two_position import two_position
 from kickstand_emulator import image
 from kickstand_tools.common import unix_port
 from kickstand_tools.replay import replay, replay_engine
+from support import command
+from support.recordings import analysis_rides
 
 
 def replayed(log, cal, engine="cpython"):

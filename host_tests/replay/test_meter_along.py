@@ -7,13 +7,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-import smoothed_rides
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.csv_lines import write_log
 from kickstand_tools.logs.reader import read_blocks, read_log
 from kickstand_tools.replay import replay, replay_engine
 from kickstand_tools.replay.meter_along import MeterAlong
+from support.recordings import smoothed_rides
 
 BY_NUMPY = ("lean_formula_deg", "static_lean_deg")  # its arc functions may differ in the last digit of a double
 

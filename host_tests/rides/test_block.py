@@ -4,9 +4,9 @@ import types
 from binascii import crc32
 
 import pytest
-import ride_writer
 from kickstand.rides import block as block_format
 from kickstand.rides.block import RideBlock, block_length
+from support.recordings import ride_writer
 
 
 def some_turns(count):

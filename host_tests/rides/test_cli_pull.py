@@ -6,14 +6,13 @@ import os
 import types
 from pathlib import Path
 
-import command
-import fake_board
 import numpy as np
 import pytest
-import ride_writer
 from kickstand import __version__
 from kickstand.rides import ride_paths
 from kickstand_tools.logs.reader import read_log
+from support import command, fake_board
+from support.recordings import ride_writer
 
 
 @pytest.fixture

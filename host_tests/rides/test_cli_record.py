@@ -12,14 +12,13 @@ import signal
 import types
 from itertools import pairwise
 
-import command
-import fake_board
 import pytest
-import ride_writer
 from kickstand_tools.deploy import board_console
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.rides import stream
-from watched import Watched, watched
+from support import command, fake_board
+from support.recordings import ride_writer
+from support.watched_stderr import Watched, watched
 
 
 class Clocks:

@@ -15,14 +15,13 @@ import time
 import types
 from pathlib import Path
 
-import command
-import fake_board
 import pytest
-import ride_writer
 from kickstand.rides import ride_paths
 from kickstand_tools.common import output
 from kickstand_tools.deploy import board_console
 from kickstand_tools.logs.reader import read_log
+from support import command, fake_board
+from support.recordings import ride_writer
 from test_cli_pull import left, put
 from test_cli_record import Clocks, Stream, Streaming, half_seconds
 

@@ -2,10 +2,7 @@
 
 from itertools import pairwise
 
-import devices
-import engines
 import pytest
-from devices import ALIGNED
 from kickstand.lean.meter import LeanMeter
 from kickstand.rides.flash_ring import RideRing
 from kickstand_tools.calibration.file import read_calibration
@@ -13,6 +10,8 @@ from kickstand_tools.logs.reader import read_blocks
 from kickstand_tools.replay import replay_engine
 from kickstand_tools.rides import block_reader, ride_log
 from kickstand_tools.simulated_board.simulator import Board
+from support import device_plans, engines
+from support.device_plans import ALIGNED
 
 SHORT, LONG = 0.15, 1.2
 
@@ -74,7 +73,7 @@ def test_a_recorded_ride_replays_as_the_display_showed(engine, tmp_path, compute
     """Recorded from power-on: one ride before the alignment and one after it, which a power cut ends."""
     flash = tmp_path / "flash"
     flash.mkdir()
-    record = devices.run(engine, flash, {**ALIGNED, "seed": 2, "config": {"RECORD": True}})
+    record = device_plans.run(engine, flash, {**ALIGNED, "seed": 2, "config": {"RECORD": True}})
     showed = list(computed)  # a copy, because the replay below computes leans as well
     found, problems = rides(flash)
     assert sorted(found) == [1, 2]
@@ -94,7 +93,7 @@ def test_a_recorded_ride_replays_as_the_display_showed(engine, tmp_path, compute
 
 def test_a_fault_of_the_sensor_in_a_ride_is_replayed(tmp_path, computed):
     """The sensor is set up again, the filter starts again, and the ride goes on in the same file."""
-    devices.align(tmp_path)
+    device_plans.align(tmp_path)
     plan = {
         "ride": [["upright", 4.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 5.0], ["turn", 40.0, 5.0]],
         "faults": [["supply_dip", [16.0]]],
@@ -102,7 +101,7 @@ def test_a_fault_of_the_sensor_in_a_ride_is_replayed(tmp_path, computed):
         "until": 30,
     }
     computed.clear()
-    record = devices.run("cpython", tmp_path, plan)
+    record = device_plans.run("cpython", tmp_path, plan)
     exact = list(computed)
     assert record.first("Sensor reset") < 18
     found, problems = rides(tmp_path)
@@ -141,7 +140,7 @@ def test_a_wheel_is_not_misread_while_flash_is_erased(tmp_path, monkeypatch):
         "config": {"SPEED": "wheel", "PULSES_PER_METRE": 3.0, "RECORD": True, "VEHICLE": "car"},
         "until": 45,
     }
-    devices.run("cpython", tmp_path, plan)
+    device_plans.run("cpython", tmp_path, plan)
     assert len(writes) > 16 * 5
     turns = [turn for block in rides(tmp_path)[0][1] for turn in block.turns]
     speeds = [turn.speed_mps for turn in turns if turn.speed_mps is not None and turn.time_us > 8e6]
@@ -150,10 +149,10 @@ def test_a_wheel_is_not_misread_while_flash_is_erased(tmp_path, monkeypatch):
 
 
 def test_the_menu_starts_and_ends_a_ride(tmp_path):
-    devices.align(tmp_path)
+    device_plans.align(tmp_path)
     pages = [[16 + i, SHORT] for i in range(6)]
     plan = {"lean": [[0, 0], [20, 10]], "presses": [*menu(8), *pages, *menu(30)], "until": 40}
-    record = devices.run("cpython", tmp_path, plan)
+    record = device_plans.run("cpython", tmp_path, plan)
     assert 12 < record.first("Record ride") < 14
     assert record.at(15.9)[0].startswith("Rec         0:0") or record.at(15.9)[0].endswith("*")
     assert record.at(20.8)[0] in ("Rec         0:05", "Rec         0:06")

@@ -6,9 +6,9 @@ from itertools import pairwise
 from types import SimpleNamespace
 
 import pytest
-import ride_writer
 from kickstand.errors import CardError, Notice
 from kickstand_tools.rides import block_reader
+from support.recordings import ride_writer
 
 TURN_US = 10_000
 

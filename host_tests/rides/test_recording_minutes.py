@@ -1,15 +1,15 @@
-"""How long a board records, as firmware/README.md says, from the firmware's own numbers."""
+"""How long a board records, as firmware/docs/rides.md says, from the firmware's own numbers."""
 
 import re
 import types
 from pathlib import Path
 
 import pytest
-import ride_writer
 from kickstand.rides import flash_ring, ride_paths
 from kickstand.rides.flash_ring import RideRing
+from support.recordings import ride_writer
 
-README = Path(__file__).resolve().parents[2] / "firmware" / "README.md"
+PAGE = Path(__file__).resolve().parents[2] / "firmware" / "docs" / "rides.md"
 BYTES_S = 1024  # what the recorder assumes until a block is measured
 # Bytes of the file system that MicroPython's images make: ports/rp2/boards/*/mpconfigboard.cmake,
 # ports/esp32/partitions-4MiBplus.csv
@@ -17,7 +17,7 @@ FLASH_KB = {"Pico": 1408, "Pico W": 848, "Pico 2": 3072, "Pico 2 W": 2560, "ESP3
 
 
 def rows():
-    section = README.read_text(encoding="utf-8").partition("| recorded to |")[2].partition("\n\n")[0]
+    section = PAGE.read_text(encoding="utf-8").partition("| recorded to |")[2].partition("\n\n")[0]
     return {name.strip(): int(value) for name, value in re.findall(r"^\| ([^|]+) \| (\d+) ", section, re.MULTILINE)}
 
 

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from mpy import run_mpy
+from support.mpy import run_mpy
 
 SECTOR_S = 3.1e-3  # at 1.32 MHz, with the commands
 TURN_S, BEGIN_S = 0.1, 1.0

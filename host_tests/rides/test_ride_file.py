@@ -10,15 +10,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import ride_writer
 from kickstand import __version__
 from kickstand.calibration import store
 from kickstand.rides import block as block_format
 from kickstand_tools.calibration.file import read_calibration
 from kickstand_tools.replay.replay import replay
 from kickstand_tools.rides import block_reader, ride_log, stream
-from mpy import run_mpy
-from ride_writer import CHIP
+from support.mpy import run_mpy
+from support.recordings import ride_writer
+from support.recordings.ride_writer import CHIP
 
 _EXTREMES = [
     ([32767] * 7, 1, 1),

@@ -2,14 +2,13 @@
 
 import struct
 
-import devices
-import engines
 import numpy as np
 import pytest
-import ride_writer
 from kickstand.rides import block as block_format
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.rides import block_reader, ride_log
+from support import device_plans, engines
+from support.recordings import ride_writer
 from test_recorder import rides
 
 MIDNIGHT_S = 1_798_761_600.0  # 1 January 2027
@@ -74,7 +73,7 @@ def test_a_recorded_ride_says_where_it_was(engine, tmp_path):
         "config": {"RECORD": True, "SPEED": "gps", "GPS_BAUD": 38400},
         "until": 14,
     }
-    devices.run(engine, tmp_path, plan)
+    device_plans.run(engine, tmp_path, plan)
     (blocks,) = rides(tmp_path)[0].values()
     ride_log.write(tmp_path / "ride.csv", blocks)
     log = read_log(tmp_path / "ride.csv")

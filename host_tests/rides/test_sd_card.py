@@ -3,10 +3,10 @@ The whole device on the simulated board, with MicroPython's own FAT."""
 
 import base64
 
-import devices
 import pytest
 from kickstand_tools.common import unix_port
 from kickstand_tools.rides import block_reader
+from support import device_plans
 
 pytestmark = pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
 
@@ -16,7 +16,7 @@ RIDE = {"lean": [[0, 0], [8, 20]], "until": 35, "config": PINS}
 
 def run(flash, card=None, **plan):
     """A ride with this card, on a board that was aligned before if the plan says so."""
-    return devices.run("micropython", flash, {**RIDE, "card": card or {}, **plan})
+    return device_plans.run("micropython", flash, {**RIDE, "card": card or {}, **plan})
 
 
 def blocks(record):
@@ -51,9 +51,9 @@ def test_a_card_records_and_costs_no_reading_and_little_time(tmp_path):
 
 def test_without_a_card_nothing_waits_for_one(tmp_path):
     plan = {**RIDE, "config": {"RECORD": True}, "until": 5}
-    shown = devices.run("micropython", tmp_path, plan).first("Raw")
+    shown = device_plans.run("micropython", tmp_path, plan).first("Raw")
     plan["config"] = {}
-    assert shown == devices.run("micropython", tmp_path, plan).first("Raw") < 0.7
+    assert shown == device_plans.run("micropython", tmp_path, plan).first("Raw") < 0.7
 
 
 def test_a_card_that_is_busy_as_cards_may_be_loses_nothing(tmp_path):

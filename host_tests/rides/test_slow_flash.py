@@ -4,15 +4,15 @@ a lean that is wrong for it is not shown as good."""
 import gc
 import re
 
-import devices
 import pytest
 from kickstand.lean.meter import LeanMeter
 from kickstand_tools.rides import block_reader
 from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted import script
+from support import device_plans
 
 SHORT, LONG = 0.15, 1.2
-BENDS = devices.RIDE[:3] + [["turn", -40.0, 3.0], ["turn", 40.0, 3.0]] * 6 + [["straight", 6.0]]
+BENDS = device_plans.RIDE[:3] + [["turn", -40.0, 3.0], ["turn", 40.0, 3.0]] * 6 + [["straight", 6.0]]
 FROM_S, UNTIL_S = 22.0, 70.0
 # WHO_AM_I, how long an erase takes, and for how long the FIFO keeps the samples
 PARTS = {"1024 bytes": (0x68, 0.40, 0.365), "512 bytes": (0x70, 0.25, 0.180)}
@@ -47,14 +47,14 @@ def run(request, tmp_path_factory):
     who_am_i, erase_s, fifo_s = PARTS[request.param]
     flash = tmp_path_factory.mktemp("flash")
     plan = {"seed": 2, "board": {"who_am_i": who_am_i}}
-    devices.run("cpython", flash, {**devices.ALIGNED, **plan, "until": 20})
+    device_plans.run("cpython", flash, {**device_plans.ALIGNED, **plan, "until": 20})
     info = [[56.5, LONG], *([58.5 + i, SHORT] for i in range(3)), [62.5, LONG]]
     faults = [["slow_flash", [0.0, 1000.0, erase_s]]]
     config = {"RECORD": True}
     plan |= {"ride": BENDS, "config": config, "faults": faults, "presses": info, "until": UNTIL_S}
     with pytest.MonkeyPatch.context() as monkeypatch:
         seen = Seen(monkeypatch)
-        record = devices.run("cpython", flash, plan)
+        record = device_plans.run("cpython", flash, plan)
     return record, seen.turns, blocks(flash), erase_s, fifo_s
 
 

@@ -4,12 +4,11 @@ lean goes on."""
 import binascii
 import contextlib
 
-import devices
-import engines
 import pytest
 from kickstand import console, errors
 from kickstand_tools.rides.block_reader import parse
 from kickstand_tools.simulated_board.simulator import Board
+from support import device_plans, engines
 
 FROM_S, FOR_S = 20.0, 600.0
 
@@ -33,10 +32,10 @@ def blocks(said):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_the_stream_ends_itself_and_the_lean_goes_on(engine, tmp_path, capsys):
-    devices.align(tmp_path)
+    device_plans.align(tmp_path)
     capsys.readouterr()
     plan = {"stream": True, "lean": [[0, 0], [24, 20]], "faults": [["usb_asleep", [FROM_S, FOR_S]]], "until": 40}
-    record = devices.run(engine, tmp_path, plan, capsys)
+    record = device_plans.run(engine, tmp_path, plan, capsys)
     assert FROM_S < record.first("USB not read") < FROM_S + 3.0
     assert record.at(39)[0] == "Lean  20° right "
     assert record.first("Lean  20° right ") < 28  # as soon as without the stream: it stalls no more

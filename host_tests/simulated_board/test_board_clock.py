@@ -1,10 +1,10 @@
 """The virtual clock and the `time` built on it."""
 
 import kickstand_tools.simulated_board.clock as clock_module
-from board_access import level, raised
 from kickstand_tools.simulated_board.clock import Clock, PowerOff
 from kickstand_tools.simulated_board.fakes import fake_time
 from kickstand_tools.simulated_board.simulator import Board
+from support.board_access import level, raised
 
 
 def test_the_deadline_stops_the_clock_and_stays():

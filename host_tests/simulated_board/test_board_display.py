@@ -4,8 +4,8 @@ under MicroPython."""
 import gc
 import sys
 
-from board_access import on_board
 from kickstand_tools.simulated_board.lcd import Lcd
+from support.board_access import on_board
 
 OLEDS = ("ssd1306", "sh1106")
 KINDS = ("lcd",) + OLEDS

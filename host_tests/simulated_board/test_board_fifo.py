@@ -1,6 +1,6 @@
 """The MPU6050's FIFO."""
 
-from board_access import read, write
+from support.board_access import read, write
 from test_board_sensor import awake
 
 FRAME = 12

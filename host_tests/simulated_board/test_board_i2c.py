@@ -2,9 +2,9 @@
 
 import errno
 
-from board_access import firmware, on_board, raised
 from kickstand_tools.simulated_board.fakes import fake_machine, fake_time
 from kickstand_tools.simulated_board.fakes.fake_machine import I2C, Pin, SoftI2C
+from support.board_access import firmware, on_board, raised
 
 
 def open_sensor(freq=400_000, timeout=5000):

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from mpy import BOARD_HEAP, run_tests
+from support.mpy import BOARD_HEAP, run_tests
 
 
 @pytest.mark.parametrize("name", ["display", "oled", "place", "speed"])

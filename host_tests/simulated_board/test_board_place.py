@@ -1,8 +1,8 @@
 """Positions of a GPS receiver: the firmware's driver on the simulated board. Runs on MicroPython too."""
 
-from board_access import level
 from kickstand_tools.simulated_board.gps import sentence
 from kickstand_tools.simulated_board.simulator import Board
+from support.board_access import level
 from test_board_speed import Listing
 
 DAY = 26 << 9 | 11 << 5 | 21  # 21 November 2026

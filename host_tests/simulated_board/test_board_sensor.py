@@ -1,8 +1,8 @@
 """The MPU6050 at its registers."""
 
-from board_access import counts, level, read, write
 from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.mpu6050 import START_UP_US, WAKE_US, Mpu6050
+from support.board_access import counts, level, read, write
 
 
 def ramp(t_s):

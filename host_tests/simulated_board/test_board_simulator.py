@@ -2,10 +2,10 @@
 
 import sys
 
-from board_access import firmware, level, on_board, raised
 from kickstand_tools.simulated_board.fakes import fake_machine, fake_time
 from kickstand_tools.simulated_board.fakes.fake_machine import WDT, Pin
 from kickstand_tools.simulated_board.simulator import Board
+from support.board_access import firmware, level, on_board, raised
 
 
 def test_power_is_lost_by_off_and_kept_by_reset():

@@ -1,8 +1,8 @@
 """Speed from GPS and wheel: the firmware's drivers on the simulated board. Runs on MicroPython too."""
 
-from board_access import level
 from kickstand_tools.simulated_board.gps import sentence
 from kickstand_tools.simulated_board.simulator import Board
+from support.board_access import level
 
 STEP_US = 10_000
 

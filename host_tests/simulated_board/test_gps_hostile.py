@@ -2,8 +2,8 @@
 
 import random
 
-from board_access import level
 from kickstand_tools.simulated_board.simulator import Board
+from support.board_access import level
 from test_board_speed import Listing
 
 

@@ -85,7 +85,8 @@ def test_bands_are_those_of_a_sine():
 
 
 def test_simulated_roads_reach_what_a_real_motorcycle_meets():
-    """Through town (see the README): vertical 0.078 g from 1 to 3 Hz and 0.151 g from 3 to 10, between C and D."""
+    """Through town (tools/docs/simulation.md): vertical 0.078 g from 1 to 3 Hz and 0.151 g from 3 to 10,
+    between C and D."""
     calm, rough = (of_simulated("street", 0, 100.0, road, None)[QUANTITIES[0]] for road in "CD")
     assert len(calm) == len(BANDS_HZ)
     assert calm[3] < 0.151 and rough[3] > 0.078

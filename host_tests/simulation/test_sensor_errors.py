@@ -82,7 +82,7 @@ for n in range(60):
 
 @pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
 def test_the_same_readings_under_micropython():
-    import mpy
+    from support import mpy
 
     here: dict = {}
     exec(_BOTH, here)

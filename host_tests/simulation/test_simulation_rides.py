@@ -4,12 +4,12 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from command import refused, works
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.simulation.files import simulate
 from kickstand_tools.simulation.physics.chip import RATE_HZ
 from kickstand_tools.simulation.profiles import PROFILES
 from kickstand_tools.simulation.ride import ride
+from support.command import refused, works
 
 SHORT_S = 150.0
 

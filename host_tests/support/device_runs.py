@@ -9,10 +9,10 @@ import json
 import math
 import sys
 
-import cards
-import phones
 from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted import script, sensor_errors
+
+from support import sd_cards, simulated_phones
 
 FRAME_S = 0.1
 
@@ -99,9 +99,9 @@ class Device:
         getattr(self.board, "fit_" + source)(lambda t_s: ride.truth(t_s)[1], **model)
 
     def fit_card(self, formatted=True, fsinfo=True, faults=(), **model):
-        """An SD card, as cards.format_card() leaves it. faults: [[at_s, attribute, value], ...]."""
+        """An SD card, as sd_cards.format_card() leaves it. faults: [[at_s, attribute, value], ...]."""
         self.board.fit_card(**model)
-        cards.format_card(self.board.card, formatted, fsinfo)
+        sd_cards.format_card(self.board.card, formatted, fsinfo)
         for at_s, attribute, value in faults:
             self.board.at(at_s, lambda attribute=attribute, value=value: setattr(self.board.card, attribute, value))
 
@@ -135,13 +135,13 @@ class Device:
         if self.phones:
             seen["phones"] = [phone.record() for phone in self.phones]
         if board.card:
-            seen["rides"], seen["card_hz"] = cards.rides(board), board.card.most_hz
+            seen["rides"], seen["card_hz"] = sd_cards.rides(board), board.card.most_hz
         return seen
 
     def _run_until(self, until_s, main):
         end = "reset"
         while end == "reset":
-            cards.eject()
+            sd_cards.eject()
             end = self.board.run(main, until_s)
             self.ends.append(end)
 
@@ -196,7 +196,7 @@ def run_device(plan):
     or "poses" as for poses_of; "seed" of the part (None: perfect); "presses" [[at_s, for_s], ...];
     "faults" [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...];
     "gps", "wheel" and "card": arguments of Device's methods; config "VEHICLE" "car": the ride is a car's; "remount"
-    [at_s, seed of the mounting from then on]; "phones": [[[at_s, what a Phone of phones.py does, arguments...], ...],
+    [at_s, seed of the mounting from then on]; "phones": [[[at_s, what a simulated Phone does, arguments...], ...],
     ...], one after the other; "stream" True: as `kickstand record` starts it.
     """
     world, ride = _world(plan)
@@ -207,7 +207,7 @@ def run_device(plan):
     if "card" in plan:
         device.fit_card(**plan["card"])
     for acts in plan.get("phones", []):
-        device.phones.append(phones.Phone(device.board, acts))
+        device.phones.append(simulated_phones.Phone(device.board, acts))
     for at_s, for_s in plan.get("presses", []):
         device.board.press(at_s, for_s)
     for method, arguments in plan.get("faults", []):

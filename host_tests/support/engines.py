@@ -3,12 +3,13 @@
 import json
 from pathlib import Path
 
-import firmware_calls
 import pytest
 from kickstand.errors import Refusal
 from kickstand_tools.common import unix_port
 from kickstand_tools.refusals import sentence
-from mpy import run_mpy
+
+from support import firmware_calls
+from support.mpy import run_mpy
 
 SCRIPT = Path(firmware_calls.__file__)
 

@@ -8,7 +8,6 @@ import math
 import sys
 from array import array
 
-import driving_runs
 from kickstand import rotation
 from kickstand.calibration import six_position, two_position
 from kickstand.calibration.parameters import Calibration
@@ -18,6 +17,8 @@ from kickstand.errors import Refusal
 from kickstand.imu import fifo_frames
 from kickstand.lean import formula
 from kickstand.ui import messages
+
+from support import driving_runs
 
 
 def matrix_of(values):

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from kickstand_tools.common import unix_port
 
-HERE = Path(__file__).resolve().parent
+HOST_TESTS = Path(__file__).resolve().parents[1]
 # The models of a board fit. Each time that the app collects its garbage, all of the heap is looked through.
 BOARD_HEAP = "4M"
 _TESTS = """
@@ -38,7 +38,7 @@ def run_mpy(
     if not unix_port.available():
         pytest.skip("no MicroPython unix port for this system")
     environment = unix_port.environment()
-    environment["MICROPYPATH"] = f"{HERE}:{environment['MICROPYPATH']}:{directory or ''}"  # as a board's flash is
+    environment["MICROPYPATH"] = f"{HOST_TESTS}:{environment['MICROPYPATH']}:{directory or ''}"  # as a board's flash is
     with tempfile.TemporaryDirectory() as scratch:
         if isinstance(script, str):
             file = Path(scratch) / "script.py"

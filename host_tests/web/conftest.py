@@ -2,12 +2,12 @@
 
 import threading
 
-import analysis_rides
 import pytest
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.web import serve, site
-from rider import LAPTOP, Rider
-from rides_page import Rides
+from support.recordings import analysis_rides
+from support.web.rider import LAPTOP, Rider
+from support.web.rides_page import Rides
 
 
 @pytest.fixture(scope="session")

@@ -4,9 +4,9 @@ import json
 from pathlib import Path
 
 import pytest
-import repeat
-from mpy import run_mpy
-from rider import Rider
+from support.mpy import run_mpy
+from support.web import page_repeated
+from support.web.rider import Rider
 
 LEAN_DEG = 30
 RIDING_S = 6
@@ -71,7 +71,7 @@ def is_what_the_firmware_shows(rider, flash):
     displays, orders = rider.seen("displays"), rider.seen("orders")
     assert len(displays) > 100
     given = json.dumps({"orders": orders, "until_s": displays[-1][0] + 0.001})
-    said = run_mpy(Path(repeat.__file__), "loop", stdin=given, directory=flash)
+    said = run_mpy(Path(page_repeated.__file__), "loop", stdin=given, directory=flash)
     assert json.loads(said.splitlines()[-1])["displays"] == displays
 
 

@@ -2,19 +2,19 @@
 
 import json
 
-import devices
 import pytest
-from command import works
-from kept import saved
-from rider import PHONE, Rider
+from support import device_plans
+from support.command import works
+from support.web.rider import PHONE, Rider
+from support.web.saved_by_page import saved
 
 pytest.importorskip("bumble", reason="no bumble")
-from bluetooth_bridge import FAKE, Bridge
+from support.web.bluetooth_bridge import FAKE, Bridge
 
 BEGIN_S = 26.0
 # The last part lasts for all of the test, however late a busy machine is
 RIDE = [["kickstand", 8.0], ["upright", 8.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 900.0]]
-PLAN = {"ride": RIDE, "presses": devices.PRESSES, "config": {"LIVE": True}, "until": 900}
+PLAN = {"ride": RIDE, "presses": device_plans.PRESSES, "config": {"LIVE": True}, "until": 900}
 
 LOGGED = """async (packets) => {
   const { BluetoothLog } = await import("./live/bluetooth/log.mjs");
@@ -121,7 +121,7 @@ def packets(tmp_path_factory):
     ride = [*RIDE[:3], *turns, ["straight", 4.0], ["brake", 0.0, 3.0], ["upright", 12.0]]
     acts = [[18.0, "connect"], [18.1, "write", "rate", [40, 0]]]
     plan = {**PLAN, "ride": ride, "board": {"machine": "pico w"}, "phones": [acts], "until": 104}
-    record = devices.run("cpython", tmp_path_factory.mktemp("flash"), plan)
+    record = device_plans.run("cpython", tmp_path_factory.mktemp("flash"), plan)
     return record.phones[0]["packets"], record
 
 

@@ -1,13 +1,13 @@
 """An emulated Pico at the pages Install and Live, one after the other."""
 
 import pytest
-from checked_board import part
-from emulated import calibrated, firmware, leaning, modules, pico, shows
-from kept import recorded, saved, streamed
 from kickstand_tools.simulated_board.lcd import shown_lean
 from kickstand_tools.simulation.scripted.script import Ride, kickstand, upright
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
-from serial_line import SerialLine
+from support.checked_board import part
+from support.emulated import calibrated, firmware, leaning, modules, pico, shows
+from support.web.saved_by_page import recorded, saved, streamed
+from support.web.serial_line import SerialLine
 
 LEAN_DEG = 20.0
 

@@ -3,8 +3,8 @@
 import json
 from pathlib import Path
 
-import repeat
-from mpy import run_mpy
+from support.mpy import run_mpy
+from support.web import page_repeated
 
 # Safe mode too: the button is held while the power comes on
 ORDERS = [
@@ -19,7 +19,7 @@ UNTIL_S = 14.0
 def run(kind, orders, flash):
     flash.mkdir()
     given = json.dumps({"orders": orders, "until_s": UNTIL_S})
-    return json.loads(run_mpy(Path(repeat.__file__), kind, stdin=given, directory=flash).splitlines()[-1])
+    return json.loads(run_mpy(Path(page_repeated.__file__), kind, stdin=given, directory=flash).splitlines()[-1])
 
 
 def test_the_page_turns_the_loop_as_the_firmware_does(tmp_path):

@@ -2,7 +2,7 @@
 
 import json
 
-from mpy import run_mpy
+from support.mpy import run_mpy
 
 _SCRIPT = """
 import json

@@ -3,15 +3,14 @@
 import re
 import types
 
-import command
-import fake_board
 import pytest
-from fake_board import FakeBoard
 from kickstand_tools.deploy import firmware_files
 from kickstand_tools.deploy.bytecode import PICO
-from raw_prompt import RawPrompt
-from rider import Rider
-from serial_line import SerialLine
+from support import command, fake_board
+from support.fake_board import FakeBoard
+from support.web.raw_prompt import RawPrompt
+from support.web.rider import Rider
+from support.web.serial_line import SerialLine
 
 FIRMWARE = firmware_files.contents(PICO)
 

@@ -6,15 +6,15 @@ import json
 import types
 
 import pytest
-import ride_writer
-from fake_board import FakeBoard
-from kept import recorded, saved
 from kickstand.rides import ride_paths
 from kickstand_tools.deploy import connection
 from kickstand_tools.rides.pull import pull
-from raw_prompt import RawPrompt
-from rider import LAPTOP, MISSING, PHONE, Rider
-from serial_line import SerialLine
+from support.fake_board import FakeBoard
+from support.recordings import ride_writer
+from support.web.raw_prompt import RawPrompt
+from support.web.rider import LAPTOP, MISSING, PHONE, Rider
+from support.web.saved_by_page import recorded, saved
+from support.web.serial_line import SerialLine
 
 PLAYED = """async () => {
   const player = new (await import("./live/player.mjs")).Player();

@@ -1,7 +1,7 @@
 """The page for everyone: axe-core finds nothing, in the light and in the dark, on a phone and on a laptop."""
 
 import pytest
-from rider import LAPTOP, PHONE, Rider
+from support.web.rider import LAPTOP, PHONE, Rider
 
 PAGES = {"": "Try", "install.html": "Install", "live.html": "Live"}
 

@@ -3,7 +3,7 @@ nothing they need is stopped."""
 
 import re
 
-from rider import LAPTOP, Rider
+from support.web.rider import LAPTOP, Rider
 
 BOARD_PAGES = ("live.html", "install.html")
 PYTHON = "() => import('./python.mjs').then((m) => m.loadPython([])).then((python) => python.runPython('6 * 7'))"

@@ -4,17 +4,16 @@ import json
 import re
 from pathlib import Path
 
-import analysis_rides
-import app_exports
-import command
 import numpy as np
 import pytest
-from command import works
 from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.plot import charts, interactive
 from kickstand_tools.analysis.ride import open_ride
-from rider import LAPTOP, MISSING, PHONE, Rider
-from rides_page import WAIT_MS, Rides, assert_near, near
+from support import command
+from support.command import works
+from support.recordings import analysis_rides, app_exports
+from support.web.rider import LAPTOP, MISSING, PHONE, Rider
+from support.web.rides_page import WAIT_MS, Rides, assert_near, near
 
 AWAKE = """() => {
   let last = performance.now();

@@ -5,17 +5,15 @@ import gzip
 import json
 from pathlib import Path
 
-import analysis_rides
-import app_exports
-import phone_tracks
 import pytest
-from command import works
 from kickstand_tools.api import CalibrationFile, Log, Track, simulate_ride
 from kickstand_tools.calibration.file import write_calibration
 from kickstand_tools.logs.csv_lines import write_log
 from kickstand_tools.simulation.files import positions
-from rider import LAPTOP, Rider
-from rides_page import PHONE_MOUNTED, WAIT_MS, assert_near, near
+from support.command import works
+from support.recordings import analysis_rides, app_exports, phone_tracks
+from support.web.rider import LAPTOP, Rider
+from support.web.rides_page import PHONE_MOUNTED, WAIT_MS, assert_near, near
 
 DROP = Path(__file__).with_name("drop.js").read_text()
 PULLED = Path(__file__).with_name("keep_pulled.js").read_text()

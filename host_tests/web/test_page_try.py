@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from rider import LAPTOP, Rider
+from support.web.rider import LAPTOP, Rider
 
 ACTIVE = "document.activeElement.id || document.activeElement.value"
 

@@ -2,13 +2,12 @@
 
 import json
 
-import analysis_rides
-import app_exports
 import numpy as np
 import pytest
 from kickstand_tools import remedies
 from kickstand_tools.cli.main import kickstand
 from kickstand_tools.web import rides_guest
+from support.recordings import analysis_rides, app_exports
 
 
 def test_every_remedy_has_words_for_the_page():

@@ -15,11 +15,12 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from command import refused, works
 from kickstand_tools.common import firmware_path
 from kickstand_tools.deploy.firmware_files import firmware_files
 from kickstand_tools.web import archives, npm_packages, serve, site
+from kickstand_tools.web.documents import documents
 from kickstand_workshop.bench import pages
+from support.command import refused, works
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = [path.lstrip("/") for path in firmware_files()]
@@ -102,7 +103,9 @@ def test_every_page_leads_home(files, monkeypatch):
     made = site.site_files()
     assert made["service_worker.js"] != files["service_worker.js"]
     pages = {name: data.decode() for name, data in made.items() if name.endswith(".html")}
-    assert all('<h1><a href="./">' in text and text.count(f'href="{home}"') == 1 for text in pages.values())
+    for name, text in pages.items():
+        to_the_first = "../" if name.startswith(documents.FOLDER) else "./"
+        assert f'<h1><a href="{to_the_first}">' in text and text.count(f'href="{home}"') == 1, name
     assert f'href="{home}/issues/new/choose"' in pages["install.html"]
     assert home not in "".join(data.decode() for name, data in files.items() if name.endswith(".html"))
 
@@ -112,13 +115,13 @@ def test_every_file_is_kept_for_a_time_without_network(files):
     listed = re.search(r"const FILES = (\[.*?\]);", worker)
     assert listed
     large = "esptool/", "firmware.zip", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip", "sample/"
-    later = {name for name in files if name.startswith(large)}
+    later = {name for name in files if name.startswith((*large, documents.FOLDER))}
     assert set(json.loads(listed[1])) == {"./", *files} - {"service_worker.js", "index.html"} - later
     assert "{{" not in worker
 
 
 def test_it_is_small(files):
-    first = [data for name, data in files.items() if not name.startswith(site.LATER)]
+    first = [data for name, data in files.items() if not name.startswith((*site.LATER, documents.FOLDER))]
     assert sum(len(gzip.compress(data)) for data in first) < 1_000_000
 
 
@@ -204,7 +207,7 @@ def test_a_file_is_not_written_over(files, tmp_path):
 def test_every_page_has_a_policy_and_the_charts_have_a_frame_without_rights(files):
     """No script but the site's own runs; what a page frames reaches neither it nor what the browser keeps for it."""
     pages = {name: data.decode() for name, data in files.items() if name.endswith(".html")}
-    assert len(pages) == 4
+    assert len(pages) == 4 + len(documents.PATHS) + 1
     for name, text in pages.items():
         policy = re.findall('<meta http-equiv="Content-Security-Policy" content="([^"]+)">', text)[0]
         assert policy.startswith("default-src 'none'; base-uri 'none'; form-action 'none'; script-src 'self'"), name

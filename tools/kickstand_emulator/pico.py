@@ -1,4 +1,4 @@
-"""The emulated Pico with the parts that are wired to it: for tests, bench, replay and `kickstand emulate`."""
+"""The emulated Pico with the parts wired to it: for tests, bench, replay and `kickstand emulate`."""
 
 from collections.abc import Callable
 from typing import Any
@@ -49,14 +49,14 @@ class Pico(Device):
         self.powered = True
 
     def power_off(self) -> None:
-        """Cut the supply; only the content of the flash is kept."""
+        """Cut the power; only the content of the flash is kept."""
         self.powered = False
         self.chip.power_off()
         self.board.power_off()
         self._reset()
 
     def run(self, seconds: float, between: Callable[[], None] | None = None) -> None:
-        """Let time pass. A PowerCut ends it early; `powered` is then False."""
+        """Advance the time. A PowerCut ends it early; `powered` is then False."""
         if not self.powered:
             self.chip.sleep(seconds)
             return
@@ -79,10 +79,10 @@ class Pico(Device):
         self.chip.stop()
 
     def stall(self, seconds: float) -> None:
-        """Let time pass in which the processor stands still, as in a long flash operation.
+        """Advance the time while the processor is stopped, as in a long flash operation.
 
-        The program itself starts such an operation, never in the middle of an I2C transfer. So this waits until there
-        was no transfer for a millisecond.
+        The program starts such an operation, never in the middle of an I2C transfer. So this waits until there has been
+        no transfer for a millisecond.
         """
         before = None
         while before != (begun := [dict(bus.transfers) for bus in self.board.buses]) or self._transferring():
@@ -110,7 +110,7 @@ class Pico(Device):
         HostLink(self.chip, b"", sink)
 
     def send(self, data: bytes) -> None:
-        """Send data to the board's console as fast as it takes them."""
+        """Send data to the board's console as fast as it accepts them."""
         self.console.send(data)
 
     # The wires

@@ -1,4 +1,4 @@
-"""Encodes the packets for a phone, and decodes its requests. The same tables are in firmware/README.md.
+"""Encodes the packets for a phone, and decodes its requests. The same tables are in firmware/docs/live.md.
 
 An unknown value is never sent as a plausible number: RaceChrono then gets no packet, and our own page gets UNKNOWN.
 """

@@ -19,6 +19,7 @@ class AlignWizard(Wizard):
     pressed: the rider has already pressed the button for the pose on the kickstand.
     """
 
+    name = "align"
     POSE_SECONDS = 3
 
     def __init__(self, chip, rate_hz, calibration, side, pressed=False):
@@ -27,24 +28,29 @@ class AlignWizard(Wizard):
         if pressed:
             self._next_pose()
 
+    @property
+    def upright(self):
+        """True once the pose on the kickstand is taken: the next one is upright."""
+        return self._kickstand is not None
+
     def _start(self):
         self._kickstand = None  # the first pose, once it is taken
         self._show(ASKING, _ASK[0])
 
     def _next_pose(self):
-        self._begin_pose(_TAKING[self._kickstand is not None], "")
+        self._begin_pose(_TAKING[self.upright], "")
 
     def _progress(self, done, total):
         restless = "not still yet" if self._taker.restless else ""
-        self._lines = (_TAKING[self._kickstand is not None], pages.progress_bar(done, total) or restless)
+        self._lines = (_TAKING[self.upright], pages.progress_bar(done, total) or restless)
 
     def _spoilt(self, problem, now_ms):
-        self._show(ASKING, messages.lines(problem))  # the next press takes the pose again
+        self._show(ASKING, messages.lines(problem), problem)  # the next press takes the pose again
 
     def _pose_done(self, pose, now_ms):
         """Keep the first pose; with the second one compute and save the alignment. Raises AlignmentError for poses that
         do not fit together, GyroError where the gyro does not fit them, StoreError."""
-        if self._kickstand is None:
+        if not self.upright:
             self._kickstand, self._kickstand_ms = pose, now_ms
             self._turn.start(pose.gyro)
             self._show(ASKING, _ASK[1])

@@ -12,17 +12,24 @@ _TIMEOUT_MS = const(20_000)
 class Menu:
     """entries: (name of at most 15 characters, what to call with now_ms when it is chosen) each."""
 
+    name = "menu"
+
     def __init__(self, entries, now_ms):
         self._entries = entries + (("Leave menu", None),)
         self._at = 0
         self._until_ms = ticks_add(now_ms, _TIMEOUT_MS)
         self.ended = False
 
+    @property
+    def entry(self):
+        """The name of the entry that is shown."""
+        return self._entries[self._at][0]
+
     def lines(self, now_ms):
         if ticks_diff(now_ms, self._until_ms) >= 0:
             self.ended = True
             return None
-        return ARROW + self._entries[self._at][0], "next %d/%d hold=ok" % (self._at + 1, len(self._entries))
+        return ARROW + self.entry, "next %d/%d hold=ok" % (self._at + 1, len(self._entries))
 
     def press(self, event, now_ms):
         if event == SHORT:

@@ -1,5 +1,5 @@
 """The pages, which a short press turns. A page is a function in pages.py. To add one called load, add
-pages.load to MOTORCYCLE or CAR, and a row to the table of pages in firmware/README.md."""
+pages.load to MOTORCYCLE or CAR, and a row to the table of pages in firmware/docs/displays.md."""
 
 from ..board.button import SHORT
 from ..errors import attempt
@@ -15,8 +15,9 @@ class PageRing:
     LeanMeter, the ActiveCalibration, the BackgroundAlignment or None, and the Recording, all to be read only. align:
     called for a short press while there is no alignment: it means that the bike is on its kickstand.
 
-    late: True if the next page must not show a lean, because it comes too late. live: a Live, which has a page then, or
-    None. draws: True if the display shows pictures. own: the owner's pages, functions that return two lines each.
+    name: of the page that is shown: the name of its function in pages.py, "drive", "live" or "own". late: True if the
+    next page must not show a lean, because it comes too late. live: a Live, which has a page then, or None. draws: True
+    if the display shows pictures. own: the owner's pages, functions that return two lines each.
     """
 
     def __init__(self, leans, meter, calibration, drive, rides, align):
@@ -30,6 +31,7 @@ class PageRing:
         self.late = self.draws = False
         self._glance = None  # the module, once a display draws
         self._glance_tried = False
+        self.name = "not_aligned"
         self.live = None
         self.own = []
 
@@ -67,12 +69,18 @@ class PageRing:
     def _drive_lines(self, now_ms):
         from . import drive_page  # only with a speed source
 
+        self.name = "drive"
         return drive_page.lines(self._drive, now_ms)
+
+    def _own_page(self):
+        self.name = "own"
+        return self.own[self._own_at]()
 
     def lines(self, now_ms):
         if self._own_at is not None:
-            return self.own[self._own_at]()
+            return self._own_page()
         if not self._calibration.aligned:
+            self.name = "not_aligned"
             if not self._driving:
                 return pages.not_aligned(self._meter, now_ms // 1000)
             if self._at % 2 == 0:
@@ -84,12 +92,14 @@ class PageRing:
             self._at = 0
             if self.own:
                 self._own_at = 0
-                return self.own[0]()
+                return self._own_page()
         if self._at == len(self._pages) and self._driving:
             return self._drive_lines(now_ms)
         if self._at == more and self.live:
+            self.name = "live"
             return self.live.lines()
         if self._at >= more:
+            self.name = "recording"
             return pages.recording(self._rides.recorder)
         return self._page(self._pages[self._at])
 
@@ -102,6 +112,7 @@ class PageRing:
 
     def _page(self, page):
         meter, pictures = self._meter, self._pictures
+        self.name = page.__name__
         recording = self._at == 0 and self._rides.recorder.active
         if meter.fallen:
             return pages.FALLEN

@@ -1,7 +1,7 @@
 """A stack of views: the one in front is shown on the display and takes presses of the button.
 
 A view has lines(now_ms), which returns two lines of 16 characters, or None while it has nothing to show, and
-press(event, now_ms), which returns True if it used the press.
+press(event, now_ms), which returns True if it used the press. Its name tells programs which view it is.
 """
 
 import gc
@@ -17,15 +17,19 @@ _NOTICE_MS = const(2000)
 
 
 class NoticeView:
-    """Shows two lines for two seconds. A press ends this early and is passed on to the view below."""
+    """Shows two lines for two seconds. A press ends this early and is passed on to the view below. code: the Notice's,
+    or None."""
+
+    name = "notice"
 
     def __init__(self):
-        self._lines = None
+        self._lines = self.code = None
         self._until_ms = 0
 
-    def show(self, lines, now_ms):
+    def show(self, lines, now_ms, code=None):
         """Show two lines for _NOTICE_MS from now on."""
         self._lines = lines
+        self.code = code
         self._until_ms = ticks_add(now_ms, _NOTICE_MS)
 
     def lines(self, now_ms):
@@ -41,7 +45,8 @@ class NoticeView:
 class View:
     """Made of two functions, lines and press."""
 
-    def __init__(self, lines, press):
+    def __init__(self, name, lines, press):
+        self.name = name
         self.lines = lines
         self.press = press
 
@@ -52,7 +57,7 @@ class Screen:
     starts as well.
 
     wizard: the AlignWizard or SixWizard under way, which takes every sample, or None. menu: the open Menu, or None.
-    pages: the PageRing.
+    pages: the PageRing. front: the view that the display shows.
     """
 
     def __init__(self, settings, sensor, clock, meter, calibration, drive, rides):
@@ -66,19 +71,23 @@ class Screen:
         self.menu = None
         self._notice = NoticeView()
         # why there are no readings
-        self._fault = View(lambda now_ms: sensor.fault and messages.lines(sensor.fault), lambda event, now_ms: False)
+        self._fault = View(
+            "fault", lambda now_ms: sensor.fault and messages.lines(sensor.fault), lambda event, now_ms: False
+        )
         self._clock = clock
         self._info_open = False
-        self._info = View(self._info_lines, self._press_info)
+        self._info = View("info", self._info_lines, self._press_info)
         # a report or a question of alignment by driving
         self._question = View(
-            lambda now_ms: drive and drive.message and messages.lines(drive.message), self._press_question
+            "question", lambda now_ms: drive and drive.message and messages.lines(drive.message), self._press_question
         )
         self.pages = PageRing(settings.leans, meter, calibration, drive, rides, self._align_now)
+        self.front = self.pages
 
     def lines(self, now_ms):
         """What the display should show now: two lines and, where it draws, a picture. Call it about every 100 ms."""
-        return self._update_front(now_ms)[1]
+        self.front, lines = self._update_front(now_ms)
+        return lines
 
     def press(self, event, now_ms):
         """React to a press. event: SHORT or LONG. A long press that the view in front does not use opens the menu. The
@@ -89,7 +98,7 @@ class Screen:
 
     def notify(self, notice, now_ms):
         """Show a Notice for two seconds."""
-        self._notice.show(messages.lines(notice), now_ms)
+        self._notice.show(messages.lines(notice), now_ms, notice.code)
 
     def _press(self, event, now_ms):
         view = self._update_front(now_ms)[0]
@@ -123,7 +132,7 @@ class Screen:
         """Cancel a calibration under way, because the sensor has failed, unless the wizard continues in spite of it."""
         if self.wizard and not self.wizard.bears(self._sensor.fault, now_ms):
             self.wizard = None
-            self._notice.show(("Calibration", "stopped: fault"), now_ms)
+            self._notice.show(("Calibration", "stopped: fault"), now_ms, "stopped")
 
     def _update_front(self, now_ms):
         """Return the view in front and its two lines: the first in this order that has something to show. Drop a

@@ -19,6 +19,8 @@ _MAX_POSES = const(12)  # six sides, a slanted pose, and those that repeat a tur
 class SixWizard(Wizard):
     """See Wizard."""
 
+    name = "six"
+
     def _start(self):
         self._sides = [-1] * 6  # the number of each side's pose, -1 until it is taken
         self._poses, self._turns = [], []  # for SensorFit
@@ -81,10 +83,10 @@ class SixWizard(Wizard):
         return True
 
     def _followed(self, now_ms):
-        if self._state == COMPUTING:
+        if self.state == COMPUTING:
             if next(self._work, True):  # a yield gives None, the end gives True
                 self._computed(now_ms)
-        elif self._spoilt_turn and not self._told and self._state in (TAKING, NOTICE):
+        elif self._spoilt_turn and not self._told and self.state in (TAKING, NOTICE):
             self._told = True  # readings at the end of the range do not come, so lost ones count too
             self._notice(now_ms, "Turned too fast:", "turn it slower")
 

@@ -25,6 +25,8 @@ class Wizard:
 
     chip, rate_hz: as for PoseTaker. calibration: the ActiveCalibration. A subclass says which poses it asks for,
     what it does with each, and how long each takes if it is not POSE_SECONDS.
+
+    state: see above. problem: the Refusal that is shown, or None.
     """
 
     POSE_SECONDS = 2
@@ -38,11 +40,11 @@ class Wizard:
     @property
     def ended(self):
         """True once the wizard is over."""
-        return self._state == _ENDED
+        return self.state == _ENDED
 
     def sample(self, counts, now_ms):
         """Take one sample: 7 counts, the chip's order."""
-        if self._state != TAKING:
+        if self.state != TAKING:
             return
         try:
             step = self._taker.step(counts)
@@ -61,7 +63,7 @@ class Wizard:
 
     def follow(self, sums, n, dt_us, now_ms):
         """Take the sums of the n samples that sample() has just taken, and the microseconds since those before."""
-        self._turn.add(sums, n, dt_us, self._state == TAKING and self._taker.averaging)
+        self._turn.add(sums, n, dt_us, self.state == TAKING and self._taker.averaging)
         try:
             self._followed(now_ms)
         except Refusal as problem:
@@ -76,7 +78,7 @@ class Wizard:
         if isinstance(problem, GyroError):
             report(problem)
         self._turn.running = False
-        self._show(_REFUSED, messages.lines(problem))
+        self._show(_REFUSED, messages.lines(problem), problem)
 
     def _followed(self, now_ms):
         """Called with each pass of the main loop. May raise a Refusal, which is shown."""
@@ -100,25 +102,26 @@ class Wizard:
         """Called with each complete StillPose. May raise a Refusal, which is shown."""
 
     def lines(self, now_ms):
-        if self._state in (NOTICE, RESULT) and ticks_diff(now_ms, self._until_ms) >= 0:
-            if self._state == NOTICE:
+        if self.state in (NOTICE, RESULT) and ticks_diff(now_ms, self._until_ms) >= 0:
+            if self.state == NOTICE:
                 self._next_pose()
             else:
-                self._state = _ENDED
+                self.state = _ENDED
         return None if self.ended else self._lines
 
     def press(self, event, now_ms):
-        if event == LONG or self._state == RESULT:
-            self._state = _ENDED
-        elif self._state == ASKING:
+        if event == LONG or self.state == RESULT:
+            self.state = _ENDED
+        elif self.state == ASKING:
             self._next_pose()
-        elif self._state == _REFUSED:
+        elif self.state == _REFUSED:
             self._start()
         return True
 
-    def _show(self, state, lines):
+    def _show(self, state, lines, problem=None):
         """Go into a state and show two lines."""
-        self._state = state
+        self.problem = problem
+        self.state = state
         self._lines = lines
 
     def _show_for(self, ms, state, now_ms, *lines):

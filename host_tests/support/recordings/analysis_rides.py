@@ -4,9 +4,10 @@ import functools
 import json
 from pathlib import Path
 
-import command
 import numpy as np
 from kickstand_tools.simulation.scripted import script
+
+from support import command
 
 CALIBRATION = {
     "version": 1,

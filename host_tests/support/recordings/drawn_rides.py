@@ -3,7 +3,7 @@
 On the second simulator (other_bike.py), so that nothing is shared with kickstand_tools.simulation. Parameters of the
 estimators are fitted with even seeds only, and figures are reported of odd ones:
 
-    OMP_NUM_THREADS=1 python host_tests/support/recordings/drawn_rides.py odd 100
+    OMP_NUM_THREADS=1 .venv/bin/python -m support.recordings.drawn_rides odd 100
 """
 
 import sys
@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
-from other_bike import FINE_HZ, KINDS, G, _about, _course, _mounting, _noise, _readings, _tolerances
-from smoothed_rides import Known, rms
+
+from support.recordings.other_bike import FINE_HZ, KINDS, G, _about, _course, _mounting, _noise, _readings, _tolerances
+from support.recordings.smoothed_rides import Known, rms
 
 # And how often. "foreign": accelerations that are not the bike's, of whatever shakes or bends the mount
 MOUNTS = {"firm": 0.5, "holder": 0.1, "aliasing": 0.1, "clipping": 0.1, "drifting": 0.1, "foreign": 0.1}

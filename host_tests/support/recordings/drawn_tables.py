@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from app_exports import riding
+
+from support.recordings.app_exports import riding
 
 GRAVITY = 9.80665
 ACCEL_UNITS = {"g": 1.0, "m/s2": GRAVITY, "mg": 1000.0}

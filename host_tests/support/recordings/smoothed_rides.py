@@ -1,5 +1,5 @@
 """Rides of both simulators with sloppy calibrations, with what the display shows of them. As a program: the table of
-tools/README.md, errors of the shown and of the smoothed lean."""
+tools/docs/accuracy.md, errors of the shown and of the smoothed lean."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,8 @@ from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
 from kickstand_tools.simulation.ride import ride
 from kickstand_workshop.evaluation.runs import as_log, calibrated_by_poses
-from other_bike import other_ride
+
+from support.recordings.other_bike import other_ride
 
 
 @dataclass

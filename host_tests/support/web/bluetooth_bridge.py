@@ -9,9 +9,9 @@ import threading
 from concurrent.futures import Future
 from pathlib import Path
 
-import bumble_air
-from device_runs import Device, _world
-from published import SERVICE
+from support import virtual_radio
+from support.device_runs import Device, _world
+from support.radio_decoder import SERVICE
 
 FAKE = Path(__file__).with_name("fake_bluetooth.js").read_text()
 
@@ -34,8 +34,8 @@ class Bridge:
         device = self.device = Device(world, machine="pico w")
         for press in plan["presses"]:
             device.board.press(*press)
-        air = self.air = bumble_air.Air(device.board)
-        self.central = bumble_air.Central(air).at(begin_s - 1, self._serve)
+        air = self.air = virtual_radio.Air(device.board)
+        self.central = virtual_radio.Central(air).at(begin_s - 1, self._serve)
         device.board.at(begin_s, lambda: device.board.clock.set_pace(1.0))
         device.board.every(0.2, self._look_whether_over)
         with contextlib.suppress(SystemExit):

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-import analysis_rides
-import app_exports
 import numpy as np
 import pytest
+
+from support.recordings import analysis_rides, app_exports
 
 WAIT_MS = 120_000  # a busy machine starts Python late
 PHONE_MOUNTED = analysis_rides.CALIBRATION | {"vehicle_from_sensor": app_exports.PHONE.tolist()}

@@ -7,8 +7,8 @@ import base64
 import json
 from pathlib import Path
 
-from raw_prompt import RawPrompt
-from rider import Rider
+from support.web.raw_prompt import RawPrompt
+from support.web.rider import Rider
 
 # Takes the place of navigator.serial. boardSays() and boardHears() are Python's.
 FAKE = Path(__file__).with_name("fake_serial.js").read_text()

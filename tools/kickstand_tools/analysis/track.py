@@ -8,7 +8,7 @@ from ..logs.log import Block
 from ..signals import Array
 from .channels import Channels
 
-GAP_S = 5.0  # in a longer time without a position the place is not known
+GAP_S = 5.0  # after a longer time without a position the place is unknown
 
 
 @dataclass
@@ -20,8 +20,8 @@ class Track:
     lon_deg: Array
 
     def at(self, t_s: Array) -> tuple[Array, Array]:
-        """Latitude and longitude (n) at these times (n), along straight lines, also across 180 degrees; NaN before the
-        first position, after the last, and in gaps of over GAP_S."""
+        """Latitude and longitude (n) at these times (n), interpolated along straight lines, also across 180 degrees.
+        NaN before the first position, after the last, and in gaps of over GAP_S."""
         none = np.full(len(t_s), np.nan)
         if not len(self.t_s):
             return none, none

@@ -7,9 +7,10 @@ the rate p. Rates w and forces f are the readings without the sensor's errors:
     p = (w_x sin t + w_y cos t) / cos q        t' = w_z - p sin q        q' = w_y sin t - w_x cos t
     l' = a_l - p v        v' = a_f + p l        u' = a_u        a: the force in level axes, less 1 g upwards
 
-These are the firmware's kickstand.lean.bike_model without its assumption that there is no motion sideways or up. That
-is a measurement here, with noise: an error of velocity is brief, while accelerations err with every bump. The wheels'
-velocity is the sensor's less the rates times its place (rigid body). The measurements are differences that should be 0:
+These are the equations of the firmware's kickstand.lean.bike_model, without its assumption of no motion sideways or up.
+Here that is a measurement with noise: an error of velocity is brief, while every bump causes errors of acceleration.
+The wheels' velocity is the sensor's minus the rates times the sensor's place (rigid body). The measurements are
+differences that should be 0:
 
     SLIDING      the wheels' velocity sideways: they do not slide
     CLIMBING     their velocity up less that along the chassis: it points along the road, but for its dive in braking,
@@ -34,7 +35,7 @@ SLIDING, CLIMBING, SLOPING, BALANCED, ANY_SPEED, MEASURED_SPEED = range(STATES, 
 RESTING, RESTING_RATE, BACKWARD = slice(14, 17), slice(17, 20), 20
 ROWS = 21
 USUAL_MPS = 15.0  # mean of the speed's prior
-STRAIGHT = 0.1  # rad: lean up to which a road is cambered; in bends that lean more it is banked into the bend
+STRAIGHT = 0.1  # rad: up to this lean a road is cambered; in bends with more lean it is banked into the bend
 STEP = 1e-6  # of finite differences, in the unknowns' units
 
 
@@ -49,7 +50,7 @@ def process_and_measurements(windows: Windows, x: Array) -> Array:
     fx, fy, fz = _corrected(windows.force.T, p, of.ACCEL) + p[of.OFFSET] + p[of.OFFSET_PER_C] * windows.warm
     st, ct, sq, cq = np.sin(t), np.cos(t), np.sin(q), np.cos(q)
     yaw = (wx * st + wy * ct) / cq
-    upright = fx * st + fy * ct  # upward force in axes that pitch but do not lean
+    upright = fx * st + fy * ct  # upward force in axes that pitch but do not lean with the bike
     ahead = (fz * cq - upright * sq) * STANDARD_GRAVITY
     found = np.zeros((ROWS, len(t)))
     found[LEAN] = wz - yaw * sq

@@ -1,4 +1,4 @@
-"""A ride's yaw and forces over the steps of a track, for any shift between their clocks."""
+"""Computes a ride's yaw and forces over the steps of a track, for any shift between their clocks."""
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
@@ -13,7 +13,7 @@ _MOST_SINE = 0.87  # largest sine of the lean; over 60 degrees the speed or the 
 class Comparison:
     """A ride beside a track. A shift is the track's time at the ride's first sample, s since the track's first point.
 
-    given: the segments of the track that lie within the ride, whatever shift within margin_s is the right one.
+    given: the segments of the track that are within the ride for every shift within margin_s.
     """
 
     def __init__(self, motion: Motion, course: Course, segments: Segments, shift_s: float, margin_s: float) -> None:
@@ -66,7 +66,7 @@ def _double_sums(motion: Motion, course: Course, shift_s: float) -> Array:
     cosine = np.asarray(np.sqrt(1.0 - sine * sine), dtype=float)
     turned = _sums(rates / cosine[:, None])
     sped_up = _sums(motion.force_g * STANDARD_GRAVITY)
-    sped_up -= np.linspace(0.0, 1.0, len(sped_up))[:, None] * sped_up[-1]  # without gravity, which would cost digits
+    sped_up -= np.linspace(0.0, 1.0, len(sped_up))[:, None] * sped_up[-1]  # subtract gravity, which would cost digits
     once = np.hstack((turned, sped_up))
     return _sums((once[1:] + once[:-1]) / 2.0)
 

@@ -1,6 +1,6 @@
-"""The yaw of a ride by its sensor alone: no calibration is needed, and the sensor may sit at any angle.
+"""Finds the yaw of a ride from the sensor alone, without a calibration: the sensor may be mounted at any angle.
 
-Up is the mean direction of the force in bends: a motorcycle leans so that the force stays along its own up. The rate
+Up is the mean direction of the force in bends, because a motorcycle leans until the force is along its own up. The rate
 about it is the yaw rate times the cosine of the lean.
 """
 
@@ -23,8 +23,8 @@ _LONGEST_S = 100 * 3600.0  # longest ride, limited by memory
 class Motion:
     """A ride in n cells of STEP_S from its first sample.
 
-    force_g, rate_dps (n, 3): means in the sensor's axes, rates less the gyro's bias. there (n): False where the log has
-    no sample, or frozen readings; force and rate are 0 there. speed, positions: True if the log has any.
+    force_g, rate_dps (n, 3): means in the sensor's axes, rates minus the gyro's bias. there (n): False without samples
+    or with frozen readings; force and rate are then 0. speed, positions: True if the log has any.
     """
 
     force_g: Array
@@ -45,7 +45,7 @@ class Motion:
 
     @property
     def up(self) -> Array:
-        """(3) the bike's up in the sensor's axes, to some degrees, because the accelerometer's bias is in it."""
+        """(3) the bike's up in the sensor's axes, exact to some degrees: it contains the accelerometer's bias."""
         turning = np.minimum(np.linalg.norm(self.rate_dps, axis=1), _MOST_DPS)
         up: Array = turning @ self.force_g
         return up / max(float(np.linalg.norm(up)), 1e-9)
@@ -65,7 +65,7 @@ def motion(ride: Source, progress: Progress | None = None, notices: list[Notice]
     cells = table.evenly(round(_LONGEST_S / STEP_S) + 1)
     if cells is None:
         raise InputError(f"{name_of(ride)}: all readings are frozen: check the sensor")
-    missing = np.zeros((cells.first, 6))  # frozen from the beginning on
+    missing = np.zeros((cells.first, 6))  # frozen from the beginning
     means = np.vstack((missing, cells.means - np.append(np.zeros(3), np.nanmedian(cells.means[:, 3:], axis=0))))
     there = np.append(missing[:, 0], cells.count) > 0
     means[~there] = 0.0

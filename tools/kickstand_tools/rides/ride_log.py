@@ -1,4 +1,4 @@
-"""A recorded ride as the project's log CSV and CAL.json."""
+"""Writes a recorded ride as the project's log CSV and CAL.json."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -17,10 +17,10 @@ def header(track: Sequence[str]) -> tuple[str, ...]:
 
 
 def rows(blocks: Iterable[Block], track: Sequence[str], from_us: int = 0) -> Iterator[list[str]]:
-    """One row a turn of the board's loop: the mean of its samples at the time of the last, in s since from_us.
+    """One row per turn of the board's loop: the mean of its samples at the time of the last one, in s since from_us.
 
-    Values have enough digits to separate one count of the chip from the next. The temperature stands in the first row
-    of each block. track: as header() takes it.
+    Values have enough digits to distinguish single counts of the chip. The temperature is in the first row of each
+    block. track: as for header().
     """
     for block in blocks:
         lsb, gyro_lsb = block.accel_lsb_per_g, block.gyro_lsb_tenths / 10
@@ -49,7 +49,7 @@ def _track_cells(turn: Turn) -> dict[str, str]:
 
 
 def calibration(block: Block) -> CalibrationFile:
-    """The calibration that the lean on the display was computed with, with notes on board and chip."""
+    """The calibration used for the lean on the display, with notes on board and chip."""
     c = block.calibration()
     notes = {"firmware": block.firmware, "who_am_i": f"{block.who_am_i:#04x}", "sample_hz": block.sample_hz}
     return CalibrationFile(

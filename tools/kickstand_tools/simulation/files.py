@@ -34,8 +34,8 @@ def simulate(
     """Simulate a ride of exactly this length and write it to out_dir. conditions: see ride.ride. Raises InputError.
 
     Logs: POSE_1.csv to POSE_7.csv (the last one slanted), SIX.csv (seven poses in one log, with the turns between
-    them), KICKSTAND.csv, UPRIGHT.csv, RIDE.csv. TRUTH.csv has one row for each row of RIDE.csv. A RIDE.cal.json in
-    out_dir is removed. speed: RIDE.csv gets a speed and a position once a second.
+    them), KICKSTAND.csv, UPRIGHT.csv, RIDE.csv. TRUTH.csv has one row per row of RIDE.csv. A RIDE.cal.json in out_dir
+    is removed. speed: RIDE.csv gets a speed and a position once per second.
     """
     check_profile(profile)
     directory = Path(out_dir)
@@ -55,7 +55,7 @@ def simulate(
 
 
 def _cut(made: Ride, seconds: float) -> Ride:
-    """The beginning of a ride."""
+    """The first seconds of a ride."""
     n = min(len(made.time), round(seconds * made.rate_hz))
     truth = {name: values[:n] for name, values in made.truth.items()}
     return replace(made, time=made.time[:n], readings=made.readings[:n], truth=truth, phase=made.phase[:n])
@@ -89,7 +89,7 @@ def _log(time: NDArray, readings: NDArray) -> NDArray:
 
 
 def _write(path: Path, names: Iterable[str], formats: list[str], table: NDArray, *texts: list[str]) -> None:
-    """A CSV file of the table's columns, and of one of each of the texts."""
+    """Write a CSV file with the table's columns, then one column per list of texts."""
     form = ",".join(formats)
     with whole_file(path) as temporary, temporary.open("w", encoding="ascii") as file:
         print(*names, sep=",", file=file)
@@ -98,7 +98,7 @@ def _write(path: Path, names: Iterable[str], formats: list[str], table: NDArray,
 
 
 def write_ride(path: Path, made: Ride, speed: bool) -> None:
-    """Write its log. speed: with a speed and a position once a second."""
+    """Write its log. speed: with a speed and a position once per second."""
     log = _log(made.time, made.readings)
     if not speed:
         _write(path, _LOG, _FORMATS, log)

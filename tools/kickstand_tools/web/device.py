@@ -11,7 +11,6 @@ import json
 
 from ..demo.hand_bike import HandBike
 from ..simulated_board.clock import PowerOff, Reset, to_us
-from ..simulated_board.fakes.fake_time import sleep_us, ticks_add, ticks_diff, ticks_us
 from ..simulated_board.lcd import shown_lean
 from ..simulated_board.oled import Oled
 from ..simulated_board.simulator import Board
@@ -24,6 +23,8 @@ REST_US = 10_000  # steps of the time in which no firmware runs
 CUT_AFTER_BYTES = 40  # of a calibration's record
 FOREVER_S = 1e9
 SHORTEST_PRESS_US = 100_000  # by the board's clock
+STATE = "view", "code", "step", "pose", "entry", "trusted", "fault"
+WHOLE_TICKS = 10  # the longest that a display that keeps changing is not sent
 
 
 class Device:
@@ -37,7 +38,10 @@ class Device:
         self.board = Board(Sensor(seed=PART_SEED, share=PART_SHARE).world(self.bike.motion))
         self.powered = True
         self._ticks = []
-        self._seen = -1  # the display's count of changes at the last tick
+        self._changes = -1  # the display's count of changes at the last tick
+        self._seen = -1  # the same when it was last sent
+        self._held = 0  # ticks for which a change has not been sent
+        self._state = None  # the last that was sent
         self._plugged = True
         self._pressed_us = 0
         self._text = {}
@@ -116,10 +120,27 @@ class Device:
         meter = self.meter()
         if meter:
             tick["meter"] = meter
-        if board.lcd.changes != self._seen:
-            self._seen = board.lcd.changes
-            tick["display"] = self._display()
+        if self._whole():
+            if board.lcd.changes != self._seen:
+                self._seen = board.lcd.changes
+                tick["display"] = self._display()
+            state = self.state()
+            if state != self._state:
+                self._state = tick["state"] = state
         self._ticks.append(tick)
+
+    def _whole(self):
+        """False while the firmware writes to the display: it would be read half-written. Each turn of the firmware's
+        loop writes some characters, and is shorter than a tick."""
+        changes = self.board.lcd.changes
+        still = changes == self._changes
+        self._changes = changes
+        self._held = 0 if still else self._held + 1
+        return still or self._held > WHOLE_TICKS
+
+    def state(self) -> "dict | None":
+        """STATE of App.state(); before there is an App the view is "off", "starting" or "safe"."""
+        return None
 
     def meter(self) -> "list | None":
         """What the lean meter knows: lean_deg, None where it would not be shown, and forward_g, both None before the
@@ -137,7 +158,7 @@ class Device:
     def take(self):
         """What was to be seen every TICK_S since the last call, as JSON: a list of objects with the time t_s, the
         bike's true lean_deg, speed_mps, yaw_rate_dps and phase, powered, the meter, if there is one, and the display,
-        where it has changed."""
+        where it has changed. state() as well, if it has changed."""
         ticks, self._ticks = self._ticks, []
         return json.dumps(ticks)
 
@@ -160,15 +181,12 @@ def display(lcd):
 
 
 class PageDevice(Device):
-    """A Device whose firmware is turned a while at a time, because a page must get its control back: as kickstand.app
-    has a method for one turn of its loop, the loop itself is here once more. A test compares both."""
+    """A Device whose firmware runs a while at a time, because a page must get its control back: it calls App.step(),
+    one pass of the firmware's own loop."""
 
     def __init__(self):
         super().__init__()
-        from kickstand.app import App  # after Board.install()
-
-        setattr(App, "run", lambda app: self._hand_over(app))  # noqa: B010 type checkers know that run() never returns
-        self._app = None  # while its loop is turned
+        self._app = None  # while its loop runs
         self._stopped = False  # main() has ended by itself: safe mode
 
     def order(self, name, value):
@@ -197,36 +215,29 @@ class PageDevice(Device):
         aligned, lean = meter.calibration.aligned, round(meter.lean_deg, 1)
         return [lean if aligned and meter.trusted else None, round(meter.smooth_force[2], 3) if aligned else None]
 
+    def state(self):
+        if not self._app:
+            return {"view": "safe" if self._stopped else "starting" if self.powered else "off"}
+        state = self._app.state()
+        return {name: state[name] for name in STATE}
+
     def _hand_over(self, app):
         """In place of App.run()."""
         self._app = app
 
     def _start(self):
-        from kickstand.board import port
         from kickstand.start import main
 
-        ended = self.board.run(main, FOREVER_S)
+        ended = self.board.run(lambda: main(self._hand_over), FOREVER_S)
         self._stopped = ended == "returned" and self._app is None
         self._ended(ended)
         if self._app:
-            self._watchdog = port.start_watchdog() if self._app.settings.WATCHDOG else None
-            self._due_us = ticks_us()
+            self._ended(self.resume(self._app.begin))
 
     def _turn(self, app, until_us):
-        """App._loop(), but that garbage is collected by the page."""
-        from kickstand.app import LOOP_US
-
-        watchdog, clock = self._watchdog, self.board.clock
+        clock = self.board.clock
         while clock.now_us < until_us:
-            app.turn()
-            if watchdog:
-                watchdog.feed()
-            self._due_us = ticks_add(self._due_us, LOOP_US)
-            wait_us = ticks_diff(self._due_us, ticks_us())
-            if wait_us > 0:
-                sleep_us(wait_us)
-            else:
-                self._due_us = ticks_us()
+            app.step()
 
     def _ended(self, ended):
         if ended != "returned":

@@ -14,6 +14,7 @@ from ..common.templates import filled, source_hash
 from ..pictures import building, lcd, wiring
 from ..pictures.lcd_font import ROM
 from . import archives, npm_packages, sample_ride
+from .documents import documents
 
 PAGE = Path(__file__).resolve().parent / "page"
 # Large, and only for those who have a board or a ride: fetched when they ask for it
@@ -22,6 +23,7 @@ _BOARDS = {"pico": wiring.PICO, "esp32": wiring.ESP32}
 _NARROW = 4  # of the seven poses stand beside each other on a phone
 _SHOWN = ("Kickstand", "starting")  # on the drawn display
 _NOT_KEPT = ("service_worker.js", "index.html")  # the browser keeps the first by itself, the second as "./"
+_WHEN_READ = (*LATER, documents.FOLDER)  # what the browser keeps once it was opened
 
 
 def python_files() -> dict[str, str]:
@@ -45,6 +47,7 @@ def site_files() -> dict[str, bytes]:
     library = files["plotly/plotly.min.js"].decode()
     values["charts"] = " ".join(map(source_hash, (library, *page.SCRIPTS)))  # as a policy names them
     files |= {name: _filled(name, **values) for name in files if name.endswith(".html")}
+    files |= documents.document_files(values["home"])
     files |= {f"sample/{name}": data for name, data in sample_ride.sample_ride().items()}
     files["python.json"] = json.dumps(python_files()).encode()
     files["install.zip"] = archives.install_archive()
@@ -57,7 +60,7 @@ def site_files() -> dict[str, bytes]:
         {name: len(data) for name, data in files.items() if name.startswith(LATER)}
     ).encode()
     version = hashlib.sha256(b"".join(name.encode() + data for name, data in sorted(files.items()))).hexdigest()[:12]
-    kept = sorted(["./", *(name for name in files if name not in _NOT_KEPT and not name.startswith(LATER))])
+    kept = sorted(["./", *(name for name in files if name not in _NOT_KEPT and not name.startswith(_WHEN_READ))])
     files["service_worker.js"] = _filled("service_worker.js", files=kept, version=version)
     return files
 

@@ -1,9 +1,9 @@
 """AiM's CSV from RaceStudio: InlineAcc, LateralAcc and VerticalAcc in g, RollRate, PitchRate and YawRate in deg/s.
 
-Heads and signs as measured on the session tests/test_data/SFJ/*_0101.csv of https://github.com/m3rlin45/libxrk: at rest
-VerticalAcc is -1, LateralAcc and YawRate are positive in a right turn and InlineAcc when speeding up, so the axes are
-forward, right and down. Where VerticalAcc is +1 at rest that channel points up, so its sign is kept; the others are
-treated the same.
+Column names and signs were measured on the session tests/test_data/SFJ/*_0101.csv of
+https://github.com/m3rlin45/libxrk: at rest VerticalAcc is -1. LateralAcc and YawRate are positive in a right turn,
+InlineAcc when speeding up. So the axes are forward, right and down. If VerticalAcc is +1 at rest, that channel points
+up and keeps its sign; the others are treated the same.
 """
 
 import numpy as np
@@ -18,8 +18,8 @@ _ACCEL = ("LateralAcc", "VerticalAcc", "InlineAcc")
 _RATES = ("PitchRate", "YawRate", "RollRate")
 
 
-def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
-    """Each file that says it is AiM's is a recording."""
+def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
+    """Each file with AiM's heading is a recording."""
     return [[file] for file in files if "AiM CSV File" in file.text[:200]]
 
 

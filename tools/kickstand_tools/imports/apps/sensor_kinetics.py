@@ -1,8 +1,8 @@
-"""Sensor Kinetics (Innoventions): NAME_accm.csv, NAME_gyrm.csv and so on, with a time in s from the start, rounded.
+"""Sensor Kinetics (Innoventions): NAME_accm.csv, NAME_gyrm.csv and so on, with a rounded time in s from the start.
 
 Names of the files: https://rotoview.com/multi-sensor-file-system.html and the recordings in
-https://github.com/Intelligent-Systems-Phystech/MobileSensorData, some of which have semicolons and decimal commas, in
-m/s2 and rad/s, at rest with the screen up +9.8 in z.
+https://github.com/Intelligent-Systems-Phystech/MobileSensorData, some of which have semicolons and decimal commas.
+Units are m/s2 and rad/s; at rest with the screen up z is +9.8.
 """
 
 import re
@@ -16,11 +16,11 @@ NAME = "Sensor Kinetics"
 _HEAD = ["time", "x_value", "y_value", "z_value"]
 _UP = "+1 g up, as on Android"
 _KINDS = {"acc": "total", "lac": "user", "grv": "gravity", "gyr": "gyro"}
-_SENSOR = re.compile(r"^(.*?)[_.]?(acc|gyr|grv|lac|mag|rot)m?$")  # the end of a file's name
+_SENSOR = re.compile(r"^(.*?)[_.]?(acc|gyr|grv|lac|mag|rot)m?$")  # the end of a file name
 
 
-def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
-    """The recordings among these files: those whose names are alike but for the sensor's."""
+def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
+    """The recordings among these files: the names of a recording's files differ only in the sensor."""
     alike: dict[str, list[RecordingFile]] = {}
     for file in files:
         head = [cell.lower() for cell in names_in(next(iter(file.first_lines(1)), ""))]

@@ -1,8 +1,9 @@
-"""Sensor Logger (Kelvin Choi): a CSV for each sensor, times in ns since 1970; signs as the phone's system has them.
+"""Sensor Logger (Kelvin Choi): one CSV per sensor, times in ns since 1970, signs as in the phone's system.
 
 Files and units: UNITS.md, signs: COORDINATES.md and CROSSPLATFORM.md of
-https://github.com/tszheichoi/awesome-sensor-logger. Accelerometer.csv has no gravity in it. An iPhone's acceleration
-and gravity have the opposite sign, and AccelerometerUncalibrated is in g, unless "Standardise Units & Frames" was on.
+https://github.com/tszheichoi/awesome-sensor-logger. Accelerometer.csv does not contain gravity. An iPhone's
+acceleration and gravity have the opposite sign, and AccelerometerUncalibrated is in g, unless "Standardise Units &
+Frames" was on.
 """
 
 from ...common.errors import InputError
@@ -12,12 +13,12 @@ from ..recording import Recording, Sensor, names_in, read_sheet, sensor_of, trac
 
 NAME = "Sensor Logger"
 _TOTAL, _RAW, _USER, _GRAVITY = "totalacceleration", "accelerometeruncalibrated", "accelerometer", "gravity"
-_KINDS = {"total": (_TOTAL, _RAW), "user": (_USER,), "gravity": (_GRAVITY,)}  # of two, the first one counts
+_KINDS = {"total": (_TOTAL, _RAW), "user": (_USER,), "gravity": (_GRAVITY,)}  # if both exist, the first is used
 _GYROS = ("gyroscope", "gyroscopeuncalibrated")
 
 
-def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
-    """The recordings among these files, one a folder."""
+def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
+    """The recordings among these files, one per folder."""
     folders = dict.fromkeys(file.folder for file in files if _is_ours(file))
     return [[file for file in files if file.folder == folder] for folder in folders]
 

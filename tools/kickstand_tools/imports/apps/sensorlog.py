@@ -1,8 +1,8 @@
 """SensorLog (Bernd Thomas) on an iPhone or a Watch: one wide CSV, each sensor with its own time since the start of iOS.
 
-Columns as in the example logs at http://sensorlog.berndthomas.net. Values are Core Motion's: accelerations in g that
-read -1 along the axis that points up at rest (https://developer.apple.com/reference/uikit/uiacceleration), also
-gravity and the user's acceleration, whose sum they are; rates in rad/s, right-handed.
+Columns are those of the example logs at http://sensorlog.berndthomas.net. Values are Core Motion's. Accelerations are
+in g and read -1 along the axis that points up at rest (https://developer.apple.com/reference/uikit/uiacceleration),
+they are the sum of gravity and the user's acceleration, which are also given. Rates are in rad/s, right-handed.
 """
 
 import numpy as np
@@ -23,7 +23,7 @@ _KINDS = {"total": ("accelerometer", _ACCEL), "user": ("motion", _USER), "gravit
 _RATE = [f"motionRotationRate{axis}" for axis in "XYZ"]
 
 
-def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
+def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     """Each file that has SensorLog's columns is a recording."""
     return [[file] for file in files if _is_ours(file)]
 
@@ -48,13 +48,13 @@ def _is_ours(file: RecordingFile) -> bool:
 
 
 def _places(sheet: Sheet, names: list[str]) -> list[int]:
-    """The columns of three axes, none where one is missing or holds nothing."""
+    """The columns of three axes; none if one is missing or empty."""
     found, missing = sheet.axes(*names)
     return found if not missing and np.any(np.isfinite(sheet.table(found)).all(axis=1)) else []
 
 
 def _clock(sheet: Sheet, sensor: str) -> Nanoseconds:
-    """A sensor's own times; only the first row of each of its samples has one, for a row repeats what is not new."""
+    """A sensor's own times. Rows repeat old samples; only the first row of each sample gets a time."""
     time_ns = _times(sheet, sensor)
     return np.where(np.diff(time_ns, prepend=NO_TIME) == 0, REPEATED, time_ns)
 
@@ -75,7 +75,7 @@ def _gyro(sheet: Sheet, name: str) -> Sensor:
 
 
 def _utc_ns(sheet: Sheet) -> int | None:
-    """UTC less the time since the start of iOS, by the times at which the rows were logged."""
+    """UTC minus the time since the start of iOS, from the times at which the rows were logged."""
     logged = sheet.place("loggingTime")
     if logged is None:
         return None
@@ -89,7 +89,7 @@ def _utc_ns(sheet: Sheet) -> int | None:
 
 
 def _location(sheet: Sheet) -> Track | None:
-    """The positions and speeds; a fix is new in the row in which its own time has changed."""
+    """The positions and speeds. A fix is new in a row if its own time has changed."""
     row_ns = _times(sheet, "accelerometer" if _places(sheet, _ACCEL) else "motion")
     fix = sheet.place("locationTimestamp_since1970")
     if fix is not None:

@@ -1,4 +1,4 @@
-// What to do next, read from what the display shows: the first minute, and what to look at after a fault.
+// What to do next, from what the firmware shows: the first minute, and what to look at after a fault.
 
 import { shows } from "./shows.mjs";
 
@@ -48,18 +48,18 @@ export class Guide {
   }
 
   /**
-   * The step that fits, or null for the one before. lines: the display's two; shown: the lean that it shows, or null.
+   * The step that fits, or null for the one before. view: as shows() takes it; shown: the lean that it shows, or null.
    * pose: "kickstand", "upright", "ride"; standing: it has come to rest in it. state: {powered, plugged, armed (a save
    * will be cut), time (s), lean_deg: the true one}.
    */
-  next(lines, shown, pose, standing, state) {
-    const { kind } = shows(lines) ?? {};
+  next(view, shown, pose, standing, state) {
+    const { kind } = shows(view) ?? {};
     this.#wanted = WANTED[kind] ?? this.#wanted;
     if (kind === "aligned" || pose === "ride") this.#cut = false;
     return (
       this.#fault(kind, state) ??
-      this.#alignment(kind, lines, pose, standing) ??
-      this.#use(kind, lines, shown, pose, state)
+      this.#alignment(kind, view, pose, standing) ??
+      this.#use(kind, view, shown, pose, state)
     );
   }
 
@@ -89,7 +89,7 @@ export class Guide {
     return null;
   }
 
-  #alignment(kind, lines, pose, standing) {
+  #alignment(kind, view, pose, standing) {
     const stand = this.#wanted === "kickstand";
     const number = stand ? 1 : 2;
     const there = stand ? ON_STAND : UPRIGHT;
@@ -123,7 +123,7 @@ export class Guide {
         if (!standing) return step(number, "The meter says why it has not taken this pose. Wait until it is still.");
         return step(number, "The meter says why it has not taken this pose. Press the button: once more.");
       case "unlike":
-        if (lines[0].startsWith("Same pose")) {
+        if (view.code === "same-pose") {
           return step(1, "Both poses were the same. Press the button, and begin again with the stand.");
         }
         return step(1, "The meter says why it takes neither pose. Press the button, and begin with the stand.");
@@ -134,9 +134,9 @@ export class Guide {
     }
   }
 
-  #use(kind, lines, shown, pose, state) {
+  #use(kind, view, shown, pose, state) {
     if (kind !== "lean" && kind !== "menu" && !PAGES[kind]) return null;
-    if (state.armed) return this.#save(kind, lines, pose);
+    if (state.armed) return this.#save(kind, view, pose);
     if (kind === "menu") {
       return step(0, "The menu: a press goes to the next entry, a long one takes it. It closes after 20 seconds.");
     }
@@ -150,12 +150,12 @@ export class Guide {
   }
 
   /** How to have the firmware save a calibration, which is to be cut. */
-  #save(kind, lines, pose) {
+  #save(kind, view, pose) {
     if (pose !== "kickstand") {
       return step(0, "The power goes in the middle of the next save. Stop for a new alignment.", ON_STAND);
     }
     if (kind !== "menu") return step(0, "Hold the button for a second: the menu comes.");
-    if (lines[0].startsWith("→Align the bike")) return step(0, "Hold the button once more: “Align the bike” is chosen.");
+    if (view.entry === "Align the bike") return step(0, "Hold the button once more: “Align the bike” is chosen.");
     return step(0, "Press until the menu says “Align the bike”, then hold the button for a second.");
   }
 

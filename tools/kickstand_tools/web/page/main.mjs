@@ -28,6 +28,7 @@ const state = { powered: true, plugged: true, armed: false, stopped: false, time
 let display;
 let tick = { t_s: 0, lean_deg: -12, speed_mps: 0, yaw_rate_dps: 0, phase: "kickstand" };
 let screen = { text: ["", ""], shown_deg: null };
+let view = { view: "starting" }; // what the firmware shows
 let words = "–"; // in place of a lean that the display does not show
 let drawn = { t_s: -1 };
 let shownStep = null;
@@ -48,9 +49,12 @@ const board = new Board({
       if (!state.powered) guide.dark(state.armed);
       state.armed = false;
     }
+    if (next.state) {
+      view = next.state;
+      words = shows(view)?.words ?? words;
+    }
     if (next.display) {
       screen = next.display;
-      words = shows(screen.text)?.words ?? words;
       display?.show(screen);
     }
     tell();
@@ -118,7 +122,7 @@ function focusPress() {
 /** The guide's step and the faults, where they have changed. */
 function tell() {
   const standing = tick.phase === settled[steering.pose];
-  const step = guide.next(screen.text, screen.shown_deg, steering.pose, standing, state);
+  const step = guide.next(view, screen.shown_deg, steering.pose, standing, state);
   toggle("wire", !state.plugged);
   toggle("cut", state.armed);
   toggle("power", !state.powered);

@@ -1,38 +1,47 @@
-// What the display shows, read from its two lines: the words of firmware/kickstand/ui and start.py.
+// What the display shows, from the firmware's state: firmware/kickstand/state.py.
 
-// The lines as one text, joined by "|"; the kind; in few words, for beside the true lean. The first that fits counts.
-const KINDS = [
-  [/^\|$/, "dark", "nothing"],
-  [/^Kickstand\|/, "starting", "starting"],
-  [/^Safe mode/, "safe", "safe mode"],
-  [/^(No sensor|No MPU6050|Unknown sensor|Sensor (lost|silent|reset)|Sensor frozen\|starting|Readings lost)/, "fault", "a fault"],
-  [/^(Sensor (keeps|answers)|Sensor: its FIFO|SDA and SCL|\w+ stays low)|\|not supported$/, "fault", "a fault"],
-  [/^Calibration\|stopped/, "stopped", "a fault"],
-  [/^→/, "menu", "the menu"],
-  [/^Raw /, "unaligned", "not aligned"],
-  [/^On the stand,/, "ask-stand", "aligning"],
-  [/^Stand: hold/, "take-stand", "aligning"],
-  [/^Now upright:/, "ask-upright", "aligning"],
-  [/^Upright: hold/, "take-upright", "aligning"],
-  [/^Aligned!/, "aligned", "aligned"],
-  [/^(Moved!|Accel saturated|Too few readings|Sensor frozen\|Check|Gyro offset)/, "spoilt", "refused"],
-  [/^(Reads |Same pose|Tilt |Not saved)/, "unlike", "refused"],
-  [/^(Side |Not on a side|Check|Slant it|Axis |Poses unclear|Saved, err)/, "six", "positions"],
-  [/^Lean /, "lean", "not sure"],
-  [/^Max left/, "maxima", "maxima"],
-  [/^(Accel|Brake) +\d/, "force", "g"],
-  [/^Formula /, "formula", "formula"],
-  [/^ *-?\d+\.\d\d[ -]*\d+\.\d\d[ -]*\d+\.\d\dg\|/, "readings", "readings"],
-  [/^(Rec|Rec\.) /, "recording", "recording"],
-  [/^[A-Z0-9]{3,9} +-?\d+\.\d°C\|/, "info", "sensor info"],
-];
+// By the name of the view: its kind for the guide; in few words, for beside the true lean
+const VIEWS = {
+  off: ["dark", "nothing"],
+  starting: ["starting", "starting"],
+  safe: ["safe", "safe mode"],
+  fault: ["fault", "a fault"],
+  menu: ["menu", "the menu"],
+  six: ["six", "positions"],
+  info: ["info", "sensor info"],
+  not_aligned: ["unaligned", "not aligned"],
+  lean: ["lean", "not sure"],
+  maxima: ["maxima", "maxima"],
+  acceleration: ["force", "g"],
+  formula: ["formula", "formula"],
+  raw: ["readings", "readings"],
+  recording: ["recording", "recording"],
+};
+const DOUBTED = ["lean", "maxima", "acceleration", "formula", "raw"]; // while the lean is not trusted they say so instead
+const ALIGNING = {
+  ask: { kickstand: "ask-stand", upright: "ask-upright" },
+  take: { kickstand: "take-stand", upright: "take-upright" },
+};
 
 /**
- * {kind, words} of the display's two lines; null for others, as for a line that is half written. Where the lean itself
- * is shown, this is of the kind "lean" too.
+ * {kind, words}, or null for a view that is none of these. state: as Device.state() in web/device.py gives it. Where the
+ * lean itself is shown, this is of the kind "lean" too.
  */
-export function shows(lines) {
-  const text = lines.map((line) => line.trimEnd()).join("|");
-  const found = KINDS.find(([pattern]) => pattern.test(text));
-  return found ? { kind: found[1], words: found[2] } : null;
+export function shows(state) {
+  if (state.view === "notice" && state.code === "stopped") return { kind: "stopped", words: "a fault" };
+  const found = state.view === "align" ? aligning(state) : VIEWS[viewOf(state)];
+  return found ? { kind: found[0], words: found[1] } : null;
+}
+
+function viewOf({ view, code, fault, trusted }) {
+  if (view === "fault" && code === "starting") return "starting";
+  if (view === "notice" && code && code === fault) return "fault";
+  if (DOUBTED.includes(view) && !trusted) return "lean";
+  return view;
+}
+
+function aligning({ step, code, pose }) {
+  if (step === "result") return ["aligned", "aligned"];
+  if (step === "refused") return ["unlike", "refused"];
+  return code ? ["spoilt", "refused"] : [ALIGNING[step][pose], "aligning"];
 }

@@ -30,7 +30,7 @@ class Tests:
         self.root, self._files = root, files
         self.seconds = 600.0
         self._output = tempfile.TemporaryFile("w+")
-        paths = [str(root / name) for name in ("tools", "tools/workshop", "firmware")]
+        paths = [str(root / name) for name in ("tools", "tools/workshop", "firmware", "host_tests")]
         sys.path[:0] = paths
         os.environ["PYTHONPATH"] = os.pathsep.join(paths)
         os.environ["OPENBLAS_NUM_THREADS"] = "1"

@@ -3,7 +3,7 @@
 from kickstand_tools.common import firmware_path
 
 from ..browser import CHROMIUM
-from . import page, ride
+from . import explained, page, ride
 from .drawn import drawn
 
 
@@ -12,6 +12,7 @@ def main() -> None:
     for name, svg in drawn().items():
         (directory / name).write_text(svg, encoding="utf-8")
     (directory / "ride.png").write_bytes(ride.draw())
+    (directory / "lean_compared.png").write_bytes(explained.lean_compared())
     if CHROMIUM:
         (directory / page.NAME).write_bytes(page.draw())
     else:

@@ -2,16 +2,17 @@
 
 from kickstand_tools.pictures import building, lcd, oled
 
-from . import terminal
+from . import explained, terminal
 from .device_pages import lcd_pages, oled_pages
 
 
 def drawn() -> dict[str, str]:
-    """{file name: SVG}: pages of both displays, wiring of both boards, what is built, the demo. Takes some seconds."""
+    """{file name: SVG}: pages of both displays, wiring of both boards, what is built, the demo, the forces in a
+    bend. Takes some seconds."""
     pictures = {f"lcd_{name}.svg": lcd.draw(codes, cgram) for name, (codes, cgram) in lcd_pages().items()}
     pictures |= {f"oled_{name}.svg": oled.draw(pixels) for name, pixels in oled_pages().items()}
     return (
         pictures
         | building.drawings(pictures["oled_lean.svg"], pictures["lcd_lean.svg"])
-        | {"demo.svg": terminal.draw()}
+        | {"demo.svg": terminal.draw(), "forces.svg": explained.forces()}
     )

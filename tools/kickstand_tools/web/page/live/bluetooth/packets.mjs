@@ -1,4 +1,4 @@
-// The packets of a board's radio, decoded by the tables in firmware/README.md, "Live on the phone".
+// The packets of a board's radio, decoded by the tables in firmware/docs/live.md.
 
 export const VERSION = 1;
 export const SERVICE = "7b6f0000-3c1e-4d5a-9a55-6b69636b7374";

@@ -2,7 +2,7 @@
 
 import io
 
-import command
+from support import command
 
 
 class Watched(io.StringIO):

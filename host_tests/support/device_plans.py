@@ -10,8 +10,8 @@ import shutil
 import tempfile
 from pathlib import Path
 
-import device_runs
-from mpy import BOARD_HEAP, run_mpy
+from support import device_runs
+from support.mpy import BOARD_HEAP, run_mpy
 
 SCRIPT = Path(device_runs.__file__)
 

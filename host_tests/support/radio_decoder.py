@@ -1,10 +1,11 @@
-"""Decodes what comes from the radio by firmware/README.md alone: its equations for RaceChrono, its tables of bytes."""
+"""Decodes what comes from the radio by firmware/docs/live.md alone: its equations for RaceChrono and its
+tables of bytes."""
 
 import re
 from pathlib import Path
 
-README = Path(__file__).resolve().parents[2] / "firmware" / "README.md"
-_SECTION = README.read_text(encoding="utf-8").split("## Live on the phone")[1].split("\n## ")[0]
+PAGE = Path(__file__).resolve().parents[2] / "firmware" / "docs" / "live.md"
+_SECTION = PAGE.read_text(encoding="utf-8")
 SERVICE = re.findall(r"is `([0-9a-f-]{36})`", _SECTION)[0]
 
 # {channel, its words before the first comma: (packet, equation)}

@@ -1,0 +1,32 @@
+"""What the app shows and knows, as data for other programs, such as a simulation or a test."""
+
+STEPS = ("ask", "take", "notice", "refused", "result", "ended", "compute")  # by the states of ui/wizard.py
+
+
+def state(app):
+    """A dictionary with plain values. It says what the display was last given, not more than 100 ms ago:
+
+    view: "notice", "align", "six", "menu", "info", "fault", "question", or the name of a page (see PageRing.name).
+    code: that of the notice, fault, question or refusal in view, or None (see errors.py).
+    step: of an alignment or the six positions, from STEPS; pose: "kickstand" or "upright", of an alignment.
+    entry: the name of the menu's entry.
+    trusted: True if the lean may be shown; lean_deg: that lean, > 0 to the right, or None.
+    aligned, recording: True or False. fault: the code of the sensor's fault, or None.
+    """
+    screen, fault, trusted = app.screen, app.sensor.fault, app.trusted
+    view = screen.front
+    notice = {"fault": fault, "question": app.drive and app.drive.message, "notice": view}.get(view.name)
+    if view.name in ("align", "six"):
+        notice = view.problem
+    return {
+        "view": view.name,
+        "code": notice.code if notice else None,
+        "step": STEPS[view.state] if view.name in ("align", "six") else None,
+        "pose": ("upright" if view.upright else "kickstand") if view.name == "align" else None,
+        "entry": view.entry if view.name == "menu" else None,
+        "trusted": trusted,
+        "lean_deg": app.meter.lean_deg if trusted else None,
+        "aligned": app.calibration.aligned,
+        "recording": app.recording,
+        "fault": fault.code if fault else None,
+    }

@@ -1,0 +1,40 @@
+"""The notebook of the tools runs as it is, from the first cell to the last, and finds the lean of its own ride."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+NOTEBOOK = Path(__file__).resolve().parents[2] / "tools" / "examples" / "first_ride.ipynb"
+
+
+def cells(kind):
+    found = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
+    return ["".join(cell["source"]) for cell in found if cell["cell_type"] == kind]
+
+
+def test_the_notebook_runs_and_finds_the_lean(monkeypatch, tmp_path, capsys):
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    pyplot.switch_backend("Agg")
+    monkeypatch.setattr("tempfile.mkdtemp", lambda: str(tmp_path))
+    names: dict = {}
+    for number, cell in enumerate(cells("code")):
+        exec(compile(cell, f"cell {number}", "exec"), names)
+    said = capsys.readouterr().out
+    assert "samples per second" in said and "phyphox" in said
+    shown, smoothed = (float(found) for found in re.findall(r"^\w+: (.*?) degrees rms", said, re.M))
+    assert smoothed < 0.4 and shown < 0.8
+    assert len(pyplot.figure(1).axes) == 2
+    pyplot.close("all")
+    total, true_deg = names["total"], names["true_deg"]
+    assert abs(total.right_deg.value - np.max(true_deg)) < 1.5 and abs(total.left_deg.value + np.min(true_deg)) < 1.5
+    assert (tmp_path / "RIDE-lean.csv").stat().st_size > 5e5
+
+
+def test_each_step_of_the_notebook_is_explained_and_no_output_is_kept():
+    """What it prints is the reader's own run."""
+    whole = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
+    assert whole[0]["cell_type"] == "markdown" and len(cells("markdown")) >= len(cells("code")) - 1
+    assert not any(cell.get("outputs") or cell.get("execution_count") for cell in whole)

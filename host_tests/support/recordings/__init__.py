@@ -1,0 +1,1 @@
+"""Rides, logs and exports of apps that the tests make: whole, random or broken."""

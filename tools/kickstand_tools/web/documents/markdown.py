@@ -1,0 +1,124 @@
+"""One document of Markdown as HTML: headings with the names that GitHub gives them, links as a caller wants them."""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+from markdown_it import MarkdownIt
+from markdown_it.token import Token
+
+_IMAGE = re.compile(r'(<img [^>]*?src=")([^"]+)(")')
+_SCROLLED = {"tabindex": "0", "role": "region"}  # what is wider than a phone is scrolled, by the keyboard too
+
+Link = Callable[[str], str | None]
+
+
+@dataclass
+class Heading:
+    """level: 1 is the title. name: the anchor. text: without markup."""
+
+    level: int
+    name: str
+    text: str
+
+
+@dataclass
+class Document:
+    """title: the text of the first heading. about: that of the first paragraph. headings: all but the title. html: the
+    whole document."""
+
+    title: str
+    about: str
+    headings: list[Heading]
+    html: str
+
+
+def anchor(text: str) -> str:
+    """The name that GitHub gives a heading.
+
+    >>> anchor("MicroPython on an ESP32: `esptool`")
+    'micropython-on-an-esp32-esptool'
+    """
+    return re.sub(r"[^\w\- ]", "", text.lower()).replace(" ", "-")
+
+
+def converted(text: str, link: Link, picture: Callable[[str], str], deeper: int = 1, name: str = "") -> Document:
+    """Convert a document. link(target): the address of a link, None to leave out the link and keep its words.
+    picture(source): the address of a picture. deeper: a heading of level n is an <h(n + deeper)>, because the site has
+    its own first heading. name: in front of all anchors, where several documents share a page."""
+    markdown = MarkdownIt("commonmark", {"html": True}).enable("table")
+    tokens = markdown.parse(text)
+    headings, about, table = [], "", 0
+    for at, token in enumerate(tokens):
+        inside = tokens[at + 1] if at + 1 < len(tokens) else token
+        if token.type == "heading_open":
+            words = _words(inside)
+            same = sum(heading.text == words for heading in headings)  # GitHub numbers them
+            headings.append(Heading(int(token.tag[1]), name + anchor(words) + (f"-{same}" if same else ""), words))
+            token.attrSet("id", headings[-1].name)
+        elif token.type == "paragraph_open" and not about:
+            about = _words(inside)
+        elif token.type == "th_open" and not inside.content:
+            token.tag = tokens[at + 2].tag = "td"  # an empty cell heads nothing
+        elif token.type == "html_block":
+            token.content = _with_pictures(token.content, picture)
+        elif token.type == "inline":
+            token.children = _linked(token.children or [], link, picture)
+        if token.type.startswith("heading_"):
+            token.tag = f"h{int(token.tag[1]) + deeper}"
+    title, *rest = headings
+    html = str(markdown.renderer.render(tokens, markdown.options, {}))
+    named = "".join(f' {key}="{value}"' for key, value in _SCROLLED.items())
+
+    def framed(found: re.Match[str]) -> str:
+        nonlocal table
+        table += 1
+        return f'<div class="wide"{named} aria-label="{escape(title.text)}, table {table}"><table>'
+
+    html = re.sub("<table>", framed, html).replace("</table>", "</table></div>")
+    html = html.replace("<pre><code", '<pre tabindex="0"><code')
+    return Document(title.text, about, rest, html)
+
+
+def _words(inline: Token) -> str:
+    """The text of an inline token, without markup."""
+    return "".join(
+        " " if token.type == "softbreak" else token.content
+        for token in inline.children or []
+        if token.type in ("text", "code_inline", "softbreak")
+    )
+
+
+def _linked(children: list[Token], link: Link, picture: Callable[[str], str]) -> list[Token]:
+    """The tokens with other addresses, without the links that lead nowhere."""
+    kept: list[Token] = []
+    open_links: list[bool] = []
+    for token in children:
+        if token.type == "link_open":
+            address = link(str(token.attrGet("href")))
+            open_links.append(address is not None)
+            if address is None:
+                continue
+            token.attrSet("href", address)
+            if address.startswith(("https:", "http:")):
+                _set(token, target="_blank", rel="noopener")
+        elif token.type == "link_close" and not open_links.pop():
+            continue
+        elif token.type == "image":
+            token.attrSet("src", picture(str(token.attrGet("src"))))
+            token.attrSet("loading", "lazy")
+        elif token.type == "html_inline":
+            token.content = _with_pictures(token.content, picture)
+        kept.append(token)
+    return kept
+
+
+def _with_pictures(html: str, picture: Callable[[str], str]) -> str:
+    return _IMAGE.sub(lambda found: found[1] + picture(found[2]) + found[3], html)
+
+
+def _set(token: Token, **attributes: Any) -> None:
+    for name, value in attributes.items():
+        token.attrSet(name, value)
