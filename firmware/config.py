@@ -1,4 +1,4 @@
-"""Your settings. Remove the '#' and the space behind it to change a line; what is not set has the default shown."""
+"""Your settings. To change a line, remove the '#' and the space after it. Unchanged lines keep the default shown."""
 
 # Which side does the kickstand lean the bike to?
 # SIDE = "left"             # or "right"
