@@ -7,8 +7,8 @@ import pytest
 from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.ride import Ride
 from kickstand_tools.api import Log, replay, smooth
-from kickstand_tools.checks.sensor import NAMES, SensorHealth
-from kickstand_tools.refusals import sentence
+from kickstand_tools.checks.sensor import NAMES, AxisDead, GyroSaturated, SensorHealth
+from kickstand_tools.common.messages import sentence
 from kickstand_tools.signals import rotation_matrix
 from support.recordings.smoothed_rides import rms, simulated
 
@@ -32,9 +32,9 @@ def test_a_dead_axis_is_named_and_has_no_lean(street, axis):
 
     log = ill(street, die)
     for found in (smooth(log, street.calibration), replay(log, street.calibration)):
-        (notice,) = (n for n in found.notices if n.code == "axis-dead")
-        assert notice.values[0] == NAMES[axis]
-        assert notice.values[2] == pytest.approx(50.0, abs=2.0)
+        (notice,) = (n for n in found.notices if isinstance(n, AxisDead))
+        assert notice.name == NAMES[axis]
+        assert notice.begin_s == pytest.approx(50.0, abs=2.0)
         assert f"{NAMES[axis]} is dead" in sentence(notice)
         dead = (log.t_s > 52.0) & (log.t_s < 95.0)
         assert np.mean(np.isnan(found.lean_deg[dead])) > 0.9
@@ -80,9 +80,9 @@ def test_a_saturated_gyro_is_said_and_the_rest_of_the_ride_is_good(street):
 
     log = ill(street, saturate)
     found = smooth(log, street.calibration)
-    (notice,) = (n for n in found.notices if n.code == "gyro-saturated")
-    assert notice.values[:2] == ("y", 1)
-    assert notice.values[2] == pytest.approx(0.5, abs=0.02)
+    (notice,) = (n for n in found.notices if isinstance(n, GyroSaturated))
+    assert (notice.axis, notice.times) == ("y", 1)
+    assert notice.seconds == pytest.approx(0.5, abs=0.02)
     there = street.riding & (np.abs(log.t_s - 60.0) > 2.0)
     assert rms((found.lean_deg - street.lean_deg)[there]) < 0.4
     assert np.all(np.isnan(found.lean_deg[(log.t_s > 60.01) & (log.t_s < 60.49)]))

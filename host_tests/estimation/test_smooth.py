@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kickstand_tools.api import Log, smooth
+from kickstand_tools.common.messages import sentence
 from kickstand_tools.estimation import smooth as module
 from kickstand_tools.estimation.least_squares import Estimate
+from kickstand_tools.estimation.smooth import PoseOff
 from kickstand_tools.estimation.unknowns import DIVE
-from kickstand_tools.refusals import sentence
 from kickstand_tools.signals import rotation_matrix
 from kickstand_tools.simulation.physics.bike import Bike
 from support.recordings.drawn_rides import drawn_ride, judged
@@ -115,9 +116,9 @@ def test_the_dive_of_a_bike_is_learned(monkeypatch, dive_deg_per_g):
 def test_pose_that_was_not_upright_is_reported(street, wrong_deg):
     turned = rotation_matrix(np.radians([0.0, 0.0, -wrong_deg])) @ street.calibration.vehicle_from_sensor
     calibration = replace(street.calibration, vehicle_from_sensor=turned)
-    (notice,) = (n for n in smooth(street.log, calibration).notices if n.code == "pose-off")
-    assert np.sign(notice.values[0]) == np.sign(wrong_deg)
-    assert abs(abs(notice.values[0]) - 4.0) < 2.1  # the ride's own pose is 1.5 off
+    (notice,) = (n for n in smooth(street.log, calibration).notices if isinstance(n, PoseOff))
+    assert np.sign(notice.angle_deg) == np.sign(wrong_deg)
+    assert abs(abs(notice.angle_deg) - 4.0) < 2.1  # the ride's own pose is 1.5 off
     assert ("right" if wrong_deg > 0.0 else "left") in sentence(notice)
 
 

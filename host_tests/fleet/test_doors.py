@@ -18,8 +18,8 @@ from kickstand_fleet.period import failed, work_on_period
 from kickstand_fleet.run import run_fleet
 from kickstand_fleet.show import plot
 from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import sentence
 from kickstand_tools.common.output import whole_file
-from kickstand_tools.refusals import sentence
 from support import command
 from support.recordings import broken_logs
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from kickstand_tools import api
+from kickstand_tools.imports.importing import ImportDamaged
 from kickstand_tools.imports.join import join, on_clock
 from kickstand_tools.imports.recording import AppRecording, ReceiverTrack, RecordedSensor
 from support import command
@@ -117,7 +118,7 @@ def test_damaged_row_costs_only_itself(tmp_path):
     (tmp_path / "r.csv").write_text("\n".join(lines))
     found = api.import_recording(tmp_path / "r.csv")
     assert len(found.log.t_s) == len(ride.t_s) - 4
-    assert [(notice.code, notice.values) for notice in found.notices] == [("import-damaged", (3,))]
+    assert found.notices == [ImportDamaged(3)]
     assert np.max(np.abs(found.log.accel_g)) < 2.0
 
 

@@ -4,8 +4,6 @@ import json
 
 import numpy as np
 import pytest
-from kickstand_tools import remedies
-from kickstand_tools.cli.main import kickstand
 from kickstand_tools.web import rides_guest
 from support.recordings import analysis_rides, app_exports
 

@@ -6,10 +6,12 @@ the end of its range, and how fast the bike rolled there is unknown. Lean must n
 accelerometer that vibration clips the force is nearly right between the blows: these readings are used, and remarked.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
-from kickstand.errors import Notice
 from kickstand.units import AXES
 
+from ..common.messages import Message, Remedy
 from ..signals import Array, Bools, Ints, cell_numbers
 
 DEAD_S = 1.0  # an axis is judged in each stretch of this length
@@ -29,6 +31,39 @@ NAMES = tuple(f"{sensor} {axis}" for sensor in ("accelerometer", "gyro") for axi
 _SENSORS = slice(0, 3), slice(3, 6)
 _MOTION = [0, 1, 2, 4, 5, 6]  # of the chip's order: without the temperature
 _LEAST = np.repeat([OTHER_G, OTHER_DPS], 3)
+
+
+@dataclass(frozen=True)
+class AxisDead(Message):
+    """An axis stays the same while others change. name: "gyro x"."""
+
+    name: str
+    seconds: float
+    begin_s: float
+
+    code = "axis-dead"
+    text = (
+        "{name} is dead: from {begin_s:.1f} s on it does not change for {seconds:.0f} s while others do; these "
+        "readings are left out, and the lean is not known there"
+    )
+    todo = Remedy("check the sensor and its solder joints, or replace it")
+
+
+@dataclass(frozen=True)
+class GyroSaturated(Message):
+    """The gyro was at the end of its range. begin_s: of the first time."""
+
+    axis: str
+    times: int
+    seconds: float
+    begin_s: float
+
+    code = "gyro-saturated"
+    text = (
+        "gyro {axis} is at the end of its range {times} times, {seconds:.1f} s in all, first at {begin_s:.1f} s: these "
+        "readings are left out"
+    )
+    todo = Remedy("fix the sensor firmly, or set a larger GYRO_RANGE_DPS")
 
 
 class SensorHealth:
@@ -75,16 +110,14 @@ class SensorHealth:
             self._find_clipped(axis, time_s, values[:, axis])
         return sick
 
-    def notices(self) -> list[Notice]:
+    def notices(self) -> list[Message]:
         """The notices about the log so far."""
-        found = [
-            Notice("axis-dead", name, float(seconds), float(begin))
+        found: list[Message] = [
+            AxisDead(name, float(seconds), float(begin))
             for name, seconds, begin in zip(NAMES, self._dead_s, self._begin_s)
             if seconds >= DEAD_FROM_S
         ]
-        found += [
-            Notice("gyro-saturated", name, int(at[1]), at[2], at[0]) for name, at in zip(AXES, self._saturated) if at
-        ]
+        found += [GyroSaturated(name, int(at[1]), at[2], at[0]) for name, at in zip(AXES, self._saturated) if at]
         for axis, name in enumerate(AXES):
             ends = [end for end in self._ends[axis :: len(AXES)] if self._is_clipped(axis, end)]
             if ends:

@@ -136,7 +136,7 @@ def _list(transport: ConnectedBoard, name: str) -> tuple[str, str, dict[int, lis
     directory, vehicle = literal(first, (str, str))
     in_order = sorted(_Part(*literal(line, (int, int, int, str))) for line in lines)
     if not all(part.path.startswith(f"{directory}/") and part.ride < 100_000 for part in in_order):
-        raise InputError(f"the board at {name} names rides that are none: kickstand flash brings it up to date")
+        raise InputError(f"the board at {name} lists invalid rides", UPDATE)
     by_ride = itertools.groupby(in_order, lambda part: part.ride)
     return directory, vehicle, {ride: list(group) for ride, group in by_ride}
 

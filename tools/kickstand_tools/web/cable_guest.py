@@ -45,7 +45,7 @@ class LiveStream:
                     with contextlib.suppress(Exception):  # the cable may be out
                         restart(transport)
         except InputError as error:
-            return json.dumps({"refused": str(error)})
+            return json.dumps({"refused": error.line(page=True)})
         return json.dumps({"notes": notes, "changed": stream.CHANGED in notes})
 
     def stop(self):
@@ -76,7 +76,7 @@ def pull(line, name, progress):
         try:
             pulling.pull(BrowserBoard(line, name), Path(directory), progress=progress, pulled=rides.append)
         except InputError as error:
-            refused = str(error)
+            refused = error.line(page=True)
         written = [path for ride in rides if ride.log for path in (ride.log, calibration_path(ride.log))]
         files = [(path.name, path.read_bytes()) for path in written]
     found = [vars(ride) | {"log": ride.log and ride.log.name} for ride in rides]

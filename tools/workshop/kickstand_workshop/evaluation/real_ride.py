@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from kickstand.errors import Notice
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.checks.log import remarks
 from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import Message
 from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.reader import Log, read_log
 from kickstand_tools.signals import moving_mean
@@ -47,7 +47,7 @@ class RecordingScores:
     name: str
     scores: dict[str, RealScore]
     traces: dict[str, NDArray[np.float64]]
-    notices: list[Notice] = field(default_factory=list)
+    notices: list[Message] = field(default_factory=list)
 
 
 def compare(path: Path) -> RecordingScores:

@@ -1,7 +1,7 @@
 // Shows a board's stream, keeps it as a log, and fetches recorded rides from the board: `kickstand record` and
 // `kickstand pull` on CPython for WebAssembly (web/cable_guest.py).
 
-import { ASKING, choosePort, inPages, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
+import { ASKING, choosePort, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
 import { Riding } from "./bluetooth/riding.mjs";
 import { Chart } from "./chart.mjs";
@@ -152,7 +152,7 @@ async function pull() {
 
 /** Lines of the commands, one after the other. */
 function sentences(lines) {
-  return lines.map((line) => inPages(line).replace(/^./, (first) => first.toUpperCase())).join(". ") + ".";
+  return lines.map((line) => line.replace(/^./, (first) => first.toUpperCase())).join(". ") + ".";
 }
 
 /** From Python's [(name, bytes)]. */
