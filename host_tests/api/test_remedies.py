@@ -1,4 +1,4 @@
-"""The remedy of a refusal in the words of other programs than the command."""
+"""Notices and refusals: each has a sentence, and what to do in the words of a terminal and of a page."""
 
 import json
 import pickle
@@ -65,7 +65,7 @@ def test_each_code_is_one_class():
         ),
     ],
 )
-def test_refusal_gives_the_remedy_in_the_given_words(error, terminal, page):
+def test_an_error_has_the_words_of_terminal_and_page(error, terminal, page):
     for one in (error, pickle.loads(pickle.dumps(error))):
         assert str(one).endswith(terminal)
         assert one.line(page=True).endswith(page)
@@ -91,7 +91,7 @@ def test_the_same_line_is_kept_once():
     assert distinct([first, same, other]) == [first, other]
 
 
-def test_invalid_calibration_is_refused_in_the_given_words(tmp_path):
+def test_a_file_that_is_not_a_calibration_is_refused(tmp_path):
     path = tmp_path / "A.cal.json"
     path.write_text("[]")
     with pytest.raises(InputError) as caught:

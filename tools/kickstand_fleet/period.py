@@ -17,6 +17,7 @@ from kickstand_tools.calibration.drive import DriveFit, fit_logs, usable
 from kickstand_tools.calibration.drive_refusals import Uncertain, of_firmware
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.checks.bends import LeftHanded
+from kickstand_tools.checks.sensor import AccelClipped, AxisDead, GyroSaturated
 from kickstand_tools.common.errors import InputError, RefusedInput, cause
 from kickstand_tools.logs.frozen import FrozenReadings
 from kickstand_tools.logs.log import Log
@@ -34,7 +35,7 @@ NO_SPEED, MOVED = "no-speed", "mount-moved"
 # signals
 AFTERWARDS, DISK_FULL = "not-finished", "disk-full"
 # Notices about parts of a log that are not used, or of a sensor that is ill
-_LEFT_OUT = (CutLine, CutGzip, NulEnd, "frozen-readings", "axis-dead", "gyro-saturated", "accel-clipped")
+_LEFT_OUT = (CutLine, CutGzip, NulEnd, FrozenReadings, AxisDead, GyroSaturated, AccelClipped)
 _SUSPECTS = (MOVED, "parts-differ", "uncertain")  # refusals of the firmware after which moves are searched
 _PLOTTED = 160  # intervals in a picture
 _AGAINST = -0.5  # evidence.handedness() below this, the gyro or the axes are mirrored

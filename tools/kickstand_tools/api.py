@@ -12,8 +12,7 @@ A log is a path, an open file of text or bytes, a Log made of arrays, or a Stret
 to_pandas(). Long functions accept `progress`, a function that is called with (done, total).
 
 InputError says in one line what is wrong with the input. Its subclass RefusedInput has the
-reason as a Message. A notice is of a
-refusal by a firmware named fields, and sentence() puts it into words.
+reason as a Message. A notice is a Message, too: a code, named fields, and sentence() puts it into words.
 """
 
 from .analysis.brake_tests import brake_tests as brake_tests

@@ -1,7 +1,7 @@
 """Checks that the readings fit the model: the lean filter judges itself by its own innovations.
 
-A filter's covariance does not show a partly failed sensor, but its innovations do. The square of one over
-its expected variance, the normalised innovation squared, is 1 on average if everything fits (Y. Bar-Shalom and others,
+A filter's covariance does not show a partly failed sensor, but its innovations do. The square of an innovation over its
+expected variance, the normalised innovation squared, is 1 on average if everything fits (Y. Bar-Shalom and others,
 Estimation with Applications to Tracking and Navigation, section 5.4). Here the mean is of its root, with its sign.
 Vibration and bumps, which a good sensor has too, cancel in this mean. A dead or mirrored axis, half of the scale, a
 step of the bias and a slipped mount do not cancel. The forces to the left and up each have a short mean, which shows
@@ -16,7 +16,7 @@ innovations are large, of either sign, and so are their means.
 After a doubt one thing more is asked. A gyro that is wrong about up makes a straight a bend that does not end, with all
 forces as they should be. So a lean that has stayed on one side for long is not shown then.
 
-What a misfit the lean is doubted, and hidden until everything has fitted for a while. Repeated misfits are a fault of
+After a misfit the lean is doubted, and hidden until everything has fitted for a while. Repeated misfits are a fault of
 the sensor.
 """
 

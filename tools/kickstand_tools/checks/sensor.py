@@ -66,6 +66,23 @@ class GyroSaturated(Message):
     todo = Remedy("fix the sensor firmly, or set a larger GYRO_RANGE_DPS")
 
 
+@dataclass(frozen=True)
+class AccelClipped(Message):
+    """Vibration clipped the accelerometer. end_g: the end of its range. begin_s: of the first such sample."""
+
+    axis: str
+    end_g: float
+    samples: int
+    begin_s: float
+
+    code = "accel-clipped"
+    text = (
+        "accelerometer {axis} is at the end of its range ({end_g:.1f} g) in {samples} samples, first at {begin_s:.1f} "
+        "s: its mean is wrong there"
+    )
+    todo = Remedy("mount the sensor more softly, or set a larger ACCEL_RANGE_G")
+
+
 class SensorHealth:
     """Finds sick readings. mark() takes a log part by part."""
 
@@ -122,7 +139,7 @@ class SensorHealth:
             ends = [end for end in self._ends[axis :: len(AXES)] if self._is_clipped(axis, end)]
             if ends:
                 samples = sum(count for _, count, _ in ends)
-                found.append(Notice("accel-clipped", name, ends[0][0], samples, min(first for *_, first in ends)))
+                found.append(AccelClipped(name, ends[0][0], samples, min(first for *_, first in ends)))
         return found
 
     def _dead(self, spread: Array, noisy: Bools, constant: Bools) -> Bools:

@@ -8,16 +8,15 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from kickstand.errors import Notice
 from kickstand.lean.meter import LeanMeter
 
 from ..calibration.file import CalibrationFile
+from ..common.messages import Message, Remedy, WrongAxes, WrongMount
 from ..logs.log import Block
-from ..refusals import WRONG_AXES, WRONG_MOUNT
 from ..signals import Array, Bools
 from .replay_engine import NOT_SHOWN, ODD, Replay
 
-CAUSES = WRONG_AXES | WRONG_MOUNT | {"sensor-odd"}  # remarks that say why readings do not fit
+CAUSES = WrongAxes, WrongMount  # remarks that say why readings do not fit
 TOO_SMALL = 0.01  # g2, as in kickstand.lean: in free fall the force has no direction
 
 
@@ -60,6 +59,21 @@ class MeterAlong(Replay):
         )
 
 
+@dataclass(frozen=True)
+class ReadingsMisfit(Message):
+    """The meter named the sensor. seconds: in all. first_s: of the first time."""
+
+    seconds: float
+    first_s: float
+
+    code = "readings-misfit"
+    text = (
+        "the readings do not fit together again and again, first at {first_s:.0f} s, {seconds:.0f} s in all; the board "
+        "shows no lean there"
+    )
+    todo = Remedy("is the sensor's mount loose, or the sensor ill?")
+
+
 @dataclass
 class Misfit:
     """Where the meter named the sensor, because its readings do not fit again and again: first at first_s, for seconds
@@ -74,11 +88,11 @@ class Misfit:
             self.first_s = self.first_s if self.seconds else float(t_s[np.argmax(odd)])
             self.seconds += float(np.sum(np.diff(t_s, prepend=t_s[0])[odd])) or 1e-6
 
-    def remarks(self, known: Iterable[Notice]) -> list[Notice]:
+    def remarks(self, known: Iterable[Message]) -> list[Message]:
         """The notice of it, unless `known` has the reason."""
-        if not self.seconds or any(notice.code in CAUSES for notice in known):
+        if not self.seconds or any(isinstance(notice, CAUSES) for notice in known):
             return []
-        return [Notice("readings-misfit", self.seconds, self.first_s)]
+        return [ReadingsMisfit(self.seconds, self.first_s)]
 
 
 def static_lean_deg(left: Array, up: Array) -> Array:

@@ -15,7 +15,7 @@ from mpremote.transport import TransportExecError
 from ..common.errors import InputError
 from ..common.output import check_directory, make_directory
 from ..deploy.board_console import BrokenOff, lines
-from ..deploy.connection import ConnectedBoard, Port, Progress, connected, literal, printed, restart
+from ..deploy.connection import UPDATE, ConnectedBoard, Port, Progress, connected, literal, printed, restart
 from . import ride_log
 from .block_reader import CUT_SHORT, StoredBlock, missing_note, read
 

@@ -158,7 +158,6 @@ export async function overCable(port, tell, use, restarted = false) {
     return null;
   }
   try {
-    // A line that is not USB, such as a bridge to an emulated board, gets the longer time-outs of `kickstand flash`
     return await use(line, "this port");
   } catch (error) {
     console.error(error);
