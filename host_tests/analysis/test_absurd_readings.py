@@ -1,4 +1,4 @@
-"""Readings that no vehicle gives: the lean is not trusted, a warning says where and what, and numpy says nothing."""
+"""Implausible readings: the lean is not trusted, a warning gives place and values, and numpy prints no warning."""
 
 import re
 import warnings
@@ -18,8 +18,8 @@ def spinning(seed):
     return Log(np.arange(600) / 100.0, np.tile([0.0, 1.0, 0.0], (600, 1)), rates, name="spin.csv")
 
 
-def test_readings_that_make_the_lean_filter_diverge():
-    """As it does in some of six rides."""
+def test_impossible_readings_give_a_warning_and_no_lean():
+    """They make the filter diverge in some of six rides."""
     diverged_in = 0
     for seed in range(6):
         notices = []

@@ -1,4 +1,4 @@
-"""A config.py is a program: one that ends, hides or prolongs its own check is refused in one line."""
+"""A config.py is a program. One that ends, hides or delays its own check is refused in one line."""
 
 import pytest
 from kickstand_tools.deploy import config_check
@@ -25,7 +25,7 @@ _UNEQUAL = "class E:\n    def __eq__(self, other):\n        raise OSError\nVEHIC
         "input()\n",
     ],
 )
-def test_it_is_refused_in_one_line(tmp_path, monkeypatch, text):
+def test_config_that_escapes_its_check_is_refused_in_one_line(tmp_path, monkeypatch, text):
     monkeypatch.setattr(config_check, "LONGEST_S", 2)
     path = tmp_path / "config.py"
     path.write_text(text)

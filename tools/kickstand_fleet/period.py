@@ -17,6 +17,7 @@ from kickstand_tools.calibration.drive import DriveFit, fit_logs, usable
 from kickstand_tools.calibration.drive_refusals import Uncertain, of_firmware
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.checks.bends import LeftHanded
+from kickstand_tools.checks.sensor import AccelClipped, AxisDead, GyroSaturated
 from kickstand_tools.common.errors import InputError, RefusedInput, cause
 from kickstand_tools.logs.frozen import FrozenReadings
 from kickstand_tools.logs.log import Log
@@ -33,7 +34,8 @@ NO_SPEED, MOVED = "no-speed", "mount-moved"
 # AFTERWARDS: the vehicle is aligned, but brake tests or signals of this log are missing. DISK_FULL: no space for
 # signals
 AFTERWARDS, DISK_FULL = "not-finished", "disk-full"
-_LEFT_OUT = (CutLine, CutGzip, NulEnd, FrozenReadings)  # notices about parts of a log that are not used
+# Notices about parts of a log that are not used, or of a sensor that is ill
+_LEFT_OUT = (CutLine, CutGzip, NulEnd, FrozenReadings, AxisDead, GyroSaturated, AccelClipped)
 _SUSPECTS = (MOVED, "parts-differ", "uncertain")  # refusals of the firmware after which moves are searched
 _PLOTTED = 160  # intervals in a picture
 _AGAINST = -0.5  # evidence.handedness() below this, the gyro or the axes are mirrored

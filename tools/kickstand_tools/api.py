@@ -9,9 +9,9 @@
     stops = api.find_stops(api.vehicle_channels("RIDE.csv.gz", two.calibration))
 
 A log is a path, an open file of text or bytes, a Log made of arrays, or a Stretch of one of these. Tables have
-to_pandas(). What takes long takes `progress`, a function that is called with (done, total).
+to_pandas(). Long functions accept `progress`, a function that is called with (done, total).
 
-InputError says in one line what is wrong with what was given. Its subclass RefusedInput has the
+InputError says in one line what is wrong with the input. Its subclass RefusedInput has the
 reason as a Message. A notice is a Message, too: a code, named fields, and sentence() puts it into words.
 """
 
@@ -59,5 +59,5 @@ from .web.site import site_files as site_files, write_site as write_site
 
 SimulatedRide, simulate_ride = _simulation.SimulatedRide, _simulation.ride
 
-# All of the above: without it pydoc leaves out what is imported
+# All names above: without it pydoc leaves out imported names
 __all__ = [name for name in dir() if not name.startswith("_")]  # pyright: ignore[reportUnsupportedDunderAll]

@@ -13,8 +13,8 @@ from ..estimation.smooth import smooth_blocks
 from ..logs.log import Block, Stretch
 from ..logs.reader import Source, check_first_line, read_blocks, split_stretch
 from ..logs.source import File, Progress, log_stem, name_of
-from ..replay.meter_along import MeterAlong
-from ..signals import Array
+from ..replay.meter_along import MeterAlong, Misfit
+from ..signals import Array, Bools
 from .channels import Channels, channels, joined
 
 _MAX_SIGMA_DEG = 3.0  # a smoothed lean less certain than this counts as not sure
@@ -76,11 +76,13 @@ class Ride:
         InputError."""
         along, absurd, slow, some = MeterAlong(self.calibration), False, False, False
         log, stretch = split_stretch(self.log)
+        misfit = Misfit()
         for whole, found in self._read(log, progress, notices):
             block = whole.measured
             if not len(block.time_us):
                 continue
-            lean, variance = _lean_along(along, block, shown=found is None)
+            lean, variance, odd = _lean_along(along, block, shown=found is None)
+            misfit.add(block.t_s, odd)
             if notices is not None and not absurd and np.any(variance < 0.0):
                 absurd = True
                 notices.append(_absurd(block, int(np.argmax(variance < 0.0))))
@@ -100,6 +102,8 @@ class Ride:
             yield seen
         if not some:
             raise InputError(f"{self.name}: all readings are frozen, so that nothing is known: check the sensor")
+        if notices is not None and not self.car:
+            notices += misfit.remarks(notices)
         if notices is not None and slow:
             notices.append(SmoothSlow())
 
@@ -179,21 +183,23 @@ def _absurd(block: Block, at: int) -> Message:
     return AbsurdReadings(block.time_us[at] / 1e6, float(np.max(most[4:])), float(np.max(most[:3])))
 
 
-def _lean_along(along: MeterAlong, block: Block, shown: bool) -> tuple[dict[str, Array], Array]:
-    """The arguments of channels(), computed by the firmware's meter, and the variance of its lean (rad2), < 0 if it
-    diverged.
+def _lean_along(along: MeterAlong, block: Block, shown: bool) -> tuple[dict[str, Array], Array, Bools]:
+    """The arguments of channels(), computed by the firmware's meter, the variance of its lean (rad2), < 0 if it
+    diverged; and where
+    it named the sensor, because its readings do not fit.
 
     shown: compute the lean that was shown; otherwise it and sure are 0, which saves a tenth of the time.
     """
-    names = ("lean_deg", "shown_g", "variance", "resting", "rolling", "sure")
+    names = ("lean_deg", "shown_g", "variance", "resting", "rolling", "odd", "sure")
     columns: list[list[float]] = [[] for _ in names]
-    lean_deg, forward, variance, resting, rolling, sure = (column.append for column in columns)
+    lean_deg, forward, variance, resting, rolling, odd, sure = (column.append for column in columns)
     for meter in along.after_each(block, *along.in_vehicle(block)):
         lean = meter.filter
         forward(meter.smooth_force[2])
         variance(lean.variance)
         resting(lean.at_rest)
         rolling(lean.rolling)
+        odd(meter.odd is not None)
         if shown:
             lean_deg(meter.lean_deg)
             sure(meter.trusted)
@@ -202,4 +208,4 @@ def _lean_along(along: MeterAlong, block: Block, shown: bool) -> tuple[dict[str,
     variances = found.pop("variance")
     found["doubtful"] = np.zeros(n)  # known afterwards only
     found["lean_sigma_deg"] = np.degrees(np.sqrt(np.where(variances >= 0.0, variances, np.nan)))
-    return found, variances
+    return found, variances, found.pop("odd") > 0.0

@@ -187,7 +187,7 @@ def _drive_lines(found: DriveFit, several: bool) -> Iterable[str]:
 
 
 def _event_lines(event: events.DriveEvent, several: bool) -> Iterable[str]:
-    """Of several logs, the name of each is said before its events."""
+    """Print the events; of several logs, print each name before its events."""
     if event.what in (events.LOG_BEGINS, events.LOG_WITHOUT_EVENTS):
         if several:
             yield f"{event.log}:" if event.what == events.LOG_BEGINS else "           no braking in it"

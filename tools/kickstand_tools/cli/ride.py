@@ -289,8 +289,8 @@ def overlay_command(
 
 
 def _from_export(source: Path, calibration: Path | None) -> tuple[Imported, CalibrationFile] | None:
-    """An app's export or a table, imported, with its calibration: the one given or beside it, else it is aligned by its
-    bends; a line says so. None for anything else, such as a log."""
+    """Import an app's export or a table, with its calibration: the given one, or the one beside it; otherwise it is
+    aligned by its bends, which a line reports. None for anything else, such as a log."""
     found = None
     if not is_log(source):
         with spinner("importing"):
@@ -322,7 +322,7 @@ def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float
 
 def _log_of(source: Path, calibration: Path | None, out: Path) -> tuple[Path | Log, CalibrationFile]:
     """A ride's log and its calibration; notices about its import are printed. See _from_export(). Raises InputError
-    without a calibration, and where writing out would fail or destroy an input."""
+    without a calibration, and if writing out would fail or destroy an input."""
     if is_log(source) or source.suffix.lower() == ".json":
         return source, read_calibration(_given_or_beside(source, calibration, out))
     check_output(out, [*_inputs(source), *([calibration] if calibration else [])])
@@ -334,27 +334,27 @@ def _log_of(source: Path, calibration: Path | None, out: Path) -> tuple[Path | L
 
 
 def _overview(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> Overview:
-    """The overview of a ride of _opened(), in front of its notices those of the import; all are printed."""
+    """The overview of a ride from _opened(). Its notices begin with those of the import; all are printed."""
     opened, imported = _opened(source, calibration, live, **stretch)
     with Bar("reading") as bar:
         seen = overview(opened, bar.reach)
-    seen.notices = distinct([*imported, *seen.notices])  # the log that was imported is checked again
+    seen.notices = distinct([*imported, *seen.notices])  # the imported log is checked again
     common.warn(source, seen.notices)
     return seen
 
 
 def _inputs(source: Path) -> list[Path]:
-    """The files that writing must not destroy: the source, or what is in it."""
+    """The files that writing must not destroy: the source or its content."""
     return sorted(source.rglob("*")) if source.is_dir() else [source]
 
 
 def _stretch(log: Path | Log, from_s: float | None = None, to_s: float | None = None) -> Source:
-    """What the options of STRETCH leave of a log."""
+    """The part of a log selected by the options of STRETCH."""
     return log if from_s is None and to_s is None else Stretch(log, from_s, to_s)
 
 
 def _given_or_beside(ride: Path, calibration: Path | None, out: Path, *inputs: Path) -> Path:
-    """The calibration. Raises InputError without one, and where writing out would fail or destroy an input."""
+    """The calibration. Raises InputError without one, and if writing out would fail or destroy an input."""
     calibration = calibration or calibration_beside(ride)
     check_output(out, [ride, calibration, *inputs])
     return calibration
@@ -393,7 +393,7 @@ def _joined_lines(joined: Joined) -> Iterator[str]:
         "track's first point"
     )
     yield f"match: correlation {found.correlation:.2f} over {found.common_s / 60.0:.1f} minutes"
-    if abs(found.drift) * found.common_s > 3.0 * found.sigma_s:  # less is not known from a ride of this length
+    if abs(found.drift) * found.common_s > 3.0 * found.sigma_s:  # a smaller drift is uncertain
         yield f"the ride's clock is {abs(found.drift) * 1e6:.0f} ppm {'slow' if found.drift > 0.0 else 'fast'}"
     if joined.own_speed:
         yield "the log's own speed is kept"

@@ -9,7 +9,7 @@ DISTRIBUTION = "kickstand-lean"  # as in pyproject.toml; the package "kickstand"
 
 
 class InputError(Exception):
-    """Something that the user has given cannot be used. Its text is one line: what is wrong, and what to do.
+    """Input from the user that cannot be used. The text is one line: the fault, and what to do.
 
     what: a Message, or what is wrong in words. remedy: what to do about it; leave it out if `what` says it in words
     that suit a terminal and a page.

@@ -310,7 +310,7 @@ def last_line(text: str) -> str:
 
 def _enter(transport: SerialTransport, name: str) -> None:
     """Ctrl-C, then a soft reset into the raw prompt, which does not start main.py."""
-    for limit_s in (_STARTING_S, ANSWER_S):  # a board that resets when its port is opened is starting the first time
+    for limit_s in (_STARTING_S, ANSWER_S):  # a board may reset when its port is opened: it is starting
         try:
             with contextlib.redirect_stdout(io.StringIO()):  # mpremote prints input that it did not understand
                 transport.enter_raw_repl(timeout_overall=limit_s)

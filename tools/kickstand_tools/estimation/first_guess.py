@@ -20,7 +20,7 @@ STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # a standing bike's windows diff
 BIAS_RADPS = np.radians(4.0)  # limit of the gyro's bias since its calibration: a higher mean rate is a bend
 MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # while the sensor is mounted, its mean force over MOUNTED_S is this close to up
 BETWEEN_S = 20.0  # a shorter time between two movements in a hand counts as in the hand too
-SURELY_S = 4.0  # the sensor is surely in a hand where it seems so for all of this: the bike may still ride, or fall
+SURELY_S = 4.0  # surely in a hand if it seems so for this long: otherwise the bike may ride or fall
 SLOW_S = 4.0  # slower changes of lean are computed from the yaw rate, faster ones from the roll rate
 TURNS_S = 40.0  # the speed is computed from the bends within this time
 CALM_S = 1.0  # without a standstill, the gyro's bias is the mean over almost calm stretches of this length
@@ -28,7 +28,7 @@ MIN_RIDING_S = 30.0
 MIN_LEAN = np.radians(3.0)  # rms: a ride with less lean does not show forward
 MIN_LIKENESS = 0.5  # correlation between leaning and turning; bikes have over 0.75
 MAX_PUSHED = 0.5  # force to the side over the lean in bends; bikes have 0.1 to 0.2, because of their tyres' width
-CAR_G, CAR_LEAN = 0.045, np.radians(5.0)  # a car's rms of the force to the side is above, of its lean below
+CAR_G, CAR_LEAN = 0.045, np.radians(5.0)  # rms of a car: the force to the side is larger, the lean smaller
 STUCK_MPS = 0.5  # a log's speed that changes by less is stuck
 MAX_SPEED_FACTOR = 1.8  # limit of the ratio of the log's speed to that from the bends, and of its inverse
 # Prior of the speed from the bends: this speed, with the weight of bends of this yaw rate

@@ -21,7 +21,7 @@ from ..logs.reader import Source, read_blocks, read_twice, split_stretch
 from ..logs.source import Progress, total_bytes
 from ..signals import Array
 from . import replay_engine
-from .meter_along import MeterAlong
+from .meter_along import MeterAlong, Misfit
 
 _LONG_BYTES = 20 << 20  # a quarter of an hour at 200 Hz: for a smaller file a second process costs more than it saves
 
@@ -118,12 +118,15 @@ def replay_blocks(
     the end."""
     car = calibration.vehicle == "car"
     whole, stretch = split_stretch(log)
+    misfit = Misfit()
     for block, results in _replayed(whole, calibration, engine, progress, notices):
+        if not car:
+            misfit.add(block.measured.t_s, results[:, _SIGMA] == replay_engine.ODD)
         found = _with_frozen(block, results)
         if car:
             found[:, _SIGMA] = np.nan
         yield from within(stretch, block, found)
-    notices += [CarReplayed()] if car else []
+    notices += [CarReplayed()] if car else misfit.remarks(notices)
 
 
 def _replayed(
@@ -149,7 +152,7 @@ def _with_frozen(block: Block, results: Array) -> Array:
     found = np.full((len(block.time_us), len(replay_engine.COLUMNS)), np.nan)
     found[~block.frozen] = results
     sigma = found[:, _SIGMA]
-    sigma[sigma == replay_engine.NOT_SHOWN] = np.nan
+    sigma[sigma < 0.0] = np.nan
     return found
 
 

@@ -20,7 +20,7 @@ from ..ride import Ride
 from ..track import LogTrack, joined, track
 from . import export_columns, export_gpx, export_racechrono, export_vbo
 
-STEP_S = {"csv": 0.0, "gpx": 0.0, "parquet": 0.0, "racechrono": 0.001, "vbo": 0.01}  # the finest time that two hold
+STEP_S = {"csv": 0.0, "gpx": 0.0, "parquet": 0.0, "racechrono": 0.001, "vbo": 0.01}  # resolution of the time
 _WRITE: dict[str, Callable[[Path, Iterator[Channels], float], None]] = {
     "csv": export_columns.write_csv,
     "gpx": export_gpx.write,
@@ -28,7 +28,7 @@ _WRITE: dict[str, Callable[[Path, Iterator[Channels], float], None]] = {
     "racechrono": export_racechrono.write,
     "vbo": export_vbo.write,
 }
-_NEEDS = {"gpx": ("GPX", "gpxpy"), "parquet": ("Parquet", "pyarrow")}  # its name, and the library that writes it
+_NEEDS = {"gpx": ("GPX", "gpxpy"), "parquet": ("Parquet", "pyarrow")}  # format's name, and its library
 _DATED = ("gpx", "racechrono", "vbo")
 _CLOCK_S = 1e8  # March 1973: a log that starts later uses Unix time
 
