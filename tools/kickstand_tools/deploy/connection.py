@@ -91,11 +91,11 @@ def connected(port: Port) -> Iterator[tuple[Board, str]]:
     """
     if port is None or isinstance(port, str):
         name = port or find_port()
-        transport = _opened(name)
+        transport = _open_board(name)
     else:
         transport, name = port, port.device_name
     try:
-        _enter(transport, name)
+        _enter_raw_prompt(transport, name)
         yield transport, name
     except TransportExecError as error:
         said = last_line(error.error_output)
@@ -119,7 +119,7 @@ def connected(port: Port) -> Iterator[tuple[Board, str]]:
             transport.close()  # its port may be gone or restarting
 
 
-def _opened(name: str) -> Board:
+def _open_board(name: str) -> Board:
     kind = _EmulatedBoard if name.startswith(_EMULATED) else Board
     try:
         return kind(name, timeout=ANSWER_S * (_SLOWER if kind is _EmulatedBoard else 1))
@@ -257,7 +257,7 @@ def last_line(text: str) -> str:
     return text.strip().rpartition("\n")[2].strip() or "an error without words"
 
 
-def _enter(transport: SerialTransport, name: str) -> None:
+def _enter_raw_prompt(transport: SerialTransport, name: str) -> None:
     """Ctrl-C, then a soft reset into the raw prompt, which does not start main.py."""
     for limit_s in (_STARTING_S, ANSWER_S):  # a board may reset when its port is opened: it is starting
         try:
