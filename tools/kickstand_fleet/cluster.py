@@ -173,9 +173,9 @@ class Cluster:
                     "run the same command again to resume"
                 )
             future.release()
-        yield from self._end_late_ones()
+        yield from self._end_overdue_tasks()
 
-    def _end_late_ones(self) -> Iterator[Outcome]:
+    def _end_overdue_tasks(self) -> Iterator[Outcome]:
         now = time.monotonic()
         for key, (began_s, worker) in list(self._started.items()):
             if key not in self._under_way:

@@ -189,9 +189,9 @@ def _alignment(seen: Overview, on_page: bool) -> str:
         far = abs(quality.roll_deg or 0.0) > SWAPPED_DEG and not seen.ride.car
         # swapped poses exchange forward and backward too
         swapped = far and (seen.exchanged or not seen.has_speed)
-        costs = "" if seen.ride.car or seen.exchanged else _costs(lean_cost(quality), seen.has_speed, on_page)
+        costs = "" if seen.ride.car or seen.exchanged else _cost_sentences(lean_cost(quality), seen.has_speed, on_page)
         said = f"Alignment: it seems off by {', '.join(known)}"
-        if _good(seen):
+        if _is_well_aligned(seen):
             said = f"Alignment: good. It seems off by {', '.join(known)}, which costs less than {COSTS_DEG}° of lean."
         else:
             said += ": were the poses swapped?" if swapped else ": was it held upright?" if far else "."
@@ -199,7 +199,7 @@ def _alignment(seen: Overview, on_page: bool) -> str:
     return said + _gravity(quality.gravity_g, on_page)
 
 
-def _good(seen: Overview) -> bool:
+def _is_well_aligned(seen: Overview) -> bool:
     """True if the ride shows that the alignment errors of a motorcycle together cause a lean error under COSTS_DEG."""
     cost = lean_cost(seen.quality)
     if seen.ride.car or seen.exchanged or cost.roll_deg is None or cost.yaw_deg is None:
@@ -225,7 +225,7 @@ def judged(seen: Overview) -> bool:
     )
 
 
-def _costs(cost: LeanCost, speed: bool, on_page: bool) -> str:
+def _cost_sentences(cost: LeanCost, speed: bool, on_page: bool) -> str:
     """A sentence for each angle that causes a lean error, and the remedy; "" if none does. speed: True if the log has
     one."""
     costs = {

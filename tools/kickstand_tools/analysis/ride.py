@@ -85,7 +85,7 @@ class Ride:
             misfit.add(block.t_s, odd)
             if notices is not None and not absurd and np.any(variance < 0.0):
                 absurd = True
-                notices.append(_absurd(block, int(np.argmax(variance < 0.0))))
+                notices.append(_divergence_notice(block, int(np.argmax(variance < 0.0))))
             slow |= self.smoothed and found is None
             if found is not None:
                 lean_deg, sigma_deg, _, _, doubtful = found[~whole.frozen].T
@@ -176,7 +176,7 @@ def vehicle_channels(
     return joined(open_ride(log, calibration).blocks(progress))
 
 
-def _absurd(block: Block, at: int) -> Message:
+def _divergence_notice(block: Block, at: int) -> Message:
     """The notice that the lean filter diverged at this row, with the readings of the previous second."""
     before = slice(int(np.searchsorted(block.time_us, block.time_us[at] - 1_000_000)), at + 1)
     most = np.max(np.abs(block.readings[before]), axis=0)

@@ -71,7 +71,7 @@ class Summary:
         sure = block.trusted
         lean = np.where(sure, block.lean_deg, np.nan)
         forward = np.where(sure, block.shown_g, np.nan)
-        self._hold(t, lean)
+        self._update_maxima(t, lean)
         self.accel_g.add(t, forward)
         self.brake_g.add(t, -forward)
         self.speed_mps.add(t, block.speed_mps)
@@ -83,7 +83,7 @@ class Summary:
         held = riding & sure
         self.histogram_s += np.histogram(block.lean_deg[held], BINS_DEG, weights=step[held])[0]
 
-    def _hold(self, t_s: Array, lean: Array) -> None:
+    def _update_maxima(self, t_s: Array, lean: Array) -> None:
         """Update the maxima of the lean that last for HELD_S. lean: NaN where it is not trusted."""
         if not len(t_s):
             return

@@ -45,7 +45,7 @@ def fit_procedure(source: Source) -> SixPositions:
     ((3, 3), 6)
     """
     log = read_log(source)
-    stretches = _still(log)
+    stretches = _still_stretches(log)
     if len(stretches) == 1:
         raise wrong_number(1)
     poses = [_pose(log, first, last) for first, last in stretches]
@@ -83,7 +83,7 @@ def fit_procedure(source: Source) -> SixPositions:
     )
 
 
-def _still(log: Log) -> list[tuple[int, int]]:
+def _still_stretches(log: Log) -> list[tuple[int, int]]:
     """The stretches in which the sensor was still: index of the first sample, and index after the last."""
     step_s = float(np.median(np.diff(log.t_s))) if len(log.t_s) > 1 else 1.0
     n = max(4, round(_WINDOW_S / step_s))

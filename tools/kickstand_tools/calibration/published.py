@@ -83,7 +83,7 @@ class PublishedAlignment:
         self._event: list[tuple[Array, complex]] = []
         self._interval: list[tuple[Array, complex]] = []
         self._level = np.eye(3)
-        self._forget()
+        self._drop_event()
 
     @property
     def problem(self) -> Refusal | None:
@@ -127,7 +127,7 @@ class PublishedAlignment:
     def interrupt(self) -> None:
         """Samples are missing: drop the current braking event. Accepted events are kept."""
         self._improved.interrupt()
-        self._forget()
+        self._drop_event()
 
     def finish(self) -> None:
         """Do all pending work at once: see DriveAlignment.finish()."""
@@ -159,7 +159,7 @@ class PublishedAlignment:
         turn = rotation_between(braking / np.linalg.norm(braking), BACKWARD, 1)
         out[:] = array("f", (turn @ self._level).ravel())
 
-    def _forget(self) -> None:
+    def _drop_event(self) -> None:
         self._event, self._interval = [], []
         self._speed, self._loss, self._interval_us = -1.0, 0.0, 0
         self._sums, self._sums_us = [0.0] * 3, 0

@@ -45,7 +45,7 @@ def values(text: str) -> dict[str, str]:
     >>> values('SIDE = "right"  # mine\\n# RECORD = False\\n')
     {'SIDE': '"right"'}
     """
-    return {name: ast.get_source_segment(text, node.value) or "" for name, node in _assigned(text).items()}
+    return {name: ast.get_source_segment(text, node.value) or "" for name, node in _assignments(text).items()}
 
 
 def with_values(text: str, wanted: dict[str, str | None]) -> str:
@@ -58,7 +58,7 @@ def with_values(text: str, wanted: dict[str, str | None]) -> str:
     # RECORD = True
     """
     written = lines(text)
-    assigned = _assigned(text)
+    assigned = _assignments(text)
     added = []
     for name, value in wanted.items():
         if value is not None:
@@ -84,7 +84,7 @@ def with_values(text: str, wanted: dict[str, str | None]) -> str:
     return "\n".join([*written, *added]) + "\n"
 
 
-def _assigned(text: str) -> dict[str, ast.Assign]:
+def _assignments(text: str) -> dict[str, ast.Assign]:
     """The assignment to each name. The file is not executed, because a page reads the file of any board."""
     try:
         body = ast.parse(text).body

@@ -145,11 +145,11 @@ def connected(port: Port) -> Iterator[tuple[ConnectedBoard, str]]:
     """
     if port is None or isinstance(port, str):
         name = port or find_port()
-        transport = _opened(name)
+        transport = _open_board(name)
     else:
         transport, name = port, port.device_name
     try:
-        _enter(transport, name)
+        _enter_raw_prompt(transport, name)
         yield transport, name
     except TransportExecError as error:
         said = last_line(error.error_output)
@@ -173,7 +173,7 @@ def connected(port: Port) -> Iterator[tuple[ConnectedBoard, str]]:
             transport.close()  # its port may be gone or restarting
 
 
-def _opened(name: str) -> ConnectedBoard:
+def _open_board(name: str) -> ConnectedBoard:
     kind = _EmulatedBoard if name.startswith(_EMULATED) else ConnectedBoard
     try:
         return kind(name, timeout=ANSWER_S * (_SLOWER if kind is _EmulatedBoard else 1))
@@ -308,7 +308,7 @@ def last_line(text: str) -> str:
     return text.strip().rpartition("\n")[2].strip() or "an unknown error"
 
 
-def _enter(transport: SerialTransport, name: str) -> None:
+def _enter_raw_prompt(transport: SerialTransport, name: str) -> None:
     """Ctrl-C, then a soft reset into the raw prompt, which does not start main.py."""
     for limit_s in (_STARTING_S, ANSWER_S):  # a board may reset when its port is opened: it is starting
         try:

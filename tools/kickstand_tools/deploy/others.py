@@ -87,7 +87,7 @@ def find(there: Contents, judge: Callable[[Path], Judged], replace_config: bool)
         leave.append(BOOT)
     own, mended = there.texts.get(CONFIG), False
     if own is not None and not (installed and replace_config):
-        config, fault = _judged(own, judge)
+        config, fault = _check_config(own, judge)
         ours = _settings_named(config)
         if installed:
             foreign = fault and not ours
@@ -105,10 +105,10 @@ def find(there: Contents, judge: Callable[[Path], Judged], replace_config: bool)
     for path in leave:
         moves[path] = _free_name(path, taken)
         taken.add(moves[path])
-    return Others(_moved(there.files, moves), moves, own, mended)
+    return Others(_after_renaming(there.files, moves), moves, own, mended)
 
 
-def _judged(content: bytes, judge: Callable[[Path], Judged]) -> tuple[bytes, str | None]:
+def _check_config(content: bytes, judge: Callable[[Path], Judged]) -> tuple[bytes, str | None]:
     """The content as MicroPython reads it, and its fault."""
     try:
         content = cleaned(content)
@@ -151,6 +151,6 @@ def _free_name(path: str, taken: set[str]) -> str:
     return next(name for name in names if name not in taken)
 
 
-def _moved(files: BoardFiles, moves: dict[str, str]) -> BoardFiles:
+def _after_renaming(files: BoardFiles, moves: dict[str, str]) -> BoardFiles:
     renamed = {moves.get(path, path): mark for path, mark in files.files.items()}
     return BoardFiles(renamed, files.folders, files.block, files.free_blocks, files.has_rides)

@@ -89,7 +89,7 @@ class Hypotheses:
         )
 
 
-def _all() -> Hypotheses:
+def _all_hypotheses() -> Hypotheses:
     mounts = (FIRM, FIRM, 0.0), (FIRM, YIELDING, YIELDS), (YIELDING, YIELDING, YIELDS)
     pushes = (CALM_G, 0.0), (WIND_G, WINDY), (STORM_G, STORMY)
     rows = [
@@ -100,4 +100,4 @@ def _all() -> Hypotheses:
     return Hypotheses(*np.array(rows).T)
 
 
-ALL = _all()
+ALL = _all_hypotheses()

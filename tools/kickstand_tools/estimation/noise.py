@@ -94,7 +94,7 @@ class Noise:
     def sigma(self) -> Array:
         """(n, ROWS): standard deviations of the process noise over a window, and of the measurements; infinite without
         a measurement."""
-        w, riding, balanced = self._windows, self.riding, self._balanced
+        w, riding, balanced = self._windows, self.riding, self._is_balanced
         speed, roughness = np.maximum(self.speed, 0.0), self.roughness
         found = np.full((len(w), eq.ROWS), np.inf)
         found[:, :LEFT] = ANGLE_ROOT
@@ -111,7 +111,7 @@ class Noise:
         found[riding, eq.CLIMBING] = (roughness * np.hypot(DIVE_MPS, DIVE_RAD * speed))[riding]
         found[riding, eq.SLOPING] = np.hypot(SLOPE_MPS, SLOPE_RAD * speed)[riding]
         found[balanced, eq.BALANCED] = (self.unbalance * self._of_balance())[balanced]
-        found[:, eq.CLIMBING : eq.SLOPING + 1] *= self._steep[:, None]
+        found[:, eq.CLIMBING : eq.SLOPING + 1] *= self._wheelie_factor[:, None]
         found[riding, eq.ANY_SPEED] = ANY_MPS
         found *= self._lasting
         found[balanced, eq.BALANCED] = np.hypot(found[:, eq.BALANCED], BALANCE_ROLLING * self._rolling)[balanced]
@@ -148,7 +148,7 @@ class Noise:
             size = off[:, eq.CLIMBING] / sigma
             return self._misfit(size / np.hypot(1.0, size / limit))
 
-        unit = np.hypot(DIVE_MPS, DIVE_RAD * MISFIT_MPS) * self._steep * self._lasting[:, eq.CLIMBING]
+        unit = np.hypot(DIVE_MPS, DIVE_RAD * MISFIT_MPS) * self._wheelie_factor * self._lasting[:, eq.CLIMBING]
         self._own_misfit = factor(unit)
         self.misfit = factor(self.sigma()[:, eq.CLIMBING])
         self.doubtful = self.riding & (self.misfit >= MOST_MISFIT)
@@ -170,7 +170,7 @@ class Noise:
 
     def estimate_unbalance(self, force: Array, over_s: float) -> None:
         """Set unbalance from the measurement BALANCED (n, g). over_s: BRIEF_S or LONG_S."""
-        counted = self._balanced
+        counted = self._is_balanced
         share, whole = averaged(counted.astype(float), LASTS_S), averaged(counted.astype(float), over_s) > 0.97
         self.unbalance = 1.0
         if np.count_nonzero(whole) < LEAST_WINDOWS:
@@ -183,13 +183,13 @@ class Noise:
         self.unbalance = float(np.clip(np.sqrt(np.mean(mean**2) / left), LEAST_UNBALANCE, MOST_UNBALANCE))
 
     @property
-    def _steep(self) -> Array:
+    def _wheelie_factor(self) -> Array:
         """(n) factor on the noise of the wheels' upward motion: in a wheelie the chassis does not point along the
         road."""
         return 1.0 + (self.pitch / STEEP) ** 4
 
     @property
-    def _balanced(self) -> Bools:
+    def _is_balanced(self) -> Bools:
         return self.riding & (self.speed > BALANCE_MIN_MPS)
 
     def _of_balance(self) -> Array:

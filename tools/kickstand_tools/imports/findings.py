@@ -119,8 +119,8 @@ def find(sheet: Sheet) -> Findings:
             findings.single |= _single(sheet, key, kind)
     for key, places in (
         ("speed", _speed(sheet)),
-        ("lat", _named(sheet, "^lat|latitude")),
-        ("lon", _named(sheet, "^lon|^lng|longitude")),
+        ("lat", _find_by_name(sheet, "^lat|latitude")),
+        ("lon", _find_by_name(sheet, "^lon|^lng|longitude")),
     ):
         if places is not None:
             findings.found[key] = places
@@ -194,7 +194,7 @@ def _seconds(sheet: Sheet, time: ColumnFinding | None) -> Array | None:
 
 
 @dataclass
-class _Three:
+class _Triple:
     """Three columns, one per axis. kind: a key of _KINDS, "" if their names do not show it."""
 
     stem: str
@@ -203,11 +203,11 @@ class _Three:
     values: Array
 
 
-def _threes(sheet: Sheet) -> list[_Three]:
+def _find_triples(sheet: Sheet) -> list[_Triple]:
     """The groups of three columns that belong together."""
     stems: dict[str, dict[str, int]] = {}
     for place, name in enumerate(sheet.columns):
-        for stem, axis in _stems(name):
+        for stem, axis in _split_axis(name):
             stems.setdefault(stem, {}).setdefault(axis, place)
     found, used = [], set()
     for stem, axes in stems.items():
@@ -216,7 +216,7 @@ def _threes(sheet: Sheet) -> list[_Three]:
             places = [axes[axis] for axis in axes_of_one]
             if not used & set(places) and _numeric(sheet, places):
                 used |= set(places)
-                found.append(_Three(stem, places, _kind(stem), sheet.table(places)))
+                found.append(_Triple(stem, places, _kind(stem), sheet.table(places)))
     if not found:
         found = _side_by_side(sheet)
     return found
@@ -224,7 +224,7 @@ def _threes(sheet: Sheet) -> list[_Three]:
 
 def _single(sheet: Sheet, key: str, kind: str) -> dict[str, str]:
     """The columns of single axes whose names fit a sensor of this kind."""
-    named = [(stem, axis, name) for name in sheet.columns for stem, axis in _stems(name)]
+    named = [(stem, axis, name) for name in sheet.columns for stem, axis in _split_axis(name)]
     return {key + axis: name for stem, axis, name in reversed(named) if axis in "xyz" and _kind(stem) == kind}
 
 
@@ -240,7 +240,7 @@ def _numbered(axes: dict[str, int]) -> list[list[str]]:
     return [numbers[k : k + 3] for k in range(0, len(numbers), 3)]
 
 
-def _side_by_side(sheet: Sheet) -> list[_Three]:
+def _side_by_side(sheet: Sheet) -> list[_Triple]:
     """Two groups without meaningful names: the first six columns side by side that are not a time."""
     numeric = [
         place
@@ -248,7 +248,7 @@ def _side_by_side(sheet: Sheet) -> list[_Three]:
         if _numeric(sheet, [place]) and not _TIME.search(plain(sheet.columns[place])) and not _increasing(sheet, place)
     ]
     runs = [numeric[k : k + 3] for k in range(0, len(numeric) - 2, 3)]
-    return [_Three("", run, "", sheet.table(run)) for run in runs if run[2] - run[0] == 2]
+    return [_Triple("", run, "", sheet.table(run)) for run in runs if run[2] - run[0] == 2]
 
 
 def _increasing(sheet: Sheet, place: int) -> bool:
@@ -257,7 +257,7 @@ def _increasing(sheet: Sheet, place: int) -> bool:
     return len(steps) > 2 and bool(np.mean(steps >= 0.0) > 0.95 and np.any(steps > 0.0))
 
 
-def _stems(name: str) -> Iterable[tuple[str, str]]:
+def _split_axis(name: str) -> Iterable[tuple[str, str]]:
     """(name without its axis, axis) for each way to read an axis in a name."""
     bare = _without_unit(name)
     sensor, colon, bare = bare.rpartition(":")
@@ -318,7 +318,7 @@ def _kind(stem: str) -> str:
 
 def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> None:
     """Add both to findings, and note what is missing."""
-    threes = _threes(sheet)
+    threes = _find_triples(sheet)
     kinds = {kind: [three for three in threes if three.kind == kind] for kind in (*_KINDS, "")}
     unnamed = [*kinds["either"], *kinds[""]]
     accel = _first_with_gravity(
@@ -346,11 +346,11 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
         findings.found["g"] = found
 
 
-def _names(sheet: Sheet, three: _Three) -> list[str]:
+def _names(sheet: Sheet, three: _Triple) -> list[str]:
     return [sheet.columns[place] for place in three.places]
 
 
-def _first_with_gravity(threes: Sequence[_Three], seconds: Array | None) -> _Three | None:
+def _first_with_gravity(threes: Sequence[_Triple], seconds: Array | None) -> _Triple | None:
     """The first group whose length is that of gravity in some unit, otherwise the first that keeps its length."""
     return next(
         (three for three in threes if _has_gravity(three, seconds, near=True)),
@@ -358,7 +358,7 @@ def _first_with_gravity(threes: Sequence[_Three], seconds: Array | None) -> _Thr
     )
 
 
-def _has_gravity(three: _Three, seconds: Array | None, near: bool) -> bool:
+def _has_gravity(three: _Triple, seconds: Array | None, near: bool) -> bool:
     """True if these values contain gravity: their length is constant while they are calm, and hardly ever near 0. near:
     the length is that of gravity in some unit; otherwise it must be more constant."""
     values = three.values[np.all(np.isfinite(three.values), axis=1)]
@@ -485,7 +485,7 @@ def _speed(sheet: Sheet) -> ColumnFinding | None:
 _SPEED_WORDS = (("kmh", "km/h"), ("kph", "km/h"), ("mph", "mph"), ("mps", "m/s"), ("knot", "knots"))
 
 
-def _named(sheet: Sheet, words: str) -> ColumnFinding | None:
+def _find_by_name(sheet: Sheet, words: str) -> ColumnFinding | None:
     for place, name in enumerate(sheet.columns):
         bare = plain(name)
         if re.search(words, bare) and "acc" not in bare and np.any(np.isfinite(sheet.numbers(place))):

@@ -273,14 +273,14 @@ def _increases(numbers: Cells) -> bool:
 def _labelled(name: str, text: str) -> Sheet | None:
     """The table in lines of `label: value`; None without such lines."""
     head = [line for line in text[:20_000].split("\n") if line.strip()]
-    pairs = [len(list(_pairs(line))) for line in head]
+    pairs = [len(list(_labelled_values(line))) for line in head]
     if sum(count > 0 for count in pairs) < 0.7 * len(head) or sum(pairs) < max(FEWEST_CELLS, 1.5 * len(head)):
         return None
     rows: list[dict[str, str]] = []
     row: dict[str, str] = {}
     stamp = ""
     for line in text.split("\n"):
-        for label, value in sorted(_pairs(line), key=lambda pair: pair[0] != _STAMPED):
+        for label, value in sorted(_labelled_values(line), key=lambda pair: pair[0] != _STAMPED):
             if label in row and label != _STAMPED:  # a sample ends where its first label returns
                 rows.append(row)
                 row = {_STAMPED: stamp} if stamp else {}
@@ -297,7 +297,7 @@ def _labelled(name: str, text: str) -> Sheet | None:
     return Sheet(name, labels, cells)
 
 
-def _pairs(line: str) -> Iterator[tuple[str, str]]:
+def _labelled_values(line: str) -> Iterator[tuple[str, str]]:
     """(label, value) of each value in a line. A label of one letter is prefixed by an earlier word, as in "Acceleration
     X: 0.1, Y: 0.2". A unit after a value is added to the label in brackets."""
     for several in _SEVERAL.finditer(line):

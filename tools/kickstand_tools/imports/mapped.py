@@ -124,7 +124,7 @@ def read_mapped(
     track = track_of(sheet, time_ns, speed, places.get("lat"), places.get("lon"), speed_unit, (lat, lon))
     temp_c = sheet.numbers(places["temp"]) if "temp" in places else None
     utc_ns = 0 if len(time_ns) and int(np.median(time_ns)) > EPOCH_NS else None
-    recording = AppRecording(NAME, accel, gyro, track, temp_c, notices, utc_ns=utc_ns, sign_known=_turned(units))
+    recording = AppRecording(NAME, accel, gyro, track, temp_c, notices, utc_ns=utc_ns, sign_known=_sign_is_changed(units))
     if why is not None:
         for taken, key in zip(recording.taken, ("t", "a", "g")):
             taken.why = why.found[key].why
@@ -194,7 +194,9 @@ def unknown(files: list[RecordingFile], source: str, table: MappedTable | None =
             f"{source}: not a file of an app that is known{several}, and no time found in it: write the time of each "
             "row, such as millis(), or switch the time stamps of the serial monitor on"
         )
-    given = [f"{key}={_typed(table, key)}" for key in (*REQUIRED, *OPTIONAL) if key in (*REQUIRED, *table.found)]
+    given = [
+        f"{key}={_column_as_typed(table, key)}" for key in (*REQUIRED, *OPTIONAL) if key in (*REQUIRED, *table.found)
+    ]
     units = ",".join(f"{key}={name}" for key, name in table.units.items())
     where = source if len(files) == 1 or table.joined else f"{source}/{table.name}"
     ask = "Put in what the ? stand for" if table.missing else "Put in what is not right"
@@ -209,7 +211,7 @@ def unknown(files: list[RecordingFile], source: str, table: MappedTable | None =
     )
 
 
-def _typed(table: MappedTable, key: str) -> str:
+def _column_as_typed(table: MappedTable, key: str) -> str:
     """The column of a key as the user types it: its number if its name would be misread, ? for none."""
     name = table.found.get(key, "?")
     if name != "?" and (any(mark in name for mark in ",=") or table.columns.count(name) > 1):
@@ -375,6 +377,6 @@ def _unit(units: Mapping[str, str], keys: tuple[str, ...], column: str) -> str:
     return next((units[key] for key in keys if key in units), unit_in(column) or findings.stated_unit(column))
 
 
-def _turned(units: Mapping[str, str]) -> bool:
+def _sign_is_changed(units: Mapping[str, str]) -> bool:
     """True if the user has asked for a change of sign. It is then not checked."""
     return any(units.get(key, "").startswith("-") for key in ("a", *ACCEL))

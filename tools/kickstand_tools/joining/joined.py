@@ -111,7 +111,7 @@ def write_joined(out: Path | str, joined: Joined, progress: Progress | None = No
                 cells = [_FORMAT[name] % value for name, value in zip(columns, values)]
                 ends[row] = "," + ",".join(cells).replace("nan", "")
             count += len(points)
-            own = block.lines if len(kept) == len(block.names) else _only(block, kept)
+            own = block.lines if len(kept) == len(block.names) else _with_columns(block, kept)
             yield "".join([f"{line}{end}\n" for line, end in zip(own, ends)]).encode()
 
     write_packed(out, lines())
@@ -136,7 +136,7 @@ def _placed(values: Array, rows: Ints, count: int) -> Array:
     return placed
 
 
-def _only(block: Block, kept: list[str]) -> list[str]:
+def _with_columns(block: Block, kept: list[str]) -> list[str]:
     """The lines with these columns."""
     places = [block.names.index(name) for name in kept]
     rows = (next(csv.reader([line])) if '"' in line else line.split(",") for line in block.lines)

@@ -108,7 +108,7 @@ def overlay(
         arguments = [*given, *_TRANSPARENT[out.suffix.lower()]]
     else:
         assert offset_s is not None
-        arguments = _over(filmed, begin_s - offset_s, end_s - begin_s, fps, given, round(MARGIN * size))
+        arguments = _laid_over(filmed, begin_s - offset_s, end_s - begin_s, fps, given, round(MARGIN * size))
     with whole_file(out) as temporary:
         temporary.touch()  # if this fails, the user sees the system's reason, which ffmpeg would hide
         write_video(temporary, arguments, pictures(), drawn)
@@ -166,7 +166,9 @@ def _part(
     return begin_s, end_s if video else min(end_s, last_s)
 
 
-def _over(video: Video, begin_s: float, seconds: float, fps: float | None, gauge: list[str], margin: int) -> list[str]:
+def _laid_over(
+    video: Video, begin_s: float, seconds: float, fps: float | None, gauge: list[str], margin: int
+) -> list[str]:
     """ffmpeg's arguments to draw the gauge over the video's lower left corner. Sound is copied."""
     even = "crop=iw-mod(iw\\,2):ih-mod(ih\\,2)"
     rate = f",fps={fps:g}" if fps else ""

@@ -45,14 +45,14 @@ class Shown:
         """The values at other times (m), interpolated; NaN before the ride, after it and in gaps."""
         before = np.clip(np.searchsorted(self.t_s, t_s, side="right") - 1, 0, len(self.t_s) - 2)
         lean, forward, left = (
-            _between(self.t_s, value, before, t_s, _GAP_S) for value in (self.lean_deg, self.forward_g, self.left_g)
+            _along_lines(self.t_s, value, before, t_s, _GAP_S) for value in (self.lean_deg, self.forward_g, self.left_g)
         )
         known = np.flatnonzero(np.isfinite(self.speed_mps))
         speed = np.full(len(t_s), np.nan)
         if len(known) > 1:
             at_s = self.t_s[known]
             place = np.clip(np.searchsorted(at_s, t_s, side="right") - 1, 0, len(known) - 2)
-            speed = _between(at_s, self.speed_mps[known], place, t_s, _SPEED_S)
+            speed = _along_lines(at_s, self.speed_mps[known], place, t_s, _SPEED_S)
         last = np.searchsorted(self.t_s, t_s, side="right") - 1
         most_left, most_right = (np.where(last >= 0, value[last], 0.0) for value in (self.left_deg, self.right_deg))
         return Shown(t_s, lean, forward, left, speed, most_left, most_right)
@@ -79,7 +79,7 @@ def _maximum(t_s: Array, lean: Array) -> Array:
     return np.maximum(np.maximum.accumulate(lasted), 0.0)
 
 
-def _between(at_s: Array, values: Array, before: Ints, t_s: Array, gap_s: float) -> Array:
+def _along_lines(at_s: Array, values: Array, before: Ints, t_s: Array, gap_s: float) -> Array:
     """Interpolate values at t_s along straight lines; NaN outside, and between values further apart than gap_s."""
     step_s = at_s[before + 1] - at_s[before]
     share = (t_s - at_s[before]) / step_s

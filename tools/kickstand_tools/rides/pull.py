@@ -221,18 +221,18 @@ def _read(transport: ConnectedBoard, part: _Part, title: str, came: _Came) -> tu
     """A file of the board, and True if all announced bytes arrived as the board read them."""
     content, whole = b"", False
     for attempt in range(_TRIES):
-        again, whole = _copied(transport, part, title, came if attempt == 0 else _nothing)
+        again, whole = _try_to_copy(transport, part, title, came if attempt == 0 else _no_progress)
         content = max(content, again, key=len) if not whole else again
         if whole:
             break
     return content, whole
 
 
-def _nothing(_what: str, _count: int) -> None:
+def _no_progress(_what: str, _count: int) -> None:
     """The progress function of a second try, which is not shown."""
 
 
-def _copied(transport: ConnectedBoard, part: _Part, title: str, came: _Came) -> tuple[bytes, bool]:
+def _try_to_copy(transport: ConnectedBoard, part: _Part, title: str, came: _Came) -> tuple[bytes, bool]:
     """One attempt of _read()."""
     content = bytearray()
     there = None

@@ -60,8 +60,8 @@ def record(
             notes: list[str] = []
             # The calibration first: if the disk is full at the end, there would be no room for it
             with whole_file(out) as temporary, whole_file(beside) as calibration, _signals(stopped):
-                with _Growing(temporary, out.suffix == ".gz") as file:
-                    made = _noting_first(blocks(transport, name, notes, stopped), calibration)
+                with _GrowingFile(temporary, out.suffix == ".gz") as file:
+                    made = _save_first_calibration(blocks(transport, name, notes, stopped), calibration)
                     recorded.write(file, made, notes)
         finally:
             with contextlib.suppress(Exception):  # the cable may be out
@@ -69,7 +69,7 @@ def record(
     return RecordResult(out, beside, recorded.seconds, recorded.count, notes)
 
 
-def _noting_first(blocks: Iterator[StoredBlock], calibration: Path) -> Iterator[StoredBlock]:
+def _save_first_calibration(blocks: Iterator[StoredBlock], calibration: Path) -> Iterator[StoredBlock]:
     """Yield the blocks. Before the first one, write its calibration to the file `calibration`."""
     for i, block in enumerate(blocks):
         if i == 0:
@@ -77,7 +77,7 @@ def _noting_first(blocks: Iterator[StoredBlock], calibration: Path) -> Iterator[
         yield block
 
 
-class _Growing(io.TextIOBase):
+class _GrowingFile(io.TextIOBase):
     """A text file that contains only complete writes: a write that fails, on a full disk, leaves the earlier content.
 
     packed: each write becomes a separate gzip member, because a gzip file cut inside a member is damaged.
@@ -129,7 +129,7 @@ def live_line() -> Iterator[Callable[[str], None]]:
 @contextlib.contextmanager
 def _signals(stopped: threading.Event) -> Iterator[None]:
     """A context in which signals that would end this program only set `stopped`."""
-    before = {number: signal.signal(number, lambda *_: stopped.set()) for number in _ends()}
+    before = {number: signal.signal(number, lambda *_: stopped.set()) for number in _ending_signals()}
     try:
         yield
     finally:
@@ -137,7 +137,7 @@ def _signals(stopped: threading.Event) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _ends() -> list[signal.Signals]:
+def _ending_signals() -> list[signal.Signals]:
     """The signals that end a recording: Ctrl-C, kill, a closed terminal (not on Windows; not after nohup)."""
     ends = [signal.SIGINT, signal.SIGTERM]
     if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:

@@ -53,7 +53,7 @@ class Clock:
         if target < self.next_us:
             self.now_us = target
         else:
-            self._pass_to(target)
+            self._advance_to(target)
 
     def at(self, due_us, function):
         """Call function() at due_us; if that time has passed, at the next advance()."""
@@ -101,7 +101,7 @@ class Clock:
             due = self._events[0][0]
         self.next_us = due
 
-    def _pass_to(self, target):
+    def _advance_to(self, target):
         while self.next_us <= target:
             if self._reset:
                 raise Reset

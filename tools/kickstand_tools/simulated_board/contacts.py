@@ -66,9 +66,9 @@ class Button(Contact):
         self._set_at(at_us, closed)
         step = BOUNCE_US // (2 * _BOUNCES)
         for i in range(1, 2 * _BOUNCES + 1):
-            self._set_at(at_us + i * step - self._below(step // 2), closed if i % 2 == 0 else not closed)
+            self._set_at(at_us + i * step - self._random_below(step // 2), closed if i % 2 == 0 else not closed)
 
-    def _below(self, limit):
+    def _random_below(self, limit):
         self._random = (self._random * 1103515245 + 12345) & 0x7FFFFFFF
         return (self._random >> 8) % limit
 
@@ -90,9 +90,9 @@ class Wheel(Contact):
         self._bounce_us = bounce_us
         self._turned = 0.5  # share of the way to the next pulse
         self._look_us = clock.now_us
-        clock.at(clock.now_us, self._look)
+        clock.at(clock.now_us, self._add_distance)
 
-    def _look(self):
+    def _add_distance(self):
         """Add the distance since the last call. At a pulse schedule closing and opening. Schedule the next call."""
         now_us = self._clock.now_us
         speed = self._speed(now_us / 1e6)
@@ -106,7 +106,7 @@ class Wheel(Contact):
             self._turn(True, now_us)
             self._turn(False, now_us + int(_CLOSED_SHARE / rate))
         left_us = int((1.0 - self._turned) / rate) + 1 if rate else _LOOK_US
-        self._clock.at(now_us + min(_LOOK_US, left_us), self._look)
+        self._clock.at(now_us + min(_LOOK_US, left_us), self._add_distance)
 
     def _turn(self, closed, at_us):
         self._set_at(at_us, closed)

@@ -56,7 +56,7 @@ def commands(legs: list[Leg], rate_hz: float) -> RiderCommands:
     ends = np.cumsum([leg.seconds for leg in legs])
     starts = ends - [leg.seconds for leg in legs]
     time = np.arange(int(ends[-1] * rate_hz)) / rate_hz
-    speeds = _kept(legs, "speed_mps")
+    speeds = _fill_in(legs, "speed_mps")
     speed = np.interp(time, np.concatenate(([0.0], ends)), [speeds[0], *speeds])
     speed = np.maximum(smoothed(speed, _SPEED_SMOOTHING_S, rate_hz), 0.0)
     speed[speed < 1e-4] = 0.0
@@ -64,7 +64,7 @@ def commands(legs: list[Leg], rate_hz: float) -> RiderCommands:
 
     def stepped(name: str, settle_s: float | None = 1.0) -> Signal:
         """The signal of a value that each leg reaches within settle_s of its start (None: its roll_s), then holds."""
-        values = _kept(legs, name)
+        values = _fill_in(legs, name)
         result = np.full_like(time, values[0])
         for leg, start, before, after in zip(legs[1:], starts[1:], values, values[1:]):
             if after != before:
@@ -81,7 +81,7 @@ def commands(legs: list[Leg], rate_hz: float) -> RiderCommands:
         speed,
         distance,
         np.radians(stepped("lean_deg", None)),
-        _slope(distance, np.interp(ends, time, distance), _kept(legs, "slope_percent")),
+        _slope(distance, np.interp(ends, time, distance), _fill_in(legs, "slope_percent")),
         stepped("hang_m"),
         np.radians(stepped("lift_deg")),
         stepped("engine"),
@@ -92,7 +92,7 @@ def commands(legs: list[Leg], rate_hz: float) -> RiderCommands:
     )
 
 
-def _kept(legs: list[Leg], name: str) -> list[float]:
+def _fill_in(legs: list[Leg], name: str) -> list[float]:
     """One value per leg: None is replaced by the previous leg's value, in the first leg by 0."""
     kept, now = [], 0.0
     for leg in legs:

@@ -175,7 +175,7 @@ def _motion(
     rolled = roll(command, bike, weave(chance, command, conditions.unrest_deg))
     surface = profile_slope(chance, float(command.distance[-1]) + 10.0, conditions.roughness)
     for phase, spacing, height, length in conditions.bumps:
-        add_bumps(surface, _places(command, phase, spacing), height, length)
+        add_bumps(surface, _distances_in_phase(command, phase, spacing), height, length)
     shaken = shaking(chance, command.distance, command.speed, surface, bike, rate)
     dive = bike.dive(np.gradient(command.speed, 1.0 / rate), rate)
     motion = Motion(
@@ -214,7 +214,7 @@ def _sideways(lean: NDArray[np.float64], left: NDArray[np.float64]) -> NDArray[n
     return np.column_stack((left * np.cos(lean), -left * np.sin(lean), np.zeros_like(left)))
 
 
-def _places(command: RiderCommands, phase: str, spacing_m: float) -> list[float]:
+def _distances_in_phase(command: RiderCommands, phase: str, spacing_m: float) -> list[float]:
     """The multiples of spacing_m at which the ride is in this phase."""
     if phase not in command.phases:
         return []

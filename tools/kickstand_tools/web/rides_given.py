@@ -67,7 +67,7 @@ def sorted_out(names: list[str]) -> Given:
                     loose += files
         except InputError as error:
             found.refused[name] = error
-    for name, files in _together(loose):
+    for name, files in _recordings_among(loose):
         _add(found, name, [file.name for file in files], files)
     found.rides.sort(key=lambda ride: _by_number(ride.log))
     beside = {ride.log: calibration_path(Path(ride.log)).name for ride in found.rides}
@@ -88,7 +88,7 @@ def _in_folder(name: str, files: list[RecordingFile]) -> str:
     return name
 
 
-def _together(files: list[RecordingFile]) -> Iterator[tuple[str, list[RecordingFile]]]:
+def _recordings_among(files: list[RecordingFile]) -> Iterator[tuple[str, list[RecordingFile]]]:
     """(name, its files) of each recording among single files: the name is that of a folder if there are several
     files."""
     found = recordings(files)

@@ -103,13 +103,13 @@ def take(log, is_log, columns, units, track, progress):
     out, warnings, words = log, [], ""
     if not is_log:
         found = import_recording(log, json.loads(columns) or None, json.loads(units))
-        out = str(_made(log, f"{log.partition('.')[0]}.csv"))
+        out = str(_result_path(log, f"{log.partition('.')[0]}.csv"))
         write_imported(out, found)
         warnings = [notice.line(page=True) for notice in [*found.notices, *found.shortfalls]]
     if track:
         try:
             joined = join_track(Path(out), Path(track), progress)
-            out = str(_made(log, f"{log.partition('.')[0]}.joined.csv"))
+            out = str(_result_path(log, f"{log.partition('.')[0]}.joined.csv"))
             write_joined(out, joined)
             match = joined.match
             words = f"{track} is joined: correlation {match.correlation:.2f}, known to {match.sigma_s:.2f} s."
@@ -152,7 +152,7 @@ def look(log, calibration, progress):
 def smooth(log, calibration, progress):
     """{"path": of LEAN.csv as written by `smooth`}. Results of look() are reused."""
     ride = open_ride(Path(log), Path(calibration))
-    out = _made(log, f"{ride.stem}.lean.csv")
+    out = _result_path(log, f"{ride.stem}.lean.csv")
     kept = _smoothed.get(ride.name, [None])
     if any(found is None for found in kept):
         smooth_to_csv(Path(log), ride.calibration, out, progress)
@@ -173,13 +173,13 @@ def _blocks_with(values, ride, progress):
 def align(log, progress):
     """{"path": of the calibration from `calibrate ride`, "roll_deg", "pitch_deg", "yaw_deg": its standard errors}."""
     found = fit_ride(Path(log), progress=progress)
-    out = _made(log, calibration_path(Path(log)).name)
+    out = _result_path(log, calibration_path(Path(log)).name)
     write_calibration(out, found.calibration)
     known = {name: round(getattr(found, name), 1) for name in ("roll_deg", "pitch_deg", "yaw_deg")}
     return {"path": str(out), **known}
 
 
-def _made(log, name):
+def _result_path(log, name):
     """A path for a result of a log. Another log may have a result of the same name."""
     folder = Path(log).parent if MADE in Path(log).parents else MADE / log
     folder.mkdir(parents=True, exist_ok=True)

@@ -49,7 +49,7 @@ class Server(ThreadingHTTPServer):
 
     def process_request(self, request: Any, client_address: Any) -> None:
         if not self._free.acquire(blocking=False) and not (
-            self._end_a_silent_one() or self._free.acquire(timeout=FULL_S)
+            self._end_silent_connection() or self._free.acquire(timeout=FULL_S)
         ):
             with contextlib.suppress(OSError, StopIteration, RuntimeError):  # another may end meanwhile
                 next(iter(self._open)).shutdown(socket.SHUT_RDWR)
@@ -57,7 +57,7 @@ class Server(ThreadingHTTPServer):
         self._open[request] = None
         super().process_request(request, client_address)
 
-    def _end_a_silent_one(self) -> bool:
+    def _end_silent_connection(self) -> bool:
         """End the oldest connection that has sent no request, and use its place; False if there is none."""
         with contextlib.suppress(OSError, StopIteration, RuntimeError):
             next(one for one in list(self._open) if one not in self.has_asked).shutdown(socket.SHUT_RDWR)

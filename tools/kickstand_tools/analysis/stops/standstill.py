@@ -27,7 +27,7 @@ def standing(ride: Channels) -> Bools:
     """(n) True where the vehicle stands still: from the log's speed, or without one from its small shaking."""
     still = _quiet(ride)
     if not np.any(still):
-        still = _rested(ride)
+        still = _rests_of_filter(ride)
     there = ~np.isnan(ride.speed_mps)
     latest = np.maximum.accumulate(np.where(there, np.arange(len(there)), 0))
     known = there[latest] & (ride.t_s - ride.t_s[latest] < STALE_S)
@@ -42,19 +42,19 @@ def _quiet(ride: Channels) -> Bools:
     quiet = np.ones(len(still) - second + 1, dtype=bool)
     for rate in ride.pitch_rate_dps, ride.yaw_rate_dps:
         slow = smoothed(rate, ride.t_s, ENGINE_S)
-        quiet &= (np.abs(window_means(slow, second)) < STILL_DPS) & _calm(slow, second, QUIET_SHARE)
-        quiet &= _calm(_road(rate, ride.t_s), second, QUIET_SHARE)
-    quiet &= _calm(_road(ride.up_g, ride.t_s), second, QUIET_UP_SHARE)
+        quiet &= (np.abs(window_means(slow, second)) < STILL_DPS) & _is_calm(slow, second, QUIET_SHARE)
+        quiet &= _is_calm(_shaking_by_road(rate, ride.t_s), second, QUIET_SHARE)
+    quiet &= _is_calm(_shaking_by_road(ride.up_g, ride.t_s), second, QUIET_UP_SHARE)
     half = second // 2
     forward = window_means(ride.forward_g, half)
     quiet &= np.abs(forward[second - half :] - forward[: len(quiet)]) < STILL_G
-    quiet &= _weight(ride, second) & (window_means(ride.rolling, second) < 0.5)
+    quiet &= _has_force_at_rest(ride, second) & (window_means(ride.rolling, second) < 0.5)
     for shift in range(second):  # mark every sample of a quiet window
         still[shift : shift + len(quiet)] |= quiet
     return still
 
 
-def _rested(ride: Channels) -> Bools:
+def _rests_of_filter(ride: Channels) -> Bools:
     """The rests that the lean filter found, for a road that is too smooth for the test of shaking. Each is extended
     back to where the forward force reached that of the rest."""
     still = ride.resting > 0.5
@@ -66,20 +66,20 @@ def _rested(ride: Channels) -> Bools:
     return still
 
 
-def _road(values: Array, time: Array) -> Array:
+def _shaking_by_road(values: Array, time: Array) -> Array:
     """The shaking caused by the road: values without the engine's shaking, and without bends and braking, which are
     larger."""
     slow = smoothed(values, time, ENGINE_S)
     return slow - smoothed(slow, time, BEND_S)
 
 
-def _calm(values: Array, n: int, share: float) -> Bools:
+def _is_calm(values: Array, n: int, share: float) -> Bools:
     """True where the standard deviation of n successive samples is under this share of the one while moving."""
     spread = window_spreads(values, n)
     return spread < share * np.percentile(spread, RIDING_PERCENTILE)
 
 
-def _weight(ride: Channels, n: int) -> Bools:
+def _has_force_at_rest(ride: Channels, n: int) -> Bools:
     """True where the force over n successive samples equals that at rest, within the sensor's calibration errors."""
     size = np.sqrt(sum(window_means(axis, n) ** 2 for axis in (ride.left_g, ride.up_g, ride.forward_g)))
     rests = size[window_means(ride.resting, n) > 0.99]

@@ -41,7 +41,7 @@ def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a missing column or sensor."""
     sheet = read_sheet(files[0])
-    places = {kind: _places(sheet, names) for kind, (_, names) in _KINDS.items()}
+    places = {kind: _axis_columns(sheet, names) for kind, (_, names) in _KINDS.items()}
 
     def acceleration(kind: str) -> RecordedSensor:
         return sensor_of(sheet, _clock(sheet, _KINDS[kind][0]), places[kind], "accelerometer", "g", _UP, -1.0)
@@ -57,7 +57,7 @@ def _is_ours(file: RecordingFile) -> bool:
     return bool(head & {plain(_ACCEL[0]), plain(_USER[0])})
 
 
-def _places(sheet: Sheet, names: list[str]) -> list[int]:
+def _axis_columns(sheet: Sheet, names: list[str]) -> list[int]:
     """The columns of three axes; none if one is missing or empty."""
     found, missing = sheet.axes(*names)
     return found if not missing and np.any(np.isfinite(sheet.table(found)).all(axis=1)) else []
@@ -78,7 +78,7 @@ def _times(sheet: Sheet, sensor: str) -> Nanoseconds:
 
 def _gyro(sheet: Sheet, name: str) -> RecordedSensor:
     for sensor, names in (("gyro", _GYRO), ("motion", _RATE)):
-        places = _places(sheet, names)
+        places = _axis_columns(sheet, names)
         if places:
             return sensor_of(sheet, _clock(sheet, sensor), places, "gyro", "rad/s", "right-handed")
     raise InputError(f"{name}: no gyroRotation or motionRotationRate in it: log the gyro, too")
@@ -93,14 +93,14 @@ def _utc_ns(sheet: Sheet) -> int | None:
         written = sheet.times(logged, "")
     except InputError:
         return None
-    own = _times(sheet, "accelerometer" if _places(sheet, _ACCEL) else "motion")
+    own = _times(sheet, "accelerometer" if _axis_columns(sheet, _ACCEL) else "motion")
     both = (written != NO_TIME) & (own != NO_TIME)
     return int(np.median(written[both] - own[both])) if np.any(both) else None
 
 
 def _location(sheet: Sheet) -> ReceiverTrack | None:
     """The positions and speeds. A fix is new in a row if its own time has changed."""
-    row_ns = _times(sheet, "accelerometer" if _places(sheet, _ACCEL) else "motion")
+    row_ns = _times(sheet, "accelerometer" if _axis_columns(sheet, _ACCEL) else "motion")
     fix = sheet.place("locationTimestamp_since1970")
     if fix is not None:
         values = sheet.numbers(fix)

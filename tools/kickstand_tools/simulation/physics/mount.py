@@ -39,17 +39,17 @@ class Holder:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Force (n, 3, g) and rates (n, 3, deg/s) of the held sensor from those of the bike, along left, up,
         forward."""
-        held = np.column_stack([self._passed(column, k, rate_hz) for k, column in enumerate(force.T)])
+        held = np.column_stack([self._by_spring(column, k, rate_hz) for k, column in enumerate(force.T)])
         turned = np.zeros_like(held)
         turned[:, 0] = (self.sag[0] * held[:, 2]).clip(-_SAG_LIMIT, _SAG_LIMIT)
         turned[:, 2] = (-self.sag[2] * held[:, 0]).clip(-_SAG_LIMIT, _SAG_LIMIT)
         turning = np.column_stack([derivative(column, rate_hz) for column in turned.T])
-        turning = np.column_stack([self._passed(column, k, rate_hz) for k, column in enumerate(rates.T)]) + np.degrees(
-            turning
-        )
+        turning = np.column_stack(
+            [self._by_spring(column, k, rate_hz) for k, column in enumerate(rates.T)]
+        ) + np.degrees(turning)
         return held - np.cross(turned, held), turning
 
-    def _passed(self, x: Signal, axis: int, rate_hz: float) -> Signal:
+    def _by_spring(self, x: Signal, axis: int, rate_hz: float) -> Signal:
         """x, filtered by a mass on a spring that is shaken at its base."""
 
         def transfer(f: Signal) -> NDArray:

@@ -47,12 +47,12 @@ def oracle(made: SimulatedRide) -> NDArray[np.float64]:
     rate = rate @ np.linalg.inv(chip.gyro_matrix).T
     calibration = CalibrationFile(vehicle_from_sensor=made.vehicle_from_sensor, aligned=True, six_done=True)
     log = Log(made.time, force, rate, made.truth["speed_mps"].copy(), name="RIDE.csv")
-    with _knowing():
+    with _oracle_parameters():
         return replay(log, calibration).lean_deg
 
 
 @contextmanager
-def _knowing() -> Iterator[None]:
+def _oracle_parameters() -> Iterator[None]:
     """A context that sets the filter's parameters for readings without errors, in this process."""
     with patch.multiple(measurements, **_ORACLE), patch.object(upright_trim, "MAX_TRIM", 0.0):
         yield

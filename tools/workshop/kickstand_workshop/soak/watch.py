@@ -35,7 +35,7 @@ class Watch:
         self._why_since: float | None = None
         board.every(LOOK_S, self._look)
 
-    def _say(self, what: str) -> None:
+    def _report(self, what: str) -> None:
         line = f"{what} at {self._board.clock.now_us / 1e6:.1f} s: {'|'.join(self._text)}"
         if not self.found or self.found[-1].split(" at ")[0] != what:
             self.found.append(line)
@@ -49,7 +49,7 @@ class Watch:
             self._text = text
             self.changes += 1
         if text[0].startswith(("Error", "Incomplete", "config.py")):
-            self._say("the program has failed")
+            self._report("the program has failed")
         busy = self._during_fault(t_s)
         self._alive(t_s, busy)
         lean = shown_lean(text)
@@ -65,7 +65,7 @@ class Watch:
         if count != self._transfers[0] or busy:
             self._transfers = (count, t_s)
         elif t_s - self._transfers[1] > STILL_S:
-            self._say("the program hangs")
+            self._report("the program hangs")
 
     def _accurate(self, t_s: float, lean: float | None) -> None:
         error = 0.0
@@ -79,7 +79,7 @@ class Watch:
         self._wrong_since = self._wrong_since if self._wrong_since is not None else t_s
         self.wrong_s = max(self.wrong_s, t_s - self._wrong_since)
         if self.wrong_s > WRONG_S and t_s - self._wrong_since > WRONG_S:
-            self._say("a wrong lean is shown as good")
+            self._report("a wrong lean is shown as good")
 
     def _fresh(self, t_s: float, lean: float | None) -> None:
         """Check that a lean disappears when no more readings arrive, unless the display cannot be reached."""
@@ -95,7 +95,7 @@ class Watch:
             return
         self.stale_s = max(self.stale_s, t_s - self._read[1])
         if t_s - self._read[1] > STALE_S:
-            self._say("an old lean is shown")
+            self._report("an old lean is shown")
 
     def _explained(self, t_s: float, line: str) -> None:
         """Check that the message shown instead of the lean disappears when the fault is over."""
@@ -105,4 +105,4 @@ class Watch:
         self._why_since = self._why_since if self._why_since is not None else t_s
         self.without_s = max(self.without_s, t_s - self._why_since)
         if t_s - self._why_since > 10.0 and not line.startswith("Lean"):
-            self._say("a fault is over and still shown")
+            self._report("a fault is over and still shown")
