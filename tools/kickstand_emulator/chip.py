@@ -1,4 +1,4 @@
-"""An emulated RP2040 with the corrections of this package, and methods that let its time pass."""
+"""An emulated RP2040 with the corrections of this package, and methods that advance its time."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -22,12 +22,12 @@ from .i2c_controller import TimedI2C
 
 _SSI = 0x18000  # keys of rp2040py's table of peripherals: address >> 12
 _I2C = (0x40044, 0x40048)
-_OSCILLATORS = WDSEL_XOSC | WDSEL_ROSC  # which the SDK excludes from a reset by the watchdog
+_OSCILLATORS = WDSEL_XOSC | WDSEL_ROSC  # the SDK excludes these from a reset by the watchdog
 _ACCESS = ("read_uint8", "read_uint16", "read_uint32", "write_uint8", "write_uint16", "write_uint32")
 
 
 class EmulatedClock:
-    """Takes the place of simulated_board.clock.Clock: integer microseconds, driven by the processor's cycles."""
+    """Replaces simulated_board.clock.Clock: integer microseconds, driven by the processor's cycles."""
 
     def __init__(self, clock: IClock) -> None:
         self._clock = clock
@@ -38,12 +38,12 @@ class EmulatedClock:
         return int(self._clock.nanos + 0.5) // 1000
 
     def at(self, due_us: float, function: Callable[[], None]) -> None:
-        """Call function() at due_us; at once if that time is over."""
+        """Call function() at due_us, or at once if that time has passed."""
         self._clock.create_alarm(function).schedule(max(0.0, due_us * 1000.0 - self._clock.nanos))
 
 
-class Chip:
-    """rp2040: rp2040py's chip with its flash and I2C controllers replaced. run() lets time pass."""
+class EmulatedChip:
+    """rp2040: rp2040py's chip with its flash and I2C controllers replaced. run() advances the time."""
 
     def __init__(self, image: Path) -> None:
         self.rp2040 = RP2040()
@@ -76,15 +76,15 @@ class Chip:
         self.rp2040.vreg_and_chip_reset.record_reset_cause(HAD_POR)
 
     def power_off(self) -> None:
-        """Stop the processor. sleep() still lets time pass."""
+        """Stop the processor. sleep() still advances the time."""
         self._reset(from_watchdog=False)
 
     def sleep(self, seconds: float) -> None:
-        """Let time pass while the processor has no power."""
+        """Advance the time while the processor has no power."""
         self.clock.tick(seconds * 1e9)
 
     def run(self, seconds: float, between: Callable[[], None] | None = None) -> None:
-        """Let emulated time pass. between: called about every 5 ms of the host's time. Raises PowerCut."""
+        """Advance the emulated time. between: called about every 5 ms of the host's time. Raises PowerCut."""
         self.stopped = False
         end = self.clock.create_alarm(self.stop)
         end.schedule(seconds * 1e9)
@@ -112,13 +112,13 @@ class Chip:
         self.rp2040.pio = self._pios
         self.rp2040.enter_reset(from_watchdog=from_watchdog)
         self.rp2040.pio = []
-        # rp2040py's watchdog keeps running; on the chip it stands still after a reset until it is started again
+        # rp2040py's watchdog keeps running; the chip's own stops at a reset until it is started again
         watchdog = self.rp2040.watchdog
         watchdog.timer.enable = watchdog.alarm.enable = False
         self.rp2040.core.pc = FLASH_START_ADDRESS
 
     def _hurry(self) -> None:
-        """Double the emulation's speed on the host without any other effect.
+        """Double the emulation's speed on the host. There is no other effect.
 
         rp2040py's compiled core looks up the method of each memory access by name, which makes a new method object
         each time unless the instance holds one. It also polls both PIO blocks, which MicroPython does not use, after
@@ -131,7 +131,8 @@ class Chip:
 
 
 def _hurry_division(rp2040: RP2040) -> None:
-    """MicroPython divides all the time, unsigned, which rp2040py's SIO finds after dozens of comparisons."""
+    """Speed up unsigned divisions: MicroPython needs them often, and rp2040py's SIO makes dozens of comparisons before
+    each."""
     block, core = rp2040.sio, rp2040.core
     read_other, write_other = block.read_uint32, block.write_uint32
 

@@ -1,4 +1,4 @@
-"""The emulated Pico's console, over its USB."""
+"""The emulated Pico's console over USB."""
 
 from collections.abc import Callable
 
@@ -7,10 +7,10 @@ from rp2040py.usb.cdc import USBCDC
 
 
 class QuietConsole(USBCDC):
-    """The board's USB console. received: called with what the board prints.
+    """The board's USB console. received: called with the board's output.
 
-    rp2040py's USB host answers every buffer that is ready with an empty packet: 34,000 a second, which take the Pico
-    two thirds of its time. This one sends nothing while it has no data, as a real host.
+    rp2040py's USB host answers every ready buffer with an empty packet: 34,000 per second, which cost the Pico two
+    thirds of its time. Like a real host, this one sends nothing while it has no data.
     """
 
     def __init__(self, usb: RPUSBController, received: Callable[[bytes], None]) -> None:
@@ -22,7 +22,7 @@ class QuietConsole(USBCDC):
         self.on_serial_data = lambda data: received(bytes(data))
 
     def send(self, data: bytes) -> None:
-        """Send data to the board as fast as it takes them."""
+        """Send data to the board as fast as it accepts them."""
         self._waiting += data
         self._give()
 

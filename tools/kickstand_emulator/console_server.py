@@ -8,9 +8,9 @@ from kickstand_tools.common.errors import InputError, cause
 
 
 class ConsoleServer:
-    """Serves one client at a time, as a serial port does. Call poll() often. Port 0 takes a free one, see `port`.
+    """Serves one client at a time, as a serial port does. Call poll() often. Port 0 chooses a free port, see `port`.
 
-    send: takes what the client sends.
+    send: called with the client's data.
     """
 
     def __init__(self, send: Callable[[bytes], None], port: int) -> None:
@@ -25,11 +25,11 @@ class ConsoleServer:
 
     def close(self) -> None:
         """Disconnect the client and stop listening."""
-        self._hang_up()
+        self._disconnect()
         self._server.close()
 
     def poll(self) -> None:
-        """Accept a client, or pass on what it has sent."""
+        """Accept a client, or pass on its data."""
         if self._client is None:
             with contextlib.suppress(BlockingIOError):
                 self._client = self._server.accept()[0]
@@ -45,19 +45,19 @@ class ConsoleServer:
         if data:
             self._send(data)
         else:
-            self._hang_up()
+            self._disconnect()
 
     def say(self, data: bytes) -> None:
-        """Send what the board prints to the client; it is lost if there is none."""
+        """Send the board's output to the client. Without a client it is lost."""
         if self._client:
             try:
                 self._client.setblocking(True)
                 self._client.sendall(data)
                 self._client.setblocking(False)
             except OSError:
-                self._hang_up()
+                self._disconnect()
 
-    def _hang_up(self) -> None:
+    def _disconnect(self) -> None:
         if self._client:
             self._client.close()
             self._client = None

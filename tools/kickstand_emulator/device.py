@@ -1,4 +1,4 @@
-"""What the emulated boards have in common: power, time, the console, and the parts that are wired to them."""
+"""The base class of the emulated boards: power, time, the console, and the parts wired to the board."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -19,18 +19,18 @@ class NotReached(Exception):
 
 
 class GuestError(Exception):
-    """The code that was given to exec() raised an exception. The text is the board's traceback."""
+    """The code passed to exec() raised an exception. The text is the board's traceback."""
 
 
-class Device(ABC):
-    """Has no power until power_on(); `with` switches it on, and off at the end. Times are emulated seconds; they
-    continue through resets and power cycles.
+class EmulatedDevice(ABC):
+    """An emulated board. It is off until power_on(). `with` switches it on, and off at the end. Times are emulated
+    seconds; they continue through resets and power cycles.
 
-    Made with world: as for simulator.Board, level and at rest if None.  files: what its flash holds, see
-    flash_image.py.  fitted: other arguments of Board.
+    Arguments: world: as for simulator.Board; level and at rest if None. files: the content of its flash, see
+    flash_image.py. fitted: other arguments of Board.
 
-    NAME: of the board.  FLASH: where its file system is.  MPY: the bytecode it takes, see bytecode.py.  SINK: code for
-    the board, a class Sink whose write() gives bytes to what listens here.
+    NAME: the board's name. FLASH: location of its file system. MPY: the bytecode that it accepts, see bytecode.py.
+    SINK: code for the board: a class Sink whose write() passes bytes to the function given to listen().
     """
 
     NAME: str
@@ -40,12 +40,12 @@ class Device(ABC):
 
     def __init__(self, board: Board) -> None:
         self.board = board
-        self.said = bytearray()  # what the board printed
-        self.heard: Callable[[bytes], None] | None = None  # called with each part of it
+        self.said = bytearray()  # the board's output
+        self.heard: Callable[[bytes], None] | None = None  # called with each part of the output
         self.powered = False
-        self.resets = 0  # since it was made, without those by power
+        self.resets = 0  # since the start, without power cycles
         self._awaited = b""
-        self._raw = False  # True while its console is in the raw REPL
+        self._raw = False  # True while the console is in the raw REPL
         self._wire(board.button_pin)
 
     def __enter__(self):
@@ -60,7 +60,7 @@ class Device(ABC):
     @property
     @abstractmethod
     def time_s(self) -> float:
-        """Emulated seconds since it was made."""
+        """Emulated seconds since the object was made."""
 
     @abstractmethod
     def power_on(self) -> None:
@@ -68,11 +68,11 @@ class Device(ABC):
 
     @abstractmethod
     def power_off(self) -> None:
-        """Cut the supply; only the content of the flash is kept."""
+        """Cut the power; only the content of the flash is kept."""
 
     @abstractmethod
     def run(self, seconds: float, between: Callable[[], None] | None = None) -> None:
-        """Let time pass. between: called every few ms of the host's time."""
+        """Advance the time. between: called every few ms of the host's time."""
 
     @abstractmethod
     def stop(self) -> None:
@@ -85,14 +85,14 @@ class Device(ABC):
 
     @abstractmethod
     def reset(self) -> None:
-        """Reset the chip, while sensor and display keep their supply."""
+        """Reset the chip, while sensor and display keep their power."""
 
     @abstractmethod
     def _set_pin(self, number: int, level: int) -> None:
-        """What is wired to this GPIO pulls it to ground (0), or does no more (1)."""
+        """Set the level of this GPIO from outside: pulled to ground (0) or released (1)."""
 
     def _wire(self, number: int) -> None:
-        """To the part that simulator.Board has at this GPIO."""
+        """Wire this GPIO to the part that simulator.Board has there."""
         self.board.watch_pin(number, partial(self._set_pin, number))
 
     def fit_wheel(self, speed: Callable[[float], float], **kind: Any) -> None:
@@ -107,7 +107,8 @@ class Device(ABC):
         self.power_on()
 
     def run_until(self, condition: Callable[[], Any], limit_s: float, step_s: float = 0.005) -> Any:
-        """Let time pass until condition() is true; return its value. It is called every step_s. Raises NotReached."""
+        """Advance the time until condition() is true; return its value. It is called every step_s. Raises NotReached if
+        the condition is not met within limit_s."""
         end_s = self.time_s + limit_s
         while not (reached := condition()):
             if self.time_s >= end_s:
@@ -115,14 +116,14 @@ class Device(ABC):
             self.run(step_s)
         return reached
 
-    # What a rider sees and does
+    # The display and the button
 
     def lcd(self) -> list[str]:
         """The two lines of the display."""
         return self.board.lcd.text()
 
     def press(self, at_s: float | None = None, for_s: float = 0.15) -> None:
-        """Press the button at at_s (now, if None)."""
+        """Press the button at at_s (None: now)."""
         self.board.press(at_s, for_s)
 
     # The flash
@@ -148,14 +149,14 @@ class Device(ABC):
 
     @abstractmethod
     def listen(self, sink: Callable[[bytes], Any]) -> None:
-        """Call sink() with what Sink.write() on the board is given."""
+        """Call sink() with the bytes that the board's code passes to Sink.write()."""
 
     @abstractmethod
     def send(self, data: bytes) -> None:
-        """Send data to the board's console as fast as it takes them."""
+        """Send data to the board's console as fast as it accepts them."""
 
     def exec(self, code: str, limit_s: float = 10.0) -> str:
-        """Interrupt what runs on the board, run code there as mpremote does, and return what it printed.
+        """Interrupt the board's program, run code as mpremote does, and return its output.
 
         Raises GuestError with the board's traceback, and NotReached if it takes longer than limit_s.
         """
@@ -173,11 +174,11 @@ class Device(ABC):
         return output.decode(errors="replace").replace("\r\n", "\n")
 
     def _until_it_reads(self) -> None:
-        """Let time pass until the board reads its console."""
+        """Advance the time until the board reads its console."""
         self.run(0.1)
 
     def soft_reset(self) -> None:
-        """What Ctrl-D does at the friendly prompt."""
+        """Do a soft reset, like Ctrl-D at the friendly prompt."""
         self.send(_CTRL_B + _CTRL_D)
         self._raw = False
 

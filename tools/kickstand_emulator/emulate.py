@@ -25,7 +25,7 @@ from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 from rich.live import Live
 
 from .console_server import ConsoleServer
-from .device import Device
+from .device import EmulatedDevice
 
 if TYPE_CHECKING:
     from .esp32 import Esp32
@@ -40,8 +40,8 @@ _NO_FIRMWARE = "No firmware on it yet, so the display is blank. In another termi
 
 
 def device_class(chip: str) -> Kind:
-    """The class of the emulated board with this chip, "rp2040" or "esp32". Each needs packages that the other does
-    not: only its own are imported."""
+    """The class of the emulated board with this chip, "rp2040" or "esp32". Only the packages of this chip's emulator
+    are imported."""
     if chip == "esp32":
         from .esp32 import Esp32
 
@@ -52,7 +52,7 @@ def device_class(chip: str) -> Kind:
 
 
 class ScriptedBike:
-    """The demo's ride. It begins when the display comes on, which shows that the firmware has started."""
+    """The demo's ride. It begins when the display switches on, because then the firmware has started."""
 
     def __init__(self) -> None:
         self._ride = Ride(SCRIPT)
@@ -62,8 +62,8 @@ class ScriptedBike:
         """See script.Ride.motion()."""
         return self._ride.motion(0.0 if self.begun_s is None else t_s - self.begun_s)
 
-    def follow(self, device: Device) -> None:
-        """Begin the ride once the display is on, and have the button pressed where the script says."""
+    def follow(self, device: EmulatedDevice) -> None:
+        """Begin the ride once the display is on, and press the button at the script's times."""
         if self.begun_s is None and device.board.lcd.on:
             self.begun_s = device.time_s
             for press_s in (KICKSTAND_PRESS_S, UPRIGHT_PRESS_S):
@@ -73,8 +73,8 @@ class ScriptedBike:
 def emulate(port: int, say: Callable[[str], None], chip: str = "rp2040", display: str = "lcd") -> None:
     """Serve an emulated board's console on socket://127.0.0.1:port until the user quits. Raises InputError.
 
-    In a terminal the bike is steered with keys. Elsewhere say() gets each new text of the display, and the bike goes
-    on the demo's ride once the firmware runs. display: "lcd", "ssd1306" or "sh1106".
+    In a terminal the user steers the bike with keys. Otherwise say() receives each new text of the display, and the
+    bike follows the demo's ride once the firmware runs. display: "lcd", "ssd1306" or "sh1106".
     """
     watched = sys.stdin.isatty() and sys.stdout.isatty()
     bike = HandBike() if watched else ScriptedBike()
@@ -93,14 +93,14 @@ def emulate(port: int, say: Callable[[str], None], chip: str = "rp2040", display
         server.close()
 
 
-def _run(device: Device, server: ConsoleServer) -> None:
-    """Let a step of time pass, not faster than real time: the time-outs of mpremote go by the host's clock."""
+def _run(device: EmulatedDevice, server: ConsoleServer) -> None:
+    """Advance the time by a step, not faster than real time: the time-outs of mpremote use the host's clock."""
     begun, before = time.monotonic(), device.time_s
     device.run(_STEP_S, server.poll)
     time.sleep(max(0.0, device.time_s - before - (time.monotonic() - begun)))
 
 
-def _watch(device: Device, server: ConsoleServer, bike: HandBike, address: str) -> None:
+def _watch(device: EmulatedDevice, server: ConsoleServer, bike: HandBike, address: str) -> None:
     with keyboard() as pressed, Live(screen=True, auto_refresh=False) as live:
         while True:
             for key in pressed(0.0):
@@ -119,11 +119,11 @@ def _watch(device: Device, server: ConsoleServer, bike: HandBike, address: str) 
 
 
 def below(on: bool, address: str) -> str:
-    """What stands below the picture. on: is the display switched on, which only the firmware does?"""
+    """The text below the picture. on: True if the display is on, which only the firmware does."""
     return _HELP if on else _NO_FIRMWARE.format(address) + _HELP
 
 
-def _print(device: Device, server: ConsoleServer, bike: ScriptedBike, say: Callable[[str], None]) -> None:
+def _print(device: EmulatedDevice, server: ConsoleServer, bike: ScriptedBike, say: Callable[[str], None]) -> None:
     shown: list[str] = device.lcd()
     while True:
         _run(device, server)

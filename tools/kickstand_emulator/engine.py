@@ -13,15 +13,15 @@ from kickstand_tools.replay import replay_engine
 
 _CHUNK = 500  # samples between two calls of progress
 _RESULT_BYTES = struct.calcsize(replay_engine.RESULT)
-_EMULATED_S = 1e6  # limit of the emulated time: practically none, because logs may be long
+_EMULATED_S = 1e6  # limit of the emulated time, practically unlimited, because logs may be long
 
 
 @contextlib.contextmanager
 def rp2040(records: Iterator[bytes], progress: Progress | None) -> Iterator[IO[bytes]]:
-    """The results of an emulated Pico: 32-bit floats and the board's own interpreter. Raises InputError, GuestError."""
+    """Replay on an emulated Pico: 32-bit floats and the board's own interpreter. Raises InputError, GuestError."""
     from . import image, native
 
-    image.find()  # raises InputError for what is not installed, before an import below fails because of it
+    image.find()  # raises InputError if something is not installed, before an import below fails
     native.build()
     from . import flash_image
     from .host_link import GUEST, HostLink

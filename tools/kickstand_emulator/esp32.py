@@ -1,8 +1,8 @@
-"""The emulated ESP32 with the parts that are wired to it: for tests, bench, replay and `kickstand emulate`.
+"""The emulated ESP32 with the parts wired to it: for tests, bench, replay and `kickstand emulate`.
 
-QEMU runs in a process of its own, esp32_machine.py; the models are here. Switched on it is a new process, switched off
-that is killed. Its time is an estimate: eight nanoseconds for each instruction, of either of the two processors, and
-none for the flash. The times of a real ESP32 depend on its cache and its flash.
+QEMU runs in a separate process, esp32_machine.py; the models are here. Each power-on starts a new process; power-off
+kills it. Emulated time is an estimate: eight nanoseconds per instruction of either processor, and none for the flash.
+The times of a real ESP32 depend on its cache and its flash.
 """
 
 import contextlib
@@ -20,7 +20,7 @@ from kickstand_tools.simulated_board.i2c import Bus
 from kickstand_tools.simulated_board.simulator import Board
 
 from . import esp32_library, flash_image
-from .device import LEVEL, Device
+from .device import LEVEL, EmulatedDevice
 from .esp32_machine import (
     COMMAND,
     GO,
@@ -40,24 +40,24 @@ from .esp32_machine import (
 
 _IMAGE_AT, _FLASH_SIZE = 0x1000, 4 << 20
 _ROM_STARTS = b"ets Jul 29 2019"  # what the chip's ROM prints first
-_READY = b">>> ", b"Ctrl-C stops it."  # what is printed once MicroPython takes what comes
+_READY = b">>> ", b"Ctrl-C stops it."  # printed once MicroPython accepts input
 _BOOT_S = 5.0
-_CHUNK = 64  # bytes that are sent to the console at once: half of what the chip's FIFO takes
+_CHUNK = 64  # bytes sent to the console at once: half of the chip's FIFO
 _CHUNK_US = 10 * _CHUNK * 1_000_000 // 115_200
 _CONSOLE, _GPS = 0, 2  # UARTs
-_WRITES, _WRITTEN = b"\x01", b"\x02"  # around what Sink.write() prints
+_WRITES, _WRITTEN = b"\x01", b"\x02"  # around the output of Sink.write()
 _MEMORY = Path("/dev/shm")
 
 
 class Stopped(Exception):
-    """QEMU has ended by itself."""
+    """QEMU has ended unexpectedly."""
 
 
-class Esp32(Device):
+class Esp32(EmulatedDevice):
     """See Device."""
 
     NAME, FLASH, MPY = "ESP32", flash_image.ESP32, bytecode.ESP32
-    # Over the console, because registers cannot be added to it as host_link.py does
+    # Uses the console, because QEMU takes no added registers such as those of host_link.py
     SINK = """
 from binascii import hexlify
 class Sink:
@@ -82,8 +82,8 @@ class Sink:
         self._end_us = 0  # of run()
         self._waiting = bytearray()  # for its console
         self._sending = False
-        self._booted = self._reads = False  # its ROM has begun; its console is read
-        self._sends = [False] * len(self.board.buses)  # by bus: is the device to send?
+        self._booted = self._reads = False  # its ROM has begun; its program reads the console
+        self._sends = [False] * len(self.board.buses)  # by bus: True if the device will send
         self._levels = {self.board.button_pin: 1}
         for number, bus in enumerate(self.board.buses):
             self._have_wires(number, bus)
@@ -112,7 +112,7 @@ class Sink:
         return self.board.sensor_bus.open and self._sends[0]
 
     def reset(self) -> None:
-        """Reset the chip, as its EN button does. A device that was sending does not notice it, and holds SDA."""
+        """Reset the chip, as its EN button does. A device that was sending does not notice the reset, and holds SDA."""
         sending = [number for number, bus in enumerate(self.board.buses) if bus.open and self._sends[number]]
         self._kill()
         for bus in self.board.buses:
@@ -143,7 +143,7 @@ class Sink:
     def _kill(self) -> None:
         if self._process:
             if self._process.poll() is None:
-                self._sync()  # a write to the flash that was done is done
+                self._sync()  # a completed write to the flash must be kept
             self._process.kill()
             self._process.wait()
             self._link.close()
@@ -180,7 +180,7 @@ class Sink:
         while True:
             message = receive(size, socket.MSG_WAITALL)
             if len(message) < size:
-                raise Stopped(f"QEMU has ended: {self._last_words()}")
+                raise Stopped(f"QEMU has ended: {self._last_output()}")
             now_ns, kind, a, b = MESSAGE.unpack(message)
             self.clock.now_us = self._begun_us + now_ns // 1000
             if kind == READ:
@@ -200,7 +200,7 @@ class Sink:
             elif kind == STOPPED:
                 return
 
-    def _last_words(self) -> str:
+    def _last_output(self) -> str:
         self._said.seek(0)
         said = self._said.read().decode(errors="replace").strip()
         return said.rpartition("\n")[2] or "it said nothing"
@@ -250,7 +250,7 @@ class Sink:
         self.run_until(lambda: self._reads, _BOOT_S)
         super()._until_it_reads()
 
-    # Parts that can be added
+    # Optional parts
 
     def fit_gps(self, speed: Callable[[float], float], **kind: Any) -> None:
         """Connect a GPS receiver, as simulator.Board.fit_gps() does."""
@@ -269,7 +269,7 @@ class Sink:
             self._command(PIN, number, level)
 
     def _have_wires(self, number: int, bus: Any) -> None:
-        """Whether a device holds SDA is known where the wires are."""
+        """Tell the other process, which has the wires, whether a device holds SDA."""
 
         def hang(bits: int = 8) -> None:
             Bus.stop(bus)

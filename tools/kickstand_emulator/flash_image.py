@@ -12,7 +12,7 @@ from littlefs import LittleFS, UserContext
 
 @dataclass(frozen=True)
 class FileSystem:
-    """Where a board's littlefs lies in its flash, in bytes, and how MicroPython mounts it there."""
+    """The place of a board's littlefs in its flash, in bytes, and how MicroPython mounts it."""
 
     start: int
     blocks: int
@@ -21,7 +21,7 @@ class FileSystem:
 
     @property
     def size(self) -> int:
-        """All of it."""
+        """The size of the file system, bytes."""
         return self.block * self.blocks
 
     def build(self, files: dict[str, bytes]) -> bytes:
@@ -38,7 +38,7 @@ class FileSystem:
         return bytes(context.buffer)
 
     def read(self, image: bytes) -> dict[str, bytes]:
-        """Every file of a file system, by path. Raises littlefs.errors.LittleFSError if it cannot be mounted."""
+        """All files of a file system, by path. Raises littlefs.errors.LittleFSError if it cannot be mounted."""
         context = UserContext(self.size)
         context.buffer = bytearray(image)
         system = self._mount(context, fresh=False)
@@ -78,7 +78,7 @@ def firmware(compiled: bool = False, mpy: int = bytecode.PICO) -> dict[str, byte
 
 
 def stored(calibration: Calibration, who_am_i: int = 0x68) -> dict[str, bytes]:
-    """The files in which a board with this sensor, in its range of 8 g, keeps this calibration."""
+    """The files in which a board with this sensor, in its range of 8 g, stores this calibration."""
     with tempfile.TemporaryDirectory() as directory:
         Store(who_am_i, 8, directory).save(calibration)
         return {path.name: path.read_bytes() for path in Path(directory).iterdir()}

@@ -1,4 +1,4 @@
-"""Corrects rp2040py's flash: erasing and programming take time, in which the processor stands still.
+"""Corrects rp2040py's flash: erasing and programming take time, during which the processor stops.
 
 It can also cut the power in the middle of such an operation.
 """
@@ -21,11 +21,12 @@ PROGRAM_MS = 0.5  # for a page of 256 bytes
 
 
 class PowerCut(Exception):
-    """The supply is gone. Raised by TimedFlash in the operation that cut_power() has chosen; Pico.run() catches it."""
+    """The power was cut. Raised by TimedFlash in the operation chosen by cut_power(). Pico.run() catches it."""
 
 
 class TimedFlash(RPSSI):
-    """rp2040py's flash interface, with the time that erasing and programming take. operations: how many were begun."""
+    """rp2040py's flash interface, with the time that erasing and programming take. operations: number of operations
+    begun."""
 
     def __init__(self, rp2040: RP2040, name: str) -> None:
         rp2040.qspi[1]._listeners.clear()  # the interface that this one replaces
@@ -36,7 +37,8 @@ class TimedFlash(RPSSI):
         self._cut_share = 0.0
 
     def cut_power(self, operation: int, share: float = 0.0) -> None:
-        """Raise PowerCut in the nth erase or program from now (1: the next), when a share of it is done (0..1)."""
+        """Raise PowerCut in an erase or program: number `operation` from now (1: the next), after a share of it
+        (0..1)."""
         self._cut_at = self.operations + operation
         self._cut_share = share
 

@@ -1,6 +1,6 @@
-"""Registers that the real chip does not have, by which code on the emulated Pico exchanges bytes with the host.
+"""Registers through which code on the emulated Pico exchanges bytes with the host. The real chip does not have them.
 
-The console would do too, but every byte on it costs the Pico time. GUEST is the code for the Pico's end.
+The console would work too, but every byte on it costs the Pico time. GUEST is the code for the Pico.
 """
 
 from collections.abc import Callable
@@ -9,7 +9,7 @@ from typing import Any
 from rp2040py.memory_map import RAM_START_ADDRESS
 from rp2040py.peripherals.peripheral import BasePeripheral
 
-from .chip import Chip
+from .chip import EmulatedChip
 
 _PLACE = 0x40068  # address >> 12, reserved on the chip
 _COUNT, _FILL, _TAKE = 0x0, 0x4, 0x8
@@ -34,9 +34,10 @@ class Sink:
 
 
 class HostLink(BasePeripheral):
-    """source: what Source.read() on the Pico returns, in order.  sink: called with what Sink.write() is given."""
+    """source: the bytes that Source.read() on the Pico returns, in order. sink: called with the bytes passed to
+    Sink.write()."""
 
-    def __init__(self, chip: Chip, source: bytes, sink: Callable[[bytes], Any]) -> None:
+    def __init__(self, chip: EmulatedChip, source: bytes, sink: Callable[[bytes], Any]) -> None:
         super().__init__(chip.rp2040, "HOST_LINK")
         self._source = source
         self._sink = sink
@@ -44,11 +45,11 @@ class HostLink(BasePeripheral):
         chip.rp2040.peripherals[_PLACE] = self
 
     def read_uint32(self, offset: int) -> int:
-        """How many bytes the last FILL copied."""
+        """The number of bytes that the last FILL copied."""
         return self._count
 
     def write_uint32(self, offset: int, value: int) -> None:
-        """COUNT: how many bytes; FILL, TAKE: the address in memory to copy them to or from."""
+        """COUNT: the number of bytes. FILL, TAKE: the address in memory to copy them to or from."""
         start = value - RAM_START_ADDRESS
         if offset == _COUNT:
             self._count = value

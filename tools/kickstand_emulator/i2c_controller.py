@@ -1,6 +1,6 @@
 """Corrects rp2040py's I2C controllers, and connects them to the models' buses.
 
-On the chip bits take time, an absent device causes EIO at once, and a controller that is disabled releases the wires.
+On the real chip bits take time, an absent device causes EIO at once, and a disabled controller releases the wires.
 """
 
 from collections.abc import Callable
@@ -26,8 +26,8 @@ _POLLED = (IC_RAW_INTR_STAT, IC_RXFLR, IC_TX_ABRT_SOURCE)
 class TimedI2C(RPI2C):
     """rp2040py's controller on a bus of simulated_board; each bit takes as long as the SCL count registers say.
 
-    The SDK waits for the end of each byte by reading registers in a loop. Here the first such read lets the time pass
-    until the byte is over. The loop would do nothing else until then, and emulating it takes the host ten times as
+    The SDK waits for the end of each byte by reading registers in a loop. Here the first of these reads advances the
+    time to the end of the byte: the loop would do nothing else until then, and emulating it takes the host ten times as
     long. Interrupts are therefore late by up to a byte.
     """
 
@@ -57,7 +57,7 @@ class TimedI2C(RPI2C):
         self._busy = self._stop = self._pending_restart = False
 
     def reset(self) -> None:
-        """Reset with the chip. A device that was sending does not notice it, and holds SDA."""
+        """Reset with the chip. A device that was sending does not notice the reset, and holds SDA."""
         if getattr(self, "_then", None) is not None:
             reading = self.reading()
             self.let_go()

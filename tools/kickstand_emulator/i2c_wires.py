@@ -1,6 +1,6 @@
-"""The I2C devices as GPIO pins see them, bit by bit: for SoftI2C, I2C.scan() and for freeing a stuck bus.
+"""The I2C devices at the level of GPIO pins, bit by bit: for SoftI2C, I2C.scan() and for freeing a stuck bus.
 
-rp2040py emulates only the controllers. MicroPython drives the pins itself for writes of length 0, as in scan(), and
+rp2040py emulates only the controllers. MicroPython drives the pins directly for writes of length 0, as in scan(), and
 the firmware does so to free a bus.
 """
 
@@ -14,8 +14,8 @@ _IDLE, _LISTENS, _SENDS = 0, 1, 2
 class Wires:
     """Follows the levels that the chip drives on two pins, answers as the devices do, and sets the pins' inputs.
 
-    set_sda(level), set_scl(level): called when the level of that wire changes. The board has pull-ups: a wire that
-    nobody pulls low is high.
+    set_sda(level), set_scl(level): called when the level of that wire changes. The board has pull-ups: a wire is high
+    unless something pulls it low.
     """
 
     def __init__(self, bus: Bus, set_sda: Callable[[int], None], set_scl: Callable[[int], None]) -> None:
@@ -24,7 +24,7 @@ class Wires:
         self.release()
 
     def release(self) -> None:
-        """The chip drives neither pin, as after its reset."""
+        """Note that the chip drives neither pin, as after its reset."""
         self._driven_sda = self._driven_scl = 1
         self._pull = 0  # 1 while a device pulls SDA low
         self._mode = _IDLE
@@ -35,7 +35,7 @@ class Wires:
         self.show()
 
     def driven(self, sda: int, scl: int) -> None:
-        """The chip pulls these wires low (0) or lets go of them (1)."""
+        """Note that the chip pulls these wires low (0) or releases them (1)."""
         if scl != self._driven_scl:
             self._driven_scl = scl
             self._bus.set_scl(scl)
@@ -69,7 +69,7 @@ class Wires:
             self._pull = 0 if self._bit == 8 or self._byte >> (7 - self._bit) & 1 else 1
 
     def _take(self) -> int:
-        """Pass on the byte that has arrived. 1 if it is acknowledged."""
+        """Pass on the received byte. Returns 1 if it is acknowledged."""
         if not self._address:
             return 1 if self._bus.write_byte(self._byte) else 0
         return 1 if self._bus.start(self._byte >> 1, bool(self._byte & 1)) else 0
@@ -83,7 +83,7 @@ class Wires:
         self._pull = 1 if self._mode == _SENDS and not self._byte & 0x80 else 0
 
     def show(self) -> None:
-        """Set the inputs, where they have changed: rp2040py takes the same level again for an edge."""
+        """Set the inputs that have changed: rp2040py treats a repeated level as an edge."""
         scl, sda = self._bus.scl_level(), 0 if self._pull else self._bus.sda_level()
         if scl != self._scl:
             self._scl = scl

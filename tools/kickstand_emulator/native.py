@@ -1,8 +1,8 @@
-"""rp2040py compiled for the running Python version, which runs it 2.3 times as fast.
+"""Compiles rp2040py for the running Python version, which makes it 2.3 times as fast.
 
-The modules of its wheel are for any Python (the limited API), and look up each attribute by its name. The wheel has
-their C sources too. build() compiles the five that dominate the run time, once per Python version and user; install()
-has them imported in place of the wheel's. Cycles and memory are the same with both.
+The modules in its wheel work with any Python (the limited API), but look up each attribute by name. The wheel also
+contains their C sources. build() compiles the five that dominate the run time, once per Python version and user.
+install() makes Python import them instead of the wheel's modules. Cycles and memory are the same with both.
 """
 
 import contextlib
@@ -19,18 +19,18 @@ from importlib.machinery import EXTENSION_SUFFIXES, ModuleSpec
 from pathlib import Path
 
 _PACKAGE = "rp2040py.native"
-_MODULES = ("_rp2040", "_cortex_m0_core", "_bit", "_simulator", "_simulation_clock")  # those that take longest first
+_MODULES = ("_rp2040", "_cortex_m0_core", "_bit", "_simulator", "_simulation_clock")  # slowest to compile first
 _CHECK = "from kickstand_emulator import native; native.install({!r}); import rp2040py; rp2040py.RP2040()"
 
 
 def folder() -> Path:
-    """Where the compiled modules are, or would be: a folder of the user's, for this rp2040py and this Python."""
+    """The folder of the compiled modules, present or future: one per user, rp2040py version and Python version."""
     version = importlib.metadata.version("rp2040py")
     return Path.home() / ".cache" / "kickstand" / f"rp2040py-{version}-{sysconfig.get_config_var('SOABI')}"
 
 
 def install(directory: str | Path | None = None) -> None:
-    """Import the compiled modules, where there are any, from now on. directory: those in it, not in folder()."""
+    """From now on import the compiled modules that exist. directory: their folder, None for folder()."""
     sys.meta_path.insert(0, _Finder(directory))
 
 
@@ -47,8 +47,8 @@ class _Finder:
 
 
 def build() -> bool:
-    """Compile the modules (20 s) unless already compiled. Returns False if there is no compiler or there are no Python
-    headers; the wheel's own modules then run."""
+    """Compile the modules (20 s) unless already compiled. Returns False without a compiler or the Python headers; then
+    the wheel's own modules run."""
     if not importlib.util.find_spec("rp2040py"):
         return False
     wanted, compiler = folder(), shutil.which("cc")
@@ -58,7 +58,7 @@ def build() -> bool:
         return False
     with contextlib.suppress(OSError):  # a full disk, a read-only home, or another process was first
         wanted.parent.mkdir(parents=True, exist_ok=True)
-        # What has been renamed is no longer there to be removed
+        # The folder is renamed in the end, and cannot be removed then
         with tempfile.TemporaryDirectory(dir=wanted.parent, ignore_cleanup_errors=True) as made:
             if _compile(compiler, Path(made)):
                 Path(made).rename(wanted)
@@ -66,7 +66,7 @@ def build() -> bool:
 
 
 def _compile(compiler: str, directory: Path) -> bool:
-    """True if all are compiled and work together."""
+    """Compile all modules. True if they work together."""
     spec = importlib.util.find_spec("rp2040py")
     assert spec and spec.origin
     sources = Path(spec.origin).parent / "native"

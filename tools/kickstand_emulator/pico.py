@@ -1,4 +1,4 @@
-"""The emulated Pico with the parts that are wired to it: for tests, bench, replay and `kickstand emulate`."""
+"""The emulated Pico with the parts wired to it: for tests, bench, replay and `kickstand emulate`."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,15 +9,15 @@ from kickstand_tools.simulated_board.simulator import Board
 from rp2040py.gpio_pin import GPIOPinState
 
 from . import flash_image, image
-from .chip import Chip, EmulatedClock
+from .chip import EmulatedChip, EmulatedClock
 from .console import QuietConsole
-from .device import LEVEL, Device
+from .device import LEVEL, EmulatedDevice
 from .flash_memory import PowerCut
 from .host_link import GUEST, HostLink
 from .i2c_wires import Wires
 
 
-class Pico(Device):
+class Pico(EmulatedDevice):
     """See Device."""
 
     NAME, FLASH, MPY, SINK = "Pico", flash_image.PICO, bytecode.PICO, GUEST
@@ -25,7 +25,7 @@ class Pico(Device):
     def __init__(
         self, world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any
     ) -> None:
-        self.chip = Chip(image.find())
+        self.chip = EmulatedChip(image.find())
         super().__init__(Board(world or (lambda t_s: LEVEL), clock=EmulatedClock(self.chip.clock), **fitted))
         self._wires = [self._wired(bus) for bus in self.board.buses]
         for bus in self.board.buses:
@@ -49,14 +49,14 @@ class Pico(Device):
         self.powered = True
 
     def power_off(self) -> None:
-        """Cut the supply; only the content of the flash is kept."""
+        """Cut the power; only the content of the flash is kept."""
         self.powered = False
         self.chip.power_off()
         self.board.power_off()
         self._reset()
 
     def run(self, seconds: float, between: Callable[[], None] | None = None) -> None:
-        """Let time pass. A PowerCut ends it early; `powered` is then False."""
+        """Advance the time. A PowerCut ends it early; `powered` is then False."""
         if not self.powered:
             self.chip.sleep(seconds)
             return
@@ -79,10 +79,10 @@ class Pico(Device):
         self.chip.stop()
 
     def stall(self, seconds: float) -> None:
-        """Let time pass in which the processor stands still, as in a long flash operation.
+        """Advance the time while the processor is stopped, as in a long flash operation.
 
-        The program itself starts such an operation, never in the middle of an I2C transfer. So this waits until there
-        was no transfer for a millisecond.
+        The program starts such an operation, never in the middle of an I2C transfer. So this waits until there has been
+        no transfer for a millisecond.
         """
         before = None
         while before != (begun := [dict(bus.transfers) for bus in self.board.buses]) or self._transferring():
@@ -110,7 +110,7 @@ class Pico(Device):
         HostLink(self.chip, b"", sink)
 
     def send(self, data: bytes) -> None:
-        """Send data to the board's console as fast as it takes them."""
+        """Send data to the board's console as fast as it accepts them."""
         self.console.send(data)
 
     # The wires

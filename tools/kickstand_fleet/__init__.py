@@ -1,6 +1,6 @@
 """Alignment, moved mounts and brake tests of many vehicles.
 
-manifest.py says which logs belong together, period.py works on the logs of one mount (a plain function on files;
-evidence.py, forward.py and moved.py are its mathematics), cluster.py has Dask do so for all, journal.py keeps each
-result as it comes, tables.py and the modules in show/ show them.
+manifest.py finds out which logs belong together. period.py works on the logs of one mount: a plain function on files,
+whose mathematics is in evidence.py, forward.py and moved.py. cluster.py runs it with Dask for all mounts. journal.py
+saves each result at once. tables.py and the modules in show/ write the results.
 """

@@ -1,11 +1,11 @@
-"""The fleet's functions for a notebook or a cluster, as kickstand_tools.api has those for single rides.
+"""The fleet's functions for a notebook or a cluster. Those for single rides are in kickstand_tools.api.
 
     from kickstand_fleet import api
 
     fleet = api.run_fleet(api.read_manifest("MANIFEST.csv"), "results")
     print(fleet.seen.statuses)
 
-They return data and print nothing. InputError says in one line what is wrong with the input.
+They return data and print nothing. They raise InputError, with one line of text, if the input is wrong.
 """
 
 from kickstand_tools.common.errors import InputError as InputError

@@ -1,14 +1,13 @@
 """Runs a function on many items with Dask, on this computer or on a cluster.
 
-Workers on this computer and their scheduler talk over 127.0.0.1 by TLS, with keys that are made for the run and known
-to its processes alone: another user of the computer can connect, but neither read nor run anything. Dask has no Unix
-sockets, and a process pool of our own would need the same care for crashes a second time. Dask's web pages are left
-out.
+Workers on this computer and their scheduler talk over 127.0.0.1 by TLS. The keys are made for the run, and only its
+processes have them: another user of the computer can connect, but can neither read nor run anything. Dask has no Unix
+sockets, and our own process pool would have to handle crashes a second time. Dask's web pages are off.
 
-A task that kills its worker must cost no other task. Dask would give it to other workers, which it kills too, and
-compute again what these had finished. So no retries are allowed, only a few tasks are under way at a time, and Dask
-keeps no results. Tasks whose worker died are tried a second time, after all others and one at a time: if the worker
-dies then, the task itself has killed it.
+A task that kills its worker must not cost another task. Dask would give it to other workers, which it kills too, and
+recompute the results that these had finished. So no retries are allowed, only a few tasks run at a time, and Dask keeps
+no results. Tasks whose worker died are tried a second time, after all others and one at a time: if the worker dies
+then, the task itself has killed it.
 """
 
 import contextlib
@@ -24,7 +23,7 @@ from typing import Any
 from kickstand_tools.common.errors import InputError, cause, extra
 
 CRASHED, TIMED_OUT = "crashed", "timed-out"
-_PER_WORKER = 2  # tasks under way per worker: one runs, one waits
+_PER_WORKER = 2  # tasks per worker: one runs, one waits
 _LOOK_S = 0.5  # time between two checks for tasks that take too long
 _TOPIC = "kickstand-fleet"  # topic of the messages by which a worker announces that it begins a task
 Outcome = tuple[int, Any | None, str, str]
@@ -39,7 +38,7 @@ def run_tasks(
     timeout_s: float = 600.0,
 ) -> Iterator[Outcome]:
     """Yield (index, result, "", "") of function(*item) for each item, in any order; without a result (index, None,
-    CRASHED or TIMED_OUT, what happened). Starts no workers if there are no items. See Cluster."""
+    CRASHED or TIMED_OUT, explanation). Starts no workers if there are no items. See Cluster."""
     if items:
         with Cluster(scheduler, workers, timeout_s) as cluster:
             yield from cluster.run(function, items)
@@ -48,9 +47,9 @@ def run_tasks(
 class Cluster:
     """with Cluster(scheduler, workers, timeout_s) as cluster: for index, outcome in cluster.run(function, items).
 
-    scheduler: the address of a scheduler, None for workers on this computer. workers: their number there, None for one
-    per processor; then the number that there are. timeout_s: a task that takes longer is ended. Raises InputError where
-    there is no cluster.
+    scheduler: address of a scheduler, None for workers on this computer. workers: number of workers on this computer,
+    None for one per processor; once connected, the attribute holds the actual number. timeout_s: a task that takes
+    longer is ended. Raises InputError without a cluster.
     """
 
     def __init__(self, scheduler: str | None, workers: int | None, timeout_s: float) -> None:
@@ -83,7 +82,7 @@ class Cluster:
                     "distributed.comm.timeouts.connect": "10s",
                     "distributed.scheduler.http.routes": [],
                     "distributed.worker.http.routes": [],
-                    # What _silence() is here: in workers, from their start on
+                    # The same as _silence(), for workers, from their start
                     "distributed.nanny.pre-spawn-environ": {
                         **config.get("distributed.nanny.pre-spawn-environ"),
                         "DASK_LOGGING__DISTRIBUTED": "critical",
@@ -93,7 +92,7 @@ class Cluster:
         )
         try:
             if self._address is None:
-                with _undisturbed():
+                with _without_interrupts():
                     cluster = LocalCluster(
                         n_workers=self._wanted,
                         threads_per_worker=1,
@@ -116,7 +115,7 @@ class Cluster:
             where = self._address or "this computer"
             raise InputError(f"no workers at {where}: {cause(error)}") from error
         self._started: dict[str, tuple[float, str]] = {}  # by key: when it began, and on which worker
-        self._client.subscribe_topic(_TOPIC, self._hear)
+        self._client.subscribe_topic(_TOPIC, self._note_begin)
         self.workers = len(self._client.scheduler_info(n_workers=-1)["workers"])
         return self
 
@@ -125,8 +124,8 @@ class Cluster:
             self._stack.close()
 
     def run(self, function: Callable[..., Any], items: Sequence[tuple[Any, ...]]) -> Iterator[Outcome]:
-        """Yield outcomes as run_tasks() does. function and items have to be picklable. Raises InputError if the
-        scheduler is lost."""
+        """Yield outcomes as run_tasks() does. function and items must be picklable. Raises InputError if the scheduler
+        is lost."""
         self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._under_way: dict[str, tuple[int, Any]] = {}
         suspects: list[int] = []
@@ -145,7 +144,7 @@ class Cluster:
 
     def _submit(self, function: Callable[..., Any], items: Sequence[tuple[Any, ...]], index: int) -> None:
         key = f"fleet-{index}-{time.monotonic_ns()}"
-        future = self._client.submit(_announced, key, function, *items[index], key=key, pure=False)
+        future = self._client.submit(_announce_and_run, key, function, *items[index], key=key, pure=False)
         self._under_way[key] = index, future
         future.add_done_callback(self._ended.put)
 
@@ -189,17 +188,17 @@ class Cluster:
                     self._client.restart_workers([worker], timeout=30, raise_for_error=False)
                 yield index, None, TIMED_OUT, f"took longer than {self._timeout_s:.0f} s, so it was ended"
 
-    def _hear(self, event: tuple[float, Any]) -> None:
+    def _note_begin(self, event: tuple[float, Any]) -> None:
         _, (key, worker) = event
         self._started[key] = time.monotonic(), worker
 
 
 @contextlib.contextmanager
-def _undisturbed() -> Iterator[None]:
-    """A context in which Ctrl-C is deferred to its end: stopped while it starts or connects, Dask prints pages of
+def _without_interrupts() -> Iterator[None]:
+    """A context that defers Ctrl-C to its end. If Dask is interrupted while it starts or connects, it prints pages of
     errors.
 
-    Processes that are started within never receive it.
+    Processes started in it never receive Ctrl-C.
     """
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
@@ -219,7 +218,7 @@ def _silence() -> None:
             logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
-def _announced(key: str, function: Callable[..., Any], *arguments: Any) -> Any:
+def _announce_and_run(key: str, function: Callable[..., Any], *arguments: Any) -> Any:
     """In a worker: announce that the task begins, then return function(*arguments)."""
     from distributed import get_worker
 

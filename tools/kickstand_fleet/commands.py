@@ -32,11 +32,11 @@ def fleet_command(manifests: tuple[str, ...], out: str, vehicle: str, **how: Any
     GLOB takes each file that it matches for a vehicle of its own. Paths may be s3://. Run again, and only what is new
     is done.
     """
-    from .manifest import by_pattern, is_pattern, read_manifest  # only here: numpy takes its time
+    from .manifest import by_pattern, is_pattern, read_manifest  # imported here, because numpy is slow to import
     from .run import run_fleet
 
     manifest = manifests[0]
-    if len(manifests) > 1:  # the shell has put names into the place of a pattern
+    if len(manifests) > 1:  # the shell has replaced a pattern by names
         raise click.UsageError("One manifest, or one pattern in quotation marks.")
     periods = by_pattern(manifest, vehicle) if is_pattern(manifest) else read_manifest(manifest)
     try:

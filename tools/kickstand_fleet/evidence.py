@@ -1,18 +1,18 @@
 """The normal equations of a drive for the sensor's alignment, in blocks of some seconds that can be compared.
 
-As in the firmware's ForwardRegression, the force of each interval between two speeds is explained by
+As in the firmware's ForwardRegression, a regression explains the force of each interval between two speeds by
 
     f = level + forward a + left c + arm w        a = dv/dt / g, c = v (yaw rate) / g, w = d(yaw rate)/dt
 
-in the sensor's own axes. Unlike there, bends are used too: in a car they show left as well as braking shows forward. A
-sensor ahead of the rear axle is accelerated sideways as a bend begins and ends, which is when drivers brake and speed
-up: the coefficient arm, its distance from that axle, takes this up. A motorcycle leans into bends, so that its force
-stays along its own up and grows to sqrt(1 + c^2): there
+in the sensor's own axes. Unlike the firmware, it also uses bends: in a car they show left as well as braking shows
+forward. A sensor ahead of the rear axle is accelerated sideways when a bend begins and ends. Drivers brake and speed up
+at the same moments. The coefficient arm, the sensor's distance from that axle, absorbs this. A motorcycle leans into
+bends: its force stays along its own up and grows to sqrt(1 + c^2). So for a motorcycle
 
     f = level sqrt(1 + c^2) + forward a
 
-Besides, a car's body sways on its springs, mostly sideways. The direction depends on the vehicle, but does not change:
-if it changes in the sensor's axes, the mount has moved.
+A car's body also sways on its springs, mostly sideways. The direction depends on the vehicle but does not change: if it
+changes in the sensor's axes, the mount has moved.
 """
 
 import math
@@ -30,14 +30,15 @@ from kickstand_tools.signals import STANDING_MPS, Array, moving_mean, runs
 INTERVAL_S = 0.9  # least time between two speeds that are used
 MOVING_MPS = 2.0
 STANDING_WEIGHT = 0.3  # weight of a second at a stop: a stop shows one slope of the road, however long it is
-LEVEL_S = 20.0  # the mean force over so long is about vertical: the rate about it is the yaw rate
+LEVEL_S = 20.0  # over this time the mean force is about vertical: the rate about it is the yaw rate
 BLOCK_S = 8.0
-# The road: variance of its slope over that of all other errors in a mean over 1 s, and its correlation length
+# The road: ratio of the variance of its slope to that of all other errors in a mean over 1 s, and its correlation
+# length
 ROAD_SHARE, ROAD_M = 1.0, 150.0
 SWING_S = 0.2  # the yaw rate at both ends of an interval is averaged over this
-SWAY_S = 0.05, 0.3  # sway is the force's mean over the first less that over the second: neither noise nor driving
-# deg/s: at this yaw rate an interval of a car counts half. In a tight turn a sensor ahead of the rear axle moves aside
-# of where the vehicle points, by its distance from that axle over the turn's radius.
+SWAY_S = 0.05, 0.3  # sway is the mean force over the first minus that over the second: it excludes noise and driving
+# deg/s: at this yaw rate an interval of a car counts half. In a tight turn a sensor ahead of the rear axle moves in a
+# direction that differs from the vehicle's heading by its distance from that axle over the turn's radius.
 TIGHT_DPS = 20.0
 
 
@@ -57,11 +58,11 @@ class Intervals:
 
 @dataclass
 class Blocks(Table):
-    """m blocks of intervals that follow one another in one or several logs.
+    """m consecutive blocks of intervals in one or several logs.
 
     square (m, 4, 4), product (m, 4, 3): sums of terms x terms and of terms x force, the road's slope filtered out (see
-    _without_road()). sway (m, 3, 3): mean of the intervals' divided by its trace, so that a rough road counts no more
-    than another. log (m): index of the log; t_s, end_s (m): begin and end in it.
+    _without_road()). sway (m, 3, 3): mean of the intervals' divided by its trace, because a rough road must count no
+    more than another. log (m): index of the log; t_s, end_s (m): begin and end in it.
     """
 
     square: Array
@@ -73,14 +74,14 @@ class Blocks(Table):
 
 
 def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
-    """The intervals of a log whose speed is delayed by lag_s. bias_dps (3): the gyro's."""
+    """The intervals of a log whose speed is delayed by lag_s. bias_dps (3): the gyro's bias."""
     step = np.diff(log.t_s, prepend=log.t_s[0])
     step = np.where(step * 1e6 > GAP_US, 0.0, step)
     rate = np.radians(log.gyro_dps - bias_dps)
     there = np.flatnonzero(~np.isnan(log.speed_mps))
     time, speed = log.t_s[there] - lag_s, log.speed_mps[there]
     kept = time >= 0.0
-    time, speed = _spread(time[kept], speed[kept])
+    time, speed = _thinned(time[kept], speed[kept])
     curve = rate * (np.interp(log.t_s, time, speed) / STANDARD_GRAVITY)[:, None]
     sway = _sway(log)
     squares = (one * other for one in sway.T for other in sway.T)
@@ -97,7 +98,7 @@ def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
     if kind == MOTORCYCLE:
         terms = np.column_stack((np.sqrt(1.0 + c * c), a, np.zeros_like(a), np.zeros_like(a)))
         weight = length * (mean_mps > MOVING_MPS)  # at lower speeds a foot is down
-        shown = np.zeros_like(a)  # a motorcycle sways about its wheels' contacts and with its rider: not used
+        shown = np.zeros_like(a)  # not used: a motorcycle sways about its wheels' contacts and with its rider
     else:
         later, sooner = (_integrals(rate.T, log.t_s, step, time + ahead) for ahead in (SWING_S / 2.0, -SWING_S / 2.0))
         swing = (later - sooner) / SWING_S
@@ -133,8 +134,8 @@ def blocks(logs: list[Intervals]) -> Blocks:
 
 
 def fits(square: Array, product: Array) -> tuple[Array, Array]:
-    """Solve k normal equations of t terms. (k, t, 3): level, forward, left and so on; (k, 2): the variation of a and c,
-    g^2 s."""
+    """Solve k normal equations of t terms. Returns (k, t, 3), the coefficients level, forward, left, arm, and (k, 2),
+    the variation of a and c, g^2 s."""
     ridge = np.diag([1e-9] + [1e-6] * (square.shape[-1] - 1)) * np.maximum(square[..., :1, :1], 1e-3)
     found = np.asarray(np.linalg.solve(square + ridge, product), dtype=float)
     seconds = np.maximum(square[..., 0, 0], 1e-9)[..., None]
@@ -159,8 +160,8 @@ def frame_of(up: Array, ahead: Array) -> Array:
 
 
 def handedness(found: Array, varied: Array) -> float:
-    """The lateral force in bends over the one that the yaw rate requires: about 1; about -1 where the gyro's signs or
-    the axes are mirrored; 0 without bends (or on a motorcycle, which leans into them)."""
+    """The ratio of the lateral force in bends to the one that the yaw rate requires. It is about 1; about -1 if the
+    gyro's signs or the axes are mirrored; 0 without bends and on a motorcycle, which leans into them."""
     if varied[1] < 0.05:
         return 0.0
     level, forward, left = found[:3]
@@ -169,12 +170,13 @@ def handedness(found: Array, varied: Array) -> float:
 
 
 def _without_road(log: Intervals) -> tuple[Array, Array]:
-    """Terms and force, whitened: each less its prediction from the intervals before, over its standard deviation.
+    """Terms and force, whitened: each minus its prediction from the earlier intervals, divided by its standard
+    deviation.
 
-    Slope and camber of the road look like another level for some hundred metres: neighbouring intervals share their
-    errors, and a plain regression would take the road's slope during a braking event for forward. The innovations of a
-    filter that follows the road (a first-order Gauss-Markov process in distance) are uncorrelated: their sums are those
-    of generalized least squares.
+    Slope and camber of the road look like another level for some hundred metres. Neighbouring intervals share these
+    errors, and a plain regression would treat the road's slope during braking as forward. The innovations of a filter
+    that follows the road (a first-order Gauss-Markov process in distance) are uncorrelated: their sums are those of
+    generalized least squares.
     """
     rows = np.hstack((log.terms, log.force))
     driven = log.speed * np.diff(log.t_s, prepend=log.t_s[0])
@@ -199,7 +201,7 @@ def sway_deg(sway: Array, frame: Array) -> Array:
 
 
 def _sway(log: Log) -> Array:
-    """(samples, 3) the changes of force, g, that take some tenths of a second."""
+    """(samples, 3) the changes of force that take some tenths of a second, g."""
     step_s = float(np.median(np.diff(log.t_s)))
     quick, slow = (moving_mean(log.accel_g, round(width_s / step_s)) for width_s in SWAY_S)
     return quick - slow
@@ -210,8 +212,8 @@ def _integrals(columns: Iterable[Array], t_s: Array, step: Array, time: Array) -
     return np.array([np.interp(time, t_s, np.cumsum(column * step)) for column in columns]).T
 
 
-def _spread(time: Array, speed: Array) -> tuple[Array, Array]:
-    """The speeds, thinned to one per INTERVAL_S at most."""
+def _thinned(time: Array, speed: Array) -> tuple[Array, Array]:
+    """The speeds, thinned to at most one per INTERVAL_S."""
     kept, last = [], -np.inf
     for k, now in enumerate(time.tolist()):
         if now - last >= INTERVAL_S:

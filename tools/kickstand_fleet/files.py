@@ -1,4 +1,4 @@
-"""Logs wherever fsspec reaches them: local files, s3:// and others."""
+"""Reads and writes files through fsspec: local files, s3:// and others."""
 
 import contextlib
 import gzip
@@ -18,12 +18,12 @@ from kickstand_tools.logs.reader import read_log
 from kickstand_tools.logs.source import open_input
 
 MOST_BYTES = 300_000_000  # largest (packed) log in a store: ten hours at 200 Hz have 150 million
-_LONGEST = 100  # longest name in bytes; a file system takes 255, with ending and temporary name
+_LONGEST = 100  # longest name in bytes; a file system takes 255, including the ending and a temporary name
 
 
 def file_stem(readable: str, *exact: str) -> str:
-    """A file's name without ending: readable, as far as any file system takes it, and a hash of exact, which makes the
-    name unique. It is the same in every run.
+    """A unique file name without ending: `readable`, changed where a file system would not take it, and a hash of
+    `exact`. It is the same in every run.
 
     >>> file_stem(".bus 12", "bus 12", "front")
     'bus%2012-e9a9b5c8f0'
@@ -32,7 +32,7 @@ def file_stem(readable: str, *exact: str) -> str:
 
 
 def folder_value(value: str) -> str:
-    """value as data frames read it from the name of a folder KEY=VALUE; a very long one is cut and made unique.
+    """Encode value for a folder named KEY=VALUE, which data frames read. A very long value is cut and made unique.
 
     >>> folder_value("bus 12"), len(folder_value(300 * "x"))
     ('bus%2012', 111)
@@ -58,7 +58,7 @@ def _bytes(text: str) -> bytes:
 
 
 def is_remote(path: str) -> bool:
-    """True for a path that fsspec has to open."""
+    """True for a path that only fsspec can open."""
     return "://" in path
 
 
@@ -70,7 +70,7 @@ def join(base: str, path: str) -> str:
 
 
 def read_bytes(path: str, most: int = MOST_BYTES) -> bytes:
-    """A whole file of at most so many bytes. Raises InputError."""
+    """Read a whole file of at most `most` bytes. Raises InputError."""
     if is_remote(path):
         with _in_store(path, "read") as (fs, place):
             content = fs.cat_file(place, end=most + 1)
@@ -86,7 +86,7 @@ def read_bytes(path: str, most: int = MOST_BYTES) -> bytes:
 
 
 def read_all(paths: list[str]) -> list[bytes]:
-    """Whole files of one store, fetched together. Raises InputError."""
+    """Read whole files of one store, fetched together. Raises InputError."""
     with _in_store(paths[0], "read") as (fs, _):
         places = [_system(path)[1] for path in paths]
         found = fs.cat(places)
@@ -94,16 +94,16 @@ def read_all(paths: list[str]) -> list[bytes]:
 
 
 def matches(pattern: str) -> list[str]:
-    """The files that a pattern with * ? [ ] stands for, sorted; ** reaches through directories."""
+    """The files that match a pattern with * ? [ ], sorted; ** matches any number of directories."""
     with _in_store(pattern, "read") as (fs, place):
         found = sorted(str(path) for path in fs.glob(place))
         return [fs.unstrip_protocol(path) for path in found] if is_remote(pattern) else found
 
 
 def identities(paths: Iterable[str]) -> dict[str, str]:
-    """By path a mark that changes with the file: its ETag, or its size and time; "" where there is no file.
+    """For each path a mark that changes with the file: its ETag, or its size and time; "" without a file.
 
-    Remote directories are listed once each.
+    Each remote directory is listed once.
     """
     known: dict[str, str] = {}
     directories: dict[str, dict[str, str]] = {}
@@ -112,7 +112,7 @@ def identities(paths: Iterable[str]) -> dict[str, str]:
             try:
                 stat = Path(path).stat()
                 known[path] = f"{stat.st_size}-{stat.st_mtime_ns}"
-            except (OSError, ValueError):  # a name with a NUL in it
+            except (OSError, ValueError):  # a name that contains a NUL
                 known[path] = ""
             continue
         parent = path.rpartition("/")[0]
@@ -123,7 +123,7 @@ def identities(paths: Iterable[str]) -> dict[str, str]:
 
 
 def open_log(path: str) -> Log:
-    """Read a log, without judging its axes. Raises InputError."""
+    """Read a log without checking its axes. Raises InputError."""
     if not is_remote(path):
         return read_log(path, axes=False)
     file: io.BytesIO = _Named(path, read_bytes(path))
@@ -140,8 +140,8 @@ class _Named(io.BytesIO):
 
 
 def listed(parent: str) -> dict[str, str]:
-    """By path a mark that changes with the file (see identities()), for all files in a directory of a store; none where
-    there is no directory. Raises InputError."""
+    """For each file in a directory of a store, by path, a mark that changes with the file (see identities()). Empty if
+    the directory does not exist. Raises InputError."""
     marks: dict[str, str] = {}
     with _in_store(parent, "read") as (fs, place), contextlib.suppress(FileNotFoundError):
         fs.invalidate_cache(place)
@@ -153,7 +153,7 @@ def listed(parent: str) -> dict[str, str]:
 
 @contextlib.contextmanager
 def _in_store(path: str, what: str) -> Iterator[tuple[Any, str]]:
-    """A context with (file system, path in it) of a remote path. Any error of the libraries within becomes an
+    """A context with (file system, path in it) of a remote path. Any error of the libraries in it becomes an
     InputError: the path cannot be read, or written."""
     try:
         yield _system(path)
@@ -186,7 +186,7 @@ def write_bytes(path: str, content: bytes) -> None:
             fs.pipe_file(place, content)
         return
     directory = Path(path).parent
-    try:  # it stays if the file fails: other workers write to it, too
+    try:  # the directory stays if the write fails: other workers use it, too
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{directory} cannot be made: {cause(error)}") from error
@@ -196,8 +196,8 @@ def write_bytes(path: str, content: bytes) -> None:
 
 @contextlib.contextmanager
 def to_write(path: str) -> Iterator[Path]:
-    """A temporary path to write to; at the end of the `with` that file is put where it belongs, whole or not at all.
-    Raises InputError."""
+    """A context with a temporary path to write to. At its end the file is moved to `path`, whole or not at all. Raises
+    InputError."""
     if not is_remote(path):
         with whole_file(Path(path)) as temporary:
             yield temporary

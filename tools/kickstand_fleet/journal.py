@@ -1,8 +1,8 @@
-"""Keeps each result as it comes, so that a run that was stopped, or whose disk filled up, can be continued.
+"""Saves each result at once: a run that was stopped, or whose disk was full, can be resumed.
 
-In a directory of this computer the journal is one file with a line of JSON per result; in a store such as S3, whose
-files cannot grow, one file per result. Each has a check sum: lines that were cut, by a loss of power or a full disk, or
-that were damaged are dropped when the journal is opened again, and their results are computed again.
+In a directory on this computer the journal is one file with a line of JSON per result. In a store such as S3, whose
+files cannot grow, it is one file per result. Each result has a check sum. Cut or damaged lines (power loss, full disk)
+are dropped when the journal is opened again, and their results are recomputed.
 """
 
 import contextlib
@@ -20,20 +20,20 @@ from . import files
 from .period import PeriodResult
 
 _AT_ONCE = 200  # results that are fetched from a store together
-_LONGEST = 1 << 26  # longest line in bytes; one of a thousand logs has a hundredth of that
+_LONGEST = 1 << 26  # longest line in bytes; the line of a thousand logs is a hundredth of that
 
 
 class Journal:
     """with Journal(path) as journal: journal.add(key, result); key in journal; journal.results(keys).
 
-    key: identifies the logs and the options of a result. Memory holds the place of each result in the file, which is
-    read again for results(). damaged: number of lines that could not be used.
+    key: identifies the logs and the options of a result. Memory only holds the position of each result in the file;
+    results() reads the file again. damaged: number of lines that could not be used.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._places: dict[str, int] = {}
-        self._again: set[str] = set()  # keys of results that another run should compute again
+        self._again: set[str] = set()  # keys of results that the next run should recompute
         self.damaged = 0
 
     def __enter__(self) -> "Journal":
@@ -44,7 +44,7 @@ class Journal:
                 if not self._note(line) and line.strip():
                     self.damaged += 1
                     self._file.seek(self._end)
-                    self._file.write(b" " * (len(line) - 1) + b"\n")  # so that it is counted once
+                    self._file.write(b" " * (len(line) - 1) + b"\n")  # it must be counted only once
                 self._end += len(line)
             self._file.flush()
         except OSError as error:
@@ -52,7 +52,7 @@ class Journal:
         return self
 
     def _open(self) -> None:
-        """Open the file and lock it, again if the run before has removed it meanwhile."""
+        """Open the file and lock it. Repeat this if an earlier run has removed the file meanwhile."""
         while True:
             self._file = open(os.open(self._path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666), "r+b")
             self._lock()
@@ -62,7 +62,7 @@ class Journal:
             self._file.close()
 
     def _lock(self) -> None:
-        """Lock the file against a second run that writes to it. Raises InputError."""
+        """Lock the file against a second run. Raises InputError."""
         with contextlib.suppress(ImportError):  # Windows
             import fcntl
 
@@ -74,7 +74,7 @@ class Journal:
 
     def __exit__(self, *exception: object) -> None:
         with contextlib.suppress(OSError):
-            if not self._end and os.name != "nt":  # while it is locked: it may be another run's as soon as it is not
+            if not self._end and os.name != "nt":  # while still locked: once unlocked it may belong to another run
                 self._path.unlink()
         with contextlib.suppress(OSError):
             self._file.close()
@@ -86,7 +86,7 @@ class Journal:
         return key in self._places and key not in self._again
 
     def add(self, key: str, result: PeriodResult, again: bool = False) -> None:
-        """Keep a result. again: another run should compute it again. Raises InputError; earlier results stay."""
+        """Save a result. again: the next run should recompute it. Raises InputError; earlier results stay."""
         line = _line(key, result, again) + b"\n"
         try:
             self._file.seek(self._end)
@@ -95,16 +95,16 @@ class Journal:
         except OSError as error:
             with contextlib.suppress(OSError):
                 self._file.truncate(self._end)
-            raise self._cannot(error) from error
+            raise self._write_error(error) from error
         self._note(line)
         self._end += len(line)
 
     def sync(self) -> None:
-        """Flush the results to the disk, so that they outlast a loss of power. Raises InputError."""
+        """Flush the results to the disk, so that they survive a power loss. Raises InputError."""
         try:
             os.fsync(self._file.fileno())
         except OSError as error:
-            raise self._cannot(error) from error
+            raise self._write_error(error) from error
 
     def results(self, keys: Iterable[str]) -> Iterator[PeriodResult]:
         """The latest result of each of these keys that has one."""
@@ -115,7 +115,7 @@ class Journal:
                     if entry := _entry(file.readline()):
                         yield entry[2]
 
-    def _cannot(self, error: OSError) -> InputError:
+    def _write_error(self, error: OSError) -> InputError:
         return InputError(
             f"{self._path} cannot be written: {cause(error)}; what is finished is kept, the same command goes on"
         )
@@ -131,8 +131,8 @@ class Journal:
 
 
 class StoreJournal:
-    """A Journal in a directory of a store: KEY.json is final, KEY.again.json should be computed again. All are read
-    when the journal is opened; those that are damaged are computed again."""
+    """A Journal in a directory of a store. KEY.json is final; KEY.again.json should be recomputed. All files are read
+    when the journal is opened. Damaged ones are recomputed."""
 
     def __init__(self, directory: str) -> None:
         self._directory = directory

@@ -1,4 +1,4 @@
-"""Assigns logs to vehicles: by MANIFEST.csv, or by a pattern of paths."""
+"""Assigns logs to vehicles, by MANIFEST.csv or by a pattern of paths."""
 
 import csv
 import io
@@ -17,7 +17,7 @@ _MOST_BYTES = 100_000_000  # largest manifest: a million logs
 
 @dataclass(frozen=True)
 class Period:
-    """Logs, in the order of time, in which the sensor should have had the same alignment on the same vehicle.
+    """Logs of one vehicle, in chronological order, in which the sensor should have had the same alignment.
 
     kind: "motorcycle" or "car" (anything that does not lean). mount: name of the mounting, "" if the vehicle has only
     one. paths: the logs' paths, as fsspec takes them.
@@ -32,8 +32,8 @@ class Period:
 def read_manifest(path: str) -> list[Period]:
     """The periods of a manifest: CSV with the columns vehicle,path,kind and optionally mount.
 
-    Rows of the same vehicle and mount are one period. Paths are seen from the manifest's directory and may be patterns
-    (logs/*.csv.gz). Raises InputError naming the line.
+    Rows of the same vehicle and mount form one period. Paths are relative to the manifest's directory and may be
+    patterns (logs/*.csv.gz). Raises InputError naming the line.
 
     >>> import tempfile
     >>> with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
@@ -81,7 +81,7 @@ def read_manifest(path: str) -> list[Period]:
 
 
 def by_pattern(pattern: str, kind: str = CAR) -> list[Period]:
-    """Each file that the pattern matches is a vehicle of its own, named by its path. Raises InputError.
+    """One period per file that the pattern matches: a separate vehicle, named by its path. Raises InputError.
 
     >>> import tempfile
     >>> with tempfile.NamedTemporaryFile(suffix=".csv") as file:
@@ -95,7 +95,7 @@ def by_pattern(pattern: str, kind: str = CAR) -> list[Period]:
 
 
 def is_pattern(path: str) -> bool:
-    """True if it has * ? or [ in it."""
+    """True if the path contains * ? or [."""
     return any(mark in path for mark in "*?[")
 
 

@@ -1,10 +1,10 @@
-"""Finds mounts that were rotated, by a few degrees or by many, between two logs or during one.
+"""Finds mounts that rotated by a few degrees or more, between two logs or during one.
 
-The firmware refuses a drive only where the mount surely moved, by some 7 to 30 degrees. Here, for every moment in all
-logs of a mount, the alignment before it is compared with the one after it. A rotation that tilts the sensor shows in
-gravity. One about the vertical shows in braking and in bends only, and in the direction in which the vehicle sways on
-its springs, which needs neither. The variance comes from a jackknife over blocks of some seconds; added to it are
-errors that last longer: slopes of a road and, from one log to another, load and temperature.
+The firmware refuses a drive only if the mount surely moved, by some 7 to 30 degrees. Here, for every moment in all logs
+of a mount, the alignment before it is compared with the alignment after it. A rotation that tilts the sensor shows in
+gravity. A rotation about the vertical shows only in braking, in bends, and in the direction in which the vehicle sways
+on its springs, which needs neither. The variance comes from a jackknife over blocks of some seconds. Errors that last
+longer are added: slopes of a road and, from one log to another, load and temperature.
 """
 
 from dataclasses import dataclass
@@ -15,11 +15,11 @@ from kickstand_tools.signals import Array, rotation_vector
 from . import evidence
 from .evidence import Blocks, Intervals, blocks, fits, frames
 
-LEAST_DEG = 3.2  # least rotation that is reported: smaller ones may be by roads, load and temperature
+LEAST_DEG = 3.2  # least rotation that is reported: roads, load and temperature can cause smaller ones
 # Least number of standard deviations: between two logs, and within one, where there are many moments to choose from
 BETWEEN_SIGMAS, WITHIN_SIGMAS = 3.3, 4.3
 SUDDEN_SIGMAS = 3.8  # within a log, where the vertical jumps at that moment
-SUSPECTED_SHARE = 0.7  # factor on these limits where the firmware suspects the mount, too
+SUSPECTED_SHARE = 0.7  # factor on these limits if the firmware suspects the mount, too
 # Errors that last on each side of the comparison, 1 sigma in degrees: pitch, yaw and roll (about left, up, forward),
 # during a log (ROAD_DEG) and from one log to another (OTHER_ROAD_DEG)
 ROAD_DEG = np.array([0.5, 0.25, 0.35])
@@ -27,16 +27,16 @@ OTHER_ROAD_DEG = np.array([0.75, 0.7, 0.5])
 REACH = 75  # blocks on each side that are compared: ten minutes
 LEAST_BLOCKS = 7
 LEAST_VARIED = 0.2  # g^2 s: least variation by braking, speeding up and bends on each side, for a forward
-# A few blocks that happen to agree make the jackknife optimistic: so this is added to yaw, 1 sigma in degrees at 1 g^2
+# If a few blocks happen to agree, the jackknife is too optimistic. So this is added to yaw, 1 sigma in degrees at 1 g^2
 # s
 YAW_PRIOR_DEG = 0.4
-# The direction of sway: its change by roads on each side, 1 sigma in degrees. It is not used where its standard
-# deviation over both sides is above SWAY_WORST_DEG, or where it contradicts the braking by more than SWAY_SIGMAS
+# The direction of sway: its change by roads on each side, 1 sigma in degrees. It is not used if its standard deviation
+# over both sides is above SWAY_WORST_DEG, or if it contradicts the braking by more than SWAY_SIGMAS
 SWAY_DEG, SWAY_WORST_DEG, SWAY_SIGMAS = 0.7, 5.0, 3.0
-SURELY_DEG = 8.0  # no two slopes of a road differ by more; during a log a smaller tilt has to be sudden
+SURELY_DEG = 8.0  # no two slopes of a road differ by more; during a log a smaller tilt must be sudden
 TILT_DEG = 2.2  # a rotation with less tilt is one about the vertical
 STEP_S, STEP_GAP_S = 8.0, 1.0  # a sudden tilt is measured from STEP_GAP_S to STEP_S on each side of the moment
-STEP_SHARE = 0.7  # share of the tilt that has to be sudden
+STEP_SHARE = 0.7  # share of the tilt that must be sudden
 
 
 @dataclass
@@ -69,8 +69,8 @@ class Move:
 
 
 def find_moves(logs: list[Intervals], suspected: bool = False) -> list[Move]:
-    """The rotations of the mount, in the order of time. logs: the intervals of each. suspected: the firmware found
-    parts of the drive that differ."""
+    """Find the rotations of the mount, in chronological order. logs: the intervals of each log. suspected: True if the
+    firmware found parts of the drive that differ."""
     return _search(logs, blocks(logs), SUSPECTED_SHARE if suspected else 1.0)
 
 
@@ -89,7 +89,7 @@ def _search(logs: list[Intervals], whole: Blocks, share: float) -> list[Move]:
         if move.angle_deg < LEAST_DEG or score < 1.0 or (best and score <= best[0]):
             continue
         if not between and tilted and abs(turn[1]) < WITHIN_SIGMAS * sigma[1]:  # a slope of the road has no yaw
-            moment = _moment(logs[move.log], move)
+            moment = _moment_of_jump(logs[move.log], move)
             if moment is None:
                 continue
             move.at_s = moment
@@ -105,7 +105,7 @@ def _sides(whole: Blocks, at: int, between: bool) -> tuple[Blocks, Blocks]:
     if between:
         return whole.part(slice(max(0, at - REACH), at)), whole.part(slice(at, at + REACH))
     first, last = np.searchsorted(whole.log, [whole.log[at], whole.log[at] + 1])
-    # the block in which it happens is on neither side
+    # the block in which the rotation happens is on neither side
     return whole.part(slice(max(first, at - REACH), at)), whole.part(slice(at + 1, min(last, at + 1 + REACH)))
 
 
@@ -114,14 +114,14 @@ def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
     forward). None if one of them does not determine an alignment."""
     if min(len(before.log), len(after.log)) < LEAST_BLOCKS:
         return None
-    one, other = _known(before), _known(after)
+    one, other = _align_part(before), _align_part(after)
     if one is None or other is None:
         return None
     turn = np.degrees(rotation_vector(other.frame @ one.frame.T))
     road = ROAD_DEG if before.log[-1] == after.log[0] else OTHER_ROAD_DEG
     variance = one.variance + other.variance + 2.0 * road**2
-    # The direction of the sway is an independent measurement of yaw: where the two frames differ by an error of yaw, it
-    # seems to turn by that error
+    # The direction of the sway is an independent measurement of yaw: if the two frames differ by an error of yaw, the
+    # sway seems to turn by that error
     swayed = one.sway_variance + other.sway_variance + 2.0 * SWAY_DEG**2
     error = (other.sway_deg - one.sway_deg + 90.0) % 180.0 - 90.0
     if swayed < SWAY_WORST_DEG**2 and error**2 < SWAY_SIGMAS**2 * (swayed + variance[1]):
@@ -131,7 +131,7 @@ def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
 
 
 @dataclass
-class _Known:
+class _PartAlignment:
     """The alignment on one side: frame (3, 3), its variance (3, degrees^2), and the direction of the sway in it."""
 
     frame: Array
@@ -140,7 +140,7 @@ class _Known:
     sway_variance: float
 
 
-def _known(part: Blocks) -> _Known | None:
+def _align_part(part: Blocks) -> _PartAlignment | None:
     """The alignment by some blocks, with its variance by the jackknife; None if they do not determine it."""
     square, product = np.sum(part.square, axis=0), np.sum(part.product, axis=0)
     found, varied = fits(square, product)
@@ -155,11 +155,11 @@ def _known(part: Blocks) -> _Known | None:
     sway = np.sum(part.sway, axis=0)
     sway_deg = float(evidence.sway_deg(sway, frame))
     off = (evidence.sway_deg(sway - part.sway, frame) - sway_deg + 90.0) % 180.0 - 90.0
-    return _Known(frame, variance, sway_deg, (n - 1) / n * float(off @ off) if np.any(sway) else np.inf)
+    return _PartAlignment(frame, variance, sway_deg, (n - 1) / n * float(off @ off) if np.any(sway) else np.inf)
 
 
-def _moment(log: Intervals, move: Move) -> float | None:
-    """The time in the log, s, at which the vertical jumped; None if it did not, so that it may be a slope of the
+def _moment_of_jump(log: Intervals, move: Move) -> float | None:
+    """The time in the log, s, at which the vertical jumped. None if it did not: then the cause may be a slope of the
     road."""
     tilt = move.tilt_deg
     if move.at_s is None:
@@ -170,7 +170,7 @@ def _moment(log: Intervals, move: Move) -> float | None:
     if np.count_nonzero(near) < 10:
         return None
     found, varied = fits(terms[near].T @ terms[near], terms[near].T @ force[near])
-    level = (force - terms[:, 1:] @ found[1:]) / terms[:, :1]  # the vertical: the force less that by driving
+    level = (force - terms[:, 1:] @ found[1:]) / terms[:, :1]  # the vertical: the force without the part by driving
     left, _, forward = frames(found, varied)
     tips = (left * move.turn_deg[2] - forward * move.turn_deg[0]) / tilt  # the direction in which up moves
     best, moment = 0.0, move.at_s

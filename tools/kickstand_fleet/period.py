@@ -27,21 +27,22 @@ from .moved import Move, find_moves
 
 UNREADABLE, CHANGED, NO_MEMORY, FAULT = "unreadable", "changed", "no-memory", "fault"
 NO_SPEED, MOVED, LEFT_HANDED = "no-speed", "mount-moved", "left-handed"
-# The vehicle is aligned, but brake tests or signals of this log are missing; because the disk for signals is full
+# AFTERWARDS: the vehicle is aligned, but brake tests or signals of this log are missing. DISK_FULL: no space for
+# signals
 AFTERWARDS, DISK_FULL = "not-finished", "disk-full"
 # Notices about parts of a log that are not used, or of a sensor that is ill
 _LEFT_OUT = ("cut-line", "cut-gzip", "nul-end", "frozen-readings", "axis-dead", "gyro-saturated", "accel-clipped")
-_SUSPECTS = (MOVED, "parts-differ", "uncertain")  # refusals of the firmware after which moves are looked for
+_SUSPECTS = (MOVED, "parts-differ", "uncertain")  # refusals of the firmware after which moves are searched
 _PLOTTED = 160  # intervals in a picture
-_AGAINST = -0.5  # evidence.handedness() below this: the gyro or the axes are mirrored
+_AGAINST = -0.5  # evidence.handedness() below this, the gyro or the axes are mirrored
 
 Row = dict[str, Any]
 
 
 @dataclass
 class PeriodResult:
-    """The rows of one mount of one vehicle in tables.TABLES, and the points of its picture: for each of some intervals
-    the change of speed, the force forward, the centripetal acceleration, the force to the left (4, g)."""
+    """The rows of one mount of one vehicle in tables.TABLES, and the points of its picture. A point is an interval's
+    change of speed, force forward, centripetal acceleration and force to the left (4, g)."""
 
     alignment: Row
     moved: list[Row] = field(default_factory=list)
@@ -51,11 +52,11 @@ class PeriodResult:
 
 
 def work_on_period(period: Period, signals_to: str | None = None) -> PeriodResult:
-    """Align a period of a manifest, look where its mount moved, and measure its brake tests.
+    """Align a period of a manifest, find where its mount moved, and measure its brake tests.
 
-    signals_to: a directory for each log's accelerations along the vehicle's axes, None for none. What is wrong with
-    the data is part of the result: a log that cannot be used costs a row of errors, and where none is left the status
-    is "error" or "refused". Never raises, so that one vehicle cannot stop a fleet.
+    signals_to: a directory for each log's accelerations along the vehicle's axes, None for none. Problems of the data
+    are part of the result: a log that cannot be used adds a row of errors. If no log is left, the status is "error" or
+    "refused". Never raises, because one vehicle must not stop a fleet.
 
     >>> found = work_on_period(Period("bus 12", "", "car", ("no-such-file.csv",)))
     >>> found.alignment["status"], found.errors[0]["message"]
@@ -67,7 +68,7 @@ def work_on_period(period: Period, signals_to: str | None = None) -> PeriodResul
         return failed(period, NO_MEMORY, "its logs take more memory than there is")
     except OSError as error:
         return failed(period, UNREADABLE, cause(error))
-    except Exception as error:  # a fault of ours: it must not cost other vehicles
+    except Exception as error:  # a bug in Kickstand: it must not affect other vehicles
         where = traceback.extract_tb(error.__traceback__)[-1]
         message = f"{type(error).__name__}: {error} ({Path(where.filename).name}, line {where.lineno})"
         return failed(period, FAULT, message)
@@ -105,21 +106,21 @@ def _result(period: Period, signals_to: str | None) -> PeriodResult:
         for notice in log.notices
         if notice.code in _LEFT_OUT
     ]
-    moved = [_whose(period) | _moved_row(move, logs) for move in drive.moves]
+    moved = [_vehicle_columns(period) | _moved_row(move, logs) for move in drive.moves]
     result = PeriodResult(row, moved, [], errors, _picture(drive))
     if aligned and drive.found:
         known = CalibrationFile(
             gyro_bias_dps=drive.fit.bias_dps, vehicle_from_sensor=drive.found.frame, aligned=True, vehicle=period.kind
         )
         for log in logs:
-            _use(result, period, log, known, signals_to)
+            _add_drive(result, period, log, known, signals_to)
     return result
 
 
 @dataclass
 class _Drive:
-    """The alignment by the logs of a period: the firmware's own and, where needed, the intervals, the moves of the
-    mount and forward by all of them."""
+    """The alignment by the logs of a period: the firmware's own and, if needed, the intervals, the moves of the mount,
+    and forward from all logs."""
 
     fit: DriveFit
     intervals: list[evidence.Intervals] = field(default_factory=list)
@@ -137,7 +138,7 @@ def _drive(period: Period, logs: list[Log]) -> _Drive:
 
 
 def _refusal(drive: _Drive, logs: list[Log]) -> tuple[str, str]:
-    """Why there is no alignment: code and sentence; two empty texts if there is one."""
+    """The reason for no alignment: code and sentence. Two empty texts if there is an alignment."""
     fit, found = drive.fit, drive.found
     if drive.moves:
         return MOVED, _moved_words(drive.moves, logs)
@@ -145,7 +146,7 @@ def _refusal(drive: _Drive, logs: list[Log]) -> tuple[str, str]:
     if _mirrored(drive.intervals):
         problem = AlignmentError(LEFT_HANDED)
     elif fit.reason == MOVED:
-        problem = fit_problem(fit.lag_s or 0.0, 1.0)  # with a late speed braking looks like a stop on another slope
+        problem = fit_problem(fit.lag_s or 0.0, 1.0)  # if the speed is late, braking looks like a stop on another slope
     elif found and found.sure:
         return "", ""
     elif found and not fit.reason:
@@ -154,11 +155,11 @@ def _refusal(drive: _Drive, logs: list[Log]) -> tuple[str, str]:
     return (refusal.code, str(refusal)) if refusal else ("", "")
 
 
-def _use(result: PeriodResult, period: Period, log: Log, known: CalibrationFile, signals_to: str | None) -> None:
+def _add_drive(result: PeriodResult, period: Period, log: Log, known: CalibrationFile, signals_to: str | None) -> None:
     """Add the brake tests of a log to the result, and write its signals."""
     try:
         tests = brake_tests(log, known)
-        result.brake_tests += [_whose(period) | {"log": log.name} | _stop_row(stop, log) for stop in tests]
+        result.brake_tests += [_vehicle_columns(period) | {"log": log.name} | _stop_row(stop, log) for stop in tests]
         if signals_to is not None:
             signals.write(signals_to, period, log, known)
     except (InputError, OSError) as error:
@@ -166,16 +167,16 @@ def _use(result: PeriodResult, period: Period, log: Log, known: CalibrationFile,
         result.errors.append(_error(period, log.name, DISK_FULL if full else AFTERWARDS, cause(error)))
 
 
-def _whose(period: Period) -> Row:
+def _vehicle_columns(period: Period) -> Row:
     return {"vehicle": period.vehicle, "mount": period.mount}
 
 
 def _error(period: Period, log: str, reason: str, message: str) -> Row:
-    return _whose(period) | {"log": log, "reason": reason, "message": message}
+    return _vehicle_columns(period) | {"log": log, "reason": reason, "message": message}
 
 
 def _logs(period: Period) -> tuple[list[Log], list[Row]]:
-    """The logs that can be used, and a row of errors for each other one."""
+    """The logs that can be used, and a row of errors for each other log."""
     logs, errors = [], []
     for path in period.paths:
         reason = UNREADABLE
@@ -196,7 +197,7 @@ def _alignment(
 ) -> Row:
     fit, found = (drive.fit, drive.found) if drive else (None, None)
     known = found if status == "aligned" else None
-    return _whose(period) | {
+    return _vehicle_columns(period) | {
         "kind": period.kind,
         "status": status,
         "reason": reason,
@@ -261,7 +262,7 @@ def _stop_row(stop: Stop, log: Log) -> Row:
 
 
 def _utc_s(log: Log, at_s: float) -> float | None:
-    """Universal Time at at_s in the log; None where it has none."""
+    """Universal Time at at_s in the log; None if the log has none."""
     return None if log.start_utc_s is None else log.start_utc_s + at_s
 
 

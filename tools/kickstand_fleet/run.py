@@ -1,4 +1,5 @@
-"""Processes a whole fleet: computes what is new, and writes all results to a directory, meanwhile and at the end."""
+"""Processes a whole fleet: computes new results, and writes all results to a directory, during the run and at its
+end."""
 
 import contextlib
 import hashlib
@@ -23,13 +24,13 @@ from .show.page import Glance
 RESULTS_VERSION = 4  # a new number makes all earlier results obsolete
 PLOTS, SIGNALS = "plots", "signals"
 TIMEOUT_S = 600.0  # longest time for one mount of one vehicle
-_WRITE_S, _SHARE = 15.0, 20.0  # the tables are written again after the longer of 15 s and 20 times a writing
+_WRITE_S, _SHARE = 15.0, 20.0  # s and multiple of the last writing's time until the tables are rewritten
 
 
 @dataclass
 class FleetRun:
-    """vehicles: number of mounts of vehicles; new: number of those computed in this run, the others were finished
-    before. damaged: number of earlier results that could not be read, and are computed again. seen: a summary of all
+    """vehicles: number of mounts of vehicles. new: number of these that this run computed; the others were finished
+    earlier. damaged: number of earlier results that could not be read and are recomputed. seen: a summary of all
     results."""
 
     vehicles: int
@@ -52,10 +53,10 @@ def run_fleet(
 
     scheduler: the address of a Dask cluster, None for workers on this computer: `workers`, or one per processor.
     with_signals: also write each log's accelerations along the vehicle's axes, to out/signals. timeout_s: for one
-    period. progress: called with (done, all). What an earlier run into the same directory has finished is not done
-    again, as long as its logs have not changed. Raises InputError; what is finished is kept and shown then, too.
+    period. progress: called with (done, all). Results of an earlier run into the same directory are reused if their
+    logs have not changed. Raises InputError; finished results are kept and shown even then.
 
-    A script has to call it below `if __name__ == "__main__":`, because workers on this computer import the script.
+    A script must call it below `if __name__ == "__main__":`, because workers on this computer import the script.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as directory:
@@ -97,8 +98,8 @@ def run_fleet(
                     write_results(directory, journal.results(keys), len(keys))
                     last_s = time.monotonic()
                     pause_s = max(_WRITE_S, _SHARE * (last_s - before_s))
-        except BaseException:  # also when it is stopped
-            with contextlib.suppress(InputError):  # a full disk is said already
+        except BaseException:  # also when the user stops it
+            with contextlib.suppress(InputError):  # the first error already reports a full disk
                 if next(journal.results(keys), None):
                     write_results(directory, journal.results(keys), len(keys))
             raise
@@ -107,7 +108,7 @@ def run_fleet(
 
 
 def write_results(directory: str, results: Iterable[PeriodResult], expected: int) -> Glance:
-    """Write the tables and the page of the results so far. expected: how many there will be. Raises InputError."""
+    """Write the tables and the page of the results so far. expected: final number of results. Raises InputError."""
     glance = Glance()
 
     def seen() -> Iterator[PeriodResult]:
@@ -132,7 +133,7 @@ def _note_changed(period: Period, marks: dict[str, str], result: PeriodResult) -
 
 
 def _keep(directory: str, journal: Journal | StoreJournal, key: str, kept: PeriodResult, again: bool) -> None:
-    """Keep a result in the journal at once. again: another run should compute it again. Raises InputError."""
+    """Save a result in the journal at once. again: the next run should recompute it. Raises InputError."""
     missing = [row for row in kept.errors if row["reason"] in (AFTERWARDS, DISK_FULL)]
     unshown = None
     if kept.picture:
@@ -156,7 +157,7 @@ def _marks(periods: list[Period]) -> dict[str, str]:
 
 
 def _keys(periods: list[Period], marks: dict[str, str], with_signals: bool) -> list[str]:
-    """What distinguishes the result of each period from that of other logs, other options and other versions."""
+    """A key per period: it changes with the logs, the options and the version."""
     keys = []
     for period in periods:
         logs = [(path, marks[path]) for path in period.paths]

@@ -1,4 +1,5 @@
-"""Accelerations along the vehicle's axes as Parquet, in directories by vehicle and day as data frames read them."""
+"""Writes accelerations along the vehicle's axes as Parquet, in directories by vehicle and day, which data frames can
+read."""
 
 import datetime
 import io
@@ -28,10 +29,9 @@ COLUMNS = {
 
 
 def write(directory: str, period: Period, log: Log, calibration: CalibrationFile) -> list[str]:
-    """Write a log to DIRECTORY/vehicle=.../day=.../NAME.parquet, one file for each day of Universal Time in it (day
-    "unknown" where the log has none). NAME is made of the mount and the log's name, with a hash of its path: no two
-    logs share a file, and another run writes the same ones. Returns the paths. calibration: an aligned one. Raises
-    InputError."""
+    """Write a log to DIRECTORY/vehicle=.../day=.../NAME.parquet: one file per day of Universal Time, day "unknown" if
+    the log has no time. NAME consists of the mount, the log's name and a hash of its path: two logs never share a file,
+    and another run writes the same files. Returns the paths. calibration: must be aligned. Raises InputError."""
     import pyarrow
     from pyarrow import parquet
 

@@ -12,7 +12,7 @@ from .period import PeriodResult, Row
 if TYPE_CHECKING:
     import pyarrow
 
-_GROUP = 20_000  # rows that are written at a time
+_GROUP = 20_000  # rows written at a time
 _TEXT, _NUMBER, _COUNT, _LIST = "string", "double", "int32", "list"
 
 # column: (type, unit, meaning)
@@ -96,7 +96,7 @@ def schema(table: str) -> "pyarrow.Schema":
 
 
 def check() -> None:
-    """Raise InputError where Parquet cannot be written."""
+    """Raise InputError if Parquet cannot be written."""
     try:
         import pyarrow.parquet  # noqa: F401
     except ImportError as error:
@@ -104,8 +104,8 @@ def check() -> None:
 
 
 def write_tables(directory: str, results: Iterable[PeriodResult]) -> None:
-    """Write a file NAME.parquet for each of TABLES, whole or not at all. Memory does not grow with the number of
-    results, which are gone through once. Raises InputError."""
+    """Write a file NAME.parquet for each of TABLES, whole or not at all. The results are read once, and memory does not
+    grow with their number. Raises InputError."""
     with contextlib.ExitStack() as opened:
         tables = {name: opened.enter_context(_table(directory, name)) for name in TABLES}
         for result in results:

@@ -23,10 +23,11 @@ Equations, with ' for the derivative by time
                              f_x = cos q sin t + (v (w_y - d sin t) + psi v' - h cos t w_z') / g   (4)
                              f_y = cos q cos t - (v (w_x + d cos t) + h w_z^2) / g                 (5)
     roads are level          0 = q + psi sin t  on average                             (6)
-    lean of the bike itself  t - psi cos t (q + psi sin t)                             (7)
+    lean of the bike itself  t - psi cos t (tan q + 1/2 psi sin t)                     (7)
 
 t and q are those of the sensor's axes, which psi has turned: they share in the bike's own pitch, q + psi sin t. On a
-slope of 10 % a yaw error of 5 degrees makes half a degree of lean.
+slope of 10 % a yaw error of 5 degrees makes half a degree of lean. (7) is to second order of psi; on the level, where
+q is -psi sin t, it is that of tan(lean of the bike) = tan t / cos psi.
 
 d is the part of the pitch rate q' that is the springs' and not the road's: the wheels do not rise with it. Braking
 explains most of it; dive.py has (8).
@@ -38,7 +39,7 @@ tan t. Just after the bike has entered a turn its speed is still known from befo
 lean.
 """
 
-from math import cos, radians, sin, sqrt
+from math import cos, radians, sin, sqrt, tan
 
 from ..units import STANDARD_GRAVITY, const
 
@@ -194,4 +195,4 @@ class Linearisation:
 
     def lean_by_pitch(self, x):
         """(7): the part of the state's lean, rad, that is the bike's own pitch, which the yaw error shows as lean."""
-        return x[YAW_ERROR] * self.cos_lean * (x[PITCH] + x[YAW_ERROR] * self.sin_lean)
+        return x[YAW_ERROR] * self.cos_lean * (tan(x[PITCH]) + 0.5 * x[YAW_ERROR] * self.sin_lean)

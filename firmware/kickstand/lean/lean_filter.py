@@ -133,7 +133,10 @@ class LeanFilter:
         for i in range(BIAS_LEFT, STATES):
             self._x[i] = self._good[i - BIAS_LEFT]
             sigma = measurements.GOOD_SHARE * measurements.SIGMA_START[i]
-            self._kept.append((i, (measurements.SIGMA_GOOD_BIAS if i < YAW_ERROR else sigma) ** 2))
+            variance = (measurements.SIGMA_GOOD_BIAS if i < YAW_ERROR else sigma) ** 2
+            if i >= SCALE_LEFT and self._gyro_variances:
+                variance = min(variance, self._gyro_variances[i - SCALE_LEFT])
+            self._kept.append((i, variance))
 
     def _forget(self):
         """Restart with nothing kept."""

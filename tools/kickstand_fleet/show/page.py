@@ -1,4 +1,4 @@
-"""index.html: a fleet at one glance. It needs no network and no server."""
+"""index.html: a fleet at a glance. It needs no network and no server."""
 
 import heapq
 import math
@@ -46,7 +46,7 @@ class Glance:
     statuses, reasons: numbers of results with each; moved_count, errors: numbers of rows in these tables; first_errors:
     (log or vehicle, message) of some of these. decelerations: (s since 1970 or NaN, m/s2) of each brake test. worst:
     the least certain alignments; moved: the largest rotations of mounts, each with its picture. moved_vehicles: number
-    of those and of the mounts that seem to have moved without it being known when.
+    of mounts that moved, including those for which the time is unknown.
     """
 
     def __init__(self) -> None:
@@ -57,10 +57,10 @@ class Glance:
         self.reasons: Counter[tuple[str, str]] = Counter()
         self.decelerations: tuple[array[float], array[float]] = array("d"), array("d")
         self._qualities = array("d")
-        self.below: str | None = None  # the folder that all names have in common, with its /
+        self.below: str | None = None  # the folder that all names share, with its /
         self.worst: list[Row] = []
         self.moved: list[tuple[Row, str]] = []
-        # rows of the table of vehicles, each with its decelerations; by aligned or not
+        # rows of the table of vehicles, each with its decelerations; key: aligned or not
         self._rows: dict[bool, list[tuple[Row, list[float]]]] = {False: [], True: []}
 
     def add(self, result: PeriodResult) -> None:
@@ -92,7 +92,7 @@ class Glance:
             self._rows[aligned].append((row, [test["mfdd_mps2"] for test in result.brake_tests]))
 
     def page(self, expected: int) -> str:
-        """The page as HTML. expected: number of results in the end."""
+        """The page as HTML. expected: final number of results."""
         tests, hours = len(self.decelerations[1]), self.driven_s / 3600.0
         tiles = [
             (self.statuses["aligned"], f"aligned ({_share(self.statuses['aligned'], self.count)})", "good"),
@@ -132,7 +132,7 @@ def _quality(values: Sequence[float]) -> Markup:
 
 
 def _braking(utc_s: Sequence[float], values: Sequence[float]) -> list[Markup]:
-    """The decelerations as a histogram and, where their days are known, over time. Nothing without any."""
+    """The decelerations as a histogram and, if their days are known, over time. Empty without decelerations."""
     if not values:
         return []
     hardest = min(12.0, max(values) * 1.05)
@@ -170,7 +170,7 @@ def _medians(dated: Sequence[tuple[float, float]], width_s: float) -> list[tuple
 
 
 def _spark(values: Sequence[float]) -> Markup:
-    """Decelerations, one after the other, as small bars of up to 8 m/s2."""
+    """Decelerations in sequence, as small bars of up to 8 m/s2."""
     width = min(4.0, 100.0 / len(values))
     path = "".join(f"M{(k + 0.5) * width:.1f} 20v{-max(1.0, min(y, 8.0) * 2.4):.1f}" for k, y in enumerate(values))
     bars = element("path", d=path, stroke="#c2410c", stroke_width=0.7 * width)
@@ -179,8 +179,8 @@ def _spark(values: Sequence[float]) -> Markup:
 
 _PAGE = Path(__file__).parent / "page.html"
 _SCRIPT = _PAGE.read_text(encoding="utf-8").partition("<script>")[2].partition("</script>")[0]
-# Nothing is loaded, and of scripts only the page's own runs. Bars have their widths in style attributes, which a policy
-# can only allow all together.
+# The page loads nothing, and only its own script runs. Bars have their widths in style attributes, which a policy can
+# only allow all together.
 _POLICY = (
     "default-src 'none'; base-uri 'none'; form-action 'none'; style-src 'unsafe-inline'; "
     f"script-src {source_hash(_SCRIPT)}"

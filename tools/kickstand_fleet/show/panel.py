@@ -14,8 +14,8 @@ _QUIET, _RULE = "#777", "#8883"
 
 @dataclass
 class Panel:
-    """x, y, width, height: its place in the picture. across, along: the values at its left and right edge, and at its
-    lower and upper one. unit, unit_along: names of these. words: formats a value of the horizontal axis."""
+    """x, y, width, height: its place in the picture. across: the values at its left and right edge. along: those at its
+    lower and upper edge. unit, unit_along: their units. words: formats a value of the horizontal axis."""
 
     x: float
     y: float

@@ -1,4 +1,4 @@
-"""The picture of one vehicle: do the aligned axes fit what was driven, and how does it brake over time?"""
+"""The picture of one vehicle: do the aligned axes fit the drive, and how does it brake over time?"""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Writes a simulated fleet: logs, MANIFEST.csv, and TRUTH.csv, which says what a run over it has to find."""
+"""Writes a simulated fleet: logs, MANIFEST.csv, and TRUTH.csv, which lists the results that a run over it must find."""
 
 import gzip
 from collections.abc import Callable, Iterator
@@ -15,7 +15,7 @@ from kickstand_tools.signals import Array, rotation_matrix
 from .route import random_route
 from .vehicle import HANDLING, Receiver, drive_log, random_sensor
 
-# What is wrong with a vehicle, and in which share of the fleet; nothing is wrong with the others
+# Troubles of vehicles, and the share of the fleet that has each; the other vehicles are fine
 TROUBLES = {
     "moved-between": 0.06,  # the mount was turned between two logs
     "moved-within": 0.06,  # the mount was turned during a log
@@ -29,7 +29,7 @@ TROUBLES = {
     "cut": 0.02,  # the end of the first log is missing
     "missing": 0.02,  # the first log is not there
 }
-# The expected codes of the refusal where the alignment cannot be known; any one of them is right
+# The expected codes of the refusal if the alignment cannot be determined; any one of them is right
 _REASONS = {
     "moved-between": "mount-moved",
     "moved-within": "mount-moved",
@@ -48,7 +48,7 @@ MATRIX = tuple(f"{row}_{axis}" for row in ("left", "up", "forward") for axis in 
 class MadeVehicle:
     """A vehicle of the fleet. trouble: a key of TROUBLES, or "". mounts: rotation from sensor to vehicle axes (3, 3):
     one, or two if the mount moved. It then moved by moved_deg, moved_s after the start of the log with the index
-    moved_log (NaN: between that log and the one before)."""
+    moved_log (NaN: between that log and the previous one)."""
 
     name: str
     kind: str
@@ -61,7 +61,7 @@ class MadeVehicle:
 
     @property
     def reasons(self) -> str:
-        """Codes, separated by spaces, of which the refusal has to carry one; "" where it has to be aligned."""
+        """Codes, separated by spaces; the refusal must have one of them. "" if the vehicle must be aligned."""
         return _REASONS.get(self.trouble, "")
 
 
@@ -76,8 +76,8 @@ def make_fleet(
 ) -> list[MadeVehicle]:
     """Simulate a fleet and write it to a directory: drives/*.csv.gz, MANIFEST.csv, TRUTH.csv. Raises InputError.
 
-    A third each of cars, buses and motorcycles with one to three drives of about `seconds` each. troubles: one for each
-    vehicle, "" for none; at random in the shares of TROUBLES if None. progress: called with (done, vehicles). A seed
+    A third each of cars, buses and motorcycles with one to three drives of about `seconds` each. troubles: one per
+    vehicle, "" for none; None: at random, in the shares of TROUBLES. progress: called with (done, vehicles). A seed
     always gives the same fleet.
     """
     directory = Path(out)
@@ -147,7 +147,7 @@ def _vehicle(
 
 
 def _turn(chance: np.random.Generator, degrees: float) -> Array:
-    """(3, 3): a rotation by so many degrees about a random axis."""
+    """(3, 3): a rotation by this angle about a random axis."""
     axis = chance.standard_normal(3)
     return rotation_matrix(np.radians(degrees) * axis / np.linalg.norm(axis))
 

@@ -1,4 +1,4 @@
-"""A random route of a few minutes: speed, yaw rate and slope as the driver and the road make them."""
+"""A random route of a few minutes: speed, yaw rate and slope, as chosen by the driver and the road."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.signals import Array, moving_mean
 
 _SMOOTH_S = 0.6  # a driver changes the pedal and the steering wheel within about this
-_SLOPE_M, _SLOPE_DEG, _CAMBER_DEG = 120.0, 1.2, 0.7  # slope and camber have new values each 120 m, with these 1 sigma
+_SLOPE_M, _SLOPE_DEG, _CAMBER_DEG = 120.0, 1.2, 0.7  # slope and camber change every 120 m; 1 sigma
 _FASTEST_LATERAL_MPS2 = 3.0
 
 
@@ -37,8 +37,8 @@ class Route:
 def random_route(
     chance: np.random.Generator, handling: Handling, seconds: float, rate_hz: float, straight: bool = True
 ) -> Route:
-    """A route with stops, bends and braking in straight lines. straight False: in circles all the time, as in a car
-    park, so without straight braking."""
+    """A route with stops, bends and braking in straight lines. straight=False: always in circles, as in a car park, so
+    without straight braking."""
     legs = _Legs(chance, handling)
     legs.stand(chance.uniform(7.0, 14.0))
     while legs.seconds < seconds - 12.0:
@@ -52,7 +52,7 @@ def random_route(
     width = max(2, round(_SMOOTH_S * rate_hz))
     speed = moving_mean(np.interp(time, knots[:, 0], knots[:, 1]), width)
     place = np.searchsorted(knots[:, 0], time, side="right").clip(1, len(knots) - 1)
-    lateral = moving_mean(knots[place, 2], 2 * width)  # a leg's lateral acceleration stands in the knot at its end
+    lateral = moving_mean(knots[place, 2], 2 * width)  # a leg's lateral acceleration is in the knot at its end
     yaw_rate = np.where(speed > 0.3, lateral / np.maximum(speed, 1.5), 0.0)
     distance = np.cumsum(speed) / rate_hz
     return Route(
@@ -66,8 +66,8 @@ def random_route(
 
 
 class _Legs:
-    """Collects the legs of a route. knots: (time, speed, lateral acceleration since the knot before), one at the end of
-    each leg."""
+    """Collects the legs of a route. knots: (time, speed, lateral acceleration since the previous knot), one at the end
+    of each leg."""
 
     def __init__(self, chance: np.random.Generator, handling: Handling) -> None:
         self.chance, self._handling = chance, handling

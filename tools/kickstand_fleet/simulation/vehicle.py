@@ -1,4 +1,4 @@
-"""What a sensor in a car, a bus or on a motorcycle reads on a route."""
+"""Simulates the readings of a sensor in a car, in a bus or on a motorcycle on a route."""
 
 from dataclasses import dataclass
 
@@ -15,13 +15,13 @@ HANDLING = {
     "bus": Handling((7.0, 14.0), (0.7, 1.3), (1.0, 2.0), (0.7, 1.6)),
     "motorcycle": Handling((9.0, 22.0), (1.5, 3.2), (1.6, 4.5), (1.5, 4.0)),
 }
-# degrees per g: how far the body rolls outwards by lateral acceleration, and how far it dives by braking
+# degrees per g: how far the body rolls outwards under lateral acceleration, and how far it dives under braking
 _ROLL_DEG, _DIVE_DEG = {"car": 4.0, "bus": 5.5, "motorcycle": 0.0}, {"car": 2.5, "bus": 2.0, "motorcycle": 4.0}
 _COUNT_G, _COUNT_DPS = 1.0 / 16384.0, 1.0 / 131.0
 
 
 @dataclass
-class Sensor:
+class VehicleSensor:
     """mount (3, 3): vehicle from sensor, rows left, up, forward; offset_g, slope, bias_dps (3): its errors."""
 
     mount: Array
@@ -41,30 +41,30 @@ class Receiver:
     until_s: float = float("inf")
 
 
-def random_sensor(chance: np.random.Generator) -> Sensor:
-    """A sensor at a random mounting, with random errors of an ordinary MPU6050 without calibration."""
+def random_sensor(chance: np.random.Generator) -> VehicleSensor:
+    """A sensor in a random mounting, with random errors of an ordinary, uncalibrated MPU6050."""
     errors = (chance.normal(mean, sigma, 3) for mean, sigma in ((0.0, 0.01), (1.0, 0.01), (0.0, 1.0)))
-    return Sensor(random_rotation(chance), *errors)
+    return VehicleSensor(random_rotation(chance), *errors)
 
 
 def drive_log(
     chance: np.random.Generator,
     kind: str,
     route: Route,
-    sensor: Sensor,
+    sensor: VehicleSensor,
     receiver: Receiver,
     start_utc_s: float,
     moved: tuple[float, Array] | None = None,
     name: str = "the log",
 ) -> Log:
-    """The log of a drive. moved: (time in s, matrix (3, 3) of the new mount); the mount rotates to that within 0.3
-    s."""
+    """Simulate the log of a drive. moved: (time in s, matrix (3, 3) of the new mount); the mount rotates to it within
+    0.3 s."""
     force, rate = _readings(chance, kind, route)
     mount = np.broadcast_to(sensor.mount, (len(force), 3, 3))
     if moved is not None:
         at_s, other = moved
         mount = np.where((route.time >= at_s)[:, None, None], other, mount)
-        rate = rate + _knock(route.time, at_s, other @ sensor.mount.T)
+        rate = rate + _mount_rates(route.time, at_s, other @ sensor.mount.T)
     force = np.einsum("nij,ni->nj", mount, force)
     rate = np.einsum("nij,ni->nj", mount, rate)
     force = np.round((force / STANDARD_GRAVITY - sensor.offset_g) / sensor.slope / _COUNT_G) * _COUNT_G
@@ -106,7 +106,7 @@ def _readings(chance: np.random.Generator, kind: str, route: Route) -> tuple[Arr
     return force, rate
 
 
-def _knock(time: Array, at_s: float, turn: Array, seconds: float = 0.3) -> Array:
+def _mount_rates(time: Array, at_s: float, turn: Array, seconds: float = 0.3) -> Array:
     """(n, 3) rad/s about the vehicle's axes: the rates of a mount that rotates by `turn` (3, 3) around at_s."""
     turning = (time >= at_s - seconds / 2) & (time < at_s + seconds / 2)
     return np.outer(turning, rotation_vector(turn) / seconds)

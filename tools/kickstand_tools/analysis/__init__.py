@@ -1,1 +1,1 @@
-"""A recorded ride analysed: the vehicle's channels, statistics, brake tests, pictures, files for other programs."""
+"""Analyses a recorded ride: the vehicle's channels, statistics, brake tests, pictures, files for other programs."""

@@ -1,8 +1,8 @@
-"""Errors of the aligned axes against those of the bike, estimated from the ride itself.
+"""Estimates the errors of the aligned axes against the bike's own, from the ride itself.
 
-On a straight a balanced bike is upright, so the force across it has the direction of its own up: `roll`. Braking
-and speeding up on a straight push along its own forward: `yaw`. From one standstill to another on level ground
-speeding up and braking cancel out, which leaves `pitch`. Standing still, the force is 1 g: `gravity`.
+On a straight a balanced bike is upright: the mean force shows its own up, and so `roll`. Braking and speeding up on a
+straight push along its own forward, which shows `yaw`. From one standstill to another on level ground, speeding up and
+braking cancel out, which leaves `pitch`. At standstill the force is 1 g, which shows `gravity`.
 """
 
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ from kickstand.lean.upright_trim import MAX_TRIM
 from ..signals import Array, Bools
 from .channels import Channels, spacing_s
 
-# The rms error of the shown lean by each error, measured with simulated rides whose calibrations were rotated on
-# purpose. With a yaw error, pitching looks like rolling: roll rate' = roll rate cos(yaw) + pitch rate sin(yaw), and the
-# lean's error is the bike's pitching times sin(yaw). With a pitch error, yawing looks like rolling likewise, most of
-# which the filter corrects. A roll error adds to the lean, but riding corrects up to MAX_TRIM of it.
+# The rms error of the shown lean caused by each error, measured with simulated rides and rotated calibrations. With a
+# yaw error, pitching looks like rolling: roll rate' = roll rate cos(yaw) + pitch rate sin(yaw), and the lean's error is
+# the bike's pitching times sin(yaw). With a pitch error, yawing looks like rolling in the same way; the filter corrects
+# most of that. A roll error adds to the lean, but riding corrects up to MAX_TRIM of it.
 YAW_COSTS_DEG, PITCH_COSTS_DEG = 3.0, 5.0  # rms error of the lean, over the sine of that error
 
 SMOOTH_S = 0.5
@@ -28,11 +28,12 @@ ENOUGH_G = 0.05  # least rms of braking and speeding up on straights
 
 @dataclass
 class Quality:
-    """Angles in degrees by which the aligned axes seem to be off, None where the ride does not show it.
+    """Angles in degrees by which the aligned axes seem to be off; None if the ride does not show an angle.
 
     roll > 0: "up" leans to the right of the bike's own. pitch > 0: "forward" points up. yaw > 0: "forward" points
-    to the right of the direction in which the bike speeds up. gravity_g: mean force at rest. straight_s: seconds of
-    riding straight on, from which roll and yaw are found. lateral_g, forward_g: of that riding, means of SMOOTH_S.
+    to the right of the direction in which the bike speeds up. gravity_g: mean force at rest. straight_s: time of riding
+    straight ahead, from which roll and yaw are found, s. lateral_g, forward_g: forces in that time, means over
+    SMOOTH_S.
     """
 
     roll_deg: float | None
@@ -46,7 +47,7 @@ class Quality:
 
 @dataclass
 class LeanCost:
-    """The rms error of the shown lean by each angle, degrees, roughly; None where the angle is unknown."""
+    """The approximate rms error of the shown lean caused by each angle, degrees; None for an unknown angle."""
 
     roll_deg: float | None
     pitch_deg: float | None
@@ -75,8 +76,8 @@ def yaw_cost_deg(yaw_deg: float) -> float:
 
 
 def quality(ride: Channels, standing: Bools) -> Quality:
-    """The Quality by a whole ride with evenly spaced samples (see downsampled()). standing (n): True where the vehicle
-    stands still."""
+    """The Quality from a whole ride with evenly spaced samples (see downsampled()). standing (n): True where the
+    vehicle stands still."""
     step_s = spacing_s(ride)
     n = min(max(1, round(SMOOTH_S / step_s)), len(ride.t_s))
     count = len(ride.t_s) // n

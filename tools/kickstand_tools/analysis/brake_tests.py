@@ -1,4 +1,4 @@
-"""The brake tests of a log: its stops, as UN Regulation No. 13 measures them."""
+"""Measures the brake tests of a log: its stops, as defined by UN Regulation No. 13."""
 
 import numpy as np
 
@@ -13,8 +13,8 @@ from .stops.brake_test import RATE_S, Stop, find_stops
 def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
     """Every stop of a log from over 10 km/h, as UN Regulation No. 13 measures it (see find_stops). Raises InputError.
 
-    calibration: an aligned one. A car has no lean, so the firmware's lean filter, which takes most of the time, is run
-    for motorcycles only.
+    calibration: must be aligned. A car has no lean, so the firmware's lean filter, which takes most of the time, runs
+    only for motorcycles.
 
     >>> from kickstand_tools.api import Log, fit_two_positions, simulate_ride
     >>> ride = simulate_ride("street", seed=1, seconds=60.0)

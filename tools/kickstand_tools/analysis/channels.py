@@ -1,7 +1,7 @@
-"""A ride in the vehicle's axes, for plot, report and export; with fewer samples a second as means over stretches.
+"""Computes a ride in the vehicle's axes, for plot, report and export, and reduces its sample rate by means.
 
-The lean is the firmware's own, sample by sample, or the smoothed one. Everything that does not depend on the past is
-computed by numpy; a test holds it equal to the firmware.
+The lean is the firmware's own for each sample, or the smoothed one. numpy computes everything that does not depend on
+earlier samples; a test compares it with the firmware.
 """
 
 from collections.abc import Iterable, Iterator
@@ -25,10 +25,10 @@ class Channels(Table):
     t_s: seconds since the log's first sample. lean_deg: > 0 to the right; lean_formula_deg: by Nicolae's (25)-(26)
     alone. left_g, up_g, forward_g: specific force; lateral_g: acceleration to the left in the road's plane, (23).
     pitch_rate_dps: > 0 nose up; yaw_rate_dps: > 0 in a left turn; roll_rate_dps: > 0 to the right. shown_g: the forward
-    force, smoothed as on the display. lean_sigma_deg: standard deviation of the lean. 1 or 0: resting: the meter has
-    detected a standstill; rolling: its estimated speed is surely not 0; sure: it trusts its lean; doubtful: that of
-    smooth(), 0 where the lean is not smoothed. lat_deg, lon_deg: degrees north and east, and utc_s: s since 1970, both
-    only where there is a new value.
+    force, smoothed as on the display. lean_sigma_deg: standard deviation of the lean. These are 1 or 0: resting: the
+    meter has detected a standstill; rolling: its estimated speed is surely not 0; sure: it trusts its lean; doubtful:
+    from smooth(), 0 if the lean is not smoothed. lat_deg, lon_deg (degrees north and east) and utc_s (s since 1970) are
+    given only for new values.
     """
 
     t_s: Array
@@ -55,8 +55,8 @@ class Channels(Table):
 
     @property
     def trusted(self) -> Bools:
-        """(n) True where the display shows the lean and holds its maxima; a smoothed one by its standard
-        deviation, and FALLEN_DEG."""
+        """(n) True where the display shows the lean and updates its maxima. For a smoothed lean its standard deviation
+        and FALLEN_DEG decide."""
         return (self.sure > 0.0) & ~(np.abs(self.lean_deg) >= FALLEN_DEG)
 
     @property
@@ -71,10 +71,11 @@ class Channels(Table):
 
 
 def channels(block: Block, calibration: CalibrationFile, lean: dict[str, Array], car: bool = False) -> Channels:
-    """The block in the vehicle's axes. lean: lean_deg, lean_sigma_deg, shown_g, resting, rolling, sure and doubtful.
+    """Convert a block to the vehicle's axes. lean: lean_deg, lean_sigma_deg, shown_g, resting, rolling, sure and
+    doubtful.
 
     Forces by Nicolae's (18)-(20) and the matrix, then (25)-(26) and (23). A car has no lean, and its lateral
-    acceleration is the force to the left: of its lean only shown_g, resting and sure are taken.
+    acceleration is the force to the left: of `lean` only shown_g, resting and sure are used.
     """
     none = np.zeros(len(block.time_us))
     if car:
@@ -105,8 +106,8 @@ def channels(block: Block, calibration: CalibrationFile, lean: dict[str, Array],
 
 
 def joined(parts: Iterable[Channels]) -> Channels:
-    """The parts of a ride joined to one. Takes them one by one, to limit memory; a column without any value takes none,
-    and is read only."""
+    """Join the parts of a ride. They are read one by one to limit memory. A column without any value takes no memory
+    and is read-only."""
     columns: list[Array | None] = [None for _ in fields(Channels)]
     length = 0
     for part in parts:
@@ -118,7 +119,7 @@ def joined(parts: Iterable[Channels]) -> Channels:
                     continue
                 column = columns[k] = np.full(end, np.nan)
             if end > len(column):
-                longer = np.empty(2 * end)  # what is not written yet takes no memory, but in a browser
+                longer = np.empty(2 * end)  # except in a browser, memory not yet written to is free
                 longer[:length] = column[:length]
                 column = columns[k] = longer
             column[length:end] = values
@@ -130,29 +131,29 @@ def joined(parts: Iterable[Channels]) -> Channels:
 
 
 def thinned(course: Channels, step_s: float) -> Channels:
-    """A whole ride in means over step_s; unchanged if it has no more samples than that."""
+    """A whole ride in means over step_s; unchanged if it does not have more samples."""
     if np.all(np.diff(_stretches(course.t_s, step_s)) > 0.0):
         return course
     return joined(downsampled([course], step_s))
 
 
 def spacing_s(course: Channels) -> float:
-    """Median time from sample to sample, s."""
+    """Median time between samples, s."""
     return float(np.median(np.diff(course.t_s))) if len(course.t_s) > 1 else 1.0
 
 
 def downsampled(blocks: Iterable[Channels], step_s: float, rounded: bool = False) -> Iterator[Channels]:
-    """The means over each stretch of step_s in which there are samples; a channel's NaNs do not count. For positions
-    and their time it is the last value: there is no mean of longitudes on both sides of 180 degrees.
+    """Yield the means over each stretch of step_s with samples. NaNs do not count. Positions and their time are the
+    last values, because longitudes on both sides of 180 degrees have no mean.
 
-    A ride with at most one sample per stretch is not changed. A stretch may extend over several blocks. rounded: each
-    stretch is of the times that round to the same multiple of step_s.
+    A ride with at most one sample per stretch is not changed. A stretch may extend over several blocks. rounded: a
+    stretch contains the times that round to the same multiple of step_s.
     """
     rest: Channels | None = None
     for block in blocks:
         block = block if rest is None else joined([rest, block])
         step = _stretches(block.t_s, step_s, rounded)
-        last = int(np.searchsorted(step, step[-1]))  # the last stretch may go on in the next block
+        last = int(np.searchsorted(step, step[-1]))  # the last stretch may continue in the next block
         rest = block.part(slice(last, None))
         if last:
             yield _means(block.part(slice(0, last)), step[:last])
@@ -161,12 +162,12 @@ def downsampled(blocks: Iterable[Channels], step_s: float, rounded: bool = False
 
 
 def rounded_to(t_s: Array, step_s: float) -> Array:
-    """Times as multiples of step_s: of stretches that are rounded no two are the same."""
+    """Times rounded to multiples of step_s. Rounded stretches have different times."""
     return _stretches(t_s, step_s, True) * step_s
 
 
 def _stretches(t_s: Array, step_s: float, rounded: bool = False) -> Array:
-    """The number of the stretch that each sample lies in."""
+    """The number of each sample's stretch."""
     return np.floor(t_s / step_s + 0.5 * rounded + 1e-6)
 
 

@@ -1,4 +1,4 @@
-"""Reads a ride once and keeps what its report and its pictures need."""
+"""Reads a ride once and keeps the data for its report and its pictures."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -17,8 +17,8 @@ from .stops.standstill import standing
 from .summary import Summary
 
 _NOT_KEPT = ("lean_formula_deg", "temp_c", "shown_g", "lean_sigma_deg", "utc_s")  # a quarter of a long ride's memory
-# A vehicle that has gone anywhere has turned, sped up or braked by this much for a second. An engine that idles at
-# standstill shakes as much as a road, but its mean over a second hardly changes.
+# A vehicle that has moved has turned, sped up or braked by this much for a second. An engine that idles at standstill
+# shakes as much as a road, but the mean over a second hardly changes.
 OVER_S = 1.0
 TURNS_DPS, PUSHES_G = 3.0, 0.05
 MOVES_MPS = 1.0
@@ -26,11 +26,11 @@ MOVES_MPS = 1.0
 
 @dataclass
 class Overview:
-    """A ride: the summary of every sample, and its course in means over RATE_S, in which the columns that neither
-    report nor pictures need are NaN (vehicle_channels() has them).
+    """A ride: the summary of every sample, and its course in means over RATE_S. Columns that neither report nor
+    pictures need are NaN (vehicle_channels() has them).
 
-    riding_s: time without the standstills of standing(), s, as `report` states it. notices: what is remarkable in the
-    log, and what contradicts the calibration. stops: empty if forward and backward are exchanged.
+    riding_s: time without the standstills of standing(), s, as shown by `report`. notices: remarks about the log, and
+    contradictions to the calibration. stops: empty if forward and backward are exchanged.
     """
 
     ride: Ride
@@ -53,9 +53,9 @@ class Overview:
 
 
 def overview(ride: Ride, progress: Progress | None = None) -> Overview:
-    """Read a ride of open_ride() through, block by block: memory hardly grows with its length. Raises InputError.
+    """Read a ride of open_ride(), block by block: memory hardly grows with its length. Raises InputError.
 
-    progress: called with how much of the log is done of how much.
+    progress: called with (done, total) of the log.
 
     >>> import numpy as np
     >>> from kickstand_tools.api import CalibrationFile, Log, open_ride
@@ -73,10 +73,10 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
             yield replace(block, **dict.fromkeys(_NOT_KEPT, np.full(len(block.t_s), np.nan)))
 
     course = joined(downsampled(blocks(), RATE_S))
-    if total.speed_mps.time_s is None:  # always 0, as of a torn wheel contact: it must not say that the bike stood
+    if total.speed_mps.time_s is None:  # always 0, as with a broken wheel contact: it does not mean that the bike stood
         course = replace(course, speed_mps=np.broadcast_to(np.nan, len(course.t_s)))
     frozen_s = sum(float(notice.values[1]) for notice in notices if notice.code == "frozen-readings")
-    # The notice is of the whole log, also of a stretch of it.
+    # The notice is about the whole log, even if the ride is a stretch of it.
     total.frozen_s = min(frozen_s, total.missing_s) if isinstance(ride.log, Stretch) else frozen_s
     still = standing(course)
     found = quality(course, still)
@@ -90,9 +90,9 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
 
 
 def _riding_s(ride: Channels, standing: Bools, whole: bool = True) -> float:
-    """How long a vehicle was on the move, s. ride: with evenly spaced samples (see downsampled()). standing (n): True
-    where it stands still. whole: not a stretch of a ride, in which a vehicle may go straight on, or keep to one turn,
-    from beginning to end."""
+    """The time for which a vehicle was moving, s. ride: with evenly spaced samples (see downsampled()). standing (n):
+    True where it stands still. whole: False for a stretch of a ride: there a vehicle may go straight ahead, or keep one
+    turn, from start to end."""
     if whole and not _has_moved(ride):
         return 0.0
     return float(np.count_nonzero(~standing)) * spacing_s(ride)
@@ -104,11 +104,11 @@ def _has_moved(ride: Channels) -> bool:
     half = round(0.5 * OVER_S / spacing_s(ride))
     if len(ride.t_s) <= 2 * half:
         return False
-    inner = slice(half, len(ride.t_s) - half)  # at its ends a mean is mostly that of the first or the last sample
+    inner = slice(half, len(ride.t_s) - half)  # at the ends a mean is mostly that of the first or the last sample
     turns, pushes = (smoothed(values, ride.t_s, OVER_S)[inner] for values in (ride.yaw_rate_dps, ride.forward_g))
     return _changes(turns) > TURNS_DPS or _changes(pushes) > PUSHES_G
 
 
 def _changes(means: Array) -> float:
-    """The largest difference of means from their median: that is a gyro's bias, or the slope of the ground."""
+    """The largest difference of means from their median. The median is a gyro's bias, or the slope of the ground."""
     return float(np.max(np.abs(means - np.median(means))))

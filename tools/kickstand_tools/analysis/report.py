@@ -1,4 +1,4 @@
-"""A ride in words, for a terminal or a page, or as JSON."""
+"""Describes a ride in words, for a terminal or a page, or as JSON."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,12 +15,12 @@ from .summary import Peak
 if TYPE_CHECKING:
     from rich.console import Group
 
-COSTS_DEG = 0.25  # smaller errors of the lean, which nobody sees on the display, ask for nothing
-GRAVITY_G = 0.02  # by so much the force at rest may differ from 1 g, as in the proof of the six positions
-RIDDEN_S = 10.0  # least riding: in a shorter one the bike was only pushed about
+COSTS_DEG = 0.25  # smaller errors of the lean are invisible on the display and need no action
+GRAVITY_G = 0.02  # allowed difference of the force at rest from 1 g, as in the check of the six positions
+RIDDEN_S = 10.0  # least riding: in less time the bike was only pushed around
 STOPS_TITLE = "Stops"
 STOPS_UNITS = {"at": "", "from": "km/h", "time": "s", "distance": "m", "MFDD": "m/s²", "peak": "m/s²", "jerk": "m/s³"}
-STOPS_UNITS |= {"pulls": "m"}  # one line a stop in 80 columns: no units in it
+STOPS_UNITS |= {"pulls": "m"}  # one line per stop in 80 columns: no room for units
 STOPS_TERMS = (
     "MFDD: mean deceleration while the speed falls from 80 to 10 % of what it was (UN R13). peak: the largest. "
     "jerk: how fast the deceleration changes, at most. pulls: how far the bike ends beside its straight line."
@@ -29,9 +29,9 @@ STOPS_TERMS = (
 
 @dataclass
 class Words:
-    """The texts of a report. name: the log's. too_little: sentence that the log holds too little of a ride, or "".
-    ride: rows of (quantity, value, time or ""). alignment: a paragraph. stops: a row per stop with the columns of
-    STOPS_UNITS, some of which STOPS_TERMS explains. remark: about the stops, or why there are none, or ""."""
+    """The texts of a report. name: the log's. too_little: sentence that the log has too little of a ride, or "". ride:
+    rows of (quantity, value, time or ""). alignment: a paragraph. stops: a row per stop with the columns of
+    STOPS_UNITS, some of which STOPS_TERMS explains. remark: about the stops, or the reason for none, or ""."""
 
     name: str
     too_little: str
@@ -42,7 +42,7 @@ class Words:
 
 
 def as_data(seen: Overview) -> dict[str, Any]:
-    """The values of the report for JSON; None where there is no value."""
+    """The values of the report for JSON; None for a missing value."""
     total, quality = seen.summary, seen.quality
     data: dict[str, Any] = {
         "ride": seen.ride.name,
@@ -110,7 +110,7 @@ def page(seen: Overview) -> "Group":
 
 
 def words(seen: Overview, remedies: Remedies = COMMANDS) -> Words:
-    """The ride in words. remedies: those for what to do."""
+    """The ride in words. remedies: the wording of instructions."""
     alignment = _alignment(seen, remedies)
     return Words(
         Path(seen.ride.name).name, _too_little(seen), _ride(seen), alignment, _stops(seen.stops), _remark(seen)
@@ -134,7 +134,7 @@ def _no_stops(seen: Overview) -> str:
     if seen.exchanged:
         return "Stops: not known, see the warning."
     if not seen.has_speed and seen.riding_s > RIDDEN_S:
-        return "Stops: not known, the log has no speed."  # there may have been some: none was sure enough
+        return "Stops: not known, the log has no speed."  # there may have been stops, but none was sure enough
     if stops_by_speed(seen.course):
         return "The speed falls to a stop, the force says otherwise: is the calibration this ride's?"
     return "No stop from over 10 km/h found."
@@ -186,7 +186,7 @@ def _alignment(seen: Overview, remedies: Remedies) -> str:
 
 
 def _good(seen: Overview) -> bool:
-    """True if the ride shows that the errors of a motorcycle's alignment together cost less than COSTS_DEG of lean."""
+    """True if the ride shows that the alignment errors of a motorcycle together cause a lean error under COSTS_DEG."""
     cost = lean_cost(seen.quality)
     if seen.ride.car or seen.exchanged or cost.roll_deg is None or cost.yaw_deg is None:
         return False
@@ -204,12 +204,13 @@ def _gravity(found_g: float | None, remedies: Remedies) -> str:
 
 
 def judged(seen: Overview) -> bool:
-    """True if the ride shows how well the sensor is aligned: not if it contradicts the calibration altogether."""
+    """True if the ride shows how well the sensor is aligned. False if it contradicts the calibration altogether."""
     return not any(notice.code in CONTRADICTING for notice in seen.notices)
 
 
 def _costs(cost: LeanCost, speed: bool, remedies: Remedies) -> str:
-    """A sentence for each of these angles that costs lean, and the remedy; "" where none does. speed: in the log."""
+    """A sentence for each angle that causes a lean error, and the remedy; "" if none does. speed: True if the log has
+    one."""
     costs = {
         "Roll": (cost.roll_deg, remedies["less_roll"]),
         "Pitch": (cost.pitch_deg, remedies["less_pitch"]),
@@ -240,13 +241,13 @@ def _stops(stops: list[Stop]) -> list[tuple[str, ...]]:
 
 
 def peak_words(peak: Peak, form: str) -> tuple[str, str]:
-    """A peak's value and its time; "--" for none, because no lean was certain enough."""
+    """A peak's value and its time; "--" if no lean was certain enough."""
     if peak.time_s is None:
         return "--", ""
     return form.format(peak.value), f"at {clock(peak.time_s)}"
 
 
 def angles(quality: Quality) -> list[str]:
-    """The angles that are known, in words."""
+    """The known angles, in words."""
     named = {"roll": quality.roll_deg, "pitch": quality.pitch_deg, "yaw": quality.yaw_deg}
     return [f"{name} {value:+z.1f}°" for name, value in named.items() if value is not None]

@@ -1,4 +1,4 @@
-"""A recorded ride, read block by block: a log, its calibration, and which lean to use."""
+"""Reads a recorded ride block by block: a log with its calibration, and the lean to use."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from ..calibration.file import CalibrationFile, calibration_path, read_calibrati
 from ..common.errors import InputError
 from ..estimation.smooth import smooth_blocks
 from ..logs.log import Block, Stretch
-from ..logs.reader import Source, apart, check_first_line, read_blocks
+from ..logs.reader import Source, check_first_line, read_blocks, split_stretch
 from ..logs.source import File, Progress, log_stem, name_of
 from ..replay.meter_along import MeterAlong, Misfit
 from ..signals import Array, Bools
@@ -22,8 +22,7 @@ _MAX_SIGMA_DEG = 3.0  # a smoothed lean less certain than this counts as not sur
 
 @dataclass
 class Ride:
-    """A log and the calibration it is read with. smoothed: its lean is the smoothed one, and not the one that the
-    display showed."""
+    """A log and its calibration. smoothed: use the smoothed lean, not the one that the display showed."""
 
     log: Source
     calibration: CalibrationFile
@@ -31,7 +30,7 @@ class Ride:
 
     @property
     def name(self) -> str:
-        """The log's, with its path if it has one."""
+        """The log's name, with its path if it has one."""
         return name_of(self.log)
 
     @property
@@ -41,14 +40,15 @@ class Ride:
 
     @property
     def car(self) -> bool:
-        """A car, which has no lean; else a motorcycle."""
+        """True for a car, which has no lean; False for a motorcycle."""
         return self.calibration.vehicle == "car"
 
     def blocks(self, progress: Progress | None = None, notices: list[Notice] | None = None) -> Iterator[Channels]:
-        """The channels of the ride, block by block, without frozen readings: these are a gap. progress, notices: see
-        read_blocks(); for the whole log, even if the ride is a stretch of it. Raises InputError."""
+        """Yield the channels of the ride, block by block, without frozen readings, which become gaps. progress,
+        notices: see read_blocks(); they are for the whole log, even if the ride is a stretch of it. Raises
+        InputError."""
         along, absurd, slow, some = MeterAlong(self.calibration), False, False, False
-        log, stretch = apart(self.log)
+        log, stretch = split_stretch(self.log)
         misfit = Misfit()
         for whole, found in self._read(log, progress, notices):
             block = whole.measured
@@ -62,7 +62,7 @@ class Ride:
             slow |= self.smoothed and found is None
             if found is not None:
                 lean_deg, sigma_deg, _, _, doubtful = found[~whole.frozen].T
-                sure = sigma_deg <= _MAX_SIGMA_DEG  # NaN is not
+                sure = sigma_deg <= _MAX_SIGMA_DEG  # False for NaN
                 lean |= {"lean_deg": lean_deg, "lean_sigma_deg": sigma_deg, "doubtful": doubtful}
                 lean["sure"] = sure.astype(float)
             seen = channels(block, self.calibration, lean, self.car)
@@ -83,8 +83,8 @@ class Ride:
     def _read(
         self, log: Source, progress: Progress | None, notices: list[Notice] | None
     ) -> Iterator[tuple[Block, Array | None]]:
-        """The blocks of the log, each with its smoothed values (see smooth_blocks()); None in place of these if the
-        ride is not smoothed, and where the log has under 10 samples a second."""
+        """The blocks of the log, each with its smoothed values (see smooth_blocks()); None instead of these if the ride
+        is not smoothed or the log has under 10 samples per second."""
         if self.smoothed:
             return smooth_blocks(log, self.calibration, progress, notices, lines=False)
         blocks = read_blocks(log, 2, progress, notices, lines=False, calibration=self.calibration)
@@ -92,7 +92,8 @@ class Ride:
 
 
 def calibration_beside(log: Path) -> Path:
-    """calibration_path() of a file that exists. Raises InputError without it, without the log, and if log is no log."""
+    """calibration_path() of an existing file. Raises InputError without it, without the log, and if log is not a
+    log."""
     if not log.is_file():
         what = "is a directory: give the name of a ride in it" if log.is_dir() else "there is no such file"
         raise InputError(f"{log}: {what}")
@@ -109,8 +110,8 @@ def calibration_beside(log: Path) -> Path:
 def open_ride(log: Source, calibration: CalibrationFile | File | None = None, smoothed: bool = False) -> Ride:
     """Open a ride: a log (see read_log) with a calibration, or the file of one; None: NAME.cal.json beside the log.
 
-    smoothed: with the lean of smooth() in the place of the firmware's; a car has none. Raises InputError, also for a
-    calibration that is not aligned: lean and braking are then unknown.
+    smoothed: use the lean of smooth() instead of the firmware's; a car has none. Raises InputError, also for a
+    calibration that is not aligned, because lean and braking are then unknown.
 
     >>> import numpy as np
     >>> from kickstand_tools.api import CalibrationFile, Log
@@ -149,17 +150,17 @@ def vehicle_channels(
 
 
 def _absurd(block: Block, at: int) -> Notice:
-    """The notice that the lean filter diverged at this row, with the readings of the second before it."""
+    """The notice that the lean filter diverged at this row, with the readings of the previous second."""
     before = slice(int(np.searchsorted(block.time_us, block.time_us[at] - 1_000_000)), at + 1)
     most = np.max(np.abs(block.readings[before]), axis=0)
     return Notice("absurd-readings", block.time_us[at] / 1e6, float(np.max(most[4:])), float(np.max(most[:3])))
 
 
 def _lean_along(along: MeterAlong, block: Block, shown: bool) -> tuple[dict[str, Array], Array, Bools]:
-    """What channels() takes, by the firmware's meter; the variance of its lean (rad2), < 0 where it diverged; and where
-    it named the sensor, because its readings do not fit.
+    """The arguments of channels(), computed by the firmware's meter, the variance of its lean (rad2), < 0 if it
+    diverged, and where it named the sensor, because its readings do not fit.
 
-    shown: compute the lean that was shown; else it and sure are 0, which saves a tenth of the time.
+    shown: compute the lean that was shown; otherwise it and sure are 0, which saves a tenth of the time.
     """
     names = ("lean_deg", "shown_g", "variance", "resting", "rolling", "odd", "sure")
     columns: list[list[float]] = [[] for _ in names]

@@ -1,4 +1,4 @@
-"""A ride in figures: maxima with their times, time at large leans, how long at which lean. Block by block."""
+"""Summarises a ride in numbers, block by block: maxima with their times, time at large leans, histogram of the lean."""
 
 from dataclasses import dataclass, field
 
@@ -11,7 +11,7 @@ from .channels import Channels
 
 LEANS_DEG = (30.0, 40.0)
 BIN_DEG = 1.0
-HELD_S = 2e-6 * HELD_US  # a maximum of the lean lasts so long, as on the display
+HELD_S = 2e-6 * HELD_US  # a maximum of the lean must last this long, as on the display
 BINS_DEG = np.arange(-70.0, 70.0 + BIN_DEG, BIN_DEG)
 
 
@@ -23,7 +23,7 @@ class Peak:
     time_s: float | None = None
 
     def add(self, t_s: Array, values: Array) -> None:
-        """Take values (n) at the times t_s (n); NaN where they do not count."""
+        """Add values (n) at the times t_s (n); NaN for a value that does not count."""
         if len(values) and np.nanmax(values, initial=-np.inf) > self.value:
             at = int(np.nanargmax(values))
             self.value, self.time_s = float(values[at]), float(t_s[at])
@@ -31,14 +31,14 @@ class Peak:
 
 @dataclass
 class Summary:
-    """A ride in figures; add() takes it block by block.
+    """A ride in numbers. Call add() block by block.
 
     left_deg, right_deg: the largest lean to each side that lasted HELD_S. brake_g, accel_g: the largest forces,
-    smoothed as on the display. These four count where the display would show the lean. riding_s: time in which the lean
-    filter finds no rest; a stop with a shaking engine counts as riding, unlike in Overview.riding_s. beyond_s: time at
-    a lean of at least so many degrees, by degrees. histogram_s: time, of riding_s, in each bin of BINS_DEG.
-    not_sure_s: time in which the meter does not trust its lean.  missing_s: time without readings, longer than LOST_US
-    each. frozen_s: of that, the time in which there were readings, but frozen ones.
+    smoothed as on the display. These four count only while the display would show the lean. riding_s: time in which the
+    lean filter finds no rest; unlike in Overview.riding_s, a stop with a shaking engine counts as riding. beyond_s:
+    time at a lean of at least each key in degrees. histogram_s: time, of riding_s, in each bin of BINS_DEG.
+    not_sure_s: time in which the meter does not trust its lean. missing_s: time without readings, longer than LOST_US
+    each. frozen_s: part of it with frozen readings.
     """
 
     samples: int = 0
@@ -55,15 +55,15 @@ class Summary:
     missing_s: float = 0.0
     frozen_s: float = 0.0
     _begin_s: float = 0.0
-    _last_t_s: Array = field(default_factory=lambda: np.zeros(0))  # of the block before, as far as it is needed
+    _last_t_s: Array = field(default_factory=lambda: np.zeros(0))  # end of the previous block, as far as needed
     _last_deg: Array = field(default_factory=lambda: np.zeros(0))
 
     def add(self, block: Channels) -> None:
-        """The next part of the ride."""
+        """Add the next part of the ride."""
         t = block.t_s
         self._begin_s = t[0] if not self.samples else self._begin_s
         step = np.diff(t, prepend=self._begin_s + self.duration_s)
-        longest_s = max(LOST_US / 1e6, 4.0 * float(np.median(step)))  # of a slow log that is whole
+        longest_s = max(LOST_US / 1e6, 4.0 * float(np.median(step)))  # in a slow log such steps are no gaps
         self.missing_s += float(np.sum(step[step > longest_s]))
         step = np.where(step * 1e6 > GAP_US, 0.0, step)  # readings were missing
         self.samples += len(t)
@@ -101,7 +101,7 @@ class Summary:
 
 
 def summary(channels: Channels) -> Summary:
-    """A ride in figures, from its channels (see vehicle_channels).
+    """Summarise a ride in numbers, from its channels (see vehicle_channels).
 
     >>> import numpy as np
     >>> from kickstand_tools.api import CalibrationFile, Log, vehicle_channels

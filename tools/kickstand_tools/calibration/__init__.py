@@ -1,1 +1,1 @@
-"""A calibration computed from recorded poses (poses) or drives (drive), and its file (file)."""
+"""Computes a calibration from recorded poses (poses) or drives (drive), and reads and writes its file (file)."""

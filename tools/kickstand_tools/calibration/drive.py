@@ -1,4 +1,4 @@
-"""Alignment from recorded drives, by the firmware's own module."""
+"""Computes the alignment from recorded drives with the firmware's own module."""
 
 import math
 from array import array
@@ -24,14 +24,14 @@ from .published import PublishedAlignment
 
 METHODS = {"improved": DriveAlignment, "published": PublishedAlignment}
 _SLOWEST_US = 50_000  # longest time between samples
-# Standard error of up, pitch and roll together: slopes and camber that a whole drive has in common, or a pose
+# Standard error of up, pitch and roll combined: slopes and camber common to a whole drive, or to a pose
 UP_DEG = 1.1
 
 
 @dataclass
 class PoseCheck:
     """An alignment of two poses, compared with the drive. verdict: a constant of kickstand.drive_alignment.verdict;
-    yaw_deg: yaw error of the alignment by the poses."""
+    yaw_deg: yaw error of the alignment from the poses."""
 
     verdict: int
     yaw_deg: float
@@ -39,14 +39,14 @@ class PoseCheck:
 
 @dataclass
 class DriveFit:
-    """The alignment by drives. refusal: why they do not determine it, None where they do. With a refusal calibration is
-    the earlier one.
+    """The alignment from drives. refusal: the reason why they do not determine it, otherwise None. With a refusal,
+    calibration is the earlier one.
 
-    vehicle: "car" or "motorcycle". used, turned: braking events that were counted, and those in bends that were not.
-    quality_deg: standard error of forward about the vertical. ready_s: seconds of all logs until the alignment was
-    ready. lag_s: delay of the speed; halves_deg: difference of two halves of the drive; None for the published method.
-    poses: for a motorcycle with an earlier alignment by two poses. notices: what is remarkable in the logs, with the
-    log's name. bias_dps (3): the gyro's.
+    vehicle: "car" or "motorcycle". used: number of braking events that count. turned: number of those in bends, which
+    do not count. quality_deg: standard error of forward about the vertical. ready_s: seconds of all logs until the
+    alignment was ready. lag_s: delay of the speed; halves_deg: difference of two halves of the drive; None for the
+    published method. poses: for a motorcycle with an earlier alignment from two poses. notices: remarks about the logs,
+    with the log's name. bias_dps (3): the gyro's.
     """
 
     calibration: CalibrationFile
@@ -72,12 +72,12 @@ class DriveFit:
 
     @property
     def attitude_deg(self) -> float:
-        """Standard error of the whole alignment, up included."""
+        """Standard error of the whole alignment, including up."""
         return math.hypot(self.quality_deg, UP_DEG)
 
     @property
     def reason(self) -> str:
-        """The code of the refusal (see kickstand.errors), "" where there is none."""
+        """The code of the refusal (see kickstand.errors), "" for none."""
         return self.refusal.code if self.refusal else ""
 
 
@@ -89,14 +89,15 @@ def fit_drive(
     progress: Progress | None = None,
     on_event: Callable[[DriveEvent], None] | None = None,
 ) -> DriveFit:
-    """The alignment of a sensor on a vehicle, from logs of driving with speed: stops, and braking in straight lines.
+    """Find the alignment of a sensor on a vehicle from logs of driving with speed: stops, and braking in straight
+    lines.
 
-    logs: of one mount in time order (see read_log). calibration: the earlier one, with offset and slope, and the two
-    poses of a motorcycle. vehicle: "motorcycle" or "car"; if None, a motorcycle where calibration has two poses, else a
-    car. method: "improved", or "published", ViriCiti's as it was published. progress: called with the samples done and
-    all there are (each is gone through twice). on_event: called with each DriveEvent as it happens, also when the
-    drive is refused in the end. Raises InputError; RefusedInput, a subclass with code and values, where the drive does
-    not determine how the sensor sits.
+    logs: of one mount in chronological order (see read_log). calibration: the earlier one, with offset and slope, and
+    the two poses of a motorcycle. vehicle: "motorcycle" or "car"; None: a motorcycle if calibration has two poses,
+    otherwise a car. method: "improved", or "published" for ViriCiti's published method. progress: called with the
+    samples done and their total (each is read twice). on_event: called with each DriveEvent as it happens, even if the
+    drive is refused in the end. Raises InputError; RefusedInput, a subclass with code and values, if the drive does not
+    determine the sensor's mounting.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("city", seed=3, seconds=240.0)
@@ -123,20 +124,20 @@ def fit_logs(
     progress: Progress | None = None,
     on_event: Callable[[DriveEvent], None] | None = None,
 ) -> DriveFit:
-    """fit_drive() for logs that are usable(). A refusal is not raised but part of the result, with the counts."""
+    """fit_drive() for logs from usable(). A refusal is not raised: it is part of the result, with the counts."""
     before = calibration or CalibrationFile()
     poses = before.aligned and before.vehicle != CAR
     kind = vehicle or (MOTORCYCLE if poses else CAR)
     up = before.vehicle_from_sensor[1].tolist() if kind == MOTORCYCLE and poses else None
     steps = Steps(progress, 2 * sum(len(log.t_s) for log in logs))
-    # the gyro's bias is found at a stop: a first pass looks for one, so that driving before it counts too
+    # the gyro's bias is found at a stop: a first pass searches one, so driving before it also counts
     stood = standing(logs, before, steps)
     known = stood.stops or calibration is not None
     alignment = METHODS[method](kind, up, list(stood.bias) if known else None)
     watch = DriveWatch(alignment, on_event)
     feed(alignment, logs, before, steps, watch)
     matrix = array("f", [0.0] * 9)
-    # what it found at stops is a rate, the bias is a reading
+    # `standing` gives a rate, but the bias is a reading
     bias = before.gyro_bias_dps + np.linalg.solve(before.gyro_matrix, alignment.standing.bias)
     refusal, result = None, before
     try:
@@ -178,7 +179,7 @@ def fit_logs(
 
 
 def usable(log: Log, others: bool) -> Log:
-    """The log without frozen readings, where it has a speed and enough samples. others: there are other logs, so that
+    """The log without frozen readings, checked for a speed and enough samples. others: True if there are other logs, so
     this one can be left out. Raises InputError."""
     log = without_frozen(log)
     if np.all(np.isnan(log.speed_mps)):

@@ -1,4 +1,4 @@
-"""The events in an alignment by driving: braking events used, readiness, problems."""
+"""The events in an alignment by driving: used braking events, readiness, problems."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ class DriveEvent:
     """Something that happened in a drive, t_s seconds from the first sample of the log of that name.
 
     what: USED (a braking event in a straight line, or a start; counted of needed), TURNING (a braking event in a bend,
-    not counted), PROBLEM (refusal says which), READY (the alignment is good enough, with quality_deg), NOT_READY (it is
-    not any more; refusal says why where no PROBLEM does), LOG_BEGINS, LOG_WITHOUT_EVENTS.
+    not counted), PROBLEM (refusal says which), READY (the alignment is good enough, with quality_deg), NOT_READY (no
+    longer ready; refusal gives the reason if no PROBLEM does), LOG_BEGINS, LOG_WITHOUT_EVENTS.
     """
 
     log: str
@@ -47,10 +47,10 @@ class DriveWatch:
         self._counts = (0, 0)  # used, turned
         self._ready = False
         self._problem: Refusal | None = None
-        self._elapsed_s = 0.0  # duration of the logs before this one
+        self._elapsed_s = 0.0  # duration of the earlier logs
 
     def begin(self, log: str) -> None:
-        """Set the name of the log for the events to come, and emit LOG_BEGINS. Nothing is reset."""
+        """Set the name of the log for the following events, and emit LOG_BEGINS. Nothing is reset."""
         self._log = log
         self._add(0.0, LOG_BEGINS)
 

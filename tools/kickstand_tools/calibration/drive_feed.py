@@ -1,7 +1,7 @@
-"""Runs recorded drives through the firmware's classes for alignment by driving, in sums over 100 ms by numpy.
+"""Runs recorded drives through the firmware's classes for alignment by driving, in numpy sums over 100 ms.
 
-DriveAlignment adds up its samples one by one and works on the sums alone. Adding them up here and handing over whole
-sums gives it the same numbers. Ten minutes at 200 Hz take 0.2 s, sample by sample they take 0.9 s.
+DriveAlignment adds up its samples and only uses the sums. Adding them here and passing the sums gives it the same
+numbers. Ten minutes at 200 Hz take 0.2 s instead of 0.9 s.
 """
 
 from bisect import bisect_left
@@ -27,13 +27,13 @@ _CHUNK = 1000  # least number of samples between two calls of progress
 
 @dataclass
 class Bin:
-    """Successive samples, which DriveAlignment only adds up until the last of them.
+    """Successive samples that DriveAlignment only adds up, until the last one.
 
-    begins: they do not follow on from the bin before; start_mps: then the speed at their beginning. force (3, g), rate
-    (3, deg/s): means, in the sensor's axes. first_us: the time that all samples but the last cover; last_us: that of
-    the last one, 0 where the bin is not full. speeds: (microseconds before the end of first_us, m/s) in first_us;
-    end_mps: the speed of the last sample. Speeds are None where there is no new value. end_us: the log's time at the
-    last sample; samples: their number.
+    begins: True if they do not continue the previous bin; then start_mps is the speed at their start. force (3, g),
+    rate (3, deg/s): means, in the sensor's axes. first_us: the time that all samples but the last cover; last_us: that
+    of the last one, 0 if the bin is not full. speeds: (microseconds before the end of first_us, m/s) in first_us;
+    end_mps: the speed of the last sample. Speeds are None without a new value. end_us: the log's time at the last
+    sample; samples: their number.
     """
 
     begins: bool
@@ -49,7 +49,7 @@ class Bin:
 
 
 def drive_bins(log: Log, calibration: CalibrationFile, length_us: int) -> Iterator[Bin]:
-    """The samples of a log in bins, each the shortest of at least length_us (of one sample each where that is 0)."""
+    """The samples of a log in bins, each the shortest of at least length_us (one sample each if that is 0)."""
     time_us = log.time_us
     step_us = np.diff(time_us, prepend=time_us[0])
     is_gap = step_us > GAP_US
@@ -96,7 +96,7 @@ def drive_bins(log: Log, calibration: CalibrationFile, length_us: int) -> Iterat
 
 
 def standing(logs: Sequence[Log], calibration: CalibrationFile, steps: "Steps") -> StandingVertical:
-    """The StandingVertical of the stops in all logs. Uses nothing else, so it is much faster than an alignment."""
+    """The StandingVertical from the stops in all logs. It uses nothing else, so it is much faster than an alignment."""
     standing = StandingVertical()
     speed_mps, silent_us = -1.0, 0  # none yet
     for log in logs:
@@ -125,7 +125,7 @@ def feed(
         alignment.measure_speed(speed_mps, age_us)
         watch.look(time_us / 1e6)
 
-    length_us = BIN_US if isinstance(alignment, DriveAlignment) else 0  # the published one looks at single samples
+    length_us = BIN_US if isinstance(alignment, DriveAlignment) else 0  # the published method uses single samples
     for log in logs:
         watch.begin(log.name)
         end_us = 0
@@ -146,7 +146,7 @@ def feed(
                     alignment.update(part.force, part.rate, part.last_us)
                 if part.end_mps is not None:
                     measure(part.end_mps, 0, end_us)
-            except ValueError as error:  # of a null vector
+            except ValueError as error:  # from a null vector
                 what = f"{log.name}, at {end_us / 1e6:.1f} s: accelerations of nearly 0"
                 raise InputError(f"{what}: at rest 1 g is needed, check the sensor") from error
             steps.more(part.samples)
@@ -156,7 +156,7 @@ def feed(
 
 
 def _end_stop(standing: StandingVertical) -> None:
-    """End a stop at the end of a log: at the beginning of the next one the vehicle stands elsewhere."""
+    """End a stop at the end of a log: at the start of the next one the vehicle stands elsewhere."""
     standing.update((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 2.0 * MOVED_MPS, 0.0)  # as if it had driven
 
 
@@ -167,7 +167,7 @@ class Steps:
         self._progress, self._done, self._said, self._total = progress, 0, 0, total
 
     def more(self, samples: int) -> None:
-        """Count so many more samples."""
+        """Count more samples."""
         self._done += samples
         if self._progress and (self._done - self._said >= _CHUNK or self._done == self._total):
             self._said = self._done

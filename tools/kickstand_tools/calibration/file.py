@@ -1,4 +1,4 @@
-"""CAL.json: a calibration as the tools read and write it."""
+"""Reads and writes CAL.json: a calibration."""
 
 import json
 import math
@@ -27,7 +27,7 @@ from ..logs.source import File, log_stem, name_of, open_input
 from ..signals import Array, rotated
 
 VERSION = 1
-MOST_BYTES = 1_000_000  # largest file; those of kickstand have a thousandth of that
+MOST_BYTES = 1_000_000  # largest file; those of kickstand are a thousand times smaller
 MAX_DELAY_S = 0.05  # largest delay of a chip's low-pass: the slowest has 33 ms
 _NEUTRAL = {"accel_matrix": np.eye(3), "gyro_matrix": np.eye(3), "gyro_sigma": np.zeros((3, 3))}
 _MATRICES = tuple(_NEUTRAL)  # in the order of the firmware's Calibration.matrices()
@@ -39,13 +39,13 @@ class CalibrationFile:
     """The parameters of one mounted sensor: calibrated = slope * reading + offset, Nicolae's (18)-(20).
 
     accel_offset_g (3), accel_slope (3), gyro_bias_dps (3); vehicle_from_sensor (3, 3): rows left, up, forward.
-    aligned: the matrix was measured; six_done: offset and slope were. trim_deg: the roll-misalignment correction that
-    riding has found. vehicle: "car" or "motorcycle" if the matrix was measured by driving, "car" also if the board was
-    set to one, else "".
-    kickstand_side: "left" or "right", to which the kickstand leaned the bike in the two poses, else "". notes: further
-    entries to write to the file. gyro_delay_s: delay of the gyro by the low-pass DLPF in a recorded ride, None if
-    unknown. accel_matrix, gyro_matrix (3, 3): what remains, force = accel_matrix x (slope * reading + offset), rate =
-    gyro_matrix x (reading - bias). gyro_sigma (3, 3): standard errors of gyro_matrix, zeros where it was not measured.
+    aligned: the matrix was measured; six_done: offset and slope were. trim_deg: the roll-misalignment correction found
+    while riding. vehicle: "car" or "motorcycle" if the matrix was measured by driving, "car" also if the board was set
+    to one, otherwise "".
+    kickstand_side: "left" or "right", the side of the kickstand in the two poses, otherwise "". notes: further entries
+    for the file. gyro_delay_s: delay of the gyro by the low-pass DLPF in a recorded ride, None if unknown.
+    accel_matrix, gyro_matrix (3, 3): the remaining corrections: force = accel_matrix x (slope * reading + offset), rate
+    = gyro_matrix x (reading - bias). gyro_sigma (3, 3): standard errors of gyro_matrix, zeros if it was not measured.
 
     >>> calibration = CalibrationFile(gyro_bias_dps=[1.0, 0.0, 0.0])
     >>> calibration.vehicle_from_sensor @ [0.0, 1.0, 0.0]
@@ -101,19 +101,24 @@ class CalibrationFile:
         return force, rate
 
     def in_sensor(self, accel_g: Array, gyro_dps: Array) -> tuple[Array, Array]:
-        """Force (n, 3, g) and rate (n, 3, deg/s) along the sensor's own axes, by (18)-(20) and the matrices: the
+        """Force (n, 3, g) and rate (n, 3, deg/s) along the sensor's own axes, by (18)-(20) and the matrices, with the
         firmware's Calibration.apply()."""
         readings = [*accel_g.T, None, *gyro_dps.T]  # the firmware's function for one reading, with arrays as numbers
         force, rate = [np.zeros(0)] * 3, [np.zeros(0)] * 3
         self.to_firmware().apply(readings, force, rate)
         return np.column_stack(force), np.column_stack(rate)
 
+    def gyro_sigma_in_vehicle(self) -> Array:
+        """(3, 3): gyro_sigma along left, up, forward, where the errors of its entries are independent."""
+        squared = self.vehicle_from_sensor**2
+        return np.sqrt(squared @ self.gyro_sigma**2 @ squared.T)
+
     def delay_s(self) -> float:
         """gyro_delay_s, or that of the default DLPF."""
         return DELAY_S if self.gyro_delay_s is None else self.gyro_delay_s
 
     def as_json(self) -> dict[str, Any]:
-        """The content of a CAL.json, in plain numbers and lists."""
+        """The content of a CAL.json, as plain numbers and lists."""
         data = {
             "version": VERSION,
             "accel_offset_g": _rounded(self.accel_offset_g),
@@ -187,7 +192,7 @@ def read_calibration(source: File) -> CalibrationFile:
 
 
 def _one_of(name: str, data: dict[str, Any], entry: str, words: tuple[str, str]) -> str:
-    """The entry, one of these words; "" without it. Raises InputError for another."""
+    """The entry, which must be one of these words; "" without it. Raises InputError for another word."""
     if data.get(entry) in (None, ""):
         return ""
     if data[entry] not in words:
@@ -217,7 +222,7 @@ def write_calibration(target: Path | str | IO[str], calibration: CalibrationFile
 
 def calibration_path(log: Path) -> Path:
     """NAME.cal.json beside NAME.csv or NAME.csv.gz, or beside another app's export: the calibration of a ride."""
-    if log.name in ("", ".."):  # the folder that one is in, or the one above: it lies beside that
+    if log.name in ("", ".."):  # the current folder, or its parent: the file is beside that folder
         log = Path(os.path.abspath(log))
     return log.parent / f"{log_stem(log.name)}.cal.json"
 
@@ -232,13 +237,13 @@ def _list(name: str, data: dict[str, Any], entry: str) -> list[Any]:
 
 
 def _matrix(name: str, data: dict[str, Any], entry: str) -> Array:
-    """An entry of three rows of three numbers. Raises InputError for others."""
+    """An entry of three rows of three numbers. Raises InputError for other values."""
     rows = _list(name, data, entry)
     return np.array([_numbers(name, f"{entry}, row {i + 1},", row) for i, row in enumerate(rows)])
 
 
 def _numbers(name: str, entry: str, values: Any) -> list[float]:
-    """The values of an entry, three finite floats. Raises InputError for others."""
+    """The values of an entry, three finite floats. Raises InputError for other values."""
     if not isinstance(values, list) or len(values) != 3:
         raise InputError(f"{name}: {entry} has to be 3 numbers: calibrate again")
     for value in values:
@@ -248,7 +253,7 @@ def _numbers(name: str, entry: str, values: Any) -> list[float]:
 
 
 def _within(name: str, data: dict[str, Any], entry: str, limit: float) -> float:
-    """The number of an entry, from -limit to limit; 0 if it is missing. Raises InputError for others."""
+    """The number of an entry, from -limit to limit; 0 if it is missing. Raises InputError for other values."""
     value = data.get(entry, 0.0)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= limit:
         raise InputError(f"{name}: {entry} is {_shown(value)}, it is at most {limit:g}: calibrate again")

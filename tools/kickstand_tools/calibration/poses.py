@@ -1,5 +1,5 @@
-"""A calibration from recorded still poses, by the firmware's own modules: offset and slope of the accelerometer from
-six, the alignment from two."""
+"""Computes a calibration from recorded still poses with the firmware's own modules: offset and slope of the
+accelerometer from six poses, the alignment from two."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,8 +20,8 @@ from ..signals import Array
 from .file import CalibrationFile
 
 _MICRO = 1_000_000  # StillPose sums integers: millionths of g and deg/s
-_SATURATED = 1_990_000  # a still pose is measured with a range of 2 g or more: an axis at 2 g is at its end
-GOOD_FREE_POSE_G = 0.010  # a free pose that is nearer to 1 g than this confirms a good calibration
+_SATURATED = 1_990_000  # a still pose is measured with a range of at least 2 g: an axis at 2 g may be at its limit
+GOOD_FREE_POSE_G = 0.010  # a free pose closer to 1 g than this confirms a good calibration
 _SHEET_OFFSET_G = (0.05, 0.05, 0.08)  # the data sheet's limit of the MPU6050's offset, for each axis
 _SHEET_SLOPE_ERROR = 0.03
 _EQUAL_TILT_DEG = 3.0  # least tilt of the free pose from its nearest axis, beyond that of the side pose there
@@ -52,13 +52,13 @@ class Pose:
 
 def read_pose(source: Source) -> Pose:
     """Average a recorded pose (see read_log for source). Raises InputError naming the file; RefusedInput, a subclass,
-    where the pose was not still."""
+    if the pose was not still."""
     log = read_log(source)
     return take_pose(log.name, log.readings, "capture this pose again")
 
 
 def take_pose(name: str, readings: Array, advice: str) -> Pose:
-    """Average the readings (n, 7) of a still pose, in the chip's order (g, C, deg/s). name: what messages call it.
+    """Average the readings (n, 7) of a still pose, in the chip's order (g, C, deg/s). name: its name in messages.
     Raises RefusedInput, with the advice, if it was not still."""
     still = StillPose(_MICRO, _MICRO, _SATURATED, len(readings))
     where = f"{name}: pose refused"
@@ -85,13 +85,13 @@ def refuse_same_file(sources: Sequence[Source]) -> None:
 
 @dataclass
 class SixPositions:
-    """The calibration by six or seven poses.
+    """The calibration from six or seven poses.
 
     sides: the pose of each side in the order of kickstand.calibration.six_position.SIDES (+x -x +y -y +z -z up);
-    tilt_deg: the tilt of each from its axis. free_pose, free_pose_error_g: the seventh, slanted one, and its calibrated
-    length less 1 g; None without one. beyond_sheet: axes whose offset or slope exceeds the data sheet's limits. turns,
-    all_turns: number of turns between poses that have calibrated the gyro, and of all; 0 where each pose was a log of
-    its own.
+    tilt_deg: the tilt of each from its axis. free_pose, free_pose_error_g: the seventh, slanted pose, and its
+    calibrated length minus 1 g; None without one. beyond_sheet: axes whose offset or slope exceeds the data sheet's
+    limits. turns: number of turns between poses that calibrated the gyro. all_turns: number of all turns. Both are 0 if
+    each pose was a separate log.
     """
 
     calibration: CalibrationFile
@@ -105,12 +105,12 @@ class SixPositions:
 
 
 def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
-    """Offset (g) and slope of each axis from six still poses, each side up once, in any order.
+    """Find offset (g) and slope of each axis from six still poses, each side up once, in any order.
 
     poses: six logs, or seven with a slanted one that checks the result (see read_log for what a log may be). Nicolae's
     paper, section 4, equations (16)-(20), solved so that each calibrated reading is 1 g long whether or not the axis
     points exactly up. The gyro's bias is the median of the poses. Raises InputError; RefusedInput, a subclass with
-    code and values, where the firmware refuses a pose or the result.
+    code and values, if the firmware refuses a pose or the result.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("parked", seed=1, seconds=20.0)
@@ -140,7 +140,7 @@ def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
 
 
 def wrong_number(captures: int) -> InputError:
-    """The refusal of so many captures of a still pose."""
+    """The refusal of a wrong number of captures of a still pose."""
     return InputError(
         f"{captures} captures given: six are needed, one for each side up, or seven with a free pose; or one log of "
         "the whole procedure"
@@ -150,7 +150,7 @@ def wrong_number(captures: int) -> InputError:
 def _sides(poses: list[Pose]) -> tuple[list[Pose], Pose | None]:
     """The pose of each side in the order of SIDES, and the free pose (None without one).
 
-    Of seven poses two have the same side nearest to up: the one further from the axis is the free pose.
+    Of seven poses, two have the same side nearest to up: the one further from the axis is the free pose.
     """
     found: dict[int, list[Pose]] = {}
     for pose in poses:
@@ -179,7 +179,7 @@ def _tilt_deg(pose: Pose) -> float:
 
 
 def _with_file(error: CalibrationError, sides: list[Pose], free: Pose | None) -> RefusedInput:
-    """The refusal with the file that it is about, where it is about one."""
+    """The refusal with its file, if it is about one."""
     if error.code == "side-tilted":
         return RefusedInput(error, sides[SIDES.index(error.values[0])].name, ": capture this side again")
     return RefusedInput(error, free.name if free and error.code == "free-pose-off" else "")
@@ -196,7 +196,7 @@ def beyond_sheet(offset: Sequence[float], slope: Sequence[float]) -> list[str]:
 
 @dataclass
 class TwoPositions:
-    """The alignment by two poses. tilt_deg: the angle between them; under 8 degrees, forward is uncertain."""
+    """The alignment from two poses. tilt_deg: the angle between them; under 8 degrees, forward is uncertain."""
 
     calibration: CalibrationFile
     kickstand: Pose
@@ -207,12 +207,12 @@ class TwoPositions:
 def fit_two_positions(
     kickstand: Source, upright: Source, calibration: CalibrationFile | None = None, side: str = "left"
 ) -> TwoPositions:
-    """The alignment of a sensor on a bike, from a pose on the kickstand and one upright: rows left, up, forward.
+    """Find the alignment of a sensor on a bike from a pose on the kickstand and one upright: rows left, up, forward.
 
     kickstand, upright: logs (see read_log). calibration: that of fit_six_positions(), with offset and slope; None: the
-    readings are taken as calibrated. side: "left" or "right", to which the kickstand leans the bike. The gyro's bias is
-    that of the pose on the kickstand. Nicolae's paper, section 2, equations (3)-(8). Raises InputError; RefusedInput, a
-    subclass with code and values, where the firmware refuses the poses.
+    readings are treated as calibrated. side: "left" or "right", the side of the kickstand. The gyro's bias is that of
+    the pose on the kickstand. Nicolae's paper, section 2, equations (3)-(8). Raises InputError; RefusedInput, a
+    subclass with code and values, if the firmware refuses the poses.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("parked", seed=1, seconds=20.0)

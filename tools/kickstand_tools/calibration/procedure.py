@@ -1,4 +1,5 @@
-"""The six positions from one log: the still poses are found in it, and the turns between them calibrate the gyro."""
+"""Computes the six positions from one log: finds the still poses in it, and calibrates the gyro by the turns between
+them."""
 
 from dataclasses import replace
 
@@ -16,22 +17,22 @@ from ..refusals import RefusedInput
 from .file import CalibrationFile
 from .poses import Pose, SixPositions, beyond_sheet, take_pose, wrong_number
 
-_WINDOW_S = 0.5  # stillness is looked for in windows of this length
-_LEAST_S = 1.0  # a shorter stretch of it is no pose
-_MARGIN_S = 0.1  # is left out at both ends of a pose
+_WINDOW_S = 0.5  # stillness is searched in windows of this length
+_LEAST_S = 1.0  # a shorter still stretch is not a pose
+_MARGIN_S = 0.1  # left out at both ends of a pose
 _STILL_G, _STILL_DPS = 0.1, 6.0  # largest change of an axis in a window
 _STILL_SPREAD_G = 0.02  # largest standard deviation
 _STILL_DRIFT_G = 0.007  # largest difference of the means of both halves
 _ROUGH_TILT_DEG = 30.0  # a pose further from every axis is a slanted one
 _MICRO = 1_000_000  # Turn sums integers: millionths of deg/s
-_RANGES_DPS = (250.0, 500.0, 1000.0, 2000.0)  # of a gyro; a log does not say which one it was
-_AT_RANGE = 0.985, 1.01  # a largest rate that is so large a share of a range is taken for its end
-_QUICK = 0.95  # share of the range from which on a rate may have been clipped before the chip's low-pass
+_RANGES_DPS = (250.0, 500.0, 1000.0, 2000.0)  # ranges of a gyro; a log does not contain its range
+_AT_RANGE = 0.985, 1.01  # a largest rate between these shares of a range counts as the end of that range
+_QUICK = 0.95  # from this share of the range on, a rate may have been clipped before the chip's low-pass
 
 
 def fit_procedure(source: Source) -> SixPositions:
-    """The whole sensor from one log of the six positions: still on each side once, in any order, and slanted at least
-    once, with the turns in between.
+    """Calibrate the whole sensor from one log of the six positions: still on each side once, in any order, and slanted
+    at least once, with the turns between.
 
     Offset, slope and cross-axis errors of the accelerometer, scale and cross-axis errors of the gyro, and its bias: see
     kickstand.calibration.sensor_fit. Every still pose counts, and every turn. source: see read_log. Raises InputError;
@@ -82,7 +83,7 @@ def fit_procedure(source: Source) -> SixPositions:
 
 
 def _still(log: Log) -> list[tuple[int, int]]:
-    """The stretches in which the sensor lay still: number of the first sample, and of that after the last."""
+    """The stretches in which the sensor was still: index of the first sample, and index after the last."""
     step_s = float(np.median(np.diff(log.t_s))) if len(log.t_s) > 1 else 1.0
     n = max(4, round(_WINDOW_S / step_s))
     if len(log.t_s) < n:
@@ -106,8 +107,8 @@ def _still(log: Log) -> list[tuple[int, int]]:
 
 
 def _pose(log: Log, first: int, last: int) -> Pose:
-    """The mean of these samples. A hand that is put down slowly tilts a little for a long time: then of the calmest
-    half."""
+    """The mean of these samples, or of the calmest half if the sensor still tilts a little, as when a hand puts it down
+    slowly."""
     name = f"{log.name}, {log.t_s[first]:.1f} to {log.t_s[last - 1]:.1f} s"
     quarter = (last - first) // 4
     problem = None
@@ -121,7 +122,7 @@ def _pose(log: Log, first: int, last: int) -> Pose:
 
 
 def _sides(log: Log, means: list[list[float]]) -> list[int]:
-    """The number of the pose of each side, in the order of SIDES: of several the least tilted."""
+    """The number of the pose of each side, in the order of SIDES; of several, the least tilted."""
     best: dict[int, int] = {}
     for k, mean in enumerate(means):
         side = six_position.side_of(mean)
@@ -139,7 +140,7 @@ def _sides(log: Log, means: list[list[float]]) -> list[int]:
 
 
 def _turns(log: Log, stretches: list[tuple[int, int]], poses: list[Pose]) -> list[tuple[list[float], float] | None]:
-    """The turns between the poses, as SensorFit takes them: None where readings are missing, or clipped."""
+    """The turns between the poses, for SensorFit: None if readings are missing or clipped."""
     times_us = np.round(log.t_s * 1e6).astype(int)
     steps_us = np.diff(times_us, prepend=times_us[0])
     rates = np.round(log.gyro_dps * _MICRO).astype(int).tolist()

@@ -1,9 +1,9 @@
-"""Alignment by driving as ViriCiti published it: R = R2 R1, each a rotation by Rodrigues' formula.
+"""Alignment by driving with ViriCiti's published method: R = R2 R1, each a rotation by Rodrigues' formula.
 
 R1 rotates the mean direction of gravity at the stops to up. R2 rotates the mean force of the braking events, levelled
 by R1, to backward. A braking event counts if the directions of its levelled force spread little. A remaining tilt of
-the vertical by the stops makes a yaw error of some 3 to 4 degrees, which more braking events do not reduce. The
-firmware's DriveAlignment does not have this error; the published method is here for comparison.
+the vertical from the stops causes a yaw error of some 3 to 4 degrees, which more braking events do not reduce. The
+firmware's DriveAlignment does not have this error. The published method is here for comparison.
 """
 
 from array import array
@@ -19,14 +19,14 @@ from kickstand.units import GAP_US
 from ..signals import Array, cross_matrix
 
 MAX_DISPERSION = 0.02  # 8 degrees
-MIN_LEVEL_G = 0.03  # a smaller levelled force points anywhere
+MIN_LEVEL_G = 0.03  # a smaller levelled force has a random direction
 BRAKING_MPS2 = -1.0  # an interval with more deceleration belongs to a braking event
 MEAN_US = 100_000
 LOSS_MPS = 1.5  # a braking event that reduces the speed by less is noise
 MIN_EVENTS = 3
 UP = np.array([0.0, 1.0, 0.0])
 BACKWARD = np.array([0.0, 0.0, -1.0])
-NO_MEAN = 9.9  # where there is no mean direction, as of opposite ones; also the largest value given
+NO_MEAN = 9.9  # the value without a mean direction, such as for opposite directions; also the largest value returned
 
 
 def rotation_between(a: Array, b: Array, axis: int) -> Array:
@@ -34,10 +34,10 @@ def rotation_between(a: Array, b: Array, axis: int) -> Array:
 
         R = I + K + K^2 / (1 + c),  K the cross product matrix of a x b, c = a . b
 
-    Near c = -1 the quotient has no significant digits left. So where c < 0, a half turn D about a coordinate axis comes
+    Near c = -1 the quotient has no significant digits left. So if c < 0, a half turn D about a coordinate axis is done
     first, after which c > 0: R = Rodrigues(D a, b) D.
 
-    axis: 0, 1 or 2, the coordinate axis of the half turn; it has to be perpendicular to b.
+    axis: 0, 1 or 2, the coordinate axis of the half turn; it must be perpendicular to b.
     """
     half_turn = np.eye(3)
     if a @ b < 0.0:
@@ -49,8 +49,8 @@ def rotation_between(a: Array, b: Array, axis: int) -> Array:
 
 
 def circular_dispersion(directions: Sequence[complex]) -> float:
-    """How much directions in a plane spread, complex numbers of length 1 (N. I. Fisher, 1993, section 2.3); at most
-    NO_MEAN.
+    """The spread of directions in a plane, given as complex numbers of length 1 (N. I. Fisher, 1993, section 2.3); at
+    most NO_MEAN.
 
         d = (1 - rho2) / (2 R^2),  R = |mean of e^(i a)|,  rho2 = the mean cosine of 2 (a - mean direction)
 
@@ -65,9 +65,10 @@ def circular_dispersion(directions: Sequence[complex]) -> float:
 
 
 class PublishedAlignment:
-    """Has the methods of a DriveAlignment. Runs one beside it, which checks speed and mount and finds the vertical.
+    """Has the methods of a DriveAlignment. It also runs one, which checks speed and mount and finds the vertical.
 
-    counted, turned: braking events accepted, and refused for their dispersion; needed: how many must be accepted.
+    counted: number of accepted braking events. turned: number refused for their dispersion. needed: required number of
+    accepted ones.
     """
 
     def __init__(self, vehicle: str, up: list[float] | None = None, bias: list[float] | None = None) -> None:
@@ -77,8 +78,8 @@ class PublishedAlignment:
         self.counted = self.turned = 0
         self._accepted = np.zeros(3)  # sum of their forces
         self._means: list[complex] = []  # one direction for each accepted braking event
-        # Mean forces over MEAN_US each (g, along the sensor's axes) with their levelled directions: of the braking
-        # event under way, and since the last speed: the next speed shows whether they were braking
+        # Mean forces over MEAN_US each (g, along the sensor's axes) with their levelled directions: those of the
+        # current braking event, and those since the last speed: the next speed shows whether they were braking
         self._event: list[tuple[Array, complex]] = []
         self._interval: list[tuple[Array, complex]] = []
         self._level = np.eye(3)
@@ -97,17 +98,17 @@ class PublishedAlignment:
     @property
     def quality_deg(self) -> float:
         """Standard error of the mean direction of the accepted braking events, 180 until there are two. It does not
-        contain the error by a wrong vertical."""
+        include the error of a wrong vertical."""
         n = self.counted
         return float(np.degrees(np.sqrt(circular_dispersion(self._means) / n))) if n > 1 else 180.0
 
     @property
     def reason(self) -> Refusal:
-        """Why matrix() gives no alignment yet: an AlignmentError."""
+        """The reason why matrix() gives no alignment yet: an AlignmentError."""
         return self.problem or self._improved.missing(self.counted, self.needed, self.turned)
 
     def update(self, force: Sequence[float], rate: Sequence[float], dt_us: int) -> None:
-        """Take a sample: see DriveAlignment.update()."""
+        """Add a sample: see DriveAlignment.update()."""
         if dt_us > GAP_US:
             self.interrupt()
             return
@@ -124,7 +125,7 @@ class PublishedAlignment:
                     self._interval.append((mean, levelled / abs(levelled)))
 
     def interrupt(self) -> None:
-        """Samples are missing: drop the braking event under way. Accepted events stay."""
+        """Samples are missing: drop the current braking event. Accepted events are kept."""
         self._improved.interrupt()
         self._forget()
 
@@ -133,7 +134,7 @@ class PublishedAlignment:
         self._improved.finish()
 
     def measure_speed(self, speed_mps: float, age_us: int = 0) -> None:
-        """Take a new speed: see DriveAlignment.measure_speed(), but the lag is not estimated."""
+        """Add a new speed: see DriveAlignment.measure_speed(), but the lag is not estimated."""
         self._improved.measure_speed(speed_mps, age_us)
         seconds = self._interval_us * 1e-6
         if self._interval_us < MIN_INTERVAL_US:
@@ -164,7 +165,7 @@ class PublishedAlignment:
         self._sums, self._sums_us = [0.0] * 3, 0
 
     def _find_level(self) -> bool:
-        """Level forces by the vertical as it is known now. False if it is not known yet."""
+        """Level forces by the current vertical. False if it is unknown."""
         up = vector()
         known = self._improved.vertical.known(up)
         if known:

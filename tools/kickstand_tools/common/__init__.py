@@ -1,1 +1,2 @@
-"""What all parts of the tools use: errors, files written whole, progress, templates, SVG, places of files."""
+"""Helpers for all parts of the tools: errors, complete writing of files, progress, templates, SVG, locations of
+files."""

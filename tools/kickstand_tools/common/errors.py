@@ -5,7 +5,7 @@ import sys
 from ..remedies import COMMANDS, Remedies
 from . import firmware_path
 
-DISTRIBUTION = "kickstand-lean"  # as in pyproject.toml; a package "kickstand" is another project's
+DISTRIBUTION = "kickstand-lean"  # as in pyproject.toml; the package "kickstand" belongs to another project
 
 
 class InputError(Exception):
@@ -33,15 +33,15 @@ def cause(error: BaseException) -> str:
 
 
 def printable(text: str) -> str:
-    """The text with the codes of characters that would be commands to a terminal, as ESC, in their place."""
+    """The text with characters that control a terminal, such as ESC, replaced by their codes."""
     return "".join(c if c in "\n\t" or c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 def extra(name: str) -> str:
     """How to install an optional part of the project.
 
-    From a checkout with -e and its path, because otherwise a copy would replace the checkout, and `kickstand flash`
-    would take the copy's firmware.
+    For a checkout it uses -e and the path. Otherwise a copy would replace the checkout, and `kickstand flash` would use
+    the copy's firmware.
     """
     if firmware_path.installed():
         return f'{sys.executable} -m pip install "{DISTRIBUTION}[{name}]"'

@@ -1,11 +1,11 @@
-"""Where the firmware's files are: in a checkout or in an installed wheel."""
+"""Finds the firmware's files, in a checkout or in an installed wheel."""
 
 import os
 from pathlib import Path
 
 import kickstand
 
-TOOLS = Path(__file__).resolve().parents[2]  # the directory kickstand_tools is imported from
+TOOLS = Path(__file__).resolve().parents[2]  # the directory that kickstand_tools is imported from
 PACKAGE = Path(kickstand.__file__).resolve().parent  # the firmware's package, which the host imports too
 
 
@@ -19,13 +19,13 @@ def _packaged() -> Path:
 
 
 def installed() -> bool:
-    """True if these tools were installed as a package: they are no checkout, whose files a rider may edit."""
+    """True if these tools were installed as a package. False in a checkout, whose files a rider may edit."""
     return _packaged().is_dir()
 
 
 def config() -> Path:
-    """The rider's config.py: that of the checkout in the current directory, for an installed package also the one in
-    the current directory itself; else the one beside these tools."""
+    """The rider's config.py: that of a checkout in the current directory; for an installed package also config.py in
+    the current directory; otherwise the one beside these tools."""
     here = Path("firmware").resolve()
     if (here / "kickstand").is_dir() and (here / "config.py").is_file():
         return here / "config.py"

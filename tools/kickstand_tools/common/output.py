@@ -1,4 +1,4 @@
-"""Writes files completely or not at all, and makes the directories for them."""
+"""Writes files completely or not at all, and makes their directories."""
 
 import contextlib
 import errno
@@ -10,15 +10,15 @@ from pathlib import Path
 
 from .errors import InputError, cause
 
-_MOST_LINKS = 40  # as Linux follows
+_MOST_LINKS = 40  # the limit of Linux
 
 
 def check_output(path: Path, inputs: list[Path]) -> None:
-    """Refuse, before any work is done, an output that could not be written or that would destroy an input."""
+    """Refuse an output that cannot be written or that would destroy an input. Call it before any work is done."""
     _resolved(path)
     if path.is_dir():
         raise InputError(f"{path} is a directory: give --out the name of a file")
-    if _is_open_here(path):  # a file that the shell has opened would be replaced, with what is in it
+    if _is_open_here(path):  # it would replace a file that the shell has opened, with its content
         raise InputError(f"{path} is this command's own input or output: give --out the name of another file")
     if path.exists() and not path.is_file():
         raise InputError(f"{path} is not an ordinary file: give --out the name of one")
@@ -56,7 +56,7 @@ def _is_open_here(path: Path) -> bool:
 
 
 def check_directory(path: Path) -> None:
-    """Refuse, before any work is done, a directory to write to if that is a file."""
+    """Refuse an output directory that is a file. Call it before any work is done."""
     _resolved(path)
     if path.exists() and not path.is_dir():
         raise InputError(f"{path} is a file: give --out the name of a directory")
@@ -64,7 +64,7 @@ def check_directory(path: Path) -> None:
 
 @contextlib.contextmanager
 def new_directory(path: Path) -> Iterator[None]:
-    """Make a directory and those above it. Those that are empty at the end of the `with` are removed again."""
+    """Make a directory and its parents. Those that are empty at the end of the `with` are removed."""
     made: list[Path] = []
     try:
         try:
@@ -80,7 +80,7 @@ def new_directory(path: Path) -> Iterator[None]:
 
 
 def make_directory(path: Path) -> None:
-    """Make a directory and those above it, if they are not there. Raises InputError."""
+    """Make a directory and its parents if they do not exist. Raises InputError."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -89,12 +89,12 @@ def make_directory(path: Path) -> None:
 
 @contextlib.contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """A temporary path to write to; at the end of the `with` that file becomes path. If it fails, a file that was at
-    path stays. The file is then on the disk, also after a loss of power. Raises InputError.
+    """A context with a temporary path to write to. At its end the file is renamed to path, and is on the disk even
+    after a power loss. If writing fails, an earlier file at path stays. Raises InputError.
 
-    The temporary name has the ending of path, from which libraries tell the format.
+    The temporary name has the ending of path, because libraries choose the format by it.
     """
-    path = _resolved(path)  # a symbolic link stays one
+    path = _resolved(path)  # keep a symbolic link
     temporary = path.with_name(f".{os.getpid()}-{path.name}")
     try:
         yield temporary
@@ -104,15 +104,15 @@ def whole_file(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise InputError(f"{path} cannot be written: {cause(error)}; choose another place") from error
     finally:
-        with contextlib.suppress(OSError):  # on a read-only file system it would hide the reason
+        with contextlib.suppress(OSError):  # on a read-only file system this error would hide the reason
             temporary.unlink(missing_ok=True)
 
 
 def flush_to_disk(path: Path) -> None:
     """Wait until a file, or the entries of a directory, are on the disk. Raises OSError.
 
-    Without it a file system may store the new name before the content, and a loss of power then leaves neither the old
-    content nor the new one (fsync(2)).
+    Without it a file system may store the new name before the content. A power loss then leaves neither the old content
+    nor the new (fsync(2)).
     """
     directory = path.is_dir()
     if sys.platform == "emscripten" or (directory and os.name == "nt"):  # has no disk; opens no directories

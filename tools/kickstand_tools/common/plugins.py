@@ -1,7 +1,7 @@
-"""Parts that other packages add to the tools, by entry points of a group.
+"""Finds parts that other packages add to the tools by entry points.
 
-The leaves of this project, kickstand_fleet and kickstand_emulator, add theirs in pyproject.toml. So the core works
-without them and imports none of them.
+The leaves of this project, kickstand_fleet and kickstand_emulator, add theirs in pyproject.toml. The core works without
+them and does not import them.
 """
 
 from importlib.metadata import EntryPoint, distributions
@@ -14,7 +14,8 @@ SIMULATIONS = "kickstand.simulations"  # simulation.files.simulate's siblings, f
 
 
 def entry_points(group: str) -> dict[str, EntryPoint]:
-    """The entry points of a group, by name. Of two with one name that of this project counts, else the first found."""
+    """The entry points of a group, by name. If two have the same name, this project's is used, otherwise the first
+    one."""
     found: dict[str, EntryPoint] = {}
     for distribution in distributions():
         try:

@@ -1,6 +1,6 @@
 """A progress bar or a spinner on standard error for work that takes over a second; only if that is a terminal.
 
-Elsewhere work that takes minutes prints its progress in lines: Bar's lines_s.
+Otherwise work that takes minutes prints its progress in lines: see Bar's lines_s.
 """
 
 import contextlib
@@ -17,8 +17,8 @@ PATIENCE_S = 1.0
 class Bar:
     """with Bar("replaying", total) as bar: bar.advance(n). The first call after patience_s shows it.
 
-    To a function that reports (done, total), pass bar.reach, and no total here.
-    lines_s: where standard error is no terminal, time between two lines; None for none.
+    For a function that reports (done, total), pass it bar.reach and leave out total.
+    lines_s: time between two lines if standard error is not a terminal, s; None for no lines.
     """
 
     def __init__(
@@ -39,12 +39,12 @@ class Bar:
         return self
 
     def advance(self, amount: int) -> None:
-        """Count `amount` more of the total as done."""
+        """Add `amount` to the work done."""
         self._progress.advance(self._task, amount)
         self._show()
 
     def reach(self, done: int, total: int) -> None:
-        """done of total is done; total is 0 if it is not known."""
+        """Set the work done and the total; total is 0 if unknown."""
         self._progress.update(self._task, completed=done, total=total or None)
         self._show()
 
@@ -68,7 +68,7 @@ class Bar:
 
 @contextlib.contextmanager
 def spinner(what: str) -> Iterator[None]:
-    """A spinner for work whose progress is not known."""
+    """A spinner for work whose progress is unknown."""
     if not sys.stderr.isatty():
         yield
         return

@@ -1,12 +1,12 @@
-"""Drawings as SVG, the pages' and the READMEs': elements written by hand, because a fleet has thousands of pictures and
-each takes a millisecond."""
+"""Writes SVG drawings for the pages and the READMEs. The elements are written directly because it is fast: a fleet has
+thousands of pictures, at a millisecond each."""
 
 from markupsafe import Markup, escape
 
 
 def element(name: str, *inside: str, **attributes: object) -> Markup:
-    """An element of SVG. inside: other elements, and text, which is escaped. attributes: with _ for -, and one at the
-    end of what Python reserves; numbers are rounded to hundredths, None is left out.
+    """An SVG element. inside: other elements, and text, which is escaped. attributes: write _ for -, and add _ to a
+    word that Python reserves. Numbers are rounded to hundredths, None is left out.
 
     >>> print(element("text", "1 < 2", x=1.25, text_anchor="end", class_="small"))
     <text x="1.25" text-anchor="end" class="small">1 &lt; 2</text>

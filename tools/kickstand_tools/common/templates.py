@@ -1,4 +1,4 @@
-"""HTML and SVG from templates of Jinja. A template is a file beside the module that fills it."""
+"""Makes HTML and SVG from Jinja templates. A template is a file beside the module that fills it."""
 
 import base64
 import hashlib
@@ -14,11 +14,11 @@ _ENVIRONMENT.policies["json.dumps_kwargs"] = {"allow_nan": False, "ensure_ascii"
 
 
 def filled(template: Path, **values: Any) -> str:
-    """A template with these values, each escaped but where the template says `| safe`; `| tojson` is JSON for an
-    element of HTML. Raises jinja2.UndefinedError for a value that is missing."""
+    """Fill a template with these values. Each is escaped unless the template says `| safe`; `| tojson` makes JSON for
+    an HTML element. Raises jinja2.UndefinedError for a missing value."""
     return _ENVIRONMENT.from_string(template.read_text(encoding="utf-8")).render(values)
 
 
 def source_hash(script: str) -> str:
-    """A script as a content security policy names it: nothing else runs."""
+    """The hash of a script for a content security policy, which then allows no other script."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"

@@ -1,4 +1,4 @@
-"""Times as they are read on a page or an axis."""
+"""Formats times for a page or an axis."""
 
 
 def clock(seconds: float) -> str:
@@ -9,5 +9,5 @@ def clock(seconds: float) -> str:
 
 
 def tick_s(seconds: float) -> float:
-    """A round time between ticks, so that there are 6 to 12 of them."""
+    """A round time between ticks, which gives 6 to 12 ticks."""
     return next((tick for tick in (1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800) if seconds < 12 * tick), 3600)

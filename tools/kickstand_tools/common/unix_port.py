@@ -1,4 +1,4 @@
-"""MicroPython's unix port, a package from PyPI that runs the firmware's own files on the host."""
+"""Runs the firmware's files on the host with MicroPython's unix port, a package from PyPI."""
 
 import importlib.util
 import os
@@ -20,6 +20,6 @@ def command(script: str, *arguments: str) -> list[str]:
 
 
 def environment() -> dict[str, str]:
-    """The environment for command(): firmware and tools are on MicroPython's path."""
+    """The environment for command(): puts firmware and tools on MicroPython's path."""
     path = f"{firmware_path.search_path()}:.frozen"
     return os.environ | {"MICROPYPATH": path}

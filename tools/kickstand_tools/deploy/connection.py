@@ -1,4 +1,4 @@
-"""A connection to a board at its raw prompt, by mpremote, with its errors in words."""
+"""Connects to a board at its raw prompt with mpremote, and puts errors into words."""
 
 import ast
 import contextlib
@@ -16,16 +16,16 @@ from serial.tools import list_ports
 
 from ..common.errors import InputError, cause
 
-# Called with what is being done, the bytes that are done and the bytes in all.
+# Called with the current action, the bytes done and the total bytes.
 Progress = Callable[[str, int, int], None]
 
-MOST_BYTES = 1_000_000  # longest answer; the list of a board's files has a hundredth of that
+MOST_BYTES = 1_000_000  # longest answer in bytes; the list of a board's files has a hundredth of that
 _HEARD_BYTES = 3000
 ANSWER_S = 10
-_STARTING_S = 3  # longest time in which a board that starts does not hear what is sent to it
+_STARTING_S = 3  # longest time in which a starting board ignores input
 _POLL_S = 0.01
 _PROGRAM_S = 60  # longest time of a program: an emulated board takes a while to compile the modules
-_EMULATED = "socket:"  # begins the name of an emulated board's port
+_EMULATED = "socket:"  # start of the name of an emulated board's port
 _SLOWER = 12  # factor on times for an emulated board, whose seconds last longer on a busy host
 _RESTART_S = 2  # time until the board's USB port is back: the next command may follow at once
 
@@ -38,18 +38,18 @@ VENDORS = {
     0x1A86: "WCH CH340",
     0x0403: "FTDI",
 }
-_DEBUG_PROBE = (0x2E8A, 0x000C)  # a device of the same vendor that is no board
+_DEBUG_PROBE = (0x2E8A, 0x000C)  # a device of the same vendor that is not a board
 
 
-class Board(SerialTransport):
-    """A board, with a limit on the length of answers: mpremote reads for as long as bytes come. slower: factor on
-    mpremote's limits of silence, for a board whose seconds last longer than real ones."""
+class ConnectedBoard(SerialTransport):
+    """A board with a limit on the length of answers, because mpremote reads as long as bytes arrive. slower: factor on
+    mpremote's limits of silence, for a board that runs slower than real time."""
 
     slower = 1
-    heard = b""  # the last of what the board has printed
+    heard = b""  # the end of the board's output
 
     def wait(self, seconds: float) -> None:
-        """Sleep for so long. A program that must not sleep overrides this in a class of its own."""
+        """Sleep. A program that must not sleep overrides this in a subclass."""
         time.sleep(seconds)
 
     def read_until(self, min_num_bytes, ending, timeout=10, data_consumer=None, timeout_overall=None):
@@ -59,7 +59,7 @@ class Board(SerialTransport):
         limits: list[Any] = [math.inf if limit is None else limit * self.slower for limit in (timeout, timeout_overall)]
         while not said.endswith(ending):
             now_s = time.monotonic()
-            # An emulator's pseudo-terminal may not say what waits. Of mpremote the older ones know nothing of those.
+            # An emulator's pseudo-terminal may not report waiting bytes. Older versions of mpremote do not have is_pty.
             if piece := serial.read(1) if getattr(self, "is_pty", False) or serial.inWaiting() > 0 else b"":
                 said += piece
                 self.heard = (self.heard + piece)[-_HEARD_BYTES:]
@@ -75,17 +75,17 @@ class Board(SerialTransport):
         return bytes(said)
 
 
-class _EmulatedBoard(Board):
+class _EmulatedBoard(ConnectedBoard):
     slower = _SLOWER
 
 
-# The name of a board's port, a board at a port that is open, or None for the only board that is plugged in
-Port = str | Board | None
+# The name of a board's port, a board at an open port, or None for the only board that is plugged in
+Port = str | ConnectedBoard | None
 
 
 @contextlib.contextmanager
-def connected(port: Port) -> Iterator[tuple[Board, str]]:
-    """A board at its raw prompt, its program interrupted, and the name of its port.
+def connected(port: Port) -> Iterator[tuple[ConnectedBoard, str]]:
+    """A context with a board at its raw prompt, its program interrupted, and the name of its port.
 
     Raises InputError, also for errors of the connection inside the with block.
     """
@@ -111,16 +111,16 @@ def connected(port: Port) -> Iterator[tuple[Board, str]]:
             raise InputError(f"{error.filename}: {cause(error)}: check the disk or the file, then repeat") from error
         if error.errno == errno.ENOSPC:
             raise InputError(f"the board at {name} is full: remove files of your own from it") from error
-        if error.errno in (errno.EILSEQ, 84, 52):  # of the board, which mpremote raises here
+        if error.errno in (errno.EILSEQ, 84, 52):  # an error on the board, which mpremote raises here
             raise InputError(f"{name}: the board's file system is damaged: erase its flash: {_NUKE}") from error
         raise InputError(f"{name}: connection lost ({cause(error)}): plug the board in again, then repeat") from error
     finally:
         with contextlib.suppress(OSError):
-            transport.close()  # its port may be gone, or just restarting
+            transport.close()  # its port may be gone or restarting
 
 
-def _opened(name: str) -> Board:
-    kind = _EmulatedBoard if name.startswith(_EMULATED) else Board
+def _opened(name: str) -> ConnectedBoard:
+    kind = _EmulatedBoard if name.startswith(_EMULATED) else ConnectedBoard
     try:
         return kind(name, timeout=ANSWER_S * (_SLOWER if kind is _EmulatedBoard else 1))
     except (TransportError, ValueError):
@@ -142,7 +142,7 @@ def find_port() -> str:
 
 
 def why_closed(port: str) -> InputError:
-    """The error that says why a port cannot be opened, found by trying once more."""
+    """The error with the reason why a port cannot be opened, found by another attempt."""
     try:
         serial.serial_for_url(port, timeout=1, exclusive=True).close()
     except ValueError as error:
@@ -161,8 +161,8 @@ def why_closed(port: str) -> InputError:
     return InputError(f"{port} could not be opened at first, and now can: try again")
 
 
-def restart(transport: Board) -> None:
-    """Reset the board, so that it starts as after power-on. Its USB port goes away for a moment."""
+def restart(transport: ConnectedBoard) -> None:
+    """Reset the board: it starts as after power-on. Its USB port disappears for a moment."""
     transport.exec_raw_no_follow("import time, machine\ntime.sleep_ms(100)\nmachine.reset()")
     transport.wait(_RESTART_S)
 
@@ -175,8 +175,8 @@ def ask(transport: SerialTransport, expression: str, *shapes: Any) -> Any:
 def literal(text: bytes, *shapes: Any) -> Any:
     """The Python value that a line of a board's output represents.
 
-    shapes: the allowed types: a type, or a tuple of the types of a tuple's values; numbers are integers and not
-    negative, and None stands for None. Raises InputError for others: the board may be another device.
+    shapes: the allowed types: a type, or a tuple of the types of a tuple's values; numbers are integers >= 0, and None
+    means None. Raises InputError for other values: the board may be another device.
 
     >>> literal(b"('/rides', 3)", (str, int))
     ('/rides', 3)
@@ -226,8 +226,8 @@ def printed(transport: SerialTransport, name: str, code: str, what: str) -> byte
 
 
 def status(port: Port, wirings: bool = False) -> str:
-    """The output of kickstand.status() on the board, which is restarted afterwards. wirings: its display shows each
-    wiring of a backpack. Raises InputError."""
+    """The output of kickstand.status() on the board, which then restarts. wirings: also show each wiring of a backpack
+    on its display. Raises InputError."""
     with connected(port) as (transport, name):
         describe(transport, name)
         try:
@@ -238,9 +238,9 @@ def status(port: Port, wirings: bool = False) -> str:
 
 
 def refuse_unfit_firmware(reason: str, name: str) -> None:
-    """Raise InputError if this error of the board at that port says that Kickstand is not on it, or lacks a module.
+    """Raise InputError if this error of the board at port `name` means that Kickstand is not on it, or lacks a module.
 
-    An update that was broken off lacks modules too.
+    After an interrupted update, modules are missing too.
     """
     if "no module named 'kickstand'" in reason:
         raise InputError(f"Kickstand is not on the board at {name}: kickstand flash puts it there")
@@ -261,7 +261,7 @@ def _enter(transport: SerialTransport, name: str) -> None:
     """Ctrl-C, then a soft reset into the raw prompt, which does not start main.py."""
     for limit_s in (_STARTING_S, ANSWER_S):  # a board that resets when its port is opened is starting the first time
         try:
-            with contextlib.redirect_stdout(io.StringIO()):  # mpremote prints what it did not understand
+            with contextlib.redirect_stdout(io.StringIO()):  # mpremote prints input that it did not understand
                 transport.enter_raw_repl(timeout_overall=limit_s)
             return
         except TransportError:
@@ -276,11 +276,11 @@ _NUKE = (
 _CORRUPT = ("filesystem appears to be corrupted", "EILSEQ", "] EIO", "Errno 84", "Errno 52")
 _WATCHDOG = ("wdt", "watchdog", "rst:0x")
 _CRASHES = ("guru meditation", "fatal python error", "abort() was called", "fatal error", "panic", "stack smashing")
-_LONGEST_WORDS = 60  # letters of what the board has printed
+_LONGEST_WORDS = 60  # most letters of the board's output in a message
 
 
 def _why_silent(name: str, heard: bytes) -> InputError:
-    """The error for a board that does not come to its prompt. heard: the last that it has printed."""
+    """The error for a board that does not show its prompt. heard: the end of its output."""
     text = heard.decode(errors="replace")
     if damaged(text):
         return InputError(f"{name}: the board says that its file system is damaged: erase its flash: {_NUKE}")
@@ -307,6 +307,6 @@ def _why_silent(name: str, heard: bytes) -> InputError:
 
 
 def damaged(text: str) -> bool:
-    """True if a board's words say that its file system is damaged: MicroPython's own (inisetup.py of the ESP32), or the
-    errors that littlefs and the flash give (EILSEQ and LFS_ERR_CORRUPT are 84)."""
+    """True if a board's message means that its file system is damaged: MicroPython's own message (inisetup.py of the
+    ESP32), or the errors of littlefs and the flash (EILSEQ and LFS_ERR_CORRUPT are 84)."""
     return any(mark in text for mark in _CORRUPT)

@@ -1,6 +1,6 @@
 """Lists the files of the firmware, for `kickstand flash` and mip.
 
-python -m kickstand_tools.deploy.firmware_files writes mip's list, firmware/package.json, anew.
+python -m kickstand_tools.deploy.firmware_files rewrites mip's list, firmware/package.json.
 """
 
 import json
@@ -18,7 +18,7 @@ MODULE_ENDINGS = (".py", ".mpy")
 
 
 def firmware_files() -> dict[str, Path]:
-    """Path on the board -> source file, in the order to copy them: main.py, which starts the rest, is the last."""
+    """Path on the board -> source file, in the order of copying: main.py, which starts the rest, is the last."""
     root = firmware_path.directory()
     package = firmware_path.PACKAGE
     files = {f"{PACKAGE}/{path.relative_to(package).as_posix()}": path for path in sorted(package.rglob("*.py"))}
@@ -29,7 +29,7 @@ def contents(mpy: int | None, compiler: bytecode.Compiler | None = None) -> dict
     """Path on the board -> content, in the order of firmware_files().
 
     mpy: the board's sys.implementation._mpy: the package is compiled to .mpy files for it. None: the package stays .py.
-    main.py and config.py are always .py: MicroPython starts no main.mpy, and the rider edits config.py.
+    main.py and config.py are always .py, because MicroPython does not start a main.mpy and the rider edits config.py.
     compiler: see bytecode.compiled(). Raises CannotCompile.
     """
     files = firmware_files()
@@ -41,8 +41,8 @@ def contents(mpy: int | None, compiler: bytecode.Compiler | None = None) -> dict
 
 
 def unfinished(path: str) -> str:
-    """The name of a file until it is verified. A main.py that is cut short must not be started, and a config.py that is
-    cut short must not be kept as the rider's own."""
+    """The name of a file until it is verified. An incomplete main.py must not start, and an incomplete config.py must
+    not be kept as the rider's own."""
     return path.removesuffix(".py") + ".new" if path in (CONFIG, MAIN) else path
 
 

@@ -11,21 +11,20 @@ from ..common.errors import InputError
 from . import bytecode, config_check, others
 from .board_files import fingerprint, survey
 from .config_text import cleaned
-from .connection import Board, Port, Progress, ask, connected, describe, restart
+from .connection import ConnectedBoard, Port, Progress, ask, connected, describe, restart
 from .firmware_files import CONFIG, contents, unfinished
 from .update import Update, plan, refuse_without_room
 
-_TRIES = 3  # to copy a file: a cable may lose a byte
-_CHUNK = 2048  # bytes per exchange; with mpremote's 256 copying takes half as long again
+_TRIES = 3  # attempts to copy a file: a cable may lose a byte
+_CHUNK = 2048  # bytes per exchange; with mpremote's 256, copying takes 1.5 times as long
 
 
 @dataclass(frozen=True)
 class InstallResult:
     """Paths on the board.
 
-    copied: files that were verified to read back as they were sent.  copied_bytes: their size.  kept: files that were
-    not changed.  removed: files of older versions.  config_differs: the rider's config.py, which is kept, is not this
-    version's.
+    copied: files that were copied and verified. copied_bytes: their size. kept: files that were not changed. removed:
+    files of older versions. config_differs: True if the rider's config.py, which is kept, is not this version's.
     """
 
     copied: list[str]
@@ -37,9 +36,9 @@ class InstallResult:
 
 @dataclass(frozen=True)
 class FlashResult:
-    """board: its name and version of MicroPython.  port: its name.  config: the config.py that was checked to be
-    copied, or None.  others: a line for each file of another project that was kept under another name.  unused:
-    settings in the rider's config.py that are behind a '#'.  why_sources: why the firmware was not compiled, or None.
+    """board: its name and version of MicroPython. port: its name. config: the config.py that was checked before
+    copying, or None. others: one line per file of another project that was kept under another name. unused: settings in
+    the rider's config.py that are behind a '#'. why_sources: the reason why the firmware was not compiled, or None.
     installed: the files."""
 
     board: str
@@ -55,17 +54,17 @@ def flash(
     port: Port,
     replace_config: bool = False,
     progress: Progress | None = None,
-    describe: Callable[[Board, str], str] = describe,
+    describe: Callable[[ConnectedBoard, str], str] = describe,
     compiler: bytecode.Compiler | None = None,
     judge: Callable[[Path, str, str], config_check.Judged] | None = None,
     agree: Callable[[list[str]], None] | None = None,
 ) -> FlashResult:
     """Bring a board's files up to date, verify them and restart it.
 
-    replace_config: update the rider's config.py too.  describe: returns the board's name, and refuses other devices.
-    compiler, judge: replacements where mpy-cross, or another process, cannot be run; None: bytecode.cross_compiled()
-    and config_check.judge().  agree: called with a line for each file of another project that will get another name;
-    may raise InputError.  Raises InputError, for want of room before anything is changed.
+    replace_config: update the rider's config.py too. describe: returns the board's name, and refuses other devices.
+    compiler, judge: replacements if mpy-cross or another process cannot run; None: bytecode.cross_compiled() and
+    config_check.judge(). agree: called with one line per file of another project that will be renamed; may raise
+    InputError. Raises InputError; for lack of room it does so before any change.
     """
     with connected(port) as (transport, name):
         board = describe(transport, name)
@@ -90,7 +89,7 @@ def flash(
             if there.moves and agree:
                 agree(there.words())
         except InputError:
-            restart(transport)  # the board's program goes on
+            restart(transport)  # the board's program starts again
             raise
         installed = install(transport, update, progress)
         restart(transport)
@@ -103,8 +102,8 @@ def prepare(
     replace_config: bool = False,
     there: others.Others | None = None,
 ) -> Update:
-    """The Update that install() has to carry out. Changes nothing. wanted: see contents().  there: the files of other
-    projects. Raises InputError."""
+    """The Update for install(). Changes nothing. wanted: see contents(). there: the files of other projects. Raises
+    InputError."""
     present = there.files if there else survey(transport)
     update = plan(wanted, present, replace_config)
     if there and there.moves:
@@ -114,10 +113,10 @@ def prepare(
 
 
 def install(transport: SerialTransport, update: Update, progress: Progress | None = None) -> InstallResult:
-    """Carry out an update. Raises InputError for what reads back differently, OSError, TransportError.
+    """Carry out an update. Raises InputError if a file reads back differently, OSError, TransportError.
 
-    main.py goes first, and comes back once all the rest is verified: broken off at any point, this leaves a board that
-    starts nothing, never a mixture of versions, and so can be flashed again.
+    main.py is removed first, and copied after the rest is verified. So an interruption leaves a board that starts
+    nothing and can be flashed again, never a mixture of versions.
     """
     for path, to in update.moves.items():
         transport.exec(f"import os\nos.rename({path!r}, {to!r})")
@@ -153,8 +152,8 @@ def install(transport: SerialTransport, update: Update, progress: Progress | Non
 
 
 def _contents(transport: SerialTransport, compiler: bytecode.Compiler | None) -> tuple[dict[str, bytes], str | None]:
-    """The firmware for this board, and why it is not compiled."""
-    mpy = ask(transport, "getattr(__import__('sys').implementation, '_mpy', 0)", int)  # 0: takes no compiled files
+    """The firmware for this board, and the reason why it is not compiled."""
+    mpy = ask(transport, "getattr(__import__('sys').implementation, '_mpy', 0)", int)  # 0: accepts no compiled files
     try:
         return contents(mpy, compiler), None
     except bytecode.CannotCompile as reason:
@@ -162,6 +161,6 @@ def _contents(transport: SerialTransport, compiler: bytecode.Compiler | None) ->
 
 
 def _differing(transport: SerialTransport, copied: dict[str, bytes]) -> dict[str, bytes]:
-    """Those files of which the board reads something else than was sent."""
+    """The files whose content on the board differs from the sent content."""
     found = survey(transport).files if copied else {}
     return {path: data for path, data in copied.items() if found.get(unfinished(path)) != fingerprint(data)}

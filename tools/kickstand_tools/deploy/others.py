@@ -1,4 +1,4 @@
-"""Files of another project on a used board: main.py, boot.py and config.py make way and are kept under another name."""
+"""Finds another project's main.py, boot.py and config.py on a used board. They are renamed and kept."""
 
 import ast
 import hashlib
@@ -19,7 +19,7 @@ from .firmware_files import CONFIG, MAIN, PACKAGE
 
 BOOT = "/boot.py"
 _KEPT = "-before-kickstand"
-_MANY = 3  # so many of Kickstand's settings are in no other project's file: others too may have a DISPLAY
+_MANY = 3  # no other project's file has so many of Kickstand's settings; others may also have a DISPLAY
 _ON_THE_BOARD = "config.py on the board"
 # The first digits of the SHA-256 of every main.py that Kickstand has had, with \n as the line's end
 _OWN_MAIN = {
@@ -41,9 +41,9 @@ _OWN_MAIN = {
 
 @dataclass(frozen=True)
 class Others:
-    """What was on a board. files: its files and folders.  moves: the new name of each file that makes way, by its
-    path.  config: the content that the board's own config.py should have, None if there is none or it makes way.
-    mended: True if config is not what the board has now."""
+    """What was on a board. files: its files and folders. moves: the new name of each file to rename, by its path.
+    config: the content that the board's own config.py should have; None without one, or if it is renamed. mended: True
+    if config differs from the board's current one."""
 
     files: BoardFiles
     moves: dict[str, str]
@@ -51,28 +51,28 @@ class Others:
     mended: bool
 
     def words(self) -> list[str]:
-        """A line for each file that makes way."""
+        """One line per file to rename."""
         return [f"{path[1:]} on the board is another project's: kept as {to[1:]}" for path, to in self.moves.items()]
 
 
 @dataclass(frozen=True)
 class Contents:
-    """files: the board's files and folders.  texts: content of MAIN, BOOT and CONFIG, as far as they are there."""
+    """files: the board's files and folders. texts: content of MAIN, BOOT and CONFIG, if they exist."""
 
     files: BoardFiles
     texts: dict[str, bytes]
 
 
 def read(transport: SerialTransport) -> Contents:
-    """Look at the board. Changes nothing."""
+    """Read the board's files. Changes nothing."""
     files = survey(transport)
     there = [path for path in (MAIN, BOOT, CONFIG) if path in files.files]
     return Contents(files, {path: bytes(transport.fs_readfile(path)) for path in there})
 
 
 def find(there: Contents, judge: Callable[[Path], Judged], replace_config: bool) -> Others:
-    """Decide which files make way. judge: checks a config.py for this board.  replace_config: the rider's config.py is
-    to be replaced. Raises InputError for a config.py of the rider's that would stop the firmware."""
+    """Decide which files to rename. judge: checks a config.py for this board. replace_config: True if the rider's
+    config.py will be replaced. Raises InputError for a config.py of the rider's that would stop the firmware."""
     installed = PACKAGE in there.files.folders
     leave = []
     if MAIN in there.texts and not _is_own_main(there.texts[MAIN]):
@@ -130,7 +130,7 @@ def _settings_named(content: bytes) -> int:
 
 
 def _does_something(content: bytes) -> bool:
-    """True if the file has more than comments and texts, as the boot.py that MicroPython makes on an ESP32 has."""
+    """True if the file has more than comments and texts. MicroPython's own boot.py on an ESP32 has only these."""
     try:
         body = ast.parse(content).body
     except (SyntaxError, ValueError, RecursionError, MemoryError):

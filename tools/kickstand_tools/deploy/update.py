@@ -1,8 +1,8 @@
-"""Plans an update of a board: the files and folders to remove and to make, and whether they fit.
+"""Plans an update of a board: the files and folders to remove and to create, and checks the free space.
 
-A file takes whole flash blocks, which are freed when it is removed, or when its replacement is closed. Each block after
-the first begins with pointers of 4 bytes to blocks before it (littlefs, DESIGN.md, "CTZ skip-lists"). A small file may
-be kept within its folder instead: up to an eighth of a block, less on some boards. A folder takes two blocks, and two
+A file takes whole flash blocks. They are freed when it is removed, or when its replacement is closed. Each block after
+the first begins with pointers of 4 bytes to earlier blocks (littlefs, DESIGN.md, "CTZ skip-lists"). A small file may be
+stored within its folder instead: up to an eighth of a block, less on some boards. A folder takes two blocks, and two
 more when its entries outgrow them.
 """
 
@@ -14,7 +14,7 @@ from .board_files import BoardFiles, fingerprint
 from .firmware_files import CONFIG, MAIN, MODULE_ENDINGS, PACKAGE, unfinished
 
 FOLDER_BLOCKS = 2
-SPARE_BLOCKS = 4  # a folder may outgrow its two, and littlefs writes a new block before it frees a worn one
+SPARE_BLOCKS = 4  # a folder may outgrow its two blocks, and littlefs writes a new block before it frees a worn one
 _POINTER = 4
 
 
@@ -33,12 +33,12 @@ def least_blocks(size: int, block: int) -> int:
 
 @dataclass(frozen=True)
 class Update:
-    """The steps of an update, in this order. On a board that is up to date there is nothing to remove, make or copy.
+    """The steps of an update, in this order. A board that is up to date needs none.
 
     remove: files, main.py first.  remove_folders: already empty by then.  make_folders: folders to create.
     copy: contents by path, main.py last.  obsolete: files in `remove` that belong to no module of this version.
-    keep: files that stay unchanged.  moves: the new names of files of another project, by their paths, before all else.
-    config_differs: the rider's config.py, which is kept, is not this version's.
+    keep: files that stay unchanged. moves: the new names of files of another project, by their paths; they are renamed
+    first. config_differs: True if the rider's config.py, which is kept, is not this version's.
     """
 
     remove: list[str]
@@ -52,16 +52,16 @@ class Update:
 
 
 def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> Update:
-    """The Update after which the board has the wanted files. The rider's own files stay.
+    """Plan the Update that gives the board the wanted files. The rider's own files are kept.
 
-    Whatever is replaced is removed first, which frees its blocks: nothing is lost, since the board starts nothing
-    without main.py, and the firmware can be copied again. Raises InputError for a file in the way.
+    Replaced files are removed first, which frees their blocks. Nothing is lost: without main.py the board starts
+    nothing, and the firmware can be copied again. Raises InputError for a file in the way.
     """
     copy = {path: data for path, data in wanted.items() if board.files.get(path) != fingerprint(data)}
     config_differs = CONFIG in copy and CONFIG in board.files and not replace_config
     if config_differs:
         del copy[CONFIG]
-    left_over = {unfinished(MAIN), unfinished(CONFIG)}  # by an update that was broken off
+    left_over = {unfinished(MAIN), unfinished(CONFIG)}  # left by an interrupted update
     stale = [path for path in board.files if path in left_over or (_is_module(path) and path not in wanted)]
     kept = board.files.keys() - set(stale)
     folders = {folder for path in wanted for folder in _folders(path)}
@@ -72,7 +72,7 @@ def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> U
     in_order = dict.fromkeys([MAIN, *stale, *copy] if copy else [])
     modules = {_module(path) for path in wanted}
     return Update(
-        remove=[path for path in in_order if path in board.files and path != CONFIG],  # the config is the rider's own
+        remove=[path for path in in_order if path in board.files and path != CONFIG],  # config.py belongs to the rider
         remove_folders=sorted(empty, reverse=True),  # the inner ones first
         make_folders=sorted(folders - board.folders),
         copy=copy,
@@ -83,7 +83,7 @@ def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> U
 
 
 def needed_blocks(update: Update, board: BoardFiles) -> int:
-    """Number of flash blocks that have to be free for an update."""
+    """Number of flash blocks that must be free for an update."""
     if not update.copy:
         return 0
     takes = sum(most_blocks(len(data), board.block) for data in update.copy.values())
@@ -98,7 +98,7 @@ def refuse_without_room(update: Update, board: BoardFiles) -> None:
     if blocks <= board.free_blocks:
         return
     remedy = "remove files of your own from it"
-    if board.has_rides and f"{PACKAGE}/rides" in board.folders:  # firmware up to 0.4 has to be updated before that
+    if board.has_rides and f"{PACKAGE}/rides" in board.folders:  # firmware up to 0.4 must be updated before that
         remedy = "pull the rides with kickstand pull --delete, then flash again"
     needed_kb, free_kb = (count * board.block // 1000 for count in (blocks, board.free_blocks))
     raise InputError(f"not enough room on the board: {needed_kb} kB needed, {free_kb} kB free: {remedy}")
@@ -118,8 +118,8 @@ def _folders(path: str) -> list[str]:
 
 
 def _refuse_in_the_way(wanted: dict[str, bytes], folders: set[str], kept: set[str]) -> None:
-    """Raise InputError for a rider's file that MicroPython would import in place of a wanted one: a folder lean/ in
-    place of lean.py, and lean.py in place of lean.mpy."""
+    """Raise InputError for a rider's file that MicroPython would import instead of a wanted one: a folder lean/ instead
+    of lean.py, and lean.py instead of lean.mpy."""
     modules = {_module(path) for path in wanted}
     for path in sorted(kept):
         if path in folders or modules.intersection(_folders(path)):

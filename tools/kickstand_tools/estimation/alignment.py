@@ -1,11 +1,11 @@
-"""The alignment of a motorcycle's sensor with its covariance, from an ordinary ride without poses.
+"""Finds the alignment of a motorcycle's sensor, with its covariance, from an ordinary ride without poses.
 
 The readings are rotated by a first guess of the axes (first_guess.py). Then the misalignment is estimated together with
-the motion, the gyro's bias and the errors of sensor and bike, with a prior so wide that it says nothing of the
-misalignment. The lean follows the gyro through the bends; its mean on straights is the bike's own up, because the bike
-is balanced there, and the residual force across the bike is then the bias of the accelerometer. A lateral offset of the
-centre of mass and a roll misalignment are not separately observable. Nor are an error of the sensor's axes against each
-other and the misalignment: these errors are the larger part of its standard deviation.
+the motion, the gyro's bias and the errors of sensor and bike. The prior is too wide to contain information about the
+misalignment. The lean follows the gyro through the bends. Its mean on straights is the bike's own up, because the bike
+is balanced there; the residual force across the bike is then the bias of the accelerometer. A lateral offset of the
+centre of mass cannot be distinguished from a roll misalignment. Errors between the sensor's axes cannot be
+distinguished from the misalignment either: they are the larger part of its standard deviation.
 """
 
 from dataclasses import dataclass
@@ -32,19 +32,19 @@ from .windows import WINDOW_S, Windows, windows_of
 SLOWEST_HZ = 20.0
 LONGEST_S = 1800.0  # more than half an hour of a ride adds nothing
 # Standard deviations of the prior
-ROTATION_SIGMA = 10.0  # rad: misalignment, of which nothing is known
+ROTATION_SIGMA = 10.0  # rad: misalignment, which is unknown
 AXES_SIGMA = 0.012  # ratio: scale and cross-axis errors of the accelerometer
 BESIDE_SIGMA_G = 0.005  # force to the side on straights, by luggage or camber
-UNSETTLED = np.radians(0.5)  # if the last step changed an angle by more, it has not converged
-# An error of the sensor that comes out at over ODD_SIGMAS of its prior enlarges the standard errors; one over
-# ABSURD_SIGMAS is refused
+UNSETTLED = np.radians(0.5)  # if the last step changed an angle by more, the estimate has not converged
+# An estimated error of the sensor over ODD_SIGMAS of its prior enlarges the standard errors. Over ABSURD_SIGMAS the
+# ride is refused
 ODD_SIGMAS, ABSURD_SIGMAS = 4.0, 20.0
 MAX_DEG = np.array([5.0, 5.0, 3.5])  # pitch, yaw, roll: an alignment with a larger standard error is refused
-MOVED_DEG = 8.0  # and one whose two halves of the ride differ by more
+MOVED_DEG = 8.0  # so is one if the two halves of the ride differ by more
 CONSTANT = Hypotheses(*np.array([[1e-5], [1e-5], [1e-4], [0.0], [1.0]]))  # nothing changes in the ride
 
-# How a phone may be mounted, as its user says it: a check of what the ride says, and a hint where that says little. A
-# phone's axes, seen by who looks at its screen: x to the right, y to the top, z out of the screen (W3C Device
+# The mountings of a phone that its user can name: a check of the ride's result, and a hint if the ride shows little. A
+# phone's axes, seen by someone who looks at its screen: x to the right, y to the top, z out of the screen (W3C Device
 # Orientation; Android and iOS have the same).
 X, Y, Z = np.eye(3)
 
@@ -54,21 +54,21 @@ PHONES = {
     "landscape": [np.array([Y, X, -Z]), np.array([-Y, -X, -Z])],
     "flat": [np.array([-X, Z, Y])],
 }
-PHONE_SIGMA_DEG = 20.0  # of a holder that is tilted towards the rider's eyes
+PHONE_SIGMA_DEG = 20.0  # a holder may be tilted towards the rider's eyes
 PHONE_MAX_DEG = 45.0  # the mountings are at least 90 degrees apart
 
 
 @dataclass
 class RideFit:
-    """The alignment by a ride, with its quality. Angles in degrees.
+    """The alignment from a ride, with its quality. Angles in degrees.
 
-    roll_deg, pitch_deg, yaw_deg: standard errors of the alignment about forward, left and up. The larger part of them
-    are errors of the sensor that are not observable from a ride. Upright is where the bike is balanced on straights.
-    halves_deg: second half of the ride less first, in these three. offset_g (3): bias of the accelerometer along left,
-    up and forward, which the calibration takes off; offset_sigma_g (3): standard errors. used_s: first and last second
-    of the log in which the sensor was mounted. riding_s, standing_s: seconds of that time. lean_deg: rms of the ride's
-    lean. lag_s: delay of the log's speed, None without a speed. phone_deg: angle between the mounting that was found
-    and the one named by `phone`, None if none was. notices: what is remarkable in the log.
+    roll_deg, pitch_deg, yaw_deg: standard errors of the alignment about forward, left and up. Most of them comes from
+    errors of the sensor that a ride does not show. Upright is the balanced position on straights. halves_deg: second
+    half of the ride minus first half, in these three. offset_g (3): bias of the accelerometer along left, up and
+    forward, which the calibration subtracts; offset_sigma_g (3): standard errors. used_s: first and last second of the
+    log in which the sensor was mounted. riding_s, standing_s: seconds of that time. lean_deg: rms of the ride's lean.
+    lag_s: delay of the log's speed, None without a speed. phone_deg: angle between the mounting found and the one named
+    by `phone`, None if `phone` was None. notices: remarks about the log.
     """
 
     calibration: CalibrationFile
@@ -88,13 +88,13 @@ class RideFit:
 
 
 def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = None) -> RideFit:
-    """The alignment of a sensor on a motorcycle, from a ride with bends, in which no pose was held.
+    """Find the alignment of a sensor on a motorcycle from a ride with bends, without poses.
 
-    log: see read_log; a speed helps and is optional. phone: None, or how it was mounted: "portrait", "landscape" or
-    "flat" (see PHONES). progress: called with (steps done, all steps). Up is where the bike is balanced on
+    log: see read_log; a speed helps and is optional. phone: None, or its mounting: "portrait", "landscape" or "flat"
+    (see PHONES). progress: called with (steps done, all steps). Up is where the bike is balanced on
     straights, forward is the axis about which it leans into its bends and along which it speeds up; leaning into bends
     separates left from right. Scale errors of the accelerometer are not observable from a ride. Raises InputError;
-    RefusedInput, a subclass with code and values, where the ride does not determine how the sensor sits.
+    RefusedInput, a subclass with code and values, if the ride does not determine the sensor's mounting.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("city", seed=3, seconds=240.0)
@@ -128,8 +128,8 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
 def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) -> Estimate:
     """Estimate the misalignment against a first guess, with the motion.
 
-    windows: along the sensor's axes. expected: vehicle from sensor (3, 3) as the user says it, None if unknown. The
-    alignment is the result's matrix times that of the guess; the result's parameters are the same in each block.
+    windows: along the sensor's axes. expected: vehicle from sensor (3, 3) as named by the user, None if unknown. The
+    alignment is the result's matrix times that of the guess. The result's parameters are the same in each block.
     Raises Refusal if no alignment fits.
     """
     sigma, mean = Prior.of_pose(six_done=False).sigma, MEAN.copy()
@@ -160,7 +160,7 @@ def mounted_windows(log: Log) -> Windows:
     if not len(mounted):
         raise Refusal("ride-short", 0.0, MIN_RIDING_S)
     begin, end = mounted[np.argmax(np.diff(mounted, axis=1))]
-    margin = round(MOUNTED_S / WINDOW_S)  # windows after which the mean is of the ride alone
+    margin = round(MOUNTED_S / WINDOW_S)  # after this number of windows the mean contains only the ride
     first = windows.edges[begin + margin * (begin > 0)]
     last = windows.edges[end - margin * (end < len(windows))]
     return _windows(log, (log.t_s >= first) & (log.t_s < min(last, first + LONGEST_S)))
@@ -175,7 +175,7 @@ def _windows(log: Log, part: Bools | slice = slice(None)) -> Windows:
 
 
 def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | None, notices: list[Notice]) -> RideFit:
-    """The estimate as a RideFit. Raises Refusal where its quality is too low."""
+    """The estimate as a RideFit. Raises Refusal if its quality is too low."""
     halves = np.degrees(found.split())
     if np.max(np.abs(halves)) > MOVED_DEG:
         raise Refusal("ride-halves", float(np.max(np.abs(halves))))
@@ -183,12 +183,12 @@ def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | N
     odd = float(np.max(np.abs(parameters[SENSOR] / prior.sigma[SENSOR])))
     if odd > ABSURD_SIGMAS:
         raise Refusal("ride-contradicts")
-    # where the halves differ by more than the standard error, there was a disturbance that the model lacks
+    # if the halves differ by more than the standard error, there was a disturbance that the model lacks
     error = np.hypot(np.degrees(sigma[ROTATION]), 0.5 * halves) * max(1.0, odd / ODD_SIGMAS)
     if np.any(error > MAX_DEG):
         raise Refusal("ride-uncertain", *(float(error[i]) for i in (2, 0, 1)))
     pitch, yaw, roll = (float(angle) for angle in error)
-    # so that the calibrated force on a level, upright bike is 1 g up, whatever the scale errors are
+    # then the calibrated force on a level, upright bike is 1 g up for any scale errors
     offset = parameters[OFFSET] + parameters[ACCEL].reshape(3, 3)[:, 1]
     matrix, states = found.matrix @ guess.matrix, found.states[: len(windows) + 1]
     bias = guess.bias + np.median(states[:, BIAS], axis=0) @ matrix
@@ -224,7 +224,7 @@ def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | N
 
 
 def _mounting(phone: str, found: Array) -> Array:
-    """Of PHONES[phone] the matrix (3, 3) that is nearest to `found`. Raises Refusal where `found` is further than
+    """The matrix (3, 3) of PHONES[phone] that is nearest to `found`. Raises Refusal if `found` differs by over
     PHONE_MAX_DEG from it."""
     off, nearest = min(((_off_deg(found, matrix), i) for i, matrix in enumerate(PHONES[phone])))
     if off > PHONE_MAX_DEG:

@@ -1,4 +1,5 @@
-"""The starting point of the estimation: where the bike stands, its lean and speed, and for an alignment its axes."""
+"""Finds the starting point of the estimation: when the bike stands, its lean and speed, and for an alignment its
+axes."""
 
 import itertools
 from dataclasses import dataclass, replace
@@ -17,17 +18,17 @@ BIAS_RADPS = np.radians(4.0)  # limit of the gyro's bias since its calibration: 
 MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # while the sensor is mounted, its mean force over MOUNTED_S is this close to up
 BETWEEN_S = 20.0  # a shorter time between two movements in a hand counts as in the hand too
 SURELY_S = 4.0  # the sensor is surely in a hand where it seems so for all of this: the bike may still ride, or fall
-SLOW_S = 4.0  # changes of lean that take longer are computed from the yaw rate, quicker ones from the roll rate
-TURNS_S = 40.0  # the speed is computed from the bends within this
-CALM_S = 1.0  # without a standstill the gyro's bias is the mean of stretches this long that are nearly as calm
+SLOW_S = 4.0  # slower changes of lean are computed from the yaw rate, faster ones from the roll rate
+TURNS_S = 40.0  # the speed is computed from the bends within this time
+CALM_S = 1.0  # without a standstill, the gyro's bias is the mean over almost calm stretches of this length
 MIN_RIDING_S = 30.0
-MIN_LEAN = np.radians(3.0)  # rms: a ride that leans less does not show forward
+MIN_LEAN = np.radians(3.0)  # rms: a ride with less lean does not show forward
 MIN_LIKENESS = 0.5  # correlation between leaning and turning; bikes have over 0.75
-MAX_PUSHED = 0.5  # force to the side over the lean in bends; bikes have 0.1 to 0.2 by their tyres' width
+MAX_PUSHED = 0.5  # force to the side over the lean in bends; bikes have 0.1 to 0.2, because of their tyres' width
 CAR_G, CAR_LEAN = 0.045, np.radians(5.0)  # a car's rms of the force to the side is above, of its lean below
 STUCK_MPS = 0.5  # a log's speed that changes by less is stuck
-MAX_SPEED_FACTOR = 1.8  # limit of the log's speed over that of the bends, and of the inverse
-# Prior of the speed by the bends: this speed, with the weight of bends of this yaw rate
+MAX_SPEED_FACTOR = 1.8  # limit of the ratio of the log's speed to that from the bends, and of its inverse
+# Prior of the speed from the bends: this speed, with the weight of bends of this yaw rate
 USUAL_MPS, USUAL_RADPS = 10.0, 0.14
 
 
@@ -44,16 +45,16 @@ def _calm(w: Windows, over_s: float) -> Bools:
 
 
 def in_hand(w: Windows) -> tuple[Bools, Bools]:
-    """Two (n): True where the sensor is surely moved about in a hand, or lies with the bike, because up is far from
-    where it was; and True in these windows and the seconds before and after, which may not be riding either.
+    """Two arrays (n). True where the sensor is surely moved in a hand, or is on a fallen bike, because up is far from
+    its usual direction. True in these windows and the seconds around them, which may not be riding either.
 
-    On a bike in balance the force is along its own up, however far it leans.
+    On a bike in balance the force is along its own up at any lean.
     """
     there = ~w.gap
     mean = averaged(w.force * there[:, None], MOUNTED_S)
     off = there & (mean[:, 1] < np.cos(np.radians(MOUNTED_DEG)) * np.linalg.norm(mean, axis=1))
     places = np.flatnonzero(off)
-    if len(places):  # between two of them, and between one and an end of the log, it need not be mounted
+    if len(places):  # between two of them, and between one and an end of the log, the sensor may not be mounted
         ends = np.concatenate(([0], places, [len(w) - 1]))
         for begin, end in itertools.pairwise(ends):
             if w.edges[end + 1] - w.edges[begin] < BETWEEN_S:
@@ -63,10 +64,10 @@ def in_hand(w: Windows) -> tuple[Bools, Bools]:
 
 
 def lean_and_speed(w: Windows, still: Bools) -> tuple[Array, Array]:
-    """Lean (n, rad) and speed (n, m/s), roughly. still (n): see standing().
+    """Approximate lean (n, rad) and speed (n, m/s). still (n): see standing().
 
-    Without a speed in the log it is computed from the force in bends: in balance that is 1 / cos(lean), and speed x yaw
-    rate = g tan(lean).
+    Without a speed in the log, it is computed from the force in bends: in balance the force is 1 / cos(lean), and speed
+    x yaw rate = g tan(lean).
     """
     known, yaw = w.known_speed, w.rate[:, 1]
     force = averaged(np.linalg.norm(w.force[:, :2], axis=1), 2.0)
@@ -92,9 +93,8 @@ class Axes:
 def axes(w: Windows) -> Axes:
     """The vehicle's axes, within some degrees, and the gyro's bias. w: windows along the sensor's axes.
 
-    In balance the specific force keeps the direction of the bike's own up, so that its mean over the riding is up. For
-    forward and the handedness see signals/leaning.py. Raises Refusal where the ride is not a motorcycle's, or leans too
-    little.
+    In balance the specific force has the direction of the bike's own up, so its mean while riding is up. For forward
+    and the handedness see signals/leaning.py. Raises Refusal if the ride is not a motorcycle's, or has too little lean.
     """
     bias = _bias(w)
     w = replace(w, rate=w.rate - bias)
@@ -109,8 +109,8 @@ def axes(w: Windows) -> Axes:
 
 
 def _bias(w: Windows) -> Array:
-    """(3, rad/s) the gyro's bias: the median rate at rest; without a standstill in calm riding; without that in the
-    whole ride, because most of a ride is nearly straight."""
+    """(3, rad/s) the gyro's bias: the median rate at rest; without a standstill, that in calm riding; without that, in
+    the whole ride, because most of a ride is nearly straight."""
     for over_s in (STILL_S, CALM_S):
         places = _calm(w, over_s)
         if np.any(places):
@@ -120,7 +120,7 @@ def _bias(w: Windows) -> Array:
 
 def _refuse_no_motorcycle(found: Leaning, sideways: Array, riding: Bools) -> None:
     """Raise Refusal unless the ride is a motorcycle's with enough leaning and right-handed rates. sideways (n): force
-    to the left, g, less what changes slowly."""
+    to the left, g, without its slow changes."""
     in_radians_mps = speed_in_radians(found)
     if in_radians_mps is not None:
         raise Refusal("rates-in-radians", in_radians_mps)
@@ -139,8 +139,8 @@ def _refuse_no_motorcycle(found: Leaning, sideways: Array, riding: Bools) -> Non
 
 
 def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array) -> None:
-    """Raise Refusal if the log's speed is stuck or not in m/s, by the speed at which yaw rate and lean in the bends
-    balance. known: the log's speed, NaN if it has none."""
+    """Raise Refusal if the log's speed is stuck or not in m/s: compare it with the speed at which yaw rate and lean in
+    bends balance. known: the log's speed, NaN if it has none."""
     if not len(known) or np.isnan(known[0]):
         return
     if np.ptp(known) < STUCK_MPS:

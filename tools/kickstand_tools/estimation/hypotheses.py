@@ -1,9 +1,9 @@
-"""Hypotheses on how the parameters change during a ride (their random walk), and posterior weights of these.
+"""Hypotheses on how the parameters change during a ride (their random walk), and their posterior weights.
 
-On its straights a bike seems to lean when its mount has yielded, and when something pushes it to the side for minutes,
-such as wind. Each of these, alone or together, is a hypothesis. Its posterior weight follows from its prior probability
-and from the likelihood of the readings. Where the readings do not separate two hypotheses, the result lies between
-both, and its standard deviation grows with their difference.
+On straights a bike seems to lean if the sensor's mount has yielded, or if something such as wind pushes it to the side
+for minutes. Each of these, alone or combined, is a hypothesis. Its posterior weight follows from its prior probability
+and from the likelihood of the readings. If the readings do not distinguish two hypotheses, the result is between both,
+and its standard deviation grows with their difference.
 """
 
 from dataclasses import dataclass
@@ -20,15 +20,16 @@ BLOCK_S = 10.0  # duration of a block of windows: the random walk's step
 FIRM, YIELDING = np.radians([0.05, 0.11])  # rad: rotation of the mount from block to block
 CALM_G, WIND_G, STORM_G = 0.00052, 0.01047, 0.03142  # force to the side that lasts for PUSHED_S
 PUSHED_S = 120.0
-# of the other parameters from block to block, as a share of their prior's standard deviation: a sensor warms up
+# of the other parameters from block to block, as a share of their prior's standard deviation, because a sensor warms up
 DRIFT = np.full(PARAMETERS, 1e-4)
 DRIFT[OFFSET] = 0.15, 0.05, 0.05
-DRIFT_G = 0.0008  # g: of OFFSET besides, as of a sensor that warms up after its six positions
+# g: additional for OFFSET, for a sensor that warms up after its six positions, by 0.03 g within minutes
+DRIFT_G = 0.0015
 # Minus twice the logarithm of the prior probability. A light lasting wind is common, but its readings look like those
-# of a yielding mount, and mistaking that mount for wind costs more than the reverse: so its prior is low.
+# of a yielding mount. To mistake that mount for wind costs more than the reverse, so the prior of wind is low.
 YIELDS, WINDY, STORMY = 1.0, 8.0, 5.0
-WEIGHT = 0.25  # exponent of the likelihood: errors that no model has last, so that readings are not independent
-LEAST_SHARE = 0.02  # a hypothesis of less posterior weight is left out
+WEIGHT = 0.25  # exponent of the likelihood: errors outside the model last, so readings are not independent
+LEAST_SHARE = 0.02  # a hypothesis with less posterior weight is left out
 
 
 @dataclass
@@ -53,7 +54,7 @@ class Hypotheses:
         )
 
     def first(self) -> "Hypotheses":
-        """The first hypothesis alone, with the weight 1."""
+        """Only the first hypothesis, with weight 1."""
         return self.select(np.zeros(1, dtype=np.intp), np.ones(1))
 
     def weighted(self, blocks: Reduced, prior: Prior, parameters: Array, unbalance: float) -> "Hypotheses":
@@ -69,8 +70,9 @@ class Hypotheses:
         return self.select(kept, weight[kept] / np.sum(weight[kept]))
 
     def random_walks(self, prior: Prior, parameters: Array) -> RandomWalks:
-        """Of the estimated parameters, for the solver: prior by each hypothesis, variances of the random walk from
-        block to block, and the parameters' own differences between blocks. parameters: see weighted()."""
+        """The random walks of the estimated parameters for the solver: prior by each hypothesis, variances of the
+        random walk from block to block, and the parameters' current differences between blocks. parameters: see
+        weighted()."""
         unknown = prior.unknown
         sigma = np.tile(prior.sigma, (len(self.weight), 1))
         sigma[:, BESIDE] = np.hypot(sigma[:, BESIDE], self.pushed)

@@ -1,4 +1,4 @@
-"""The smoothed lean of a recorded ride: at each instant from all readings, earlier and later ones."""
+"""Computes the smoothed lean of a recorded ride: at each instant from all readings, earlier and later ones."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from ..calibration.file import CalibrationFile
 from ..common.errors import InputError
 from ..logs.csv_lines import write_lean
 from ..logs.log import Block, Table, within
-from ..logs.reader import Source, apart, read_blocks
+from ..logs.reader import Source, read_blocks, split_stretch
 from ..logs.source import Progress, name_of
 from ..refusals import WRONG_AXES, WRONG_MOUNT
 from ..signals import Array, Bools
@@ -24,20 +24,22 @@ from .windows import Windows, windows_of
 
 SLOWEST_HZ = 10.0
 SEGMENT_S = 120.0  # a log is cut into segments of this length
-TOGETHER = 8  # so many segments are estimated together, with one before and one after them
-# Further standard deviations of the lean: times the lean, for errors that the model leaves out, such as the gyro's
-# sensitivity to acceleration; times the roll rate, for the delay of the gyro's low-pass and the samples' times
-LEANED_SHARE = 0.004
-TIMING_S = 0.004  # s
+TOGETHER = 8  # this many segments are estimated together, with one before and one after them
+# Further standard deviations of the lean. LEANED_SHARE: times the lean, for errors outside the model, such as the
+# gyro's sensitivity to acceleration. TIMING_S: times the roll rate, for the delay of the gyro's low-pass and errors of
+# the samples' times
+LEANED_SHARE = 0.001
+TIMING_S = 0.002  # s
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps", "doubtful")
 DIGITS = 3, 3, 3, 3, 0
-DOUBTFUL = 0.2  # share of the riding; more is remarked
-# Largest lean in which a bike is in balance on straights, if the upright pose was right and no luggage sits on one side
+DOUBTFUL = 0.2  # share of the riding; a larger share gives a remark
+# Largest lean at which a bike is in balance on straights, if the upright pose was right and there is no luggage on one
+# side
 POSE_DEG = 1.8
-# An error of the gyro that comes out at over so many standard deviations of its prior is no sound gyro's, of which none
-# was over 2.6 on good and bad mounts. Then the lean's standard deviation grows by that factor.
+# An estimated error of the gyro over this many standard deviations of its prior means a faulty gyro: no sound one was
+# over 2.6 on good and bad mounts. Then the lean's standard deviation grows by that factor.
 ODD_SIGMAS = 4.0
-CAUSES = WRONG_AXES | WRONG_MOUNT  # reasons why accelerations do not fit a bike: then nothing is said of the pose
+CAUSES = WRONG_AXES | WRONG_MOUNT  # reasons why accelerations do not fit a bike: then there is no remark about the pose
 
 
 @dataclass(eq=False)
@@ -46,7 +48,7 @@ class SmoothedRide(Table):
 
     t_s: seconds since the log's first sample. lean_deg: > 0 to the right. lean_sigma_deg: its standard deviation.
     pitch_deg: of road and suspension, > 0 nose up. speed_mps: of the sensor, forward. doubtful: 1 where accelerations
-    are so far from a bike's that the lean is less exact, else 0. notices: what is remarkable in the ride
+    differ so much from a bike's that the lean is less exact, otherwise 0. notices: remarks about the ride
     (kickstand_tools.refusals.sentence puts a notice into words).
     """
 
@@ -60,11 +62,10 @@ class SmoothedRide(Table):
 
 
 def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None = None) -> SmoothedRide:
-    """The lean of a motorcycle from all readings of its ride, with a standard deviation for each sample.
+    """Compute the lean of a motorcycle from all readings of its ride, with a standard deviation for each sample.
 
-    log: see read_log; a speed helps and is optional. calibration: aligned, of a motorcycle. progress: called with how
-    much of the log is done and how much there is. Least squares over the whole ride: see equations.py. Raises
-    InputError.
+    log: see read_log; a speed helps and is optional. calibration: aligned, of a motorcycle. progress: called with
+    (done, total) of the log. Least squares over the whole ride: see equations.py. Raises InputError.
 
     >>> from kickstand_tools.api import CalibrationFile, Log, simulate_ride
     >>> ride = simulate_ride("street", seed=1, seconds=60.0)
@@ -93,9 +94,8 @@ def smooth_to_csv(
 def _checked_blocks(
     log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
 ) -> Iterator[tuple[Block, Array]]:
-    """smooth_blocks() of the stretch that `log` names. Raises InputError, also for under SLOWEST_HZ samples a
-    second."""
-    whole, stretch = apart(log)
+    """smooth_blocks() of the stretch in `log`. Raises InputError, also for under SLOWEST_HZ samples per second."""
+    whole, stretch = split_stretch(log)
     for block, found in smooth_blocks(whole, calibration, progress, notices):
         if found is None:
             raise InputError(f"{name_of(log)}: under {SLOWEST_HZ:.0f} samples a second: too few to smooth the lean")
@@ -109,8 +109,8 @@ def smooth_blocks(
     notices: list[Notice] | None = None,
     lines: bool = True,
 ) -> Iterator[tuple[Block, Array | None]]:
-    """Each segment of the log with its values (n, COLUMNS), None where there are too few samples a second. notices,
-    lines: of read_blocks(). Raises InputError."""
+    """Yield each segment of the log with its values (n, COLUMNS), None for too few samples per second. notices, lines:
+    see read_blocks(). Raises InputError."""
     if calibration.vehicle == "car":
         raise InputError(f"{name_of(log)}: a car does not lean, and its calibration is a car's")
     if not calibration.aligned:
@@ -123,7 +123,7 @@ def smooth_blocks(
         if len(waiting) > TOGETHER:
             past, waiting, before = waiting[:TOGETHER], waiting[TOGETHER:], past[-1:]
             yield from smoother.together(before, past, waiting)
-    # the end of a ride may be short: segments before it are estimated with it, up to TOGETHER
+    # the end of a ride may be short: earlier segments are estimated with it, up to TOGETHER
     yield from smoother.together(past[-max(1, TOGETHER - len(waiting)) :], waiting, [])
     if notices is not None:
         notices.extend(smoother.remarks(notices))
@@ -139,8 +139,8 @@ def _segments(blocks: Iterator[Block]) -> Iterator[Block]:
 
 
 class Smoother:
-    """Smooths a ride segment by segment, and collects what is to be remarked on: errors that the standard deviation
-    does not contain, or only in part."""
+    """Smooths a ride segment by segment, and collects remarks about errors that the standard deviation does not fully
+    contain."""
 
     def __init__(self, calibration: CalibrationFile) -> None:
         self._calibration = calibration
@@ -150,7 +150,7 @@ class Smoother:
     def together(
         self, before: list[Block], own: list[Block], after: list[Block]
     ) -> Iterator[tuple[Block, Array | None]]:
-        """Each of the segments `own` with its values, estimated together with those before and after them."""
+        """Yield each of the segments `own` with its values, estimated together with those before and after them."""
         measured = [segment.measured for segment in (*before, *own, *after)]
         ends = np.cumsum([0, *(len(segment.time_us) for segment in measured)])
         first = int(ends[len(before)])
@@ -167,8 +167,8 @@ class Smoother:
             yield segment, found
 
     def estimated(self, segments: list[Block], own: slice) -> Array | None:
-        """(samples, COLUMNS), NaN where the readings are not a ride's; None for under SLOWEST_HZ samples a second. own:
-        the samples whose lean this call is for, between those that only help to find it; remarks count these alone."""
+        """(samples, COLUMNS), NaN where the readings are not a ride's; None for under SLOWEST_HZ samples per second.
+        own: the samples whose lean is wanted; the others only help to find it. Remarks count only these."""
         t_s = np.concatenate([segment.t_s for segment in segments])
         readings = np.concatenate([segment.readings for segment in segments])
         speed = np.concatenate([segment.speed_mps for segment in segments])
@@ -183,9 +183,10 @@ class Smoother:
             warm = np.interp(t_s, t_s[there], readings[there, 3]) - self._start_c
         force, rate = self._calibration.in_vehicle(readings)
         rate = np.radians(rate)
-        windows = windows_of(t_s, force, rate, speed, warm)
+        windows = windows_of(t_s, force, rate, speed, warm, aligned=True)
         try:
-            estimate = Estimate(windows, Prior.of_pose(self._calibration.six_done), ALL)
+            prior = Prior.of_pose(self._calibration.six_done, self._calibration.gyro_sigma_in_vehicle())
+            estimate = Estimate(windows, prior, ALL)
         except np.linalg.LinAlgError:
             return nothing  # readings that are not a ride's
         noise, mine = estimate.noise, np.unique(windows.number[own])
@@ -201,15 +202,15 @@ class Smoother:
         return found
 
     def add(self, seconds: Array, riding: Bools, doubtful: Bools, pose_rad: float) -> None:
-        """Count n windows of so many seconds. doubtful: True where accelerations are not the bike's. pose_rad: lean to
-        the right, by the upright pose, in which the bike is in balance on straights."""
+        """Count n windows. seconds: their durations. doubtful: True where accelerations are not the bike's. pose_rad:
+        lean to the right, relative to the upright pose, at which the bike is in balance on straights."""
         riding_s = float(np.sum(seconds[riding]))
         self._riding_s += riding_s
         self._doubtful_s += float(np.sum(seconds[riding & doubtful]))
         self._leaned += riding_s * float(np.degrees(pose_rad))
 
     def remarks(self, known: Iterable[Notice]) -> list[Notice]:
-        """Those about the whole ride. known: what is remarked of it already."""
+        """The remarks about the whole ride. known: existing remarks about it."""
         if not self._riding_s or any(notice.code in CAUSES for notice in known):
             return []
         if self._odd:
@@ -228,7 +229,7 @@ def at_samples(windows: Windows, rate: Array, found: Estimate, delay_s: float) -
     """(samples, 4): lean, its standard deviation, pitch (rad) and speed (m/s). Between the edges of the windows the
     corrected gyro gives the lean.
 
-    rate (samples, 3): rad/s, as windows_of() took it. delay_s: delay of the gyro's low-pass.
+    rate (samples, 3): rad/s, the one passed to windows_of(). delay_s: delay of the gyro's low-pass.
     """
     number, sigma = windows.number, found.sigma()[:, LEAN]
     duration = windows.before + windows.after
@@ -236,7 +237,7 @@ def at_samples(windows: Windows, rate: Array, found: Estimate, delay_s: float) -
     window = np.cumsum(last) - last
 
     def integral(rate: Array) -> tuple[Array, Array]:
-        """The integral of rate (samples) from the begin of a sample's window to the sample, and over that window."""
+        """The integral of rate (samples) from the start of a sample's window to the sample, and over that window."""
         until = np.cumsum(rate * duration)
         edges = np.concatenate(([0.0], until[last]))
         return until - rate * windows.after - edges[window], np.diff(edges)[window]

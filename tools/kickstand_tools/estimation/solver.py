@@ -1,11 +1,11 @@
-"""Linear least squares over a chain of states, with parameters that follow a random walk from block to block.
+"""Solves linear least squares over a chain of states, with parameters that follow a random walk from block to block.
 
-The windows of a ride are laid side by side as B blocks of K windows. A link holds the normal equations of two states
-that follow one another, and their columns for the parameters of the block and for the right-hand side. Every second
-state is eliminated by its Schur complement, in all blocks at the same time, until one link of each block is left
-(cyclic reduction). The blocks then are a chain themselves, of states that are a block's first state together with its
-parameters. The same elimination solves it, for G hypotheses about the random walk at the same time, and gives the
-likelihood of each. The result is that of one least squares over the whole chain.
+The windows of a ride are arranged as B blocks of K windows. A link holds the normal equations of two successive states,
+with columns for the parameters of the block and for the right-hand side. Every second state is eliminated by its Schur
+complement, in all blocks at the same time, until one link per block is left (cyclic reduction). The blocks then form a
+chain, whose states are a block's first state together with its parameters. The same elimination solves this chain, for
+G hypotheses about the random walk at the same time, and gives the likelihood of each. The result equals that of one
+least-squares solution over the whole chain.
 """
 
 from dataclasses import dataclass
@@ -20,10 +20,10 @@ class Reduced:
     """B chains whose inner states are eliminated. s: number of values of a state; m: number of a chain's parameters.
 
     One array per level of the elimination, the first level first: gains (B, states, s, s + s + m + 1): a state's change
-    is minus this times (the state before, the state after, the parameters, 1); covariances (B, states, s, s): those of
-    a state, given these. left (B, s + s + m, s + s + m + 1): the normal equations of the first state, the last one and
-    the parameters; the last column is the gradient. log_determinant (B): that of the information matrix of the
-    eliminated states. residual (B): the sum of squares at their optimum.
+    is minus this times (the previous state, the next state, the parameters, 1); covariances (B, states, s, s): the
+    covariance of a state, given these. left (B, s + s + m, s + s + m + 1): the normal equations of the first state, the
+    last one and the parameters; the last column is the gradient. log_determinant (B): that of the information matrix of
+    the eliminated states. residual (B): the sum of squares at their optimum.
     """
 
     s: int
@@ -36,8 +36,8 @@ class Reduced:
 
 def reduce_windows(jacobian: Array, states: int) -> Reduced:
     """Eliminate the inner states of B blocks of K windows. jacobian (B, K, r, s + s + m + 1): derivatives of a window's
-    r residuals by the state at its begin, that at its end and the parameters, then the residuals themselves. states: s.
-    Raises LinAlgError."""
+    r residuals by the state at its start, the state at its end and the parameters, then the residuals themselves.
+    states: s. Raises LinAlgError."""
     links = np.matmul(jacobian[..., : 2 * states].transpose(0, 1, 3, 2), jacobian)
     common = _in_rows(jacobian[..., 2 * states :])
     return _reduced(links, np.matmul(common.transpose(0, 2, 1), common))
@@ -93,7 +93,7 @@ def covariances(reduced: Reduced, joint: Array) -> Array:
     """(B, K, s + s, s + s + m): covariance of the states at both ends of each link, with each other and with the
     parameters. joint (B, s + s + m, s + s + m): that of the first state, the last one and the parameters."""
     s, width = reduced.s, joint.shape[1]
-    ends = np.r_[:s, 2 * s : 3 * s]  # rows of the outer two of the three states of two links
+    ends = np.r_[:s, 2 * s : 3 * s]  # rows of the two outer states of two links, which have three states
     all_but_inner = np.r_[ends, 3 * s : width + s]
     found, common = joint[:, None, : 2 * s], joint[:, None, 2 * s :]
     for gain, own in zip(reversed(reduced.gains), reversed(reduced.covariances), strict=True):
@@ -129,11 +129,11 @@ class RandomWalks:
 
 
 def _chains(blocks: Reduced, walks: RandomWalks) -> tuple[Reduced, Array, Array]:
-    """G chains of blocks. The n = s + m values of a state are a block's first state and its parameters; those after the
-    last block are a copy.
+    """G chains of blocks. The n = s + m values of a state are a block's first state and its parameters; the values
+    after the last block are a copy.
 
     Returns the chains, the normal equations (G, 2 n, 2 n + 1) of both ends of each, and minus twice the log-likelihood
-    (G), less a constant common to all hypotheses.
+    (G), up to a constant common to all hypotheses.
     """
     (count, width), s = blocks.left.shape[:2], blocks.s
     hypotheses, n = len(walks.prior), width - s
@@ -162,7 +162,7 @@ def _squared(information: Array, gradient: Array) -> Array:
 
 
 def minus_two_log_likelihood(blocks: Reduced, walks: RandomWalks) -> Array:
-    """(G): minus twice the log-likelihood of the readings by each hypothesis, less a constant common to all."""
+    """(G): minus twice the log-likelihood of the readings under each hypothesis, up to a constant common to all."""
     return _chains(blocks, walks)[2]
 
 

@@ -18,8 +18,8 @@ GYRO = slice(3, 12)  # ratio: scale and cross-axis errors of the gyro, 3 x 3
 ACCEL = slice(12, 21)  # ratio: scale and cross-axis errors of the accelerometer, 3 x 3
 OFFSET = slice(21, 24)  # g: bias of the accelerometer
 HEIGHT, AHEAD = 24, 25  # m: the sensor's height above the roll axis, and its distance in front of the rear wheel
-TYRES = 26  # ratio: force to the side over (sin(lean) force up), because tyres touch the road beside their middle
-BESIDE = 27  # g: level force to the side that lasts, by wind; see hypotheses.py
+TYRES = 26  # ratio: force to the side over (sin(lean) force up): in a lean, tyres touch the road beside their middle
+BESIDE = 27  # g: lasting level force to the side, by wind; see hypotheses.py
 DELAY = 28  # s: delay of the log's speed
 DIVE = 29  # rad per g: pitch of the nose in braking, the share of (8) in the firmware's kickstand.lean.dive
 CAMBER = 30  # g: force to the side on straights, where a cambered road meets the tyres beside their middle
@@ -35,7 +35,9 @@ MEAN, SIGMA = np.zeros(PARAMETERS), np.zeros(PARAMETERS)
 SIGMA[ROTATION], SIGMA[GYRO] = np.radians([1.5, 5.0, 2.0]), 0.012
 SIGMA[OFFSET], SIGMA[UP_SCALE] = (0.001, 0.003, 0.003), 0.004
 SIGMA[OFFSET_PER_C], SIGMA[BIAS_PER_C] = 0.0003, np.radians(0.06)  # an ordinary sensor's; the sheet allows thrice that
-# OFFSET's and UP_SCALE's where the six positions were not done
+# ratio: change of the gyro's errors with temperature since the six positions have measured them, as in the firmware
+GYRO_DRIFT = 0.002
+# Sigmas of OFFSET and UP_SCALE without the six positions
 WITHOUT_SIX_G, WITHOUT_SIX_SCALE = 0.04, 0.015
 MEAN[HEIGHT], SIGMA[HEIGHT] = 0.5, 0.3
 MEAN[AHEAD], SIGMA[AHEAD] = 0.6, 0.5
@@ -43,7 +45,7 @@ MEAN[TYRES], SIGMA[TYRES] = 0.07, 0.06
 SIGMA[BESIDE] = 0.001
 SIGMA[CAMBER] = 0.0035  # ordinary tyres, whose TYRES is 0.12, on a road that falls to the side by 3 %
 MEAN[DELAY], SIGMA[DELAY] = 0.4, 0.4
-MEAN[DIVE], SIGMA[DIVE] = 0.026, 0.035  # none or, as of anti-dive forks, below 0, to 6 degrees per g
+MEAN[DIVE], SIGMA[DIVE] = 0.026, 0.035  # from none, or below 0 with anti-dive forks, to 6 degrees per g
 
 
 @dataclass
@@ -56,10 +58,15 @@ class Prior:
     posed: bool
 
     @classmethod
-    def of_pose(cls, six_done: bool) -> "Prior":
-        """The prior for a sensor that was aligned by poses. six_done: its accelerometer was calibrated by six
-        positions."""
+    def of_pose(cls, six_done: bool, gyro_sigma: Array | None = None) -> "Prior":
+        """The prior for a sensor that was aligned by poses.
+
+        six_done: its accelerometer was calibrated by six positions. gyro_sigma (3, 3): standard errors that they left
+        in the gyro's scale and axes, along left, up, forward; None or zeros where the gyro was not measured.
+        """
         sigma = SIGMA.copy()
+        if gyro_sigma is not None and np.any(gyro_sigma):
+            sigma[GYRO] = np.minimum(np.hypot(gyro_sigma, GYRO_DRIFT).ravel(), sigma[GYRO])
         if not six_done:
             sigma[OFFSET], sigma[UP_SCALE] = WITHOUT_SIX_G, WITHOUT_SIX_SCALE
         return cls(MEAN, sigma, True)
@@ -70,8 +77,8 @@ class Prior:
         return np.flatnonzero(self.sigma)
 
     def information(self, sigma: Array) -> Array:
-        """(m, m): information matrix (inverse covariance) of the prior with the standard deviations sigma (PARAMETERS),
-        which a hypothesis may have enlarged.
+        """(m, m): information matrix (inverse covariance) of the prior with the standard deviations sigma (PARAMETERS).
+        A hypothesis may have enlarged them.
 
         The upright pose was measured with a biased accelerometer. So the prior holds for the sum of misalignment and
         bias (the lean and pitch that the sensor reads in that pose), not for the misalignment alone.

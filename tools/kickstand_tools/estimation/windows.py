@@ -1,4 +1,4 @@
-"""A stretch of a ride as means over a fifth of a second, in which the vibration of the engine averages out."""
+"""A stretch of a ride as means over a fifth of a second, which average out the vibration of the engine."""
 
 from dataclasses import dataclass, replace
 
@@ -7,17 +7,17 @@ import numpy as np
 from ..signals import Array, Bools, Ints, cell_numbers, rotated
 from ..signals.leaning import WINDOW_S
 
-GAP_S = 0.17  # a longer step between two samples: readings are missing
+GAP_S = 0.17  # after a longer step between two samples, readings are missing
 
 
 @dataclass
 class Windows:
-    """n windows without gaps between them: where readings are missing, one window with `gap` True spans that time.
+    """n windows without gaps between them: one window with `gap` True spans a time of missing readings.
 
-    edges (n + 1, s): times of their begins and ends. rate (n, 3, rad/s), force (n, 3, g): means, along the vehicle's
-    axes. jolt (n, rad/s): largest difference of a sample's rate from that mean. speed (n, m/s): NaN where there is
-    none. warm (n, C): temperature less that at the begin of the log, 0 where unknown. gap (n): True without readings.
-    Per sample: number, the index of its window; before and after (s): the time that it stands for.
+    edges (n + 1, s): times of their starts and ends. rate (n, 3, rad/s), force (n, 3, g): means, along the vehicle's
+    axes. jolt (n, rad/s): largest difference of a sample's rate from that mean. speed (n, m/s): NaN for none. warm (n,
+    C): temperature minus that at the start of the log, 0 if unknown. gap (n): True without readings. Per sample:
+    number, the index of its window; before and after (s): the time that it represents.
     """
 
     edges: Array
@@ -59,7 +59,7 @@ class Windows:
         return replace(self, rate=rate, force=force)
 
     def padded(self, length: int) -> "Windows":
-        """A copy whose number of windows is a multiple of `length`: gaps of no duration are appended."""
+        """A copy whose number of windows is a multiple of `length`, with gaps of zero duration appended."""
         more = -len(self) % length
 
         def longer(values: Array, fill: float = 0.0) -> Array:
@@ -77,11 +77,13 @@ class Windows:
         )
 
 
-def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array) -> Windows:
-    """The Windows of samples: t_s (s), force (samples, 3, g), rate (samples, 3, rad/s), speed (m/s, NaN where there is
-    no new one), warm (C, see Windows).
+def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array, aligned: bool = False) -> Windows:
+    """The Windows of samples: t_s (s), force (samples, 3, g), rate (samples, 3, rad/s), speed (m/s, NaN for no new
+    one), warm (C, see Windows).
 
-    Each sample stands for the time until half way to its neighbours, so that the sum over a window is the integral.
+    Each sample represents the time until half way to its neighbours. So the sum over a window is the integral.
+    aligned: the axes are left, up, forward. Then each sample counts along the axes that left and up have in the middle
+    of its window: where a bike rolls by 20 degrees in a window, means along axes that roll are half a percent small.
     """
     step = np.diff(t_s)
     usual = float(np.median(step)) if len(step) else WINDOW_S
@@ -99,6 +101,11 @@ def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array)
 
     there = np.flatnonzero(~np.isnan(speed))
     place = np.searchsorted(starts, np.arange(len(t_s)), side="right") - 1
+    if aligned:
+        rolled = np.cumsum(rate[:, 2] * weight)
+        whole = np.add.reduceat(rate[:, 2] * weight, starts)
+        rolled -= 0.5 * rate[:, 2] * weight + (np.cumsum(whole) - 0.5 * whole)[place]
+        force, rate = _rolled_back(force, rolled), _rolled_back(rate, rolled)
     in_window = np.full(len(starts), np.nan)
     in_window[place[there]] = speed[there]
     mean_rate = mean(rate)
@@ -118,3 +125,10 @@ def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array)
         before,
         after,
     )
+
+
+def _rolled_back(vectors: Array, roll: Array) -> Array:
+    """vectors (samples, 3: left, up, forward) along the axes before the bike rolled to the right by roll (samples,
+    rad)."""
+    (left, up, forward), c, s = vectors.T, np.cos(roll), np.sin(roll)
+    return np.column_stack((c * left - s * up, s * left + c * up, forward))

@@ -1,1 +1,1 @@
-"""Converts recordings of other apps and loggers to logs: recognises the format, units and signs, joins the clocks."""
+"""Converts recordings of other apps and loggers to logs: recognises format, units and signs, and joins the clocks."""

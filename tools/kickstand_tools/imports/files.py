@@ -1,4 +1,4 @@
-"""The text files of a recording: one file, a folder of them, or a zip, in whatever encoding the app has written."""
+"""Reads the text files of a recording: one file, a folder or a zip, in any encoding that apps use."""
 
 import gzip
 import itertools
@@ -12,18 +12,17 @@ from typing import IO
 from ..common.errors import InputError, printable
 from ..logs.source import SUFFIXES, errors_of, open_input
 
-_EXCEL = b"\xd0\xcf\x11\xe0"  # first bytes of Excel's older files; the newer are zips
+_EXCEL = b"\xd0\xcf\x11\xe0"  # first bytes of Excel's older files; newer ones are zips
 # Largest recording as text: some hours at 100 Hz. Reading it takes at most ten times its memory.
 MOST_BYTES = 250_000_000
 MOST_FILES = 10_000  # most files in a folder or a zip
-LONGEST_LINE = 1_000_000  # characters of the longest line; a table of a thousand columns has a tenth of that
+LONGEST_LINE = 1_000_000  # characters of the longest line; a table of a thousand columns needs a tenth of this
 _BOMS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
 
 
 @dataclass
 class RecordingFile:
-    """One file of a recording. name: with its folders below what was given, parted by /. content: its bytes, unpacked.
-
+    """One file of a recording. name: its path below the given folder or zip, with /. content: its bytes, unpacked.
     text: the decoded content; lines end in a line feed.
     """
 
@@ -33,23 +32,24 @@ class RecordingFile:
 
     @property
     def folder(self) -> str:
-        """The folders of its name, "" for none."""
+        """The folder part of its name, "" for none."""
         return str(PurePosixPath(self.name).parent).removeprefix(".")
 
     @property
     def stem(self) -> str:
-        """The name without folders and suffix, in small letters."""
+        """The name without folders and suffix, in lower case."""
         return PurePosixPath(self.name.removesuffix(".gz")).stem.lower()
 
     def first_lines(self, count: int) -> list[str]:
-        """At most count lines of the text, without those that are blank."""
+        """At most count lines of the text, without blank ones."""
         return [line for line in self.text[: 1 << 16].split("\n") if line.strip()][:count]
 
 
 def read_files(source: Path | str) -> list[RecordingFile]:
-    """What a file, a folder or a zip holds; in the last two only files of SUFFIXES, and one zip that is all they hold.
+    """Read a file, a folder or a zip. Of the last two only files of SUFFIXES are read, or a zip that is their only
+    content.
 
-    Raises InputError for a source that is missing, damaged, empty, no text, or over MOST_BYTES when unpacked.
+    Raises InputError for a source that is missing, damaged, empty, not text, or over MOST_BYTES when unpacked.
     """
     path = Path(source)
     with errors_of(str(path)):
@@ -72,7 +72,7 @@ def _bounded(path: Path) -> Iterator[tuple[str, bytes]]:
 
 
 def _read(file: IO[bytes]) -> bytes:
-    """The content of a file, cut one byte after the limit, which shows that it is too large."""
+    """The content of a file, cut one byte after the limit: this byte shows that it is too large."""
     return file.read(MOST_BYTES + 1)
 
 
@@ -83,7 +83,7 @@ def _contents(path: Path) -> Iterator[tuple[str, bytes]]:
         yield from _unzipped(path) if zipped else [(path.name, _unpacked_file(path))]
         return
     whole = path.resolve()
-    # without those that a link in the folder has elsewhere
+    # without files outside the folder that a link leads to
     names = (file for file in path.rglob("*") if file.is_file() and file.resolve().is_relative_to(whole))
     names = sorted(itertools.islice(names, MOST_FILES + 1))
     if len(names) > MOST_FILES:
@@ -100,14 +100,18 @@ def _contents(path: Path) -> Iterator[tuple[str, bytes]]:
 
 def _unpacked_file(path: Path) -> bytes:
     with open_input(path) as file:
-        if path.suffix != ".gz":
-            return _read(file)
-        with gzip.GzipFile(fileobj=file) as unpacked:
-            return _read(unpacked)  # type: ignore[arg-type] - it has read()
+        return _without_gzip(path.name, file)
+
+
+def _without_gzip(name: str, file: IO[bytes]) -> bytes:
+    if not name.endswith(".gz"):
+        return _read(file)
+    with gzip.GzipFile(fileobj=file) as unpacked:
+        return _read(unpacked)  # type: ignore[arg-type] - it has read()
 
 
 def _check_directory(file: IO[bytes], path: Path) -> None:
-    """Refuse a zip whose directory, which zipfile reads whole, is larger than that of MOST_FILES files."""
+    """Refuse a zip with a directory larger than that of MOST_FILES files, because zipfile reads it whole."""
     size = file.seek(0, 2)
     file.seek(max(0, size - 65_557))
     _, mark, last = file.read().rpartition(b"PK\5\6")
@@ -129,19 +133,19 @@ def _unzipped(path: Path) -> Iterator[tuple[str, bytes]]:
 
 def _unpacked(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, path: Path) -> bytes:
     try:
-        # bzip2 and LZMA are unpacked whole, however little of it is read
+        # bzip2 and LZMA are unpacked whole, even if only a part is read
         if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise NotImplementedError
         with archive.open(entry) as file:
-            return _read(file)
+            return _without_gzip(entry.filename, file)
     except RuntimeError as error:  # NotImplementedError is one, too
         raise InputError(f"{path} is packed with a password, or in another way: unpack it first") from error
-    except (OSError, ValueError) as error:  # an entry that points outside the file
+    except (OSError, ValueError) as error:  # an entry that points out of the file
         raise zipfile.BadZipFile(str(error)) from error
 
 
 def _wanted(name: str) -> bool:
-    """A table by its name; neither hidden nor one of macOS's companions."""
+    """True for a table by its name: neither hidden nor one of macOS's companion files."""
     path = PurePosixPath(name)
     hidden = any(part.startswith((".", "__MACOSX")) for part in path.parts)
     return not hidden and name.lower().removesuffix(".gz").endswith(SUFFIXES)
@@ -156,7 +160,7 @@ def _no_text(path: Path) -> list[RecordingFile]:
 
 
 def _recording_file(name: str, content: bytes) -> RecordingFile | None:
-    """The Piece of a file; None if it is no text."""
+    """The RecordingFile of these bytes; None if they are not text."""
     if content.startswith(b"PAR1"):
         return RecordingFile(name, content, "")
     text = _decoded(content)
@@ -175,4 +179,4 @@ def _decoded(content: bytes) -> str:
     try:
         return content.decode(encoding or "utf-8")
     except UnicodeDecodeError:
-        return content.decode("cp1252", errors="replace")  # a degree sign of Windows
+        return content.decode("cp1252", errors="replace")  # for a degree sign from Windows

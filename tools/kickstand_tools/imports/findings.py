@@ -1,12 +1,13 @@
-"""Which columns of an unknown table are the time, the accelerometer and the gyro, and in which units: found from their
-names and, more than by these, from their values.
+"""Finds the time, the accelerometer and the gyro in an unknown table, and their units, from the columns' names and
+mainly from their values.
 
-* Three columns belong together if their names differ in the axis alone, or if they stand side by side without names.
-* The accelerometer's length is the same whenever it is calm: that of gravity, in some unit.
+* Three columns belong together if their names differ only in the axis, or if they are side by side without names.
+* The length of the acceleration is the same whenever the sensor is calm: that of gravity, in some unit.
 * The gyro's unit is the one in which its rates turn gravity's direction in the sensor (rate_fit.py).
-* The time's unit gives a sensor's usual number of samples per second.
+* The time's unit is the one that gives a usual number of samples per second.
 
-A finding says why, and whether it is certain. What is not certain is proposed, and the user is asked.
+A finding contains the reason, and whether it is certain. An uncertain finding is proposed to the user, who must confirm
+it.
 """
 
 import re
@@ -37,7 +38,7 @@ from .units import (
 ACCEL, GYRO = ("ax", "ay", "az"), ("gx", "gy", "gz")
 REQUIRED = ("t", *ACCEL, *GYRO)
 OPTIONAL = ("speed", "lat", "lon", "temp")
-_KINDS = {  # of sensors, by the words that their columns' names are made of
+_KINDS = {  # of sensors, by the words in their columns' names
     "linear": r"lin|user|withoutgravity|nograv",
     "gravity": r"grav",
     "other": r"mag|compass|orient|euler|quat|angle|roll|pitch|yaw|azimuth|^[bmqh]$|^mg?$|press|baro",
@@ -49,16 +50,17 @@ _TIME = re.compile(r"time|milli|micro|^(t|ts|ms|us|ns|s|sec|secs|seconds|elapsed
 _CLOCK = re.compile(r"\s*(\d{4}-\d\d-\d\d.)?\d{1,2}:\d\d")
 _COUNTER = re.compile(r"^(no|nr|n|i|index|count|counter|record|sample|frame|id|row)$")
 CALM_S = 0.5  # duration over which a length is calm
-CALMEST = 0.2  # share of the samples that are taken for calm
-NEAR = 1.3  # largest factor between a calm length and gravity's in a unit: clones and rough rides are that far off
+CALMEST = 0.2  # share of the samples that count as calm
+NEAR = 1.3  # largest factor between a calm length and gravity in a unit: clones and rough rides differ so much
 NOISE_DPS = 0.1  # of a gyro at rest, standard deviation
-LINEAR = 0.35  # of a length without gravity the mean vector is a smaller share
+LINEAR = 0.35  # without gravity the mean vector is a smaller share of the mean length
 _SLOWEST_S, _QUICKEST_S = 1.0, 1e-4  # between samples of a recording
 
 
 @dataclass
-class Finding:
-    """columns: the names in the table. unit: of them. why: in words. certain: False where the user should look."""
+class ColumnFinding:
+    """columns: the names in the table. unit: their unit. why: the reason in words. certain: False if the user should
+    check it."""
 
     columns: list[str]
     unit: str = ""
@@ -68,18 +70,18 @@ class Finding:
 
 @dataclass
 class Findings:
-    """What each quantity is: "t", "a", "g", "speed", "lat", "lon", as far as it is found. lacking: the quantities that
-    are needed and missing, in words. single: columns of single axes, by the keys of REQUIRED, of a sensor that lacks
-    another axis. remarks: what is wrong with the columns that are there."""
+    """The finding of each quantity that was found: "t", "a", "g", "speed", "lat", "lon". lacking: the required
+    quantities that are missing, in words. single: columns of single axes, by the keys of REQUIRED, of a sensor that
+    lacks another axis. remarks: problems of the existing columns."""
 
-    found: dict[str, Finding] = field(default_factory=dict)
+    found: dict[str, ColumnFinding] = field(default_factory=dict)
     lacking: list[str] = field(default_factory=list)
     single: dict[str, str] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
 
     @property
     def decided(self) -> bool:
-        """True if nothing that is needed is missing or uncertain."""
+        """True if all required quantities are found and certain."""
         return not self.lacking and all(self.found[key].certain for key in ("t", "a", "g"))
 
     @property
@@ -98,12 +100,12 @@ class Findings:
 
     @property
     def reasons(self) -> str:
-        """Why, in one sentence per quantity."""
+        """The reasons, one sentence per quantity."""
         return "; ".join(f"{key}: {finding.why}" for key, finding in self.found.items() if finding.why)
 
 
 def find(sheet: Sheet) -> Findings:
-    """What the columns of a table are."""
+    """Find the quantities in the columns of a table."""
     findings = Findings()
     time = _time(sheet)
     if time is None:
@@ -131,8 +133,8 @@ def find(sheet: Sheet) -> Findings:
 # Time
 
 
-def _time(sheet: Sheet) -> Finding | None:
-    """The column of the time: one that increases, by name if there are several; of these the finest."""
+def _time(sheet: Sheet) -> ColumnFinding | None:
+    """The column of the time: an increasing one. Of several, the ones with such a name count; of these, the finest."""
     usable = []
     for place, name in enumerate(sheet.columns):
         named = bool(_TIME.search(plain(name.rpartition(":")[2])))
@@ -149,7 +151,7 @@ def _time(sheet: Sheet) -> Finding | None:
         if len(steps) < 2 or np.mean(steps >= 0.0) < 0.95 or good[-1] <= good[0]:
             continue
         if not named and (_COUNTER.match(plain(name)) or np.all(np.diff(sheet.numbers(place)) == 1.0)):
-            continue  # a number of each row
+            continue  # this column numbers the rows
         usable.append((named, len(np.unique(good)) > 0.5 * len(good), not text, -place))
     if not usable:
         return None
@@ -159,11 +161,11 @@ def _time(sheet: Sheet) -> Finding | None:
     numbers = sheet.numbers(place)
     found = time_unit(sheet.cells[place])
     if stated in ("s", "ms", "us", "ns") and _step_fits(numbers, stated):
-        return Finding([name], stated, f"{name} says {stated}")
+        return ColumnFinding([name], stated, f"{name} says {stated}")
     if found == DATES:
-        return Finding([name], "", "dates or times of day")
+        return ColumnFinding([name], "", "dates or times of day")
     hz = 1.0 / max(_mean_step(numbers) * _SECONDS[found], 1e-9)
-    return Finding([name], found, f"in {found} it is {hz:.3g} samples per second")
+    return ColumnFinding([name], found, f"in {found} it is {hz:.3g} samples per second")
 
 
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -179,8 +181,8 @@ def _step_fits(numbers: Array, name: str) -> bool:
     return _QUICKEST_S / 2.0 < _mean_step(numbers) * _SECONDS[name] < _SLOWEST_S
 
 
-def _seconds(sheet: Sheet, time: Finding | None) -> Array | None:
-    """(n) times from the first, s; None without a time."""
+def _seconds(sheet: Sheet, time: ColumnFinding | None) -> Array | None:
+    """(n) seconds since the first time; None without a time column."""
     if time is None:
         return None
     ns = sheet.times(sheet.columns.index(time.columns[0]), time.unit)
@@ -193,7 +195,7 @@ def _seconds(sheet: Sheet, time: Finding | None) -> Array | None:
 
 @dataclass
 class _Three:
-    """Three columns, one per axis. kind: a key of _KINDS, "" if their names say nothing."""
+    """Three columns, one per axis. kind: a key of _KINDS, "" if their names do not show it."""
 
     stem: str
     places: list[int]
@@ -221,7 +223,7 @@ def _threes(sheet: Sheet) -> list[_Three]:
 
 
 def _single(sheet: Sheet, key: str, kind: str) -> dict[str, str]:
-    """The columns of single axes that are named as those of a sensor of this kind."""
+    """The columns of single axes whose names fit a sensor of this kind."""
     named = [(stem, axis, name) for name in sheet.columns for stem, axis in _stems(name)]
     return {key + axis: name for stem, axis, name in reversed(named) if axis in "xyz" and _kind(stem) == kind}
 
@@ -231,7 +233,7 @@ def _numeric(sheet: Sheet, places: Sequence[int]) -> bool:
 
 
 def _numbered(axes: dict[str, int]) -> list[list[str]]:
-    """Axes that are numbers, three by three: data1 to data3, data4 to data6."""
+    """Groups of three axes that are numbered: data1 to data3, data4 to data6."""
     numbers = sorted((axis for axis in axes if axis.isdigit()), key=int)
     if len(numbers) % 3 or not numbers or int(numbers[-1]) - int(numbers[0]) != len(numbers) - 1:
         return []
@@ -239,7 +241,7 @@ def _numbered(axes: dict[str, int]) -> list[list[str]]:
 
 
 def _side_by_side(sheet: Sheet) -> list[_Three]:
-    """Without names that say anything: the first six columns side by side that are no time, three by three."""
+    """Two groups without meaningful names: the first six columns side by side that are not a time."""
     numeric = [
         place
         for place in range(len(sheet.columns))
@@ -256,7 +258,7 @@ def _increasing(sheet: Sheet, place: int) -> bool:
 
 
 def _stems(name: str) -> Iterable[tuple[str, str]]:
-    """(name without its axis, axis) for each way in which a name can name one."""
+    """(name without its axis, axis) for each way to read an axis in a name."""
     bare = _without_unit(name)
     sensor, colon, bare = bare.rpartition(":")
     words = re.sub(r"axis|[^a-z0-9]+", " ", bare.lower()).split()
@@ -275,7 +277,7 @@ def _stems(name: str) -> Iterable[tuple[str, str]]:
 
 
 def _without_unit(name: str) -> str:
-    """A name without its unit: in brackets at its end, or behind the last _."""
+    """A name without its unit, which is in brackets at its end or after the last _."""
     bare = re.sub(r"[(\[]([^)\]]*)[)\]]\s*$", lambda found: "" if _is_unit(found[1]) else " " + found[1], name)
     head, mark, last = bare.rpartition("_")
     return head if mark and _is_unit(last) and len(head) > 1 else bare
@@ -315,7 +317,7 @@ def _kind(stem: str) -> str:
 
 
 def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> None:
-    """Find both, and what is missing."""
+    """Add both to findings, and note what is missing."""
     threes = _threes(sheet)
     kinds = {kind: [three for three in threes if three.kind == kind] for kind in (*_KINDS, "")}
     unnamed = [*kinds["either"], *kinds[""]]
@@ -337,7 +339,7 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
         findings.lacking.append("gyro")
         return
     names = _names(sheet, rates)
-    findings.found["g"] = Finding(names, stated_unit(names[0]), "by name", False)
+    findings.found["g"] = ColumnFinding(names, stated_unit(names[0]), "by name", False)
     if accel is not None:
         found = gyro(accel.values, rates.values, findings.found["a"], seconds, stated_unit(names[0]))
         found.columns = names
@@ -349,7 +351,7 @@ def _names(sheet: Sheet, three: _Three) -> list[str]:
 
 
 def _first_with_gravity(threes: Sequence[_Three], seconds: Array | None) -> _Three | None:
-    """The first group whose length is gravity's in some unit, else the first that keeps its length."""
+    """The first group whose length is that of gravity in some unit, otherwise the first that keeps its length."""
     return next(
         (three for three in threes if _has_gravity(three, seconds, near=True)),
         next((three for three in threes if _has_gravity(three, seconds, near=False)), None),
@@ -357,8 +359,8 @@ def _first_with_gravity(threes: Sequence[_Three], seconds: Array | None) -> _Thr
 
 
 def _has_gravity(three: _Three, seconds: Array | None, near: bool) -> bool:
-    """True if gravity is in these values: they keep a length while they are calm, and hardly ever come near 0. near:
-    the length is that of gravity in some unit; else it must be kept more exactly."""
+    """True if these values contain gravity: their length is constant while they are calm, and hardly ever near 0. near:
+    the length is that of gravity in some unit; otherwise it must be more constant."""
     values = three.values[np.all(np.isfinite(three.values), axis=1)]
     if len(values) < 3:
         return False
@@ -372,7 +374,7 @@ def _has_gravity(three: _Three, seconds: Array | None, near: bool) -> bool:
 
 
 def _rows_in(span_s: float, seconds: Array | None, count: int) -> int:
-    """Number of rows in span_s; of an unknown time a fiftieth of all."""
+    """Number of rows in span_s; without a time column, a fiftieth of all rows."""
     if seconds is None or not np.any(np.isfinite(seconds)):
         return max(1, min(25, count // 10))
     span = float(np.nanmax(seconds) - np.nanmin(seconds))
@@ -380,7 +382,7 @@ def _rows_in(span_s: float, seconds: Array | None, count: int) -> int:
 
 
 def calm_length(values: Array, seconds: Array | None) -> float:
-    """Median length of vectors (n, 3) while they are calm: while their length changes least."""
+    """Median length of vectors (n, 3) while they are calm, which means while their length changes least."""
     values = values[np.all(np.isfinite(values), axis=1)]
     lengths = np.linalg.norm(values, axis=1)
     spread = moving_spread(lengths, _rows_in(CALM_S, seconds, len(values)))
@@ -393,8 +395,9 @@ def _gravities() -> dict[str, float]:
     return gravities | {f"counts/{size:g}": size for size in COUNTS_PER_G}
 
 
-def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> Finding:
-    """The unit of accelerations (n, 3), by the length of gravity. stated: the unit in their names. columns: empty."""
+def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> ColumnFinding:
+    """Find the unit of accelerations (n, 3) from the length of gravity. stated: the unit in their names. The finding's
+    columns are empty."""
     length = calm_length(values, seconds)
     whole = _are_whole(values)
     gravities = {name: size for name, size in _gravities().items() if whole or not name.startswith("counts")}
@@ -402,10 +405,10 @@ def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> Fin
     off = max(length / gravities[near], gravities[near] / length)
     why = f"gravity at rest is {length:.4g} long"
     if stated in gravities and max(length / gravities[stated], gravities[stated] / length) < NEAR:
-        return Finding([], stated, f"{why}, as its name says")
+        return ColumnFinding([], stated, f"{why}, as its name says")
     if near.startswith("counts"):
         why += f": raw counts of a sensor with {near.partition('/')[2]} counts (LSB) per g"
-    return Finding([], near, why, off < NEAR and stated in ("", near, "counts"))
+    return ColumnFinding([], near, why, off < NEAR and stated in ("", near, "counts"))
 
 
 def _are_whole(values: Array) -> bool:
@@ -413,41 +416,42 @@ def _are_whole(values: Array) -> bool:
     return len(good) > 0 and bool(np.all(good == np.rint(good))) and float(np.max(np.abs(good))) > 20.0
 
 
-def gyro(force: Array, rates: Array, accel: Finding, seconds: Array | None, stated: str = "") -> Finding:
-    """The unit of rates (n, 3): by the turns of gravity, by their names, else by size. accel: the finding of the
-    accelerometer. columns: empty."""
+def gyro(force: Array, rates: Array, accel: ColumnFinding, seconds: Array | None, stated: str = "") -> ColumnFinding:
+    """Find the unit of rates (n, 3): from the turns of gravity, from their names, otherwise from their size. accel: the
+    finding of the accelerometer. The finding's columns are empty."""
     fit = RateFit() if seconds is None else fit_rates(seconds, force, rates)
     candidates = gyro_units(rates, accel)
     by_fit = fit.unit_among(candidates)
     if stated in RATES:
         also = f", and so do the turns of gravity: {by_fit}" if by_fit == stated else ""
         against = f", but gravity turns as by {by_fit}" if by_fit not in ("", stated) else ""
-        return Finding([], stated, f"its name says so{also}{against}", not against)
+        return ColumnFinding([], stated, f"its name says so{also}{against}", not against)
     if by_fit:
-        return Finding([], by_fit, "in it the rates turn gravity as it turns")
+        return ColumnFinding([], by_fit, "in it the rates turn gravity as it turns")
     if "deg/s" not in candidates:
         usual = f"counts/{_usual_counts(accel):g}"
-        return Finding(
+        return ColumnFinding(
             [], usual, "raw counts whose range nothing shows: the usual one with this accelerometer's", False
         )
-    return Finding([], *_by_size(rates, force), certain=False)
+    return ColumnFinding([], *_by_size(rates, force), certain=False)
 
 
-def gyro_units(rates: Array, accel: Finding) -> dict[str, float]:
-    """The units that rates (n, 3) can be in, with their factors to deg/s: counts beside those of an accelerometer."""
+def gyro_units(rates: Array, accel: ColumnFinding) -> dict[str, float]:
+    """The possible units of rates (n, 3), with their factors to deg/s. Counts are possible if the accelerometer has
+    counts."""
     if counts_per(accel.unit) and _are_whole(rates):
         return {f"counts/{size:g}": 1.0 / size for size in COUNTS_PER_DPS}
     return dict(RATES)
 
 
-def _usual_counts(accel: Finding) -> float:
-    """Counts per deg/s of an MPU6050 whose accelerometer has this unit: both ranges are usually set alike."""
+def _usual_counts(accel: ColumnFinding) -> float:
+    """Counts per deg/s of an MPU6050 whose accelerometer has this unit: usually both ranges have the same setting."""
     size = counts_per(accel.unit)
     return COUNTS_PER_DPS[COUNTS_PER_G.index(size)] if size in COUNTS_PER_G else COUNTS_PER_DPS[0]
 
 
 def _by_size(rates: Array, force: Array) -> tuple[str, str]:
-    """A likely unit and why: by the largest rates of a ride, by the noise of a sensor at rest."""
+    """A likely unit and the reason: from the largest rates of a ride, or from the noise of a sensor at rest."""
     good = rates[np.all(np.isfinite(rates), axis=1)]
     length = np.linalg.norm(good - np.median(good, axis=0), axis=1)
     most, noise = float(np.percentile(length, 90.0)), float(np.median(np.std(good, axis=0)))
@@ -464,7 +468,7 @@ def _by_size(rates: Array, force: Array) -> tuple[str, str]:
 # Speed and position
 
 
-def _speed(sheet: Sheet) -> Finding | None:
+def _speed(sheet: Sheet) -> ColumnFinding | None:
     for place, name in enumerate(sheet.columns):
         bare = plain(name)
         if re.search(r"speed|velocity|kmh|kph", bare) and not re.search(
@@ -474,16 +478,16 @@ def _speed(sheet: Sheet) -> Finding | None:
                 continue
             stated = stated_unit(name)
             stated = stated if stated in SPEEDS else next((u for w, u in _SPEED_WORDS if w in bare), "")
-            return Finding([name], stated, "by its name", bool(stated))
+            return ColumnFinding([name], stated, "by its name", bool(stated))
     return None
 
 
 _SPEED_WORDS = (("kmh", "km/h"), ("kph", "km/h"), ("mph", "mph"), ("mps", "m/s"), ("knot", "knots"))
 
 
-def _named(sheet: Sheet, words: str) -> Finding | None:
+def _named(sheet: Sheet, words: str) -> ColumnFinding | None:
     for place, name in enumerate(sheet.columns):
         bare = plain(name)
         if re.search(words, bare) and "acc" not in bare and np.any(np.isfinite(sheet.numbers(place))):
-            return Finding([name], "", "by its name")
+            return ColumnFinding([name], "", "by its name")
     return None

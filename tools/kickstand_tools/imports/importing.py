@@ -1,4 +1,4 @@
-"""Imports a recording of another app or logger: finds its format, joins its sensors on one clock, checks and writes
+"""Imports a recording of another app or logger: finds its format, joins its sensors on one clock, checks it and writes
 it."""
 
 from collections.abc import Mapping
@@ -21,26 +21,27 @@ from . import mapped
 from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, sensor_logger, sensorlog, vbo
 from .files import RecordingFile, read_files
 from .join import GAP_NS, join
-from .recording import Recording, Taken
+from .recording import AppRecording, Taken
 from .units import ACCELERATIONS, factor
 
-# Each is a module with NAME, the app's; finds(files): one list of files for each recording of this app among them; and
-# read(files, name): such a list's Recording (see recording.py), or InputError. If it has ASKS, the quantities whose
-# unit the user may give, it is read(files, name, units). Each is asked about the files that none before it has claimed:
-# phyphox, which goes by names of columns, is last.
+# Each is a module with NAME, the app's name; find_recordings(files), which returns one list of files per recording of
+# this app; and read(files, name), which returns the AppRecording of such a list (see recording.py) or raises
+# InputError.
+# If the module has ASKS, the quantities whose unit the user may give, its function is read(files, name, units). Each
+# module gets the files that no earlier module has claimed. phyphox is last, because it only looks at names of columns.
 _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
-LEAST_HZ = 19.5  # samples per second that a lean needs: 20, with the clock of a phone
+LEAST_HZ = 19.5  # samples per second required for a lean: 20, minus the error of a phone's clock
 NAMES = [app.NAME for app in reversed(_APPS)]
 
 
 @dataclass(eq=False)
 class Imported:
-    """app: name of the app. log: times from the recording's own start. taken: the file, columns and unit of each
-    quantity. notices: what is remarkable (kickstand_tools.refusals.sentence puts a notice into words). gaps_s: duration
-    of each gap.
+    """app: name of the app. log: times count from the recording's own start. taken: the file, columns and unit of each
+    quantity. notices: remarks (kickstand_tools.refusals.sentence puts a notice into words). gaps_s: duration of each
+    gap.
 
-    vehicle_axes: True if x points left, y up, z forward on the vehicle already, provided that its logger was mounted
-    so.
+    vehicle_axes: True if x already points left, y up and z forward on the vehicle, provided that the logger was mounted
+    as its maker requires.
     """
 
     app: str
@@ -51,12 +52,12 @@ class Imported:
 
     @property
     def rate_hz(self) -> float:
-        """Samples per second, gaps not counted."""
+        """Samples per second, without the gaps."""
         return 1.0 / float(np.median(np.diff(self.log.t_s)))
 
     @property
     def shortfalls(self) -> list[Notice]:
-        """Why no alignment can be found from it: too few samples per second, too short."""
+        """The reasons why it gives no alignment: too few samples per second, too short."""
         found = [Notice("import-slow", self.rate_hz)] if self.rate_hz < LEAST_HZ else []
         lasts_s = float(self.log.t_s[-1])
         return found + ([Notice("import-short", lasts_s, MIN_RIDING_S)] if lasts_s < MIN_RIDING_S else [])
@@ -77,11 +78,11 @@ def import_recording(
 ) -> Imported:
     """Read a recording of another app or logger: a file, a folder or a zip.
 
-    Known are the exports of the apps that `kickstand import --help` names. Of any other table the columns and units are
-    found from its values where these are certain. Else, or where they are given, columns says which is
-    which ({"t": "time", "ax": "accX", ...}: t, ax, ay, az, gx, gy, gz, and speed, lat, lon, temp where there are), and
-    units in which unit ({"a": "m/s2", "g": "rad/s", "speed": "km/h"}; a - before a unit reverses the sign). start_s,
-    end_s: the stretch to take, from the recording's own start. Raises InputError.
+    `kickstand import --help` names the apps whose exports are known. For any other table, columns and units are found
+    from its values if these are certain. Otherwise pass them. columns: {"t": "time", "ax": "accX", ...}, with the keys
+    t, ax, ay, az, gx, gy, gz, and optionally speed, lat, lon, temp. units: {"a": "m/s2", "g": "rad/s", "speed":
+    "km/h"}; a - before a unit reverses the sign. start_s, end_s: the stretch to import, s from the recording's own
+    start. Raises InputError.
 
     >>> import pathlib, tempfile
     >>> rows = [f"{10 * k},0.0,9.81,0.0,0.0,0.0,0.1" for k in range(300)]
@@ -98,8 +99,8 @@ def import_recording(
 
 
 def import_of_app(source: Path) -> Imported | None:
-    """A recording of another app, imported; None for what is none. Raises InputError for a folder or a zip that cannot
-    be read, and as import_recording()."""
+    """Import a recording of a known app; None if source is not one. Raises InputError for a folder or a zip that cannot
+    be read, and like import_recording()."""
     try:
         files = read_files(source)
         of_apps = recordings(files)
@@ -112,7 +113,7 @@ def import_of_app(source: Path) -> Imported | None:
     return _imported(_recording(files, str(source), None, {}), str(source)) if known else None
 
 
-def _imported(recording: Recording, name: str, start_s: float | None = None, end_s: float | None = None) -> Imported:
+def _imported(recording: AppRecording, name: str, start_s: float | None = None, end_s: float | None = None) -> Imported:
     log, damaged = join(recording, name)
     _check_sign(recording, log)
     if damaged:
@@ -125,7 +126,8 @@ def _imported(recording: Recording, name: str, start_s: float | None = None, end
 def write_imported(path: Path | str, imported: Imported) -> None:
     """Write the log, gzipped if its name ends in .gz, whole or not at all. Raises InputError.
 
-    Columns: a log's, those that may be empty as far as there are values; t_s from the recording's own start.
+    It has the columns of a log. Optional columns without any value are left out. t_s counts from the recording's own
+    start.
 
     >>> import tempfile
     >>> log = Log([0.0, 0.01], [[0.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 0.0]] * 2)
@@ -139,7 +141,7 @@ def write_imported(path: Path | str, imported: Imported) -> None:
 
 def _recording(
     files: list[RecordingFile], name: str, columns: Mapping[str, str] | None, units: dict[str, str]
-) -> Recording:
+) -> AppRecording:
     found = recordings(files)
     if columns is not None:
         return mapped.read_mapped(mapped.sheet_of(files, name, columns), columns, units)
@@ -164,25 +166,25 @@ def _recording(
         recording.sign_known = True
         if factor(units["a"], ACCELERATIONS, "a") < 0.0:
             recording.accel.values = -recording.accel.values
-            _say_sign(recording, "turned")
+            _note_sign(recording, "turned")
     return recording
 
 
 def recordings(files: list[RecordingFile]) -> list[tuple[Any, list[RecordingFile]]]:
-    """The recordings among some files: (module in apps/, its files) of each; the module's NAME is the app's."""
+    """The recordings among some files: (module in apps/, its files) for each. The module's NAME is the app's."""
     found, left = [], files
     for app in _APPS:
-        for group in app.finds(left):
+        for group in app.find_recordings(left):
             found.append((app, group))
         claimed = {id(file) for _, group in found for file in group}
         left = [file for file in left if id(file) not in claimed]
     return found
 
 
-def _check_sign(recording: Recording, log: Log) -> None:
-    """Change the sign of an accelerometer if that was only likely and the track shows that it is mirrored.
+def _check_sign(recording: AppRecording, log: Log) -> None:
+    """Change the sign of an accelerometer if it was uncertain and the track shows that it is mirrored.
 
-    One whose sign is known stays: reading the log gives a remark about it.
+    A known sign is kept: reading the log gives a remark about it.
     """
     if recording.sign_known:
         return
@@ -190,19 +192,19 @@ def _check_sign(recording: Recording, log: Log) -> None:
     if agrees is None:
         recording.notices.append(Notice("import-sign", recording.app))
     elif agrees:
-        _say_sign(recording, "+1 g up, by the turns of the track")
+        _note_sign(recording, "+1 g up, by the turns of the track")
     else:
         log.accel_g = -log.accel_g
-        _say_sign(recording, "-1 g up, by the turns of the track: sign turned")
+        _note_sign(recording, "-1 g up, by the turns of the track: sign turned")
 
 
-def _say_sign(recording: Recording, sign: str) -> None:
+def _note_sign(recording: AppRecording, sign: str) -> None:
     for taken in recording.accel.taken:
         taken.sign = sign if taken.quantity == "accelerometer" else taken.sign
 
 
 def _stretch(log: Log, start_s: float | None, end_s: float | None) -> Log:
-    """From start_s to end_s since the recording's own start; negative: before its end."""
+    """The log from start_s to end_s since the recording's own start; negative: before its end."""
     since_us = np.rint((log.start_s + log.t_s) * 1e6)
     last_s = float(since_us[-1]) / 1e6
     start_s, end_s = (s if s is None or s >= 0.0 else max(0.0, s + last_s) for s in (start_s, end_s))

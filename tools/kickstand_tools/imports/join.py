@@ -1,4 +1,4 @@
-"""The sensors of a recording, each on its own clock and at its own rate, joined on the accelerometer's."""
+"""Joins the sensors of a recording, each with its own clock and rate, on the accelerometer's clock."""
 
 from collections.abc import Callable, Container
 from dataclasses import replace
@@ -12,21 +12,22 @@ from ..logs.cells import MOST_DPS, MOST_G, TRACK
 from ..logs.even_times import even_times
 from ..logs.log import Log
 from ..signals import Array, Bools, Ints
-from .recording import Recording, Sensor, Track
+from .recording import AppRecording, ReceiverTrack, RecordedSensor
 
 MOST_MPS = 200.0  # largest speed, and largest degrees of a position
 GAP_NS = LOST_US * 1000  # no interpolation between samples that are further apart
-FASTER = 1.5  # a gyro with over FASTER times the accelerometer's rate is averaged over each of its samples
-MANY = 0.02  # a larger share of readings over MOST_G and MOST_DPS is no damaged cells, but another unit
-SHUFFLED_NS = 500_000_000  # samples that come after younger ones are sorted if the delay is shorter
+FASTER = 1.5  # a gyro with over FASTER times the accelerometer's rate is averaged over each accelerometer sample
+MANY = 0.02  # a larger share of readings over MOST_G or MOST_DPS means another unit, not damaged cells
+SHUFFLED_NS = 500_000_000  # samples that come after later ones are sorted if the delay is shorter
 LATE_STEPS, MOST_LATE = 4.0, 0.02  # and if at most a share of MOST_LATE is later by over LATE_STEPS median steps
 MOST_HZ = 10_000.0  # highest rate of an inertial sensor; the fastest have 8,000
 
 
-def join(recording: Recording, name: str) -> tuple[Log, int]:
-    """The log on the accelerometer's clock, from its first sample, and the number of rows left out as damaged.
+def join(recording: AppRecording, name: str) -> tuple[Log, int]:
+    """Return the log on the accelerometer's clock, from its first sample, and the number of damaged rows that are left
+    out.
 
-    name: the recording's, for messages. Raises InputError where the sensors have no time in common.
+    name: the recording's, for messages. Raises InputError if the sensors have no time in common.
     """
     accel = in_order(recording.accel, name)
     gyro = in_order(recording.gyro, name)
@@ -37,7 +38,7 @@ def join(recording: Recording, name: str) -> tuple[Log, int]:
         raise InputError(f"{name}: its readings are past any sensor's, {_most(accel.values, rates)}: check their units")
     there &= ~past
     lost = int(np.count_nonzero(past)) + len(recording.accel.time_ns) - len(accel.time_ns)
-    lost += max(recording.accel.damaged, recording.gyro.damaged)  # both may stand in the same rows
+    lost += max(recording.accel.damaged, recording.gyro.damaged)  # both sensors may be in the same rows
     if np.count_nonzero(there) < 2:
         raise InputError(f"{name}: accelerometer and gyro have no time in common: were they recorded together?")
     temp_c = recording.temp_c
@@ -50,8 +51,9 @@ def join(recording: Recording, name: str) -> tuple[Log, int]:
     return log, lost
 
 
-def in_order(sensor: Sensor, name: str) -> Sensor:
-    """A sensor with times that increase, rounded ones spread evenly. Raises InputError where they cannot."""
+def in_order(sensor: RecordedSensor, name: str) -> RecordedSensor:
+    """Return the sensor with increasing times; rounded ones are spread evenly. Raises InputError if that is
+    impossible."""
     if len(sensor.time_ns) < 2:
         raise InputError(f"{name}: {sensor.name} has {len(sensor.time_ns)} samples: was it recorded?")
     time_ns, values = sensor.time_ns, sensor.values
@@ -82,7 +84,7 @@ def in_order(sensor: Sensor, name: str) -> Sensor:
 
 
 def _damaged(time_ns: Ints) -> Bools:
-    """(n) True for a time that fits neither the one before nor the one after it, which fit each other."""
+    """(n) True for a time that fits neither its predecessor nor its successor, while these fit each other."""
     wrong = np.zeros(len(time_ns), dtype=bool)
     if len(time_ns) > 2:
         before, now, after = time_ns[:-2], time_ns[1:-1], time_ns[2:]
@@ -94,10 +96,11 @@ def _damaged(time_ns: Ints) -> Bools:
     return wrong
 
 
-def on_clock(sensor: Sensor, clock_ns: Ints, period_ns: float) -> Array:
+def on_clock(sensor: RecordedSensor, clock_ns: Ints, period_ns: float) -> Array:
     """A sensor's values (n, 3) at the times of another clock (n); NaN outside its own and in its gaps.
 
-    Interpolated along straight lines; a sensor that is faster than the clock, whose period is given, is averaged.
+    Values are interpolated along straight lines. If the sensor is faster than the clock, they are averaged over
+    period_ns.
     """
     slow = _period_ns(sensor) * FASTER < period_ns
     known = _averaged(sensor, period_ns) if slow else sensor.values
@@ -113,14 +116,14 @@ def on_clock(sensor: Sensor, clock_ns: Ints, period_ns: float) -> Array:
 
 
 def _between(at: Array, since: Array, values: Array) -> Array:
-    """Values (n) at other times, along straight lines over those that are NaN; NaN outside."""
+    """Values (n) at other times, along straight lines between those that are not NaN; NaN outside."""
     there = ~np.isnan(values)
     if not np.any(there):
         return np.full(len(at), np.nan)
     return np.interp(at, since[there], values[there], left=np.nan, right=np.nan)
 
 
-def _averaged(sensor: Sensor, over_ns: float) -> Array:
+def _averaged(sensor: RecordedSensor, over_ns: float) -> Array:
     """A sensor's values (n, 3) averaged over over_ns around each."""
     half = round(over_ns / 2.0)
     begin, end = (np.searchsorted(sensor.time_ns, sensor.time_ns + side, side="right") for side in (-half, half))
@@ -131,13 +134,13 @@ def _averaged(sensor: Sensor, over_ns: float) -> Array:
 
 
 def with_gravity(
-    there: Container[str], sensor: Callable[[str], Sensor], name: str, whose: str, remedy: str, none: str
-) -> Sensor:
-    """The accelerometer, with gravity. there: those of "total" (with gravity), "user" (without) and "gravity" that
-    exist.
+    there: Container[str], sensor: Callable[[str], RecordedSensor], name: str, whose: str, remedy: str, none: str
+) -> RecordedSensor:
+    """The accelerometer, with gravity. there: the existing ones of "total" (with gravity), "user" (without) and
+    "gravity".
 
     sensor: called with one of these, returns it. Raises InputError if there is only acceleration without gravity
-    (whose: its name; remedy: what to do), and if there is none (none: the message).
+    (whose: its name; remedy: what to do), or no acceleration at all (none: the message).
     """
     if "total" in there:
         return sensor("total")
@@ -149,19 +152,19 @@ def with_gravity(
     user.taken[0].sign = "without gravity: gravity added"
     values = user.values + on_clock(gravity, user.time_ns, _period_ns(user))
     taken = [*user.taken, *gravity.taken]
-    return Sensor(user.name, user.time_ns, values, max(user.damaged, gravity.damaged), taken)
+    return RecordedSensor(user.name, user.time_ns, values, max(user.damaged, gravity.damaged), taken)
 
 
 def _most(accel_g: Array, rates_dps: Array) -> str:
     return f"up to {np.max(np.abs(accel_g)):.3g} g and {np.max(np.abs(np.nan_to_num(rates_dps))):.3g} deg/s"
 
 
-def _period_ns(sensor: Sensor) -> float:
+def _period_ns(sensor: RecordedSensor) -> float:
     return float(np.median(np.diff(sensor.time_ns)))
 
 
-def _on_rows(track: Track | None, time_ns: Ints, utc_ns: int | None) -> dict[str, Any]:
-    """Speed, latitude, longitude and UTC (n each): each of the track's values in the row nearest to it in time."""
+def _on_rows(track: ReceiverTrack | None, time_ns: Ints, utc_ns: int | None) -> dict[str, Any]:
+    """Speed, latitude, longitude and UTC (n each): each value of the track is in the row nearest in time."""
     found = {name: np.full(len(time_ns), np.nan) for name in TRACK}
     if utc_ns is not None:
         found["utc_s"][0] = (time_ns[0] + utc_ns) * 1e-9

@@ -1,8 +1,8 @@
-"""The layout of a table that no app's module knows: where its rows are, and which sensor each of its cells belongs to.
+"""Finds the layout of a table of an unknown app: where its rows are, and to which sensor each cell belongs.
 
-Read are: cells between commas, semicolons, tabs or blanks, with a decimal point or comma; any lines before the rows;
-names above them, with or without units in a line below, or none; `label: value` texts of a serial monitor, with or
-without its time stamps, in one or several lines per sample; one row per event of a sensor; one file per sensor.
+It accepts cells between commas, semicolons, tabs or blanks, with a decimal point or comma; any lines before the rows;
+names above the rows, with or without units in a line below, or no names; `label: value` texts of a serial monitor, with
+or without its time stamps, in one or several lines per sample; one row per event of a sensor; one file per sensor.
 """
 
 import csv
@@ -20,16 +20,16 @@ from .files import RecordingFile
 from .recording import Sheet, decimal_points
 from .units import ACCELERATIONS, RATES, SPEEDS, TIMES, unit
 
-LOOKED_AT = 400  # lines from which the layout is found
-SEPARATORS = "\t;, "  # of two that part the same lines into as many cells the first is taken
-FEWEST_CELLS = 4  # numbers in a row of a table of sensors: a time and three axes
+LOOKED_AT = 400  # lines used to find the layout
+SEPARATORS = "\t;, "  # if two split the same lines into equally many cells, the first is used
+FEWEST_CELLS = 4  # least numbers in a row of a table of sensors: a time and three axes
 MOST_KINDS = 20  # names of sensors or events in one column
 EVENT = ":"  # between a sensor's name and a column's
 _UNITS = {**ACCELERATIONS, **RATES, **SPEEDS, **TIMES}
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _COMMA_NUMBER = re.compile(r"[+-]?\d+(?:,\d+)?(?:[eE][+-]?\d+)?")
 _WHEN = re.compile(r"(?:\d{4}-\d\d-\d\d[T ])?\d{1,2}:\d\d(?::\d\d(?:[.,]\d+)?)?(?:Z|[+-]\d\d:?\d\d)?")
-_MARKS = " \t#%/;*'\"!"  # begin a comment
+_MARKS = " \t#%/;*'\"!"  # characters that begin a comment
 _SENSOR_ID = re.compile(r"sensor|type|kind|event|source|device")
 _STAMP = re.compile(r"^\s*(\d{1,2}:\d\d:\d\d[.,]\d+)\s*->\s*")
 _STAMPED = "monitor_s"  # the name of the serial monitor's time
@@ -42,8 +42,8 @@ _SEVERAL = re.compile(r"([A-Za-z][\w/ ]*?)\s*[:=]\s*((?:[+-]?\d+(?:\.\d+)?[\s,;]
 
 @dataclass(frozen=True)
 class Grid:
-    """Rows of cells. names: the line of names, None without one; first: the line of the first row. separator: of the
-    cells, " " for any blanks. comma: decimal commas. width: cells in a row."""
+    """Rows of cells. names: number of the line of names, None without one. first: number of the line of the first row.
+    separator: of the cells, " " for any blanks. comma: True for decimal commas. width: cells in a row."""
 
     names: int | None
     first: int
@@ -53,8 +53,8 @@ class Grid:
 
 
 def sheet_in(file: RecordingFile, wanted: Collection[str] = ()) -> Sheet | None:
-    """The table in a file; None if there is none. wanted: names that its line of names has. Raises InputError for a
-    table that is too large."""
+    """The table in a file; None if there is none. wanted: names that its line of names must have. Raises InputError for
+    a table that is too large."""
     text = without_stamps(file.text)
     labelled = _labelled(file.name, text)
     if labelled is not None:
@@ -65,8 +65,8 @@ def sheet_in(file: RecordingFile, wanted: Collection[str] = ()) -> Sheet | None:
 
 
 def joined_sheet(files: list[RecordingFile]) -> Sheet | None:
-    """The tables of several files, one per sensor, as one. None if fewer than two files are tables, or if two have the
-    same name.
+    """The tables of several files, one per sensor, joined to one. None if fewer than two files are tables, or if two
+    have the same name.
 
     Its columns are FILE:NAME, and each row is from one file. The first column of each file is its time."""
     sheets = [(PurePosixPath(file.name).name.partition(".")[0], sheet_in(file)) for file in files]
@@ -89,8 +89,8 @@ def joined_sheet(files: list[RecordingFile]) -> Sheet | None:
 
 
 def without_stamps(text: str) -> str:
-    """The text with the time stamps of a serial monitor, `12:30:05.250 -> `, as a first cell. If the lines have labels,
-    as a first label."""
+    """Turn the time stamps of a serial monitor, `12:30:05.250 -> `, into a first cell, or into a first label if the
+    lines have labels."""
     head = [line for line in text[:20_000].split("\n") if line.strip()]
     if not head or sum(bool(_STAMP.match(line)) for line in head) < 0.8 * len(head):
         return text
@@ -106,7 +106,7 @@ def _clock_s(clock: str) -> float:
 
 
 def split_row(line: str, separator: str) -> list[str]:
-    """The cells of a line, without blanks around them; none of a line that is no CSV."""
+    """The cells of a line, without blanks around them; none if the line is not CSV."""
     if separator == " ":
         return line.split()
     try:
@@ -116,10 +116,10 @@ def split_row(line: str, separator: str) -> list[str]:
 
 
 def find_grid(lines: Sequence[str]) -> Grid | None:
-    """The rows among some lines: those that most lines agree with; None where hardly a line holds numbers."""
+    """Find the layout that fits most of these lines; None if hardly any line has numbers."""
     best: tuple[int, int, Grid] | None = None
     for separator in SEPARATORS:
-        for comma in (True, False):  # whole numbers beside a time with a decimal comma are both
+        for comma in (True, False):  # whole numbers beside a time with a decimal comma fit both
             if comma and separator == ",":
                 continue
             found = _rows(lines, separator, comma)
@@ -129,7 +129,7 @@ def find_grid(lines: Sequence[str]) -> Grid | None:
 
 
 def _rows(lines: Sequence[str], separator: str, comma: bool) -> tuple[int, int, Grid] | None:
-    """(number of rows, of their numbers, the grid) if the cells are parted so."""
+    """(number of rows, number of numbers, the grid) if the cells are separated in this way."""
     number = _COMMA_NUMBER if comma else _NUMBER
     split = [split_row(line, separator) for line in lines]
     counts = [sum(bool(number.fullmatch(cell) or _WHEN.fullmatch(cell)) for cell in cells) for cells in split]
@@ -155,12 +155,12 @@ def _rows(lines: Sequence[str], separator: str, comma: bool) -> tuple[int, int, 
 
 
 def _names_by_commas(lines: Sequence[str], at: int, width: int) -> int | None:
-    """The line above the rows if its names are parted otherwise than the rows."""
+    """The line of names above the rows, if it has another separator than the rows."""
     return at if any(_is_names(split_row(lines[at].lstrip(_MARKS), mark), width) for mark in SEPARATORS) else None
 
 
 def _is_names(cells: list[str], width: int) -> bool:
-    """True for cells that can be the names of so many columns: hardly a number among them."""
+    """True for cells that can be the names of `width` columns: hardly any of them is a number."""
     there = [cell for cell in cells if cell]
     numbers = sum(bool(_NUMBER.fullmatch(cell)) or bool(re.search(r"[{}=]|:$", cell)) for cell in there)
     return max(2, width - 3) <= len(there) <= width + 1 and numbers <= len(there) / 4
@@ -172,7 +172,7 @@ def _all_units(cells: list[str]) -> bool:
 
 
 def _grid_below(lines: Sequence[str], wanted: Collection[str]) -> Grid | None:
-    """The grid below a line that holds all the names that are asked for; None without such a line."""
+    """The grid below a line that has all wanted names; None without such a line."""
     if not wanted:
         return None
     for k, line in enumerate(lines[:-1]):
@@ -203,7 +203,7 @@ def _read(name: str, text: str, lines: Sequence[str], grid: Grid) -> Sheet:
 
 
 def _names(lines: Sequence[str], grid: Grid) -> list[str]:
-    """The columns' names, with the units of a line below them in brackets; "" for one without a name."""
+    """The columns' names, with units from a line below them in brackets; "" for a column without a name."""
     if grid.names is None:
         return [f"#{k + 1}" for k in range(grid.width)]
     line = lines[grid.names]
@@ -223,7 +223,7 @@ def _names(lines: Sequence[str], grid: Grid) -> list[str]:
 
 
 def _by_sensor(sheet: Sheet) -> Sheet:
-    """The same table with columns of their own for each sensor, where a column names the sensor of each row."""
+    """Give each sensor its own columns, if one column names the sensor of each row."""
     place = _sensor_column(sheet)
     if place is None:
         return sheet
@@ -246,8 +246,8 @@ def _by_sensor(sheet: Sheet) -> Sheet:
 
 
 def _sensor_column(sheet: Sheet) -> int | None:
-    """The column that names the sensor of each row: few texts, or numbers under such a name, that change again and
-    again."""
+    """The column that names the sensor of each row: a few texts, or numbers under such a name, that change
+    repeatedly."""
     for place, (name, values) in enumerate(zip(sheet.columns, sheet.cells)):
         if values.dtype.kind == "f" or (values.dtype.kind != "O" and not _SENSOR_ID.search(name.lower())):
             continue
@@ -261,7 +261,7 @@ def _sensor_column(sheet: Sheet) -> int | None:
 
 
 def _increases(numbers: Cells) -> bool:
-    """True for a column that can be a time: it hardly ever decreases, and increases."""
+    """True for a column that can be a time: it increases, and hardly ever decreases."""
     good = numbers[np.isfinite(numbers.astype(float))].astype(float)
     steps = np.diff(good)
     return len(steps) > 2 and bool(np.mean(steps < 0.0) < 0.02 and np.mean(steps > 0.0) > 0.01 and good[-1] > good[0])
@@ -271,7 +271,7 @@ def _increases(numbers: Cells) -> bool:
 
 
 def _labelled(name: str, text: str) -> Sheet | None:
-    """The table in lines of `label: value`; None where there are none."""
+    """The table in lines of `label: value`; None without such lines."""
     head = [line for line in text[:20_000].split("\n") if line.strip()]
     pairs = [len(list(_pairs(line))) for line in head]
     if sum(count > 0 for count in pairs) < 0.7 * len(head) or sum(pairs) < max(FEWEST_CELLS, 1.5 * len(head)):
@@ -298,8 +298,8 @@ def _labelled(name: str, text: str) -> Sheet | None:
 
 
 def _pairs(line: str) -> Iterator[tuple[str, str]]:
-    """(label, value) of each value in a line. A label of one letter gets the word before it, as in "Acceleration X:
-    0.1, Y: 0.2"; a unit after a value is in brackets behind its label."""
+    """(label, value) of each value in a line. A label of one letter is prefixed by an earlier word, as in "Acceleration
+    X: 0.1, Y: 0.2". A unit after a value is added to the label in brackets."""
     for several in _SEVERAL.finditer(line):
         values = re.split(r"[\s,;]+", several[2])
         for axis, value in zip("xyz" if len(values) == 3 else map(str, range(1, 10)), values):

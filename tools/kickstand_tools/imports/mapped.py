@@ -1,4 +1,4 @@
-"""Reads a table of no app that is known: its columns are found from their values (findings.py) or named by the user."""
+"""Reads a table of an unknown app. Its columns are found from their values (findings.py) or named by the user."""
 
 import re
 import shlex
@@ -15,7 +15,7 @@ from .files import RecordingFile
 from .findings import ACCEL, GYRO, OPTIONAL, REQUIRED, Findings
 from .layout import FEWEST_CELLS, joined_sheet, sheet_in
 from .rate_fit import fit_rates, turns_too_far
-from .recording import Recording, Sensor, Sheet, Taken, plain, rate_hz, track_of, unit_in
+from .recording import AppRecording, RecordedSensor, Sheet, Taken, plain, rate_hz, track_of, unit_in
 from .speeds import unit_by_positions
 from .units import (
     ACCELERATIONS,
@@ -41,12 +41,12 @@ WORDS |= {"speed": "speed", "lat": "latitude", "lon": "longitude", "temp": "temp
 UNIT_KEYS = {"t": TIMES, "a": ACCELERATIONS, "g": RATES, "speed": SPEEDS, "lat": ANGLES, "lon": ANGLES}
 UNIT_KEYS |= dict.fromkeys(ACCEL, ACCELERATIONS) | dict.fromkeys(GYRO, RATES)
 COUNTS = "counts"  # raw counts whose number per g or per deg/s is found from the values
-_TIMES_OFF = 3.0  # a unit is refused if the turns of gravity show another one that differs by this factor
+_TIMES_OFF = 3.0  # a unit is refused if the turns of gravity show another unit that differs by this factor
 
 
 @dataclass
-class Table:
-    """A table of sensors of an unknown app: its columns, and what they seem to be. joined: made of several files."""
+class MappedTable:
+    """A table of sensors of an unknown app, with its probable columns. joined: True if made of several files."""
 
     name: str
     sheet: Sheet
@@ -73,8 +73,8 @@ class Table:
         return [key for key in REQUIRED if key not in self.found]
 
     def first_seconds(self, seconds: float = 10.0, points: int = 300) -> dict[str, list[float] | list[list[float]]]:
-        """The beginning of the time (t, s), accelerometer (a) and gyro (g) that are found, thinned out, as they are in
-        the table; empty without a time."""
+        """The first seconds of the time (t, s), the accelerometer (a) and the gyro (g) found, thinned out, in the
+        table's units. Empty without a time."""
         found = self.findings.found
         if "t" not in found:
             return {}
@@ -98,13 +98,13 @@ class Table:
 
 def read_mapped(
     sheet: Sheet, columns: Mapping[str, str], units: Mapping[str, str], why: Findings | None = None
-) -> Recording:
-    """A table with the columns named for t, ax to az, gx to gz and, as there are, speed, lat, lon and temp.
+) -> AppRecording:
+    """Read a table with given columns: t, ax to az, gx to gz and optionally speed, lat, lon and temp.
 
-    columns: by these, the name of each in the file, or #1, #2 ... for its number. units: of t, a (all of ax to az) or
-    ax, ay, az, g (of gx to gz) or gx, gy, gz, speed, lat, lon; a - before one turns the sign. A unit that is not given
-    is the one in brackets in the column's name. why: the findings that the columns come from. Raises InputError, also
-    for units in which the rates do not turn gravity.
+    columns: for each of these keys the column's name in the file, or its number as #1, #2 ... units: keys t, a (for ax
+    to az) or ax, ay, az, g (for gx to gz) or gx, gy, gz, speed, lat, lon; a - before a unit reverses the sign. A
+    missing unit is read from the brackets in the column's name. why: the findings that gave the columns. Raises
+    InputError, also for units in which the rates do not turn gravity.
     """
     check_keys(columns, units)
     places = {key: _place(sheet, key, wanted) for key, wanted in columns.items()}
@@ -124,15 +124,15 @@ def read_mapped(
     track = track_of(sheet, time_ns, speed, places.get("lat"), places.get("lon"), speed_unit, (lat, lon))
     temp_c = sheet.numbers(places["temp"]) if "temp" in places else None
     utc_ns = 0 if len(time_ns) and int(np.median(time_ns)) > EPOCH_NS else None
-    recording = Recording(NAME, accel, gyro, track, temp_c, notices, utc_ns=utc_ns, sign_known=_turned(units))
+    recording = AppRecording(NAME, accel, gyro, track, temp_c, notices, utc_ns=utc_ns, sign_known=_turned(units))
     if why is not None:
         for taken, key in zip(recording.taken, ("t", "a", "g")):
             taken.why = why.found[key].why
     return recording
 
 
-def table_in(files: list[RecordingFile]) -> Table | None:
-    """The table in these files, the largest of several that do not belong together; None if that is no table of
+def table_in(files: list[RecordingFile]) -> MappedTable | None:
+    """The table in these files; of several that do not belong together, the largest. None if it is not a table of
     sensors."""
     largest = max(files, key=lambda file: len(file.text))
     sheet = sheet_in(largest)
@@ -141,15 +141,14 @@ def table_in(files: list[RecordingFile]) -> Table | None:
         joined = joined_sheet(files)
         of_all = None if joined is None else findings.find(joined)
         if joined and of_all and (found is None or len(of_all.lacking) < len(found.lacking)):
-            return Table(joined.name, joined, of_all, True)
+            return MappedTable(joined.name, joined, of_all, True)
     if sheet is None or found is None or not ({"a", "g"} & set(found.found) or len(sheet.columns) >= len(REQUIRED)):
         return None
-    return Table(largest.name, sheet, found)
+    return MappedTable(largest.name, sheet, found)
 
 
 def sheet_of(files: list[RecordingFile], name: str, columns: Mapping[str, str]) -> Sheet:
-    """The table that has these columns: of one file, or of several that are joined. name: for messages. Raises
-    InputError."""
+    """The table with these columns, from one file or joined from several. name: for messages. Raises InputError."""
     wanted = [column.strip() for column in columns.values() if not column.strip().startswith("#")]
     sheet = sheet_in(files[0], wanted) if len(files) == 1 else joined_sheet(files)
     if len(files) > 1 and (sheet is None or not set(wanted) <= set(sheet.columns)):
@@ -159,8 +158,8 @@ def sheet_of(files: list[RecordingFile], name: str, columns: Mapping[str, str]) 
     return sheet
 
 
-def read_table(table: Table, units: Mapping[str, str]) -> Recording | None:
-    """The recording of a table whose columns and units are certain, or given in units; None if they are not.
+def read_table(table: MappedTable, units: Mapping[str, str]) -> AppRecording | None:
+    """The recording of a table whose columns and units are certain, or given in units; otherwise None.
 
     Raises InputError.
     """
@@ -171,7 +170,7 @@ def read_table(table: Table, units: Mapping[str, str]) -> Recording | None:
     return read_mapped(table.sheet, found.columns, found.units | dict(units), found)
 
 
-def unknown(files: list[RecordingFile], source: str, table: Table | None = None) -> InputError:
+def unknown(files: list[RecordingFile], source: str, table: MappedTable | None = None) -> InputError:
     """The error for a file of an unknown app: missing columns, its columns, and the command line to type."""
     table = table or table_in(files)
     if table is None:
@@ -208,8 +207,8 @@ def unknown(files: list[RecordingFile], source: str, table: Table | None = None)
     )
 
 
-def _typed(table: Table, key: str) -> str:
-    """The column of a key as it is typed: by its number where its name would be misread; ? for none."""
+def _typed(table: MappedTable, key: str) -> str:
+    """The column of a key as the user types it: its number if its name would be misread, ? for none."""
     name = table.found.get(key, "?")
     if name != "?" and (any(mark in name for mark in ",=") or table.columns.count(name) > 1):
         return f"#{table.columns.index(name) + 1}"
@@ -234,7 +233,7 @@ def check_units(units: Mapping[str, str]) -> None:
         raise InputError(f"--units: {strange[0]!a} is not one of {', '.join(UNIT_KEYS)}")
     for key, text in units.items():
         if not (_is_counts(text) and key[0] in "ag"):
-            factor(text, UNIT_KEYS[key], key)  # raises for another unit
+            factor(text, UNIT_KEYS[key], key)  # raises InputError for another unit
 
 
 def _is_counts(text: str) -> bool:
@@ -252,7 +251,7 @@ def _check_apart(places: Mapping[str, int], columns: Mapping[str, str]) -> None:
 def _with_counts(
     sheet: Sheet, time_ns: Nanoseconds, places: Mapping[str, int], units: dict[str, str]
 ) -> dict[str, str]:
-    """The units with the number of counts in place of a bare "counts". Raises InputError where nothing shows it."""
+    """Replace a bare "counts" in units by counts/N. Raises InputError if nothing shows N."""
     if not any(map(_is_counts, units.values())):
         return units
     force, rates = (sheet.table([places[axis] for axis in axes]) for axes in (ACCEL, GYRO))
@@ -271,13 +270,14 @@ def _with_counts(
 
 
 def _seconds(time_ns: Nanoseconds) -> Array:
-    """(n) seconds from the first time; NaN where there is none."""
+    """(n) seconds since the first time; NaN for no time."""
     good = time_ns > REPEATED
     return np.where(good, (time_ns - (time_ns[good][0] if np.any(good) else 0)) * 1e-9, np.nan)
 
 
 def _check_rates(name: str, seconds: Array, force: Array, rates: Array) -> None:
-    """Refuse rates that cannot turn gravity as it turns: another unit fits, or they turn it where it stands still."""
+    """Refuse rates that do not fit the turns of gravity: another unit fits, or they would turn it while it is
+    constant."""
     fit = fit_rates(seconds, force, rates)
     shown = float(np.degrees(fit.factor))
     if fit.decides and not 1.0 / _TIMES_OFF < shown < _TIMES_OFF:
@@ -297,7 +297,8 @@ def _speed(
     units: Mapping[str, str],
     degrees: tuple[float, float],
 ) -> tuple[int | None, str, list[Notice]]:
-    """(column of the speed, its unit, notices): without a unit, as positions show it, else left out."""
+    """(column of the speed, its unit, notices). A missing unit is found from the positions; otherwise the speed is left
+    out."""
     place = places.get("speed")
     if place is None:
         return None, "m/s", []
@@ -340,7 +341,7 @@ def _sensor(
     units: Mapping[str, str],
     quantity: str,
     values: Array,
-) -> Sensor:
+) -> RecordedSensor:
     axes = ACCEL if quantity == "accelerometer" else GYRO
     names = [_unit(units, (axis, axis[0]), sheet.columns[places[axis]]) for axis in axes]
     scale = _factors(sheet, places, units, axes)
@@ -348,7 +349,7 @@ def _sensor(
     sign = "as it is" if np.all(scale > 0.0) else "turned" if np.all(scale < 0.0) else "turned in part"
     shown = ", ".join(dict.fromkeys(text.lstrip("-") for text in names))
     hz = rate_hz(time_ns[np.all(np.isfinite(values), axis=1)])
-    return Sensor(quantity, time_ns, values, sheet.left_out, [Taken(quantity, source, shown, hz, sign)])
+    return RecordedSensor(quantity, time_ns, values, sheet.left_out, [Taken(quantity, source, shown, hz, sign)])
 
 
 def _check_units(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, str]) -> None:
@@ -367,10 +368,10 @@ def _check_units(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, st
 
 
 def _unit(units: Mapping[str, str], keys: tuple[str, ...], column: str) -> str:
-    """The unit that is given for one of the keys, else the one in the column's name: in brackets or at its end."""
+    """The unit given for one of the keys, otherwise the unit in the column's name, in brackets or at its end."""
     return next((units[key] for key in keys if key in units), unit_in(column) or findings.stated_unit(column))
 
 
 def _turned(units: Mapping[str, str]) -> bool:
-    """True if the user has asked for a change of sign, which is then not judged."""
+    """True if the user has asked for a change of sign. It is then not checked."""
     return any(units.get(key, "").startswith("-") for key in ("a", *ACCEL))

@@ -1,10 +1,10 @@
-"""In which unit the rates of a gyro turn gravity: the factor between the two, by least squares.
+"""Finds the unit of a gyro's rates from the turns of gravity, by least squares.
 
-At rest, and in a hand, the direction u of gravity turns in the sensor's axes as du/dt = u x rate. Over windows of
-WINDOW_S its change is therefore the integral of u x reading, times the unit's factor, plus that of a constant bias. In
-a vehicle the force is not gravity's alone, and the rates explain it less: then the factor comes out too small, or is
-not found at all. It is searched among the 48 signed permutations of the gyro's axes, because axes that are exchanged
-are another mistake, which is judged later.
+At rest, and in a hand, the direction u of gravity turns in the sensor's axes as du/dt = u x rate. So over windows of
+WINDOW_S its change is the integral of u x reading, times the unit's factor, plus the effect of a constant bias. In a
+vehicle the force is not only gravity, and the rates explain it less: then the factor is too small, or is not found. All
+48 signed permutations of the gyro's axes are tried, because exchanged axes are a different mistake, which is checked
+later.
 """
 
 from collections.abc import Mapping
@@ -16,22 +16,23 @@ from ..checks.handedness import EXCHANGES
 from ..signals import Array
 
 CELL_S = 0.05  # readings are averaged over cells of this length
-MOST_CELLS = 12_000  # ten minutes show a unit
+MOST_CELLS = 12_000  # ten minutes are enough for a unit
 WINDOW_S = 0.4
 LEAST_TURN = 0.03  # rad, rms: a smaller turn of gravity in the windows shows nothing
 STRAIGHT = 0.25  # a cell's force is gravity's if its length is this close to the median
-EXPLAINED = 0.5  # share of the turns' variance that the rates explain: less decides nothing
-CLEARLY = 0.9  # a share with which units that differ by a factor of 2 are told apart, as the ranges of raw counts do
+EXPLAINED = 0.5  # share of the turns' variance that the rates explain: a smaller one decides nothing
+CLEARLY = 0.9  # with this share, units that differ by a factor of 2 can be distinguished: the ranges of raw counts
 FEWEST = 8  # windows
-# Over TURNED_S gravity's direction is kept if the mean of its unit vectors is as long as KEPT_DIRECTION. MOST_TURNED:
-# degrees that the mean rate across it may then turn it; the largest bias of the data sheet, 20 deg/s, is 80
+# Over TURNED_S gravity keeps its direction if the mean of its unit vectors is at least KEPT_DIRECTION long.
+# MOST_TURNED: the largest turn in degrees by the mean rate across it in that case; the largest bias of the data sheet,
+# 20 deg/s, makes 80
 TURNED_S, KEPT_DIRECTION, MOST_TURNED = 2.0, 0.97, 120.0
 
 
 @dataclass
 class RateFit:
     """factor: rad/s in one unit of the readings. explained: share of the turns' variance. turn: rad, rms of gravity's
-    turn in a window. unturned: rad, rms of the turn that the readings would make as they are in rad/s."""
+    turn in a window. unturned: rad, rms of the turn if the readings were in rad/s."""
 
     factor: float = 0.0
     explained: float = 0.0
@@ -44,7 +45,7 @@ class RateFit:
         return self.explained >= EXPLAINED and self.turn >= LEAST_TURN and self.factor > 0.0
 
     def unit_among(self, units: Mapping[str, float]) -> str:
-        """The unit, of those with these factors to deg/s, that the fit shows; "" if it shows none."""
+        """The unit that the fit shows, among units with these factors to deg/s; "" if it shows none."""
         if not self.decides:
             return ""
         off = {name: np.log(np.degrees(self.factor) / size) for name, size in units.items()}
@@ -57,7 +58,7 @@ class RateFit:
 
 def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
     """Fit rates to forces. seconds (n), force (n, 3, any unit), rates (n, 3, any unit); rows with NaN are interpolated
-    within each sensor, so both may come in rows of their own."""
+    per sensor, so each sensor may have separate rows."""
     cells = _in_cells(seconds, force, rates)
     if cells is None:
         return RateFit()
@@ -103,7 +104,7 @@ def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
 
 
 def turns_too_far(seconds: Array, force: Array, rates: Array) -> bool:
-    """True if rates (n, 3, deg/s) turn gravity right round again and again while it keeps its direction."""
+    """True if rates (n, 3, deg/s) would turn gravity all the way round repeatedly while it keeps its direction."""
     cells = _in_cells(seconds, force, rates)
     if cells is None:
         return False
@@ -125,7 +126,7 @@ def turns_too_far(seconds: Array, force: Array, rates: Array) -> bool:
 
 
 def _steady(u: Array) -> bool:
-    """True if gravity keeps its direction, so that the mean of the rates is bias."""
+    """True if gravity keeps its direction: then the mean of the rates is bias."""
     return float(np.max(np.std(u, axis=0))) < 0.02
 
 

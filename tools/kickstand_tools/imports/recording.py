@@ -1,5 +1,5 @@
-"""An app's files read: a table of text as columns of numbers (Sheet), of which its separator, its decimal mark and its
-names are found; and each sensor on its own clock, in a log's units and signs (Recording)."""
+"""The content of an app's files: a table as columns of numbers (Sheet), whose separator, decimal mark and names are
+found; and the sensors, each on its own clock, in a log's units and signs (Recording)."""
 
 import csv
 import os
@@ -15,7 +15,7 @@ from ..signals import Array, Bools
 from .files import RecordingFile
 from .units import ACCELERATIONS, NO_TIME, RATES, REPEATED, SPEEDS, Nanoseconds, factor, times_ns
 
-LONG = 6  # a common beginning of several names with so many letters is not repeated
+LONG = 6  # a common beginning of several names is not repeated if it is this long
 _DECIMAL_COMMA = re.compile(r"(?:^|[;\t\"])\s*[+-]?\d+,\d")
 SECOND_NS = 10**9
 _ABSURD = 1e6  # g or deg/s: a larger value is a damaged cell
@@ -23,8 +23,8 @@ _ABSURD = 1e6  # g or deg/s: a larger value is a damaged cell
 
 @dataclass
 class Sheet:
-    """name: the file's, for messages. columns: their names in the file, some perhaps twice. cells: those of each
-    column. left_out: number of damaged rows."""
+    """name: the file's, for messages. columns: their names in the file; a name may occur twice. cells: the cells of
+    each column. left_out: number of damaged rows."""
 
     name: str
     columns: list[str]
@@ -32,24 +32,24 @@ class Sheet:
     left_out: int = 0
 
     def place(self, *names: str) -> int | None:
-        """Number of the first column of one of these names, compared by plain()."""
+        """Number of the first column with one of these names, compared by plain()."""
         wanted = [plain(name) for name in names]
         found = [plain(column) for column in self.columns]
         return next((found.index(name) for name in wanted if name in found), None)
 
     def axes(self, *names: str | tuple[str, ...]) -> tuple[list[int], list[str]]:
-        """place() of each name, or of one of several names; and the (first) names of those that are missing."""
+        """place() of each name, or of one of several alternative names; and the (first) names of the missing ones."""
         each = [name if isinstance(name, tuple) else (name,) for name in names]
         found = {one[0]: self.place(*one) for one in each}
         places = [place for place in found.values() if place is not None]
         return places, [name for name, place in found.items() if place is None]
 
     def times(self, place: int, unit: str = "s") -> Nanoseconds:
-        """A column as times (n). unit: of numbers, "" if it is to be found from them. Raises InputError."""
+        """A column as times (n). unit: of numbers, "" to find it from them. Raises InputError."""
         return times_ns(self.cells[place], unit, self.name)
 
     def named(self, places: list[int]) -> str:
-        """The file's name and those of some columns, for messages: without units, a common beginning only once."""
+        """The names of the file and of some columns, for messages: without units, a common beginning only once."""
         names = [re.sub(r"[(\[].*?[)\]]", "", self.columns[place]).strip(" ,;") for place in places]
         same = len(os.path.commonprefix(names)) if len(names) > 2 else 0  # noqa: RUF071 - letters, no path
         if same > LONG:
@@ -57,7 +57,7 @@ class Sheet:
         return f"{self.name}: {', '.join(names)}"
 
     def numbers(self, place: int | None) -> Array:
-        """A column as numbers (n), NaN where a cell has none; all NaN for None."""
+        """A column as numbers (n), NaN for a cell without a number; all NaN if place is None."""
         if place is None:
             return np.full(len(self.cells[0]), np.nan)
         return numbers_of(self.cells[place]).astype(float)
@@ -68,18 +68,18 @@ class Sheet:
 
 
 def plain(name: str) -> str:
-    """A column's name as names are compared: small letters and digits only, without its unit in brackets."""
+    """Reduce a column's name for comparison: lower-case letters and digits only, without its unit in brackets."""
     return re.sub(r"[^a-z0-9]", "", re.sub(r"[(\[].*?[)\]]", "", name).lower())
 
 
 def unit_in(name: str) -> str:
-    """The unit that stands in brackets in a column's name, "" for none."""
+    """The unit in brackets in a column's name, "" for none."""
     found = re.search(r"[(\[]([^)\]]*)[)\]]\s*$", name)
     return found[1].strip() if found else ""
 
 
 def names_in(line: str) -> list[str]:
-    """The cells of a line of names, none of one that is blank or no CSV."""
+    """The cells of a line of names; none if it is blank or not CSV."""
     try:
         return [] if not line.strip() else [cell.strip() for cell in cells_of(line, separator_of(line))]
     except csv.Error:
@@ -87,16 +87,15 @@ def names_in(line: str) -> list[str]:
 
 
 def read_sheet(file: RecordingFile, header: int = 0, skipped: int = 0) -> Sheet:
-    """The table of a file. header: number of the line of names; skipped: lines after it that are no data.
-
-    Raises InputError where there is none.
+    """Read the table of a file. header: number of the line of names. skipped: lines after it that are not data. Raises
+    InputError if there is no table.
     """
     lines = file.text.split("\n", header + skipped + 1)
     if len(lines) < header + skipped + 2 or not lines[-1].strip():
         raise InputError(f"{file.name}: no rows under the names of the columns: was anything recorded?")
     columns = names_in(lines[header])
     while columns and not columns[-1]:
-        columns.pop()  # lines that end in a separator
+        columns.pop()  # all lines end in a separator
     text, separator = lines[-1], separator_of(lines[header])
     if separator != "," and _DECIMAL_COMMA.search(text[:20000]):
         text = decimal_points(text)
@@ -104,7 +103,7 @@ def read_sheet(file: RecordingFile, header: int = 0, skipped: int = 0) -> Sheet:
 
 
 def decimal_points(text: str) -> str:
-    """Text whose cells are not parted by commas, with decimal points in place of decimal commas."""
+    """Replace decimal commas by decimal points in text whose cells are not separated by commas."""
     return text.replace(",", ".")
 
 
@@ -112,7 +111,7 @@ def decimal_points(text: str) -> str:
 class Taken:
     """The source of a quantity: the file and the columns, their unit, and the change of sign.
 
-    rate_hz: samples per second, 0 for none. why: why it was taken for that, "" where the app's format says so.
+    rate_hz: samples per second, 0 for none. why: the reason for this choice, "" if the app's format defines it.
     """
 
     quantity: str
@@ -124,7 +123,7 @@ class Taken:
 
 
 def rate_hz(time_ns: Nanoseconds) -> float:
-    """Samples per second, gaps not counted; 0 if there are too few."""
+    """Samples per second, without the gaps; 0 if there are too few samples."""
     steps = np.diff(time_ns[time_ns > REPEATED])
     if not np.any(steps > 0):
         return 0.0
@@ -133,10 +132,11 @@ def rate_hz(time_ns: Nanoseconds) -> float:
 
 
 @dataclass
-class Sensor:
+class RecordedSensor:
     """n samples: time_ns (n) of the recorder's clock, values (n, 3): g, +1 where the axis points up at rest, or deg/s,
     right-handed. name: for messages. damaged: number of rows of its file that are left out, because they have too many
-    cells or their time or a value cannot be read; a row without any value is another sensor's. taken: its source."""
+    cells, or a time or value that cannot be read. A row without any value belongs to another sensor. taken: its
+    source."""
 
     name: str
     time_ns: Nanoseconds
@@ -146,7 +146,7 @@ class Sensor:
 
     def __post_init__(self) -> None:
         without = (self.time_ns == REPEATED) | np.all(np.isnan(self.values), axis=1)
-        good = (self.time_ns > REPEATED) & np.all(np.abs(self.values) < _ABSURD, axis=1)  # no NaN either
+        good = (self.time_ns > REPEATED) & np.all(np.abs(self.values) < _ABSURD, axis=1)  # NaN is not less
         self.damaged += int(np.count_nonzero(~good & ~without))
         self.time_ns, self.values = self.time_ns[good], self.values[good]
 
@@ -159,16 +159,16 @@ def sensor_of(
     unit: str,
     sign: str,
     turn: float | Array = 1.0,
-) -> Sensor:
-    """Three columns of a sheet. quantity: "accelerometer" or "gyro"; sign: what theirs is; turn: -1 where a log has the
-    opposite one, one number or one an axis. Raises InputError for an unknown unit."""
+) -> RecordedSensor:
+    """Three columns of a sheet. quantity: "accelerometer" or "gyro"; sign: their sign, in words. turn: -1 if a log has
+    the opposite sign, one number or one per axis. Raises InputError for an unknown unit."""
     scale = turn * factor(unit, ACCELERATIONS if quantity == "accelerometer" else RATES, sheet.name)
     taken = Taken(quantity, sheet.named(places), unit, rate_hz(time_ns), sign)
-    return Sensor(quantity, time_ns, sheet.table(places) * scale, sheet.left_out, [taken])
+    return RecordedSensor(quantity, time_ns, sheet.table(places) * scale, sheet.left_out, [taken])
 
 
 @dataclass
-class Track:
+class ReceiverTrack:
     """A satellite receiver's m values on the same clock: speed in m/s, degrees north and east; NaN for none."""
 
     time_ns: Nanoseconds
@@ -178,7 +178,7 @@ class Track:
     taken: list[Taken] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        """Drop rows that repeat the values before, and speeds below 0, by which phones mark an unknown speed."""
+        """Drop rows that repeat the previous values, and speeds below 0, which phones use for an unknown speed."""
         self.speed_mps = np.where(self.speed_mps >= 0.0, self.speed_mps, np.nan)
         nowhere = (self.lat_deg == 0.0) & (self.lon_deg == 0.0)
         nowhere |= ~((np.abs(self.lat_deg) <= 90.0) & (np.abs(self.lon_deg) <= 180.0))
@@ -187,7 +187,7 @@ class Track:
         there = (self.time_ns != NO_TIME) & ~np.all(np.isnan(rows), axis=1)
         self.keep(there)
         same = np.all((rows[there][1:] == rows[there][:-1]) | np.isnan(rows[there][1:]), axis=1)
-        same &= np.diff(self.time_ns // SECOND_NS) == 0  # repeated values of a standstill are kept once a second
+        same &= np.diff(self.time_ns // SECOND_NS) == 0  # repeated values of a standstill are kept once per second
         self.keep(np.concatenate(([True], ~same)) if len(self.time_ns) else np.zeros(0, dtype=bool))
 
     def keep(self, which: Bools) -> None:
@@ -204,15 +204,15 @@ def track_of(
     lon: int | None,
     speed_unit: str = "m/s",
     per_degree: tuple[float, float] = (1.0, 1.0),
-) -> Track | None:
-    """Speed and position of a sheet, by the numbers of their columns; None where there is neither.
+) -> ReceiverTrack | None:
+    """Speed and position of a sheet, by the numbers of their columns; None if it has neither.
 
     per_degree: factors on latitude and longitude.
     """
     if speed is None and (lat is None or lon is None):
         return None
     speed_mps = sheet.numbers(speed) * factor(speed_unit, SPEEDS, "speed")
-    track = Track(time_ns, speed_mps, sheet.numbers(lat) * per_degree[0], sheet.numbers(lon) * per_degree[1])
+    track = ReceiverTrack(time_ns, speed_mps, sheet.numbers(lat) * per_degree[0], sheet.numbers(lon) * per_degree[1])
     hz = rate_hz(track.time_ns)
     if speed is not None:
         track.taken.append(Taken("speed", sheet.named([speed]), speed_unit, hz))
@@ -222,17 +222,18 @@ def track_of(
 
 
 @dataclass
-class Recording:
-    """app: the app's name. utc_ns: UTC less the recorder's clock, ns since 1970; None if unknown.
+class AppRecording:
+    """app: the app's name. utc_ns: UTC minus the recorder's clock, ns since 1970; None if unknown.
 
-    vehicle_axes: True if x points left, y up, z forward on the vehicle already, provided that its logger was mounted
-    so. sign_known: True if at rest up reads +1 g according to the app's maker or its files; else that is only likely.
+    vehicle_axes: True if x already points left, y up and z forward on the vehicle, provided that the logger was mounted
+    as its maker requires. sign_known: True if the app's maker or its files show that up reads +1 g at rest; otherwise
+    this is only likely.
     """
 
     app: str
-    accel: Sensor
-    gyro: Sensor
-    track: Track | None = None
+    accel: RecordedSensor
+    gyro: RecordedSensor
+    track: ReceiverTrack | None = None
     temp_c: Array | None = None
     notices: list[Notice] = field(default_factory=list)
     utc_ns: int | None = None

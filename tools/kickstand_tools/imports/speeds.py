@@ -1,4 +1,4 @@
-"""The unit of a speed that no name states, found by the positions beside it."""
+"""Finds the unit of a speed without a stated unit, from the positions beside it."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from ..signals import Array, distance_m
 from .recording import SECOND_NS, Sheet
 from .units import SPEEDS, Nanoseconds, factor
 
-_NEAR = 1.25  # largest factor between the speed and that by positions: the units differ by 1.6 and more
+_NEAR = 1.25  # largest factor between the speed and that from positions: units differ by 1.6 or more
 
 
 def unit_by_positions(
@@ -17,7 +17,7 @@ def unit_by_positions(
     lon: int | None,
     per_degree: tuple[float, float] = (1.0, 1.0),
 ) -> str:
-    """The unit in which the speeds fit the changes of position; "" where that is not clear. speed, lat, lon: numbers of
+    """The unit in which the speeds fit the changes of position; "" if that is not clear. speed, lat, lon: numbers of
     columns; per_degree: factors on latitude and longitude."""
     if lat is None or lon is None:
         return ""
@@ -33,7 +33,7 @@ def unit_by_positions(
 
 
 def _moved_mps(time_ns: Nanoseconds, lat: Array, lon: Array) -> Array:
-    """(n) mean speed by the positions over about a second before each row, NaN where unknown."""
+    """(n) mean speed from the positions over about a second before each row; NaN if unknown."""
     steps = np.diff(time_ns)
     back = max(1, round(SECOND_NS / max(float(np.median(steps)), 1.0))) if len(steps) else 1
     apart_s = np.full(len(time_ns), np.nan)

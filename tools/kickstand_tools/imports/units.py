@@ -1,5 +1,5 @@
-"""The units of apps, with their factors to a log's own: g, deg/s, m/s, degrees. Their times in nanoseconds: numbers in
-s, ms, us or ns, from any start or from 1970, dates, clocks."""
+"""Converts the units of apps to those of a log (g, deg/s, m/s, degrees), and their times to nanoseconds: numbers in s,
+ms, us or ns, from any start or from 1970, dates, clocks."""
 
 import math
 import re
@@ -49,7 +49,7 @@ DATES = "date or clock"
 EPOCH_NS = 10**17  # 1973: a later time counts from 1970
 DAY_NS = 86400 * 10**9
 _LATEST_NS = 4.0e18  # the year 2096; twice as much still fits into 64 bits
-_WRAP = 2**32  # micros() of a microcontroller begins again from 0 after 71.6 minutes, millis() after 49.7 days
+_WRAP = 2**32  # micros() of a microcontroller restarts from 0 after 71.6 minutes, millis() after 49.7 days
 _DAY = re.compile(r"^(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})(?=[T ])")
 _THOUSANDTHS = re.compile(r"(:\d\d)[:,](\d{3})$")
 _BLANK = re.compile(r"\s+(?=[+-]\d\d:?\d\d$)")
@@ -58,15 +58,15 @@ _CLOCK = re.compile(r"^\s*(?:(\d+):)?(\d{1,2}):(\d{1,2}(?:\.\d+)?)\s*$")
 
 
 def unit(text: str) -> str:
-    """A unit in the spelling of the tables above, where it is one of theirs: "m/s^2" is "m/s2"."""
+    """A unit in the spelling of the tables above, if they have it: "m/s^2" becomes "m/s2"."""
     short = re.sub(r"[\s^*·]", "", text.strip().lower()).replace("²", "2").replace("s-2", "/s2").replace("//", "/")
     return _SAME.get(short, short)
 
 
 def factor(text: str, kinds: dict[str, float], where: str) -> float:
-    """The factor on a value in a unit; a - before the unit changes the sign. Raises InputError for another unit.
+    """The factor for a value in a unit; a - before the unit changes the sign. Raises InputError for an unknown unit.
 
-    A unit of accelerations or rates may be counts/N, N counts per g or per deg/s.
+    A unit of accelerations or rates may be counts/N: N counts per g or per deg/s.
 
     >>> factor("-m/s^2", {"g": 1.0, "m/s2": 0.102}, "ax")
     -0.102
@@ -83,16 +83,16 @@ def factor(text: str, kinds: dict[str, float], where: str) -> float:
 
 
 def counts_per(text: str) -> float:
-    """N of the unit counts/N; 0 for another one."""
+    """N of the unit counts/N; 0 for another unit."""
     found = _COUNTS.fullmatch(text.strip().lower().lstrip("-"))
     return float(found[1]) if found and float(found[1]) > 0.0 else 0.0
 
 
 def times_ns(cells: Cells, unit_name: str = "", where: str = "the recording") -> Nanoseconds:
-    """Times (n) in ns, NO_TIME for a cell that holds none.
+    """Times (n) in ns, NO_TIME for a cell without a time.
 
-    unit_name: unit of numbers, "" to find it by their size and steps. where: their name in messages. Raises InputError
-    where few cells are times.
+    unit_name: unit of numbers, "" to find it from their size and steps. where: their name in messages. Raises
+    InputError if few cells are times.
     """
     numbers = numbers_of(cells)
     count = int(np.count_nonzero(filled(cells)))
@@ -111,7 +111,7 @@ def times_ns(cells: Cells, unit_name: str = "", where: str = "the recording") ->
 
 
 def _date_ns(text: str) -> int:
-    """Nanoseconds since 1970 of a date in ISO 8601, in UTC if it has no zone; there may be a blank before the zone."""
+    """Nanoseconds since 1970 of a date in ISO 8601, in UTC without a zone; a blank before the zone is allowed."""
     try:
         plain = _DAY.sub(lambda day: f"{day[1]}-{int(day[2]):02d}-{int(day[3]):02d}", text.strip())
         plain = _THOUSANDTHS.sub(r"\1.\2", plain)
@@ -124,7 +124,7 @@ def _date_ns(text: str) -> int:
 
 
 def time_unit(cells: Cells, given: str = "") -> str:
-    """The unit of times, by their size and steps where it is not given; "date or clock" where they are these."""
+    """The unit of times, found from their size and steps if not given; "date or clock" for dates and clocks."""
     numbers = numbers_of(cells)
     if np.count_nonzero(np.isfinite(numbers)) <= np.count_nonzero(filled(cells)) // 2:
         return DATES
@@ -132,12 +132,12 @@ def time_unit(cells: Cells, given: str = "") -> str:
 
 
 def of_seconds(seconds: Array) -> Nanoseconds:
-    """Seconds (n) as ns; NO_TIME for what is no number."""
+    """Seconds (n) as ns; NO_TIME for a value that is not a number."""
     return _scaled(seconds, TIMES["s"])
 
 
 def of_day(clock: Array) -> Nanoseconds:
-    """HHMMSS.SS as numbers (n), the time of a day, as ns; a day later after midnight."""
+    """The time of day HHMMSS.SS as numbers (n), in ns; after midnight a day is added."""
     whole = np.floor(clock)
     return _after_midnight(whole // 10000 * 3600.0 + whole // 100 % 100 * 60.0 + whole % 100 + (clock - whole))
 
@@ -163,7 +163,7 @@ def _of_numbers(values: NDArray[Any], unit_name: str, where: str) -> Nanoseconds
 
 
 def unwrapped(values: NDArray[Any]) -> NDArray[Any]:
-    """Counts of a clock (n) of 32 bits that has begun again from 0, continued."""
+    """Continue the counts (n) of a 32-bit clock that has restarted from 0."""
     steps = np.diff(values)
     back = steps < -0.9 * _WRAP
     if not np.any(back) or np.nanmax(values) >= _WRAP or np.nanmin(values) < 0:
@@ -179,12 +179,12 @@ def _scaled(values: Array, scale: int) -> Nanoseconds:
 
 
 def _guessed(values: Array) -> str:
-    """The unit of times without one: those from 1970 by their size, others by their steps."""
+    """Guess the unit of times: of those since 1970 by their size, of others by their steps."""
     good = unwrapped(values[np.isfinite(values)])
     size = float(np.median(np.abs(good)))
     steps = np.diff(good)
     step = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
-    if size > 1e8 and size < 1e10 and step < 100.0:  # else a clock of microseconds that has run for minutes
+    if size > 1e8 and size < 1e10 and step < 100.0:  # otherwise a clock of microseconds that has run for minutes
         return "s"
     for name, from_1970 in (("ns", 1e17), ("us", 1e14), ("ms", 1e11)):
         if size > from_1970:

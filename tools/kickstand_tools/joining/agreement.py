@@ -1,8 +1,8 @@
-"""Compares the leans of two devices on one bike: the test of a lean meter that needs no truth.
+"""Compares the leans of two devices on one bike. This tests a lean meter without a reference.
 
-It does not show errors that both have in common, such as those of the bike's model. It shows those of each device
-alone: of its sensor, its mount, its calibration. Of two equally good devices each has the difference over the square
-root of two as its error.
+It does not show errors that both share, such as those of the bike's model. It shows the separate errors of each device:
+of its sensor, its mount and its calibration. If both devices are equally good, the error of each is the difference
+divided by the square root of two.
 """
 
 from collections.abc import Iterator
@@ -28,17 +28,17 @@ from .motion import motion
 
 STEP_S = 0.02
 _RIDING_MPS = 3.0
-_GAP_S = 0.2  # in a longer time between two samples the lean is not known
+_GAP_S = 0.2  # between samples further apart than this the lean is unknown
 _LEAST_S = 20.0  # least time of riding that is compared
 _LEANED_DEG = 3.0  # with a smaller rms of the lean neither delay nor slope is computed
 
 
 @dataclass
 class Difference:
-    """B's lean less A's, in degrees. constant_deg: its mean, by poses and mounts. moving_deg: rms of the difference
-    less that mean, of which 95 % are under p95_deg and all under worst_deg. slope: B's lean over A's. delay_s: delay of
-    B's lean. The last two are None where the ride leans too little. expected_deg: the rms that the standard deviations
-    of both predict; within_1, within_2: shares of the differences within one and two of these. Parts of seconds."""
+    """B's lean minus A's, in degrees. constant_deg: its mean, caused by poses and mounts. moving_deg: rms of the
+    difference without its mean; 95 % of it are under p95_deg and all under worst_deg. slope: B's lean over A's.
+    delay_s: delay of B's lean, s. The last two are None if the ride leans too little. expected_deg: the rms predicted
+    by both standard deviations. within_1, within_2: shares of the differences within one and two of these."""
 
     seconds: float
     rms_deg: float
@@ -55,9 +55,9 @@ class Difference:
 
 @dataclass
 class Agreement:
-    """Of rides A and B. live: of the leans as displayed, where both show one; None if that is nowhere. smoothed: of
-    those afterwards. t_s (n): s since A's first sample; the leans (n, degrees) at these times, NaN where not known.
-    names: of A's and B's logs."""
+    """The agreement of rides A and B. live: Difference of the displayed leans, where both show one; None if there is no
+    such time. smoothed: Difference of the smoothed leans. t_s (n): s since A's first sample. The leans (n, degrees) at
+    these times, NaN if unknown. names: of A's and B's logs."""
 
     clocks: Clocks
     live: Difference | None
@@ -68,7 +68,7 @@ class Agreement:
     names: tuple[str, str] = ("", "")
 
     def as_data(self) -> dict[str, Any]:
-        """All but the leans, for JSON."""
+        """All fields except the leans, for JSON."""
         live = None if self.live is None else asdict(self.live)
         remarks = {name: as_data(said) for name, said in self.notices.items()}
         return {"clocks": asdict(self.clocks), "live": live, "smoothed": asdict(self.smoothed), "remarks": remarks}
@@ -81,10 +81,10 @@ def compare_rides(
     calibration_b: CalibrationFile,
     progress: Progress | None = None,
 ) -> Agreement:
-    """Two recordings of one ride by two devices: how their leans agree. Their clocks may differ by any time.
+    """Compare two recordings of one ride by two devices. Their clocks may differ by any time.
 
-    a, b: see read_log. progress: called with how much of the first reading is done. Raises InputError, also where they
-    are not of one ride.
+    a, b: see read_log. progress: called with (done, total) of the first reading. Raises InputError, also if the
+    recordings are of different rides.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> made = simulate_ride("street", seed=1, seconds=90.0)
@@ -109,9 +109,9 @@ def compare_rides(
     at = t_s, found.of_b(t_s)
     riding = np.ones(len(t_s), dtype=bool)
     for ride, when in zip(rides, at):
-        riding &= _interpolated(ride.t_s, ride.speed_mps, when) > _RIDING_MPS  # also not-a-number
-    smoothed = [_known(ride, when, riding) for ride, when in zip(rides, at)]
-    live = [_known(ride, when, riding) for ride, when in zip(shown, at)]
+        riding &= _interpolated(ride.t_s, ride.speed_mps, when) > _RIDING_MPS  # False for NaN
+    smoothed = [_lean_while_riding(ride, when, riding) for ride, when in zip(rides, at)]
+    live = [_lean_while_riding(ride, when, riding) for ride, when in zip(shown, at)]
     difference = _difference(*smoothed)
     if difference is None:
         raise InputError(f"{name_of(a)}, {name_of(b)}: under {_LEAST_S:.0f} s of riding in common")
@@ -183,19 +183,19 @@ def draw(path: Path, found: Agreement) -> None:
         axis.margins(x=0.0)
         axis.grid(alpha=0.3)
         for label in axis.legend(loc="upper right").get_texts():
-            label.set_parse_math(False)  # a name may have $ in it
+            label.set_parse_math(False)  # a name may contain $
     figure.savefig(path, dpi=100)
 
 
 def _interpolated(t_s: Array, values: Array, at_s: Array) -> Array:
-    """values at other times, interpolated; NaN outside, in gaps, and beside values that are NaN."""
+    """Interpolate values at other times; NaN outside, in gaps, and beside values that are NaN."""
     after = np.clip(np.searchsorted(t_s, at_s), 1, len(t_s) - 1)
     near = (at_s >= t_s[0]) & (at_s <= t_s[-1]) & (t_s[after] - t_s[after - 1] < _GAP_S)
     return np.where(near, np.interp(at_s, t_s, values), np.nan)
 
 
-def _known(ride: SmoothedRide | Any, at_s: Array, riding: Bools) -> tuple[Array, Array]:
-    """Lean and its standard deviation (n, degrees), NaN where one is not known or the bike does not ride."""
+def _lean_while_riding(ride: SmoothedRide | Any, at_s: Array, riding: Bools) -> tuple[Array, Array]:
+    """Lean and its standard deviation (n, degrees); NaN if one is unknown or the bike is not riding."""
     lean, sigma = (_interpolated(ride.t_s, values, at_s) for values in (ride.lean_deg, ride.lean_sigma_deg))
     known = riding & ~np.isnan(sigma)
     return np.where(known, lean, np.nan), np.where(known, sigma, np.nan)
@@ -227,7 +227,7 @@ def _difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Difference | 
 
 
 def _slope_and_delay(a: Array, b: Array, both: Bools) -> tuple[float | None, float | None]:
-    """Slope and delay of B's lean against A's. Both are taken as equally exact: the slope is that of the principal
+    """Slope and delay of B's lean against A's. Both are treated as equally exact: the slope is that of the principal
     axis, and the delay is fitted to the mean of both roll rates."""
     one, other = a[both] - a[both].mean(), b[both] - b[both].mean()
     if _rms(one) < _LEANED_DEG or _rms(other) < _LEANED_DEG:

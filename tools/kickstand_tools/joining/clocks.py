@@ -1,8 +1,8 @@
 """Finds the shift and the drift between the clocks of two sensors on one bike.
 
 First every shift is tried on the magnitude of the rates, which does not depend on the sensors' mounting. Then shift and
-drift are fitted by least squares to the rates about A's axes; the rotation of B against A follows from the rates, too.
-A is the one in whose time and axes everything is given, B the other.
+drift are fitted by least squares to the rates about A's axes. The rotation of B against A also follows from the rates.
+All results are in the time and the axes of A; B is the other sensor.
 """
 
 from dataclasses import dataclass
@@ -14,22 +14,22 @@ from ..common.errors import InputError
 from ..signals import Array, Bools, correlations, log_likelihood_ratio, moving_mean, peaks, rotation_vector
 from .fit import USUAL_DRIFT
 from .match import LEAST_EVIDENCE, LEAST_LEAD, LEAST_S, MOST_DRIFT
-from .motion import STEP_S, Motion
+from .motion import STEP_S, CellMotion
 
-_SMOOTH = 5  # cells over which rates are averaged, so that their derivatives are known
-_MOST_DPS = 60.0  # higher rates, by jolts, are cut to this
+_SMOOTH = 5  # rates are averaged over this many cells, to find their derivatives
+_MOST_DPS = 60.0  # higher rates, caused by jolts, are cut to this
 _APART_S, _CANDIDATES = 3.0, 6
-_INDEPENDENT_S = 1.0  # rates that are further apart are taken as independent
+_INDEPENDENT_S = 1.0  # rates further apart in time are treated as independent
 _LEAST_CORRELATION = 0.8  # least correlation of the rates: two sensors on one bike have over 0.9
-_MOST_APART_DEG = 15.0  # largest contradiction by the calibrations: each is good to a few degrees
+_MOST_APART_DEG = 15.0  # largest contradiction between the calibrations: each is good to a few degrees
 _ROUNDS = 8
 
 
 @dataclass
 class Clocks:
-    """later_s: time of B's first sample less that of A's, s. drift: seconds per second that B's clock loses against
+    """later_s: time of B's first sample minus that of A's, s. drift: seconds per second that B's clock loses against
     A's. correlation: that of the rates. common_s: time for which both have samples, without gaps and frozen readings,
-    s. apart_deg: angle between B's rotation relative to A as the calibrations give it and as the gyros give it."""
+    s. apart_deg: angle between B's rotation relative to A from the calibrations and from the gyros."""
 
     later_s: float
     drift: float
@@ -42,9 +42,9 @@ class Clocks:
         return (a_s - self.later_s) * (1.0 - self.drift)
 
 
-def clocks(a: Motion, b: Motion, axes_a: CalibrationFile, axes_b: CalibrationFile) -> Clocks:
-    """The Clocks of two rides. Raises InputError where they are not of one ride, or where that cannot be shown; callers
-    put the names of both in front."""
+def clocks(a: CellMotion, b: CellMotion, axes_a: CalibrationFile, axes_b: CalibrationFile) -> Clocks:
+    """The Clocks of two recordings. Raises InputError if they are not of one ride, or if that cannot be shown. Callers
+    put both names in front of its text."""
     size = [_size(one) for one in (a, b)]
     found, count = correlations(size[0], a.there, size[1], b.there)
     found = np.where(count * STEP_S >= LEAST_S, found, 0.0)
@@ -53,7 +53,7 @@ def clocks(a: Motion, b: Motion, axes_a: CalibrationFile, axes_b: CalibrationFil
     tried = []
     for place in places:
         shift_s = (place - (len(b.there) - 1)) * STEP_S
-        alike = _alike(a, b, _along(a, np.eye(3)), _along(b, _rotation(a, b, shift_s)), shift_s)
+        alike = _correlation_at(a, b, _along(a, np.eye(3)), _along(b, _rotation(a, b, shift_s)), shift_s)
         ratio = log_likelihood_ratio(np.array(alike), count[place], STEP_S / _INDEPENDENT_S)
         tried.append((float(ratio), alike, shift_s))
     tried.sort(reverse=True)
@@ -63,7 +63,7 @@ def clocks(a: Motion, b: Motion, axes_a: CalibrationFile, axes_b: CalibrationFil
         raise InputError("they fit at two times: a longer ride with more bends is needed")
     turn = _rotation(a, b, tried[0][2])
     made = _fitted(a, b, _along(a, np.eye(3)), _along(b, turn), tried[0][2])
-    # B's axes in A's, once by the rates and once by both calibrations
+    # B's axes in A's, once from the rates and once from both calibrations
     turn = _rotation(a, b, made.later_s)
     said = np.asarray(axes_a.vehicle_from_sensor).T @ np.asarray(axes_b.vehicle_from_sensor)
     apart = float(np.degrees(np.linalg.norm(rotation_vector(said @ turn.T))))
@@ -76,37 +76,37 @@ def clocks(a: Motion, b: Motion, axes_a: CalibrationFile, axes_b: CalibrationFil
     return made
 
 
-def _size(motion: Motion) -> Array:
-    """(n) the magnitude of the rates, deg/s, less its mean."""
+def _size(motion: CellMotion) -> Array:
+    """(n) the magnitude of the rates minus its mean, deg/s."""
     size = moving_mean(np.minimum(np.linalg.norm(motion.rate_dps, axis=1), _MOST_DPS), _SMOOTH)
     return size - np.mean(size[motion.there])
 
 
-def _along(motion: Motion, axes: Array) -> Array:
+def _along(motion: CellMotion, axes: Array) -> Array:
     """(n, 3) rates about the rows of axes (3, 3), smoothed."""
     return moving_mean(np.clip(motion.rate_dps @ axes.T, -_MOST_DPS, _MOST_DPS), _SMOOTH)
 
 
-def _rotation(a: Motion, b: Motion, later_s: float) -> Array:
-    """(3, 3): A's axes from B's, by which B's rates are nearest to A's (Kabsch's algorithm)."""
-    both = _there(b, a.t_s - later_s) & a.there
-    one, other = _along(a, np.eye(3))[both], _at(b.t_s, _along(b, np.eye(3)), a.t_s[both] - later_s)
+def _rotation(a: CellMotion, b: CellMotion, later_s: float) -> Array:
+    """(3, 3): A's axes from B's: the rotation that brings B's rates nearest to A's (Kabsch's algorithm)."""
+    both = _valid_at(b, a.t_s - later_s) & a.there
+    one, other = _along(a, np.eye(3))[both], _interpolated_at(b.t_s, _along(b, np.eye(3)), a.t_s[both] - later_s)
     left, _, right = np.linalg.svd((one - one.mean(axis=0)).T @ (other - other.mean(axis=0)))
     return left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
 
 
-def _fitted(a: Motion, b: Motion, of_a: Array, of_b: Array, later_s: float) -> Clocks:
-    """The Clocks by Gauss-Newton steps from a rough shift."""
+def _fitted(a: CellMotion, b: CellMotion, of_a: Array, of_b: Array, later_s: float) -> Clocks:
+    """The Clocks, found by Gauss-Newton steps from a rough shift."""
     at_s, drift = a.t_s, 0.0
     derivative = np.gradient(of_b, STEP_S, axis=0)
     error = np.zeros(0)
     for k in range(_ROUNDS):
         on_b = (at_s - later_s) * (1.0 - drift)
-        both = _there(b, on_b) & a.there
+        both = _valid_at(b, on_b) & a.there
         if np.count_nonzero(both) * STEP_S < LEAST_S:
             raise InputError(f"they have less than {LEAST_S:.0f} s of riding in common")
         when = at_s[both] - at_s[both].mean()
-        model, changes = (_at(b.t_s, values, on_b[both]) for values in (of_b, derivative))
+        model, changes = (_interpolated_at(b.t_s, values, on_b[both]) for values in (of_b, derivative))
         error = of_a[both] - model
         weight = 1.0 / (1.0 + np.sum(error**2, axis=1) / (4.0 * np.median(np.sum(error**2, axis=1)) + 1e-9))
         by_shift = -changes
@@ -116,31 +116,33 @@ def _fitted(a: Motion, b: Motion, of_a: Array, of_b: Array, later_s: float) -> C
         normal[1, 1] += float(np.mean(weight @ error**2)) / len(error) / USUAL_DRIFT**2
         step = np.linalg.solve(normal, gradient) if k > 0 else np.array([gradient[0] / max(normal[0, 0], 1e-9), 0.0])
         step[0] = np.clip(step[0], -0.5, 0.5)
-        # The shift in the middle of what is compared moves; that at the start follows
+        # The step changes the shift in the middle of the compared part; the shift at the start follows
         drift, middle = drift + step[1], at_s[both].mean()
         later_s += step[0] - step[1] * (middle - later_s)
     if abs(drift) > MOST_DRIFT:
         raise InputError("they turn alike, but their clocks drift apart by more than clocks do: one has gaps")
-    common_s = float(np.count_nonzero(_there(b, (at_s - later_s) * (1.0 - drift)) & a.there) * STEP_S)
-    return Clocks(float(later_s), float(drift), _alike(a, b, of_a, of_b, later_s, drift), common_s)
+    common_s = float(np.count_nonzero(_valid_at(b, (at_s - later_s) * (1.0 - drift)) & a.there) * STEP_S)
+    return Clocks(float(later_s), float(drift), _correlation_at(a, b, of_a, of_b, later_s, drift), common_s)
 
 
-def _alike(a: Motion, b: Motion, of_a: Array, of_b: Array, later_s: float, drift: float = 0.0) -> float:
+def _correlation_at(
+    a: CellMotion, b: CellMotion, of_a: Array, of_b: Array, later_s: float, drift: float = 0.0
+) -> float:
     """The correlation of rates (n, 3) and (m, 3) about the same axes."""
     on_b = (a.t_s - later_s) * (1.0 - drift)
-    both = _there(b, on_b) & a.there
-    one, other = of_a[both], _at(b.t_s, of_b, on_b[both])
+    both = _valid_at(b, on_b) & a.there
+    one, other = of_a[both], _interpolated_at(b.t_s, of_b, on_b[both])
     one, other = one - one.mean(axis=0), other - other.mean(axis=0)
     return float(np.sum(one * other) / max(np.sqrt(np.sum(one**2) * np.sum(other**2)), 1e-9))
 
 
-def _there(motion: Motion, at_s: Array) -> Bools:
+def _valid_at(motion: CellMotion, at_s: Array) -> Bools:
     place = np.rint(at_s / STEP_S - 0.5).astype(np.int64)
     inside = (place >= 0) & (place < len(motion.there))
     return inside & motion.there[np.clip(place, 0, len(motion.there) - 1)]
 
 
-def _at(t_s: Array, values: Array, at_s: Array) -> Array:
+def _interpolated_at(t_s: Array, values: Array, at_s: Array) -> Array:
     return np.column_stack([np.interp(at_s, t_s, column) for column in values.T])
 
 

@@ -1,10 +1,10 @@
-"""A ride's yaw and forces over the steps of a track, for any shift between their clocks."""
+"""Computes a ride's yaw and forces over the steps of a track, for any shift between their clocks."""
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
 from ..signals import Array, moving_mean
-from .motion import STEP_S, Motion
+from .motion import STEP_S, CellMotion
 from .track import Course, Segments, without_trend
 
 _MOST_SINE = 0.87  # largest sine of the lean; over 60 degrees the speed or the rate is wrong
@@ -13,10 +13,10 @@ _MOST_SINE = 0.87  # largest sine of the lean; over 60 degrees the speed or the 
 class Comparison:
     """A ride beside a track. A shift is the track's time at the ride's first sample, s since the track's first point.
 
-    given: the segments of the track that lie within the ride, whatever shift within margin_s is the right one.
+    given: the segments of the track that are within the ride for every shift within margin_s.
     """
 
-    def __init__(self, motion: Motion, course: Course, segments: Segments, shift_s: float, margin_s: float) -> None:
+    def __init__(self, motion: CellMotion, course: Course, segments: Segments, shift_s: float, margin_s: float) -> None:
         begin_s, end_s = segments.begin_s[:, 0] - shift_s, segments.end_s[:, -1] - shift_s
         within = (begin_s > margin_s) & (end_s < motion.seconds - margin_s)
         missing = np.append(0, np.cumsum(~motion.there))
@@ -48,7 +48,7 @@ class Comparison:
         return np.array(means)
 
 
-def _double_sums(motion: Motion, course: Course, shift_s: float) -> Array:
+def _double_sums(motion: CellMotion, course: Course, shift_s: float) -> Array:
     """(n + 1, 6): integrals over time of the rotation (degrees; about up and two axes across it) and of the integrated
     force (m/s; the sensor's axes): their differences are means between two times.
 
@@ -66,7 +66,7 @@ def _double_sums(motion: Motion, course: Course, shift_s: float) -> Array:
     cosine = np.asarray(np.sqrt(1.0 - sine * sine), dtype=float)
     turned = _sums(rates / cosine[:, None])
     sped_up = _sums(motion.force_g * STANDARD_GRAVITY)
-    sped_up -= np.linspace(0.0, 1.0, len(sped_up))[:, None] * sped_up[-1]  # without gravity, which would cost digits
+    sped_up -= np.linspace(0.0, 1.0, len(sped_up))[:, None] * sped_up[-1]  # subtract gravity, which would cost digits
     once = np.hstack((turned, sped_up))
     return _sums((once[1:] + once[:-1]) / 2.0)
 

@@ -1,7 +1,7 @@
-"""The shift between the clocks of a ride and a track, found to hundredths of a second, with its standard deviation.
+"""Finds the shift between the clocks of a ride and a track to hundredths of a second, with its standard deviation.
 
-First the shifts around a rough one are tried. Then all unknowns are fitted by least squares: shift, drift, a tilt of
-the ride's up and the sensor's forward axis.
+First it tries the shifts around a rough one. Then it fits all unknowns by least squares: shift, drift, a tilt of the
+ride's up and the sensor's forward axis.
 """
 
 from dataclasses import dataclass
@@ -10,11 +10,11 @@ import numpy as np
 
 from ..signals import Array
 from .compare import Comparison
-from .motion import Motion
+from .motion import CellMotion
 from .track import Course, Segments
 
-AROUND_S = 6.0  # largest distance of the shift from the rough one, with the drift at the ends of the ride
-_TRIED_S = 0.1  # distance of the shifts that are tried
+AROUND_S = 6.0  # largest distance of the shift from the rough one, including the drift at the ends of the ride
+_TRIED_S = 0.1  # step between the shifts that are tried
 _SHIFTS = np.arange(-AROUND_S, AROUND_S + _TRIED_S / 2.0, _TRIED_S)
 _DRIFTS = np.arange(-300e-6, 301e-6, 20e-6)
 USUAL_DRIFT = 100e-6  # prior of the drift, 1 sigma: two crystals, one of them hot
@@ -22,7 +22,7 @@ _USUAL_TILT = 0.05  # prior of the tilt of up by an accelerometer's offset, 1 si
 _PRIOR = 1.0 / np.array([np.inf, USUAL_DRIFT, _USUAL_TILT, _USUAL_TILT, np.inf, np.inf, np.inf]) ** 2
 _SAME_TRACK_S = 0.05  # 1 sigma of the shift, because receivers smooth more in bends than on straights
 _FREEDOM = 4.0  # degrees of freedom of Student's distribution, which down-weights errors over two sigma
-_LEAST_ERROR = 0.5  # least error over its sigma: a better receiver does not make the gyro's scale factor exact
+_LEAST_ERROR = 0.5  # least error over its sigma: even with a better receiver the gyro's scale factor is inexact
 _LEAST_COST = 0.5 * (_FREEDOM + 1.0) * np.log1p(_LEAST_ERROR**2 / _FREEDOM)  # least cost of a step
 _ROUNDS = 8
 _FEWEST = 2  # least number of segments to compare
@@ -30,12 +30,12 @@ _STEPS_ALIKE = 4.0  # number of neighbouring steps with the same error, because 
 
 
 @dataclass
-class Fit:
+class TrackFit:
     """shift_s: the track's time at the ride's first sample, s since the track's first point. drift: seconds per second
-    that the ride's clock loses. sigma_s: standard deviation of the time in the ride of a point of the track, at the end
-    of the ride where it is larger. correlation: that of the courses' changes. evidence: natural logarithm of the
-    likelihood ratio of the courses, with the ride's yaw over without. tilt (2): tilt of the ride's up, rad. segments:
-    number of segments that were compared."""
+    that the ride's clock loses. sigma_s: standard deviation of the time of a track point in the ride, at the end of the
+    ride where it is larger. correlation: that of the courses' changes. evidence: natural logarithm of the ratio of the
+    courses' likelihoods with and without the ride's yaw. tilt (2): tilt of the ride's up, rad. segments: number of
+    segments that were compared."""
 
     shift_s: float
     drift: float
@@ -46,19 +46,19 @@ class Fit:
     segments: int
 
 
-def fitted(motion: Motion, course: Course, segments: Segments, rough_s: float) -> Fit | None:
-    """The best fit within AROUND_S of a rough shift. None where the two have hardly anything in common there."""
+def fitted(motion: CellMotion, course: Course, segments: Segments, rough_s: float) -> TrackFit | None:
+    """The best fit within AROUND_S of a rough shift. None if the two hardly overlap there."""
     compared = Comparison(motion, course, segments, rough_s, AROUND_S + 1.0)
     if len(compared.given.begin_s) < _FEWEST:
         return None
-    shift_s, drift, evidence = _tried(compared, rough_s)
-    return _polished(Comparison(motion, course, segments, shift_s, 2.0), shift_s, drift, evidence)
+    shift_s, drift, evidence = _try_shifts(compared, rough_s)
+    return _refine(Comparison(motion, course, segments, shift_s, 2.0), shift_s, drift, evidence)
 
 
-def apart(motion: Motion, course: Course, segments: Segments, fit: Fit) -> float:
-    """The reduction of the cost per segment if each has a shift of its own, in units of an error's cost.
+def cost_of_one_shift(motion: CellMotion, course: Course, segments: Segments, fit: TrackFit) -> float:
+    """The reduction of the cost per segment if each segment gets its own shift, in units of an error's cost.
 
-    Under 2 where the track belongs to the ride. The same road at other times of the day is over 4.
+    It is under 2 if the track belongs to the ride, and over 4 for the same road at another time.
     """
     compared = Comparison(motion, course, segments, fit.shift_s, AROUND_S + 1.0)
     given = compared.given
@@ -69,8 +69,8 @@ def apart(motion: Motion, course: Course, segments: Segments, fit: Fit) -> float
     return (together - float(costs.min(axis=0).sum())) / len(given.begin_s) / usual
 
 
-def _tried(compared: Comparison, rough_s: float) -> tuple[float, float, float]:
-    """The best of the shifts and drifts that are tried, and the evidence for it; see Fit."""
+def _try_shifts(compared: Comparison, rough_s: float) -> tuple[float, float, float]:
+    """The best of the tried shifts and drifts, and its evidence; see Fit."""
     given, middle_s = compared.given, compared.middle_s
     costs = _costs(compared, rough_s, 0.0, np.ones(1))
     since_s = given.middle_s.mean(axis=1) - middle_s
@@ -121,7 +121,7 @@ class _Step:
     inverse: Array
 
 
-def _polished(compared: Comparison, shift_s: float, drift: float, evidence: float) -> Fit:
+def _refine(compared: Comparison, shift_s: float, drift: float, evidence: float) -> TrackFit:
     """The best fit by Gauss-Newton steps, in each of which outliers are down-weighted."""
     given = compared.given
     forward = _least(compared.sped_up(shift_s, drift), given.speed_mps, given.speed_weight)
@@ -132,7 +132,7 @@ def _polished(compared: Comparison, shift_s: float, drift: float, evidence: floa
         by[0] = np.clip(by[0], -1.0, 1.0)
         now = now + by
         step = _step(compared, now)
-    return _judged(compared, evidence, now, step)
+    return _with_sigma(compared, evidence, now, step)
 
 
 def _step(compared: Comparison, now: Array) -> _Step:
@@ -158,8 +158,8 @@ def _step(compared: Comparison, now: Array) -> _Step:
     return _Step(model_deg, pulls, np.asarray(np.linalg.inv(curvature), dtype=float))
 
 
-def _judged(compared: Comparison, evidence: float, now: Array, step: _Step) -> Fit:
-    """The Fit with its standard deviation. Errors within a segment may be correlated, so the variance comes from the
+def _with_sigma(compared: Comparison, evidence: float, now: Array, step: _Step) -> TrackFit:
+    """The Fit with its standard deviation. Errors within a segment may be correlated. So the variance comes from the
     scatter of the segments' gradients at the solution."""
     given, count, drift = compared.given, len(step.pulls), float(now[1])
     spread = step.pulls.T @ step.pulls * count / max(count - 2, 1) + np.diag(_PRIOR)
@@ -168,7 +168,7 @@ def _judged(compared: Comparison, evidence: float, now: Array, step: _Step) -> F
     variance = max(float(np.array([1.0, end]) @ covariance @ np.array([1.0, end])) for end in ends_s)
     weight = given.course_weight
     size = np.sqrt((weight * given.turned_deg**2).sum() * (weight * step.model_deg**2).sum())
-    return Fit(
+    return TrackFit(
         (float(now[0]) - drift * compared.middle_s) / (1.0 - drift),
         drift,
         float(np.hypot(np.sqrt(variance), _SAME_TRACK_S)),

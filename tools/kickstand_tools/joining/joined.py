@@ -27,7 +27,7 @@ _FORMAT = {SPEED: "%.3f", "lat_deg": "%.7f", "lon_deg": "%.7f", "utc_s": "%.3f"}
 
 @dataclass
 class Joined:
-    """A ride, the track that belongs to it, and their Match. own_speed: the log has a speed, which stays."""
+    """A ride, its track, and their Match. own_speed: True if the log has a speed, which is kept."""
 
     ride: Source
     track: Track
@@ -44,11 +44,11 @@ class Joined:
 
 
 def join_track(ride: Source, track: Path | str | Track, progress: Progress | None = None) -> Joined:
-    """Find the place of a phone's or watch's track in a ride, by the yaw and the acceleration of both.
+    """Find the place of a phone's or watch's track in a ride from the yaw and the acceleration of both.
 
     ride: see read_log; it needs neither a calibration nor a speed. track: a .gpx or .fit file. Their clocks may differ
-    by any time and drift. progress: called with how much of the ride has been read. Raises InputError where the track
-    is another ride's, and where that cannot be shown.
+    by any time and drift. progress: called with (done, total) of the ride's bytes. Raises InputError if the track is
+    another ride's, or if the match is not certain.
 
     >>> from kickstand_tools.api import simulate_ride
     >>> ride = simulate_ride("hills", seed=1, seconds=120.0)
@@ -74,10 +74,10 @@ def join_track(ride: Source, track: Path | str | Track, progress: Progress | Non
 
 
 def write_joined(out: Path | str, joined: Joined, progress: Progress | None = None) -> int:
-    """Write the ride, line for line, with the track's values in the rows nearest to them, whole or not at all.
+    """Write the lines of the ride, with the track's values in the nearest rows, whole or not at all.
 
-    Gzipped if the name ends in .gz. Returns how many positions there are in it. progress: called with how much of the
-    ride is done. Raises InputError.
+    Gzipped if the name ends in .gz. Returns the number of positions written. progress: called with (done, total) of the
+    ride. Raises InputError.
 
     >>> import tempfile
     >>> log = Log([0.0, 0.01], [[0.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 0.0]] * 2)
@@ -119,15 +119,14 @@ def write_joined(out: Path | str, joined: Joined, progress: Progress | None = No
 
 
 def _nearest(time_us: Ints, at_us: Ints) -> tuple[Ints, Ints]:
-    """Rows, and the indices of the points that belong to them: points within the rows' time and not in a gap of the
-    log."""
+    """Rows, and the indices of the points for them: points within the rows' time and not in a gap of the log."""
     points = np.flatnonzero((at_us >= time_us[0]) & (at_us <= time_us[-1]))
     after = np.clip(np.searchsorted(time_us, at_us[points]), 1, max(len(time_us) - 1, 1))
     if len(time_us) < 2:
         return np.zeros(len(points), dtype=int), points
     rows = after - (at_us[points] - time_us[after - 1] < time_us[after] - at_us[points])
     near = np.abs(time_us[rows] - at_us[points]) <= LOST_US
-    rows, last = np.unique(rows[near][::-1], return_index=True)  # of two points in a row the later one
+    rows, last = np.unique(rows[near][::-1], return_index=True)  # if a row has two points, the later one
     return rows, points[near][::-1][last]
 
 

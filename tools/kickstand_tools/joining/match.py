@@ -1,4 +1,4 @@
-"""Finds the place of a track in a ride: the best of all shifts, or the reason for which none fits."""
+"""Finds the place of a track in a ride: the best of all shifts, or the reason why none fits."""
 
 from dataclasses import dataclass
 
@@ -8,32 +8,31 @@ from kickstand.units import STANDARD_GRAVITY
 from ..common.errors import InputError
 from ..refusals import OPPOSITE_SIGN
 from ..signals import Array, Bools, correlations, log_likelihood_ratio, moving_mean, peaks
-from .fit import AROUND_S, Fit, apart, fitted
-from .motion import STEP_S, Motion
+from .fit import AROUND_S, TrackFit, cost_of_one_shift, fitted
+from .motion import STEP_S, CellMotion
 from .track import LONGEST_S, SLOWEST_MPS, STEPS, Course, Track, course, segments
 
 _GRID_S = 0.5
 _SPAN_S = 4.0  # rough shifts are found by changes of course over this time
 _APART_S = 10.0  # least distance of two rough shifts
 _CANDIDATES = 5
-_WORTH = 0.1  # a rough shift is tried if its evidence is at least this share of the likeliest one's
-LEAST_S = 60.0  # least time of riding that both have
+_WORTH = 0.1  # a rough shift is tried if its evidence is at least this share of the largest evidence
+LEAST_S = 60.0  # least time of riding in both
 _LEAST_TURN_DEG = 360.0  # least sum of the changes of course
 LEAST_EVIDENCE = 15.0  # least evidence of a match; other rides' tracks reach 9
-LEAST_LEAD = 6.0  # least difference of the best shift's evidence from another one's
+LEAST_LEAD = 6.0  # least difference between the evidence of the best shift and of another one
 _MOST_APART = 3.0
 MOST_DRIFT = 400e-6  # largest drift; that of a crystal in the heat of an engine is 100e-6
-_ALIKE = 0.9  # a higher correlation is no chance, but may be of another, similar bend
+_ALIKE = 0.9  # a higher correlation is not by chance, but may come from another, similar bend
 _LEAST_CORRELATION = 0.6
 _MOST_SIGMA_S = 0.3
 
 
 @dataclass
 class Match:
-    """start_utc_s: the track's time at the ride's first sample, s since 1970, receiver's delay included: with it
-    positions are at the bike's place. drift: seconds per second that the ride's clock loses. sigma_s: standard
-    deviation of the match. correlation: that of the changes of course, 0 to 1. common_s: time that is in both, track
-    and ride."""
+    """start_utc_s: the track's time at the ride's first sample, s since 1970. It includes the receiver's delay: with
+    it, positions are where the bike is. drift: seconds per second that the ride's clock loses. sigma_s: standard
+    deviation of the match. correlation: that of the changes of course, 0 to 1. common_s: time covered by both, s."""
 
     start_utc_s: float
     drift: float
@@ -46,14 +45,14 @@ class Match:
         return (utc_s - self.start_utc_s) * (1.0 - self.drift)
 
 
-def match(motion: Motion, track: Track) -> Match:
-    """The Match of a track with a ride. Raises InputError where the track does not belong to the ride, or where that
-    cannot be shown; callers put the names of both in front."""
+def match(motion: CellMotion, track: Track) -> Match:
+    """The Match of a track with a ride. Raises InputError if the track does not belong to the ride, or if that cannot
+    be shown. Callers put both names in front of its text."""
     track = track.once_a_second()
     steps = course(track)
     parts = segments(steps)
     _check_turns(motion, steps)
-    found: list[Fit] = []
+    found: list[TrackFit] = []
     mirrored, rough = _rough_shifts(motion, steps)
     for shift_s in rough:
         fit = fitted(motion, steps, parts, shift_s)
@@ -74,7 +73,7 @@ def match(motion: Motion, track: Track) -> Match:
     if others and others[0].evidence > best.evidence - LEAST_LEAD:
         far_s = abs(others[0].shift_s - best.shift_s)
         raise InputError(f"the track fits at two times, {far_s:.0f} s apart, as its bends are alike: {_LONGER}")
-    if abs(best.drift) > MOST_DRIFT or apart(motion, steps, parts, best) > _MOST_APART:
+    if abs(best.drift) > MOST_DRIFT or cost_of_one_shift(motion, steps, parts, best) > _MOST_APART:
         raise InputError(
             "the ride turns as the track does, but at other times: it is the same road on another day, or other bends "
             "that are alike"
@@ -92,7 +91,7 @@ _LONGER = "a longer ride with more bends is needed, or a track with a point ever
 _OTHER = "is it the track of another ride or another day?"
 
 
-def _check_turns(motion: Motion, steps: Course) -> None:
+def _check_turns(motion: CellMotion, steps: Course) -> None:
     if motion.seconds < LEAST_S:
         raise InputError(f"the ride lasts {motion.seconds:.0f} s: at least {LEAST_S:.0f} s with bends are needed")
     moving_s = float((steps.end_s - steps.begin_s)[steps.good].sum())
@@ -107,7 +106,7 @@ def _check_turns(motion: Motion, steps: Course) -> None:
         raise InputError(f"the ride turns by {turned_deg:.0f} degrees in all: too few bends to tell where it was when")
 
 
-def _rough_shifts(motion: Motion, steps: Course) -> tuple[bool, list[float]]:
+def _rough_shifts(motion: CellMotion, steps: Course) -> tuple[bool, list[float]]:
     """True if the ride would fit better with the opposite sign of yaw; and the shifts that fit best."""
     of_track, track_good = _changes_of_track(steps)
     of_ride, ride_good = _changes_of_ride(motion)
@@ -121,8 +120,8 @@ def _rough_shifts(motion: Motion, steps: Course) -> tuple[bool, list[float]]:
 
 
 def _changes_of_track(steps: Course) -> tuple[Array, Bools]:
-    """Every _GRID_S the change of course within _SPAN_S, degrees, as the gyro of a leaning bike measures it; and True
-    where it is known."""
+    """The change of course within _SPAN_S, every _GRID_S, degrees, as the gyro of a leaning bike would measure it; and
+    True where it is known."""
     middle_s, at_s = (steps.begin_s + steps.end_s) / 2.0, np.arange(0.0, steps.end_s[-1], _GRID_S)
     half = _SPAN_S / 2.0
     heading = np.cumsum(steps.turn_deg)
@@ -134,8 +133,8 @@ def _changes_of_track(steps: Course) -> tuple[Array, Bools]:
     return change * np.cos(np.arctan(speed * np.radians(change / _SPAN_S) / STANDARD_GRAVITY)), known
 
 
-def _changes_of_ride(motion: Motion) -> tuple[Array, Bools]:
-    """Likewise the ride's rotation about its up within _SPAN_S, degrees, and True where it is known."""
+def _changes_of_ride(motion: CellMotion) -> tuple[Array, Bools]:
+    """The same for the ride: its rotation about its up within _SPAN_S, degrees, and True where it is known."""
     at_s, half = np.arange(0.0, motion.seconds, _GRID_S), _SPAN_S / 2.0
     edges_s = np.arange(len(motion.there) + 1) * STEP_S
     turned = np.append(0.0, np.cumsum(motion.rate_dps @ motion.up)) * STEP_S

@@ -1,6 +1,6 @@
-"""The yaw of a ride by its sensor alone: no calibration is needed, and the sensor may sit at any angle.
+"""Finds the yaw of a ride from the sensor alone, without a calibration: the sensor may be mounted at any angle.
 
-Up is the mean direction of the force in bends: a motorcycle leans so that the force stays along its own up. The rate
+Up is the mean direction of the force in bends, because a motorcycle leans until the force is along its own up. The rate
 about it is the yaw rate times the cosine of the lean.
 """
 
@@ -20,11 +20,11 @@ _LONGEST_S = 100 * 3600.0  # longest ride, limited by memory
 
 
 @dataclass
-class Motion:
+class CellMotion:
     """A ride in n cells of STEP_S from its first sample.
 
-    force_g, rate_dps (n, 3): means in the sensor's axes, rates less the gyro's bias. there (n): False where the log has
-    no sample, or frozen readings; force and rate are 0 there. speed, positions: True if the log has any.
+    force_g, rate_dps (n, 3): means in the sensor's axes, rates minus the gyro's bias. there (n): False without samples
+    or with frozen readings; force and rate are then 0. speed, positions: True if the log has any.
     """
 
     force_g: Array
@@ -45,13 +45,13 @@ class Motion:
 
     @property
     def up(self) -> Array:
-        """(3) the bike's up in the sensor's axes, to some degrees, because the accelerometer's bias is in it."""
+        """(3) the bike's up in the sensor's axes, exact to some degrees: it contains the accelerometer's bias."""
         turning = np.minimum(np.linalg.norm(self.rate_dps, axis=1), _MOST_DPS)
         up: Array = turning @ self.force_g
         return up / max(float(np.linalg.norm(up)), 1e-9)
 
 
-def motion(ride: Source, progress: Progress | None = None, notices: list[Notice] | None = None) -> Motion:
+def motion(ride: Source, progress: Progress | None = None, notices: list[Notice] | None = None) -> CellMotion:
     """The Motion of a log (see read_log). progress, notices: see read_blocks(). Raises InputError."""
     table, speed, positions = Cells(STEP_S), False, False
     for block in read_blocks(ride, 2, progress, notices):
@@ -65,8 +65,8 @@ def motion(ride: Source, progress: Progress | None = None, notices: list[Notice]
     cells = table.evenly(round(_LONGEST_S / STEP_S) + 1)
     if cells is None:
         raise InputError(f"{name_of(ride)}: all readings are frozen: check the sensor")
-    missing = np.zeros((cells.first, 6))  # frozen from the beginning on
+    missing = np.zeros((cells.first, 6))  # frozen from the beginning
     means = np.vstack((missing, cells.means - np.append(np.zeros(3), np.nanmedian(cells.means[:, 3:], axis=0))))
     there = np.append(missing[:, 0], cells.count) > 0
     means[~there] = 0.0
-    return Motion(means[:, :3], means[:, 3:], there, speed, positions)
+    return CellMotion(means[:, :3], means[:, 3:], there, speed, positions)

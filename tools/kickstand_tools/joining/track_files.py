@@ -14,7 +14,7 @@ from .track import FASTEST_MPS, Track
 
 _DEGREES = 180.0 / 2**31  # degrees of one unit ("semicircle") in a FIT file
 _FEWEST = 30  # least number of points of a track
-_MOST_BYTES = 50_000_000  # largest file: a day at a fix a second has 20 million; parsed it takes ten times the memory
+_MOST_BYTES = 50_000_000  # largest file: a day with a fix per second has 20 million; parsing takes ten times the memory
 
 Point = tuple[float, float, float, float]  # s since 1970, latitude and longitude in degrees, m/s or NaN
 
@@ -22,7 +22,7 @@ Point = tuple[float, float, float, float]  # s since 1970, latitude and longitud
 def read_track(path: Path | str, progress: Progress | None = None) -> Track:
     """Read a .gpx or .fit file. progress: called with the bytes read and those of the file. Raises InputError.
 
-    Points without a time or a position are left out, and of those with the same time all but the first.
+    Points without a time or a position are left out. Of points with the same time the first is kept.
 
     >>> import tempfile
     >>> point = '<trkpt lat="48.1" lon="11.{0:02}"><time>2026-05-17T09:30:{0:02}Z</time></trkpt>'
@@ -43,13 +43,13 @@ def read_track(path: Path | str, progress: Progress | None = None) -> Track:
         if size > _MOST_BYTES:
             raise InputError(f"{path} is too large for a track: over {_MOST_BYTES / 1e6:.0f} MB: export a part of it")
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # fitdecode's, line by line, of a damaged file
+            warnings.simplefilter("ignore")  # fitdecode warns about each line of a damaged file
             points = list(reader(path, progress))
     except InputError:
         raise
     except OSError as error:
         raise InputError(f"{path} cannot be read: {cause(error)}") from error
-    except Exception as error:  # of the formats' libraries, which raise many kinds for damaged files
+    except Exception as error:  # the libraries raise many kinds of errors for damaged files
         raise InputError(f"{path} is damaged, or not of the format that its name says: {_words(error)}") from error
     table = np.array(points, dtype=float).reshape(-1, 4)
     on_earth = (np.abs(table[:, 1]) <= 90.0) & (np.abs(table[:, 2]) <= 180.0)
@@ -121,7 +121,7 @@ def _fit(path: Path, progress: Progress | None) -> Iterator[Point]:
 
 
 def _words(error: Exception) -> str:
-    """The beginning of a library's message, which may quote a whole file."""
+    """The beginning of a library's message: it may quote a whole file."""
     return ascii(" ".join(str(error).split())[:60])[1:-1] or type(error).__name__
 
 

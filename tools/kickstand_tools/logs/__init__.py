@@ -1,1 +1,1 @@
-"""Recorded logs: the values that a CSV may have, reading, writing and cutting, uneven times and frozen readings."""
+"""Reads, checks, writes and cuts recorded logs; corrects uneven times and marks frozen readings."""

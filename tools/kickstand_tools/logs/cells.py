@@ -11,7 +11,7 @@ from ..signals import Array
 from .csv_reader import cells_of
 
 COLUMNS = ("t_s", "ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps")
-TRACK = ("speed_mps", "lat_deg", "lon_deg", "utc_s")  # columns of a satellite receiver, with values now and then
+TRACK = ("speed_mps", "lat_deg", "lon_deg", "utc_s")  # columns of a satellite receiver, with values in some rows
 OPTIONAL = (*TRACK, "temp_c")  # may be empty in a row
 
 # A larger value is in another unit (m/s2, counts): the sensor's widest ranges are 16 g and 2000 deg/s.
@@ -25,7 +25,7 @@ _UNITS |= {"lat_deg": "degrees", "lon_deg": "degrees", "utc_s": "seconds since 1
 
 
 def check_text(log: str, content: bytes, lines_before: int) -> None:
-    """Raise InputError if the bytes are no UTF-8. log: its name for messages."""
+    """Raise InputError if the bytes are not UTF-8. log: its name for messages."""
     try:
         content.decode()
     except UnicodeDecodeError as error:
@@ -36,7 +36,7 @@ def check_text(log: str, content: bytes, lines_before: int) -> None:
 
 
 def header(log: str, line: str) -> list[str]:
-    """The names of the columns. Raises InputError where one is missing or there twice."""
+    """The names of the columns. Raises InputError if one is missing or present twice."""
     try:
         names = [name.strip() for name in cells_of(line)]
     except csv.Error as error:
@@ -62,7 +62,7 @@ def header(log: str, line: str) -> list[str]:
 
 
 def _made_from(log: str) -> str:
-    """ ", RIDE.csv", if that is the only ride beside it that has a calibration."""
+    """ ", RIDE.csv" if that is the only ride beside the log that has a calibration."""
     rides = [
         path.with_name(path.name.removesuffix(".cal.json") + ending)
         for path in Path(log).parent.glob("*.cal.json")
@@ -73,7 +73,7 @@ def _made_from(log: str) -> str:
 
 
 def plausible(table: Array, names: list[str], before_us: int | None) -> bool:
-    """True if read() would find no mistake in these values (n, columns of names; NaN for an empty cell)."""
+    """True if read() would accept these values (n, columns of names; NaN for an empty cell)."""
     for k, name in enumerate(names):
         within = np.abs(table[:, k]) <= _LIMITS[name]
         if not np.all(within | np.isnan(table[:, k]) if name in OPTIONAL else within):
@@ -83,7 +83,7 @@ def plausible(table: Array, names: list[str], before_us: int | None) -> bool:
 
 
 def read(log: str, text: str, width: int, places: dict[str, int], lines_before: int, before_us: int | None) -> Array:
-    """(n, columns in the order of places), NaN for an empty optional cell.
+    """Convert text to numbers (n, columns in the order of places), NaN for an empty optional cell.
 
     Raises InputError for the first mistake, naming its line.
     """
@@ -111,7 +111,7 @@ def read(log: str, text: str, width: int, places: dict[str, int], lines_before: 
 
 
 class _Mistake(Exception):
-    """What is wrong with a row."""
+    """A mistake in a row. Its text describes it."""
 
 
 def _number(cell: str, name: str, limit: float) -> float:

@@ -1,7 +1,7 @@
 """Writes tables of numbers as CSV, quickly; writes a log in memory, or a stretch of a log, to a file.
 
-The texts are those of Python's own formatting, made of a column at once instead of number by number: that takes a
-seventh of the time.
+The texts are the same as those of Python's own formatting. Formatting a whole column at once takes a seventh of the
+time.
 """
 
 import itertools
@@ -20,15 +20,16 @@ from .reader import read_blocks
 from .source import File, Progress
 
 _DIGITS = {"speed_mps": 3, "temp_c": 2, "lat_deg": 7, "lon_deg": 7, "utc_s": 3}
-_ROWS = 15_000  # rows written at a time: their letters fit a processor's cache
+_ROWS = 15_000  # rows written at a time: their letters fit into a processor's cache
 _MOST = 2.0**53  # in units of the last digit: larger doubles are more than one unit apart
 _POINT, _MINUS, _ZERO, _COMMA, _END = b".-0,\n"
 
-Letters = NDArray[np.uint8]  # (m, n): the ASCII letters of n texts, one in each column; 0 is none
+Letters = NDArray[np.uint8]  # (m, n): the ASCII letters of n texts, one text per column; 0 means no letter
 
 
 def csv_lines(table: Array, digits: Sequence[int]) -> Iterator[bytes]:
-    """Yield the lines of table (n, m), some at a time, with digits[k] decimals in column k; NaN is an empty cell."""
+    """Yield the lines of table (n, m), many lines at a time, with digits[k] decimals in column k. NaN gives an empty
+    cell."""
     for begin in range(0, len(table), _ROWS):
         columns = table[begin : begin + _ROWS].T
         yield joined_cells([number_cells(column, digit, nan="") for column, digit in zip(columns, digits, strict=True)])
@@ -56,7 +57,7 @@ def number_cells(values: Array, digits: int, nan: str = "nan") -> Letters:
     if not np.all(scaled < _MOST):  # infinity, too
         return text_cells([nan if value != value else f"{value:.{digits}f}" for value in values.tolist()])
     whole = np.rint(scaled)
-    # The product was rounded: close to the middle between two numbers the text may be the other one's.
+    # The product was rounded. Near the middle between two texts it may give the wrong one.
     for k in np.flatnonzero(np.abs(np.abs(scaled - whole) - 0.5) <= scaled * 2.0**-52).tolist():
         whole[k] = int(f"{abs(values[k]):.{digits}f}".replace(".", ""))
     most = int(np.max(whole, initial=0.0))
@@ -68,7 +69,8 @@ def number_cells(values: Array, digits: int, nan: str = "nan") -> Letters:
 
 
 def _letters(number: NDArray[np.unsignedinteger], digits: int, most: int, least_rows: int) -> Letters:
-    """Of integers (n) of up to `most` digits with a point before the last `digits` ones, and a free row in front."""
+    """The letters of integers (n) of up to `most` digits, with a point before the last `digits` digits and a free first
+    row."""
     places = max(most, digits + 1)
     letters = np.zeros((max(places + 2, least_rows), len(number)), dtype=np.uint8)
     row = len(letters) - 1
@@ -89,8 +91,8 @@ def write_lines(path: Path, names: Sequence[str], lines: Iterable[bytes]) -> Non
 
 
 def write_lean(out: Path, columns: Sequence[str], digits: Sequence[int], rows: Iterable[tuple[Block, Array]]) -> int:
-    """Write a LEAN.csv: the log's own times, then these columns with so many decimals each. rows: blocks of the log
-    with their values (n, columns). Returns the number of samples. Raises InputError."""
+    """Write a LEAN.csv: the log's own times, then these columns, with digits[k] decimals in column k. rows: blocks of
+    the log with their values (n, columns). Returns the number of samples. Raises InputError."""
     count = 0
 
     def lines() -> Iterator[bytes]:
@@ -107,7 +109,7 @@ def write_lean(out: Path, columns: Sequence[str], digits: Sequence[int], rows: I
 def write_log(path: Path | str, log: Log) -> None:
     """Write a log, gzipped if the name ends in .gz, whole or not at all. Raises InputError.
 
-    Of the columns that may be empty those that have a value; t_s is the recorder's own time.
+    Optional columns without any value are left out. t_s is the recorder's own time.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as directory:
@@ -131,9 +133,9 @@ def cut_log(
     progress: Progress | None = None,
     notices: list[Notice] | None = None,
 ) -> tuple[int, float]:
-    """Write from from_s to to_s of a log to out, line for line, gzipped if its name ends in .gz, whole or not at all.
+    """Copy the lines of a log from from_s to to_s to out, gzipped if its name ends in .gz, whole or not at all.
 
-    from_s, to_s: seconds since the log's first sample; negative: before its last one; None: the log's begin or end.
+    from_s, to_s: seconds since the log's first sample; negative: before its last one; None: the log's start or end.
     Returns the number of samples and their duration, s. progress, notices: see read_blocks(). Raises InputError.
 
     >>> import tempfile
@@ -158,5 +160,5 @@ def cut_log(
 
 
 def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Write a CSV file of texts and numbers that need no quotation marks, as write_lines() does. Raises InputError."""
+    """Write a CSV file of texts and numbers that need no quotation marks. See write_lines(). Raises InputError."""
     write_lines(path, columns, (",".join(map(str, row)).encode("ascii") + b"\n" for row in rows))

@@ -1,11 +1,11 @@
-"""The one reader of CSV, for logs and for the tables of other apps.
+"""Reads all CSV: logs and the tables of other apps.
 
-Each line is a row by itself: a quotation mark that is not closed does not swallow the lines after it. In a log the
-first mistake is an error with its line (cells.read()); of another app's table damaged rows are left out and counted
-(columns_of_text()). Memory is bounded: a log comes in blocks (source.chunks()), a table has so many cells at most.
+Each line is one row: an unclosed quotation mark does not swallow the following lines. In a log the first mistake raises
+an error with its line (cells.read()). In another app's table damaged rows are left out and counted (columns_of_text()).
+Memory is bounded: a log comes in blocks (source.chunks()), and the cells of a table are limited.
 
-A log whose numbers are all plainly written, as Kickstand writes them, is read by numbers_in(), which takes 0.7 s for an
-hour at 200 Hz. cells.read(), which reads every other log, takes 1.7 s.
+numbers_in() reads a log whose numbers are all plain, as Kickstand writes them: 0.7 s for an hour at 200 Hz.
+cells.read() reads all other logs, in 1.7 s.
 """
 
 import csv
@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 from ..common.errors import InputError
 from ..signals import Array, Bools
 
-Cells = NDArray[Any]  # (n): int64; float64, NaN where there is no number; or str as objects, "" where there is nothing
+Cells = NDArray[Any]  # (n): int64; float64, NaN for no number; or str as objects, "" for an empty cell
 
 ROWS = 50_000  # rows converted at once: text takes ten times the memory of numbers
 LONGEST = 40  # characters of the longest number
 LONGEST_LINE = 100_000  # characters of the longest line: Python's csv refuses cells that are not much longer
-# Limits of a table: seven hours of twelve columns at 100 Hz. Numbers take 8 bytes each, and as many while they are
-# joined, texts 60.
+# Limits of a table: seven hours of twelve columns at 100 Hz. A number takes 8 bytes, and 8 more while parts are joined;
+# a text 60.
 MOST_CELLS, MOST_TEXTS = 30_000_000, 3_000_000
 _NOTHING = {"", "-", "na", "n/a", "nan", "nil", "none", "null", "#n/a"}
 _PLAIN = b"0123456789.-,\n"
@@ -43,15 +43,15 @@ def cells_of(line: str, separator: str = ",") -> list[str]:
     """The cells of one line. Raises csv.Error for a line of over LONGEST_LINE characters."""
     if len(line) > LONGEST_LINE:
         raise csv.Error(f"a line of over {LONGEST_LINE} characters")
-    if '"' not in line:  # half the time
+    if '"' not in line:  # this takes half the time
         return line.split(separator)
     return next(csv.reader((line,), delimiter=separator, skipinitialspace=True), [])
 
 
 def numbers_in(text: bytes, count: int) -> Array | None:
-    """(n, count) the numbers in n lines of `count` cells, NaN for an empty one; float() would read the same.
+    """(n, count) the numbers in n lines of `count` cells, NaN for an empty cell. The values equal those of float().
 
-    None, for another reader, where the text is anything else than n lines of `count` plain numbers.
+    None if the text is not n lines of `count` plain numbers. The caller then falls back to another reader.
     """
     if text.translate(None, _PLAIN) or not text.strip(b"\n"):
         return None
@@ -69,10 +69,10 @@ def numbers_in(text: bytes, count: int) -> Array | None:
 
 
 def columns_of_text(text: str, separator: str, width: int) -> tuple[list[Cells], int]:
-    """The columns of CSV without a header, and how many rows were left out.
+    """The columns of CSV without a header, and the number of rows left out.
 
-    Rows with more cells than names or than the first row has, and lines that are too long, are damaged; the ends of
-    short ones are empty. Raises InputError for a table that is too large.
+    A row is damaged if it has more cells than there are names or than the first row has, or if its line is too long.
+    The missing cells of a short row are empty. Raises InputError for a table that is too large.
     """
     most, left_out = 0, 0
 
@@ -93,7 +93,7 @@ def columns_of_text(text: str, separator: str, width: int) -> tuple[list[Cells],
 
 
 def _lines(text: str) -> Iterator[str]:
-    """Yield the lines that are not blank: a list of all takes several times the memory of the text."""
+    """Yield the lines that are not blank. A list of them would take several times the memory of the text."""
     begin = 0
     while begin < len(text):
         end = text.find("\n", begin)
@@ -123,7 +123,7 @@ def columns_of(rows: Iterable[Sequence[str]], width: int) -> list[Cells]:
 
 
 def numbers_of(cells: Cells) -> NDArray[Any]:
-    """Cells (n) as integers if all of them are, else as floats, NaN for a cell that is no number."""
+    """Cells (n) as integers if all are integers, otherwise as floats, NaN for a cell that is not a number."""
     if cells.dtype.kind in "iuf":
         return cells
     numbers = [_number(str(cell)) for cell in cells.tolist()]
@@ -138,7 +138,7 @@ def filled(cells: Cells) -> Bools:
 
 
 def as_text(cells: Cells) -> list[str]:
-    """The cells as text, "" where there is nothing."""
+    """The cells as text, "" for an empty cell."""
     return ["" if cell != cell else str(cell) for cell in cells.tolist()]
 
 
@@ -168,7 +168,7 @@ def _text(cells: Iterable[str]) -> Cells:
 
 
 def _number(cell: str) -> float | None:
-    """The number in a cell; NaN for an empty one, None for text."""
+    """The number in a cell; NaN for an empty cell, None for text."""
     cell = cell.strip()
     if cell.lower() in _NOTHING:
         return np.nan

@@ -1,8 +1,8 @@
-"""Times that a recorder has rounded, spread evenly within what its rounding allows.
+"""Spreads times that a recorder has rounded evenly, within the limits of the rounding.
 
-Some recorders write times in whole hundredths or thousandths of a second, or stamp several samples with the time at
-which they were handed over. Steps are then uneven, and some are 0. A sensor samples evenly: its times are the mean
-recorded times around each sample, as near to the recorded one as the tick of the recorder's clock allows.
+Some recorders write times in whole hundredths or thousandths of a second, or give several samples the time at which
+they were handed over. Steps are then uneven, and some are 0. But a sensor samples evenly. So each time is replaced by
+the mean of the recorded times around it, within the tick of the recorder's clock.
 """
 
 from collections.abc import Callable, Iterator
@@ -18,28 +18,28 @@ from .log import Block
 
 COARSE = 0.05  # times with ticks under this share of the time between samples stay as they are
 OFTEN = 0.05  # a larger share of repeated times means that the recorder stamps several samples at once
-EXACT = 0.98  # with a larger share of equal steps the times are a grid, with a sample lost here and there
-GAP = 1.5  # a step longer than so many median steps plus a tick is a gap
+EXACT = 0.98  # with a larger share of equal steps the times are a grid with some lost samples
+GAP = 1.5  # a step longer than 1.5 median steps plus a tick is a gap
 # The mean is taken over at least AROUND samples and at least TICKS ticks
 AROUND = 64
 TICKS = 8
-# A clock stood still if over CROWD samples, and over CROWDED times the usual number per tick, have the same time
+# A clock has stopped if over CROWD samples, and over CROWDED times the usual number per tick, have the same time
 CROWDED = 10.0
 CROWD = 50
 # Largest shift of a time, in ticks: half a tick, and a margin for the ends, where the mean is less exact
 ALLOWED = 0.6
-SHORTEST_S = 2e-6  # shortest step, because times are passed on in whole microseconds
+SHORTEST_S = 2e-6  # shortest step, because times become whole microseconds
 CONTEXT = 2000  # samples before and after a block that are used for its times
 REPORTED_S = 0.002  # a larger shift of the times is reported in a notice
 
 
 def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
-    """Recorded times of samples (n, s) that rounding has made uneven, or has repeated, spread evenly (n, s).
+    """Spread the times of samples (n, s) evenly if rounding has made them uneven or equal. Returns (n, s).
 
-    Each stays within 0.6 ticks of what was recorded, the tick being what all times are multiples of, or the usual
-    step between different times where many are repeated. Steps are over 0. Gaps stay, and times that are fine enough
-    come back as they are. Raises InputError for a time that goes back or is no number, and for a clock that
-    stands still. name: what messages call the log.
+    Each stays within 0.6 ticks of the recorded time. All times are multiples of the tick; if many are repeated, it is
+    the usual step between different times. Steps are over 0. Gaps stay, and times that are fine enough are not changed.
+    Raises InputError for a time that decreases or is not a number, and for a clock that has stopped. name: the log's
+    name in messages.
 
     >>> even_times([0.0, 0.01, 0.01, 0.02, 0.03, 0.03, 0.04]).round(4).tolist()
     [0.0007, 0.0071, 0.0136, 0.02, 0.0264, 0.0329, 0.0393]
@@ -56,7 +56,7 @@ def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
     if np.any(steps_us < 0):
         at = recorded[int(np.argmax(steps_us < 0)) + 1]
         raise InputError(f"{name}: time goes back at {at:g} s: it has to increase")
-    starts = np.flatnonzero(np.diff(time_us, prepend=time_us[0] - 1))  # of the samples of each time
+    starts = np.flatnonzero(np.diff(time_us, prepend=time_us[0] - 1))  # first sample of each time
     if len(starts) == 1:
         raise InputError(f"{name}: the time is the same in all samples: it has to increase")
     counts = np.diff(np.append(starts, len(recorded)))
@@ -73,7 +73,7 @@ def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
         raise InputError(f"{name}: time stands still at {at:g} s, in {np.max(counts)} samples: it has to increase")
     if not repeated and (tick_us < COARSE * period_us or _one_step(between_us)):
         return recorded
-    times = _apart(recorded, starts, counts, period_us * 1e-6)
+    times = _spread_repeated(recorded, starts, counts, period_us * 1e-6)
     if tick_us >= COARSE * period_us:
         times = _smooth(recorded, times, tick_us * 1e-6, period_us * 1e-6)
     order = SHORTEST_S * np.arange(len(times))
@@ -84,8 +84,8 @@ def _one_step(between_us: Ints) -> bool:
     return bool(np.count_nonzero(between_us == np.median(between_us)) >= EXACT * len(between_us))
 
 
-def _apart(recorded: Array, starts: Ints, counts: Ints, period_s: float) -> Array:
-    """Times in which samples of the same time are spread up to the next time, or over their usual duration."""
+def _spread_repeated(recorded: Array, starts: Ints, counts: Ints, period_s: float) -> Array:
+    """Spread samples of the same time up to the next time, or over their usual duration."""
     until = np.append(recorded[starts[1:]], np.inf)
     longest = np.minimum((until - recorded[starts]) / counts, np.maximum(period_s, 0.0))
     number = np.arange(len(recorded)) - np.repeat(starts, counts)
@@ -93,7 +93,7 @@ def _apart(recorded: Array, starts: Ints, counts: Ints, period_s: float) -> Arra
 
 
 def _smooth(recorded: Array, times: Array, tick_s: float, period_s: float) -> Array:
-    """The mean recorded time around each sample, between one gap and the next, no further from it than ALLOWED."""
+    """The mean recorded time around each sample, between two gaps, at most ALLOWED ticks from the recorded time."""
     half = max(AROUND, round(TICKS * tick_s / period_s)) // 2
     cuts = np.flatnonzero(np.diff(recorded) > GAP * period_s + tick_s) + 1
     found = times.copy()
@@ -106,7 +106,7 @@ def _smooth(recorded: Array, times: Array, tick_s: float, period_s: float) -> Ar
 
 
 def _mean(values: Array, half: int) -> Array:
-    """Moving mean over `half` samples to each side; beyond the ends values are extrapolated along straight lines."""
+    """Moving mean over `half` samples on each side. Beyond the ends values are extrapolated along straight lines."""
     n = len(values)
     span = min(n, 2 * half + 1)
     k = np.arange(n, dtype=float)
@@ -119,7 +119,7 @@ def _mean(values: Array, half: int) -> Array:
 
 
 def _line(k: Array, values: Array) -> Callable[[Array], Array]:
-    """The straight line of least squares, as a function of k."""
+    """The least-squares line through values, as a function of k."""
     middle, mean = float(np.mean(k)), float(np.mean(values))
     away = k - middle
     slope = float(away @ (values - mean)) / max(float(away @ away), 1e-12)
@@ -127,10 +127,10 @@ def _line(k: Array, values: Array) -> Callable[[Array], Array]:
 
 
 def even_blocks(blocks: Iterator[Block], name: str, remarks: list[Notice]) -> Iterator[Block]:
-    """The blocks with times that increase, see even_times(). name: the log's; remarks: a notice of the changes is
+    """Yield the blocks with increasing times, see even_times(). name: the log's. remarks: a notice of the changes is
     appended.
 
-    Blocks whose times are even or fine are not changed. The last samples of others come with the next block.
+    Blocks whose times are even or fine are not changed. The last samples of other blocks come with the next block.
     """
     spread = _Spread(name)
     held: Block | None = None
@@ -159,14 +159,14 @@ class _Spread:
 
     def __init__(self, name: str) -> None:
         self._name = name
-        self._before_s = np.zeros(0)  # recorded times of the samples that were handed on last
+        self._before_s = np.zeros(0)  # recorded times of the samples returned last
         self._from_us: int | None = None  # time of the first sample, after spreading
         self._last_us = -1
         self._samples = self._repeated = 0
         self._shift_s = 0.0
 
     def take(self, block: Block) -> tuple[Block | None, Block | None]:
-        """The part that is ready, and the part that has to wait for the next block."""
+        """Return the finished part, and the part that must wait for the next block."""
         recorded = np.concatenate((self._before_s, block.t_s))
         steady = not np.any(np.diff(block.time_us) == 0)
         if not steady and len(block.time_us) < 2 * CONTEXT:
@@ -181,7 +181,7 @@ class _Spread:
         return self._ready(block.part(slice(0, wait)), times[len(self._before_s) :][:wait]), held
 
     def rest(self, block: Block) -> Block:
-        """The last samples, with their times spread."""
+        """Return the last samples, with their times spread."""
         times = even_times(np.concatenate((self._before_s, block.t_s)), self._name)
         return self._ready(block, times[len(self._before_s) :])
 

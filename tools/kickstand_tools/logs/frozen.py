@@ -1,8 +1,8 @@
-"""Stretches of a log in which the readings froze: a sensor that hangs, or a phone that writes its last reading again.
+"""Finds stretches of a log with frozen readings, from a sensor that hangs or a phone that repeats its last reading.
 
-Noise changes the readings of a working sensor from sample to sample, at rest too. Six that stay the same to the last
-digit for half a second were not measured. Only in a log with few digits rounding may hide the noise of a vehicle at
-rest: there the readings count where those before or after go on at the same values, and are left out where they jump.
+Noise changes the readings of a working sensor from sample to sample, even at rest. If all six stay the same to the last
+digit for half a second, they were not measured. But in a log with few digits, rounding may hide the noise of a vehicle
+at rest. There the readings are kept if those before or after continue at the same values, and left out if they jump.
 """
 
 import numpy as np
@@ -12,18 +12,18 @@ from ..signals import Array, Bools, Ints
 from .log import Log
 
 FROZEN_S, FROZEN_SAMPLES = 0.5, 10  # least duration and number of equal readings
-COARSE_G, COARSE_DPS = 0.002, 0.05  # last digits from which on rounding may hide the noise of a phone's sensor
+COARSE_G, COARSE_DPS = 0.002, 0.05  # from these last digits, rounding may hide the noise of a phone's sensor
 BESIDE_S = 0.5  # time before and after a stretch that is compared with it
-NEAR_G, NEAR_DPS = 0.02, 0.5  # largest difference of these means from the stretch at standstill
+NEAR_G, NEAR_DPS = 0.02, 0.5  # largest difference of these means from the stretch, at standstill
 
-_MOTION = [0, 1, 2, 4, 5, 6]  # of the chip's order: without the temperature
+_MOTION = [0, 1, 2, 4, 5, 6]  # indices in the chip's order, without the temperature
 
 
 class FrozenReadings:
-    """Finds frozen readings. mark() takes a log part by part."""
+    """Finds frozen readings. Call mark() with one block after another."""
 
     def __init__(self) -> None:
-        self._last = np.zeros((0, 6))  # reading at the end of the block before
+        self._last = np.zeros((0, 6))  # reading at the end of the previous block
         self._last_s = 0.0
         self._since_s = 0.0  # time from which it has been the same
         self._since_samples = 1
@@ -32,7 +32,7 @@ class FrozenReadings:
         self._stretches: list[tuple[float, float]] = []
 
     def mark(self, time_us: Ints, readings: Array) -> Bools:
-        """(n) True where readings (n, 7), as in a Block, are frozen. The first one of equal readings is not."""
+        """(n) True where readings (n, 7), as in a Block, are frozen. The first of equal readings counts as measured."""
         n = len(time_us)
         values, time_s = np.vstack((self._last, readings[:, _MOTION])), time_us.astype(float) * 1e-6
         time_s = np.concatenate(([self._last_s], time_s)) if len(self._last) else time_s
@@ -69,7 +69,7 @@ class FrozenReadings:
         return [Notice("frozen-readings", len(self._stretches), seconds, first, last)]
 
     def _doubtful(self, values: Array, time_s: Array, begin: int, end: int) -> bool:
-        """True if the equal readings from begin to end are surely frozen: no standstill with noise hidden by
+        """True if the equal readings from begin to end are surely frozen, not a standstill with noise hidden by
         rounding."""
         if not np.any(np.isfinite(self._step)):
             return False  # nothing ever changed: nothing to compare with
@@ -82,12 +82,12 @@ class FrozenReadings:
         return not any(np.all(np.abs(mean - values[begin]) <= near) for mean in means)
 
     def _add(self, begin_s: float, end_s: float) -> None:
-        if self._stretches and self._stretches[-1][1] == begin_s:  # it went on from the block before
+        if self._stretches and self._stretches[-1][1] == begin_s:  # it continues from the previous block
             begin_s = self._stretches.pop()[0]
         self._stretches.append((begin_s, end_s))
 
 
 def without_frozen(log: Log) -> Log:
-    """The log without frozen readings: where they were is a gap. The log itself where there are none."""
+    """The log without frozen readings, which become gaps. The same log if it has none."""
     kept = ~FrozenReadings().mark(log.time_us, log.readings)
     return log if np.all(kept) else log.part(kept)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from pyarrow import Schema
 
-ROOM_TEMP_C = 25.0  # temperature for the firmware's modules where a log has none
+ROOM_TEMP_C = 25.0  # temperature for the firmware's modules if a log has none
 
 FirmwareRow = tuple[int, list[float], float]
 
@@ -35,7 +35,7 @@ class Table:
 
     def part(self, which: slice | Bools) -> Self:
         """The samples of a slice, or those where an array of n is True. The arrays of a slice are views of this
-        table's; what is no array belongs to both."""
+        table's. Other fields are shared."""
         # Table's columns are the fields; a Log's are named as in a CSV
         return replace(self, **{name: values[which] for name, values in Table.columns(self).items()})
 
@@ -49,8 +49,8 @@ class Table:
 
 
 def float_schema(units: Mapping[str, str], fine: Container[str], about: dict[str, str]) -> "Schema":
-    """Of a Parquet file: columns with their units, in 64-bit floats those of fine, the rest in 32-bit floats. about:
-    its metadata."""
+    """The schema of a Parquet file: columns with their units. Columns in fine are 64-bit floats, the rest 32-bit
+    floats. about: its metadata."""
     import pyarrow
 
     return pyarrow.schema(
@@ -64,7 +64,7 @@ def float_schema(units: Mapping[str, str], fine: Container[str], about: dict[str
 
 def firmware_rows(time_us: Ints, readings: Array, speed_mps: Array) -> Iterator[FirmwareRow]:
     """Each sample for a replay by the firmware's modules: time (us), reading (7, the chip's order: g, deg C, deg/s),
-    speed (m/s, NaN for none). Where a log has no temperature it is ROOM_TEMP_C."""
+    speed (m/s, NaN for none). A missing temperature is ROOM_TEMP_C."""
     readings = np.column_stack((readings[:, :3], np.nan_to_num(readings[:, 3], nan=ROOM_TEMP_C), readings[:, 4:]))
     return zip(time_us.tolist(), readings.tolist(), speed_mps.tolist())
 
@@ -75,12 +75,12 @@ class Log(Table):
 
     t_s (n): seconds since the first sample, increasing. accel_g (n, 3): specific force, g. gyro_dps (n, 3): angular
     rate, deg/s. speed_mps (n): m/s. temperature_c (n). lat_deg, lon_deg (n): the position, degrees north and east.
-    utc_s (n): Universal Time, s since 1970. From speed_mps to utc_s each is NaN where there is no new value, and may be
-    left out. start_s: the recorder's own time at the first sample, s. name: what messages call the log. notices: what
-    is remarkable in it (kickstand_tools.refusals.sentence puts a notice into words).
+    utc_s (n): Universal Time, s since 1970. The fields from speed_mps to utc_s are optional, and NaN without a new
+    value. start_s: the recorder's own time at the first sample, s. name: the log's name in messages. notices: remarks
+    about it (kickstand_tools.refusals.sentence puts a notice into words).
 
-    t_s may start anywhere: its first value is added to start_s and taken off. Raises InputError for shapes that do not
-    fit and for a time that does not increase.
+    t_s may start at any value: its first value is added to start_s and subtracted from t_s. Raises InputError for
+    shapes that do not fit and for a time that does not increase.
 
     >>> import numpy as np
     >>> t_s = np.arange(300) / 100.0
@@ -119,7 +119,7 @@ class Log(Table):
 
     @classmethod
     def from_readings(cls, readings: ArrayLike, rate_hz: float, name: str = "the log") -> "Log":
-        """readings (n, 7): acceleration (3, g), temperature (C), rate (3, deg/s), the order in which the chip has them.
+        """readings (n, 7): acceleration (3, g), temperature (C), rate (3, deg/s), in the chip's order.
 
         rate_hz: samples per second.
         """
@@ -133,12 +133,13 @@ class Log(Table):
 
     @property
     def readings(self) -> Array:
-        """(n, 7) as from_readings() takes them."""
+        """(n, 7) the samples in the form of from_readings()."""
         return np.column_stack((self.accel_g, self.temperature_c, self.gyro_dps))
 
     @property
     def start_utc_s(self) -> float | None:
-        """Universal Time at the first sample: the median of what the rows say, because some come late; None without."""
+        """Universal Time at the first sample, s; None if unknown. It is the median over the rows, because some values
+        come late."""
         starts = (self.utc_s - self.t_s)[np.isfinite(self.utc_s)]
         return float(np.median(starts)) if len(starts) else None
 
@@ -147,7 +148,7 @@ class Log(Table):
         return firmware_rows(self.time_us, self.readings, self.speed_mps)
 
     def columns(self) -> dict[str, Array]:
-        """The samples by the names that the columns have in a CSV."""
+        """The samples by the names of the columns in a CSV."""
         named: dict[str, Array] = {"t_s": self.t_s}
         named |= {f"a{axis}_g": values for axis, values in zip(AXES, self.accel_g.T)}
         named |= {f"g{axis}_dps": values for axis, values in zip(AXES, self.gyro_dps.T)}
@@ -163,9 +164,8 @@ class Block(Table):
     """Some successive rows of a log, in the units of the firmware's modules.
 
     time_us (n): since the log's first sample. readings (n, 7): acceleration (3, g), temperature (C), rate (3, deg/s),
-    the chip's order. speed_mps, lat_deg, lon_deg, utc_s (n): as in a Log. What the log does not have is NaN. start_s:
-    the recorder's own time at the log's first sample. frozen (n): True where the readings are repeated ones, see
-    frozen.py.
+    the chip's order. speed_mps, lat_deg, lon_deg, utc_s (n): as in a Log. Missing values are NaN. start_s: the
+    recorder's own time at the log's first sample. frozen (n): True for repeated readings, see frozen.py.
     """
 
     time_us: Ints
@@ -215,11 +215,12 @@ class Block(Table):
 
 @dataclass
 class Stretch:
-    """From from_s to to_s of a log, seconds since its first sample; negative: before its last one. None: its end there.
+    """A log from from_s to to_s, seconds since its first sample; negative: before its last one. None: the log's start
+    or end.
 
-    It can be used wherever a log can. Read as a log its times count from its own first sample. Functions that compute
-    the lean read the whole log, because the lean depends on earlier readings, and return the stretch in the log's
-    times.
+    It can be used like a log. When it is read as a log, its times count from its own first sample. Functions that
+    compute the lean read the whole log, because the lean depends on earlier readings. They return the stretch in the
+    log's times.
 
     >>> import numpy as np
     >>> from kickstand_tools.api import Log, read_log
@@ -238,13 +239,13 @@ class Stretch:
         return name_of(self.source)
 
     def of_length(self, length_s: float) -> "Stretch":
-        """The stretch with both times from the beginning. length_s: length of the log."""
+        """The stretch with both times from the log's start. length_s: length of the log."""
         times = [None if t is None else t if t >= 0.0 else length_s + t for t in (self.from_s, self.to_s)]
         return Stretch(self.source, *times)
 
     def holds(self, block: Block) -> Bools:
-        """(n) True for the samples of a block of the whole log that lie in the stretch, whose times have to be from the
-        beginning."""
+        """(n) True for the samples of a block of the whole log that are in the stretch. Its times must count from the
+        log's start."""
         begin_us, end_us = self._ends_us()
         return (block.time_us >= begin_us) & (block.time_us <= end_us)
 
@@ -272,7 +273,8 @@ class Stretch:
 
 
 def within(stretch: Stretch | None, block: Block, values: Array) -> Iterator[tuple[Block, Array]]:
-    """A block of the whole log and the values of its rows (n, ...), as far as they lie in the stretch; None: all."""
+    """Yield the rows of a block of the whole log that are in the stretch, with their values (n, ...). None: all
+    rows."""
     if stretch is None:
         yield block, values
     elif (which := stretch.holds(block)).any():

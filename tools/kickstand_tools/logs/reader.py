@@ -1,4 +1,4 @@
-"""Recorded logs: CSV with the columns of COLUMNS, plain or gzipped, read block by block."""
+"""Reads recorded logs block by block: CSV with the columns of COLUMNS, plain or gzipped."""
 
 import itertools
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ from .source import File, Progress, chunks, name_of, total_bytes
 
 BLOCK_BYTES = 1 << 20  # bytes of text in a block, some 15000 samples
 BLOCK_SAMPLES = 60_000  # samples in a block of a log in memory
-MOST_SAMPLES = 10_000_000  # most samples of a log that is read as a whole: 14 hours at 200 Hz take 1 GB of memory
+MOST_SAMPLES = 10_000_000  # most samples of a log read as a whole: 14 hours at 200 Hz take 1 GB of memory
 _READINGS = ("ax_g", "ay_g", "az_g", "temp_c", "gx_dps", "gy_dps", "gz_dps")  # in the order of Block.readings
 
 Source = File | Log | Stretch  # what can be read as a log
@@ -37,9 +37,9 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None,
 
     source: a path (gzipped if it ends in .gz), an open file of text or bytes, a Log, which is checked, or a Stretch of
     one of these. minimum: the least number of samples. progress: called with the bytes read and those of the file.
-    axes: judge whether rates and accelerations belong together, which takes most of the time. Times that repeat are
-    spread, a cut end is left out. Raises InputError naming the file, and the line for a mistake in it, also for units
-    that are easily mistaken (m/s2, milliseconds, km/h).
+    axes: check whether rates and accelerations fit each other, which takes most of the time. Repeated times are spread,
+    a cut end is left out. Raises InputError with the file, and the line of a mistake, also for common wrong units
+    (m/s2, milliseconds, km/h).
 
     >>> import io
     >>> log = read_log(io.StringIO("t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\\n0.00,0,1,0,0,0,0\\n0.01,0,1,0,0,0,0\\n"))
@@ -72,9 +72,9 @@ def read_blocks(
     lines: bool = True,
     calibration: CalibrationFile | None = None,
 ) -> Iterator[Block]:
-    """Read a log block by block, however long it is. Frozen readings are marked in each block. notices: at the end
-    notices about the log, and about contradictions to `calibration`, are appended. lines: keep the rows as CSV too,
-    which take the most memory. Else see read_log()."""
+    """Read a log of any length block by block. Frozen readings are marked in each block. notices: at the end, notices
+    about the log and about contradictions to `calibration` are appended. lines: also keep the rows as CSV, which takes
+    the most memory. For the rest see read_log()."""
     name, count = name_of(source), 0
     remarks: list[Notice] = []
     checks, frozen, health = Checks(name), FrozenReadings(), SensorHealth()
@@ -102,7 +102,7 @@ def read_blocks(
 
 
 def check_first_line(log: Path) -> None:
-    """Raise InputError if the first line of a file is not that of a log, or is the only one."""
+    """Raise InputError if a file does not begin with a log's line of names, or has no other line."""
     pieces = (text for text, _ in chunks(log, BLOCK_BYTES, []))
     _, rest = _header(str(log), next(pieces, b""))
     if not rest.strip() and not any(text.strip() for text in pieces):
@@ -110,7 +110,7 @@ def check_first_line(log: Path) -> None:
 
 
 def is_log(path: Path) -> bool:
-    """By its first line."""
+    """True if the first line of a file is that of a log."""
     try:
         check_first_line(path)
         return True
@@ -119,37 +119,38 @@ def is_log(path: Path) -> bool:
 
 
 def read_twice(source: Source) -> Source:
-    """A source that can be read twice: the same one, or a Log in place of an open file."""
+    """A source that can be read twice: a Log for an open file, otherwise the same source."""
     if isinstance(source, Stretch):
-        return replace(source, source=_again(source.source))
-    return _again(source)
+        return replace(source, source=_rereadable(source.source))
+    return _rereadable(source)
 
 
-def apart(source: Source) -> tuple[File | Log, Stretch | None]:
-    """The whole log of a source and, if the source is a Stretch, that stretch with times from the log's beginning, else
-    None. Raises InputError where the stretch holds no sample."""
+def split_stretch(source: Source) -> tuple[File | Log, Stretch | None]:
+    """Split a source into its whole log and its stretch. The stretch, with times from the log's start, is None if the
+    source is not a Stretch. Raises InputError if the stretch has no sample."""
     if not isinstance(source, Stretch):
         return source, None
-    stretch = _from_beginning(replace(source, source=_again(source.source)))
+    stretch = _from_beginning(replace(source, source=_rereadable(source.source)))
     next(stretch.cut(_unchecked(stretch.source, [])))
     return stretch.source, stretch
 
 
 def _from_beginning(stretch: Stretch) -> Stretch:
-    """With both times from the log's beginning: where one is from its end, the log is read for its length."""
+    """The stretch with both times from the log's start. If one counts from the end, the log is read to find its
+    length."""
     if min(stretch.from_s or 0.0, stretch.to_s or 0.0) >= 0.0:
         return stretch
-    whole = _again(stretch.source)
+    whole = _rereadable(stretch.source)
     last_s = [float(block.t_s[-1]) for block in _unchecked(whole, [])]
     return Stretch(whole, stretch.from_s, stretch.to_s).of_length(max(last_s, default=0.0))
 
 
-def _again(source: File | Log) -> File | Log:
+def _rereadable(source: File | Log) -> File | Log:
     return source if isinstance(source, (Path, str, Log)) else read_log(source)
 
 
 def _unchecked(source: Source, remarks: list[Notice]) -> Iterator[Block]:
-    """The blocks, with units and number of samples not checked yet. remarks: notices about the file are appended."""
+    """The blocks, before units and number of samples are checked. remarks: notices about the file are appended."""
     if isinstance(source, Log):
         return _blocks_of(source)
     if not isinstance(source, Stretch):
@@ -182,7 +183,7 @@ def _parsed(source: File, name: str, remarks: list[Notice]) -> Iterator[Block]:
 
 
 def _header(name: str, first: bytes) -> tuple[list[str], bytes]:
-    """The names of a log's columns, and what is below them in its first chunk."""
+    """The names of a log's columns, and the rest of its first chunk."""
     first = first.removeprefix(b"\xef\xbb\xbf")
     if not first.strip():
         raise InputError(f"{name} is empty: a log starts with the line {','.join(COLUMNS)}")
@@ -196,7 +197,7 @@ def _header(name: str, first: bytes) -> tuple[list[str], bytes]:
 
 
 def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], remarks: list[Notice]) -> Iterator[Block]:
-    """The blocks with their times as they stand in the file, which may repeat."""
+    """The blocks with the times of the file, which may repeat."""
     places = {column: names.index(column) for column in COLUMNS + OPTIONAL if column in names}
     line, start_us, last_us = 1, None, None
     for text, done, is_last in _last_marked(pieces):
@@ -229,7 +230,7 @@ def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], rema
 def _numbers(
     name: str, text: bytes, names: list[str], places: dict[str, int], line: int, before_us: int | None
 ) -> Array:
-    """(n, columns in the order of places) the numbers in a text. line: number of lines before it."""
+    """(n, columns in the order of places) the numbers in a text. line: number of lines before the text."""
     table = numbers_in(text, len(names))
     if table is not None and cells.plausible(table[:, list(places.values())], list(places), before_us):
         return table[:, list(places.values())]
@@ -238,7 +239,7 @@ def _numbers(
 
 
 def _last_marked(parts: Iterator[tuple[bytes, int]]) -> Iterator[tuple[bytes, int, bool]]:
-    """Each part, and whether it is the last one."""
+    """Yield each part with True if it is the last one."""
     before = next(parts, None)
     for part in parts:
         if before:
@@ -249,11 +250,11 @@ def _last_marked(parts: Iterator[tuple[bytes, int]]) -> Iterator[tuple[bytes, in
 
 
 def _without_cut_line(text: bytes, names: list[str], places: dict[str, int]) -> tuple[bytes, bytes]:
-    """The end of a log without its last line if that was cut, and the cut line: empty if it was not.
+    """Remove the last line from the end of a log if it was cut. Returns the text and the cut line, empty if not cut.
 
-    text: whole lines, of which the last one may have no end. It was cut if it has fewer cells than there are columns;
-    without an end also if it cannot be read, or if its last number has fewer digits after the point than the line
-    before it: half a number is a number too.
+    text: whole lines; the last one may have no line end. It was cut if it has fewer cells than there are columns.
+    Without a line end it was also cut if it cannot be read, or if its last number has fewer decimals than in the
+    previous line: half a number is a number too.
     """
     kept = text.rstrip()
     before, _, last = kept.rpartition(b"\n")

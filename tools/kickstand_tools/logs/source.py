@@ -14,17 +14,17 @@ from kickstand.errors import Notice
 
 from ..common.errors import InputError, cause
 
-# Most bytes of a line, or of NUL bytes at the end, which a file system may leave in a file that was not closed
+# Most bytes of a line, and most NUL bytes at the end: a file system may leave these in a file that was not closed
 LONGEST_LINE = 16_000_000
-SUFFIXES = (".csv", ".txt", ".tsv", ".vbo", ".parquet")  # of logs, and of the tables of other apps
+SUFFIXES = (".csv", ".txt", ".tsv", ".vbo", ".parquet")  # of logs and of the tables of other apps
 File = Path | str | IO[bytes] | IO[str]
 Progress = Callable[[int, int], None]  # called with (done, total) in one unit; total is 0 where it is not known
 
 
 def open_input(path: Path | str) -> IO[bytes]:
-    """An ordinary file, open for reading. Raises InputError where there is none: a device or a pipe may never end."""
+    """Open an ordinary file for reading. Raises InputError for anything else: a device or a pipe may never end."""
     try:
-        # without waiting for somebody who writes into a pipe
+        # Do not wait for a writer to a pipe
         file = open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)), "rb")
         if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             return file
@@ -37,7 +37,7 @@ def open_input(path: Path | str) -> IO[bytes]:
 
 
 def name_of(source: object) -> str:
-    """The name of a source in messages: its path, the name of the file or of the log, or "the log"."""
+    """The name of a source for messages: its path, the name of the file or of the log, or "the log"."""
     if isinstance(source, (Path, str)):
         return str(source)
     name = getattr(source, "name", None)
@@ -46,18 +46,18 @@ def name_of(source: object) -> str:
 
 def log_stem(name: str) -> str:
     """The name of a log, or of an export, without path and suffixes."""
-    name = Path(os.path.abspath(name)).name.removesuffix(".gz")  # that of the folder if it is "."
+    name = Path(os.path.abspath(name)).name.removesuffix(".gz")  # the folder's name if it is "."
     ending = next((suffix for suffix in (*SUFFIXES, ".zip") if name.lower().endswith(suffix)), "")
     return name[: len(name) - len(ending)]
 
 
 def chunks(source: File, size: int, remarks: list[Notice] | None = None) -> Iterator[tuple[bytes, int]]:
-    """Yield the text, unpacked, in chunks of about `size` bytes that end at the end of a line, and the bytes read so
+    """Yield the text, unpacked, in chunks of about `size` bytes of whole lines, each with the number of bytes read so
     far.
 
-    All lines end in a line feed, whatever they end in in the file; the last one may have no end. remarks: notices about
-    the end of the file are appended: NUL bytes, which are left out, and a gzip file that was cut. Without remarks a cut
-    file is refused. Raises InputError naming the file.
+    All lines end in a line feed, whatever the file uses; the last one may have no end. remarks: notices about the end
+    of the file are appended: NUL bytes, which are left out, and a cut gzip file. Without remarks a cut file is refused.
+    Raises InputError with the file's name.
     """
     name = name_of(source)
     if isinstance(source, (Path, str)) and Path(source).is_dir():
@@ -75,7 +75,7 @@ def chunks(source: File, size: int, remarks: list[Notice] | None = None) -> Iter
 
 @contextlib.contextmanager
 def errors_of(name: str) -> Iterator[None]:
-    """A context in which errors of reading and unpacking a file of this name become InputErrors."""
+    """A context that turns errors of reading and unpacking the file `name` into InputErrors."""
     try:
         yield
     except gzip.BadGzipFile as error:
@@ -117,7 +117,7 @@ def _pieces(name: str, file: Any, packed: Any, size: int, remarks: list[Notice] 
 
 
 def _data(file: Any, size: int, remarks: list[Notice] | None) -> Iterator[bytes]:
-    """Yield the content of the file. A gzip file that was cut ends there, if anything could be unpacked."""
+    """Yield the content of the file. A cut gzip file ends at the cut, if anything could be unpacked."""
     packed, there = isinstance(file, gzip.GzipFile), False
     while True:
         try:
@@ -135,7 +135,7 @@ def _data(file: Any, size: int, remarks: list[Notice] | None) -> Iterator[bytes]
 
 
 def _with_line_feeds(text: bytes) -> bytes:
-    if b"\r" not in text:  # found fifty times as quickly as two letters
+    if b"\r" not in text:  # finding one letter is fifty times as fast as finding two
         return text
     text = text.replace(b"\r\n", b"\n")
     return text if b"\n" in text else text.replace(b"\r", b"\n")

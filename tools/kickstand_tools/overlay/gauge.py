@@ -1,7 +1,7 @@
-"""The gauge: a picture of one moment of a ride, transparent where there is nothing.
+"""Draws the gauge: a picture of one moment of a ride, with a transparent background.
 
-A dial from 60 degrees to the left over upright to 60 to the right, with a motorcycle seen from behind that leans as the
-rider's does; beside it the speed and the forces. Text has an outline, so that it can be read on snow and in a tunnel.
+It has a dial from 60 degrees left to 60 degrees right, with a motorcycle seen from behind that leans as the rider's
+does. Beside it are the speed and the forces. Text has an outline to be legible on snow and in a tunnel.
 """
 
 import math
@@ -14,19 +14,19 @@ from .parts import ACCENT, DIM, PANEL, WHITE
 MOST_DEG = 60.0  # end of the dial
 MOST_G = 1.2  # edge of the circle of forces
 SHARE = 0.3  # height of the gauge over that of the video
-LEGIBLE_PX, MOST_SHARE = 216.0, 0.45  # least height for legible text, but in small videos at most this share of theirs
+LEGIBLE_PX, MOST_SHARE = 216.0, 0.45  # least height for legible text, but at most this share of a small video's height
 UPRIGHT_DEG = 0.5  # a smaller lean is to neither side
 _WIDTH = 1.72  # width over height
-_SPREAD = 1.5  # degrees of the picture for a degree of lean
+_SPREAD = 1.5  # degrees in the picture per degree of lean
 _MIDDLE, _SIDE = 60.0, 146.0  # x of the middle of the dial, and of speed and forces
 _KMH, _MPH = 3.6, 3.6 / 1.609344
 
 
 class Gauge:
-    """Draws the gauge: shows lean, forces and, if has_speed, the speed. video_height: height of the video that it is
-    for, pixels. mph: the speed in miles, not kilometres, per hour.
+    """Draws the gauge: lean, forces and, if has_speed, the speed. video_height: height of the target video, pixels.
+    mph: show the speed in miles per hour instead of kilometres per hour.
 
-    width, height: size of the pictures in pixels, even numbers, because videos need these.
+    width, height: size of the pictures in pixels; even numbers, as videos require.
     """
 
     def __init__(self, video_height: int, has_speed: bool = True, mph: bool = False) -> None:
@@ -44,7 +44,8 @@ class Gauge:
     def picture(
         self, lean_deg: float, forward_g: float, left_g: float, speed_mps: float, left_deg: float, right_deg: float
     ) -> Image.Image:
-        """(height, width) RGBA. NaN: not known or not trusted. left_deg, right_deg: largest leans until now."""
+        """Draw one picture (height, width), RGBA. NaN: unknown or not trusted. left_deg, right_deg: largest leans so
+        far."""
         picture = self._still.copy()
         known = math.isfinite(lean_deg)
         if known:
@@ -76,7 +77,7 @@ class Gauge:
         pen.ellipse([inner, inner, size - 1 - inner, size - 1 - inner], fill=0)
 
     def _still_picture(self) -> Image.Image:
-        """The part of the picture that is the same at all times."""
+        """The part of the picture that never changes."""
         picture = Image.new("RGBA", (self.width, self.height), parts.CLEAR)
         panel = parts.smooth_mask(
             picture.size,
@@ -114,7 +115,7 @@ class Gauge:
         picture.paste(colour, mask=parts.smooth_mask(picture.size, draw))
 
     def _circle(self, picture: Image.Image) -> None:
-        """Draw the circle of forces, with rings at 0.5 and 1 g, and words at its ends."""
+        """Draw the circle of forces, with rings at 0.5 and 1 g and labels at its ends."""
         (x, y), radius = self._forces, self._forces_radius
 
         def draw(pen: ImageDraw.ImageDraw, finer: int) -> None:
@@ -143,7 +144,7 @@ class Gauge:
         picture.paste(ACCENT, at, mask)
 
     def _marks(self, picture: Image.Image, left_deg: float, right_deg: float) -> None:
-        """Mark the largest leans: a line across the dial, and figures below its ends."""
+        """Mark the largest leans: a line across the dial, and numbers below its ends."""
         pen = ImageDraw.Draw(picture)
         for sign, value in ((-1.0, left_deg), (1.0, right_deg)):
             if value > UPRIGHT_DEG:

@@ -1,7 +1,7 @@
 """Reads the gyro of a GoPro from its video file.
 
-The format is GPMF, described at github.com/gopro/gpmf-parser: keys of four letters, a type, a size and a number of
-values, big-endian, one within another. A packet of it comes about every second.
+The format is GPMF, described at github.com/gopro/gpmf-parser: nested items of a four-letter key, a type, a size and a
+number of values, big-endian. There is a packet about every second.
 """
 
 import struct
@@ -27,13 +27,13 @@ class Telemetry:
 
 
 def telemetry(video: Video) -> Telemetry | None:
-    """The Telemetry of a video; None if it has none that can be read."""
+    """The Telemetry of a video; None if it has no readable one."""
     if video.telemetry is None:
         return None
     times, rates = [], []
     try:
         found = packets(video, video.telemetry)
-    except ValueError:  # not the numbers that ffmpeg prints of a packet
+    except ValueError:  # ffmpeg printed something else than a packet's numbers
         return None
     for at_s, lasts_s, packet in found:
         samples = [values for values in streams(packet, b"GYRO") if len(values)]
@@ -47,14 +47,14 @@ def telemetry(video: Video) -> Telemetry | None:
 
 
 def streams(packet: bytes, key: bytes) -> Iterator[Array]:
-    """The values (n, axes) of each stream with this key, in the unit that the format has for it."""
+    """The values (n, axes) of each stream with this key, in the format's unit for it."""
     for name, kind, _, body in _items(packet):
         if kind == _NESTED and name in (b"DEVC", b"STRM"):
             yield from _of_stream(body, key) if name == b"STRM" else streams(body, key)
 
 
 def _of_stream(body: bytes, key: bytes) -> Iterator[Array]:
-    """SCAL stands before the values that it is to divide."""
+    """Yield the scaled values of one stream. SCAL comes before the values that it divides."""
     scale = np.ones(1)
     for name, kind, size, values in _items(body):
         if kind not in _NUMBERS or name not in (b"SCAL", key):

@@ -20,7 +20,7 @@ from .shown import Shown, shown
 from .video import Video, ffmpeg, input_of, open_video, write_video
 
 MARGIN = 0.03  # distance from the video's edges to the gauge, over the video's height
-_BEYOND_S = 1.0  # a video may begin before the ride, or end after it, by so much
+_BEYOND_S = 1.0  # a video may begin before the ride, or end after it, by this time
 _FPS = 30.0
 _CLIP_HEIGHT = 1080
 _TRANSPARENT = {
@@ -35,9 +35,9 @@ _SOLID = ("-c:v", "libx264", "-preset", "fast", "-crf", "18", "-pix_fmt", "yuv42
 
 @dataclass
 class Overlaid:
-    """pictures, fps: their number, and the number per second. begin_s, end_s: the part of the ride. offset_s: the
-    ride's time at the video's first picture, None without a video. correlation: that of camera and ride, by which the
-    offset was found, or None. notices: what is remarkable in the ride."""
+    """pictures: their number. fps: pictures per second. begin_s, end_s: the part of the ride. offset_s: the ride's time
+    at the video's first picture, None without a video. correlation: of camera and ride, if the offset was found by it,
+    otherwise None. notices: remarks about the ride."""
 
     pictures: int
     fps: float
@@ -64,12 +64,12 @@ def overlay(
 ) -> Overlaid:
     """Write a gauge of lean, forces, speed and maxima: over a video (.mp4), or as a transparent clip (.mov, .webm).
 
-    ride, calibration: as for open_ride(). video: one of the ride. offset_s: the ride's time at the video's first
+    ride, calibration: as for open_ride(). video: a video of the ride. offset_s: the ride's time at the video's first
     picture, s since the ride's first sample: 12.5 if the video begins 12.5 s after the ride, -3 if it begins 3 s before
-    it. None: found by the sensors of the GoPro that made it. fps: pictures a second; None: the video's, or 30. from_s,
-    to_s: the part of the ride; negative: before its end. height: of the video that a clip is for, pixels; None: 1080.
-    mph: miles an hour. live: the lean that the display showed, not the smoothed one. progress: called with how much
-    of the ride has been read, then with how many pictures are drawn. Raises InputError.
+    it. None: found from the sensors of a GoPro. fps: pictures per second; None: the video's, or 30. from_s, to_s: the
+    part of the ride; negative: before its end. height: height of the target video of a clip, pixels; None: 1080. mph:
+    speed in miles per hour. live: the lean that the display showed, not the smoothed one. progress: called with (done,
+    total) of reading the ride, then of drawing pictures. Raises InputError.
 
     >>> overlay("ride.csv", "clip.avi")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
@@ -110,13 +110,13 @@ def overlay(
         assert offset_s is not None
         arguments = _over(filmed, begin_s - offset_s, end_s - begin_s, fps, given, round(MARGIN * size))
     with whole_file(out) as temporary:
-        temporary.touch()  # where that fails the system's reason is said, which ffmpeg's words hide
+        temporary.touch()  # if this fails, the user sees the system's reason, which ffmpeg would hide
         write_video(temporary, arguments, pictures(), drawn)
     return Overlaid(count, rate, begin_s, end_s, offset_s, correlation, notices)
 
 
 def _check(out: Path, video: Path | str | None, offset_s: float | None, height: int | None) -> Video | None:
-    """Raise InputError, before any work is done, for what cannot be written or read."""
+    """Raise InputError for files that cannot be written or read. Call it before any work is done."""
     if video is None:
         if out.suffix.lower() not in _TRANSPARENT:
             raise InputError(f"{out}: the name of a transparent clip ends in .mov or .webm; an .mp4 needs --video")
@@ -145,7 +145,7 @@ def _found_offset(log: Source, video: Video, progress: Progress | None) -> tuple
 def _part(
     seen: Shown, video: Video | None, offset_s: float | None, from_s: float | None, to_s: float | None, name: str
 ) -> tuple[float, float]:
-    """Begin and end, in the ride, of the part to draw. Raises InputError where the ride does not have it."""
+    """Start and end of the part to draw, s in the ride. Raises InputError if it is not in the ride."""
     last_s = float(seen.t_s[-1])
     begin_s, end_s = (s if s is None or s >= 0.0 else max(0.0, last_s + s) for s in (from_s, to_s))
     if video is not None and offset_s is not None:
@@ -156,7 +156,7 @@ def _part(
         if begin_s is None and end_s is None and (first < -_BEYOND_S or last > last_s + _BEYOND_S):
             within = f"--from {max(first, 0.0):.1f} --to {min(last, last_s):.1f}"
             raise InputError(f"{where}: check --offset, or take what they have in common with {within}")
-        if begin_s is not None or end_s is not None:  # what is not given is where both are
+        if begin_s is not None or end_s is not None:  # a missing limit is that of the part that both cover
             begin_s, end_s = begin_s or 0.0, last_s if end_s is None else min(end_s, last_s)
         begin_s = first if begin_s is None else max(first, begin_s)
         end_s = last if end_s is None else min(last, end_s)
@@ -167,7 +167,7 @@ def _part(
 
 
 def _over(video: Video, begin_s: float, seconds: float, fps: float | None, gauge: list[str], margin: int) -> list[str]:
-    """The arguments that lay the gauge over the video's left lower corner. Sound is copied."""
+    """ffmpeg's arguments to draw the gauge over the video's lower left corner. Sound is copied."""
     even = "crop=iw-mod(iw\\,2):ih-mod(ih\\,2)"
     rate = f",fps={fps:g}" if fps else ""
     laid = f"overlay=x={margin}:y=main_h-overlay_h-{margin}:eof_action=repeat"

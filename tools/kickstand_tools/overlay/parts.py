@@ -10,7 +10,7 @@ Point = tuple[float, float]
 WHITE: Colour = (255, 255, 255, 255)
 DARK: Colour = (12, 14, 18, 255)
 DIM: Colour = (150, 156, 166, 255)
-ACCENT: Colour = (255, 176, 0, 255)  # amber: the colour-blind can distinguish it from white and grey, too
+ACCENT: Colour = (255, 176, 0, 255)  # amber: colour-blind people can also distinguish it from white and grey
 PANEL: Colour = (12, 14, 18, 120)
 CLEAR: Colour = (0, 0, 0, 0)
 _LAMP: Colour = (214, 40, 40, 255)
@@ -18,14 +18,15 @@ _FINER = 4  # shapes are drawn larger by this factor and then reduced, which smo
 
 
 def smooth_mask(size: tuple[int, int], draw, finer: int = _FINER) -> Image.Image:
-    """A mask, 0 to 255. draw: called with an ImageDraw and the number of its pixels to one of the mask."""
+    """A mask, 0 to 255. draw: called with an ImageDraw and its scale: the number of its pixels per pixel of the
+    mask."""
     mask = Image.new("L", (size[0] * finer, size[1] * finer), 0)
     draw(ImageDraw.Draw(mask), finer)
     return mask.resize(size, Image.Resampling.BOX)
 
 
 def outlined(mask: Image.Image, colour: Colour, width: int) -> Image.Image:
-    """The shape of a mask in a colour, with a dark edge around it of so many pixels."""
+    """The shape of a mask in a colour, with a dark edge of `width` pixels."""
     edge = mask.filter(ImageFilter.MaxFilter(2 * width + 1)).filter(ImageFilter.GaussianBlur(width * 0.4))
     picture = Image.new("RGBA", mask.size, DARK[:3] + (0,))
     picture.putalpha(edge)
@@ -36,11 +37,11 @@ def outlined(mask: Image.Image, colour: Colour, width: int) -> Image.Image:
 
 @lru_cache(maxsize=2000)
 def text(words: str, height: float, colour: Colour) -> Image.Image:
-    """Words with a dark outline, as high as the letters need; height: of the type, pixels."""
+    """Words with a dark outline; the picture is as high as the letters need. height: of the font, pixels."""
     stroke = max(1, round(height * 0.09))
     font = ImageFont.load_default(height)
     left, top, right, bottom = font.getbbox(words, stroke_width=stroke)
-    ascent = font.getbbox("0", stroke_width=stroke)  # the same line for all, whatever their letters
+    ascent = font.getbbox("0", stroke_width=stroke)  # the same baseline for all texts
     top, bottom = min(top, ascent[1]), max(bottom, ascent[3])
     picture = Image.new("RGBA", (int(right - left) + 2, int(bottom - top) + 2), DARK[:3] + (0,))
     ImageDraw.Draw(picture).text(
@@ -50,7 +51,7 @@ def text(words: str, height: float, colour: Colour) -> Image.Image:
 
 
 def put(picture: Image.Image, part: Image.Image, centre: Point) -> None:
-    """Lay a part over a picture, its middle at centre; what does not fit is cut off."""
+    """Draw a part over a picture, with its middle at centre. Pixels outside the picture are cut off."""
     x, y = round(centre[0] - part.width / 2.0), round(centre[1] - part.height / 2.0)
     left, top = max(0, -x), max(0, -y)
     right, bottom = min(part.width, picture.width - x), min(part.height, picture.height - y)

@@ -1,4 +1,4 @@
-"""The values that the gauge shows at each moment of a ride."""
+"""Computes the values that the gauge shows at each moment of a ride."""
 
 from dataclasses import dataclass
 
@@ -10,14 +10,14 @@ from ..analysis.summary import HELD_S
 from ..logs.source import Progress
 from ..signals import Array, Ints, smoothed
 
-_FORCE_S = 0.3  # forces are averaged over this, because engine and road shake them
+_FORCE_S = 0.3  # forces are averaged over this time, because engine and road shake the sensor
 _GAP_S = 0.2  # older readings are not shown
-_SPEED_S = 3.0  # nor older speeds, which mostly come once a second
+_SPEED_S = 3.0  # nor older speeds, which mostly come once per second
 
 
 @dataclass
 class Shown:
-    """n moments of a ride. t_s: since its first sample. NaN where a value is not known or not trusted.
+    """n moments of a ride. t_s: since its first sample. NaN for a value that is unknown or not trusted.
 
     lean_deg: > 0 to the right. forward_g: > 0 when speeding up. left_g: acceleration to the left along the road.
     speed_mps. left_deg, right_deg: the largest lean to each side until then, 0 for none.
@@ -59,8 +59,8 @@ class Shown:
 
 
 def shown(ride: Ride, progress: Progress | None = None, notices: list[Notice] | None = None) -> Shown:
-    """The values of a whole ride (see open_ride), with the lean that it was opened with. progress, notices: see
-    Ride.blocks(). Raises InputError."""
+    """The values of a whole ride, with the lean chosen in open_ride(). progress, notices: see Ride.blocks(). Raises
+    InputError."""
     columns: list[Array] = []
     for block in ride.blocks(progress, notices):
         lean = np.where(block.trusted, block.lean_deg, np.nan)
@@ -80,7 +80,7 @@ def _maximum(t_s: Array, lean: Array) -> Array:
 
 
 def _between(at_s: Array, values: Array, before: Ints, t_s: Array, gap_s: float) -> Array:
-    """Values at t_s along straight lines; NaN outside, and between two that are further apart than gap_s."""
+    """Interpolate values at t_s along straight lines; NaN outside, and between values further apart than gap_s."""
     step_s = at_s[before + 1] - at_s[before]
     share = (t_s - at_s[before]) / step_s
     result = values[before] * (1.0 - share) + values[before + 1] * share

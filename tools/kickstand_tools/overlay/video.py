@@ -1,4 +1,4 @@
-"""Reads and writes videos by ffmpeg, which the package imageio-ffmpeg contains."""
+"""Reads and writes videos with ffmpeg, which the package imageio-ffmpeg contains."""
 
 import re
 import subprocess
@@ -15,8 +15,8 @@ _LARGEST, _FASTEST = 16_384, 1000.0  # limits of a side in pixels, and of pictur
 
 @dataclass
 class Video:
-    """width, height: as it is shown, pixels. fps: pictures per second. seconds: its duration. telemetry: the number of
-    the stream of a GoPro's sensors, None if there is none."""
+    """width, height: as shown, pixels. fps: pictures per second. seconds: its duration. telemetry: the number of the
+    stream of a GoPro's sensors, None if there is none."""
 
     path: Path
     width: int
@@ -27,7 +27,7 @@ class Video:
 
 
 def ffmpeg() -> str:
-    """The path of the program ffmpeg. Raises InputError where it is not installed."""
+    """The path of the program ffmpeg. Raises InputError if it is not installed."""
     try:
         import imageio_ffmpeg
         import PIL  # noqa: F401  the gauge needs it, too
@@ -40,18 +40,18 @@ def ffmpeg() -> str:
 
 
 def input_of(path: Path) -> list[str]:
-    """ffmpeg's arguments to read a file. By its name alone it would take 12:30.mp4 for a protocol, and what poses as a
-    video could have it read from the network."""
+    """ffmpeg's arguments to read a file. By its name alone ffmpeg would treat 12:30.mp4 as a protocol, and a file that
+    poses as a video could make it read from the network."""
     return ["-protocol_whitelist", "file,pipe", "-i", f"file:{path}"]
 
 
 def open_video(path: Path) -> Video:
-    """The Video in a file. Raises InputError for a file that is none."""
+    """Read the properties of a video file. Raises InputError if the file is not a video."""
     if not path.is_file():
         raise InputError(f"{path}: there is no such file" if not path.is_dir() else f"{path} is a directory, no video")
-    said = _run(["-hide_banner", "-nostdin", *input_of(path)]).stderr.decode(errors="replace")
-    stream = re.search(r"Stream #0:\d+.*: Video: (.*)", said)
-    if "Input #0" not in said:
+    output = _run(["-hide_banner", "-nostdin", *input_of(path)]).stderr.decode(errors="replace")
+    stream = re.search(r"Stream #0:\d+.*: Video: (.*)", output)
+    if "Input #0" not in output:
         raise InputError(f"{path} is no video that ffmpeg can read, or its copy is not whole")
     if not stream or "attached pic" in stream[0]:
         raise InputError(f"{path} has no pictures: give a video")
@@ -65,15 +65,15 @@ def open_video(path: Path) -> Video:
     width, height = int(size[1]), int(size[2])
     if max(width, height) > _LARGEST or not 0.0 < fps <= _FASTEST:
         raise InputError(f"{path} is no camera's video: {width}x{height} pixels, {fps:g} pictures a second")
-    turned = re.search(r"rotation of (-?[\d.]+) degrees", said)
+    turned = re.search(r"rotation of (-?[\d.]+) degrees", output)
     if turned and round(float(turned[1])) % 180 == 90:
         width, height = height, width
-    telemetry = re.search(r"Stream #0:(\d+)[^\n]*\(gpmd", said)
+    telemetry = re.search(r"Stream #0:(\d+)[^\n]*\(gpmd", output)
     return Video(path, width, height, fps, int(pictures[-1]) / fps, int(telemetry[1]) if telemetry else None)
 
 
 def packets(video: Video, stream: int) -> list[tuple[float, float, bytes]]:
-    """(begin, s since the first picture; duration, s; content) of each packet of a stream."""
+    """(start, s since the first picture; duration, s; content) of each packet of a stream."""
     chosen = [*input_of(video.path), "-map", f"0:{stream}", "-c", "copy"]
     listed = _run([*_QUIET, *chosen, "-f", "framecrc", "-"]).stdout.decode(errors="replace")
     data = _run([*_QUIET, *chosen, "-f", "data", "-"]).stdout
@@ -92,9 +92,9 @@ def packets(video: Video, stream: int) -> list[tuple[float, float, bytes]]:
 def write_video(
     out: Path, arguments: Iterable[str], pictures: Iterable[bytes], each: Callable[[], None] | None = None
 ) -> None:
-    """Run ffmpeg with these arguments and out, and give it the pictures on its standard input.
+    """Run ffmpeg with these arguments and out, and write the pictures to its standard input.
 
-    each: called after every picture. Raises InputError with ffmpeg's own words where it fails.
+    each: called after every picture. Raises InputError with ffmpeg's own words if it fails.
     """
     with tempfile.TemporaryFile() as words:
         command = [ffmpeg(), "-hide_banner", "-loglevel", "error", "-y", *arguments, f"file:{out}"]
@@ -108,16 +108,16 @@ def write_video(
                         each()
                 process.stdin.close()
             except BrokenPipeError:
-                pass  # it has stopped, and says why
+                pass  # ffmpeg has stopped, and prints the reason
             process.wait()
-        except BaseException:  # Ctrl-C, too: no program goes on writing
+        except BaseException:  # also Ctrl-C: ffmpeg must not continue to write
             process.kill()
             process.wait()
             raise
         if process.returncode:
             words.seek(0)
-            said = words.read().decode(errors="replace").strip().rpartition("\n")[2]
-            raise InputError(f"ffmpeg has stopped: {said or 'it does not say why'}")
+            output = words.read().decode(errors="replace").strip().rpartition("\n")[2]
+            raise InputError(f"ffmpeg has stopped: {output or 'it does not say why'}")
 
 
 def _run(arguments: list[str]) -> "subprocess.CompletedProcess[bytes]":

@@ -1,4 +1,4 @@
-"""Replays a recorded log with the firmware's own LeanMeter, by one of several engines, block by block."""
+"""Replays a recorded log with the firmware's own LeanMeter on one of several engines, block by block."""
 
 import contextlib
 import struct
@@ -17,7 +17,7 @@ from ..common import plugins, unix_port
 from ..common.errors import InputError
 from ..logs.csv_lines import write_lean
 from ..logs.log import Block, Log, Stretch, Table, within
-from ..logs.reader import Source, apart, read_blocks, read_twice
+from ..logs.reader import Source, read_blocks, read_twice, split_stretch
 from ..logs.source import Progress, total_bytes
 from ..signals import Array
 from . import replay_engine
@@ -27,8 +27,8 @@ _LONG_BYTES = 20 << 20  # a quarter of an hour at 200 Hz: for a smaller file a s
 
 _RESULT_BYTES = struct.calcsize(replay_engine.RESULT)
 
-# Runs replay_engine.run() on another Python: takes the records and the progress, and the context is the results' file.
-# May raise InputError
+# Runs replay_engine.run() on another Python. Arguments: the records and the progress. Returns a context with the
+# results' file. May raise InputError
 Engine = Callable[[Iterator[bytes], Progress | None], contextlib.AbstractContextManager[IO[bytes]]]
 
 _SIGMA = replay_engine.COLUMNS.index("lean_sigma_deg")
@@ -38,12 +38,12 @@ _SIGMA = replay_engine.COLUMNS.index("lean_sigma_deg")
 class LeanTable(Table):
     """The board's results for a log: n samples, axes left, up, forward; lean > 0 to the right.
 
-    t_s: seconds since the first sample; where the readings froze all else is NaN. lean_deg: the meter's lean,
-    which is shown where lean_sigma_deg is not NaN.
-    lean_formula_deg: Nicolae's (25)-(26) as it stands.
+    t_s: seconds since the first sample. All other values are NaN for frozen readings. lean_deg: the meter's lean. The
+    display shows it if lean_sigma_deg is not NaN.
+    lean_formula_deg: Nicolae's (25)-(26) unchanged.
     left_g, up_g, forward_g: specific force. static_lean_deg: the lean of a vehicle at rest with this force.
-    lean_sigma_deg: the standard deviation of the lean that the firmware estimates, NaN where the display shows no
-    lean. notices: what is remarkable in the ride (kickstand_tools.refusals.sentence puts a notice into words).
+    lean_sigma_deg: the lean's standard deviation, estimated by the firmware; NaN if the display shows no lean. notices:
+    remarks about the ride (kickstand_tools.refusals.sentence puts a notice into words).
     """
 
     t_s: Array
@@ -65,7 +65,7 @@ def replay(
     """Run the firmware's own lean meter over a recorded log.
 
     log: see read_log. engine: "cpython", "micropython" (the unix port) or "rp2040" (an emulated Pico, slow). progress:
-    called with how much is done of how much. Raises InputError, also where the engine is not installed.
+    called with (done, total). Raises InputError, also if the engine is not installed.
 
     >>> from kickstand_tools.api import Log, fit_two_positions, simulate_ride
     >>> ride = simulate_ride("street", seed=1, seconds=30.0)
@@ -87,12 +87,12 @@ def replay_to_csv(
 ) -> tuple[int, list[Notice]]:
     """Write LEAN.csv: the log's own times, then replay_engine.COLUMNS. Returns the number of samples and the notices.
 
-    A long log takes two processes. Memory does not grow with it, except on the emulated Pico, which is too slow for a
-    long one. Raises InputError.
+    A long log uses two processes. Memory does not grow with its length, except on the emulated Pico, which is too slow
+    for long logs. Raises InputError.
     """
     notices: list[Notice] = []
     whole = log.source if isinstance(log, Stretch) else log
-    # for the command alone: a second process imports the main program again, which may not allow that
+    # only for the command: a second process imports the main program again, which other programs may not allow
     long = not isinstance(whole, Log) and total_bytes(whole) > _LONG_BYTES
     run = "two processes" if engine == "cpython" and long else engine
     rows = replay_blocks(log, calibration, run, progress, notices)
@@ -102,11 +102,11 @@ def replay_to_csv(
 def replay_blocks(
     log: Source, calibration: CalibrationFile, engine: str, progress: Progress | None, notices: list[Notice]
 ) -> Iterator[tuple[Block, Array]]:
-    """Each block of the log with the engine's results for it (n, COLUMNS), NaN where the readings froze: there the
-    engine gets a gap. A car's display shows no lean, so lean_sigma_deg is NaN throughout. notices is appended to
-    at the end."""
+    """Yield each block of the log with the engine's results (n, COLUMNS). They are NaN for frozen readings, which are a
+    gap for the engine. A car's display shows no lean, so lean_sigma_deg is always NaN. notices: remarks are appended at
+    the end."""
     car = calibration.vehicle == "car"
-    whole, stretch = apart(log)
+    whole, stretch = split_stretch(log)
     misfit = Misfit()
     for block, results in _replayed(whole, calibration, engine, progress, notices):
         if not car:
@@ -121,7 +121,7 @@ def replay_blocks(
 def _replayed(
     log: Source, calibration: CalibrationFile, engine: str, progress: Progress | None, notices: list[Notice]
 ) -> Iterator[tuple[Block, Array]]:
-    """Each block with the results (n, COLUMNS) for its rows that are not frozen."""
+    """Yield each block with the results (n, COLUMNS) for its rows that are not frozen."""
     log = read_twice(log) if engine in _BY_RECORDS else log
     shown = None if engine == "rp2040" else progress
     blocks = read_blocks(log, 2, shown, notices, calibration=calibration)
@@ -137,7 +137,7 @@ def _replayed(
 
 
 def _with_frozen(block: Block, results: Array) -> Array:
-    """(n, COLUMNS), NaN where there is no value."""
+    """(n, COLUMNS) results for all rows, NaN for frozen ones."""
     found = np.full((len(block.time_us), len(replay_engine.COLUMNS)), np.nan)
     found[~block.frozen] = results
     sigma = found[:, _SIGMA]
@@ -148,7 +148,7 @@ def _with_frozen(block: Block, results: Array) -> Array:
 def _by_records(
     run: contextlib.AbstractContextManager[IO[bytes]], blocks: Iterator[Block]
 ) -> Iterator[tuple[Block, Array]]:
-    """By replay_engine.run() on another Python, which reads records and writes results."""
+    """Replay by replay_engine.run() on another Python, which reads records and writes results."""
     with run as results:
         for block in blocks:
             wanted = _RESULT_BYTES * int(np.count_nonzero(~block.frozen))
@@ -160,7 +160,7 @@ def _by_records(
 
 @contextlib.contextmanager
 def micropython(records: Iterator[bytes], _progress: Progress | None) -> Iterator[IO[bytes]]:
-    """The results of MicroPython's unix port. Raises InputError where there is none."""
+    """The results of MicroPython's unix port. Raises InputError if it is not installed."""
     if not unix_port.available():
         raise InputError("engine micropython has no package for this system: use --engine cpython")
     with tempfile.TemporaryDirectory() as directory:
@@ -173,12 +173,13 @@ def micropython(records: Iterator[bytes], _progress: Progress | None) -> Iterato
             yield process.stdout
 
 
-# By another Python; rp2040, a board's own interpreter on an emulated Pico, is a leaf's: see pyproject.toml
+# Engines on another Python. rp2040, a board's own interpreter on an emulated Pico, is in a leaf package: see
+# pyproject.toml
 _BY_RECORDS: dict[str, Engine | None] = {"micropython": micropython, "rp2040": None}
 
 
 def _last_words(traceback: bytes) -> str:
-    """The last line of MicroPython's traceback, which comes over standard output."""
+    """The last line of MicroPython's traceback, which it prints to standard output."""
     return traceback.decode(errors="replace").strip().rpartition("\n")[2]
 
 

@@ -3,10 +3,10 @@
     micropython replay_engine.py RECORDS > RESULTS
 
 RECORDS starts with the calibration (46 doubles, Calibration.parameters() and matrices()) and the gyro's delay in
-seconds (a double), then one record a sample:
+seconds (a double), then one record per sample:
 its time in microseconds (int64), seven readings in the chip's order (doubles; g, C, deg/s) and the speed in m/s,
-negative where there is no new one. RESULTS has the doubles of COLUMNS for each. Both are binary, because a number that
-is printed and read again may be another number.
+negative for no new one. RESULTS has the doubles of COLUMNS for each. Both are binary, because printing and reading a
+number may change it.
 """
 
 import struct
@@ -32,31 +32,31 @@ COLUMNS = (
 CALIBRATION = "<47d"
 RECORD = "<q8d"
 RESULT = "<9d"
-# lean_sigma_deg where the display shows no lean; and where it names a sensor whose readings do not fit again and again
+# lean_sigma_deg if the display shows no lean, and if it names a sensor whose readings do not fit again and again
 NOT_SHOWN, ODD = -1.0, -2.0
-NO_SPEED = -1.0  # not NaN, which a board's struct does not read as NaN
+NO_SPEED = -1.0  # not NaN, because a board's struct does not read NaN as NaN
 
 
 class ReplayMeter(LeanMeter):
-    """The firmware's meter for single readings in g and deg/s; on a board it takes sums of counts."""
+    """The firmware's meter for single readings in g and deg/s. On a board it processes sums of counts."""
 
     def use(self, calibration, posed=False):
-        """Take a calibration: see LeanMeter.use()."""
+        """Use a calibration: see LeanMeter.use()."""
         LeanMeter.use(self, calibration, posed)
         self._force_matrix, self._force_offset, rate_matrix, rate_offset = calibration.in_vehicle()
         self._rate_matrix = [radians(value) for value in rate_matrix]
         self._rate_offset = [radians(value) for value in rate_offset]
 
     def update(self, reading, dt_us):
-        """Take a reading: 7 numbers in the chip's order (g, C, deg/s). dt_us: microseconds since the one before, 0 for
-        the first."""
+        """Process a reading: 7 numbers in the chip's order (g, C, deg/s). dt_us: microseconds since the previous one, 0
+        for the first."""
         force, rate = [0.0] * 3, [0.0] * 3
         self.in_vehicle(reading, force, rate)
         self.update_in_vehicle(force, rate, dt_us)
 
     def in_vehicle(self, reading, force, rate):
-        """Put the force (g) and the rate (rad/s) of a reading into force (3) and rate (3). A reading may also be seven
-        arrays of n numbers: the results are then arrays."""
+        """Write the force (g) and the rate (rad/s) of a reading to force (3) and rate (3). A reading may also be seven
+        arrays of n numbers; then the results are arrays."""
         m, c = self._force_matrix, self._force_offset
         x, y, z = reading[0], reading[1], reading[2]
         force[0] = m[0] * x + m[1] * y + m[2] * z + c[0]
@@ -75,10 +75,10 @@ class ReplayMeter(LeanMeter):
 
 
 class Replay:
-    """The meter over one recording: the only loop that steps it, for every engine, and for a ride as it is streamed.
+    """Runs the meter over one recording. Every engine uses this loop, and so does a streamed ride.
 
     calibration: the firmware's own, for readings in g and deg/s.  delay_s: delay of the gyro's low-pass.
-    leans: False for a car.  since_us: time of the sample before the first, if there was one.
+    leans: False for a car. since_us: time of the sample before the first one, if any.
     """
 
     def __init__(self, calibration, delay_s=DELAY_S, leans=True, since_us=None):
@@ -86,8 +86,8 @@ class Replay:
         self._before_us = since_us
 
     def follow(self, samples):
-        """Yield the meter after each sample, always the same one. samples: tuples (time_us, force, rate, speed_mps),
-        force and rate from in_vehicle(), 3 each; the speed is NaN or negative where there is no new one."""
+        """Yield the meter after each sample, always the same object. samples: tuples (time_us, force, rate, speed_mps),
+        force and rate from in_vehicle(), 3 each; the speed is NaN or negative for no new one."""
         meter = self.meter
         for time_us, force, rate, speed_mps in samples:
             if speed_mps >= 0.0:
@@ -97,13 +97,14 @@ class Replay:
             yield meter
 
     def take(self, time_us, reading, speed_mps=NO_SPEED):
-        """The meter, always the same one, after a sample: a reading of 7 in the chip's order (g, C, deg/s)."""
+        """Process a sample and return the meter, always the same object. reading: 7 numbers in the chip's order (g, C,
+        deg/s)."""
         force, rate = [0.0] * 3, [0.0] * 3
         self.meter.in_vehicle(reading, force, rate)
         return next(self.follow(((time_us, force, rate, speed_mps),)))
 
     def step(self, time_us, reading, speed_mps=NO_SPEED):
-        """The values of COLUMNS after a sample; arguments as for take()."""
+        """Process a sample and return the values of COLUMNS; arguments as for take()."""
         meter = self.take(time_us, reading, speed_mps)
         force, rate = meter.force, meter.rate
         return (

@@ -15,14 +15,14 @@ from ..logs.log import Block
 from ..signals import Array
 from .meter_along import MeterAlong
 
-_AHEAD = 3  # blocks that are read and not yet yielded: so the second process always has one to work on
+_AHEAD = 3  # blocks that are read but not yet yielded: the second process always has one to work on
 
 _along: MeterAlong  # set in the second process only
 
 
 def columns_of(blocks: Iterator[Block], calibration: CalibrationFile) -> Iterator[tuple[Block, Array]]:
-    """Each block with MeterAlong.columns() of its rows that are measured. Raises InputError, also where the second
-    process comes to an end."""
+    """Yield each block with MeterAlong.columns() of its measured rows. Raises InputError, also if the second process
+    ends."""
     spawn = multiprocessing.get_context("spawn")  # a process with threads, as of a progress bar, must not be forked
     waiting: deque[tuple[Block, Future[Array]]] = deque()
     try:
@@ -43,7 +43,7 @@ def _result(block: Block, columns: Future[Array]) -> tuple[Block, Array]:
 
 def _begin(calibration: CalibrationFile) -> None:
     global _along
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the first process's: it ends this one
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first process handles Ctrl-C, and ends this one
     _along = MeterAlong(calibration)
 
 

@@ -1,1 +1,1 @@
-"""Recorded rides: fetched from a board or streamed over USB, and their blocks turned into logs."""
+"""Fetches recorded rides from a board, or streams them over USB, and converts their blocks to logs."""

@@ -13,22 +13,22 @@ from kickstand.rides import block as block_format
 
 _HEAD_LENGTH = struct.calcsize(block_format.HEAD)
 _TAIL_LENGTH = struct.calcsize(block_format.TAIL)
-_START = _HEAD_LENGTH + store.BODY_LENGTH  # of the entries, where the calibration has no matrices
+_START = _HEAD_LENGTH + store.BODY_LENGTH  # start of the entries if the calibration has no matrices
 _PLACE_LENGTH = struct.calcsize(block_format.PLACE)
-_LATE_PERIODS = 2  # a turn that is later by so many sample periods has lost samples, as in kickstand.imu.sensor
+_LATE_PERIODS = 2  # a turn that is late by more sample periods has lost samples, as in kickstand.imu.sensor
 _DEGREE = 60 * 100_000  # in the unit of positions, 0.00001 minutes
 _MOST = 1e4  # largest parameter of a calibration, far beyond those that a board stores
-CUT_SHORT = "cut short"  # the last block of a ride often is: the power went off while it was written
+CUT_SHORT = "cut short"  # the last block of a ride often is: the power was switched off while it was written
 
 
 class BadBlock(Exception):
-    """These bytes are not a whole block; the text says why in a few words."""
+    """These bytes are not a whole block. The text gives the reason in a few words."""
 
 
 @dataclass
 class Place:
     """A position that came with a turn of the loop. lat_deg, lon_deg: north and east; utc_s: its Universal Time, s
-    since 1970, None where the receiver did not know the date."""
+    since 1970, None if the receiver did not know the date."""
 
     lat_deg: float
     lon_deg: float
@@ -36,8 +36,8 @@ class Place:
 
 
 @dataclass
-class Turn:
-    """One turn of the board's loop: sums of n samples' counts (ax ay az gx gy gz), and when the last was taken."""
+class StoredTurn:
+    """One turn of the board's loop: sums of n samples' counts (ax ay az gx gy gz), and the time of the last one."""
 
     time_us: int
     n: int
@@ -47,11 +47,11 @@ class Turn:
 
 
 @dataclass
-class Block:
+class StoredBlock:
     """One ride block: the fields of its head, and its turns. time_us: time of the last sample before it, since
-    power-on. centidegrees: the temperature. delay_tenths_ms: delay of the gyro's low-pass, 0 where the firmware did not
-    store it. body: the calibration's bytes. vehicle: that of the board's config.py, "" if unknown: it is in no
-    block."""
+    power-on. centidegrees: the temperature. delay_tenths_ms: delay of the gyro's low-pass, 0 if the firmware did not
+    store it. body: the calibration's bytes. vehicle: that of the board's config.py, "" if unknown; blocks do not
+    contain it."""
 
     ride: int
     sequence: int
@@ -64,7 +64,7 @@ class Block:
     delay_tenths_ms: int
     body: bytes
     crc: int
-    turns: list[Turn] = field(default_factory=list)
+    turns: list[StoredTurn] = field(default_factory=list)
     vehicle: str = ""
 
     @property
@@ -73,7 +73,7 @@ class Block:
         return self.body[0]
 
     def calibration(self) -> Calibration:
-        """The calibration that the lean on the display was computed with."""
+        """The calibration used for the lean on the display."""
         return store.unpack(self.body)[2]
 
     def numbers(self) -> list[float]:
@@ -82,7 +82,7 @@ class Block:
         return calibration.parameters() + calibration.matrices()
 
     def missing_s(self) -> list[float]:
-        """The durations of all gaps in the readings, s: turns of the loop that came later than their samples
+        """The durations of all gaps in the readings, s. A gap is a turn of the loop that came later than its samples
         explain."""
         period_us, before_us, found = 1_000_000 // self.sample_hz, self.time_us, []
         for turn in self.turns:
@@ -93,10 +93,10 @@ class Block:
         return found
 
 
-def read(content: bytes) -> tuple[list[Block], list[str]]:
-    """The whole blocks of a file, and a text about each place where there is no whole block.
+def read(content: bytes) -> tuple[list[StoredBlock], list[str]]:
+    """The whole blocks of a file, and a text about each place without a whole block.
 
-    Only CUT_SHORT, if just the last block is incomplete, is no damage.
+    CUT_SHORT, for an incomplete last block, is not damage.
     """
     blocks, problems = [], []
     at = 0
@@ -113,7 +113,7 @@ def read(content: bytes) -> tuple[list[Block], list[str]]:
     return blocks, problems
 
 
-def parse(data: bytes) -> Block:
+def parse(data: bytes) -> StoredBlock:
     """One whole block. Raises BadBlock."""
     if not data.startswith(block_format.MAGIC[: len(data)]):
         raise BadBlock("not of a ride")
@@ -130,24 +130,24 @@ def parse(data: bytes) -> Block:
         raise BadBlock("damaged")
     firmware = firmware.rstrip(b"\0").decode("ascii", "replace")
     fields: list[Any] = [*rest, firmware, delay, data[_HEAD_LENGTH:start], crc]
-    block = Block(*fields)
+    block = StoredBlock(*fields)
     try:
         units = block.accel_lsb_per_g, block.gyro_lsb_tenths, block.sample_hz
         if not all(units) or not all(abs(value) <= _MOST for value in block.numbers()):
-            raise ValueError  # "not <=" also refuses not-a-number
+            raise ValueError  # "not <=" also refuses NaN
         end = len(data) - _TAIL_LENGTH - places * _PLACE_LENGTH
         found = dict(_places(data[end : len(data) - _TAIL_LENGTH]))
         block.turns = list(_turns(block, data[start:end], count, found))
-    except (ValueError, ZeroDivisionError) as error:  # the check sum is right: it was written like this
+    except (ValueError, ZeroDivisionError) as error:  # the check sum is right: the block was written like this
         raise BadBlock("not decodable") from error
     return block
 
 
 def _places(data: bytes) -> Iterator[tuple[int, Place]]:
-    """The number of the entry that each position belongs to, and the position."""
+    """Yield each position with the number of its entry."""
     for entry, date, day_ms, lat, lon in struct.iter_unpack(block_format.PLACE, data):
         if abs(lat) > 90 * _DEGREE or abs(lon) > 180 * _DEGREE:
-            continue  # a receiver's error: a log with such a position would be refused
+            continue  # an error of the receiver: a log with such a position would be refused
         try:
             midnight_s = datetime(2000 + (date >> 9), date >> 5 & 15, date & 31, tzinfo=UTC).timestamp()
         except ValueError:
@@ -155,7 +155,7 @@ def _places(data: bytes) -> Iterator[tuple[int, Place]]:
         yield entry, Place(lat / _DEGREE, lon / _DEGREE, None if midnight_s is None else midnight_s + day_ms / 1000.0)
 
 
-def _turns(block: Block, data: bytes, count: int, places: dict[int, Place]) -> Iterator[Turn]:
+def _turns(block: StoredBlock, data: bytes, count: int, places: dict[int, Place]) -> Iterator[StoredTurn]:
     """Undo block_format.encode_python. places: by the number of their entry."""
     bits = bin(int.from_bytes(b"\x01" + data, "big"))[3:]
     before = [1] + [0] * (block_format.FIELDS - 1)
@@ -190,15 +190,15 @@ def _turns(block: Block, data: bytes, count: int, places: dict[int, Place]) -> I
         for i in range(2, 8):
             before[i] = (before[i] if n == n_before else before[i] * n // n_before) + difference(i)
         if n < 0 or dt_us < 0 or max(map(abs, before[2:8])) > n << 15:
-            raise ValueError  # time goes on, and counts have 16 bits
+            raise ValueError  # time increases, and counts have 16 bits
         now += dt_us
         before[0] = n
-        yield Turn(now, n, tuple(before[2:8]), speed, places.get(entry))
+        yield StoredTurn(now, n, tuple(before[2:8]), speed, places.get(entry))
         speed = None
 
 
 def missing_note(missing_s: list[float]) -> str:
-    """A line for these times without readings."""
+    """A line about these times without readings."""
     times = "once" if len(missing_s) == 1 else f"{len(missing_s)} times"
     return (
         f"readings are missing {times}, {sum(missing_s):.1f} s in all: the sensor was set up again, "

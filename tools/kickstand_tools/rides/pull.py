@@ -1,4 +1,4 @@
-"""Rides from the board's flash or SD card to logs on the host, by mpremote."""
+"""Copies rides from the board's flash or SD card to logs on the host with mpremote."""
 
 import binascii
 import contextlib
@@ -15,9 +15,9 @@ from mpremote.transport import TransportExecError
 from ..common.errors import InputError
 from ..common.output import check_directory, make_directory
 from ..deploy.board_console import BrokenOff, lines
-from ..deploy.connection import Board, Port, Progress, connected, literal, printed, restart
+from ..deploy.connection import ConnectedBoard, Port, Progress, connected, literal, printed, restart
 from . import ride_log
-from .block_reader import CUT_SHORT, Block, missing_note, read
+from .block_reader import CUT_SHORT, StoredBlock, missing_note, read
 
 _SILENT_S = 60  # longest wait for an answer: an emulated board takes a while
 
@@ -37,7 +37,7 @@ else:
     for ride, part, size in ride_paths.parts(directory):
         print((ride, part, size, ride_paths.part_path(directory, ride, part)))
 """
-# Prints a file, and at last its length and CRC-32 as the board has read it
+# Prints a file, and at the end its length and CRC-32 as read by the board
 _READ = """
 from binascii import b2a_base64, crc32
 count, crc = 0, 0
@@ -50,10 +50,10 @@ with open(PATH, "rb") as file:
         print(b2a_base64(piece).decode(), end="")
 print((count, crc))
 """
-_TRIES = 2  # to copy a file
+_TRIES = 2  # attempts to copy a file
 
 
-_Came = Callable[[str, int], None]  # called with the name of what is copied, and the number of further bytes
+_Came = Callable[[str, int], None]  # called with the name of the item that is copied, and the number of new bytes
 
 
 class _Part(NamedTuple):
@@ -67,9 +67,9 @@ class _Part(NamedTuple):
 
 @dataclass
 class PulledRide:
-    """log: the file it was written to, with its calibration beside it, or None if nothing in it can be read.  seconds,
-    readings: its length.  problems: a line for each fault.  whole: True if all of it was copied, except for an end that
-    a power cut has lost.  deleted: True if it was removed from the board."""
+    """log: the file it was written to, with its calibration beside it, or None if nothing in it can be read. seconds,
+    readings: its length. problems: one line per fault. whole: True if everything was copied, except an end lost in a
+    power cut. deleted: True if it was removed from the board."""
 
     number: int
     log: Path | None = None
@@ -82,7 +82,7 @@ class PulledRide:
 
 @dataclass(frozen=True)
 class PullResult:
-    """port: its name.  rides: in the order of their numbers."""
+    """port: its name. rides: sorted by their numbers."""
 
     port: str
     rides: list[PulledRide]
@@ -97,8 +97,8 @@ def pull(
 ) -> PullResult:
     """Write every ride on the board to a log in the directory out, then restart the board.
 
-    delete: remove from the board each ride that was copied completely.
-    pulled: called with each ride once it is done.  Raises InputError.
+    delete: remove each completely copied ride from the board.
+    pulled: called with each finished ride. Raises InputError.
     """
     check_directory(out)
     if not out.parent.is_dir():
@@ -130,7 +130,7 @@ def pull(
     return result
 
 
-def _list(transport: Board, name: str) -> tuple[str, str, dict[int, list[_Part]]]:
+def _list(transport: ConnectedBoard, name: str) -> tuple[str, str, dict[int, list[_Part]]]:
     """The directory of the rides, the vehicle in the board's config.py, and the parts of each ride by its number."""
     first, *lines = printed(transport, name, _LIST, "its rides").splitlines() or [b""]
     directory, vehicle = literal(first, (str, str))
@@ -141,11 +141,13 @@ def _list(transport: Board, name: str) -> tuple[str, str, dict[int, list[_Part]]
     return directory, vehicle, {ride: list(group) for ride, group in by_ride}
 
 
-def _pull_ride(transport: Board, number: int, parts: list[_Part], vehicle: str, out: Path, came: _Came) -> PulledRide:
-    """Copy a ride and write its log. vehicle: that of the board's config.py; a ride whose alignment is by two poses was
-    a motorcycle's."""
+def _pull_ride(
+    transport: ConnectedBoard, number: int, parts: list[_Part], vehicle: str, out: Path, came: _Came
+) -> PulledRide:
+    """Copy a ride and write its log. vehicle: that of the board's config.py. A ride aligned by two poses was a
+    motorcycle's."""
     ride = PulledRide(number)
-    blocks: list[Block] = []
+    blocks: list[StoredBlock] = []
     for part in parts:
         title = f"ride {number}, part {part.part}"
         content, whole = _read(transport, part, title, came)
@@ -189,8 +191,8 @@ def _pull_ride(transport: Board, number: int, parts: list[_Part], vehicle: str, 
     return ride
 
 
-def _delete(transport: Board, directory: str, parts: list[_Part]) -> None:
-    """Remove the parts of one ride, and the directories that are then empty."""
+def _delete(transport: ConnectedBoard, directory: str, parts: list[_Part]) -> None:
+    """Remove the parts of one ride, and then empty directories."""
     for part in parts:
         transport.fs_rmfile(part.path)
     emptied = PurePosixPath(parts[0].path).parent
@@ -201,7 +203,7 @@ def _delete(transport: Board, directory: str, parts: list[_Part]) -> None:
 
 
 def _readings(log: Path) -> int:
-    """Number of readings in a log that was pulled earlier; 0 if there is none, or none that can be read."""
+    """Number of readings in a log that was pulled earlier; 0 without a readable log."""
     try:
         with gzip.open(log) as file:
             return sum(1 for _ in file) - 1
@@ -210,13 +212,13 @@ def _readings(log: Path) -> int:
 
 
 def _free_name(log: Path) -> Path:
-    """The first of NAME-2.csv.gz, NAME-3.csv.gz ... that is not there."""
+    """The first of NAME-2.csv.gz, NAME-3.csv.gz ... that does not exist."""
     stem = log.name.removesuffix(".csv.gz")
     return next(path for n in itertools.count(2) if not (path := log.with_name(f"{stem}-{n}.csv.gz")).exists())
 
 
-def _read(transport: Board, part: _Part, title: str, came: _Came) -> tuple[bytes, bool]:
-    """A file of the board, and True if all that the board announced has come over as the board has read it."""
+def _read(transport: ConnectedBoard, part: _Part, title: str, came: _Came) -> tuple[bytes, bool]:
+    """A file of the board, and True if all announced bytes arrived as the board read them."""
     content, whole = b"", False
     for attempt in range(_TRIES):
         again, whole = _copied(transport, part, title, came if attempt == 0 else _nothing)
@@ -227,16 +229,16 @@ def _read(transport: Board, part: _Part, title: str, came: _Came) -> tuple[bytes
 
 
 def _nothing(_what: str, _count: int) -> None:
-    """The progress of a second try, which the bar has no room for."""
+    """The progress function of a second try, which is not shown."""
 
 
-def _copied(transport: Board, part: _Part, title: str, came: _Came) -> tuple[bytes, bool]:
-    """One try of _read()."""
+def _copied(transport: ConnectedBoard, part: _Part, title: str, came: _Came) -> tuple[bytes, bool]:
+    """One attempt of _read()."""
     content = bytearray()
     there = None
     came(f"pulling {title}", 0)
     try:
-        # four characters are three bytes, and a line ends in two more; the ride that is recorded now may have grown
+        # four characters are three bytes, and a line ends in two more; a ride that is being recorded may have grown
         for line in lines(
             transport, _READ.replace("PATH", repr(part.path)), _SILENT_S, most_bytes=2 * part.size + 9999
         ):

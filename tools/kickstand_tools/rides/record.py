@@ -1,4 +1,4 @@
-"""A ride streamed from the board over USB into a log, while its display goes on."""
+"""Streams a ride from the board over USB to a log, while the display keeps working."""
 
 import contextlib
 import gzip
@@ -18,14 +18,13 @@ from ..common.errors import InputError
 from ..common.output import check_output, whole_file
 from ..deploy.connection import connected, restart
 from . import ride_log
-from .block_reader import Block
-from .stream import LiveReading, Recording, blocks
+from .block_reader import StoredBlock
+from .stream import LiveReading, StreamLog, blocks
 
 
 @dataclass(frozen=True)
 class RecordResult:
-    """log, calibration: the files.  seconds, readings: length of the recording.  notes: a line for each gap or
-    fault."""
+    """log, calibration: the files. seconds, readings: length of the recording. notes: one line per gap or fault."""
 
     log: Path
     calibration: Path
@@ -42,9 +41,8 @@ def record(
 ) -> RecordResult:
     """Write readings to the log `out`, and NAME.cal.json beside it, until Ctrl-C; then restart the board.
 
-    Existing files are not overwritten: an earlier ride cannot be repeated. port: None for the only board that is
-    plugged in.  begin: called with the port's name when readings are about to come.  live: called every half second.
-    Raises InputError.
+    Existing files are not overwritten, because a ride cannot be repeated. port: None for the only board that is plugged
+    in. begin: called with the port's name before the first readings. live: called every half second. Raises InputError.
     """
     if not out.name.endswith((".csv", ".csv.gz")):
         raise InputError(f"{out}: give --out a name that ends in .csv or .csv.gz")
@@ -58,9 +56,9 @@ def record(
             if begin:
                 begin(name)
             stopped = threading.Event()
-            recorded = Recording(stopped, live)
+            recorded = StreamLog(stopped, live)
             notes: list[str] = []
-            # The calibration first: on a disk that is full at the end there would be no room for it
+            # The calibration first: if the disk is full at the end, there would be no room for it
             with whole_file(out) as temporary, whole_file(beside) as calibration, _signals(stopped):
                 with _Growing(temporary, out.suffix == ".gz") as file:
                     made = _noting_first(blocks(transport, name, notes, stopped), calibration)
@@ -71,8 +69,8 @@ def record(
     return RecordResult(out, beside, recorded.seconds, recorded.count, notes)
 
 
-def _noting_first(blocks: Iterator[Block], calibration: Path) -> Iterator[Block]:
-    """The blocks; the calibration of the first is written to that file before the block is used."""
+def _noting_first(blocks: Iterator[StoredBlock], calibration: Path) -> Iterator[StoredBlock]:
+    """Yield the blocks. Before the first one, write its calibration to the file `calibration`."""
     for i, block in enumerate(blocks):
         if i == 0:
             write_calibration(calibration, ride_log.calibration(block))
@@ -80,9 +78,9 @@ def _noting_first(blocks: Iterator[Block], calibration: Path) -> Iterator[Block]
 
 
 class _Growing(io.TextIOBase):
-    """A file of text that holds only whole writes: one that fails, on a full disk, leaves what was there before.
+    """A text file that contains only complete writes: a write that fails, on a full disk, leaves the earlier content.
 
-    packed: each write becomes a gzip member of its own, because a gzip file that is cut off in a member is damaged.
+    packed: each write becomes a separate gzip member, because a gzip file cut inside a member is damaged.
     """
 
     def __init__(self, path: Path, packed: bool) -> None:
@@ -109,9 +107,9 @@ class _Growing(io.TextIOBase):
 
 @contextlib.contextmanager
 def live_line() -> Iterator[Callable[[str], None]]:
-    """A function that draws a line on standard error, again and again, if that is a terminal.
+    """A context with a function that redraws a line on standard error, if that is a terminal.
 
-    A terminal that is closed meanwhile is no error: the work goes on.
+    If the terminal is closed meanwhile, the work continues without an error.
     """
     console = Console(stderr=True) if sys.stderr.isatty() else Console(quiet=True)
     line = Live(console=console, auto_refresh=False, transient=True)
@@ -130,7 +128,7 @@ def live_line() -> Iterator[Callable[[str], None]]:
 
 @contextlib.contextmanager
 def _signals(stopped: threading.Event) -> Iterator[None]:
-    """A context in which the signals that would end this program set `stopped` instead."""
+    """A context in which signals that would end this program only set `stopped`."""
     before = {number: signal.signal(number, lambda *_: stopped.set()) for number in _ends()}
     try:
         yield

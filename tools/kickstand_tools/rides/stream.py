@@ -1,4 +1,5 @@
-"""Reads a ride that a board streams: writes its blocks to a log as they come, and computes the lean at each moment."""
+"""Reads a ride that a board streams: writes its blocks to a log as they arrive, and computes the lean at each
+moment."""
 
 import binascii
 import contextlib
@@ -12,13 +13,13 @@ from kickstand.lean.meter import FALLEN_DEG
 from ..calibration.file import CalibrationFile
 from ..common.errors import InputError, cause
 from ..deploy.board_console import BrokenOff, lines
-from ..deploy.connection import Board, refuse_unfit_firmware
+from ..deploy.connection import ConnectedBoard, refuse_unfit_firmware
 from ..logs.cells import TRACK
 from ..replay.replay_engine import NO_SPEED, Replay
 from . import ride_log
-from .block_reader import BadBlock, Block, missing_note, parse
+from .block_reader import BadBlock, StoredBlock, missing_note, parse
 
-# The app with its turns sent over USB, its display and button alive; Ctrl-C ends it.
+# Runs the app with display and button, and sends its turns over USB. Ctrl-C ends it.
 _START = """
 from kickstand import devices, settings
 from kickstand.app import App
@@ -31,23 +32,23 @@ try:
 except KeyboardInterrupt:
     port.rest_watchdog()
 """
-_VEHICLE = b"vehicle "  # begins the line that _START prints; base64 has no space
-_SILENT_S = 60.0  # longest wait: an emulated board takes a while to start; one without a sensor sends nothing either
+_VEHICLE = b"vehicle "  # start of the line that _START prints; base64 has no space
+_SILENT_S = 60.0  # longest wait: an emulated board starts slowly; a board without a sensor sends nothing either
 CHANGED = "the board's calibration has changed: the log ends here"
 
 
 @dataclass(frozen=True)
 class LiveReading:
-    """The readings of half a second. aligned: True if the sensor is.  car: the board is set to a vehicle that does not
-    lean.
+    """The readings of half a second. aligned: True if the sensor is aligned. car: True if the board is set to a vehicle
+    that does not lean.
 
     moments: at each turn of the board's loop (s since the recording began, lean in degrees > 0 to the right, specific
-    force forward in g, and to the left in g). What is not known is None: all three before the sensor is aligned, and
-    the lean where it is too uncertain to be shown. A car has no lean, and of a motorcycle the force to the left is left
-    out, because it is near 0 in a bend.
+    force forward in g, and to the left in g). Unknown values are None: all three before the sensor is aligned, and a
+    lean that is too uncertain to be shown. A car has no lean. A motorcycle's force to the left is left out, because it
+    is near 0 in a bend.
 
-    max_left_deg, max_right_deg, max_accel_g, max_brake_g: as on the display, since the recording began, 0 before there
-    is one.  rate_hz: turns a second.  seconds: since the recording began."""
+    max_left_deg, max_right_deg, max_accel_g, max_brake_g: as on the display, since the recording began; 0 without a
+    value. rate_hz: turns per second. seconds: since the recording began."""
 
     aligned: bool
     car: bool
@@ -60,23 +61,24 @@ class LiveReading:
     seconds: float
 
 
-class Recording:
-    """Writes blocks to a log. stopped: an event that is set where the log has to end, which ends the stream.  live:
-    called with each block's LiveReading.  A log that cannot be written any further ends there, with a note.
+class StreamLog:
+    """Writes blocks to a log. stopped: an event that is set if the log must end, which ends the stream. live: called
+    with each block's LiveReading. A log that can no longer be written ends there, with a note.
 
     first: the first block; seconds, count: duration and number of readings so far; written: True once the log has a
     block."""
 
     def __init__(self, stopped: threading.Event, live: Callable[[LiveReading], None] | None = None) -> None:
         self._stopped = stopped
-        self.first: Block | None = None
+        self.first: StoredBlock | None = None
         self.seconds = 0.0
         self.count = 0
         self.written = False
         self._live = live
 
-    def write(self, file: TextIOBase, blocks: Iterator[Block], notes: list[str]) -> None:
-        """Write all blocks as they come. notes: gets a line for each gap. Raises InputError if there is no block."""
+    def write(self, file: TextIOBase, blocks: Iterator[StoredBlock], notes: list[str]) -> None:
+        """Write all blocks as they arrive. notes: a line is appended for each gap. Raises InputError if there is no
+        block."""
         missing, expected = 0, 0
         missing_s: list[float] = []
         replay = Replay(CalibrationFile().to_firmware())
@@ -97,7 +99,7 @@ class Recording:
                 replay = Replay(calibration.to_firmware(), calibration.delay_s(), not car, block.time_us)
                 aligned = calibration.aligned
             rows = list(ride_log.rows([block], TRACK, self.first.time_us))
-            try:  # a whole block: what is cut off within a line could not be read
+            try:  # write a whole block: a line that is cut could not be read
                 file.write(head + "".join(",".join(row) + "\n" for row in rows))
             except OSError as error:
                 notes.append(f"the log cannot be written any further ({cause(error)}): what came until then is kept")
@@ -139,9 +141,9 @@ class Recording:
             notes.append(missing_note(missing_s))
 
 
-def blocks(transport: Board, name: str, notes: list[str], stopped: threading.Event) -> Iterator[Block]:
+def blocks(transport: ConnectedBoard, name: str, notes: list[str], stopped: threading.Event) -> Iterator[StoredBlock]:
     """Yield the whole blocks that the board sends, until `stopped` is set or the connection is lost. name: the port's.
-    notes: gets a line with the reason for the end. Raises InputError."""
+    notes: a line with the reason for the end is appended. Raises InputError."""
     parts: list[bytes] = []
     vehicle = ""
     for line in _lines(transport, name, notes, stopped):
@@ -158,7 +160,7 @@ def blocks(transport: Board, name: str, notes: list[str], stopped: threading.Eve
         parts = []
 
 
-def _lines(transport: Board, name: str, notes: list[str], stopped: threading.Event) -> Iterator[bytes]:
+def _lines(transport: ConnectedBoard, name: str, notes: list[str], stopped: threading.Event) -> Iterator[bytes]:
     """Yield the lines that the app on the board prints."""
     try:
         yield from lines(transport, _START, _SILENT_S, stopped)

@@ -1,7 +1,7 @@
-"""What is done to arrays of samples everywhere: numpy only, no log and no file.
+"""Functions on arrays of samples, used everywhere: numpy only, no logs and no files.
 
 Moving means, standard deviations and integrals; means over cells of time; one signal against another; rotation vectors
-and matrices; standstill; distances. leaning.py: how a motorcycle's lean and yaw rate go together.
+and matrices; standstill; distances. leaning.py: the relation of a motorcycle's lean and yaw rate.
 """
 
 from collections.abc import Callable, Iterable
@@ -16,20 +16,20 @@ Bools = NDArray[np.bool_]
 Ints = NDArray[np.integer[Any]]
 
 
-# Moving means and integrals of evenly spaced samples. All are made of one running sum, so their cost does not grow with
-# the window.
+# Moving means and integrals of evenly spaced samples. All use one running sum, so their cost does not grow with the
+# window.
 
 
 def window_means(values: Array, n: int) -> Array:
-    """(m - n + 1, ...) the means of all n successive ones of m values (m, ...)."""
+    """(m - n + 1, ...) the means over each n successive values of m values (m, ...)."""
     sums = np.zeros((len(values) + 1, *values.shape[1:]))
     np.cumsum(values, axis=0, out=sums[1:])
     return (sums[n:] - sums[:-n]) / n
 
 
 def window_spreads(values: Array, n: int) -> Array:
-    """(m - n + 1, ...) the standard deviations of all n successive ones of m values (m, ...)."""
-    values = values - np.mean(values, axis=0)  # or rounding of large squares would hide the spread
+    """(m - n + 1, ...) the standard deviations over each n successive values of m values (m, ...)."""
+    values = values - np.mean(values, axis=0)  # otherwise the rounding of large squares would hide the spread
     squared = window_means(values, n)
     squared *= -squared
     values *= values
@@ -38,8 +38,8 @@ def window_spreads(values: Array, n: int) -> Array:
 
 
 def moving_mean(values: Array, n: int) -> Array:
-    """(m, ...) for each of m values (m, ...) the mean of the n values that begin n // 2 before it. Beyond the ends the
-    first and the last value are repeated."""
+    """(m, ...) for each of m values (m, ...) the mean of n values, of which the first is n // 2 before it. Beyond the
+    ends the first and the last value are repeated."""
     return values if n < 2 or not len(values) else window_means(_padded(values, n), n)
 
 
@@ -65,12 +65,12 @@ def _padded(values: Array, n: int) -> Array:
     return np.concatenate((before, values, after))
 
 
-# Samples averaged over cells of time, block by block: vibration averages out, and what remains is small.
+# Samples averaged over cells of time, block by block: vibration averages out, and the result is small.
 
 
 def cell_numbers(time_s: Array, cell_s: float) -> Ints:
-    """(n) the number of the cell that each time lies in. A time on the edge of two cells, within rounding, is in the
-    later one."""
+    """(n) the number of the cell of each time. A time on the edge of two cells, within rounding, belongs to the later
+    one."""
     return np.floor(time_s / cell_s + 1e-6).astype(np.int64)
 
 
@@ -80,14 +80,14 @@ def runs(values: NDArray[np.generic]) -> Ints:
 
 
 def stretches(true: Bools) -> Ints:
-    """(m, 2) the first index, and that after the last, of each run of True among n values."""
+    """(m, 2) the first index, and the index after the last, of each run of True among n values."""
     return np.flatnonzero(np.diff(np.concatenate(([False], true, [False])))).reshape(-1, 2)
 
 
 @dataclass
 class EvenCells:
     """n successive cells, some without samples. first: number of the first cell. count (n): samples in each. means
-    (n, k), latest (n, j): see Cells.add(); NaN where there is no value."""
+    (n, k), latest (n, j): see Cells.add(); NaN for no value."""
 
     first: int
     count: Array
@@ -95,8 +95,8 @@ class EvenCells:
     latest: Array
 
     def merged(self, by: int) -> "EvenCells":
-        """Cells that are `by` times as long and begin at multiples of `by`. Their `latest` is the first value in
-        each."""
+        """Merge into cells that are `by` times as long and begin at multiples of `by`. Their `latest` is the first
+        value in each."""
         before = self.first % by
         after = -(before + len(self.count)) % by
 
@@ -114,9 +114,9 @@ class EvenCells:
 
 
 class Cells:
-    """Averages samples over cells of time. add() takes them in the order of time, block by block.
+    """Averages samples over cells of time. Call add() block by block, in chronological order.
 
-    cell_s: length of a cell, s. most: number of cells with samples that are kept, the last ones; 0: all.
+    cell_s: length of a cell, s. most: number of last cells with samples to keep; 0: all.
     """
 
     def __init__(self, cell_s: float, most: int = 0) -> None:
@@ -125,8 +125,8 @@ class Cells:
         self._means = 0
 
     def add(self, time_s: Array, means: Array, latest: Array) -> None:
-        """Take n samples. means (n, k): values that are averaged. latest (n, j): values of which each cell keeps the
-        last that is not NaN."""
+        """Add n samples. means (n, k): values to average. latest (n, j): values of which each cell keeps the last one
+        that is not NaN."""
         if not len(time_s):
             return
         number = cell_numbers(time_s, self.cell_s)
@@ -139,7 +139,7 @@ class Cells:
         for column, values in enumerate(latest.T, after):
             there = np.flatnonzero(~np.isnan(values))
             new[np.searchsorted(starts, there, side="right") - 1, column] = values[there]
-        if self._parts and self._parts[-1][-1, 0] == new[0, 0]:  # the block before ended within this cell
+        if self._parts and self._parts[-1][-1, 0] == new[0, 0]:  # the previous block ended within this cell
             begun = self._parts[-1][-1]
             new[0, 1:after] += begun[1:after]
             new[0, after:] = np.where(np.isnan(new[0, after:]), begun[after:], new[0, after:])
@@ -163,8 +163,8 @@ class Cells:
 
 
 # The lag of one signal behind another, such as that of a satellite receiver's speed behind the force. Either some lags
-# are tried, and the one with the largest correlation is taken (cross-correlation). Or, where the shift may be anything,
-# all are tried at once by Fourier transforms.
+# are tried, and the one with the largest correlation is used (cross-correlation). Or, if any shift is possible, all are
+# tried at once by Fourier transforms.
 
 
 @dataclass
@@ -180,7 +180,7 @@ def correlation(effect: Array, cause: Array, whole: bool = False) -> Correlation
     """The correlation of effect (n) with the component of cause (n, k) along the direction of their largest covariance.
 
     whole: normalise by the variance of all components of the cause, not only of the one along `direction`. The value is
-    then smaller where the cause also varies across that direction.
+    then smaller if the cause also varies across that direction.
     """
     effect, cause = effect - np.mean(effect), cause - np.mean(cause, axis=0)
     both = effect @ cause
@@ -192,7 +192,8 @@ def correlation(effect: Array, cause: Array, whole: bool = False) -> Correlation
 
 @dataclass
 class Lag(Correlation):
-    """lag_s: delay of the effect against the cause. inside: it is neither the first nor the last of the lags tried."""
+    """lag_s: delay of the effect against the cause. inside: True if it is neither the first nor the last of the lags
+    tried."""
 
     lag_s: float
     inside: bool
@@ -203,8 +204,8 @@ def best_lag(
 ) -> Lag | None:
     """The lag of the largest correlation, interpolated by a parabola through its square and the two beside it.
 
-    lags_s: evenly spaced, increasing. pair_at: called with a lag, returns the effect (n) and the cause (n, k) that much
-    earlier, or None if there are too few values. whole: see correlation(). Returns None if pair_at always does.
+    lags_s: evenly spaced, increasing. pair_at: called with a lag, returns the effect (n) and the cause (n, k) earlier
+    by this lag, or None if there are too few values. whole: see correlation(). Returns None if pair_at always does.
     """
     tried = [(lag_s, pair_at(lag_s)) for lag_s in lags_s]
     found = [(lag_s, correlation(*pair, whole)) for lag_s, pair in tried if pair is not None]
@@ -220,7 +221,8 @@ def best_lag(
 
 
 def peak_offset(three: Array) -> float:
-    """Where the parabola through three neighbours (3) is highest, in steps from the middle one, -0.5 to 0.5."""
+    """The place of the maximum of the parabola through three neighbours (3), in steps from the middle one, -0.5 to
+    0.5."""
     before, here, after = three
     bend = before - 2.0 * here + after
     return float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
@@ -241,20 +243,21 @@ def correlations(first: Array, first_good: Bools, second: Array, second_good: Bo
 
     there, other = first_good.astype(float), second_good.astype(float)
     count = np.maximum(np.rint(crossed(there, other)), 0.0)
-    # The transforms' rounding errors are a share of the whole sums of squares: smaller results mean nothing
+    # The transforms' rounding errors are a share of the total sums of squares: smaller results mean nothing
     square = np.maximum(crossed(a * a, other), 1e-9 * (a @ a)) * np.maximum(crossed(there, b * b), 1e-9 * (b @ b))
     return crossed(a, b) / np.sqrt(np.maximum(square, 1e-30)), count
 
 
 def log_likelihood_ratio(correlation: Array, count: Array, per_sample: float) -> Array:
-    """Natural logarithm of the likelihood ratio of two normal signals: with this correlation over with none; 0 for a
+    """Natural logarithm of the ratio of two normal signals' likelihoods with this correlation and without any; 0 for a
     negative correlation. correlation, count: see correlations(). per_sample: independent values per sample."""
     r = np.clip(correlation, 0.0, 0.999)
     return -0.5 * per_sample * count * np.log1p(-r * r)
 
 
 def peaks(values: Array, apart: int, most: int) -> list[int]:
-    """Indices of the largest values over 0, at most `most`, the largest first, each over `apart` from the others."""
+    """Indices of the largest values over 0, at most `most`, the largest first, each more than `apart` from the
+    others."""
     left, found = values.copy(), []
     while len(found) < most and np.max(left) > 0.0:
         place = int(np.argmax(left))
@@ -297,20 +300,20 @@ def rotation_vector(matrix: Array) -> Array:
     return axis / np.maximum(sine, 1e-12) * angle
 
 
-# Standstill, by how little readings change: for zero-velocity updates and for the gyro's bias.
+# Standstill, detected by small changes of the readings: for zero-velocity updates and for the gyro's bias.
 
-STANDING_MPS = 0.3  # a lower speed is standing: a receiver's is never quite 0
+STANDING_MPS = 0.3  # a lower speed counts as standing: a receiver's speed is never quite 0
 STANDS = 4.0  # factor on the limits of the changes at such a speed
 
 
 def motionless(
     rate: Array, force: Array, n: int, most_rate: float, most_force: float, speed_mps: Array | None = None
 ) -> Bools:
-    """(m) True where, over the n of m samples around each, no component of rate (m, 3) and of force (m, 3) has a
-    standard deviation over most_rate and most_force, in their units.
+    """(m) True where, over n of the m samples around each, no component of rate (m, 3) has a standard deviation over
+    most_rate, and none of force (m, 3) one over most_force.
 
-    Samples: means over a fifth of a second, in which an idling engine averages out. speed_mps (m): NaN where there is
-    none. A constant rate passes, as bias or as a steady bend: check its mean in addition.
+    Samples: means over a fifth of a second, which averages out an idling engine. speed_mps (m): NaN for none. A
+    constant rate passes, from a bias or a steady bend: check its mean in addition.
     """
     speed = np.full(len(rate), np.nan) if speed_mps is None else speed_mps
     allowed = np.where(speed < STANDING_MPS, STANDS, 1.0)

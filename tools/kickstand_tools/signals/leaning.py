@@ -1,8 +1,9 @@
-"""How a motorcycle's lean and yaw rate go together, from its rates alone: shows forward, handedness, unit of the rates.
+"""Relates a motorcycle's lean and yaw rate, from its rates alone: shows forward, handedness and the unit of the rates.
 
 A bike that begins to turn leans: tan(lean) = -speed x yaw rate / g. So the rate about forward, which changes the lean,
-correlates with minus the change of the yaw rate; the sign separates forward from backward. A leaning bike's rate about
-its own left is yaw rate x sin(lean): as a product of two quantities, that shows handedness and the unit of the rates.
+correlates with minus the change of the yaw rate. The sign distinguishes forward from backward. A leaning bike's rate
+about its own left is yaw rate x sin(lean). As a product of two quantities it shows handedness and the unit of the
+rates.
 """
 
 from dataclasses import dataclass
@@ -13,21 +14,21 @@ from kickstand.units import STANDARD_GRAVITY
 from . import Array, Bools, moving_mean, moving_spread
 
 WINDOW_S = 0.2  # rates and forces are means over windows of this length
-SMOOTH_S = 0.6  # the rates whose changes are compared are moving means over this
+SMOOTH_S = 0.6  # rates are moving means over this time before their changes are compared
 SLOW_S = 12.0  # changes of lean that take longer cannot be separated from the gyro's drift
-# Rates are in rad/s where a Leaning exceeds all three. Simulated rides and recordings in deg/s have a share of 1.0 to
-# 1.6, in rad/s of 57 to 92, at over 5 sigmas; cars have a likeness under 0.6.
+# Rates are in rad/s if a Leaning exceeds all three. Simulated rides and recordings in deg/s have a share of 1.0 to 1.6,
+# in rad/s of 57 to 92, at over 5 sigmas; cars have a likeness under 0.6.
 SHARE, SIGMAS, LIKENESS = 15.0, 4.5, 0.65
-LEAST_LEAN = np.radians(2.0 / 57.3)  # rms: a ride that leans less is nearly straight; 2 degrees if rates are in rad/s
+LEAST_LEAN = np.radians(2.0 / 57.3)  # rms: a ride with less lean is nearly straight; 2 degrees if rates are in rad/s
 
 
 @dataclass
 class Leaning:
     """matrix (3, 3): vehicle from sensor, rows left, up, forward, roughly. rolled (n, rad): lean without its slow
-    changes (see without_drift()). turned (n, rad/s): yaw rate, positive to the left, likewise. likeness: correlation of
-    rolled and -turned while riding. speed (m/s): the one that balances yaw rate and lean, by regression. share: rate
-    about left over yaw rate x sin(lean), by regression: 1 where the axes are right-handed and the rates in deg/s.
-    sigmas: |share| over its standard deviation.
+    changes (see without_drift()). turned (n, rad/s): yaw rate, positive to the left, also without its slow changes.
+    likeness: correlation of rolled and -turned while riding. speed (m/s): the one that balances yaw rate and lean, by
+    regression. share: rate about left over yaw rate x sin(lean), by regression: 1 if the axes are right-handed and the
+    rates in deg/s. sigmas: |share| over its standard deviation.
     """
 
     matrix: Array
@@ -41,7 +42,7 @@ class Leaning:
 
 def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
     """The Leaning of n windows of WINDOW_S. rate (n, 3, rad/s): without bias. force (n, 3). riding (n): True for the
-    windows that are used."""
+    windows to use."""
     up = _unit(force[riding].mean(axis=0))
     yaw = averaged(rate @ up, SMOOTH_S)
     level = averaged(rate - np.outer(rate @ up, up), SMOOTH_S)
@@ -71,14 +72,14 @@ def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
 
 
 def speed_in_radians(found: Leaning) -> float | None:
-    """Where the rates are surely in rad/s, not in deg/s (so 57 times too small): the impossible speed in the bends,
-    m/s, that deg/s would mean. Else None."""
+    """If the rates are surely in rad/s, not in deg/s (so 57 times too small), the impossible speed in bends, m/s, that
+    deg/s would mean. Otherwise None."""
     wrong = found.share > SHARE and found.sigmas > SIGMAS and found.likeness > LIKENESS
     return float(np.degrees(found.speed)) if wrong and leans(found) else None
 
 
 def leans(found: Leaning) -> bool:
-    """True where the bike leans at all: the rms of the lean is over LEAST_LEAN."""
+    """True if the bike leans at all: the rms of the lean is over LEAST_LEAN."""
     return float(np.sqrt(np.mean(found.rolled**2))) > LEAST_LEAN
 
 
@@ -90,23 +91,23 @@ def leaned(rolled: Array, yaw: Array, speed: Array | float) -> Array:
 
 
 def averaged(values: Array, seconds: float) -> Array:
-    """Moving mean, over so many seconds, of windows' values (n) or (n, k)."""
+    """Moving mean over this time of windows' values (n) or (n, k)."""
     return moving_mean(values, _windows(seconds))
 
 
 def without_drift(values: Array) -> Array:
-    """values (n) without their slow changes: less their moving mean, taken twice, over SLOW_S."""
+    """values (n) without their slow changes: minus their moving mean over SLOW_S, taken twice."""
     return values - averaged(averaged(values, SLOW_S), SLOW_S)
 
 
 def unrest(values: Array, over_s: float) -> Array:
-    """(n): for each window of values (n, 3) the standard deviation over over_s seconds, of the component with the
-    largest."""
+    """(n): for each window of values (n, 3) the standard deviation over over_s seconds, the largest of the three
+    components."""
     return moving_spread(values, _windows(over_s)).max(axis=1, initial=0.0)
 
 
 def _windows(seconds: float) -> int:
-    """The odd number of windows that last about so long."""
+    """The odd number of windows that last about this time."""
     return 2 * max(1, round(seconds / WINDOW_S / 2.0)) + 1
 
 

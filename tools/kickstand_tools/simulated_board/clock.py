@@ -1,4 +1,4 @@
-"""The board's time in integer microseconds. It passes only when something on the board takes time."""
+"""The board's time in integer microseconds. It advances only when something on the board takes time."""
 
 import time as _host_time
 from heapq import heappop, heappush
@@ -6,7 +6,7 @@ from heapq import heappop, heappush
 # Kept here because Board.install() later replaces `time` under MicroPython
 _host_ns, _host_sleep = _host_time.time_ns, _host_time.sleep
 
-NEVER_US = 1 << 60  # later than any run lasts
+NEVER_US = 1 << 60  # later than the end of any run
 _PACE_STEP_US = 5000  # time between two comparisons of a paced clock with the host's
 
 
@@ -15,11 +15,11 @@ def _host_us():
 
 
 class PowerOff(BaseException):
-    """The supply is gone: ends whatever runs on the board. A BaseException, because firmware may catch Exception."""
+    """The power is off: ends the program on the board. A BaseException, because firmware may catch Exception."""
 
 
 class Reset(BaseException):
-    """The microcontroller starts again: machine.reset(), or a watchdog that was not fed."""
+    """The microcontroller restarts: machine.reset(), or a watchdog that was not fed."""
 
 
 def to_us(seconds):
@@ -28,9 +28,9 @@ def to_us(seconds):
 
 
 class Clock:
-    """now_us: the time since the clock was made. Models read it and schedule calls with at(); operations that take time
-    call advance(). next_us: when that next does more than let time pass, for a deadline, an event or a comparison with
-    the host's clock.
+    """now_us: the time since the clock was made. Models read it and schedule calls with at(). Operations that take time
+    call advance(). next_us: the next time at which advance() has more to do, for a deadline, an event or a comparison
+    with the host's clock.
 
     pace: simulated seconds per second of the host: 1.0 for real time, 0 for as fast as the host can.
     """
@@ -48,7 +48,7 @@ class Clock:
         self.set_pace(pace)
 
     def advance(self, us):
-        """Let time pass and run the events that are due. Raises PowerOff at the deadline, and what events raise."""
+        """Advance the time and run the scheduled events. Raises PowerOff at the deadline, and exceptions of events."""
         target = self.now_us + us
         if target < self.next_us:
             self.now_us = target
@@ -71,19 +71,20 @@ class Clock:
         self.at(self.now_us + period_us, again)
 
     def set_deadline(self, due_us):
-        """Let advance() raise PowerOff at each call from due_us on. None: never."""
+        """Make advance() raise PowerOff at each call from due_us on. None: never."""
         self._deadline_us = NEVER_US if due_us is None else due_us
         self._reset = False
         self._plan()
 
     def reset(self):
-        """Raise Reset now, and at each later advance() until the next set_deadline(): firmware may catch it."""
+        """Raise Reset now, and at each later advance() until the next set_deadline(), because firmware may catch it."""
         self._reset = True
         self._plan()
         raise Reset
 
     def power_off(self):
-        """Raise PowerOff now, and at each later advance() until the next set_deadline(): firmware may catch it."""
+        """Raise PowerOff now, and at each later advance() until the next set_deadline(), because firmware may catch
+        it."""
         self.set_deadline(self.now_us)
         raise PowerOff
 
@@ -114,7 +115,7 @@ class Clock:
                 raise PowerOff
             else:
                 self._keep_pace()
-        if target > self.now_us:  # an event may have called advance() itself
+        if target > self.now_us:  # an event may also have called advance()
             self.now_us = target
 
     def _host_due_us(self):
@@ -124,20 +125,20 @@ class Clock:
         late = _host_us() - self._host_lead_us - self._host_due_us()
         if late < 0:
             _host_sleep(min(-late, 4 * _PACE_STEP_US) / 1e6)  # a short sleep, in case the host's clock is set meanwhile
-        else:  # a host that was too slow does not run faster afterwards to catch up
+        else:  # after a slow phase of the host, do not run faster to catch up
             self._host_lead_us += late
         self._pace_us = self.now_us + _PACE_STEP_US
         self._plan()
 
 
 class Watchdog:
-    """Raises Reset if it is not fed in time, from within the call that lets the time pass. clock: a Clock."""
+    """Raises Reset if it is not fed in time, from the call that advances the time. clock: a Clock."""
 
     def __init__(self, clock):
         self._clock = clock
         self._timeout_us = 0
         self._due_us = 0
-        self._round = 0  # counts start() and stop(): checks that an earlier start() has scheduled do nothing
+        self._round = 0  # counts start() and stop(): checks scheduled by an earlier start() do nothing
 
     def start(self, timeout_us):
         """Start the watchdog: from now on feed() must be called within each timeout_us."""

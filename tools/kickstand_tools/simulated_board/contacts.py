@@ -6,13 +6,14 @@ BOUNCE_US = 4000  # of the button
 RELEASED_US = 150_000  # least time between two presses
 _BOUNCES = 3  # short openings (or closings) after each edge of the button
 
-_CLOSED_SHARE = 0.1  # of the way between two pulses: the magnet is near
+_CLOSED_SHARE = 0.1  # share of the way between two pulses in which the magnet is near
 _LOOK_US = 20_000  # the model of the wheel reads the speed at least this often
-_CREEP_MPS = 0.02  # slower counts as standing
+_CREEP_MPS = 0.02  # a lower speed counts as standing
 
 
 class Contact:
-    """closed: True while it connects the pin to ground.  broken_us: time at which its wire breaks."""
+    """A contact between a pin and ground. closed: True while it connects them. broken_us: time at which its wire
+    breaks."""
 
     def __init__(self, clock, broken_us=NEVER_US):
         self.closed = False
@@ -21,7 +22,7 @@ class Contact:
         self._edge = None
 
     def connect(self, edge):
-        """Call edge(level of the pin) at each change from now on. None: call nothing."""
+        """From now on call edge(level of the pin) at each change. None: no calls."""
         self._edge = edge
 
     def _set_at(self, at_us, closed):
@@ -38,13 +39,13 @@ class Contact:
 class Button(Contact):
     """seed: determines the random moments at which it bounces.
 
-    charge_us: time in which the pin's pull-up charges a capacitor that is soldered to the contacts, 0 for none.
+    charge_us: time in which the pin's pull-up charges a capacitor at the contacts, 0 for none.
     """
 
     def __init__(self, clock, seed=1):
         super().__init__(clock)
         self.charge_us = 0
-        self._free_us = 0  # when a press that is asked for now can begin
+        self._free_us = 0  # earliest start of the next press
         self._random = seed & 0x7FFFFFFF or 1
 
     def low(self, pulled_us):
@@ -52,8 +53,8 @@ class Button(Contact):
         return self.closed or self._clock.now_us < pulled_us + self.charge_us
 
     def press(self, at_us, for_us):
-        """Press it from at_us for for_us. at_us: None for now, or once the last such press is over, because a finger
-        cannot press what it holds."""
+        """Press it from at_us for for_us. at_us: None for now, or for the end of the last such press, because a finger
+        cannot press a pressed button."""
         if at_us is None:
             at_us = max(self._clock.now_us, self._free_us)
             self._free_us = at_us + for_us + RELEASED_US
@@ -73,12 +74,12 @@ class Button(Contact):
 
 
 class Wheel(Contact):
-    """It closes at each magnet that passes.
+    """A contact that closes at each passing magnet.
 
     speed(t_s): speed of the vehicle, m/s.  bounce_us: time for which the contact bounces at each edge, 0 for none.
     until_s: time at which its wire breaks.
 
-    noise_hz: pulses per second that a cable beside its own induces, in place of the wheel's; 0 for none.
+    noise_hz: pulses per second that a neighbouring cable induces instead of the wheel's; 0 for none.
     """
 
     def __init__(self, clock, speed, pulses_per_metre=0.5, bounce_us=0, until_s=1e9):
@@ -92,12 +93,12 @@ class Wheel(Contact):
         clock.at(clock.now_us, self._look)
 
     def _look(self):
-        """Add the way since the last call; at a pulse schedule closing and opening; schedule the next call."""
+        """Add the distance since the last call. At a pulse schedule closing and opening. Schedule the next call."""
         now_us = self._clock.now_us
         speed = self._speed(now_us / 1e6)
         rate = speed * self._pulses_per_metre / 1e6 if speed > _CREEP_MPS else 0.0  # pulses per us
         if self.noise_hz:
-            rate = self.noise_hz / 1e6 if self._edge else 0.0  # nobody listens: spare the time
+            rate = self.noise_hz / 1e6 if self._edge else 0.0  # save the time if nobody listens
         self._turned += rate * (now_us - self._look_us)
         self._look_us = now_us
         if self._turned >= 0.999:

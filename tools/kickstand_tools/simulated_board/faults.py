@@ -1,4 +1,4 @@
-"""The fault script: the faults on the simulated board, with their times.
+"""The fault script: faults on the simulated board, with their times.
 
 Times are in seconds of the board's clock, I2C addresses have 7 bits.
 """
@@ -12,7 +12,7 @@ from .i2c import TransferFault
 
 _FOREVER = 1 << 60  # a number of transfers
 _BLOCK = 4096  # bytes of flash that are erased at once
-_STALL_S = 0.5  # a print waits so long for a host that reads nothing (shared/tinyusb/mp_usbd_cdc.h of MicroPython)
+_STALL_S = 0.5  # a print waits this long for a host that reads nothing (shared/tinyusb/mp_usbd_cdc.h of MicroPython)
 
 
 class Faults:
@@ -46,7 +46,7 @@ class Faults:
         self._transfers("corrupt", address, nth, 1, byte, mask)
 
     def cut(self, address, at_s, byte):
-        """The first transfer to address after at_s that has so many bytes breaks off at byte `byte`."""
+        """The first transfer to address after at_s that is long enough breaks off at byte `byte`."""
 
         self._board.at(at_s, lambda: self._transfers("cut", address, 1, _FOREVER, byte))
 
@@ -98,7 +98,7 @@ class Faults:
         self._between(at_s, for_s, lambda: set_to(pulses_per_s), lambda: set_to(0))
 
     def busy(self, at_s, for_s, times=1):
-        """Something else takes all of the processor's time for for_s, `times` times with 30 ms between them."""
+        """Other work takes all of the processor's time for for_s, `times` times with 30 ms between."""
 
         def begin(left):
             self._board.clock.advance(to_us(for_s))
@@ -116,7 +116,7 @@ class Faults:
         self._replaced("open", full, at_s, for_s)
 
     def cut_file(self, ending, length):
-        """The supply is cut when `length` bytes of the next file with this ending are written. Then files_cut is 1."""
+        """The power is cut after `length` bytes of the next file with this ending. Then files_cut is 1."""
 
         def wrap(file, path):
             if not path.endswith(ending):
@@ -131,11 +131,11 @@ class Faults:
         self._files(ending, at_s, for_s, False)
 
     def file_empty(self, ending, at_s, for_s):
-        """Files whose name has this ending read as empty, as after a loss of supply."""
+        """Files whose name has this ending read as empty, as after a power loss."""
         self._files(ending, at_s, for_s, True)
 
     def slow_flash(self, at_s, for_s, erase_s):
-        """Each block of a file that is written is erased for erase_s, in which the program stands."""
+        """Each block of a written file is erased for erase_s, during which the program is blocked."""
 
         def erase():
             self._board.clock.advance(to_us(erase_s))
@@ -144,13 +144,13 @@ class Faults:
         self._replaced("open", slow, at_s, for_s)
 
     def restore(self, *names):
-        """End the faults that replace these builtin functions: open, the file system's; print, USB's."""
+        """End the faults that replace these builtin functions: open for the file system, print for USB."""
         for name in names:
             if name in self._real:
                 setattr(builtins, name, self._real.pop(name))
 
     def _replace(self, name, function):
-        """From now on function(the real one, its arguments) is called in its place."""
+        """From now on call function(the real one, its arguments) instead of the builtin `name`."""
         self.restore(name)
         self._real[name] = real = getattr(builtins, name)
         setattr(builtins, name, lambda *arguments, **named: function(real, *arguments, **named))
@@ -171,7 +171,7 @@ class Faults:
     # On USB
 
     def usb_asleep(self, at_s, for_s):
-        """The host reads nothing: each print waits, and its text is lost."""
+        """The host reads nothing: each print waits, then its text is lost."""
         self._replaced("print", lambda *_, **__: self._board.clock.advance(to_us(_STALL_S)), at_s, for_s)
 
     def _transfers(self, kind, address, nth, count, byte=0, mask=0):
@@ -189,7 +189,7 @@ class Faults:
         )
 
     def _between(self, at_s, for_s, begin, end):
-        """begin() at at_s, and end() for_s later (None: never)."""
+        """Call begin() at at_s, and end() for_s later (None: never)."""
         self._board.at(at_s, begin)
         if for_s is not None:
             self._board.at(at_s + for_s, end)
@@ -206,7 +206,7 @@ class Faults:
 
 
 class _Wrapped:
-    """The base of the two classes below: passes all else on to the file."""
+    """The base of the two classes below: passes everything else on to the file."""
 
     def __init__(self, file):
         self._file = file
@@ -222,7 +222,7 @@ class _Wrapped:
 
 
 class _ErasedFile(_Wrapped):
-    """A file that is written to flash: erase() is called for each block that it begins."""
+    """A file in flash: erase() is called for each block that a write begins."""
 
     def __init__(self, file, erase):
         super().__init__(file)
@@ -238,7 +238,7 @@ class _ErasedFile(_Wrapped):
 
 
 class _FailingFile(_Wrapped):
-    """A file of which `length` bytes can be written, then `error` is raised."""
+    """A file that raises `error` after `length` bytes are written."""
 
     def __init__(self, file, length, error):
         super().__init__(file)

@@ -18,14 +18,14 @@ _ROM_A00 = {
     0xFF: "\u2588",  # full block
 }
 
-# By number of filled columns or rows: the nearest block. Unicode's are eighths wide, a character has five columns
+# The nearest block by number of filled columns or rows. Unicode's blocks are eighths wide; a character has five columns
 _FROM_LEFT = " \u258e\u258d\u258b\u258a\u2588"
 _FROM_RIGHT = " \u2595\u2590\u2590\u2590\u2588"  # from the right Unicode has only one eighth and one half
 _FROM_BELOW = " \u2581\u2582\u2583\u2584\u2585\u2586\u2587\u2588"
 
 
 def rom(code):
-    """The ROM's character for a code >= 0x10; '?' where Unicode has none like it."""
+    """The ROM's character for a code >= 0x10; '?' if Unicode has no similar one."""
     if code in _ROM_A00:
         return _ROM_A00[code]
     if 0x20 <= code < 0x7E:

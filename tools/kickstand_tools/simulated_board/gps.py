@@ -1,13 +1,13 @@
-"""Model of a GPS receiver: NMEA sentences on a serial line, some time after the fix that they describe."""
+"""Model of a GPS receiver: it sends NMEA sentences on a serial line, some time after the fix."""
 
 _KNOTS = 3600.0 / 1852.0
-_PIECE = 8  # bytes that are handed over at once
+_PIECE = 8  # bytes delivered at once
 _START_S = 12 * 3600 - 20  # UTC time of day when the clock is 0, on 21 November 2026
 _HOME = 48.1173, 11.5166667  # degrees north and east
 
 
 def _angle(degrees, digits, sides):
-    """An angle in the form of NMEA: degrees with so many digits, minutes, and the letter of its side."""
+    """An angle in the form of NMEA: degrees with `digits` digits, minutes, and the letter of its side."""
     parts = int(abs(degrees) * 6e6 + 0.5)  # 0.00001 minutes
     whole, rest = parts // 6_000_000, parts % 6_000_000
     side = sides[1] if degrees < 0.0 else sides[0]
@@ -23,14 +23,14 @@ def sentence(body):
 
 
 class Gps:
-    """It sends by itself, as an event of the clock.
+    """It transmits on clock events.
 
-    speed(t_s): of the vehicle, m/s.  hz: fixes a second.  latency_s: from a fix to its first byte.  place(t_s):
-    latitude and longitude, degrees north and east; None: it stays where it is.
+    speed(t_s): of the vehicle, m/s. hz: fixes per second. latency_s: time from a fix to its first byte. place(t_s):
+    latitude and longitude, degrees north and east; None: it does not move.
 
-    kinds: which sentences with a speed it sends.  talker: their first letters, the satellite system.
-    faults: [[kind, from_s, until_s], ...] where kind is "unplugged", "garbled" (a wrong bit now and then), "void" (no
-    fix) or "stuck" (the last sentence again and again).
+    kinds: the sentences with a speed that it sends. talker: their first letters, the satellite system.
+    faults: [[kind, from_s, until_s], ...] where kind is "unplugged", "garbled" (occasional wrong bits), "void" (no fix)
+    or "stuck" (it repeats the last sentence).
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class Gps:
         clock.every(1_000_000 // hz, self._fix)
 
     def connect(self, receive):
-        """Call receive(bytes) with the bytes that are sent from now on. None: they are lost."""
+        """From now on call receive(bytes) with the bytes sent. None: they are lost."""
         self._receive = receive
 
     def _has(self, kind):
@@ -63,7 +63,7 @@ class Gps:
         data = bytearray(self._last)
         if self._has("garbled"):
             for i in range(self._sent % 13, len(data), 13):
-                data[i] ^= 1 << (self._sent + i // 13) % 7  # two of the same bit would leave the checksum right
+                data[i] ^= 1 << (self._sent + i // 13) % 7  # two errors in the same bit would leave the checksum right
         self._sent += 1
         start_us = self._clock.now_us + self._latency_us
         for i in range(0, len(data), _PIECE):

@@ -1,17 +1,17 @@
 """A pair of I2C wires with devices on them, and faults of the wires.
 
-A controller (the fake machine.I2C or that of an emulated chip) calls start, write_byte, read_byte and stop, and lets
-the time pass that the bits take. Pins that drive the wires directly call set_scl and set_sda.
+A controller (the fake machine.I2C or that of an emulated chip) calls start, write_byte, read_byte and stop, and
+advances the time for the bits. Pins that drive the wires directly call set_scl and set_sda.
 """
 
 from .clock import NEVER_US
 
 
 class TransferFault:
-    """A fault in the transfers number first to last to one address, if they begin between from_us and until_us.
+    """A fault in the transfers `first` to `last` to one address, if they begin between from_us and until_us.
 
-    kind: "nack"; "timeout"; "cut" acknowledges no byte from the number byte on, once; "corrupt" inverts the bits of
-    mask in the byte read with the number byte.
+    kind: "nack"; "timeout"; "cut": once, no byte from number `byte` on is acknowledged; "corrupt": the bits of mask are
+    inverted in read byte number `byte`.
     """
 
     def __init__(self, kind, address, first, last, from_us=0, until_us=NEVER_US, byte=0, mask=0):
@@ -24,7 +24,7 @@ class TransferFault:
         self._count = 0
 
     def applies(self, address, number, now_us):
-        """Whether the transfer that begins now has this fault."""
+        """True if the transfer that begins now has this fault."""
         first, last = self._numbers
         start, end = self._times
         return address == self._address and first <= number <= last and start <= now_us < end
@@ -50,7 +50,7 @@ class TransferFault:
         return value ^ self.mask if self.kind == "corrupt" and number == self._byte else value
 
 
-GOOD, OPEN, LOW = "good", "open", "low"  # a wire; one that nothing pulls up; one that touches ground
+GOOD, OPEN, LOW = "good", "open", "low"  # states of a wire: good; not pulled up; touching ground
 
 
 class Bus:
@@ -62,9 +62,9 @@ class Bus:
         self.scl = scl
         self.sda_wire = self.scl_wire = GOOD
         self.devices = {}  # by address
-        self.transfers = {}  # by address: number of transfers that were begun
+        self.transfers = {}  # by address: number of transfers begun
         self.faults = []  # a list of TransferFault
-        self._fault = None  # the fault of the transfer under way
+        self._fault = None  # the fault of the current transfer
         self._device = None
         self.open = False
         self._driven_scl = 1
@@ -88,11 +88,12 @@ class Bus:
     # For a controller
 
     def stuck(self):
-        """True while a device that was interrupted holds SDA low."""
+        """True while an interrupted device holds SDA low."""
         return self._stuck_bits > 0
 
     def start(self, address, read):
-        """START or repeated START, and address. True: acknowledged. False: not. None: a device holds SDA low."""
+        """START or repeated START, and address. True: acknowledged. False: not acknowledged. None: a device holds SDA
+        low."""
         if self._stuck_bits > 0 or not self.sda_wire == self.scl_wire == GOOD:
             return None
         self._stuck_bits = -1  # START frees a device that waits for ACK
@@ -127,7 +128,7 @@ class Bus:
         return value if self._fault is None else self._fault.on_read(value)
 
     def read_into(self, buf):
-        """Fill buf with what read_byte() returns."""
+        """Fill buf with bytes from read_byte()."""
         if self._device is not None and self._fault is None and hasattr(self._device, "read_into"):
             self._device.read_into(buf)
             return
@@ -145,7 +146,7 @@ class Bus:
         self._stuck_bits = bits
 
     def power_off(self):
-        """The supply is gone: no transfer, and no device hangs."""
+        """The power is off: no transfer, and no device hangs."""
         self.stop()
         self._stuck_bits = -1
 
@@ -158,7 +159,7 @@ class Bus:
     # For pins
 
     def scl_level(self, pulled_up=False):
-        """0 or 1. pulled_up: the pin's own pull-up is on, which a wire without others needs."""
+        """0 or 1. pulled_up: True if the pin's own pull-up is on, which a wire without other pull-ups needs."""
         return self._level(self._driven_scl, self.scl_wire, pulled_up)
 
     def sda_level(self, pulled_up=False):
@@ -170,7 +171,7 @@ class Bus:
         return 0 if wire == LOW or (wire == OPEN and not pulled_up) else driven
 
     def set_scl(self, level):
-        """Drive SCL low (0) or let it go (1)."""
+        """Drive SCL low (0) or release it (1)."""
         edge = level - self._driven_scl
         self._driven_scl = level
         if self._stuck_bits > 0 and edge < 0:
@@ -179,7 +180,7 @@ class Bus:
             self._stuck_bits = -1 if self._driven_sda else 9
 
     def set_sda(self, level):
-        """Drive SDA low (0) or let it go (1). START and STOP free a device that waits for ACK."""
+        """Drive SDA low (0) or release it (1). START and STOP free a device that waits for ACK."""
         if self._stuck_bits == 0 and self._driven_scl and level != self._driven_sda:
             self._stuck_bits = -1
         self._driven_sda = level

@@ -1,7 +1,7 @@
 """Model of a 16x2 HD44780 character display on a PCF8574 backpack (HD44780U data sheet ADE-207-272).
 
 Wiring of the usual backpack: P0 RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7; see WIRINGS. D0..D3 are not connected:
-the controller reads them as ones. What is sent while it is busy is lost, as on the chip.
+the controller reads them as ones. Data sent while it is busy is lost, as on the chip.
 """
 
 import re
@@ -29,7 +29,8 @@ _LEAN_PAGE = re.compile("Lean +([0-9]+)° (left|right)?[ *]*$")
 
 
 def shown_lean(lines):
-    """The lean on the firmware's lean page, degrees, > 0 to the right; None if the two lines show something else."""
+    """The lean shown on the firmware's lean page, degrees, > 0 to the right; None if the two lines show another
+    page."""
     found = _LEAN_PAGE.match(lines[0])
     return found and float(found.group(1)) * (-1.0 if found.group(2) == "left" else 1.0)
 
@@ -37,8 +38,8 @@ def shown_lean(lines):
 class Lcd:
     """One display. address: 0x20..0x27 (PCF8574) or 0x38..0x3F (PCF8574A).
 
-    wiring: of the backpack, 1 for the usual one, else a key of WIRINGS.
-    changes: counts visible changes. lost: counts nibbles (bytes in 8-bit mode) that were sent while it was busy.
+    wiring: of the backpack, 1 for the usual one, otherwise a key of WIRINGS.
+    changes: counts visible changes. lost: counts nibbles (bytes in 8-bit mode) sent while it was busy.
     """
 
     max_hz = 100_000  # the PCF8574 is a standard-mode part
@@ -47,7 +48,7 @@ class Lcd:
         self.address = address
         self.clock = clock
         self.wiring = 1
-        self._raw = 0xFF  # the pins as they are, of another wiring
+        self._raw = 0xFF  # the actual pins, for another wiring
         self.changes = 0
         self.power_on()
 
@@ -59,9 +60,9 @@ class Lcd:
         self.lost = 0
         self.on = self.cursor = self.blink = False
         self.two_lines = False
-        self._port = self._raw = 0xFF  # the outputs of a PCF8574 come up high
+        self._port = self._raw = 0xFF  # the outputs of a PCF8574 are high after power-on
         self._eight_bit = True
-        self._high = -1  # the first nibble of a byte until the second arrives, else -1
+        self._high = -1  # the first nibble of a byte until the second arrives, otherwise -1
         self._low_next = False  # when reading: the low nibble comes next
         self._in_cgram = False
         self._ac = 0  # address counter
@@ -73,7 +74,7 @@ class Lcd:
         self.changes += 1
 
     def power_off(self):
-        """The supply is gone: nothing is visible."""
+        """The power is off: nothing is visible."""
         self.on = False
         self._port = 0
         self.changes += 1
@@ -94,7 +95,7 @@ class Lcd:
         return [[self.ddram[start + place] for place in places] for start in (0x00, 0x40)]
 
     def text(self):
-        """Two strings of 16 characters, as they are visible: blank while the display is off."""
+        """Two strings of the 16 visible characters; blank while the display is off."""
         lines = ["".join([self._character(code) for code in line]) for line in self.codes()]
         if not self.on:
             lines = [" " * COLUMNS, " " * COLUMNS]
@@ -112,7 +113,7 @@ class Lcd:
         return True
 
     def write_byte(self, value):
-        """Set the levels of the eight pins. When E falls, the levels before it are taken. True: ACK."""
+        """Set the levels of the eight pins. When E falls, the earlier levels are used. True: ACK."""
         if self.wiring != 1:
             self._raw, value = value, self._as_usual(value)
         before = self._port
@@ -124,7 +125,8 @@ class Lcd:
         return True
 
     def read_byte(self):
-        """The eight pins. While R/W and E are high D7..D4 give busy flag and address counter, high nibble first."""
+        """Read the eight pins. While R/W and E are high, D7..D4 are busy flag and address counter, high nibble
+        first."""
         port = self._port
         if self.wiring != 1:
             return self._raw
@@ -197,7 +199,7 @@ class Lcd:
         self.changes += 1
 
     def _command(self, value):
-        """Execute a command; return how long it takes in us."""
+        """Execute a command; return its duration in us."""
         if value & 0x80:
             self._ac = value & 0x7F
             self._in_cgram = False

@@ -1,9 +1,9 @@
 """Register-level model of the InvenSense MPU6050 and of the chips sold under its name: RM-MPU-6000A rev 4.2,
 PS-MPU-6000A rev 3.4; MPU-6500 RM rev 2.1; ICM-20689 and MPU-6886 data sheets.
 
-Where these leave room the model is strict: a status bit appears only if INT_ENABLE asks for it, and what is written
-during start-up is lost. Of the low-pass only the delay is modelled: world() gives values that are filtered already. The
-self-test is that of the MPU6050, which the others lack here. Not modelled: DMP, auxiliary I2C.
+If these leave a choice, the model is strict: a status bit appears only if INT_ENABLE enables it, and writes during
+start-up are lost. Only the delay of the low-pass is modelled: world() returns filtered values. Only the MPU6050 has a
+self-test here. Not modelled: DMP, auxiliary I2C.
 """
 
 from collections import namedtuple
@@ -30,7 +30,7 @@ DLPF_DELAY_US = (980, 1900, 2800, 4800, 8300, 13400, 18600, 980)  # delay of the
 ACCEL_TRIMS, GYRO_TRIMS = (13, 17, 22), (9, 14, 11)  # factory trim codes of x, y, z (RM pp. 9 to 11)
 
 # temperature in degrees C = counts / counts_per_c + zero_c.
-# temperature_in_fifo: it goes into the FIFO with accelerometer and with gyro, whatever FIFO_EN says.
+# temperature_in_fifo: it is stored in the FIFO with accelerometer and gyro for any FIFO_EN.
 Variant = namedtuple(
     "Variant",
     ("power_after_reset", "counts_per_c", "zero_c", "has_accel_config2", "fifo_bytes", "temperature_in_fifo"),
@@ -49,7 +49,7 @@ VARIANTS = {  # by WHO_AM_I, the same ones as in CHIPS of firmware/kickstand/imu
 
 
 class Fifo:
-    """The chip's FIFO: it does not know where frames begin. size: its capacity in bytes."""
+    """The chip's FIFO. It has no marks between frames. size: its capacity in bytes."""
 
     def __init__(self, size):
         self.size = size
@@ -58,7 +58,7 @@ class Fifo:
 
     @property
     def count(self):
-        """Number of bytes that wait to be read."""
+        """Number of bytes waiting to be read."""
         return len(self._waiting)
 
     def clear(self):
@@ -66,7 +66,7 @@ class Fifo:
         self._waiting = b""
 
     def push(self, data, keep_old=False):
-        """Add bytes. True if there was no room for all: then the oldest are lost, or with keep_old the new ones."""
+        """Add bytes. True if it was full: then the oldest bytes are lost, or with keep_old the new ones."""
         waiting = self._waiting + data
         self._waiting = waiting[: self.size] if keep_old else waiting[-self.size :]
         return len(waiting) > self.size
@@ -82,11 +82,11 @@ class Fifo:
 class Mpu6050:
     """One chip.
 
-    clock: a Clock, of which the model reads now_us.
-    world(t_s): (fx, fy, fz in g, wx, wy, wz in deg/s[, temp_c]) along the chip's axes, its offset and scale errors
-    included.
-    self_test: what the self-test of each axis gives, as a share of its factory trim: three of the accelerometer, then
-    three of the gyro. 1.0 is right, 0.0 an axis that does not respond.
+    clock: a Clock; the model reads its now_us.
+    world(t_s): (fx, fy, fz in g, wx, wy, wz in deg/s[, temp_c]) along the chip's axes, including its offset and scale
+    errors.
+    self_test: result of each axis's self-test as a share of its factory trim: three of the accelerometer, then three of
+    the gyro. 1.0 is right, 0.0 an axis that does not respond.
     clock_error: relative error of the chip's sample rate, > 0 for a faster one (0.01 = 1 %).
     """
 
@@ -98,7 +98,7 @@ class Mpu6050:
         self.self_test = [1.0] * 6
         self._override = None
         self.who_am_i = who_am_i
-        self._variant = VARIANTS.get(who_am_i, VARIANTS[0x68])  # a chip unknown to the driver too
+        self._variant = VARIANTS.get(who_am_i, VARIANTS[0x68])  # also for a chip unknown to the driver
         self.fifo = Fifo(self._variant.fifo_bytes)
         self._regs = bytearray(128)
         self._pointer = 0
@@ -126,8 +126,8 @@ class Mpu6050:
             self._start_sampling(self._busy_us + WAKE_US)
 
     def supply_dip(self, leaves="asleep"):
-        """A short loss of supply. It leaves the chip "asleep" (data 0), "frozen" (asleep, the last data), awake with
-        "default_ranges", or asleep and the frame "torn" that was being read: its rates are garbage."""
+        """A short power loss. It leaves the chip "asleep" (data 0), "frozen" (asleep, the last data), awake with
+        "default_ranges", or "torn": asleep, and the rates of the frame being read are garbage."""
         self._update()
         data = bytes(self._regs[ACCEL_XOUT_H : GYRO_ZOUT_L + 1])
         self.power_on()
@@ -141,25 +141,25 @@ class Mpu6050:
             self._start_sampling(self._busy_us)
 
     def override(self, value):
-        """Begin a fault: "freeze" (no new data), or the value that every data byte reads as. None ends it."""
+        """Begin a fault: "freeze" (no new data), or the value of every data byte. None ends it."""
         self._update()
         self._override = value
 
     def peek(self, register):
-        """A register as it is, without the side effects of a read."""
+        """The content of a register, without the side effects of a read."""
         self._update()
         return self._regs[register]
 
     # The I2C side
 
     def start(self, address, read):
-        """START and address. What is read until the next START is of one sampling instant. True: ACK."""
+        """START and address. Data read until the next START is from one sample. True: ACK."""
         self._update()
         self._expect_pointer = not read
         return True
 
     def write_byte(self, value):
-        """Take the register address, then data. True: ACK, which the chip sends even if the write has no effect."""
+        """Receive the register address, then data. True: ACK, which the chip sends even if the write has no effect."""
         if self._expect_pointer:
             self._pointer = value & 0x7F
             self._expect_pointer = False
@@ -170,7 +170,7 @@ class Mpu6050:
         return True
 
     def read_byte(self):
-        """The content of the register that the pointer is at. The pointer then advances, except at FIFO_R_W."""
+        """The content of the register at the pointer. The pointer then advances, except at FIFO_R_W."""
         register = self._pointer
         if register == FIFO_R_W:
             return self.fifo.pop()[0]
@@ -186,7 +186,7 @@ class Mpu6050:
         return value
 
     def read_into(self, buf):
-        """Fill buf with what read_byte() would return, from the FIFO in one step."""
+        """Fill buf like repeated read_byte(), but from the FIFO in one step."""
         if self._pointer == FIFO_R_W:
             buf[:] = self.fifo.pop(len(buf))
             return
@@ -263,13 +263,13 @@ class Mpu6050:
         return self._first_us + (number * self._period_ns + 999) // 1000
 
     def _update(self):
-        """Take the samples that were due since the last call."""
+        """Take the samples scheduled since the last call."""
         now = self.clock.now_us
         if now < self._due_us:
             return
         last = (now - self._first_us) * 1000 // self._period_ns
         if self._fifo_registers and self._regs[USER_CTRL] & FIFO_ENABLED:
-            # Samples that later ones would push out of the FIFO are skipped: its content ends up the same
+            # Samples that later ones would push out of the FIFO are skipped: the final content is the same
             kept = self.fifo.size // len(self._fifo_registers) + 2
             for number in range(max(self._next, last + 1 - kept), last + 1):
                 self._sample(number)
@@ -305,7 +305,7 @@ class Mpu6050:
         self._put(0x47, values[5] * self._gyro_lsb)
 
     def _with_self_test(self, values, force):
-        """The readings with what the axes in self-test add: their factory trims (RM p. 11)."""
+        """The readings plus the factory trims of the axes in self-test (RM p. 11)."""
         force, values = list(force[:3]), list(values)
         for k in range(3):
             if self._regs[ACCEL_CONFIG] & 0x80 >> k:

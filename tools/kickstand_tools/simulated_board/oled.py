@@ -1,7 +1,7 @@
 """Models of two OLED controllers on I2C with a panel of 128x64 pixels: Solomon Systech SSD1306 (data sheet rev 1.1) and
 Sino Wealth SH1106 (V2.3).
 
-A transfer begins with control bytes: Co (bit 7) says whether one byte follows or the rest is a stream, D/C (bit 6)
+A transfer begins with control bytes: Co (bit 7) shows whether one byte follows or the rest is a stream, D/C (bit 6)
 whether they are data. The SSD1306 has 128 columns and three addressing modes, the SH1106 132 columns, of which the
 panel shows 2 to 129, and page addressing only.
 """
@@ -12,9 +12,9 @@ WIDTH, HEIGHT = 128, 64
 PAGES = HEIGHT // 8
 # By kind: columns of RAM, first visible one, low half of the status (as found on chips: no data sheet gives it)
 _KINDS = {"ssd1306": (128, 0, 0x03), "sh1106": (132, 2, 0x08)}
-# The other one's supply commands, which it ignores, but for those that are others of its own
+# The other controller's supply commands, which it ignores, except those that it uses for something else
 _IGNORED = {"ssd1306": (0xAD, 0x8B), "sh1106": (0x8D, 0x20, 0x2E)}
-# Commands with arguments, and how many
+# Commands with arguments, and their number
 _ARGUMENTS = {0x81: 1, 0xA8: 1, 0xD3: 1, 0xD5: 1, 0xD9: 1, 0xDA: 1, 0xDB: 1}
 _OWN_ARGUMENTS = {
     "ssd1306": {0x20: 1, 0x21: 2, 0x22: 2, 0x8D: 1, 0x26: 6, 0x27: 6, 0x29: 5, 0x2A: 5, 0xA3: 2},
@@ -27,8 +27,9 @@ _OFF = 0x40  # bit of the status
 class Oled:
     """One display. kind: "ssd1306" or "sh1106".
 
-    identity: low half of the status.  alternate: rows as on a panel of 64 rows, not in sequence as on one of 32.
-    on: switched on.  pumped: has the voltage that pixels glow with.  inverted, contrast, start_line: as set.
+    identity: low half of the status. alternate: rows alternate as on a panel of 64 rows; otherwise they are in sequence
+    as on one of 32.
+    on: switched on. pumped: has the voltage for the pixels. inverted, contrast, start_line: as set.
     changes: counts visible changes.  unknown: counts commands that the controller does not have.
     """
 
@@ -43,11 +44,11 @@ class Oled:
         self._arguments.update(_OWN_ARGUMENTS[kind])
         self.changes = 0
         self._power = 0
-        self._read, self._lines = -1, []  # the text as of so many changes
+        self._read, self._lines = -1, []  # the text, and the number of changes when it was read
         self.power_on()
 
     def power_on(self):
-        """As its reset leaves it: off, and its RAM holds anything."""
+        """The state after its reset: off, with arbitrary content in RAM."""
         self._power += 1
         self.ram = bytearray([(37 * i + 91 * self._power) & 0xFF for i in range(self._columns * PAGES)])
         self.on = self.pumped = self.inverted = self._all_on = False
@@ -55,28 +56,28 @@ class Oled:
         self.start_line = self._offset = 0
         self._mux, self.alternate = 63, True
         self._flipped_columns = self._flipped_rows = False
-        self._mode = 2  # of addressing: page by page
+        self._mode = 2  # addressing mode: page by page
         self._page = self._column = 0
         self._window = [0, self._columns - 1, 0, PAGES - 1]
         self._control = True  # the next byte is a control byte
         self._one = self._data = False
-        self._command = []  # with its arguments, until these are complete
+        self._command = []  # the command with its arguments so far
         self.unknown = 0
         self.changes += 1
 
     def power_off(self):
-        """The supply is gone: nothing glows."""
+        """The power is off: nothing is lit."""
         self.on = False
         self.changes += 1
 
     @property
     def backlight(self):
-        """True while pixels can glow."""
+        """True while pixels can be lit."""
         return self.on and self.pumped
 
     def pixels(self):
-        """What the panel shows, row after row from the top: 8 pixels a byte, the leftmost in bit 7. Modules are mounted
-        with the cable's edge at the top, so that columns and rows are both reversed."""
+        """The visible pixels, row after row from the top: 8 pixels per byte, the leftmost in bit 7. Modules are mounted
+        with the cable's edge at the top, so columns and rows are both reversed."""
         seen = bytearray(WIDTH // 8 * HEIGHT)
         if not self.backlight:
             return seen
@@ -92,16 +93,16 @@ class Oled:
 
     @property
     def rows(self):
-        """The rows that are driven: 64 or fewer."""
+        """The number of driven rows: 64 or fewer."""
         return self._mux + 1
 
     def pages(self):
-        """The visible part of the RAM: of each page 128 bytes."""
+        """The visible part of the RAM: 128 bytes per page."""
         starts = [page * self._columns + self._first for page in range(PAGES)]
         return [self.ram[start : start + WIDTH] for start in starts]
 
     def text(self):
-        """The two lines that the picture stands for, see oled_text.py."""
+        """The two lines that a character display would show, see oled_text.py."""
         if self._read != self.changes:
             self._read = self.changes
             self._lines = oled_text.lines(self)
@@ -139,7 +140,7 @@ class Oled:
             self.ram[at] = value
             self.changes += 1
         first, last, top, bottom = self._window
-        if self._mode == 2:  # within the page; an SH1106 stays at its last column
+        if self._mode == 2:  # within the page; an SH1106 stops at its last column
             if self._column < self._columns - 1:
                 self._column += 1
             elif self.kind == "ssd1306":
@@ -189,7 +190,7 @@ class Oled:
 
     def _of_ssd1306(self, command):
         code = command[0]
-        if code == 0x8D:  # the charge pump takes effect with the next switching on
+        if code == 0x8D:  # the charge pump takes effect when it is next switched on
             self.pumped = bool(command[1] & 0x04)
         elif code == 0x20:
             self._mode = command[1] & 3

@@ -1,7 +1,7 @@
-"""Reads an OLED's pixels: the two lines that a character display would show in their place.
+"""Reads an OLED's pixels as the two lines that a character display would show.
 
-So whoever follows a device by its display need not know which one it has. Letters are known by their shapes, and
-pictures (firmware/kickstand/ui/glance.py) by their digits and words.
+So code that reads a device's display works with each kind of display. Letters are recognised by their shapes, pictures
+(firmware/kickstand/ui/glance.py) by their digits and words.
 """
 
 from .fakes.framebuf_font import FONT
@@ -12,14 +12,14 @@ _DIGIT_ROWS = 5  # pages of a large digit
 _DIGIT_COLUMNS = 24
 _SPREAD = [sum([3 << 2 * bit for bit in range(4) if nibble >> bit & 1]) for nibble in range(16)]
 _LETTERS = {bytes(FONT[8 * i : 8 * i + 8]): chr(32 + i) for i in range(95)}
-# What the driver draws for other codes of an HD44780's ROM
+# The driver's pictures for other codes of an HD44780's ROM
 _LETTERS[bytes((0, 15, 9, 9, 15, 0, 0, 0))] = "\u00b0"
 _LETTERS[bytes((0, 0, 127, 62, 28, 8, 0, 0))] = "\u2192"
 _LETTERS[b"\xff" * 8] = "\u2588"
 for _columns in range(1, 5):
     _LETTERS[b"\xff" * (2 * _columns) + bytes(8 - 2 * _columns)] = "\u258e\u258d\u258b\u258a"[_columns - 1]
     _LETTERS[bytes(8 - 2 * _columns) + b"\xff" * (2 * _columns)] = "\u2595\u2590\u2590\u2590"[_columns - 1]
-# Likewise of twice the height: upper and lower half of each column in turn
+# The same at twice the height: upper and lower half of each column in turn
 _TALL = {
     bytes([half for column in shape for half in (_SPREAD[column & 15], _SPREAD[column >> 4])]): letter
     for shape, letter in _LETTERS.items()
@@ -27,7 +27,7 @@ _TALL = {
 
 
 def lines(oled):
-    """Two strings of 16 characters. oled: an Oled. Dark: blank. What is none of the firmware's pages: "?"."""
+    """Two strings of 16 characters. oled: an Oled. Dark: blank. Not one of the firmware's pages: "?"."""
     if not oled.backlight:
         return [_BLANK, _BLANK]
     pages = oled.pages()
@@ -41,7 +41,7 @@ def lines(oled):
 
 
 def _padded(line, length):
-    # by hand: MicroPython's %-16s counts the bytes of a degree sign, which are two
+    # not with %-16s: MicroPython counts the two bytes of a degree sign
     return line + " " * (length - len(line))
 
 
@@ -76,7 +76,7 @@ def _digit(pages, page, x):
 
 
 def _number(pages, page, *columns):
-    """The number whose digits stand at these columns; those before the first may be missing."""
+    """The number whose digits are at these columns; leading digits may be missing."""
     digits = [_digit(pages, page, x) for x in columns]
     while len(digits) > 1 and digits[0] is None:
         digits.pop(0)

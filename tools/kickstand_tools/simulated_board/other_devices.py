@@ -1,13 +1,13 @@
-"""Models of devices that people find on the sensor's bus in place of it, or beside it."""
+"""Models of other devices on the sensor's bus, instead of the sensor or beside it."""
 
 
 class Registers:
-    """A device with registers whose pointer advances, which keeps no more of a write than it has to.
+    """A device with registers and an advancing pointer. It stores only writes to writable registers.
 
     contents: {register: value}, others read 0.  writable: the registers that keep what is written.
     """
 
-    SIZE = 128  # registers, after which the pointer begins again
+    SIZE = 128  # number of registers, after which the pointer restarts
 
     def __init__(self, address, contents=(), writable=()):
         self.address = address
@@ -24,7 +24,7 @@ class Registers:
         return True
 
     def write_byte(self, value):
-        """The register's number, then what to write. True: ACK."""
+        """Receive the register's number, then data. True: ACK."""
         if self._first:
             self._pointer, self._first = value % self.SIZE, False
             return True
@@ -35,7 +35,7 @@ class Registers:
         return True
 
     def read_byte(self):
-        """The content of the register that the pointer is at."""
+        """The content of the register at the pointer."""
         value = self.registers[self._pointer]
         self._pointer = (self._pointer + 1) % self.SIZE
         return value

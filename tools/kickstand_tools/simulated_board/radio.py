@@ -1,13 +1,13 @@
 """The board's Bluetooth LE radio, and one phone that may be connected to it. Plain Python, on the board's clock.
 
-A phone is anything with heard(handle, data) and dropped(). It comes and goes by connect() and disconnect(), and uses
-write(), read() and give_pin().
+A phone is any object with heard(handle, data) and dropped(). It uses connect() and disconnect(), write(), read() and
+give_pin().
 """
 
 from .clock import to_us
 
-EVENT_S = 0.03  # between two connection events, in which what waits is sent
-ROOM = 12  # notifications that NimBLE keeps on an ESP32; btstack on a Pico W keeps as many as come
+EVENT_S = 0.03  # time between two connection events, at which waiting notifications are sent
+ROOM = 12  # notifications that NimBLE keeps on an ESP32; btstack on a Pico W has no limit
 
 CONNECTED, DISCONNECTED, WRITTEN, GET_SECRET, SET_SECRET, PASSKEY = 1, 2, 3, 29, 30, 31
 READ, WRITE, NOTIFY = 0x02, 0x08, 0x10
@@ -17,10 +17,9 @@ _BOND = 2  # the kind of secret
 
 
 class Radio:
-    """pairs: its MicroPython can ask for a PIN, as on an ESP32; then it has little room for notifications too.
-
-    found, named: what it advertises while it does, else None. services: [(uuid, [(uuid, flags, handle), ...]), ...].
-    values: {handle: bytes}. phone: that which is connected, or None. away: the phone is out of reach, for now.
+    """pairs: its MicroPython can ask for a PIN, as on an ESP32; then it also has little room for notifications. found,
+    named: what it advertises, or None. services: [(uuid, [(uuid, flags, handle), ...]), ...]. values: {handle: bytes}.
+    phone: the connected one, or None. away: the phone is temporarily out of reach.
     fails: active(True) raises OSError."""
 
     def __init__(self, clock, pairs=False, address=b"\x28\xcd\xc1\x0a\x1a\x2b"):
@@ -32,7 +31,7 @@ class Radio:
         self.off()
 
     def off(self):
-        """As after power-on."""
+        """Set the state after power-on."""
         self.irq = None
         self.active = False
         self.config = {}
@@ -42,10 +41,10 @@ class Radio:
         self._passkey = None
         self.paired = self.away = False
 
-    # What the fake `bluetooth` does
+    # Called by the fake `bluetooth`
 
     def register(self, services):
-        """Give each characteristic its handle; return them by service."""
+        """Give each characteristic a handle; return the handles by service."""
         handle = 8
         self.services = []
         for uuid, characteristics in services:
@@ -65,7 +64,7 @@ class Radio:
         return True
 
     def take_passkey(self, passkey):
-        """What gap_passkey() gives."""
+        """Receive the PIN of gap_passkey()."""
         self._passkey = passkey
 
     def drop(self):
@@ -95,10 +94,11 @@ class Radio:
     def _tell(self, event, *data):
         return self.irq(event, data) if self.irq else None
 
-    # What a phone does
+    # Called by a phone
 
     def connect(self, phone, address=b"\x01\x02\x03\x04\x05\x06"):
-        """False: it does not advertise. A phone that has paired before is known by its address."""
+        """Connect a phone. False: the board does not advertise. A phone that has already paired is recognised by its
+        address."""
         if self.found is None or self.phone is not None:
             return False
         self.found = self.named = None
@@ -111,14 +111,14 @@ class Radio:
         return True
 
     def disconnect(self):
-        """The phone goes, or is gone."""
+        """Disconnect the phone, or note that it is gone."""
         self.phone = None
         self._waiting = []
         self.paired = self.away = False
         self._tell(DISCONNECTED, 0, 0, self.peer)
 
     def give_pin(self, pin):
-        """Pair with what the rider typed into the phone. True: it was right."""
+        """Pair with the PIN that the rider typed into the phone. True: it was right."""
         if not self.config.get("mitm"):
             return False
         self._tell(PASSKEY, 0, _DISPLAY, 0)
@@ -127,20 +127,20 @@ class Radio:
         return self.paired
 
     def pair(self):
-        """The right PIN was given."""
+        """Pair: the PIN was right."""
         self.paired = True
         self._tell(SET_SECRET, _BOND, self.peer, b"\x00key")
 
     def write(self, handle, data):
-        """False: only a phone that has paired may, or nobody may."""
+        """Write a value. False: not allowed, or only for a paired phone."""
         flags = self.flags[handle]
         if not flags & WRITE or (flags & WRITE_PAIRED and not self.paired):
             return False
-        self.values[handle] = bytes(data[:20])  # as long a value as MicroPython keeps
+        self.values[handle] = bytes(data[:20])  # MicroPython keeps values of this length
         self._tell(WRITTEN, 0, handle)
         return True
 
     def read(self, handle):
-        """The value, or None: only a phone that has paired may, or nobody may."""
+        """The value, or None: not allowed, or only for a paired phone."""
         flags = self.flags[handle]
         return self.values[handle] if flags & READ and (self.paired or not flags & READ_PAIRED) else None

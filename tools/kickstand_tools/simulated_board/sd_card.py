@@ -13,10 +13,10 @@ class SdCard:
 
     driver: False if the board lacks the driver.
 
-    Faults, to be set at any time: rejects: number of the next writes that it rejects.  busy_next_s: time for which it
-    is busy after the next sector alone.  stuck: once busy, it stays so.  removed: nothing answers.
+    Faults that can be set at any time: rejects: number of the next writes to reject. busy_next_s: time for which it is
+    busy after the next sector only. stuck: once busy, it stays busy. removed: nothing answers.
 
-    data: the written sectors, by number, without those of zeros.  most_hz: the highest clock rate so far.
+    data: the written sectors by number, except sectors of zeros. most_hz: the highest clock rate so far.
     """
 
     def __init__(self, clock, sectors=1 << 20, cs=17, init_s=0.1, read_s=0.0005, busy_s=0.002, driver=True):
@@ -33,13 +33,13 @@ class SdCard:
         self._clock = clock
         self._init_s = init_s
         self._read_s = read_s
-        self._ready_us = None  # the time at which it gets ready, once CMD0 was sent
+        self._ready_us = None  # the time at which it becomes ready, after CMD0
         self._busy_us = 0  # the time until which it is busy
         self._command = b""
         self._answer = b""
         self._at = 0
-        self._writing = 0  # the token that a sector to be written begins with, 0: none is expected
-        self._taking = 0  # bytes of a sector that are still to come, with the check sum
+        self._writing = 0  # the first token of a sector to be written, 0: none is expected
+        self._taking = 0  # missing bytes of a sector, with the check sum
         self._sector = 0
         self._selected = False
 
@@ -51,7 +51,7 @@ class SdCard:
             self._answer = b""
 
     def exchange(self, data):
-        """The bytes that the card sends while these are sent to it."""
+        """Exchange bytes: returns those that the card sends while it receives `data`."""
         if not self._selected or self.removed:
             return b"\xff" * len(data)
         if self._taking == SECTOR + 2 and len(data) == SECTOR:
@@ -137,7 +137,7 @@ class SdCard:
         else:
             self.data[sector] = content
 
-    # As a computer's card reader sees it: a block device for os.VfsFat
+    # For a computer's card reader: a block device for os.VfsFat
 
     def readblocks(self, number, buf):
         """Read into buf."""

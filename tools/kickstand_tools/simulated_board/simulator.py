@@ -5,7 +5,7 @@
         board.run(main, until_s=10)    # "off", "reset" or "returned"
         board.lcd.text()
 
-Within the `with` statement `machine` is the board's, and `time` and `os` too. Import the firmware there.
+Within the `with` statement `machine`, `time` and `os` are the board's. Import the firmware there.
 """
 
 from .clock import Clock, PowerOff, Reset, Watchdog, to_us
@@ -28,18 +28,18 @@ WIRING = {"rp2": ((4, 5), (6, 7), 15, 9, 14), "esp32": ((21, 22), (18, 19), 4, 1
 
 
 class Board:
-    """A board with its supply off; run() switches it on.
+    """A board, initially switched off; run() switches it on.
 
     world(t_s): (fx, fy, fz, wx, wy, wz[, temp_c]) in g and deg/s along the chip's own axes, with the chip's errors.
-    who_am_i: which chip is fitted.  display: "lcd", "ssd1306" or "sh1106".  sensor_address, lcd_address: None if it is
-    not fitted; 0 for the display's usual one.
-    one_bus: the display is on the sensor's wires.  port: "rp2" or "esp32".  clock: None for one of its own, which goes
-    as fast as the host can.
-    machine: a name in chips.MACHINES, which gives the port. Firmware that is imported first after install() takes it
-    for the board it runs on; without one the firmware runs on what it was imported for, a Pico as a rule.
-    i2c_driver: of MicroPython on an ESP32, "new" or (up to 1.28) "legacy".  sensor_pins, lcd_pins: (SDA, SCL), if not
-    those of WIRING.  touched: the pins that the firmware has used since the board was made.  volts: at the pins of an
-    ADC, by number.  sent: what was written to any UART.
+    who_am_i: the fitted chip. display: "lcd", "ssd1306" or "sh1106". sensor_address, lcd_address: None if not fitted; 0
+    for the display's usual address.
+    one_bus: the display is on the sensor's wires. port: "rp2" or "esp32". clock: None for a new one, which runs as fast
+    as the host can.
+    machine: a name in chips.MACHINES, which gives the port. Firmware that is first imported after install() runs on
+    this board. Without `machine` the firmware runs on the board that it was imported for, usually a Pico.
+    i2c_driver: of MicroPython on an ESP32, "new" or (up to 1.28) "legacy". sensor_pins, lcd_pins: (SDA, SCL), if not
+    those of WIRING. touched: the pins that the firmware has used so far. volts: at the pins of an ADC, by number. sent:
+    the bytes written to UARTs.
     Times in seconds are those of the board's clock, which continues through resets and power cycles.
     """
 
@@ -81,13 +81,13 @@ class Board:
         self.sensor_bus = Bus(self.clock, *(sensor_pins or usual_sensor))
         self.lcd_bus = self.sensor_bus if one_bus else Bus(self.clock, *(lcd_pins or usual_lcd))
         self.buses = [self.sensor_bus] if one_bus else [self.sensor_bus, self.lcd_bus]
-        self.too_fast = False  # True once a bus was clocked faster than a device on it allows
+        self.too_fast = False  # True after a bus was clocked faster than a device on it allows
         self.faults = Faults(self)
         self.boots = 0
         self.ticks_at_boot_us = 0  # first value of ticks_us(); one near 1 << 30 makes ticks wrap soon
         self.reset_cause = fake_machine.PWRON_RESET
         self._off = True
-        self._pins = {}  # number: [mode, pull, level driven, since when it is in use]
+        self._pins = {}  # number: [mode, pull, driven level, time of first use]
         self._fakes = Installer()
         if sensor_address is not None:
             self.fit_sensor()
@@ -95,7 +95,7 @@ class Board:
             self.fit_lcd()
 
     def install(self):
-        """Make `machine`, `time` and `os` this board's for all code that is imported."""
+        """Replace `machine`, `time` and `os` by this board's for all imported code."""
         self._fakes.install(self)
 
     def uninstall(self):
@@ -111,7 +111,7 @@ class Board:
         self.uninstall()
 
     def run(self, function, until_s):
-        """Call function(). Returns "returned", "reset", or "off" if the supply was cut at until_s.
+        """Call function(). Returns "returned", "reset", or "off" if the power was cut at until_s.
 
         After "off" the next run() starts everything from power-on; after "reset" only the microcontroller.
         """
@@ -142,13 +142,13 @@ class Board:
                     part.connect(None)
 
     def power_on(self):
-        """The supply of everything but the processor comes up."""
+        """Switch on everything except the processor."""
         self._off = False
         self.sensor.power_on()
         self.lcd.power_on()
 
     def power_off(self):
-        """The supply of everything but the processor goes down."""
+        """Switch off everything except the processor."""
         self._off = True
         if self.radio:
             self.radio.off()
@@ -165,7 +165,7 @@ class Board:
         self.clock.every(to_us(period_s), function)
 
     def press(self, at_s=None, for_s=0.15):
-        """Press the button at at_s for for_s. None: now, or once the last such press is over."""
+        """Press the button at at_s for for_s. None: now, or at the end of the last such press."""
         self.button.press(None if at_s is None else to_us(at_s), to_us(for_s))
 
     # Parts that are connected and disconnected
@@ -190,7 +190,7 @@ class Board:
         return Oled(self.clock, address or 0x3C, kind)
 
     def change_display(self, kind):
-        """Connect another one in its place: "lcd", "ssd1306" or "sh1106"."""
+        """Replace it by another one: "lcd", "ssd1306" or "sh1106"."""
         self.remove_lcd()
         self.lcd = self._display(kind)
         self.fit_lcd()
@@ -215,20 +215,21 @@ class Board:
     # Called by the fake `machine`
 
     def connect_uart(self, pin, baud, receive):
-        """Call receive(bytes) with what arrives on this pin: noise, if the GPS receiver sends at another rate."""
+        """Call receive(bytes) with the bytes that arrive on this pin: noise, if the GPS receiver sends at another
+        rate."""
         if self.gps and pin == self._gps_pin:
             same = baud == self.gps.baud
             self.gps.connect(receive if same else lambda data: receive(bytes([b & 0xE6 for b in data])))
 
     def watch_pin(self, number, edge):
-        """Call edge(level) when the part that is wired to this pin changes its level. None: no more calls."""
+        """Call edge(level) when the part wired to this pin changes its level. None: no more calls."""
         if number == self.button_pin:
             self.button.connect(edge)
         if self.wheel and number == self.wheel_pin:
             self.wheel.connect(edge)
 
     def bus_on(self, sda, scl, hz):
-        """The bus on these pins, which a controller clocks at hz from now on. Without devices if none is wired."""
+        """The bus on these pins, clocked at hz from now on. It has no devices if none is wired."""
         self.touched.update((sda, scl))
         for bus in self.buses:
             if (bus.sda, bus.scl) == (sda, scl):
@@ -265,7 +266,7 @@ class Board:
         if number == self.wheel_pin and self.wheel and self.wheel.closed:
             return 0
         if mode == fake_machine.Pin.IN:
-            return 1 if pull == fake_machine.Pin.PULL_UP else 0  # a floating pin is taken to read low
+            return 1 if pull == fake_machine.Pin.PULL_UP else 0  # a floating pin reads low here
         return level
 
     def _drive_wire(self, number, level):

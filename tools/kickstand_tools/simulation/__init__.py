@@ -1,23 +1,24 @@
-"""Motorcycle rides whose lean is known at every instant, as an MPU6050 stuck on the bike would log them.
+"""Simulates motorcycle rides with a known lean at every instant, as an MPU6050 on the bike would log them.
 
     from kickstand_tools.simulation.files import simulate
     simulate("hills", seed=3, out_dir="ride")
     # ride/POSE_1.csv to POSE_7.csv (the last one slanted), SIX.csv, KICKSTAND.csv, UPRIGHT.csv, RIDE.csv, TRUTH.csv
 
-The way of a sample: profiles (what the rider does) -> commands (as signals) -> physics/bike (how the bike leans and
-turns) -> physics/kinematics with road and engine (what a perfect sensor on it measures) -> physics/chip (what the
-MPU6050 reads). No mathematics of the firmware is used, so that these rides can judge it.
+The path of a sample: profiles (actions of the rider) -> commands (as signals) -> physics/bike (lean and turns of the
+bike) -> physics/kinematics with road and engine (measurements of a perfect sensor) -> physics/chip (readings of the
+MPU6050). It uses no mathematics of the firmware, because these rides test the firmware.
 
-Which simulated ride for what:
-* ride.py, of the physics above: whether a lean or an alignment is right, and how exact. `kickstand simulate` and
-  `evaluate` and the tests of filters, smoother, calibrations and checks take it. Numpy only.
-* scripted/, a bike in exact balance: what a board, its display and its files do in a given second. The demo, the bench
-  and the tests of whole devices take it, because it runs on MicroPython too. It has neither suspension nor wind nor a
-  rider, so it says little of how exact a lean is. demo/hand_bike.py is the same, ridden by hand.
-* fleet/, short drives of many cars, buses and motorcycles with troubles: which of them a fleet's run finds.
+Choose a simulated ride:
+* ride.py, with the physics above, shows whether a lean or an alignment is right, and how exact it is. `kickstand
+simulate`, `evaluate` and the tests of filters, smoother, calibrations and checks use it. It needs only numpy.
+* scripted/, a bike in exact balance, shows what a board, its display and its files do in a given second. The demo, the
+bench and the tests of whole devices use it, because it also runs on MicroPython. It has neither suspension nor wind nor
+a rider, so it shows little about the accuracy of a lean. demo/hand_bike.py is the same, ridden by hand.
+* kickstand_fleet/simulation, short drives of many cars, buses and motorcycles with troubles, shows which of these a
+fleet's run finds.
 
-And on which board: simulated_board runs the firmware's Python on this computer, and shows what it says and does; its
-times are those of models, its memory is this computer's. Where time, memory, machine code, flash or a loss of power
-matters, emulator's Pico is the reference: MicroPython's own image on emulated instructions. Its ESP32 is for what is
-particular to ESP32s; its times are estimates.
+Choose a board: simulated_board runs the firmware's Python on this computer and shows what it displays and does. Its
+times are those of models, its memory is this computer's. If time, memory, machine code, flash or a power loss matters,
+the Pico of kickstand_emulator is the reference: MicroPython's own image on emulated instructions. Use its ESP32 for
+features of ESP32s only; its times are estimates.
 """

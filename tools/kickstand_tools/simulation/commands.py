@@ -1,4 +1,4 @@
-"""Converts what a rider does, given as legs, to signals over time."""
+"""Converts a rider's actions, given as legs, to signals over time."""
 
 from dataclasses import dataclass
 
@@ -6,17 +6,17 @@ import numpy as np
 
 from .physics.signals import Signal, integral, smoothed, smoothstep
 
-_SPEED_SMOOTHING_S = 0.15  # how quickly a hand changes throttle or brake
+_SPEED_SMOOTHING_S = 0.15  # time in which a hand changes throttle or brake
 
 
 @dataclass
 class Leg:
-    """A part of a ride. None: the value of the leg before.
+    """A part of a ride. None: the value of the previous leg.
 
     speed_mps: reached at the end, at constant acceleration. lean_deg: lean of the centre of mass, > 0 to the right,
     reached within roll_s of the start, then held. slope_percent: slope of the road at the end of the leg. hang_m:
     offset of the centre of mass to the right of the bike's plane. lift_deg: pitch of a wheelie. engine: 0 off, 1
-    running. crosswind_mps2: acceleration to the right by the wind. bank_deg: tilt of the road to the right.
+    running. crosswind_mps2: acceleration to the right caused by wind. bank_deg: tilt of the road to the right.
     """
 
     phase: str
@@ -33,7 +33,7 @@ class Leg:
 
 
 @dataclass
-class Commands:
+class RiderCommands:
     """Signals of n samples each, in s, m, m/s, rad. phase: index into `phases` of each sample."""
 
     rate_hz: float
@@ -51,8 +51,8 @@ class Commands:
     phases: list[str]
 
 
-def commands(legs: list[Leg], rate_hz: float) -> Commands:
-    """The signals of these legs one after the other from t = 0. The first leg starts with its own values reached."""
+def commands(legs: list[Leg], rate_hz: float) -> RiderCommands:
+    """The signals of successive legs from t = 0. The ride starts with the values of the first leg."""
     ends = np.cumsum([leg.seconds for leg in legs])
     starts = ends - [leg.seconds for leg in legs]
     time = np.arange(int(ends[-1] * rate_hz)) / rate_hz
@@ -75,7 +75,7 @@ def commands(legs: list[Leg], rate_hz: float) -> Commands:
 
     phases = list(dict.fromkeys(leg.phase for leg in legs))
     which = np.searchsorted(ends, time, side="right").clip(0, len(legs) - 1)
-    return Commands(
+    return RiderCommands(
         rate_hz,
         time,
         speed,
@@ -93,7 +93,7 @@ def commands(legs: list[Leg], rate_hz: float) -> Commands:
 
 
 def _kept(legs: list[Leg], name: str) -> list[float]:
-    """One value per leg: None is replaced by that of the leg before, in the first leg by 0."""
+    """One value per leg: None is replaced by the previous leg's value, in the first leg by 0."""
     kept, now = [], 0.0
     for leg in legs:
         value = getattr(leg, name)
@@ -103,8 +103,8 @@ def _kept(legs: list[Leg], name: str) -> list[float]:
 
 
 def _slope(distance: Signal, ends: Signal, percent: list[float]) -> Signal:
-    """The road's slope, rad, smooth from the end of each leg to that of the next. A function of distance, so that it is
-    constant at a stop."""
+    """The road's slope, rad, smooth between the ends of legs. It is a function of distance, so it is constant at a
+    stop."""
     knots, values = [0.0], [percent[0]]
     for end, value in zip(ends, percent):
         if end > knots[-1] + 1.0:

@@ -1,4 +1,4 @@
-"""The six positions in one go: a sensor that a hand puts on its sides, one after the other, and turns in between."""
+"""Simulates the six positions in one recording: a hand puts a sensor on its sides and turns it in between."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -12,9 +12,9 @@ from .physics.signals import band_noise, smoothstep
 
 @dataclass(frozen=True)
 class Hand:
-    """How a hand turns a sensor. still_s, turn_s: least and most time that it holds still, and turns by 90 degrees; a
-    half turn takes 1.6 times as long. heading_deg: largest turn about the vertical on the way. detour_deg: how far the
-    way strays from the shortest. push_g: rms acceleration meanwhile."""
+    """How a hand turns a sensor. still_s, turn_s: (least, most) time for holding still and for a turn by 90 degrees; a
+    half turn takes 1.6 times as long. heading_deg: largest turn about the vertical during a turn. detour_deg: deviation
+    from the shortest way. push_g: rms acceleration during a turn."""
 
     still_s: tuple[float, float] = (4.5, 6.0)
     turn_s: tuple[float, float] = (0.9, 2.0)
@@ -26,7 +26,7 @@ class Hand:
 def procedure(
     chance: np.random.Generator, chip: Chip, ups: NDArray[np.float64], temp_c: float, hand: Hand | None = None
 ) -> NDArray[np.float64]:
-    """Readings (n, 7), as those of Chip.read(), of still poses and the turns between them.
+    """Readings (n, 7) of still poses and the turns between them, in the form of Chip.read().
 
     ups: (poses, 3), the unit vector upward in the sensor's axes in each pose.
     """
@@ -47,7 +47,7 @@ def procedure(
         turned = np.linalg.norm(way)
         n = max(2, int(chance.uniform(*hand.turn_s) * (0.25 + 0.75 * turned / (np.pi / 2)) ** 0.7 * RATE_HZ))
         u = np.arange(n + 1) / n
-        # as hands do: slowly at both ends
+        # slowly at both ends, like a hand
         detour = np.radians(hand.detour_deg) * chance.standard_normal(3) / np.sqrt(3.0)
         share = u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
         stray = np.sin(np.pi * smoothstep(u)) ** 2

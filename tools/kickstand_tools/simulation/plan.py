@@ -1,4 +1,4 @@
-"""Builds a ride of what riders do: set off, ride straight on, turn, stop."""
+"""Builds a ride from a rider's actions: set off, ride straight ahead, turn, stop."""
 
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -10,7 +10,7 @@ from kickstand.units import STANDARD_GRAVITY
 from .commands import Leg
 from .physics.road import CLASS_B
 
-_SHORTEST_S = 3.0  # least duration of a leg that is shortened
+_SHORTEST_S = 3.0  # least duration of a shortened leg
 _CLOSING_S = 45.0  # time for the straight and the stop at the end of every ride
 
 
@@ -18,8 +18,8 @@ _CLOSING_S = 45.0  # time for the straight and the stop at the end of every ride
 class Conditions:
     """Road, engine, weather and sensor of a ride. The defaults are those of an ordinary day.
 
-    slip_deg: rms of the angle between where the bike points and where it goes. bumps: (phase, spacing m, height m,
-    length m): bumps in the road wherever the ride is in that phase.
+    slip_deg: rms of the angle between the bike's heading and its motion. bumps: (phase, spacing m, height m, length m):
+    bumps in the road while the ride is in this phase.
     """
 
     roughness: float = CLASS_B  # see road.CLASS_A, m3
@@ -30,14 +30,14 @@ class Conditions:
     sway_m: float = 0.0  # rms of the centre of mass moving from side to side
     slip_deg: float = 0.0  # rms of the tyres' side slip
     start_c: float = 22.0  # temperature of the chip at power-on
-    rise_c: float = 7.0  # how far it warms up, most of it within 10 to 15 minutes
+    rise_c: float = 7.0  # its rise while warming up, most of it within 10 to 15 minutes
     drift: float = 1.0  # factor on an ordinary sensor's change of the biases with temperature
     creep_deg: float = 0.0  # angle by which the sensor's mount has rotated by the end
     bumps: list[tuple[str, float, float, float]] = field(default_factory=list)
 
 
 class Plan:
-    """Collects the legs of a ride. chance: source of the random figures in which rides differ."""
+    """Collects the legs of a ride. chance: source of the random numbers in which rides differ."""
 
     def __init__(self, chance: np.random.Generator, seconds: float) -> None:
         self.chance = chance
@@ -46,11 +46,11 @@ class Plan:
         self._seconds = 0.0
         self._until = max(seconds - _CLOSING_S, 20.0)
         self.slope_percent = 3.0  # limit of random_slope()
-        self.roll_dps = 60.0  # mean roll rate of the quickest change of lean; its peak is nearly twice as high
+        self.roll_dps = 60.0  # mean roll rate of the fastest change of lean; its peak is nearly twice as high
 
     @property
     def going_on(self) -> bool:
-        """True while the ride needs more legs before its end (see finish())."""
+        """True while the ride needs more legs before finish()."""
         return self._seconds < self._until
 
     @property
@@ -59,8 +59,8 @@ class Plan:
         return self._seconds
 
     def fit(self, seconds: float) -> None:
-        """Make the ride so long, by the longest of the legs at one speed; each of them keeps _SHORTEST_S, which may
-        leave a ride that is longer."""
+        """Adjust the ride to this length by changing its longest legs at constant speed. Each keeps at least
+        _SHORTEST_S, so the ride may stay longer."""
         steady = [leg for before, leg in pairwise(self.legs) if leg.speed_mps in (None, before.speed_mps)]
         while steady and (over := sum(leg.seconds for leg in self.legs) - seconds):
             longest = max(steady, key=lambda leg: leg.seconds)
@@ -133,7 +133,7 @@ class Plan:
         self.add("out of turn", seconds, speed_mps, lean_deg=0.0, roll_s=roll_s)
 
     def into_turn(self, lean_deg: float, speed_mps: float, mps2: float) -> None:
-        """Brake; in the last third lean in already."""
+        """Brake, and lean in during the last third."""
         seconds = max(1.2, abs(speed_mps - self.speed) / mps2)
         between = speed_mps + 0.35 * (self.speed - speed_mps)
         self.add("braking", 0.65 * seconds, between, lean_deg=0.0, roll_s=0.8)
@@ -152,7 +152,7 @@ class Plan:
         self.add("walking pace", seconds, speed_mps, lean_deg=0.0, roll_s=1.0)
 
     def finish(self, speed_mps: float, mps2: float) -> None:
-        """Ride straight on to the end of the ride, and stop."""
+        """Ride straight ahead to the end of the ride, and stop."""
         self.to_speed(speed_mps, mps2)
         self.straight(_CLOSING_S - 15.0)
         self.to_speed(0.0, mps2)

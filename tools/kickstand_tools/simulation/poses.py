@@ -1,4 +1,4 @@
-"""The poses that a calibration needs, as a rider captures them: six sides, a slanted one, kickstand, upright."""
+"""Simulates the poses for a calibration as a rider captures them: six sides, a slanted one, kickstand, upright."""
 
 from collections.abc import Iterator
 
@@ -9,8 +9,8 @@ from .physics.chip import RATE_HZ, Chip
 from .physics.signals import band_noise
 
 POSE_S = 4.0
-_ASKEW_DEG = 4.0  # largest error of a box that is put on its side by hand
-_MOVE_DEG = 0.05  # rms lean of a bike that is held upright by hand
+_ASKEW_DEG = 4.0  # largest tilt of a box put on its side by hand
+_MOVE_DEG = 0.05  # rms lean of a bike held upright by hand
 
 
 def still(chance: np.random.Generator, chip: Chip, up: NDArray, temp_c: float) -> NDArray[np.float64]:

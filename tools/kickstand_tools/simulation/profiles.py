@@ -1,4 +1,4 @@
-"""The profiles (kinds of ride): main ones, and hard ones in each of which one condition is extreme.
+"""The profiles (kinds of ride): normal ones, and hard ones with one extreme condition each.
 
 A profile adds its legs to a plan and returns the conditions of the ride.
 """
@@ -227,9 +227,9 @@ def weight(plan: Plan) -> Conditions:
 
 
 def held(plan: Plan) -> Conditions:
-    """Turns of 60 s at 38 degrees to either side, directly one after the other, by a rider who moves about.
+    """Turns of 60 s at 38 degrees to alternate sides without a break, by a rider who moves around.
 
-    No straight shows what is upright, and for a minute nothing but the sensor's errors can change the lean.
+    No straight shows the upright direction, and for a minute the lean depends on the sensor's errors alone.
     """
     plan.begin()
     plan.slope_percent = 1.5
@@ -245,7 +245,7 @@ def held(plan: Plan) -> Conditions:
 
 
 def corners(plan: Plan) -> Conditions:
-    """Corners of 30 to 55 degrees and 3 to 7 s, with few and short straights, by a rider who moves about."""
+    """Corners of 30 to 55 degrees and 3 to 7 s, with few, short straights, by a rider who moves around."""
     plan.begin()
     plan.slope_percent, plan.roll_dps = 3.0, 80.0
     plan.to_speed(28.0, 4.0)
@@ -275,14 +275,14 @@ def creep(plan: Plan) -> Conditions:
 
 
 def temperature(plan: Plan) -> Conditions:
-    """From a cold garage into the sun: 25 C warmer, with a sensor that drifts three times as far as an ordinary one."""
+    """From a cold garage into the sun: 25 C warmer, with three times an ordinary sensor's drift."""
     conditions = street(plan)
     conditions.start_c, conditions.rise_c, conditions.drift = 8.0, 25.0, 3.0
     return conditions
 
 
 def fall(plan: Plan) -> Conditions:
-    """Some riding in town, then a fall at walking pace to either side: 80 degrees of lean, and it stays there."""
+    """Some riding in town, then a fall at walking pace to either side: the bike stays at 80 degrees of lean."""
     plan.begin()
     while plan.going_on:
         plan.to_speed(plan.uniform(8.0, 13.0), 2.5)

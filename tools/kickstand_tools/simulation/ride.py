@@ -8,7 +8,7 @@ from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
 from . import hands, poses
-from .commands import Commands, commands
+from .commands import RiderCommands, commands
 from .physics.bike import Bike, roll, weave
 from .physics.chip import DIVIDER, RATE_HZ, Chip
 from .physics.engine import vibration
@@ -25,13 +25,13 @@ _IMPACT_G = 4.0  # peak of the impact at the end of a fall
 
 
 @dataclass
-class Ride:
+class SimulatedRide:
     """A simulated ride: the sensor's readings and the truth.
 
     poses, kickstand, upright, readings: each (n, 7) at rate_hz, in the chip's order: force (g), temperature (C), rate
-    (deg/s). poses: six sides in random order and a slanted one. time (s), truth (by name) and phase: (n,), an entry for
-    each row of readings. vehicle_from_sensor: (3, 3), rows left, up, forward. stand_deg: lean of the pose kickstand; on
-    the stand where the ride begins it is another.
+    (deg/s). poses: six sides in random order and a slanted one. time (s), truth (by name) and phase: (n,), one entry
+    per row of readings. vehicle_from_sensor: (3, 3), rows left, up, forward. stand_deg: lean in the pose kickstand; on
+    the stand at the start of the ride it differs.
     """
 
     rate_hz: float
@@ -51,7 +51,7 @@ class Ride:
 
     @cached_property
     def procedure(self) -> NDArray[np.float64]:
-        """(n, 7) at rate_hz: seven other poses, as for `poses`, taken in one go, with the turns between them."""
+        """(n, 7) at rate_hz: seven other poses in one recording, with the turns between them."""
         chance = np.random.default_rng(self.seed)
         return hands.procedure(chance, self.chip, np.array(list(poses.ups(chance))), self.home_c)
 
@@ -67,15 +67,15 @@ def ride(
     mount: str | None = None,
     dive: tuple[float, float] | None = None,
     exact: bool = False,
-) -> Ride:
+) -> SimulatedRide:
     """Simulate a ride of about this length; a profile and a seed always give the same one.
 
-    upright_error_deg: lean of the bike to the right in the upright pose. pitch_change_deg: pitch on the kickstand less
-    that in the upright pose; random within 1 degree if None. share: factor on the sensor's tolerances.
-    road: a class of ISO 8608 in place of the profile's own road; it is cambered, the rider moves about and the bike
-    slips a little. mount: one of MOUNTS in place of a firm one. dive: by how much the springs
-    lower the nose in braking and raise it in acceleration, degrees per g; random, about 3 and 1.4, if None. exact:
-    exactly this length, where it is enough for setting off and stopping.
+    upright_error_deg: lean of the bike to the right in the upright pose. pitch_change_deg: pitch on the kickstand minus
+    that in the upright pose; None: random within 1 degree. share: factor on the sensor's tolerances.
+    road: a class of ISO 8608 instead of the profile's own road. It is cambered, the rider moves around and the bike
+    slips a little. mount: one of MOUNTS instead of a firm one. dive: (lowering of the nose in braking, rise in
+    acceleration) by the springs, degrees per g; None: random, about 3 and 1.4. exact: exactly this length, if it is
+    enough for setting off and stopping.
 
     >>> made = ride("parked", seed=1, seconds=20.0)
     >>> made.rate_hz, len(made.poses), made.readings.shape == (len(made.time), 7)
@@ -90,7 +90,8 @@ def ride(
     mounting = random_rotation(chance)
     if dive is not None:
         bike = replace(bike, dive_deg_per_g=dive[0], squat_deg_per_g=dive[1])
-    # From a source of its own: without them a profile and a seed give the ride that they always gave
+    # A separate random source: without these options a profile and a seed still give the same ride as in earlier
+    # versions
     more = np.random.default_rng([seed, *profile.encode(), 1])
     if road is not None:
         _rough(more, plan, conditions, CLASSES[road])
@@ -101,7 +102,7 @@ def ride(
     command = commands(plan.legs, RATE_HZ)
     slip = _slip(more, command, conditions)
     motion, extra = _motion(chance, command, bike, conditions)
-    # An hour is 29 MB in each column at 1 kHz: arrays are freed early, so none may be a view of another.
+    # An hour at 1 kHz takes 29 MB per column. Arrays are freed early, so none may be a view of another.
     temp = conditions.start_c + conditions.rise_c * (1.0 - np.exp(-command.time / _WARMING_S))
     time, phase = command.time[::DIVIDER].copy(), np.array(command.phases)[command.phase[::DIVIDER]]
     del command
@@ -123,12 +124,12 @@ def ride(
     readings = chip.read(chance, force, rates, temp)
     del force, rates, temp
     home_c = chance.uniform(18.0, 25.0)
-    nose = chance.uniform(-0.5, 0.5)  # slope, degrees, of the ground where both poses were taken
+    nose = chance.uniform(-0.5, 0.5)  # slope of the ground at both poses, degrees
     change = chance.uniform(-1.0, 1.0) if pitch_change_deg is None else pitch_change_deg
     lean = -chance.uniform(8.0, 15.0)
     seven = poses.seven(chance, chip, home_c)
     start_c = conditions.start_c
-    return Ride(
+    return SimulatedRide(
         RATE_HZ / DIVIDER,
         seven,
         poses.standing(chance, chip, mounting, lean, nose + change, start_c, held=False),
@@ -165,11 +166,11 @@ def random_rotation(chance: np.random.Generator) -> NDArray[np.float64]:
 
 
 def _motion(
-    chance: np.random.Generator, command: Commands, bike: Bike, conditions: Conditions
+    chance: np.random.Generator, command: RiderCommands, bike: Bike, conditions: Conditions
 ) -> tuple[Motion, Shaking]:
     n, rate = len(command.time), command.rate_hz
     command.crosswind += conditions.gust_mps2 * band_noise(chance, n, 0.05, 0.5, rate)
-    # A rider who moves about leans a bike that rides, not one on its stand or on the rider's feet.
+    # A rider who moves around leans a moving bike, not one on its stand or on the rider's feet.
     command.hang += conditions.sway_m * band_noise(chance, n, 0.02, 0.3, rate) * smoothstep(command.speed / 5.0)
     rolled = roll(command, bike, weave(chance, command, conditions.unrest_deg))
     surface = profile_slope(chance, float(command.distance[-1]) + 10.0, conditions.roughness)
@@ -193,15 +194,15 @@ def _motion(
 
 
 def _rough(chance: np.random.Generator, plan: Plan, conditions: Conditions, roughness: float) -> None:
-    """A road as it is: cambered or tilted to either side from leg to leg, ridden by a rider who moves about."""
+    """Make the road realistic: cambered or tilted to either side from leg to leg, with a rider who moves around."""
     conditions.roughness, conditions.slip_deg = roughness, _SLIP_DEG
     conditions.sway_m = max(conditions.sway_m, _SWAY_M)
     for leg in plan.legs:
         leg.bank_deg = (leg.bank_deg or 0.0) + float(chance.normal(0.0, _CAMBER_DEG))
 
 
-def _slip(chance: np.random.Generator, command: Commands, conditions: Conditions) -> NDArray[np.float64]:
-    """(n) m/s^2 to the left: the tyres give way and grip again, so that the bike does not go quite where it points."""
+def _slip(chance: np.random.Generator, command: RiderCommands, conditions: Conditions) -> NDArray[np.float64]:
+    """(n) m/s^2 to the left: the tyres slip and grip again, so the bike does not move exactly where it points."""
     if not conditions.slip_deg:
         return np.zeros(len(command.time))
     angle = np.radians(conditions.slip_deg) * band_noise(chance, len(command.time), 0.05, 1.0, command.rate_hz)
@@ -209,19 +210,19 @@ def _slip(chance: np.random.Generator, command: Commands, conditions: Conditions
 
 
 def _sideways(lean: NDArray[np.float64], left: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 3) along left, up, forward of a bike that leans, by level accelerations to the left."""
+    """(n, 3) level accelerations to the left, along left, up, forward of a leaning bike."""
     return np.column_stack((left * np.cos(lean), -left * np.sin(lean), np.zeros_like(left)))
 
 
-def _places(command: Commands, phase: str, spacing_m: float) -> list[float]:
-    """The distances, multiples of spacing_m, at which the ride is in this phase."""
+def _places(command: RiderCommands, phase: str, spacing_m: float) -> list[float]:
+    """The multiples of spacing_m at which the ride is in this phase."""
     if phase not in command.phases:
         return []
     met = command.distance[command.phase == command.phases.index(phase)]
     return sorted({float(k) * spacing_m for k in np.floor(met / spacing_m)})
 
 
-def _impact(chance: np.random.Generator, command: Commands) -> NDArray[np.float64]:
+def _impact(chance: np.random.Generator, command: RiderCommands) -> NDArray[np.float64]:
     """The impact at the end of a fall: (n, 3), m/s^2."""
     force = np.zeros((len(command.time), 3))
     if "lying" in command.phases:

@@ -1,1 +1,1 @@
-"""A ride in the files of other programs: one module a format."""
+"""Writes a ride in the formats of other programs, one module per format."""

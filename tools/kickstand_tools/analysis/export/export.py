@@ -1,4 +1,4 @@
-"""A ride written in the format of another program."""
+"""Writes a ride in the format of another program."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -17,7 +17,7 @@ from ...logs.source import Progress
 from ...signals import Array
 from ..channels import Channels, downsampled, rounded_to
 from ..ride import Ride
-from ..track import Track, joined, track
+from ..track import LogTrack, joined, track
 from . import export_columns, export_gpx, export_racechrono, export_vbo
 
 STEP_S = {"csv": 0.0, "gpx": 0.0, "parquet": 0.0, "racechrono": 0.001, "vbo": 0.01}  # the finest time that two hold
@@ -30,7 +30,7 @@ _WRITE: dict[str, Callable[[Path, Iterator[Channels], float], None]] = {
 }
 _NEEDS = {"gpx": ("GPX", "gpxpy"), "parquet": ("Parquet", "pyarrow")}  # its name, and the library that writes it
 _DATED = ("gpx", "racechrono", "vbo")
-_CLOCK_S = 1e8  # March 1973: a log that starts later has Unix time in it
+_CLOCK_S = 1e8  # March 1973: a log that starts later uses Unix time
 
 
 def export(
@@ -38,12 +38,12 @@ def export(
 ) -> int:
     """Write a ride of open_ride() to a file, whole or not at all. Returns the number of rows. Raises InputError.
 
-    form: "csv" (gzipped if out ends in .gz), "gpx", "parquet", "racechrono" or "vbo". progress: called with how much of
-    the log is done of how much. notices: what is remarkable in the log is appended to it.
+    form: "csv" (gzipped if out ends in .gz), "gpx", "parquet", "racechrono" or "vbo". progress: called with (done,
+    total) of the log. notices: remarks about the log are appended.
 
-    gpx needs positions. gpx, racechrono and vbo want date and time, which come with positions. A board without a
-    satellite receiver has no clock, so its ride is taken to end when its file was written last: when it was recorded
-    live, or pulled.
+    gpx needs positions. gpx, racechrono and vbo need date and time, which come with positions. A board without a
+    satellite receiver has no clock. So its ride is assumed to end when its file was last written: recorded live, or
+    pulled.
 
     >>> import tempfile
     >>> import numpy as np
@@ -68,7 +68,7 @@ def export(
         written_s = Path(log).stat().st_mtime if isinstance(log, (Path, str)) else time.time()
         start_s = float(max(0, int(written_s - whole.seconds)))
     step_s = STEP_S[form]
-    if step_s:  # times that differ stay so when the start is added
+    if step_s:  # different times stay different when the start is added
         start_s = round(start_s / step_s) * step_s
     count = given = 0
 
@@ -84,7 +84,7 @@ def export(
             if form == "gpx":
                 block = block.part(np.isfinite(block.lat_deg) & np.isfinite(block.lon_deg))
             if form in ("gpx", "vbo") and len(whole.speeds):
-                # every row of a VBO file has a speed: without this, rows between two values would say 0
+                # every row of a VBO file has a speed: without this, rows between two values would have speed 0
                 block.speed_mps = np.interp(block.t_s, *whole.speeds.T)
             if form == "vbo":
                 block.lat_deg, block.lon_deg = whole.places.at(block.t_s)
@@ -103,14 +103,14 @@ def export(
 
 @dataclass
 class _Whole:
-    """A whole log. start_s: its own time at the first sample. seconds: its length. speeds (n, 2): s from there and m/s.
-    places: its positions. utc_s: Universal Time at the first sample, the median of what its rows say, because some
-    come later than others; None where none says it."""
+    """A whole log. start_s: its own time at the first sample. seconds: its length. speeds (n, 2): s since then and m/s.
+    places: its positions. utc_s: Universal Time at the first sample; None if unknown. It is the median over the rows,
+    because some values come late."""
 
     start_s: float
     seconds: float
     speeds: Array
-    places: Track
+    places: LogTrack
     utc_s: float | None
 
 

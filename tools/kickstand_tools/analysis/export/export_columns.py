@@ -1,6 +1,6 @@
-"""Kickstand's own columns: the log calibrated and in the vehicle's axes, and the lean that the display shows.
+"""Writes Kickstand's own columns: the log, calibrated and in the vehicle's axes, and the lean that the display shows.
 
-As CSV, and as Apache Parquet for data frames, each field with its unit in its metadata:
+As CSV, or as Apache Parquet for data frames, with each field's unit in its metadata:
 https://arrow.apache.org/docs/python/parquet.html; pandas.read_parquet and others open it.
 """
 
@@ -36,11 +36,11 @@ COLUMNS = {
 }
 
 
-_FINE = ("t_s", "lat_deg", "lon_deg", "utc_s")  # a float of 32 bits has positions to 1 m only
+_FINE = ("t_s", "lat_deg", "lon_deg", "utc_s")  # a 32-bit float has positions only to 1 m
 
 
 def write_csv(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """Gzipped if the name ends in .gz."""
+    """Write CSV, gzipped if the name ends in .gz."""
     opened = gzip.open if path.suffix == ".gz" else open
     digits = [digit for digit, _ in COLUMNS.values()]
     with opened(path, "wb") as file:
@@ -51,7 +51,7 @@ def write_csv(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
 
 
 def write_parquet(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """One row group a block; times and positions in 64-bit floats, the rest in 32-bit floats. NaN where there is no
+    """Write one row group per block. Times and positions are 64-bit floats, the rest 32-bit floats. NaN for no
     value."""
     import pyarrow
     from pyarrow.parquet import ParquetWriter

@@ -1,8 +1,8 @@
-"""GPX 1.1, which maps, route planners and the programs that put data on videos open: https://www.topografix.com/GPX/1/1/
+"""Writes GPX 1.1 for maps, route planners and programs that put data on videos: https://www.topografix.com/GPX/1/1/
 
-A track point for each position of the log. GPX 1.1 has no speed of its own: it stands in Garmin's TrackPointExtension,
-https://www8.garmin.com/xmlschemas/TrackPointExtensionv2.xsd. The lean, > 0 to the right, stands beside it in an element
-of Kickstand's, where the meter trusts it.
+A track point for each position of the log. GPX 1.1 has no element for the speed: it is in Garmin's TrackPointExtension,
+https://www8.garmin.com/xmlschemas/TrackPointExtensionv2.xsd. The lean, > 0 to the right, is beside it in an element of
+Kickstand's own, if the meter trusts it.
 """
 
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ KICKSTAND = "urn:kickstand"
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """start_s: Universal Time of the log's first sample, for positions that have no time of their own. A new segment
+    """Write the file. start_s: Universal Time of the log's first sample, for positions without a time. A new segment
     begins after a gap."""
     from gpxpy.gpx import GPX, GPXTrack, GPXTrackSegment
 

@@ -1,13 +1,13 @@
-"""Racelogic's VBO, which Circuit Tools opens and RaceChrono imports.
+"""Writes Racelogic's VBO, which Circuit Tools opens and RaceChrono imports.
 
-Sections, standard channels, and units for the others alone, as in
+Sections, standard channels, and units (only for other channels) are those of
 https://developers.racelogic.co.uk/Portal/Tutorials/tutorialVBOfilestructure.html; columns and their signs as in
 https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format and the VBOX HD Lite's user guide:
 time HHMMSS.SS, velocity in km/h, latitude and longitude in minutes, north and west positive, heading in degrees
 clockwise from north, long accel > 0 forward, lat accel > 0 to the left, others with mantissa and exponent. A log does
-not have the number of satellites: it is 4, the fewest that a position takes, where there is a position, else 0, as the
-position then is. Any other column that the log has no values for is left out, except velocity, which VBO requires: it
-is then 0, and a comment in the file says so.
+not have the number of satellites. It is written as 4, the least for a position, or as 0 without a position, which is
+then 0 too. Any other column without values is left out, except velocity, which VBO requires: it is then 0, and a
+comment in the file says so.
 """
 
 import time
@@ -44,8 +44,9 @@ _SAME_M = 1e-3  # between rows, a hundredth of a second apart
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """Lines end in CR and LF; the date and each row's time are UTC. blocks: positions in as many rows as can be."""
-    first = next(blocks)  # a channel that the log does not have is NaN in its first block already
+    """Write the file. Lines end in CR and LF; the date and each row's time are UTC. blocks: with positions in as many
+    rows as possible."""
+    first = next(blocks)  # a channel that the log does not have is NaN from its first block on
     other = [column for column in OTHER if not np.all(np.isnan(getattr(first, column[2])))]
     lean = "lean-angle in degrees, > 0 to the right; " if OTHER[0] in other else ""
     satellites = f"satellites {_SATELLITES} stands for a position, 0 for none"
@@ -96,11 +97,11 @@ class _Heading:
     """Computes headings from positions, block by block."""
 
     def __init__(self) -> None:
-        self._last = np.full((3, 1), np.nan)  # latitude, longitude and heading of the last row of the block before
+        self._last = np.full((3, 1), np.nan)  # latitude, longitude and heading of the last row of the previous block
 
     def of(self, lat_deg: Array, lon_deg: Array) -> Array:
-        """(n) heading, degrees clockwise from north, from the row before to each. Where both have the same position it
-        is that of the row before; in the first row with a position it is that of the second."""
+        """(n) heading, degrees clockwise from north, from the previous row to each row. If both have the same position
+        it is that of the previous row. The first row with a position has the heading of the second."""
         lat, lon = (np.concatenate((last, now)) for last, now in zip(self._last, (lat_deg, lon_deg)))
         east, north = distance_m(lat[:-1], lon[:-1], lat[1:], lon[1:])
         found = np.concatenate((self._last[2], np.degrees(np.arctan2(east, north)) % 360.0))

@@ -1,1 +1,1 @@
-"""A ride drawn: a picture by matplotlib, a page to zoom into by plotly."""
+"""Draws a ride: a picture with matplotlib, and a page to zoom into with plotly."""

@@ -1,6 +1,6 @@
-"""What is drawn of a ride, as data: charts with their traces, units, colours and ranges.
+"""The charts of a ride as data: traces, units, colours and ranges.
 
-picture.py draws them by matplotlib, interactive.py hands them to plotly: both show the same.
+picture.py draws them with matplotlib, interactive.py passes them to plotly: both show the same.
 """
 
 from dataclasses import dataclass, field
@@ -22,17 +22,17 @@ GUIDE_COLOUR = "#bbbbbb"
 DOUBT_COLOUR, DOUBT_WIDTH = "#d99a00", 4.0
 SMOOTH_S = 0.3
 GG_BIN_G = 0.025
-GAP_S = 1.0  # lines are interrupted where there is no value for longer
+GAP_S = 1.0  # lines are interrupted if there is no value for longer
 SPEED_GAP_S = 5.0  # the same for the line of the speed, which has few values
 _HIGH, _LOW, _SQUARE = 2.5, 1.5, 3.0  # heights of charts, inches of the picture
-_MARKED = 0.82  # of a chart's height: the lines of the maxima, which so end below the words in the corner
+_MARKED = 0.82  # share of a chart's height for the lines of the maxima, which must end below the words in the corner
 _UPRIGHT_DEG = 5.0  # the share of smaller leans may be cut off: it would hide the others
 
 
 @dataclass
 class Line:
-    """A line through n points, interrupted at NaNs that last longer than gap_s. name: none for an auxiliary line.
-    width: times the usual one."""
+    """A line through n points, interrupted at NaNs that last longer than gap_s. name: empty for an auxiliary line.
+    width: factor on the usual width."""
 
     x: Array
     y: Array
@@ -73,21 +73,21 @@ class Bars:
 
 
 @dataclass
-class Cells:
-    """A map of n x n cells between the edges (n + 1) of both axes: the darker the more. values (n, n): rows along y,
-    0 where there is nothing."""
+class CellMap:
+    """A map of n x n cells between the edges (n + 1) of both axes: darker for larger values. values (n, n): rows along
+    y, 0 for nothing."""
 
     edges: Array
     values: Array
     name: str
 
 
-Trace = Line | Sides | Dots | Bars | Cells
+Trace = Line | Sides | Dots | Bars | CellMap
 
 
 @dataclass
 class Note:
-    """Words at a point. side: where of it they stand, "above", "below", "left" or "right"."""
+    """Words at a point. side: their place beside the point: "above", "below", "left" or "right"."""
 
     x: float
     y: float
@@ -98,8 +98,8 @@ class Note:
 @dataclass
 class Chart:
     """One pair of axes. height: inches of the picture. ticks: of the x axis with their words, None for the usual ones.
-    square: a unit is as long on both axes. spans: (from, to, words) in x, grey behind the traces. left, right: words in
-    the upper corners."""
+    square: True if a unit has the same length on both axes. spans: (from, to, words) in x, grey behind the traces.
+    left, right: words in the upper corners."""
 
     title: str
     traces: list[Trace]
@@ -118,8 +118,8 @@ class Chart:
 
 @dataclass
 class Charts:
-    """The charts of a ride. over_time: stacked, with one axis of time, s; below: the others, side by side. warnings: a
-    sentence each."""
+    """The charts of a ride. over_time: stacked, with one axis of time, s; below: the others, side by side. warnings:
+    one sentence each."""
 
     title: str
     over_time: list[Chart]
@@ -128,7 +128,7 @@ class Charts:
 
 
 def charts(seen: Overview) -> Charts:
-    """The charts of a ride. A car has none of lean, and without a speed there is none of it."""
+    """The charts of a ride. A car has no chart of the lean. Without a speed there is no chart of it."""
     course, car = seen.course, seen.ride.car
     lateral, forward = (smoothed(values, course.t_s, SMOOTH_S) for values in (course.lateral_g, course.forward_g))
     over_time = [] if car else [_lean(seen)]
@@ -139,7 +139,7 @@ def charts(seen: Overview) -> Charts:
 
 
 def shown_lean_deg(seen: Overview) -> Array:
-    """(n) lean at each sample of the course, NaN where the display shows none."""
+    """(n) lean at each sample of the course, NaN if the display shows none."""
     return np.where(seen.course.trusted, seen.course.lean_deg, np.nan)
 
 
@@ -157,15 +157,15 @@ def title(seen: Overview) -> str:
 
 
 def lean_limit(seen: Overview) -> float:
-    """Degrees to each side that the lean's axis shows."""
+    """The end of the lean's axis on each side, degrees."""
     return max(20.0, 1.2 * max(seen.summary.left_deg.value, seen.summary.right_deg.value))
 
 
 def envelope(time: Array, values: Array, points: int, gap_s: float = np.inf) -> tuple[Array, Array]:
-    """A long line drawn with few points that look the same: the smallest and the largest value of each stretch.
+    """Reduce a long line to few points that look the same: the smallest and the largest value of each stretch.
 
-    At most about this many of the samples, in their order; all of them if they are no more. Leaves out NaN, except for
-    one in the middle of each time of over gap_s without a value, which breaks the line.
+    Returns at most about `points` of the samples, in their order, or all if there are not more. NaNs are left out,
+    except one in the middle of each gap of over gap_s, which breaks the line.
     """
     there = ~np.isnan(values)
     time, values = time[there], values[there]
@@ -200,7 +200,7 @@ def _lean(seen: Overview) -> Chart:
     traces: list[Trace] = [lean]
     doubtful = seen.course.doubtful >= 0.5
     if np.any(doubtful):
-        words = "Lean, degrees (right up; yellow: less exact)"  # a phone has room for so many
+        words = "Lean, degrees (right up; yellow: less exact)"  # as many words as a phone has room for
         along = np.where(doubtful, -1.05 * limit, np.nan)
         traces.append(Line(seen.course.t_s, along, DOUBT_COLOUR, gap_s=GAP_S, width=DOUBT_WIDTH))
     made = _over_time(seen, words, traces, _HIGH, ((-1.1 if np.any(doubtful) else -1.0) * limit, limit))
@@ -234,7 +234,7 @@ def _g_against_g(seen: Overview, lateral: Array, forward: Array) -> Chart:
     edges = np.arange(-bins, bins + 1, dtype=float) * GG_BIN_G
     moving = seen.course.resting < 0.5
     counts = np.histogram2d(forward[moving], -lateral[moving], bins=(edges, edges))[0]
-    cells = Cells(edges, counts * spacing_s(seen.course), "seconds")
+    cells = CellMap(edges, counts * spacing_s(seen.course), "seconds")
     angle = np.linspace(0.0, 2.0 * np.pi, 100)
     rings = [Line(r * np.cos(angle), r * np.sin(angle), GUIDE_COLOUR) for r in np.arange(0.5, edges[-1] + 0.01, 0.5)]
     span = (float(edges[0]), float(edges[-1]))
@@ -244,7 +244,7 @@ def _g_against_g(seen: Overview, lateral: Array, forward: Array) -> Chart:
 
 
 def _shares(seen: Overview) -> Chart:
-    """Histogram of the time at each lean. The bars of small leans are cut off where they are by far the highest."""
+    """Histogram of the time at each lean. The bars of small leans are cut off if they are by far the highest."""
     middle, seconds = (BINS_DEG[:-1] + BINS_DEG[1:]) / 2.0, seen.summary.histogram_s
     share = 100.0 * seconds / max(float(np.sum(seconds)), 1e-9)
     leaning = np.abs(middle) > _UPRIGHT_DEG
@@ -257,7 +257,7 @@ def _shares(seen: Overview) -> Chart:
     for peak, sign in _maxima(seen):
         at = sign * peak.value
         made.traces.append(Line(np.array([at, at]), np.array([0.0, _MARKED * top]), "#555555", dotted=True))
-        beside = "left" if sign < 0 else "right"  # of small leans, so that they do not stand on one another
+        beside = "left" if sign < 0 else "right"  # at small leans, so that the words do not overlap
         made.notes.append(
             Note(at, _MARKED * top, f"{peak.value:.0f}°", "above" if peak.value > 0.3 * limit else beside)
         )
@@ -267,7 +267,7 @@ def _shares(seen: Overview) -> Chart:
 
 
 def _alignment(seen: Overview) -> Chart:
-    """Forces on the straights, and the line on which they would lie by the yaw that was found."""
+    """Forces on the straights, and the line on which the found yaw would put them."""
     found, fits = seen.quality, judged(seen)
     most = float(np.max(np.abs(found.forward_g), initial=0.0))
     reach = max(0.5, 1.1 * most)

@@ -1,5 +1,5 @@
-"""The charts of a ride as plotly.js takes them, to zoom into: {"data": traces, "layout": of a wide window, "narrow": of
-a phone}. In a wide window the last charts stand beside each other below those over time."""
+"""The charts of a ride for plotly.js, to zoom into: {"data": traces, "layout": of a wide window, "narrow": of a phone}.
+In a wide window the last charts are side by side below those over time."""
 
 import html
 from typing import Any
@@ -16,7 +16,7 @@ _MARGIN = {"l": 80, "r": 80, "t": 100, "b": 80}
 _NARROW_MARGIN = {"l": 52, "r": 12, "t": 160, "b": 60}
 _ASIDE = 0.085  # space between charts side by side, over the width of the window
 _SMALL = {"font": {"size": 12}}
-_OWN_WORDS: dict[str, Any] = {"hoverinfo": "none"}  # page.js has them, by the name of a trace
+_OWN_WORDS: dict[str, Any] = {"hoverinfo": "none"}  # page.js writes these words, by the name of a trace
 _INK = "rgb(36,36,36)"
 _AXIS = {
     "automargin": True,
@@ -35,7 +35,7 @@ PAPER = {
     "plot_bgcolor": "rgba(0,0,0,0)",
     "showlegend": False,
 }
-_SIDES: dict[str, Any] = {  # of a point: where its words stand
+_SIDES: dict[str, Any] = {  # place of the words beside a point
     "above": {"yanchor": "bottom"},
     "below": {"yanchor": "top"},
     "left": {"xanchor": "right", "xshift": -2},
@@ -44,13 +44,13 @@ _SIDES: dict[str, Any] = {  # of a point: where its words stand
 
 
 def plain(values: Array, digits: int = 3) -> list[float | None]:
-    """Numbers as JSON can hold them: None for NaN, and a page need not hold sixteen digits."""
+    """Numbers for JSON: None for NaN, and fewer digits, because a page does not need sixteen."""
     return [None if value != value else value for value in np.round(values, digits).tolist()]
 
 
 def figure(charts: Charts, linked: bool = False) -> dict[str, Any]:
     """The figure for plotly.js, in plain numbers, lists and None for NaN. linked: the mouse selects a moment anywhere
-    in a chart over time, not at its lines alone."""
+    in a chart over time, not only at its lines."""
     each = [*charts.over_time, *charts.below]
     data = [drawn | _axes(k) for k, chart in enumerate(each) for trace in chart.traces for drawn in _traces(trace)]
     layouts = {kind: _layout(charts, kind == "narrow", linked) for kind in ("layout", "narrow")}
@@ -101,12 +101,12 @@ def _traces(trace: Trace) -> list[dict[str, Any]]:
         "showscale": False,
     }
     if np.any(there):
-        drawn |= {"zmin": float(np.nanmin(logs)) - 0.7, "zmax": float(np.nanmax(logs))}  # the rarest is not white
+        drawn |= {"zmin": float(np.nanmin(logs)) - 0.7, "zmax": float(np.nanmax(logs))}  # the rarest value is not white
     return [drawn | {"name": f"{trace.name}, log10", "x": centres, "y": centres, "z": [plain(row) for row in logs]}]
 
 
 def _filled(name: str, x: Array, y: Array, colour: str) -> dict[str, Any]:
-    """A trace filled from zero to y (n); of runs of zeros it keeps both ends."""
+    """A trace filled from zero to y (n). Of each run of zeros only both ends are kept."""
     leans = y != 0.0
     kept = leans.copy()
     kept[1:] |= leans[:-1]
@@ -121,7 +121,7 @@ def _layout(charts: Charts, narrow: bool, linked: bool) -> dict[str, Any]:
     heights = [round(_INCH * chart.height) for chart in (each if narrow else each[: rows + 1])]
     gap, margin = (_NARROW_GAP, _NARROW_MARGIN) if narrow else (_GAP, _MARGIN)
     inner = sum(heights) + gap * (len(heights) - 1)
-    words = html.escape(charts.title).split("  ·  ")  # plotly takes < for the beginning of a tag
+    words = html.escape(charts.title).split("  ·  ")  # plotly treats < as the start of a tag
     lines = words if narrow else ["  ·  ".join(words[:2]), "  ·  ".join(words[2:])]
     made: dict[str, Any] = PAPER | {"height": inner + margin["t"] + margin["b"], "margin": margin}
     made["title"] = {"text": "<br>".join(filter(None, lines)), "x": 0.05, "font": {"size": 14}}
@@ -154,7 +154,8 @@ def _layout(charts: Charts, narrow: bool, linked: bool) -> dict[str, Any]:
 
 
 def _annotations(chart: Chart, x: str, y: str, narrow: bool) -> list[dict[str, Any]]:
-    """All words on a chart: its title with its traces in their colours, in its corners, at points, of its spans."""
+    """All words on a chart: its title with its traces in their colours, those in its corners, at points and of
+    spans."""
     within = {"xref": f"{x} domain", "yref": f"{y} domain"}
     names = [
         f"<span style='color:{trace.colour}'>{trace.name}</span>"

@@ -1,6 +1,6 @@
-"""The ride as one HTML page to zoom into. Written to a file it needs no other file.
+"""Writes the ride as one HTML page to zoom into. The file needs no other file.
 
-Where the log has positions a map is beside the charts: pointing at one shows the same moment in the other.
+If the log has positions, a map is beside the charts. Pointing at one shows the same moment in the other.
 """
 
 from importlib.resources import files
@@ -16,9 +16,9 @@ from . import interactive, track_map
 from .charts import charts
 
 _HERE = Path(__file__).parent
-# The scripts of the charts and of the map. They contain no data, so that they are the same on every page.
+# The scripts of the charts and of the map. They contain no data: they are the same on every page.
 SCRIPTS = tuple((_HERE / name).read_text(encoding="utf-8") for name in ("page.js", "map.js"))
-# OpenStreetMap's own server refuses a page that was opened as a file: it wants to know the page's address.
+# OpenStreetMap's own server refuses a page that was opened as a file, because it requires the page's address.
 TILES_HOST = "https://basemaps.cartocdn.com"
 TILES_URL = TILES_HOST + "/rastertiles/voyager/{z}/{x}/{y}.png"
 MOST_ZOOM = 19
@@ -34,11 +34,11 @@ def draw(path: Path, seen: Overview, tiles: bool = False) -> None:
 
 
 def page(seen: Overview, library: str, allowed: str, tiles: bool = False, warnings: bool = False) -> str:
-    """The page's HTML. library: the element that loads plotly.js; allowed: how the policy names that; tiles: of draw().
-    warnings: those of the charts stand above them.
+    """The page's HTML. library: the element that loads plotly.js. allowed: its source in the policy. tiles: see draw().
+    warnings: show the charts' warnings above them.
 
-    The policy lets the page's own scripts run, and nothing be loaded but the map's tiles. plotly.js makes functions of
-    text for its charts of many points, and sets styles.
+    The policy allows the page's own scripts, and loading of the map's tiles only. plotly.js compiles functions from
+    text for charts with many points, and sets styles.
     """
     drawn, points = charts(seen), track_map.map_points(seen)
     beside = None
@@ -63,7 +63,7 @@ def page(seen: Overview, library: str, allowed: str, tiles: bool = False, warnin
 
 
 def tiles_at(points: track_map.MapPoints) -> dict[str, Any]:
-    """The tiles' server, and the position of their world in the map's metres."""
+    """The tiles' server, and the position of its world map in this map's metres."""
     lat, lon = np.radians(points.lat_deg), np.radians(points.lon_deg)
     scale_m = EARTH_M * float(np.cos(lat))
     return {

@@ -1,4 +1,4 @@
-"""The charts of a ride as one picture, by matplotlib."""
+"""Draws the charts of a ride as one picture with matplotlib."""
 
 import re
 import textwrap
@@ -11,11 +11,11 @@ from ..overview import Overview
 from . import charts
 
 POINTS = 6000
-# Fonts with letters of other scripts, as far as they are installed
+# Fonts with letters of other scripts, if they are installed
 _OTHER_LETTERS = re.compile(
     r"CJK|Noto Sans|Gothic|Hei|Ming|Song|YaHei|Arial Unicode|Malgun|Droid|WenQuanYi|Symbola|IPA"
 )
-_CHARACTERS, _LINE = 180, 0.16  # of a line of warnings, and its height in inches
+_CHARACTERS, _LINE = 180, 0.16  # characters of a line of warnings, and its height in inches
 _STYLE: Any = {
     "font.size": 9,
     "axes.spines.top": False,
@@ -55,7 +55,7 @@ def figure_of(seen: Overview) -> Any:
     with rc_context(_STYLE | {"font.family": families}):
         figure = Figure(figsize=(11, sum(heights) + _LINE * len(said)), layout="constrained")
         FigureCanvasAgg(figure)
-        aside: Any = {"x": 0.01, "ha": "left", "parse_math": False}  # a name may have $ in it
+        aside: Any = {"x": 0.01, "ha": "left", "parse_math": False}  # a name may contain $
         figure.suptitle(title, fontsize=12, **aside)
         if said:
             figure.supxlabel("\n".join(said), fontsize=8, color=charts.BRAKE_COLOUR, **aside)
@@ -73,7 +73,7 @@ def figure_of(seen: Overview) -> Any:
 
 
 def _fonts(text: str) -> tuple[list[str], str]:
-    """The families of fonts for a text, and the text with the code of each letter that none of them has."""
+    """The font families for a text, and the text with a code for each letter that none of them has."""
     from matplotlib import font_manager
 
     families = ["DejaVu Sans"]
@@ -91,7 +91,7 @@ def _fonts(text: str) -> tuple[list[str], str]:
 
 
 def draw_chart(axes: Any, chart: charts.Chart) -> None:
-    """One chart on axes of matplotlib."""
+    """Draw one chart on axes of matplotlib."""
     axes.set(title=chart.title, xlabel=chart.x_title, ylabel=chart.y_title, xlim=chart.x_range, ylim=chart.y_range)
     if chart.square:
         axes.set_aspect("equal")

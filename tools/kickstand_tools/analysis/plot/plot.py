@@ -1,4 +1,4 @@
-"""A ride drawn: DIR/RIDE.png by matplotlib, DIR/RIDE.html by plotly."""
+"""Draws a ride: DIR/RIDE.png with matplotlib, DIR/RIDE.html with plotly."""
 
 from importlib.util import find_spec
 from pathlib import Path
@@ -10,7 +10,7 @@ from . import page, picture
 
 
 def check(directory: Path) -> None:
-    """Raise InputError if nothing can be drawn, or nothing written there."""
+    """Raise InputError if drawing or writing to the directory is impossible."""
     missing = [name for name in ("matplotlib", "plotly") if not find_spec(name)]
     if missing:
         raise InputError(f"pictures need {' and '.join(missing)}: {extra('rides')}")
@@ -20,7 +20,7 @@ def check(directory: Path) -> None:
 
 
 def draw(seen: Overview, directory: Path, tiles: bool = False) -> list[Path]:
-    """Write both; their paths. tiles: as page.draw() takes it. Raises InputError."""
+    """Write both files and return their paths. tiles: see page.draw(). Raises InputError."""
     paths = [directory / f"{seen.ride.stem}.png", directory / f"{seen.ride.stem}.html"]
     with new_directory(directory):
         with whole_file(paths[0]) as path:

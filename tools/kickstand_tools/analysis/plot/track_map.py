@@ -1,7 +1,7 @@
-"""The map of a ride: its track, coloured by lean, north up, in metres.
+"""Draws the map of a ride: its track, coloured by lean, north up, in metres.
 
-The projection is Mercator's, which keeps angles, with the scale of the ride's own latitude: 50 km to the north the
-scale is off by one per cent. The tiles of maps have it too.
+The projection is Mercator's, which keeps angles and which map tiles use. Its scale is right at the ride's own latitude;
+50 km further north it is off by one per cent.
 """
 
 from dataclasses import dataclass
@@ -11,25 +11,25 @@ import numpy as np
 
 from ...signals import EARTH_M, Array, Ints
 from ..overview import Overview
-from ..track import Track, track
+from ..track import LogTrack, track
 from .charts import LEFT_COLOUR, RIGHT_COLOUR, SPEED_COLOUR, lean_limit, shown_lean_deg
 from .interactive import PAPER, plain
 
 POINTS = 20_000
 SHORTEST_S = 0.2  # between points
-SAME_M = 0.5  # points that are no further from the one before are left out: a bike that stands is one point
+SAME_M = 0.5  # points closer to the previous one are left out: a bike that stands is one point
 MOST_LAT_DEG = 85.0  # beyond it Mercator has no map
-LEAST_LEAN_DEG = 30.0  # the lean that has the full colour is this at least
-# From left to right: the colour-blind can distinguish blue and orange, too; upright is grey
+LEAST_LEAN_DEG = 30.0  # the lean with the full colour is at least this
+# From left to right: colour-blind people can also distinguish blue and orange; upright is grey
 _COLOURS = [[0.0, "#0d3a73"], [0.25, LEFT_COLOUR], [0.5, "#c9c9c9"], [0.75, RIGHT_COLOUR], [1.0, "#7a2c05"]]
 
 
 @dataclass
 class MapPoints:
-    """m points of a track, in the order of their times t_s (s since the log's first sample).
+    """m points of a track, sorted by their times t_s (s since the log's first sample).
 
-    east_m, north_m: from the point at lat_deg, lon_deg; NaN in one point in each gap of the positions. lean_deg: NaN
-    where the display shows none. speed_kmh: NaN where the log has none.
+    east_m, north_m: from the point at lat_deg, lon_deg; one point is NaN in each gap of the positions. lean_deg: NaN if
+    the display shows none. speed_kmh: NaN if the log has none.
     """
 
     t_s: Array
@@ -42,7 +42,7 @@ class MapPoints:
 
 
 def map_points(seen: Overview) -> MapPoints | None:
-    """The track of a ride, None where there is none to draw: positions lie on straight lines between the log's."""
+    """The track of a ride; None without positions. Points are on straight lines between the log's positions."""
     places = track(seen.course)
     if len(places.t_s) < 2:
         return None
@@ -65,11 +65,11 @@ def map_points(seen: Overview) -> MapPoints | None:
 
 
 def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
-    """As plotly.js takes it: {"data": traces, "layout": ...}, in plain numbers, lists and None for NaN.
+    """The map for plotly.js: {"data": traces, "layout": ...}, in plain numbers, lists and None for NaN.
 
-    Its first trace is the track as a line: customdata are time (s), lean (degrees) and speed (km/h), None where there
-    is none. The second has the points in colour: customdata are their times. The first shape marks a place, the second
-    is the bar of the scale, and the first annotation that bar's length: map.js moves them.
+    The first trace is the track as a line: customdata are time (s), lean (degrees) and speed (km/h), None if missing.
+    The second has the points in colour: customdata are their times. The first shape marks a place, the second is the
+    bar of the scale, and the first annotation that bar's length: map.js moves them.
     """
     x, y = plain(points.east_m, 1), plain(points.north_m, 1)
     rows = [plain(row, 1) for row in np.column_stack((points.t_s, points.lean_deg, points.speed_kmh))]
@@ -115,8 +115,8 @@ def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
     return {"data": [track_line, {"type": "scattergl", "mode": "markers", "hoverinfo": "none"} | at], "layout": layout}
 
 
-def _times(places: Track, seconds: float) -> Array:
-    """The times of the points: evenly over the ride, at most POINTS."""
+def _times(places: LogTrack, seconds: float) -> Array:
+    """The times of the points: at most POINTS, evenly over the ride."""
     first, last = float(places.t_s[0]), min(seconds, float(places.t_s[-1]))
     count = int(np.clip((last - first) / SHORTEST_S, 1, POINTS)) + 1
     return np.linspace(first, last, count)
@@ -127,8 +127,8 @@ def _mercator(lat_deg: Array) -> Array:
 
 
 def _moved(east: Array, north: Array) -> Ints:
-    """The numbers of the points to keep: those over SAME_M from the last that is kept, the first in each gap, and the
-    first after it."""
+    """The numbers of the points to keep: those over SAME_M from the last kept one, the first in each gap, and the first
+    after it."""
     kept, (last_x, last_y) = [0], (east[0], north[0])
     for k, (x, y) in enumerate(zip(east.tolist(), north.tolist())):
         begins_or_ends_gap = (x != x) != (last_x != last_x)

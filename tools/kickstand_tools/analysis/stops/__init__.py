@@ -1,1 +1,1 @@
-"""Stops of a ride as a brake test has them, and the standstills they end in."""
+"""Finds the stops of a ride as in a brake test, and the standstills in which they end."""

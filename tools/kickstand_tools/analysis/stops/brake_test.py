@@ -1,20 +1,20 @@
-"""Stops, as a brake test has them: initial speed, distance, mean fully developed deceleration.
+"""Measures stops as in a brake test: initial speed, distance, mean fully developed deceleration.
 
-UN Regulation No. 13, Annex 4, paragraph 1.1.2: with the initial speed v0 when braking begins, vb = 0.8 v0 and
-ve = 0.1 v0 in km/h, and sb and se the distances in metres from there to vb and ve,
+UN Regulation No. 13, Annex 4, paragraph 1.1.2: with the initial speed v0 at the start of braking, vb = 0.8 v0 and ve =
+0.1 v0 in km/h, and the distances sb and se in metres from there to vb and ve,
 
     dm = (vb^2 - ve^2) / (25.92 (se - sb))   in m/s2.
 
 At the standstill the force shows the slope of the road, and the gyro's readings are its bias. From there speed and
-pitch are integrated backwards, so that the dive of the fork is not taken for braking:
+pitch are integrated backwards. So the dive of the fork does not look like braking:
 
     dq/dt = w_y sin t - w_x cos t,   dv/dt = f_z - g sin q       (as in kickstand.lean.bike_model)
 
 with lean t (> 0 to the right), pitch q (nose up), speed v, rates w and specific force f along left (x), up (y) and
 forward (z).
 
-Where the log has a speed, the integrated one is fitted to it (speed_fit.py). Integrated from a
-standstill that was not one, speed and distance can come out as anything: elsewhere it has to be plausible.
+If the log has a speed, the integrated one is fitted to it (speed_fit.py). If not, the result must be plausible:
+integration from a wrong standstill can give any speed and distance.
 """
 
 from dataclasses import dataclass
@@ -28,14 +28,14 @@ from ..channels import Channels, thinned
 from .speed_fit import fitted_speed, speed_delay_s
 from .standstill import standing
 
-RATE_S = 0.02  # time between the samples in which stops are searched
+RATE_S = 0.02  # time between samples for the search of stops
 MIN_SPEED_MPS = 10.0 / 3.6
-MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0  # limits of a stop's deceleration: a harder one is a fall or a fault
+MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0  # limits of a stop's deceleration: a larger one is a fall or a fault
 LONGEST_S = 60.0
-FEWEST = 10  # a standstill of no more samples shows neither slope nor bias
+FEWEST = 10  # a standstill of so few samples shows neither slope nor bias
 GAP_S = 0.5  # longest gap in the readings over which speed and pitch are integrated
 REST_S = 2.5  # duration of the standstill that is used
-SETTLE_S = 0.5  # duration of its beginning that is not used, because the fork comes up again
+SETTLE_S = 0.5  # its beginning is not used, because the fork rebounds
 ONSET_SHARE, FAINT_SHARE = 0.15, 0.04  # shares of the full deceleration: above, braking has begun; below, it has not
 ONSET_S = 0.6  # longest time between these two
 
@@ -45,12 +45,13 @@ SENSOR_HEIGHT_M = 0.65
 
 MAX_SPEED_MPS = 250.0 / 3.6
 MAX_SIDE_M, MAX_HEADING_DEG = 15.0, 30.0  # limits of the deviation from a straight line: more is a bend
-# How far the integrated speed may be from 0 at the standstill before: OPEN_MPS, and OPEN_MPS2 for each second between.
-# A degree of pitch makes 0.17 m/s2, and a gyro's drift adds to it: over more than SHOWING_S the speed shows nothing.
+# Allowed difference of the integrated speed from 0 at the previous standstill: OPEN_MPS, and OPEN_MPS2 per second
+# between them. A degree of pitch makes 0.17 m/s2, and a gyro's drift adds to it: over more than SHOWING_S the speed
+# proves nothing.
 OPEN_MPS, OPEN_MPS2, SHOWING_S = 3.0, 0.7, 30.0
 SPEED_S, SURELY_MPS2 = 15.0, 1.5  # a stop that only the speed shows takes at most SPEED_S, and is at least so hard
 
-STRAIGHT_S = 0.1  # the mean heading of the first of the braking is the direction ridden before it
+STRAIGHT_S = 0.1  # the mean heading in this first part of the braking is the direction before it
 SMOOTH_S = 0.2  # accelerations and jerks are means over this time
 
 
@@ -77,7 +78,7 @@ class Stop:
 def find_stops(channels: Channels) -> list[Stop]:
     """Every stop from over 10 km/h with at least 1 m/s2, as UN Regulation No. 13 measures it (see the module).
 
-    channels: a whole ride, of vehicle_channels(). pandas.DataFrame takes the list as it is.
+    channels: a whole ride, from vehicle_channels(). pandas.DataFrame accepts the returned list.
 
     >>> from kickstand_tools.api import Log, fit_two_positions, simulate_ride, vehicle_channels
     >>> ride = simulate_ride("street", seed=1, seconds=60.0)
@@ -123,7 +124,8 @@ def mfdd_mps2(speed_mps: Array, distance_m: Array) -> float:
 
 
 def closes(speed_mps: float, seconds: float) -> bool:
-    """True if speed_mps, integrated back from a standstill to the one before, is as near to 0 as that time allows."""
+    """True if speed_mps, integrated back from a standstill to the previous one, is as near to 0 as the time between
+    allows."""
     return seconds > SHOWING_S or abs(speed_mps) < OPEN_MPS + OPEN_MPS2 * seconds
 
 
@@ -133,8 +135,8 @@ def plausible(initial_speed_mps: float, side_m: float, heading_deg: float) -> bo
 
 
 def stops_by_speed(ride: Channels) -> bool:
-    """True if the speed in the log alone falls to a stop from over 10 km/h, surely hard enough to be a brake test, even
-    if the force does not show it."""
+    """True if the speed in the log alone shows a stop from over 10 km/h that is surely hard enough for a brake test,
+    even if the force does not show it."""
     there = ~np.isnan(ride.speed_mps)
     time, speed = ride.t_s[there], ride.speed_mps[there]
     for end in np.flatnonzero((speed[1:] < STANDING_MPS) & (speed[:-1] >= STANDING_MPS)) + 1:
@@ -146,9 +148,10 @@ def stops_by_speed(ride: Channels) -> bool:
 
 
 def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | None:
-    """The stop that ends in the standstill that begins at index rest; None if that is no stop.
+    """The stop that ends in the standstill from index rest on; None if it is not a stop.
 
-    part: the ride up to some time into that standstill. from_rest: part begins where the standstill before ends.
+    part: the ride up to some time into that standstill. from_rest: True if part begins at the end of the previous
+    standstill.
     """
     time = part.t_s
     acceleration, pitch_rate, yaw_rate = _acceleration(part, rest)
@@ -178,7 +181,7 @@ def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | 
         return None
     heading = integral(t, yaw_rate[braked])
     straight = np.mean(heading[t <= t[0] + STRAIGHT_S])
-    # the fork's rebound hides the last hundredths of the speed: they are assumed to fall evenly to zero
+    # the fork's rebound hides the last hundredths of the speed, which are assumed to fall evenly to zero
     tail = v[-1] / mfdd
     stop = Stop(
         float(t[0]),
@@ -198,7 +201,7 @@ def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | 
 
 
 def _acceleration(part: Channels, rest: int) -> tuple[Array, Array, Array]:
-    """Acceleration along the road (m/s2), pitch and yaw rate (deg/s), all less those at standstill."""
+    """Acceleration along the road (m/s2), pitch and yaw rate (deg/s), all minus their values at standstill."""
     time = part.t_s
     settled = int(np.searchsorted(time, time[rest] + SETTLE_S))
     still = slice(settled if settled < len(time) - 5 else rest, len(time))

@@ -1,6 +1,6 @@
-"""A speed integrated from the acceleration, corrected by the speed in the log.
+"""Corrects a speed integrated from the acceleration by the speed in the log.
 
-A log with a speed once a second has two or three values in a hard stop, which do not show its shape. The acceleration
+If a log has one speed per second, a hard stop has two or three values, which do not show its shape. The acceleration
 shows the shape, but its integral drifts.
 """
 
@@ -13,7 +13,7 @@ from ..channels import Channels
 SMOOTH_S = 0.2  # smoothing of the acceleration: delay x acceleration is the error of a late speed
 LEAD_S = 4.0  # time before the braking in which the log's speed is used for the fit
 DELAYS_S = np.arange(-0.5, 1.51, 0.05)  # delays of the speed that are tried
-# A delay is looked for in at least so many speeds, a second apart, whose changes have at least this standard deviation
+# A delay is searched in at least this many speeds, a second apart, whose changes have at least this standard deviation
 ENOUGH_SPEEDS, ENOUGH_CHANGE_MPS = 30, 0.5
 
 # One standard deviation of each fitted parameter and of a speed
@@ -51,13 +51,13 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
 
         u(t) = (1 + k) v(t) + integral of b from t to the end - d a(t)
 
-    with the speed v and the acceleration a as given, the error of scale k, the error b of the acceleration, m/s2, and
-    the error d of the delay, s. b comes from hill and dive that the gyro has not measured: a random walk back in time,
-    from nearly 0 at standstill, linear between knots (hat functions, the linear B-splines, are its basis).
+    with the arguments v and a, the scale error k, the error b of the acceleration, m/s2, and the error d of the delay,
+    s. b comes from hill and dive that the gyro did not measure: a random walk back in time, from nearly 0 at
+    standstill, linear between knots (its basis are hat functions, the linear B-splines).
     """
     time = part.t_s
     values = np.flatnonzero(~np.isnan(part.speed_mps))
-    # the samples they belong to
+    # the samples at which these speeds were true
     wanted = np.minimum(np.searchsorted(time, time[values] - delay_s - 1e-6), len(time) - 1)
     values, wanted = (these[time[wanted] >= time[begin] - LEAD_S] for these in (values, wanted))
     if len(wanted) < 2 or wanted[-1] < begin:
@@ -77,8 +77,8 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
 
 
 def _prior(knots: int) -> Array:
-    """(knots + 2, knots + 2): its product with the unknowns (k, b at each knot from the end on, d) is expected to be 0,
-    with a standard deviation of 1."""
+    """(knots + 2, knots + 2): the prior. Its product with the unknowns (k, b at each knot from the end on, d) is
+    expected to be 0, with a standard deviation of 1."""
     walk = [SIGMA_WALK_MPS2 * KNOT_S**0.5] * (knots - 1)
     sigma = np.array([SIGMA_SCALE, SIGMA_SLOPE_MPS2, *walk, SIGMA_DELAY_S])
     prior = np.eye(knots + 2)

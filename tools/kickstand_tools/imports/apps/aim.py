@@ -1,16 +1,16 @@
 """AiM's CSV from RaceStudio: InlineAcc, LateralAcc and VerticalAcc in g, RollRate, PitchRate and YawRate in deg/s.
 
-Heads and signs as measured on the session tests/test_data/SFJ/*_0101.csv of https://github.com/m3rlin45/libxrk: at rest
-VerticalAcc is -1, LateralAcc and YawRate are positive in a right turn and InlineAcc when speeding up, so the axes are
-forward, right and down. Where VerticalAcc is +1 at rest that channel points up, so its sign is kept; the others are
-treated the same.
+Column names and signs were measured on the session tests/test_data/SFJ/*_0101.csv of
+https://github.com/m3rlin45/libxrk: at rest VerticalAcc is -1. LateralAcc and YawRate are positive in a right turn,
+InlineAcc when speeding up. So the axes are forward, right and down. If VerticalAcc is +1 at rest, that channel points
+up and keeps its sign; the others are treated the same.
 """
 
 import numpy as np
 
 from ...common.errors import InputError
 from ..files import RecordingFile
-from ..recording import Recording, names_in, plain, read_sheet, sensor_of, track_of, unit_in
+from ..recording import AppRecording, names_in, plain, read_sheet, sensor_of, track_of, unit_in
 from ..units import SPEEDS, unit
 
 NAME = "AiM"
@@ -18,12 +18,12 @@ _ACCEL = ("LateralAcc", "VerticalAcc", "InlineAcc")
 _RATES = ("PitchRate", "YawRate", "RollRate")
 
 
-def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
-    """Each file that says it is AiM's is a recording."""
+def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
+    """Each file with AiM's heading is a recording."""
     return [[file] for file in files if "AiM CSV File" in file.text[:200]]
 
 
-def read(files: list[RecordingFile], name: str) -> Recording:
+def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a missing column or sensor."""
     lines = [names_in(line) for line in files[0].text.split("\n", 60)[:60]]
     header = next(
@@ -60,4 +60,4 @@ def read(files: list[RecordingFile], name: str) -> Recording:
     if speed_unit not in SPEEDS:
         raise InputError(f"{name}: the unit of {plain(sheet.columns[speed or 0])} is not known: {speed_unit!a}")
     track = track_of(sheet, time_ns, speed, sheet.place("GPS Latitude"), sheet.place("GPS Longitude"), speed_unit)
-    return Recording(NAME, accel, gyro, track, vehicle_axes=True)
+    return AppRecording(NAME, accel, gyro, track, vehicle_axes=True)

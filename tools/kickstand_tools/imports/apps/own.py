@@ -1,7 +1,7 @@
-"""Kickstand's own files: a log, also one saved by a spreadsheet, and what `kickstand export` writes as CSV or Parquet.
+"""Reads Kickstand's own files: a log, also saved by a spreadsheet, and the CSV or Parquet files of `kickstand export`.
 
-RaceChrono's form, which it writes too, is read by racechrono.py. Its VBO holds neither the vertical force nor the
-pitch rate.
+racechrono.py reads its exports in RaceChrono's form. Its VBO cannot be read back: it has neither the vertical force nor
+the pitch rate.
 """
 
 import io
@@ -12,21 +12,21 @@ from ...common.errors import InputError, extra
 from ...logs.cells import COLUMNS
 from ...logs.csv_reader import MOST_CELLS
 from ..files import RecordingFile
-from ..recording import Recording, Sheet, names_in, read_sheet, sensor_of, track_of
+from ..recording import AppRecording, Sheet, names_in, read_sheet, sensor_of, track_of
 from ..units import EPOCH_NS, Nanoseconds
 
 NAME = "Kickstand"
 _FORCES = ("left_g", "up_g", "forward_g")
 _RATES = ("pitch_rate_dps", "yaw_rate_dps", "roll_rate_dps")
-_RATE_SIGNS = np.array([-1.0, 1.0, 1.0])  # pitch is positive nose up, which is against the axis to the left
+_RATE_SIGNS = np.array([-1.0, 1.0, 1.0])  # pitch is positive nose up, opposite to the axis to the left
 
 
-def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
+def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     """Each of Kickstand's logs and exports is a recording."""
     return [[file] for file in files if _is_ours(file)]
 
 
-def read(files: list[RecordingFile], name: str) -> Recording:
+def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a replay's output, which does not contain all readings."""
     sheet = _sheet(files[0])
     time_ns = sheet.times(sheet.columns.index("t_s"))
@@ -45,11 +45,11 @@ def read(files: list[RecordingFile], name: str) -> Recording:
     temp_c = sheet.numbers(sheet.place("temp_c"))
     from_1970 = bool(len(time_ns)) and float(np.median(time_ns)) > EPOCH_NS
     utc_ns = 0 if from_1970 else _utc_ns(sheet, time_ns)
-    return Recording(NAME, accel, gyro, track, temp_c, utc_ns=utc_ns, vehicle_axes=bool(no_log))
+    return AppRecording(NAME, accel, gyro, track, temp_c, utc_ns=utc_ns, vehicle_axes=bool(no_log))
 
 
 def _utc_ns(sheet: Sheet, time_ns: Nanoseconds) -> int | None:
-    """UTC less the log's own time, ns since 1970; None where the log has no UTC."""
+    """UTC minus the log's own time, ns since 1970; None if the log has no UTC."""
     utc_s = sheet.numbers(sheet.place("utc_s"))
     there = np.isfinite(utc_s)
     return int(np.median(utc_s[there] * 1e9 - time_ns[there])) if np.any(there) else None

@@ -1,8 +1,9 @@
-"""phyphox: a CSV for each sensor in a folder or a zip, or one CSV with them all; signs as on Android on every phone.
+"""phyphox: one CSV per sensor in a folder or a zip, or one CSV for all sensors. Signs are Android's on every phone.
 
-Names of files and columns as in the app's own template, UI/MainView/CreateExperiment/SimpleExperimentTemplete.swift of
-https://github.com/phyphox/phyphox-ios, and the "Raw Data" of https://github.com/phyphox/phyphox-experiments. On an
-iPhone the app multiplies Core Motion's acceleration and gravity by -9.81 (ExperimentSensorInput.swift).
+Names of files and columns are those of the app's own template,
+UI/MainView/CreateExperiment/SimpleExperimentTemplete.swift of https://github.com/phyphox/phyphox-ios, and the "Raw
+Data" of https://github.com/phyphox/phyphox-experiments. On an iPhone the app multiplies Core Motion's acceleration and
+gravity by -9.81 (ExperimentSensorInput.swift).
 """
 
 import re
@@ -14,17 +15,28 @@ from ...common.errors import InputError
 from ...logs.csv_reader import as_text
 from ..files import RecordingFile
 from ..join import with_gravity
-from ..recording import Recording, Sensor, Sheet, Track, names_in, plain, read_sheet, sensor_of, track_of, unit_in
+from ..recording import (
+    AppRecording,
+    ReceiverTrack,
+    RecordedSensor,
+    Sheet,
+    names_in,
+    plain,
+    read_sheet,
+    sensor_of,
+    track_of,
+    unit_in,
+)
 from ..units import ACCELERATIONS, EPOCH_NS, RATES, Nanoseconds, of_seconds, unit
 
 NAME = "phyphox"
 _AXIS = re.compile(r"^(?:(.*\S)\s+)?([xyz])\s*\(([^)]*)\)$", re.IGNORECASE)
 _SIGN = "+1 g up, on every phone"
-_WITHOUT_GRAVITY = "linear"  # stands in the name of a sensor from which gravity has been taken
+_WITHOUT_GRAVITY = "linear"  # is in the name of a sensor without gravity
 
 
-def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
-    """The recordings among these files: one a folder; meta/ belongs to the folder that it is in."""
+def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
+    """The recordings among these files: one per folder. meta/ belongs to its parent folder."""
     by_folder: dict[str, list[RecordingFile]] = {}
     for file in files:
         folder = file.folder.removesuffix("meta").removesuffix("/") if _is_meta(file) else file.folder
@@ -32,10 +44,10 @@ def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     return [group for group in by_folder.values() if any(_is_ours(file) for file in group)]
 
 
-def read(files: list[RecordingFile], name: str) -> Recording:
+def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a missing column or sensor."""
-    found: dict[str, Sensor] = {}
-    track: Track | None = None
+    found: dict[str, RecordedSensor] = {}
+    track: ReceiverTrack | None = None
     pauses = _Pauses(files)
     for file in files:
         if not _is_ours(file):
@@ -49,7 +61,7 @@ def read(files: list[RecordingFile], name: str) -> Recording:
     accel = with_gravity(found, found.__getitem__, name, "acceleration", remedy, none)
     if "gyro" not in found:
         raise InputError(f"{name}: no gyroscope: add it to the experiment, and give all files of the export")
-    return Recording(NAME, accel, found["gyro"], track, utc_ns=pauses.utc_ns)
+    return AppRecording(NAME, accel, found["gyro"], track, utc_ns=pauses.utc_ns)
 
 
 def _is_meta(file: RecordingFile) -> bool:
@@ -57,7 +69,7 @@ def _is_meta(file: RecordingFile) -> bool:
 
 
 def _is_ours(file: RecordingFile) -> bool:
-    """True if its first line names a time in s and then quantities with their units in brackets."""
+    """True if the first line has a time in s and then quantities with their units in brackets."""
     first = names_in(next(iter(file.first_lines(1)), ""))
     if _is_meta(file) or len(first) < 2 or not re.fullmatch(r"(.*\s)?time \(s\)", first[0], re.IGNORECASE):
         return False
@@ -65,8 +77,8 @@ def _is_ours(file: RecordingFile) -> bool:
     return any(match and unit(match[3]) in ACCELERATIONS | RATES for match in known) or "latitude" in map(plain, first)
 
 
-def _sensors(sheet: Sheet, stem: str, pauses: "_Pauses") -> Iterator[tuple[str, Sensor]]:
-    """The sensors of one file, each with its kind; each has the time that stands before it."""
+def _sensors(sheet: Sheet, stem: str, pauses: "_Pauses") -> Iterator[tuple[str, RecordedSensor]]:
+    """Yield the sensors of one file, each with its kind. The time of a sensor is in the column before it."""
     groups: dict[tuple[int, str, str], dict[str, int]] = {}
     time_place = 0
     for place, column in enumerate(sheet.columns):
@@ -91,7 +103,7 @@ def _kind(what: str) -> str:
     return "user" if _WITHOUT_GRAVITY in what or "without g" in what else "total"
 
 
-def _location(sheet: Sheet, pauses: "_Pauses") -> Track | None:
+def _location(sheet: Sheet, pauses: "_Pauses") -> ReceiverTrack | None:
     lat, lon = sheet.place("Latitude"), sheet.place("Longitude")
     speed = sheet.place("Velocity", "Speed")
     if lat is None and speed is None:
@@ -102,7 +114,8 @@ def _location(sheet: Sheet, pauses: "_Pauses") -> Track | None:
 
 
 class _Pauses:
-    """meta/time.csv: when the experiment was started and paused. Its own time stands still in a pause, UTC does not."""
+    """Reads meta/time.csv: when the experiment was started and paused. The experiment's time stops in a pause, UTC does
+    not."""
 
     def __init__(self, files: list[RecordingFile]) -> None:
         self.utc_ns: int | None = None

@@ -1,8 +1,9 @@
 """RaceBox's CSV: GForceX to Z in g, GyroX to Z in deg/s; x forward, y left, z up, at rest GForceZ is +1.
 
-Heads of the presets: docs of https://github.com/beadon/RacePlex; that X is forward, Y to the left and Z up, and that
-GyroZ is positive in a left turn, is measured on the ride in its src/lib/__fixtures__/racebox-session.csv. Quantities:
-https://www.racebox.pro/products/mini-micro-protocol-documentation. The column Speed says no unit; the positions do.
+Column names of the presets: docs of https://github.com/beadon/RacePlex. The axes (X forward, Y left, Z up, GyroZ
+positive in a left turn) were measured on the ride in its src/lib/__fixtures__/racebox-session.csv. Quantities:
+https://www.racebox.pro/products/mini-micro-protocol-documentation. The column Speed names no unit; the positions show
+it.
 """
 
 from collections.abc import Mapping
@@ -11,23 +12,23 @@ from kickstand.errors import Notice
 
 from ...common.errors import InputError
 from ..files import RecordingFile
-from ..recording import Recording, names_in, plain, read_sheet, sensor_of, track_of, unit_in
+from ..recording import AppRecording, names_in, plain, read_sheet, sensor_of, track_of, unit_in
 from ..speeds import unit_by_positions
 from ..units import SPEEDS, factor, unit
 
 NAME = "RaceBox"
-ASKS = frozenset({"speed"})  # the quantities whose unit may be given: see importing.py
+ASKS = frozenset({"speed"})  # the quantities whose unit the user may give: see importing.py
 _AXES = [f"{sensor}{axis}" for sensor in ("GForce", "Gyro") for axis in "YZX"]  # left, up, forward
 
 
-def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
+def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     """Each file that has RaceBox's columns is a recording."""
     return [[file] for file in files if _header(file) is not None]
 
 
-def read(files: list[RecordingFile], name: str, units: Mapping[str, str] = {}) -> Recording:
-    """Read a recording. units: "speed" is the unit of the column Speed; without it the positions show which it is.
-    Raises InputError for a missing column and for a unit that is not a speed's."""
+def read(files: list[RecordingFile], name: str, units: Mapping[str, str] = {}) -> AppRecording:
+    """Read a recording. units: "speed" is the unit of the column Speed; without it the positions show the unit. Raises
+    InputError for a missing column and for a unit that is not one of speed."""
     said = units.get("speed", "")
     if said:
         factor(said, SPEEDS, "speed")
@@ -46,17 +47,17 @@ def read(files: list[RecordingFile], name: str, units: Mapping[str, str] = {}) -
     notices: list[Notice] = []
     if speed is not None:
         speed_unit = (
-            speed_unit or _said_unit(sheet.columns[speed]) or unit_by_positions(sheet, time_ns, speed, lat, lon)
+            speed_unit or _unit_in_name(sheet.columns[speed]) or unit_by_positions(sheet, time_ns, speed, lat, lon)
         )
         if not speed_unit:
             notices.append(Notice("import-speed-unit", sheet.columns[speed]))
             speed = None
     track = track_of(sheet, time_ns, speed, lat, lon, speed_unit or "m/s")
-    return Recording(NAME, accel, gyro, track, notices=notices, utc_ns=0, vehicle_axes=True)
+    return AppRecording(NAME, accel, gyro, track, notices=notices, utc_ns=0, vehicle_axes=True)
 
 
 def _header(file: RecordingFile) -> int | None:
-    """The number of the line of names: there may be lines about the laps before it."""
+    """The number of the line of names. Lines about the laps may come before it."""
     for number, line in enumerate(file.text.split("\n", 200)[:200]):
         names = {plain(cell) for cell in names_in(line)}
         if {"gforcex", "gforcez", "time"} <= names:
@@ -64,6 +65,6 @@ def _header(file: RecordingFile) -> int | None:
     return None
 
 
-def _said_unit(column: str) -> str:
+def _unit_in_name(column: str) -> str:
     said = "km/h" if plain(column) == "kph" else unit(unit_in(column))
     return said if said in SPEEDS else ""

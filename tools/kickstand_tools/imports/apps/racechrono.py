@@ -1,29 +1,29 @@
-"""RaceChrono's CSV, versions 2 and 3: an accelerometer's and a gyro's three axes beside what a receiver says.
+"""RaceChrono's CSV, versions 2 and 3: three axes of an accelerometer and a gyro beside the data of a receiver.
 
-Version 3 has three lines of heads, names, units and sources, and some names twice: see
+Version 3 has three heading lines (names, units, sources), and some names twice: see
 https://github.com/jLynx/RaceChrono-to-CSV, Short_RaceChrono_Offical_App_Data.csv; with x_acc to z_acc of "101: acc" in
 G and x_rate_of_rotation of "102: gyro" in deg/s https://github.com/ClassicMiniDIY/UltraLog/pull/85. lateral_acc and
-longitudinal_acc are calculated from positions and say nothing of gravity. The axes are those of the phone or the box
-that measured. Kickstand's own export has this form, too.
+longitudinal_acc are calculated from positions and do not contain gravity. The axes are those of the phone or the box.
+Kickstand's own export has this form, too.
 """
 
 from ...common.errors import InputError
 from ..files import RecordingFile
-from ..recording import Recording, names_in, plain, read_sheet, sensor_of, track_of
+from ..recording import AppRecording, names_in, plain, read_sheet, sensor_of, track_of
 
 NAME = "RaceChrono"
 _FIRST = "This file is created using RaceChrono"
 _TIMES = ("timestamp", "elapsedtime", "time")
 
 
-def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
-    """Each file that says that RaceChrono has made it is a recording."""
+def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
+    """Each file that names RaceChrono as its author is a recording."""
     return [[file] for file in files if file.text[:200].lstrip().startswith(_FIRST)]
 
 
-def read(files: list[RecordingFile], name: str) -> Recording:
+def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a missing column or sensor."""
-    lines = files[0].text.split("\n", 60)[:60]  # blank ones among them: their numbers count
+    lines = files[0].text.split("\n", 60)[:60]  # with blank ones, because line numbers count them
     header = next((k for k, line in enumerate(lines) if _is_header(line)), None)
     if header is None:
         raise InputError(f"{name}: no line with the names of its columns: export it again as CSV v3")
@@ -43,7 +43,7 @@ def read(files: list[RecordingFile], name: str) -> Recording:
     accel_unit, rate_unit = units.get(accel[0], "g").lower(), units.get(gyro[0], "deg/s").lower()
     up = "left, up, forward" if by_kickstand else "+1 g up"
     speed = next((place for place, column in enumerate(sheet.columns) if _is_speed(column)), None)
-    return Recording(
+    return AppRecording(
         NAME,
         sensor_of(sheet, time_ns, accel, "accelerometer", accel_unit, up),
         sensor_of(sheet, time_ns, gyro, "gyro", rate_unit, "right-handed"),

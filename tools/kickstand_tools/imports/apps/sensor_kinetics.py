@@ -1,8 +1,8 @@
-"""Sensor Kinetics (Innoventions): NAME_accm.csv, NAME_gyrm.csv and so on, with a time in s from the start, rounded.
+"""Sensor Kinetics (Innoventions): NAME_accm.csv, NAME_gyrm.csv and so on, with a rounded time in s from the start.
 
 Names of the files: https://rotoview.com/multi-sensor-file-system.html and the recordings in
-https://github.com/Intelligent-Systems-Phystech/MobileSensorData, some of which have semicolons and decimal commas, in
-m/s2 and rad/s, at rest with the screen up +9.8 in z.
+https://github.com/Intelligent-Systems-Phystech/MobileSensorData, some of which have semicolons and decimal commas.
+Units are m/s2 and rad/s; at rest with the screen up z is +9.8.
 """
 
 import re
@@ -10,17 +10,17 @@ import re
 from ...common.errors import InputError
 from ..files import RecordingFile
 from ..join import with_gravity
-from ..recording import Recording, Sensor, names_in, read_sheet, sensor_of
+from ..recording import AppRecording, RecordedSensor, names_in, read_sheet, sensor_of
 
 NAME = "Sensor Kinetics"
 _HEAD = ["time", "x_value", "y_value", "z_value"]
 _UP = "+1 g up, as on Android"
 _KINDS = {"acc": "total", "lac": "user", "grv": "gravity", "gyr": "gyro"}
-_SENSOR = re.compile(r"^(.*?)[_.]?(acc|gyr|grv|lac|mag|rot)m?$")  # the end of a file's name
+_SENSOR = re.compile(r"^(.*?)[_.]?(acc|gyr|grv|lac|mag|rot)m?$")  # the end of a file name
 
 
-def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
-    """The recordings among these files: those whose names are alike but for the sensor's."""
+def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
+    """The recordings among these files: the names of a recording's files differ only in the sensor."""
     alike: dict[str, list[RecordingFile]] = {}
     for file in files:
         head = [cell.lower() for cell in names_in(next(iter(file.first_lines(1)), ""))]
@@ -29,11 +29,11 @@ def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     return list(alike.values())
 
 
-def read(files: list[RecordingFile], name: str) -> Recording:
+def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a missing column or sensor."""
     by_kind = {_KINDS.get(_parts(file)[1], ""): file for file in files}
 
-    def sensor(kind: str) -> Sensor:
+    def sensor(kind: str) -> RecordedSensor:
         sheet = read_sheet(by_kind[kind])
         what = ("gyro", "rad/s", "right-handed") if kind == "gyro" else ("accelerometer", "m/s2", _UP)
         return sensor_of(sheet, sheet.times(0), [1, 2, 3], *what)
@@ -43,7 +43,7 @@ def read(files: list[RecordingFile], name: str) -> Recording:
     accel = with_gravity(by_kind, sensor, name, "linear acceleration", remedy, f"no accelerometer: {give}")
     if "gyro" not in by_kind:
         raise InputError(f"{name}: no gyroscope: {give}")
-    return Recording(NAME, accel, sensor("gyro"), sign_known=False)
+    return AppRecording(NAME, accel, sensor("gyro"), sign_known=False)
 
 
 def _parts(file: RecordingFile) -> tuple[str, str]:

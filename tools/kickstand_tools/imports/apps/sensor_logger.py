@@ -1,28 +1,29 @@
-"""Sensor Logger (Kelvin Choi): a CSV for each sensor, times in ns since 1970; signs as the phone's system has them.
+"""Sensor Logger (Kelvin Choi): one CSV per sensor, times in ns since 1970, signs as in the phone's system.
 
 Files and units: UNITS.md, signs: COORDINATES.md and CROSSPLATFORM.md of
-https://github.com/tszheichoi/awesome-sensor-logger. Accelerometer.csv has no gravity in it. An iPhone's acceleration
-and gravity have the opposite sign, and AccelerometerUncalibrated is in g, unless "Standardise Units & Frames" was on.
+https://github.com/tszheichoi/awesome-sensor-logger. Accelerometer.csv does not contain gravity. An iPhone's
+acceleration and gravity have the opposite sign, and AccelerometerUncalibrated is in g, unless "Standardise Units &
+Frames" was on.
 """
 
 from ...common.errors import InputError
 from ..files import RecordingFile
 from ..join import with_gravity
-from ..recording import Recording, Sensor, names_in, read_sheet, sensor_of, track_of
+from ..recording import AppRecording, RecordedSensor, names_in, read_sheet, sensor_of, track_of
 
 NAME = "Sensor Logger"
 _TOTAL, _RAW, _USER, _GRAVITY = "totalacceleration", "accelerometeruncalibrated", "accelerometer", "gravity"
-_KINDS = {"total": (_TOTAL, _RAW), "user": (_USER,), "gravity": (_GRAVITY,)}  # of two, the first one counts
+_KINDS = {"total": (_TOTAL, _RAW), "user": (_USER,), "gravity": (_GRAVITY,)}  # if both exist, the first is used
 _GYROS = ("gyroscope", "gyroscopeuncalibrated")
 
 
-def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
-    """The recordings among these files, one a folder."""
+def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
+    """The recordings among these files, one per folder."""
     folders = dict.fromkeys(file.folder for file in files if _is_ours(file))
     return [[file for file in files if file.folder == folder] for folder in folders]
 
 
-def read(files: list[RecordingFile], name: str) -> Recording:
+def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a missing column or sensor."""
     by_stem = {file.stem: file for file in files}
     apple, standard = _platform(by_stem)
@@ -34,7 +35,7 @@ def read(files: list[RecordingFile], name: str) -> Recording:
         )
     up = "iPhone, -1 g up: sign turned" if turned else "+1 g up, standardised" if apple else "Android, +1 g up"
 
-    def acceleration(kind: str) -> Sensor:
+    def acceleration(kind: str) -> RecordedSensor:
         stem = next(stem for stem in _KINDS[kind] if stem in by_stem)
         raw = turned and stem == _RAW
         return _sensor(by_stem[stem], "accelerometer", "g" if raw else "m/s2", up, -1.0 if turned else 1.0)
@@ -52,7 +53,7 @@ def read(files: list[RecordingFile], name: str) -> Recording:
         time_ns = sheet.times(sheet.place("time") or 0, "ns")
         speed, lat, lon = (sheet.place(column) for column in ("speed", "latitude", "longitude"))
         track = track_of(sheet, time_ns, speed, lat, lon)
-    return Recording(NAME, accel, _sensor(gyro_file, "gyro", "rad/s", "right-handed"), track, utc_ns=0)
+    return AppRecording(NAME, accel, _sensor(gyro_file, "gyro", "rad/s", "right-handed"), track, utc_ns=0)
 
 
 def _is_ours(file: RecordingFile) -> bool:
@@ -70,7 +71,7 @@ def _platform(by_stem: dict[str, RecordingFile]) -> tuple[bool | None, bool]:
     return (False, False) if _TOTAL in by_stem else (None, False)  # only Android has that file
 
 
-def _sensor(file: RecordingFile, quantity: str, unit: str, sign: str, turn: float = 1.0) -> Sensor:
+def _sensor(file: RecordingFile, quantity: str, unit: str, sign: str, turn: float = 1.0) -> RecordedSensor:
     sheet = read_sheet(file)
     places, missing = sheet.axes("time", "x", "y", "z")
     if missing:

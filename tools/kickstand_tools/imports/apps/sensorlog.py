@@ -1,8 +1,8 @@
 """SensorLog (Bernd Thomas) on an iPhone or a Watch: one wide CSV, each sensor with its own time since the start of iOS.
 
-Columns as in the example logs at http://sensorlog.berndthomas.net. Values are Core Motion's: accelerations in g that
-read -1 along the axis that points up at rest (https://developer.apple.com/reference/uikit/uiacceleration), also
-gravity and the user's acceleration, whose sum they are; rates in rad/s, right-handed.
+Columns are those of the example logs at http://sensorlog.berndthomas.net. Values are Core Motion's. Accelerations are
+in g and read -1 along the axis that points up at rest (https://developer.apple.com/reference/uikit/uiacceleration),
+they are the sum of gravity and the user's acceleration, which are also given. Rates are in rad/s, right-handed.
 """
 
 import numpy as np
@@ -10,7 +10,17 @@ import numpy as np
 from ...common.errors import InputError
 from ..files import RecordingFile
 from ..join import with_gravity
-from ..recording import Recording, Sensor, Sheet, Track, names_in, plain, read_sheet, sensor_of, track_of
+from ..recording import (
+    AppRecording,
+    ReceiverTrack,
+    RecordedSensor,
+    Sheet,
+    names_in,
+    plain,
+    read_sheet,
+    sensor_of,
+    track_of,
+)
 from ..units import NO_TIME, REPEATED, Nanoseconds
 
 NAME = "SensorLog"
@@ -23,23 +33,23 @@ _KINDS = {"total": ("accelerometer", _ACCEL), "user": ("motion", _USER), "gravit
 _RATE = [f"motionRotationRate{axis}" for axis in "XYZ"]
 
 
-def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
+def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     """Each file that has SensorLog's columns is a recording."""
     return [[file] for file in files if _is_ours(file)]
 
 
-def read(files: list[RecordingFile], name: str) -> Recording:
+def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a missing column or sensor."""
     sheet = read_sheet(files[0])
     places = {kind: _places(sheet, names) for kind, (_, names) in _KINDS.items()}
 
-    def acceleration(kind: str) -> Sensor:
+    def acceleration(kind: str) -> RecordedSensor:
         return sensor_of(sheet, _clock(sheet, _KINDS[kind][0]), places[kind], "accelerometer", "g", _UP, -1.0)
 
     there = [kind for kind, columns in places.items() if columns]
     remedy = "log the accelerometer, or gravity beside the user's acceleration"
     accel = with_gravity(there, acceleration, name, "acceleration", remedy, f"no acceleration: {remedy}")
-    return Recording(NAME, accel, _gyro(sheet, name), _location(sheet), utc_ns=_utc_ns(sheet))
+    return AppRecording(NAME, accel, _gyro(sheet, name), _location(sheet), utc_ns=_utc_ns(sheet))
 
 
 def _is_ours(file: RecordingFile) -> bool:
@@ -48,13 +58,13 @@ def _is_ours(file: RecordingFile) -> bool:
 
 
 def _places(sheet: Sheet, names: list[str]) -> list[int]:
-    """The columns of three axes, none where one is missing or holds nothing."""
+    """The columns of three axes; none if one is missing or empty."""
     found, missing = sheet.axes(*names)
     return found if not missing and np.any(np.isfinite(sheet.table(found)).all(axis=1)) else []
 
 
 def _clock(sheet: Sheet, sensor: str) -> Nanoseconds:
-    """A sensor's own times; only the first row of each of its samples has one, for a row repeats what is not new."""
+    """A sensor's own times. Rows repeat old samples; only the first row of each sample gets a time."""
     time_ns = _times(sheet, sensor)
     return np.where(np.diff(time_ns, prepend=NO_TIME) == 0, REPEATED, time_ns)
 
@@ -66,7 +76,7 @@ def _times(sheet: Sheet, sensor: str) -> Nanoseconds:
     return sheet.times(place)
 
 
-def _gyro(sheet: Sheet, name: str) -> Sensor:
+def _gyro(sheet: Sheet, name: str) -> RecordedSensor:
     for sensor, names in (("gyro", _GYRO), ("motion", _RATE)):
         places = _places(sheet, names)
         if places:
@@ -75,7 +85,7 @@ def _gyro(sheet: Sheet, name: str) -> Sensor:
 
 
 def _utc_ns(sheet: Sheet) -> int | None:
-    """UTC less the time since the start of iOS, by the times at which the rows were logged."""
+    """UTC minus the time since the start of iOS, from the times at which the rows were logged."""
     logged = sheet.place("loggingTime")
     if logged is None:
         return None
@@ -88,8 +98,8 @@ def _utc_ns(sheet: Sheet) -> int | None:
     return int(np.median(written[both] - own[both])) if np.any(both) else None
 
 
-def _location(sheet: Sheet) -> Track | None:
-    """The positions and speeds; a fix is new in the row in which its own time has changed."""
+def _location(sheet: Sheet) -> ReceiverTrack | None:
+    """The positions and speeds. A fix is new in a row if its own time has changed."""
     row_ns = _times(sheet, "accelerometer" if _places(sheet, _ACCEL) else "motion")
     fix = sheet.place("locationTimestamp_since1970")
     if fix is not None:

@@ -2,8 +2,8 @@
 
 Sections and standard channels: https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format; latitude
 and longitude in minutes, longitude positive in the west. Signs of the IMU04's channels, "CAN Output - IMU04" at
-en.racelogic.support: acceleration x forward, y to the left, z up, with gravity in it; yaw rate positive clockwise and
-pitch rate nose up, so the rates are those about axes forward, right and down.
+en.racelogic.support: acceleration x forward, y to the left, z up, including gravity; yaw rate positive clockwise, pitch
+rate positive nose up. So the rates are about axes forward, right and down.
 """
 
 import re
@@ -14,11 +14,11 @@ import numpy as np
 from ...common.errors import InputError
 from ...logs.csv_reader import columns_of
 from ..files import RecordingFile
-from ..recording import Recording, Sheet, plain, sensor_of, track_of
+from ..recording import AppRecording, Sheet, plain, sensor_of, track_of
 from ..units import ACCELERATIONS, RATES, SPEEDS, of_day, unit
 
 NAME = "VBO"
-_CHANNELS = {  # of the vehicle: along and about left, up, forward
+_CHANNELS = {  # the vehicle's: along and about left, up, forward
     "Y_Accel": ("yaccel", "yacceleration", "imuyaccel"),
     "Z_Accel": ("zaccel", "zacceleration", "imuzaccel"),
     "X_Accel": ("xaccel", "xacceleration", "imuxaccel"),
@@ -26,7 +26,7 @@ _CHANNELS = {  # of the vehicle: along and about left, up, forward
     "YawRate": ("yawrate", "imuyawrate"),
     "RollRate": ("rollrate", "imurollrate"),
 }
-# RaceBox's names, of its box's x forward, y left, z up: in the order of _CHANNELS
+# RaceBox's names (box: x forward, y left, z up), in the order of _CHANNELS
 _BOX = (
     ("LatAcc", "LateralAcc"),
     ("VertAcc", "VerticalAcc"),
@@ -45,12 +45,12 @@ _LACKING = (
 _SECTION = re.compile(r"^\[([^\]]+)\]\s*$")
 
 
-def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
+def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     """Each file with VBO's sections is a recording."""
     return [[file] for file in files if "[column names]" in file.text[:20000].lower() and "[data]" in file.text]
 
 
-def read(files: list[RecordingFile], name: str) -> Recording:
+def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a missing section or column."""
     sections = _sections(files[0])
     sheet = _sheet(files[0].name, sections)
@@ -84,7 +84,7 @@ def read(files: list[RecordingFile], name: str) -> Recording:
     )
     for taken in track.taken if track else []:
         taken.unit = "minutes, west positive" if taken.quantity == "position" else taken.unit
-    return Recording(
+    return AppRecording(
         NAME,
         sensor_of(sheet, time_ns, places[:3], "accelerometer", accel_unit, up),
         sensor_of(sheet, time_ns, places[3:], "gyro", rate_unit, turned, turn),
@@ -96,7 +96,7 @@ def read(files: list[RecordingFile], name: str) -> Recording:
 
 
 def _sections(file: RecordingFile) -> dict[str, list[str]]:
-    """The lines of each section by its name in small letters; "" has those before the first."""
+    """The lines of each section, by its name in lower case; "" for the lines before the first section."""
     sections: dict[str, list[str]] = {"": []}
     lines = sections[""]
     for line in file.text.split("\n"):
@@ -118,7 +118,7 @@ def _sheet(name: str, sections: dict[str, list[str]]) -> Sheet:
 
 
 def _units(sections: dict[str, list[str]], sheet: Sheet) -> dict[int, str]:
-    """The units of the last columns: [channel units] has one line for each that is no standard channel."""
+    """The units of the last columns: [channel units] has one line for each non-standard channel."""
     units = sections.get("channel units", [])
     while units and not units[-1]:
         units = units[:-1]
@@ -129,7 +129,7 @@ def _units(sections: dict[str, list[str]], sheet: Sheet) -> dict[int, str]:
 
 
 def _first(sheet: Sheet, name: str) -> int | None:
-    """The column of a name, also with its source after a hyphen: x_acc-acc."""
+    """The first column with this name, also with its source after a hyphen: x_acc-acc."""
     found = [plain(column.partition("-")[0]) for column in sheet.columns]
     return found.index(name) if name in found else None
 
@@ -141,7 +141,7 @@ def _speed_unit(sections: dict[str, list[str]]) -> str:
 
 
 def _midnight_ns(sections: dict[str, list[str]]) -> int | None:
-    """The start of the day on which the file was created, from 1970: the rows' times are UTC of that day."""
+    """The start of the day on which the file was created, ns since 1970: the rows' times are UTC of that day."""
     match = re.search(r"(\d{1,2})/(\d{1,2})/(\d{4})", " ".join(sections[""][:3]))
     try:
         day = datetime(int(match[3]), int(match[2]), int(match[1]), tzinfo=UTC) if match else None

@@ -1,2 +1,2 @@
-"""MicroPython's `machine`, `time` and `os` as the firmware sees them on the simulated board: Board.install() puts them
-in place. CPython and MicroPython both run them, except cpython.py, which adds what CPython lacks."""
+"""MicroPython's `machine`, `time` and `os` for the firmware on the simulated board. Board.install() installs them.
+CPython and MicroPython both run them, except cpython.py, which adds what CPython lacks."""

@@ -1,10 +1,10 @@
-"""The boards that can be simulated: what MicroPython calls them, and which pins and I2C controllers their chips have.
+"""The boards that can be simulated: their names in MicroPython, and the pins and I2C controllers of their chips.
 
 Sources: data sheets of the chips; mpconfigboard.h of each board in ports/rp2/boards and ports/esp32/boards of
 MicroPython.
 """
 
-# By a short name, what sys.implementation._machine says
+# By a short name, the board's sys.implementation._machine
 MACHINES = {
     "pico": "Raspberry Pi Pico with RP2040",
     "pico w": "Raspberry Pi Pico W with RP2040",
@@ -19,7 +19,7 @@ MACHINES = {
     "s2": "Generic ESP32S2 module with ESP32-S2",
     "s2 mini": "LOLIN_S2_MINI with ESP32-S2FN4R2",
     "s3": "Generic ESP32S3 module with ESP32-S3",
-    "s3 of 1.25": "Generic ESP32S3 module with ESP32S3",  # as MicroPython 1.25 says it
+    "s3 of 1.25": "Generic ESP32S3 module with ESP32S3",  # as in MicroPython 1.25
     "c3": "ESP32C3 module with ESP32-C3",
     "c6": "ESP32C6 module with ESP32-C6",
     "h2": "ESP32H2 module with ESP32-H2",
@@ -58,7 +58,7 @@ def i2c_controllers(machine):
 
 
 def has_bluetooth(machine):
-    """True if MicroPython on it has the module bluetooth."""
+    """True if its MicroPython has the module bluetooth."""
     chip = _chip(machine)
     return " W with " in machine if chip.startswith("RP2") else not chip.startswith("ESP32S2")
 

@@ -1,5 +1,5 @@
-"""Gives CPython what the firmware needs of MicroPython: modules `micropython` and `framebuf`, sys.print_exception, what
-gc has more."""
+"""Adds to CPython what the firmware needs from MicroPython: modules `micropython` and `framebuf`, sys.print_exception,
+and functions of gc."""
 
 import gc
 import sys
@@ -10,7 +10,7 @@ from . import framebuf
 
 
 def supplement():
-    """Add them, so that drivers and app can be imported. The firmware's mathematics runs without."""
+    """Add them, to import drivers and app. The firmware's mathematics runs without."""
     sys.modules.setdefault("micropython", _module())
     sys.modules.setdefault("framebuf", framebuf)
     if not hasattr(sys, "print_exception"):
@@ -33,5 +33,5 @@ def _module():
 
 
 def _no_viper(function):
-    """Until Python 3.13 the types in its annotations raise this; from 3.14 on nobody evaluates those."""
+    """Raise the error that its annotations' types raise until Python 3.13; from 3.14 on they are not evaluated."""
     raise NameError("CPython has no machine code")

@@ -1,12 +1,12 @@
-"""MicroPython's `bluetooth` on the simulated board: as much of it as a peripheral needs, on the radio of the board that
-was installed last. The errors are those of the ports with NimBLE (ESP32) and btstack (Pico W).
+"""MicroPython's `bluetooth` on the simulated board: the parts that a peripheral needs, on the radio of the board
+installed last. The errors are those of the ports with NimBLE (ESP32) and btstack (Pico W).
 """
 
 import errno
 
 from . import fake_machine
 
-NOTIFY_US = 150  # that a notification takes the processor; assumed, for no radio was measured
+NOTIFY_US = 150  # processor time of a notification; assumed, because no radio was measured
 
 
 class UUID:
@@ -17,13 +17,13 @@ class UUID:
 
 
 def BLE():
-    """bluetooth.BLE(): on boards that cannot pair it has no gap_passkey()."""
+    """bluetooth.BLE(). On boards that cannot pair it has no gap_passkey()."""
     radio = fake_machine.board.radio
     return PairingBle(radio) if radio.pairs else Ble(radio)
 
 
 class Ble:
-    """The radio, as the firmware speaks to it."""
+    """The firmware's interface to the radio."""
 
     _PAIRING = ()
 
@@ -90,7 +90,7 @@ class Ble:
 
 
 class PairingBle(Ble):
-    """With what NimBLE can do and btstack's build for a Pico W cannot."""
+    """Adds a feature of NimBLE that btstack's build for a Pico W lacks."""
 
     _PAIRING = ("bond", "mitm", "io", "le_secure")
 

@@ -1,5 +1,5 @@
-"""MicroPython's `machine` on the simulated board: as much of it as the firmware may use, with the errors of the rp2 and
-esp32 ports. It acts on the board that was installed last.
+"""MicroPython's `machine` on the simulated board: the parts that the firmware may use, with the errors of the rp2 and
+esp32 ports. It acts on the board installed last.
 """
 
 import errno
@@ -7,14 +7,14 @@ import errno
 from ..clock import Reset
 from . import chips
 
-CALL_US = 2  # duration of a call into `machine`, so that a loop that waits for a pin comes to an end
+CALL_US = 2  # duration of a call into `machine`: with it a loop that waits for a pin ends
 IRQ_US = 26  # duration of an interrupt without its calls into `machine` and `time`: 33 in all, as on a Pico
 
 PWRON_RESET = 1
 WDT_RESET = 3  # the rp2 port reports this after machine.reset() too
 
 _TICK_MS = 10  # tick of FreeRTOS on an ESP32
-_LEGACY_MS = 100  # time that an ESP32's legacy driver waits for each byte, and once more
+_LEGACY_MS = 100  # time that an ESP32's legacy driver waits for each byte, and once more at the end
 _SPI_CALL_US = 20  # duration of a call into machine.SPI, with the driver's Python around it
 _RP2_MAX_WATCHDOG_MS = 8388
 _ESP32_TICKS = 4  # ticks of its watchdog's second stage per millisecond, counted in 32 bits (ESP-IDF)
@@ -23,14 +23,15 @@ _WATCHDOG_ENABLE = 1 << 30
 
 
 def use(installed):
-    """Make everything here act on this simulator.Board from now on."""
+    """From now on act on this simulator.Board."""
     global board, soft_irqs
     board = installed
     soft_irqs = Irqs(board.clock, Irqs.SCHEDULED)
 
 
 class Pin:
-    """machine.Pin: levels, and interrupts from what is wired to the pin. Handlers run while simulated time passes."""
+    """machine.Pin: levels, and interrupts from the part wired to the pin. Handlers run while simulated time
+    advances."""
 
     IN, OUT, OPEN_DRAIN = 0, 1, 2
     PULL_UP, PULL_DOWN = 1, 2
@@ -92,8 +93,9 @@ class Pin:
 
 
 class Irqs:
-    """Interrupts that wait while a handler runs; what does not fit into the queue is lost. On an RP2040 one more edge
-    of a pin is kept. On an ESP32 MicroPython calls the handlers of all pins between two steps of the program; during
+    """Interrupts that wait while a handler runs. Those that do not fit into the queue are lost. On an RP2040 one more
+    edge of a pin is kept. On an ESP32 MicroPython calls the handlers of all pins between two steps of the program;
+    during
     a transfer of SoftI2C, which is one step, they wait in the queue of its scheduler.
 
     clock: a Clock.  held: True during such a transfer.
@@ -138,9 +140,9 @@ class _Controller:
         self._bus = board.bus_on(Pin(sda).id, Pin(scl).id, freq)
         self._clock = board.clock
         self._bit_ns = 1_000_000_000 // freq
-        self._ns = 0  # less than a microsecond: time that has passed but is not on the clock yet
+        self._ns = 0  # time under a microsecond that has passed but is not yet on the clock
         self._timeout_us = timeout
-        self._bytes = 0  # number of bytes in the transfer under way, without the address
+        self._bytes = 0  # number of bytes in the current transfer, without the address
 
     def readfrom_mem_into(self, addr, memaddr, buf, addrsize=8):
         self._bytes = 1 + len(buf)
@@ -209,7 +211,7 @@ class _Controller:
             raise OSError(self._NO_DEVICE)
 
     def _stall(self):
-        """Wait as long as the controller does for wires that are held; raises OSError."""
+        """Wait for held wires as long as the controller does, then raise OSError."""
         self._clock.advance(self._timeout_us)
         raise OSError(errno.ETIMEDOUT)
 
@@ -221,15 +223,15 @@ class _Controller:
 
     def _receive(self, buf):
         try:
-            self._spend(9 * len(buf) + 1)  # the STOP included
+            self._spend(9 * len(buf) + 1)  # including the STOP
         except Reset:
-            self._bus.hang()  # the device does not notice the reset and goes on sending
+            self._bus.hang()  # the device does not notice the reset and continues to send
             raise
         self._bus.read_into(buf)
 
 
 def _in_one_go(method):
-    """The same transfer of a SoftI2C, during which no handler of an interrupt is called."""
+    """The same transfer of a SoftI2C, without interrupt handlers during it."""
 
     def transfer(self, *arguments, **named):
         soft_irqs.held = True
@@ -242,8 +244,8 @@ def _in_one_go(method):
 
 
 class SoftI2C(_Controller):
-    """machine.SoftI2C, in software on any two pins. It does not look whether SDA is held: the clocks of a transfer let
-    the device that holds it finish its byte, and the zeros that it sends meanwhile pass for answers."""
+    """machine.SoftI2C, in software on any two pins. It does not check whether SDA is held: the clocks of a transfer let
+    the holding device finish its byte, and the zeros that it sends look like answers."""
 
     def __init__(self, scl, sda, freq=400000, timeout=50000):
         super().__init__(scl, sda, freq, timeout)
@@ -279,7 +281,7 @@ class SoftI2C(_Controller):
             self._clock_byte()
 
     def _clock_byte(self):
-        """Nine clocks; raises OSError if SDA is high at the last one, which is no acknowledgement."""
+        """Send nine clocks. Raises OSError if SDA is high at the last one, which means no acknowledgement."""
         for _ in range(9):
             self._bus.set_scl(0)
             self._bus.set_scl(1)
@@ -323,7 +325,7 @@ class I2C(_Controller):
 
 
 class ADC:
-    """machine.ADC: measures what the board's volts say of the pin."""
+    """machine.ADC: measures the voltage in the board's `volts` for the pin."""
 
     def __init__(self, pin):
         self._number = pin.id if isinstance(pin, Pin) else pin
@@ -409,7 +411,7 @@ class WDT:
 
 
 class Timer:
-    """machine.Timer: its callback runs within whichever call lets the time pass. period in ms."""
+    """machine.Timer: its callback runs in the call that advances the time. period in ms."""
 
     ONE_SHOT, PERIODIC = 0, 1
 

@@ -1,6 +1,6 @@
-"""MicroPython's `os` with an ilistdir() that gives sizes, as on a board, and the room of a Pico's flash.
+"""MicroPython's `os` with an ilistdir() that returns sizes, as on a board, and the free space of a Pico's flash.
 
-Under MicroPython this module takes the place of `os`; under CPython the names in ADDED are added to the real one.
+On MicroPython this module replaces `os`. On CPython the names in ADDED are added to the real one.
 """
 
 import os
@@ -13,12 +13,12 @@ BLOCK = 4096
 FLASH_BLOCKS = 352
 FIRMWARE_BLOCKS = 80  # compiled
 
-# What CPython's os does not have
+# Names that CPython's os lacks
 ADDED = ("ilistdir",)
 
 
 def ilistdir(path="."):
-    """Yield (name, type, 0, size in bytes) for each entry, and (name, type, 0) for what is mounted."""
+    """Yield (name, type, 0, size in bytes) for each entry, and (name, type, 0) for a mounted file system."""
     mounted = []
     if path == "/" and hasattr(os, "mount"):
         listed = os.ilistdir(path)  # pyright: ignore[reportAttributeAccessIssue]
@@ -32,8 +32,8 @@ def ilistdir(path="."):
 
 
 def statvfs(path):
-    """os.statvfs(). For a folder in the current one it returns the figures of a Pico's flash with the firmware and this
-    folder: the real file system may be very large."""
+    """os.statvfs(). For a folder in the current one it returns the values of a Pico's flash with the firmware and this
+    folder, because the real file system may be very large."""
     if path.startswith("/"):
         return os.statvfs(path)
     free = FLASH_BLOCKS - FIRMWARE_BLOCKS - _taken(path)

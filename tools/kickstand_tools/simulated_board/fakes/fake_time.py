@@ -1,18 +1,18 @@
 """MicroPython's `time` on the simulated board's clock.
 
-Under MicroPython this module takes the place of `time`; under CPython the names in ADDED are added to the real one.
+On MicroPython this module replaces `time`. On CPython the names in ADDED are added to the real one.
 """
 
-CALL_US = 5  # duration of reading the time, so that a loop that waits for a time comes to an end
-_PERIOD = 1 << 30  # where ticks_us() and ticks_ms() start again at 0, as on the boards
+CALL_US = 5  # duration of reading the time: with it a loop that waits for a time ends
+_PERIOD = 1 << 30  # ticks_us() and ticks_ms() restart at 0 after this, as on the boards
 _HALF = _PERIOD // 2
 
-# What CPython's time does not have
+# Names that CPython's time lacks
 ADDED = ("ticks_us", "ticks_ms", "ticks_cpu", "ticks_add", "ticks_diff", "sleep_us", "sleep_ms")
 
 
 def use(board_clock, at_zero_us):
-    """Make everything here read this clock from now on; ticks are 0 when it stands at at_zero_us."""
+    """From now on read this clock. Ticks are 0 at its time at_zero_us."""
     global clock, zero_us
     clock = board_clock
     zero_us = at_zero_us

@@ -1,4 +1,4 @@
-"""MicroPython's module framebuf for CPython: what the firmware and its examples draw with, pixel for pixel."""
+"""MicroPython's module framebuf for CPython: the functions that the firmware and its examples use, pixel for pixel."""
 
 from .framebuf_font import FONT
 

@@ -1,5 +1,5 @@
-"""Puts the fakes in the place of `machine`, `time` and `os`, and of `sys` where the board is another than the one that
-the firmware was imported for; and puts the real modules back."""
+"""Replaces `machine`, `time` and `os` by the fakes, and also `sys` if the board differs from the one that the firmware
+was imported for. Restores the real modules."""
 
 import os
 import sys
@@ -11,10 +11,10 @@ _ADDED_TO = ((time, fake_time), (os, fake_os))  # under CPython
 
 
 class Installer:
-    """install() may be called again, for another board; uninstall() undoes all of it."""
+    """install() may be called again, for another board. uninstall() undoes everything."""
 
     def __init__(self):
-        self._real = {}  # the modules that were replaced; None where there was none
+        self._real = {}  # the replaced modules; None for a module that did not exist
 
     def install(self, board):
         """Replace `machine`, `time` and `os` by those of this simulator.Board."""
@@ -35,7 +35,7 @@ class Installer:
             self._replace("time", fake_time)
             self._replace("os", fake_os)
         else:
-            from . import cpython  # imports modules that MicroPython does not have
+            from . import cpython  # it imports modules that MicroPython does not have
 
             cpython.supplement()
             for real, fake in _ADDED_TO:
@@ -43,7 +43,7 @@ class Installer:
                     setattr(real, name, getattr(fake, name))
 
     def uninstall(self):
-        """Put the real modules back."""
+        """Restore the real modules."""
         for name, module in self._real.items():
             if module is None:
                 sys.modules.pop(name, None)
@@ -67,13 +67,13 @@ class _Namespace:
 
 
 class _Esp32:
-    """The module esp32 of a board whose heap has room."""
+    """The module esp32 of a board with free heap."""
 
     HEAP_DATA = 4
 
     @staticmethod
     def idf_heap_info(capabilities):
-        """One region of ESP-IDF's heap: its size, and how much of it is free, in one piece, and at the least."""
+        """One region of ESP-IDF's heap: its size, free bytes, largest free block, and least free bytes so far."""
         return [(160_000, 0, 0, 0)]
 
 

@@ -1,9 +1,9 @@
-"""Stands in for micropython-lib's driver `sdcard`, with the same interface. write() and write_token(), in which that
-driver has faults, are left out: the firmware brings its own (kickstand/board/spi_card.py).
+"""Replaces micropython-lib's driver `sdcard`, with the same interface. write() and write_token(), which are faulty in
+that driver, are left out: the firmware has its own (kickstand/board/spi_card.py).
 """
 
 # pyright: reportAttributeAccessIssue=false
-# the time is MicroPython's, and the methods that are left out are a subclass's
+# `time` is MicroPython's, and a subclass has the missing methods
 
 import time
 
@@ -74,7 +74,7 @@ class SDCard:
     def readblocks(self, block_num, buf):
         """For the file system. Raises OSError."""
         view = memoryview(buf)
-        for i in range(len(buf) // 512):  # the real driver reads several with CMD18
+        for i in range(len(buf) // 512):  # the real driver reads several blocks with CMD18
             if self.cmd(17, block_num + i, release=False) != 0:
                 self.cs(1)
                 raise OSError(5)

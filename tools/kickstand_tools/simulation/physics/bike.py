@@ -1,7 +1,7 @@
-"""A two-wheeler: its dimensions, where the sensor sits on it, and how it leans and yaws.
+"""A two-wheeler: its dimensions, the place of the sensor, and how it leans and yaws.
 
-The roll balance is that of a bike whose rider wants a certain lean. Lean > 0 to the right, yaw rate > 0 in a left turn.
-The line from the contact point to the centre of mass leans by the balance lean b. The chassis leans more, because wide
+The rider commands a lean, and the bike stays in roll balance. Lean > 0 to the right, yaw rate > 0 in a left turn. The
+line from the contact point to the centre of mass leans by the balance lean b. The chassis leans more, because wide
 tyres touch the road beside their middle.
 """
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from ..commands import Commands
+from ..commands import RiderCommands
 from .signals import Signal, band_noise, derivative, second_order, smoothed, smoothstep
 
 _STEERING_S = 0.04  # smoothing of the steering, because its rate is limited
@@ -20,9 +20,9 @@ _STANDS_MPS, _RIDES_MPS = 0.4, 1.5  # below the first the feet hold the bike, ab
 
 @dataclass(frozen=True)
 class Bike:
-    """Lengths in m. Figures from V. Cossalter, Motorcycle Dynamics, 2nd ed., chapters 3, 4, 6 and 8.
+    """Lengths in m. Values from V. Cossalter, Motorcycle Dynamics, 2nd ed., chapters 3, 4, 6 and 8.
 
-    The defaults are an average naked bike with its rider; random() varies them as bikes on the road do.
+    The defaults are an average naked bike with its rider. random() varies them within the range of real bikes.
     """
 
     mass_height: float = 0.62  # centre of mass of bike and rider together, above the ground
@@ -33,8 +33,8 @@ class Bike:
     sensor_height: float = 0.70
     sensor_forward: float = 0.75  # distance of the sensor in front of the rear contact point
     sensor_left: float = 0.0
-    # Pitch by the springs, as a superbike's suspension sensors show it. Its wheels do not rise meanwhile.
-    dive_deg_per_g: float = 2.8  # nose down in braking, of a telescopic fork; an anti-dive fork has less than 0
+    # Pitch caused by the springs, from a superbike's suspension sensors. The wheels do not rise during it.
+    dive_deg_per_g: float = 2.8  # nose down in braking, for a telescopic fork; an anti-dive fork has less than 0
     squat_deg_per_g: float = 1.3  # nose up in acceleration
     dive_hz: float = 1.7
     dive_damping: float = 0.45
@@ -65,7 +65,7 @@ class Bike:
 
     @property
     def pendulum(self) -> float:
-        """Length of the equivalent pendulum in roll, m: the longer, the slower the bike falls into a lean."""
+        """Length of the equivalent pendulum in roll, m. A bike with a longer one falls into a lean more slowly."""
         return (self.mass_height**2 + self.roll_gyration**2) / self.mass_height
 
 
@@ -88,10 +88,10 @@ def chassis_lean(balance: Signal, bike: Bike, bank: Signal | float = 0.0, hang: 
     return balance + flank - np.arctan2(hang, arm)
 
 
-def weave(chance: np.random.Generator, command: Commands, riding_deg: float) -> Signal:
+def weave(chance: np.random.Generator, command: RiderCommands, riding_deg: float) -> Signal:
     """Random changes of the lean by the rider, rad.
 
-    riding_deg: rms at speed. They are larger at walking pace and small with the feet down; in bends the rider's
+    riding_deg: rms at speed. The changes are larger at walking pace and small with the feet down. In bends the rider's
     corrections of the line are added.
     """
     n, rate = len(command.time), command.rate_hz
@@ -103,12 +103,12 @@ def weave(chance: np.random.Generator, command: Commands, riding_deg: float) -> 
     return np.radians(moving + feet) + wander
 
 
-def roll(command: Commands, bike: Bike, unrest: Signal) -> Roll:
+def roll(command: RiderCommands, bike: Bike, unrest: Signal) -> Roll:
     """Lean and yaw rate for the commanded lean. The yaw rate p is the one that fulfils the pendulum's roll equation:
 
     pendulum * b'' = g_n sin b + ((1 + wheels) v p + wind) cos b
 
-    So a quick roll to the right begins with a yaw to the left: countersteering. unrest: as from weave().
+    So a quick roll to the right begins with a yaw to the left: countersteering. unrest: from weave().
     """
     rate, v = command.rate_hz, command.speed
     normal_g = STANDARD_GRAVITY * np.cos(command.slope) + v * derivative(command.slope, rate)

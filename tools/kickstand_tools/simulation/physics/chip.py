@@ -1,7 +1,7 @@
-"""What an MPU6050 reads of the motion of its own axes.
+"""Simulates the readings of an MPU6050 from the motion of its own axes.
 
 Data sheet PS-MPU-6000A rev 3.4, sections 6.1 and 6.2. The chip converts at 1 kHz and filters (DLPF 3: 44 Hz, 4.9 ms);
-every fifth result is read. Of frequencies above 100 Hz, what passes the filter aliases.
+every fifth result is read. Frequencies above 100 Hz that pass the filter alias.
 """
 
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ _DLPF = _dlpf()
 class Chip:
     """One sensor: its errors at 25 C, and how they change with temperature. Axes x, y, z; g, deg/s.
 
-    low_pass: False where nothing filters before the sampling.
+    low_pass: False if nothing filters before the sampling.
     """
 
     accel_matrix: NDArray[np.float64]  # (3, 3) reading over true value: scale factors on the diagonal, else cross-axis
@@ -59,9 +59,9 @@ class Chip:
         """A random sensor. share: factor on the data sheet's tolerances; drift: factor on an ordinary sensor's drift
         with temperature.
 
-        Offsets and biases are uniformly distributed within the sheet's limits; scale and cross-axis sensitivity
-        normally, with the limit at two standard deviations. Over temperature the sheet allows 35..60 mg and 20 deg/s
-        for 45..60 C; an ordinary sensor has a third of the former and a fifth of the latter.
+        Offsets and biases are uniformly distributed within the sheet's limits. Scale and cross-axis sensitivity are
+        normally distributed, with the limit at two standard deviations. Over temperature the sheet allows 35..60 mg and
+        20 deg/s for 45..60 C; an ordinary sensor has a third of the former and a fifth of the latter.
         """
 
         def near_one(scale: float, cross: float) -> NDArray[np.float64]:
@@ -84,7 +84,7 @@ class Chip:
         rates: NDArray[np.float64],
         temp_c: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Readings (n / 5, 7) at 200 Hz in the chip's order: g, C, deg/s. The first one is made of the first row.
+        """Readings (n / 5, 7) at 200 Hz in the chip's order: g, C, deg/s. The first reading is from the first row.
 
         force (n, 3) in g and rates (n, 3) in deg/s: true values along the sensor's axes at 1 kHz. temp_c (n,).
         """

@@ -16,7 +16,7 @@ _DPS_PER_G = 15.0  # rates (rms) per force (rms) of the vibration
 
 
 def crank_rpm(speed: Signal, shift_rpm: float, rate_hz: float) -> Signal:
-    """Speed of the crankshaft in the lowest gear that keeps it under shift_rpm. Below idle the clutch slips."""
+    """Speed of the crankshaft, 1/min, in the lowest gear that keeps it under shift_rpm. Below idle the clutch slips."""
     rpm = speed * _RPM_PER_MPS[-1]
     for ratio in reversed(_RPM_PER_MPS[:-1]):
         rpm = np.where(speed * ratio < shift_rpm, speed * ratio, rpm)

@@ -1,4 +1,4 @@
-"""What a perfect sensor on a moving rigid body measures: exact rates and specific force, from its attitude.
+"""Computes exact rates and specific force on a moving rigid body, from its attitude.
 
 Vehicle axes: left, up, forward. The attitude is heading about the vertical, then pitch about the lateral axis, then
 lean about the forward axis. So at rest the lean is atan2(left, up) of the specific force.
@@ -48,7 +48,7 @@ def body_rates(motion: Motion) -> NDArray[np.float64]:
 
 
 def specific_force(motion: Motion, bike: Bike) -> NDArray[np.float64]:
-    """Specific force (n, 3) in m/s^2 along left, up, forward at the sensor: its acceleration less gravity's.
+    """Specific force (n, 3) in m/s^2 along left, up, forward at the sensor: its acceleration minus gravity.
 
     The body rotates about the centre of the rear tyre's cross-section, a tyre radius above the road.
     """

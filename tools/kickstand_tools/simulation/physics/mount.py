@@ -1,6 +1,7 @@
-"""Mounts and loggers as they are: a resonating holder, a logger that aliases, readings that clip, a sensor that warms.
+"""Simulates imperfect mounts and loggers: a resonating holder, a logger that aliases, clipped readings, a warming
+sensor.
 
-Each is drawn at random within what such devices have.
+Each is random, within the range of such devices.
 """
 
 from collections.abc import Callable
@@ -12,15 +13,15 @@ from numpy.typing import NDArray
 from .chip import Chip
 from .signals import Signal, derivative, through
 
-_SAG_LIMIT = np.radians(3.0)  # of a holder's sagging: a spring is linear no further
+_SAG_LIMIT = np.radians(3.0)  # limit of a holder's sagging, because a spring is not linear beyond
 
 
 @dataclass(frozen=True)
 class Holder:
-    """A soft holder: sensor and holder are a mass on springs, along and about each axis.
+    """A soft holder: sensor and holder are a mass on springs along and about each axis.
 
-    hz, damping (3): along left, up, forward; the same springs turn it. sag (3): rad per g, about left by the force
-    forward, about up by none, about forward by the force to the left.
+    hz, damping (3): along left, up, forward; the same springs turn it. sag (3): rad per g: about left by the force
+    forward, about up none, about forward by the force to the left.
     """
 
     hz: NDArray[np.float64]
@@ -36,7 +37,8 @@ class Holder:
     def shaken(
         self, force: NDArray[np.float64], rates: NDArray[np.float64], rate_hz: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Force (n, 3, g) and rates (n, 3, deg/s) of what is held, by those of the bike, along left, up, forward."""
+        """Force (n, 3, g) and rates (n, 3, deg/s) of the held sensor from those of the bike, along left, up,
+        forward."""
         held = np.column_stack([self._passed(column, k, rate_hz) for k, column in enumerate(force.T)])
         turned = np.zeros_like(held)
         turned[:, 0] = (self.sag[0] * held[:, 2]).clip(-_SAG_LIMIT, _SAG_LIMIT)
@@ -48,7 +50,7 @@ class Holder:
         return held - np.cross(turned, held), turning
 
     def _passed(self, x: Signal, axis: int, rate_hz: float) -> Signal:
-        """Through a mass on a spring that is shaken at its foot."""
+        """x, filtered by a mass on a spring that is shaken at its base."""
 
         def transfer(f: Signal) -> NDArray:
             damped = 2j * self.damping[axis] * f / self.hz[axis]
@@ -59,7 +61,7 @@ class Holder:
 
 @dataclass(frozen=True)
 class Mount:
-    """How the sensor sits on the bike, and what reads it. rise_c: as in Conditions, None: as there."""
+    """The sensor's mount, and the logger that reads it. rise_c: replaces that of Conditions unless None."""
 
     chip: Chip
     holder: Holder | None = None
@@ -67,17 +69,18 @@ class Mount:
 
 
 def holder(chance: np.random.Generator, chip: Chip) -> Mount:
-    """5 to 40 Hz, a damping of 0.02 to 0.1, and it sags by about a fifth of a degree per g, a softer one by more."""
+    """A resonance at 5 to 40 Hz with a damping of 0.02 to 0.1. It sags by about a fifth of a degree per g, a softer one
+    by more."""
     return Mount(chip, Holder.random(chance))
 
 
 def aliasing(chance: np.random.Generator, chip: Chip) -> Mount:
-    """No low-pass before the sampling: what the engine shakes appears at other frequencies."""
+    """No low-pass before the sampling: engine vibration appears at other frequencies."""
     return Mount(replace(chip, low_pass=False))
 
 
 def clipping(chance: np.random.Generator, chip: Chip) -> Mount:
-    """Ranges of 2 g and 250 deg/s, which bumps and the engine exceed."""
+    """Ranges of 2 g and 250 deg/s: bumps and the engine exceed them."""
     return Mount(replace(chip, accel_range_g=2.0, gyro_range_dps=250.0))
 
 

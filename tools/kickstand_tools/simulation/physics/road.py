@@ -1,8 +1,8 @@
 """Road roughness through tyres and suspension.
 
-The road is a random profile of ISO 8608 whose slope is white noise over distance. So the same road shakes more at
-speed, and the rear wheel meets what the front wheel has met. Each end of the bike is a quarter-car model: the wheel on
-its tyre, the chassis on its spring.
+The road is a random profile of ISO 8608, whose slope is white noise over distance. So the same road shakes more at
+speed, and the rear wheel follows the front wheel's bumps. Each end of the bike is a quarter-car model: the wheel on its
+tyre, the chassis on its spring.
 """
 
 from dataclasses import dataclass
@@ -22,13 +22,13 @@ _CONTACT_M = 0.10  # length of a tyre's contact patch, which averages out shorte
 # One end of a motorcycle with half of its rider: kg, kg, N/m, Ns/m, N/m
 _SPRUNG, _UNSPRUNG, _SPRING, _DAMPER, _TYRE = 120.0, 15.0, 17e3, 1100.0, 150e3
 _LATERAL = 0.35  # rms along left and along forward over the vertical rms
-# Rates about left, up, forward, rms per 9.8 m/s^2 of vertical rms. 0 about left: there the pitch itself is simulated
+# Rates about left, up, forward, rms per 9.8 m/s^2 of vertical rms. 0 about left, where the pitch is simulated directly
 _RATE_DPS = np.array([0.0, 8.0, 14.0])
 
 
 @dataclass
 class Shaking:
-    """How the road moves the chassis. heave: vertical acceleration of the rear, m/s^2; pitch: rad.
+    """The motion of the chassis caused by the road. heave: vertical acceleration of the rear, m/s^2; pitch: rad.
 
     force (n, 3) in m/s^2 and rates (n, 3) in rad/s: to be added to those along and about left, up, forward.
     """
@@ -68,7 +68,7 @@ def add_bumps(slope: Signal, places_m: list[float], height_m: float, length_m: f
 def shaking(
     chance: np.random.Generator, distance: Signal, speed: Signal, slope: Signal, bike: Bike, rate_hz: float
 ) -> Shaking:
-    """The Shaking by driving over a profile. distance: the rear wheel's at each sample, m. slope: see
+    """The Shaking caused by driving over a profile. distance: the rear wheel's at each sample, m. slope: see
     profile_slope()."""
     height = np.cumsum(slope) * _STEP_M
     at = np.arange(len(slope)) * _STEP_M

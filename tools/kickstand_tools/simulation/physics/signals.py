@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Signal = NDArray[np.float64]
-_NOISE_MARGIN_S = 10.0  # noise is made longer by this at both ends and cut, because through() pads there
+_NOISE_MARGIN_S = 10.0  # noise is computed longer by this time at both ends and then cut, because through() pads there
 _BLOCK = 100_000  # frequencies computed at a time, to limit memory
 _PAD_S = 4.0  # the first and the last value are held for this time, because an FFT joins the end to the start
 
@@ -49,7 +49,7 @@ def smoothed(x: Signal, seconds: float, rate_hz: float) -> Signal:
 
 
 def second_order(x: Signal, natural_hz: float, damping: float, rate_hz: float) -> Signal:
-    """x through a low-pass of second order with gain 1 at 0 Hz, so with that filter's delay."""
+    """x filtered by a low-pass of second order with gain 1 at 0 Hz, including that filter's delay."""
 
     def transfer(f: Signal) -> NDArray:
         s = 1j * f / natural_hz

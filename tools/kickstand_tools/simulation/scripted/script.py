@@ -1,6 +1,6 @@
-"""A motorcycle in balance whose lean is known at every instant: what a perfect sensor on it would measure.
+"""A motorcycle in balance with a known lean at every instant: the measurements of a perfect sensor on it.
 
-Plain Python for CPython and MicroPython, independent of the firmware's mathematics, which it is used to judge.
+Plain Python for CPython and MicroPython, independent of the firmware's mathematics, because it tests them.
 
 Vehicle frame: left, up, forward (right-handed). Lean > 0 to the right, yaw rate > 0 in a left turn, slope > 0
 uphill. The attitude is heading about the vertical, then slope about the lateral axis, lean about forward.
@@ -20,7 +20,7 @@ KICKSTAND_DEG = -12.0  # to the left, as most are
 MOVE_S = 2.0  # from the kickstand to upright, or back
 STANDING_SWAY_DEG = 0.1  # amplitude of the lean's changes while the rider holds the bike upright
 RIDING_SWAY_DEG = 0.5  # amplitude of the lean's changes at speed
-WALKING_MPS, RIDING_MPS = 1.0, 4.0  # below the first the feet balance the bike, above the second steering alone does
+WALKING_MPS, RIDING_MPS = 1.0, 4.0  # below the first the feet balance the bike, above the second only steering does
 
 _SWAY = ((0.31, 0.6, 0.0), (0.73, 0.4, 1.0))  # Hz, share, phase
 _ROAD_HZ = (2.3, 5.9, 11.7, 19.3, 31.1)
@@ -32,7 +32,8 @@ _ENGINE_SHARE = 0.5  # the engine's share of vibration_g
 
 
 class Segment:
-    """A part of the ride in which lean, speed, slope, sway and engine change smoothly to new values (None: stay)."""
+    """A part of the ride in which lean, speed, slope, sway and engine change smoothly to new values (None: no
+    change)."""
 
     def __init__(self, phase, seconds, lean_deg=None, speed_mps=None, slope_deg=None, sway_deg=None, engine=None):
         self.phase = phase
@@ -49,7 +50,7 @@ def kickstand(seconds, lean_deg=KICKSTAND_DEG, slope_deg=None):
 
 
 def upright(seconds, lean_deg=0.0, slope_deg=None):
-    """Move upright, then be held there by the rider, engine off. lean_deg: error of that pose."""
+    """Move upright, then stay there, held by the rider, engine off. lean_deg: error of that pose."""
     return (
         Segment("moving", MOVE_S, lean_deg, 0.0, slope_deg, STANDING_SWAY_DEG, 0.0),
         Segment("upright", seconds),
@@ -57,12 +58,12 @@ def upright(seconds, lean_deg=0.0, slope_deg=None):
 
 
 def wait(seconds):
-    """Keep all values for so many seconds."""
+    """Keep all values for this time."""
     return (Segment("wait", seconds),)
 
 
 def straight(seconds, slope_deg=None):
-    """Ride straight on; a new slope is reached at the end."""
+    """Ride straight ahead; a new slope is reached at the end."""
     return (Segment("straight", seconds, slope_deg=slope_deg),)
 
 
@@ -99,7 +100,7 @@ def yaw_rate_in_balance(lean, lift_mps2, speed_mps):
     """Yaw rate about the road's normal, rad/s, that balances a lean (rad, > 0 to the right): negative in a right turn.
     lift_mps2: specific force perpendicular to the road, m/s2.
 
-    The feet help below RIDING_MPS: there it is less than what balances the lean, and from WALKING_MPS down it is 0.
+    Below RIDING_MPS the feet help: it is less than the rate that balances the lean, and below WALKING_MPS it is 0.
     """
     if speed_mps <= WALKING_MPS:
         return 0.0
@@ -114,7 +115,7 @@ def body_motion(lean, lean_rate, speed, acceleration, yaw_rate, slope=0.0, slope
 
     Angles in rad, rates in rad/s, speed in m/s, acceleration in m/s2 along the road.
     """
-    # In the road's axes: forward along the road, left level, up across both.
+    # In the road's axes: forward along the road, left level, up perpendicular to both.
     left = speed * yaw_rate * cos(slope)
     up = STANDARD_GRAVITY * cos(slope) + speed * slope_rate
     forward = acceleration + STANDARD_GRAVITY * sin(slope)
@@ -133,7 +134,7 @@ def body_motion(lean, lean_rate, speed, acceleration, yaw_rate, slope=0.0, slope
 
 
 class Ride:
-    """segments: those of the functions above, in order from t = 0. The ride starts with the values of the first one.
+    """segments: from the functions above, in order from t = 0. The ride starts with the values of the first one.
 
     vibration_g: rms of road and engine together along the up axis at 10 m/s and more, before the chip's filter.
     """

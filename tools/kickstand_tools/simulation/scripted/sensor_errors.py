@@ -1,7 +1,7 @@
-"""What an MPU6050 with its factory errors, mounted at any angle, reads of a given motion.
+"""Simulates the readings of an MPU6050 with factory errors, mounted at any angle, for a given motion.
 
-Plain Python for CPython and MicroPython. All random figures depend on the seed and the time alone: a seed gives the
-same reading at the same instant on both, whatever readings were computed before.
+Plain Python for CPython and MicroPython. All random numbers depend only on the seed and the time. So a seed gives the
+same reading at the same time on both, independent of earlier readings.
 
     world = Sensor(seed=3).world(ride.motion)
     world(20.0)         # (fx, fy, fz, wx, wy, wz, temp_c): g and deg/s in the sensor's axes, errors included
@@ -14,14 +14,14 @@ MAX_OFFSET_G = (0.05, 0.05, 0.08)  # bias of the accelerometer along x, y, z
 MAX_SCALE_ERROR = 0.03  # scale error of accelerometer and gyro
 MAX_GYRO_BIAS_DPS = 20.0
 ACCEL_NOISE_G = 0.0033  # rms: 400 ug/sqrt(Hz) behind the 44 Hz low-pass
-GYRO_NOISE_DPS = 0.041  # rms: 0.005 deg/s/sqrt(Hz) behind the 42 Hz one
+GYRO_NOISE_DPS = 0.041  # rms: 0.005 deg/s/sqrt(Hz) behind the 42 Hz low-pass
 
 UNTURNED = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 _NOISE_STEP_S = 0.0001  # the noise is constant for this time
 
 
 def scrambled(number):
-    """The 32-bit hash of an integer: the only source of random figures here."""
+    """The 32-bit hash of an integer: the only source of random numbers here."""
     number = (number ^ (number >> 16)) & 0xFFFFFFFF
     number = (number * 0x45D9F3B) & 0xFFFFFFFF
     number ^= number >> 16
@@ -30,13 +30,13 @@ def scrambled(number):
 
 
 def normal(number):
-    """A nearly normal figure of mean 0 and rms 1 from a 32-bit hash: the sum of its four bytes."""
+    """A nearly normal number of mean 0 and rms 1 from a 32-bit hash: the sum of its four bytes."""
     total = (number & 255) + (number >> 8 & 255) + (number >> 16 & 255) + (number >> 24)
     return (total - 510) / 147.8
 
 
 class Chance:
-    """A stream of random figures from a seed."""
+    """A stream of random numbers from a seed."""
 
     def __init__(self, seed):
         self._seed = scrambled(seed + 1)
@@ -89,7 +89,7 @@ class Sensor:
             self.gyro_scale = tuple([1.0 + chance.uniform(-error, error) for _ in range(3)])
 
     def read(self, motion, t_s):
-        """The seven figures of world() for a motion: left, up, forward in g, and the rates about them in deg/s."""
+        """The seven numbers of world() for a motion: left, up, forward in g, and the rates about them in deg/s."""
         m = self.vehicle_from_sensor
         left, up, forward, w_left, w_up, w_forward = motion
         instant = self._seed + int(t_s / _NOISE_STEP_S + 0.5) * 6
@@ -121,14 +121,14 @@ def resting(sensor, up):
 
 
 def turning(sensor, before, after, begin_s, end_s):
-    """Returns the function world(t_s) of a sensor that a hand turns from one pose to the next, the shortest way, slowly
-    at both ends. before, after: up in its own axes, of any length."""
+    """Returns the function world(t_s) of a sensor that a hand turns from one pose to the next on the shortest way,
+    slowly at both ends. before, after: up in its own axes, of any length."""
     m = sensor.vehicle_from_sensor
     a, b = _unit(before), _unit(after)
     n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
     size, along = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
     angle = atan2(size, along)
-    if size < 1e-6:  # a half turn, about any axis across
+    if size < 1e-6:  # a half turn, about any perpendicular axis
         n = [a[1] - a[2], a[2] - a[0], a[0] - a[1]]
         if n[0] * n[0] + n[1] * n[1] + n[2] * n[2] < 0.1:
             n = [a[1], -a[0], 0.0]
@@ -140,7 +140,7 @@ def turning(sensor, before, after, begin_s, end_s):
         at = angle * u * u * u * (10.0 + u * (6.0 * u - 15.0))
         rate = angle * 30.0 * u * u * (1.0 - u) * (1.0 - u) / (end_s - begin_s)
         up = [cos(at) * a[i] + sin(at) * across[i] for i in range(3)]
-        turn = [-degrees(rate) * n[i] for i in range(3)]  # the world turns in the sensor's axes as the sensor does not
+        turn = [-degrees(rate) * n[i] for i in range(3)]  # in the sensor's axes the world turns the other way
         return tuple(
             [m[3 * i] * v[0] + m[3 * i + 1] * v[1] + m[3 * i + 2] * v[2] for v in (up, turn) for i in range(3)]
         )
