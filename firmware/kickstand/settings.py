@@ -45,4 +45,4 @@ class Settings:
             raise
         finally:  # it takes 8 KB of heap
             del sys.modules["kickstand.setting_table"]
-            del sys.modules["kickstand"].setting_table
+            del sys.modules["kickstand"].setting_table  # type: ignore[attr-defined]

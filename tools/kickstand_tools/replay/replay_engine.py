@@ -32,7 +32,7 @@ COLUMNS = (
 CALIBRATION = "<47d"
 RECORD = "<q8d"
 RESULT = "<9d"
-# lean_sigma_deg if the display shows no lean; and where it names a sensor whose readings do not fit again and again
+# lean_sigma_deg if the display shows no lean, and if it names a sensor whose readings do not fit again and again
 NOT_SHOWN, ODD = -1.0, -2.0
 NO_SPEED = -1.0  # not NaN, because a board's struct does not read NaN as NaN
 
