@@ -8,8 +8,8 @@ import pytest
 from kickstand_tools.analysis.channels import joined
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.common.messages import sentence
 from kickstand_tools.logs.log import Log
-from kickstand_tools.refusals import sentence
 
 
 def spinning(seed):
@@ -32,6 +32,6 @@ def test_impossible_readings_give_a_warning_and_no_lean():
         assert len(said) == np.any(lost)
         if said:
             diverged_in += 1
-            found = re.match(r"readings that no vehicle gives, at (\S+) s up to 2\d\d\d deg/s and 1.0 g", said[0])
+            found = re.match(r"implausible readings at (\S+) s, up to 2\d\d\d deg/s and 1.0 g", said[0])
             assert found and float(found[1]) == pytest.approx(ride.t_s[np.argmax(lost)], abs=0.06)
     assert diverged_in

@@ -5,12 +5,14 @@ import re
 
 import numpy as np
 import pytest
-from kickstand.errors import Notice
-from kickstand_tools import remedies
 from kickstand_tools.analysis import report
 from kickstand_tools.analysis.alignment_quality import Quality, lean_cost, yaw_cost_deg
 from kickstand_tools.analysis.report import angles
 from kickstand_tools.api import Log, fit_drive, fit_two_positions, open_ride, overview, simulate_ride, vehicle_channels
+from kickstand_tools.checks.bends import LeftHanded
+from kickstand_tools.checks.log import Mirrored
+from kickstand_tools.checks.mount import ForwardExchanged
+from kickstand_tools.estimation.smooth import PoseOff
 from kickstand_tools.signals import rotation_matrix
 from kickstand_tools.simulation.scripted import script
 from support import command
@@ -120,11 +122,13 @@ def test_ride_without_straights_shows_no_alignment(tmp_path):
     assert "Alignment: not enough straight riding to know how far it is off." in said
 
 
-@pytest.mark.parametrize(("code", "fits"), [("mirrored", False), ("left-handed", False), ("forward-exchanged", True)])
-def test_a_log_that_contradicts_its_calibration_is_not_judged(scripted, code, fits):
+@pytest.mark.parametrize(
+    ("notice", "fits"), [(Mirrored(), False), (LeftHanded(), False), (ForwardExchanged(False, "left", 0.0), True)]
+)
+def test_a_log_that_contradicts_its_calibration_is_not_judged(scripted, notice, fits):
     """The angles of a mirrored log look right, but left and right are exchanged."""
     seen = overview(open_ride(scripted, with_calibration(scripted, "yaw", 0.0)))
-    seen.notices.append(Notice(code, False, "left", 0.0))
+    seen.notices.append(notice)
     assert ("not judged" not in report.words(seen).alignment) == fits
     assert (report.as_data(seen)["alignment"]["roll_deg"] is not None) == fits
 
@@ -165,16 +169,16 @@ def test_alignment_is_good_if_fully_known_and_exact(scripted):
         said = report.words(dataclasses.replace(seen, quality=quality)).alignment
         assert said.startswith("Alignment: it seems off by ")
     far = dataclasses.replace(seen.quality, roll_deg=11.0)
-    exchanged = Notice("forward-exchanged", False, "left", 11.0)
+    exchanged = ForwardExchanged(False, "left", 11.0)
     swapped = dataclasses.replace(seen, quality=far, notices=[exchanged])
     assert ": were the poses swapped?" in report.words(swapped).alignment
-    off = dataclasses.replace(seen, notices=[*seen.notices, Notice("pose-off", 2.0)])
+    off = dataclasses.replace(seen, notices=[*seen.notices, PoseOff(2.0)])
     assert not report.words(off).alignment.startswith("Alignment: good")
 
 
 def test_wrong_force_at_rest_asks_for_six_positions(scripted):
     cal = with_calibration(scripted, "yaw", 0.0, accel_slope=[1.05] * 3)
-    said = report.words(overview(open_ride(scripted, cal)), remedies.PAGE).alignment
+    said = report.words(overview(open_ride(scripted, cal)), on_page=True).alignment
     assert said.endswith("At rest the force is 1.051 g and not 1: the six positions of the sensor take that out.")
 
 

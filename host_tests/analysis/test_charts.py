@@ -7,14 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kickstand.errors import Notice
 from kickstand_tools.analysis.alignment_quality import Quality
 from kickstand_tools.analysis.overview import Overview, overview
 from kickstand_tools.analysis.plot import interactive, page, picture
-from kickstand_tools.analysis.plot.charts import Bars, Cells, Dots, Line, charts, envelope, title
+from kickstand_tools.analysis.plot.charts import Bars, CellMap, Dots, Line, charts, envelope, title
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.summary import Peak
 from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.checks.mount import UpOff
+from kickstand_tools.estimation.smooth import NotTheBikes
 from kickstand_tools.simulation.scripted import script
 from support.recordings import analysis_rides
 
@@ -68,7 +69,7 @@ def test_lean_to_the_left_is_below_and_on_the_left(seen, panels, drawn):
 
 def test_chart_of_g_against_g_has_the_right_sides(seen, panels, drawn):
     """The turn: 0.7 g for 5 s, and its beginning and end. The stop: 0.5 g for 3 s. Nothing above and on the right."""
-    (cells,) = (trace for trace in chart(seen, "g against").traces if isinstance(trace, Cells))
+    (cells,) = (trace for trace in chart(seen, "g against").traces if isinstance(trace, CellMap))
     middle = (cells.edges[1:] + cells.edges[:-1]) / 2.0
     x, y = np.meshgrid(middle, middle)
     over = {"left": x < -0.3, "right": x > 0.3, "below": y < -0.3, "above": y > 0.3}
@@ -135,7 +136,7 @@ def test_charts_are_stacked_in_a_narrow_window(seen):
 
 def test_unknown_values_are_not_drawn(seen):
     """Nothing is sure enough; nor is an alignment drawn for another mount's calibration."""
-    made = replace(seen, notices=[Notice("up-off", 20.0, False)], summary=replace(seen.summary))
+    made = replace(seen, notices=[UpOff(20.0, False)], summary=replace(seen.summary))
     made.summary.left_deg = made.summary.right_deg = made.summary.brake_g = made.summary.accel_g = Peak()
     assert title(made).endswith("lean as displayed -- left, -- right  ·  braking --, acceleration --")
     assert chart(made, "Lean").notes == []
@@ -172,7 +173,7 @@ def test_labels_of_the_lean_histogram_do_not_overlap(seen, most):
 
 def test_doubtful_lean_and_warnings_are_drawn(seen, tmp_path):
     doubtful = ((seen.course.t_s > 5.0) & (seen.course.t_s < 9.0)).astype(float)
-    made = replace(seen, course=replace(seen.course, doubtful=doubtful), notices=[Notice("not-the-bikes", 80.0)])
+    made = replace(seen, course=replace(seen.course, doubtful=doubtful), notices=[NotTheBikes(80.0)])
     lean = chart(made, "Lean")
     assert "yellow: less exact" in lean.title and "yellow" not in chart(seen, "Lean").title
     _, line = lean.traces

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from kickstand_tools.analysis.channels import Channels
 from kickstand_tools.analysis.export import export_columns, export_racechrono, export_vbo
-from kickstand_tools.analysis.export.export import export
+from kickstand_tools.analysis.export.export import RowsShare, export
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs import reader
@@ -226,7 +226,7 @@ def test_no_time_is_written_twice(tmp_path, form, step_s, columns, start_s):
     rows = [line.replace(" ", ",").split(",") for line in lines[-count:]]
     for column in columns:
         assert np.all(np.diff([float(row[column]) for row in rows]) > 0.0)
-    assert [notice.values for notice in notices if notice.code == "rows-share"] == [(len(t_s), count, step_s)]
+    assert [notice for notice in notices if notice.code == "rows-share"] == [RowsShare(len(t_s), count, step_s)]
 
 
 def test_progress_and_notices_are_passed_on(tmp_path):

@@ -11,6 +11,7 @@ import sys
 import numpy as np
 import pytest
 from kickstand_tools import api
+from kickstand_tools.calibration.pose_refusals import SamePose
 from kickstand_tools.simulation.files import simulate
 from support import command
 
@@ -103,12 +104,13 @@ def test_without_pandas_the_extra_is_named(monkeypatch):
         log.to_pandas()
 
 
-def test_a_refusal_has_its_code_and_values(directory):
+def test_a_refusal_has_its_code_and_fields(directory):
     pose = directory / "UPRIGHT.csv"
     with pytest.raises(api.RefusedInput) as raised:
         api.fit_two_positions(pose, api.read_log(pose))
     assert raised.value.code == "same-pose"
-    assert raised.value.values == pytest.approx((0.0,), abs=0.1)
+    assert isinstance(raised.value.message, SamePose)
+    assert raised.value.message.apart_deg == pytest.approx(0.0, abs=0.1)
     assert str(raised.value).startswith(f"{pose} and {pose}: both poses are the same")
 
 

@@ -180,7 +180,7 @@ def test_no_board_or_several_are_refused(tmp_path, monkeypatch, verb, found, wor
 def test_named_port_is_used_unchanged(board, monkeypatch):
     opened = []
     monkeypatch.setattr(list_ports, "comports", list)
-    monkeypatch.setattr(connection, "Board", lambda name, timeout: opened.append(name) or board)
+    monkeypatch.setattr(connection, "ConnectedBoard", lambda name, timeout: opened.append(name) or board)
     command.works("flash", "--port", "rfc2217://10.0.0.9:2217")
     assert opened == ["rfc2217://10.0.0.9:2217"]
 
@@ -255,7 +255,7 @@ def test_status_prints_the_boards_output_and_restarts_it(board):
 
 @pytest.mark.parametrize(
     ("there", "words"),
-    [(False, "kickstand flash puts it there"), (True, "bring it up to date with kickstand flash")],
+    [(False, "kickstand flash puts it there"), (True, "kickstand flash brings it up to date")],
 )
 def test_status_of_a_board_without_it_is_refused(board, there, words):
     if there:

@@ -149,7 +149,7 @@ def test_working_venv_of_another_python_is_kept(dev, steps, monkeypatch, capsys)
 
 def test_old_python_is_refused_in_one_line(dev, monkeypatch):
     monkeypatch.setattr(dev, "OLDEST", (sys.version_info[0], sys.version_info[1] + 1))
-    with pytest.raises(dev.Stop, match="newer is needed, this is") as stopped:
+    with pytest.raises(dev.SetupStopped, match="newer is needed, this is") as stopped:
         dev.main(["test"])
     assert "\n" not in str(stopped.value)
 
@@ -183,7 +183,7 @@ needs_sh = pytest.mark.skipif(os.name == "nt", reason="the stand-in for Python i
 )
 def test_failed_venv_is_reported_in_one_line(dev, monkeypatch, tmp_path, script, words):
     monkeypatch.setattr(sys, "executable", fake_python(tmp_path, script))
-    with pytest.raises(dev.Stop, match=words) as stopped:
+    with pytest.raises(dev.SetupStopped, match=words) as stopped:
         dev.make_venv()
     assert "\n" not in str(stopped.value)
 
@@ -193,7 +193,7 @@ def test_a_failed_installation_gives_the_reason_and_the_log(dev, monkeypatch, tm
     script = "echo 'Collecting x'; echo 'ERROR: No matching distribution found for x'; exit 1"
     os.mkdir(dev.VENV)
     monkeypatch.setattr(dev, "PYTHON", fake_python(tmp_path, script))
-    with pytest.raises(dev.Stop, match="No matching distribution found for x") as stopped:
+    with pytest.raises(dev.SetupStopped, match="No matching distribution found for x") as stopped:
         dev.install("test")
     assert "\n" not in str(stopped.value)
     assert dev.LOG in str(stopped.value)

@@ -30,5 +30,5 @@ def test_config_that_escapes_its_check_is_refused_in_one_line(tmp_path, monkeypa
     path = tmp_path / "config.py"
     path.write_text(text)
     fault = config_check.judge(path, "rp2", "Raspberry Pi Pico with RP2040").fault
-    assert fault and fault.startswith(str(path)) and fault.endswith("correct it and run this command again")
+    assert fault and fault.startswith(str(path)) and not fault.endswith(".")
     assert "\n" not in fault

@@ -150,7 +150,7 @@ def test_cut_end_or_full_disk_loses_no_earlier_line(tmp_path, monkeypatch):
         full = Journal(tmp_path / "full.jsonl")
         with full:
             full.add("a", result)
-            with monkeypatch.context() as patched, pytest.raises(InputError, match="the same command goes on"):
+            with monkeypatch.context() as patched, pytest.raises(InputError, match="run the same command again"):
                 patched.setattr(full, "_file", open("/dev/full", "wb"))
                 full.add("b", result)
         with Journal(tmp_path / "full.jsonl") as again:

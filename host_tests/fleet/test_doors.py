@@ -17,9 +17,10 @@ from kickstand_fleet.manifest import Period, by_pattern, read_manifest
 from kickstand_fleet.period import failed, work_on_period
 from kickstand_fleet.run import run_fleet
 from kickstand_fleet.show import plot
+from kickstand_tools.calibration.drive_refusals import of_firmware
 from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import sentence
 from kickstand_tools.common.output import whole_file
-from kickstand_tools.refusals import sentence
 from support import command
 from support.recordings import broken_logs
 
@@ -176,7 +177,9 @@ def test_move_at_an_unknown_time_is_counted(tmp_path, monkeypatch):
 
     def moved(_, items, *__):
         for index, (period, _) in enumerate(items):
-            found = failed(period, "mount-moved", sentence(AlignmentError("mount-moved", "between-stops", 8.0)))
+            found = failed(
+                period, "mount-moved", sentence(of_firmware(AlignmentError("mount-moved", "between-stops", 8.0)))
+            )
             found.alignment["status"] = "refused"
             yield index, found, "", ""
 

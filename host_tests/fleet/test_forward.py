@@ -4,12 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
-from kickstand.errors import AlignmentError
 from kickstand_fleet import evidence, forward, period
 from kickstand_fleet.forward import find_forward
 from kickstand_tools.calibration.drive import fit_logs, usable
+from kickstand_tools.calibration.drive_refusals import MountMoved
+from kickstand_tools.common.errors import RefusedInput
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.refusals import RefusedInput
 from kickstand_tools.signals import rotation_vector
 from made_fleet import drive, turn_of, worked_on, yaw_deg
 
@@ -68,7 +68,7 @@ def test_uncertain_forward_is_reported_as_refused(tmp_path, monkeypatch, limit):
 
 def test_late_speed_is_not_reported_as_a_moved_mount(tmp_path, monkeypatch):
     log, _ = drive(4)
-    moved = RefusedInput(AlignmentError("mount-moved", "between-stops", 8.0))
+    moved = RefusedInput(MountMoved("between-stops", 8.0))
     fit = dataclasses.replace(fit_logs([log], None, "car"), refusal=moved)
     for lag_s, reason in ((0.5, "mount-moved"), (2.5, "speed-late")):
         monkeypatch.setattr(period, "fit_logs", lambda *_, lag_s=lag_s: dataclasses.replace(fit, lag_s=lag_s))

@@ -95,7 +95,7 @@ def test_signals_that_did_not_fit_are_written_by_the_next_run(results, alone, tm
 
     with monkeypatch.context() as patched:
         patched.setattr("kickstand_fleet.signals.write_bytes", full)
-        with pytest.raises(InputError, match="No space left on device; what is finished is kept, the same command"):
+        with pytest.raises(InputError, match="No space left on device; finished work is kept: run the same command"):
             run_fleet(periods[:2], tmp_path, with_signals=True)
     rows = parquet.read_table(tmp_path / "alignments.parquet").to_pylist()
     assert [row["status"] for row in rows] == ["aligned"]
@@ -112,6 +112,6 @@ def test_a_journal_that_cannot_reach_the_disk_is_reported(tmp_path, monkeypatch)
     monkeypatch.setattr(os, "fsync", full)
     with (
         Journal(tmp_path / "journal.jsonl") as journal,
-        pytest.raises(InputError, match="No space left on device; what is finished is kept, the same command goes on"),
+        pytest.raises(InputError, match="No space left on device; finished work is kept: run the same command"),
     ):
         journal.sync()

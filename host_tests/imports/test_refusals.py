@@ -94,7 +94,8 @@ LACKING = {
 
 
 def test_each_app_has_a_test_of_missing_parts():
-    assert {name for name in NAMES if not any(key.startswith(name) for key in LACKING)} == {"Kickstand"}
+    untried = [name for name in NAMES if not any(key.startswith(name) for key in LACKING)]
+    assert untried == ["Kickstand"], f"add to LACKING above what each but Kickstand says of a missing sensor: {untried}"
 
 
 @pytest.mark.parametrize("name", LACKING)

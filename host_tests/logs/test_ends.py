@@ -5,9 +5,9 @@ import gzip
 import numpy as np
 import pytest
 from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import sentence
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.refusals import sentence
 from support import command
 from support.recordings import analysis_rides
 

@@ -6,10 +6,10 @@ from kickstand_tools.analysis import report
 from kickstand_tools.api import Log, open_ride, overview, replay
 from kickstand_tools.calibration import drive
 from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.common.messages import sentence
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.frozen import without_frozen
 from kickstand_tools.logs.reader import read_blocks
-from kickstand_tools.refusals import sentence
 from support import command
 from support.recordings import analysis_rides
 
@@ -52,7 +52,7 @@ def test_a_freeze_is_marked_to_the_sample(monkeypatch, blocks_of):
     list(read_blocks(log_of(readings), notices=notices))
     (notice,) = notices
     assert sentence(notice).startswith("the readings froze from 3.")
-    assert sentence(notice).endswith("to 5.0 s: they are left out, and the lean begins anew after each")
+    assert sentence(notice).endswith("to 5.0 s: they are left out, and the lean filter restarts after each")
 
 
 def test_freezes_at_each_end_and_twice_are_marked():

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from kickstand.errors import Notice
 from kickstand_tools import api
 from kickstand_tools.overlay.shown import shown
 from support.recordings import analysis_rides
@@ -55,6 +54,6 @@ def test_contradicted_calibration_is_reported_by_overlay(ride):
     calibration = api.read_calibration(ride.with_name("RIDE.cal.json"))
     backward = replace(calibration, vehicle_from_sensor=np.diag([-1.0, 1.0, -1.0]))
     for given, codes in ((calibration, []), (backward, ["forward-exchanged"])):
-        notices: list[Notice] = []
+        notices: list[api.Message] = []
         shown(api.open_ride(ride, given), notices=notices)
         assert [notice.code for notice in notices] == codes

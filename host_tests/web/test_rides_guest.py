@@ -4,17 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from kickstand_tools import remedies
-from kickstand_tools.cli.main import kickstand
 from kickstand_tools.web import rides_guest
 from support.recordings import analysis_rides, app_exports
-
-
-def test_every_remedy_has_words_for_the_page():
-    assert remedies.PAGE.keys() == remedies.COMMANDS.keys()
-    for name, words in remedies.PAGE.items():
-        assert "--" not in words, name
-        assert not any(f"kickstand {command}" in words for command in kickstand.list_commands(None)), name
 
 
 def test_singular_matrix_is_detected_in_webassembly():

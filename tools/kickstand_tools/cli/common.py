@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from kickstand.errors import Notice
 
 from ..common.errors import printable
-from ..refusals import sentence
+from ..common.messages import Message, distinct
 
 if TYPE_CHECKING:
     from ..estimation.alignment import RideFit
@@ -119,10 +118,10 @@ def known_to(found: "RideFit") -> str:
     return f"known to: roll {found.roll_deg:.1f}, pitch {found.pitch_deg:.1f}, yaw {found.yaw_deg:.1f} degrees"
 
 
-def warn(log: Path | str, notices: Iterable[Notice]) -> None:
+def warn(log: Path | str, notices: Iterable[Message]) -> None:
     """Print a warning for each notice, once. log: the name of its log."""
-    for words in dict.fromkeys(map(sentence, notices)):
-        warning(f"{log}: {words}")
+    for notice in distinct(notices):
+        warning(f"{log}: {notice.line()}")
 
 
 def echo(text: object = "", err: bool = False) -> None:

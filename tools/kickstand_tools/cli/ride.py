@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-from kickstand.errors import Notice
 from rich.console import Console
 from rich.table import Table
 
@@ -18,6 +17,7 @@ from ..analysis.report import as_data, page
 from ..analysis.ride import Ride, calibration_beside, open_ride
 from ..calibration.file import CalibrationFile, calibration_path, read_calibration
 from ..common.errors import InputError
+from ..common.messages import Message, WrongAxes, distinct
 from ..common.output import check_output, whole_file
 from ..common.progress import Bar, spinner
 from ..estimation.alignment import fit_ride
@@ -30,7 +30,6 @@ from ..logs.csv_lines import cut_log
 from ..logs.log import Log, Stretch
 from ..logs.reader import Source, is_log
 from ..overlay.overlay import overlay
-from ..refusals import WRONG_AXES, sentence
 from ..replay.replay import replay_to_csv
 from . import common
 
@@ -80,7 +79,7 @@ def import_command(
         common.echo("If the sensor has been moved since, recalibrate: kickstand calibrate ride")
     elif found.shortfalls:
         common.warn(source, found.shortfalls)
-    elif not any(notice.code in WRONG_AXES for notice in found.notices):
+    elif not any(isinstance(notice, WrongAxes) for notice in found.notices):
         common.echo(f"next: kickstand calibrate ride {out} --out {beside}")
         common.echo(f"      kickstand report {out}")
         common.echo(f"      kickstand plot {out} --out plots")
@@ -240,7 +239,7 @@ def cut_command(log: Path, from_s: float | None, to_s: float | None, out: Path) 
     if from_s is None and to_s is None:
         raise click.UsageError("Give --from, --to or both: seconds from the beginning of the log.")
     check_output(out, [log])
-    notices: list[Notice] = []
+    notices: list[Message] = []
     with Bar("cutting") as bar:
         count, seconds = cut_log(log, out, from_s, to_s, bar.reach, notices)
     common.warn(log, notices)
@@ -312,7 +311,7 @@ def _from_export(source: Path, calibration: Path | None) -> tuple[Imported, Cali
     return found, known
 
 
-def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> tuple[Ride, list[Notice]]:
+def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> tuple[Ride, list[Message]]:
     """A ride, and notices about its import. See _from_export()."""
     taken = _from_export(source, calibration)
     if taken is None:
@@ -339,8 +338,7 @@ def _overview(source: Path, calibration: Path | None, live: bool, **stretch: flo
     opened, imported = _opened(source, calibration, live, **stretch)
     with Bar("reading") as bar:
         seen = overview(opened, bar.reach)
-    known = {sentence(notice) for notice in seen.notices}  # the imported log is checked again
-    seen.notices[:0] = [notice for notice in imported if sentence(notice) not in known]
+    seen.notices = distinct([*imported, *seen.notices])  # the imported log is checked again
     common.warn(source, seen.notices)
     return seen
 

@@ -17,7 +17,7 @@ from ..rides import pull as pulling, ride_log, stream
 from .serial_guest import BrowserBoard
 
 
-class Live:
+class LiveStream:
     """Watches a board's stream and keeps it."""
 
     def __init__(self):
@@ -33,7 +33,7 @@ class Live:
         Returns JSON: {"notes": lines about missing parts, "changed": true if the log ended because of another
         calibration} or {"refused": reason}. The data received until then is in files().
         """
-        self._recording = stream.Recording(self._stopped, lambda reading: live(json.dumps(vars(reading))))
+        self._recording = stream.StreamLog(self._stopped, lambda reading: live(json.dumps(vars(reading))))
         notes = []
         try:
             with connected(BrowserBoard(line, name)) as (transport, _):
@@ -45,7 +45,7 @@ class Live:
                     with contextlib.suppress(Exception):  # the cable may be out
                         restart(transport)
         except InputError as error:
-            return json.dumps({"refused": str(error)})
+            return json.dumps({"refused": error.line(page=True)})
         return json.dumps({"notes": notes, "changed": stream.CHANGED in notes})
 
     def stop(self):
@@ -76,7 +76,7 @@ def pull(line, name, progress):
         try:
             pulling.pull(BrowserBoard(line, name), Path(directory), progress=progress, pulled=rides.append)
         except InputError as error:
-            refused = str(error)
+            refused = error.line(page=True)
         written = [path for ride in rides if ride.log for path in (ride.log, calibration_path(ride.log))]
         files = [(path.name, path.read_bytes()) for path in written]
     found = [vars(ride) | {"log": ride.log and ride.log.name} for ride in rides]

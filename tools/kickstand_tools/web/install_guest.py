@@ -41,7 +41,7 @@ class Installation:
                 finally:
                     connection.restart(transport)
         except InputError as error:
-            return json.dumps({"refused": str(error)})
+            return json.dumps({"refused": error.line(page=True)})
         self._path = firmware_path.config()
         self._template = self._path.read_text(encoding="utf-8")
         for module in [module for module in sys.modules if module.startswith("kickstand.")]:
@@ -95,7 +95,7 @@ class Installation:
             board = BrowserBoard(line, name)
             done = flash.flash(board, replaces, progress, describe=_describe, compiler=_compiled, judge=_judged)
         except InputError as error:
-            return json.dumps({"refused": str(error)})
+            return json.dumps({"refused": error.line(page=True)})
         installed = done.installed
         counts = {"copied": len(installed.copied), "kept": len(installed.kept)}
         return json.dumps({"board": done.board, "config_kept": CONFIG not in installed.copied} | counts)
@@ -106,7 +106,7 @@ def status(line, name):
     try:
         return json.dumps({"text": connection.status(BrowserBoard(line, name))})
     except InputError as error:
-        return json.dumps({"refused": str(error)})
+        return json.dumps({"refused": error.line(page=True)})
 
 
 def check(line, name, say):
@@ -115,7 +115,7 @@ def check(line, name, say):
     try:
         checked = board_check.check(BrowserBoard(line, name), say)
     except InputError as error:
-        return json.dumps({"refused": str(error)})
+        return json.dumps({"refused": error.line(page=True)})
     lines = [board_check.line(finding) for finding in checked.findings]
     return json.dumps({"text": "\n".join([*lines, board_check.verdict(checked.findings)])})
 

@@ -29,8 +29,6 @@ from ..imports.importing import import_recording, write_imported
 from ..joining.joined import join_track, write_joined
 from ..logs.csv_lines import write_lean
 from ..logs.reader import read_blocks
-from ..refusals import sentence
-from ..remedies import PAGE
 from .rides_given import sorted_out
 
 PLOTLY = "./plotly/plotly.min.js"  # the page of a ride loads it from the site
@@ -47,7 +45,7 @@ def in_json(function: Callable[..., Any]) -> Callable[..., str]:
         try:
             return json.dumps(function(*given))
         except InputError as error:
-            return json.dumps({"refused": _one_line(error.said(PAGE))})
+            return json.dumps({"refused": _one_line(error.line(page=True))})
         except MemoryError:
             return json.dumps({"refused": TOO_LONG})
 
@@ -73,11 +71,11 @@ def rides(given, names):
         vars(one) | {"isLog": found.kinds.get(one.log) == "log", "table": one.table and asked_for(one.table)}
         for one in found.rides
     ]
-    refused = {name: _one_line(error.said(PAGE)) for name, error in found.refused.items()}
+    refused = {name: _one_line(error.line(page=True)) for name, error in found.refused.items()}
     return {"rides": rides, "kinds": found.kinds, "why": refused}
 
 
-def asked_for(table: mapped.Table) -> dict[str, Any]:
+def asked_for(table: mapped.MappedTable) -> dict[str, Any]:
     """The questions of the page about a table: {"columns": all, "keys": [[key, words, required, probable column or ""],
     ...], "units": [[key, words, [[unit, words], ...], probable unit, reason], ...], "lacking": missing columns in
     words, "certain": true if all required columns are certain, "picture": Table.first_seconds()}."""
@@ -107,7 +105,7 @@ def take(log, is_log, columns, units, track, progress):
         found = import_recording(log, json.loads(columns) or None, json.loads(units))
         out = str(_result_path(log, f"{log.partition('.')[0]}.csv"))
         write_imported(out, found)
-        warnings = [sentence(notice, PAGE) for notice in [*found.notices, *found.shortfalls]]
+        warnings = [notice.line(page=True) for notice in [*found.notices, *found.shortfalls]]
     if track:
         try:
             joined = join_track(Path(out), Path(track), progress)
@@ -116,7 +114,7 @@ def take(log, is_log, columns, units, track, progress):
             match = joined.match
             words = f"{track} is joined: correlation {match.correlation:.2f}, known to {match.sigma_s:.2f} s."
         except InputError as error:
-            warnings.append(f"{track} is not joined: {_one_line(error.said(PAGE))}")
+            warnings.append(f"{track} is not joined: {_one_line(error.line(page=True))}")
     made = {"path": out} if out != log else {}
     return {"log": out, "warnings": warnings, "words": words} | made
 
@@ -141,9 +139,9 @@ def look(log, calibration, progress):
     seen = overview(ride, progress)
     table = {"units": report.STOPS_UNITS, "title": report.STOPS_TITLE, "terms": report.STOPS_TERMS}
     return {
-        "words": asdict(report.words(seen, PAGE)) | table,
+        "words": asdict(report.words(seen, on_page=True)) | table,
         "json": report.as_data(seen) | {"ride": Path(log).name},
-        "warnings": [sentence(notice, PAGE) for notice in seen.notices],
+        "warnings": [notice.line(page=True) for notice in seen.notices],
         "page": page(seen, f'<script src="{PLOTLY}"></script>', "'self'"),
         "plotly": PLOTLY,
         "stem": ride.stem,

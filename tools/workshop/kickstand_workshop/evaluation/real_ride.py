@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from kickstand.errors import Notice
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.checks.log import remarks
 from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import Message
 from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.reader import Log, read_log
 from kickstand_tools.signals import moving_mean
@@ -37,7 +37,7 @@ class RealScore:
 
 
 @dataclass
-class Comparison:
+class RecordingScores:
     """name: of the recording's file. scores: by estimator.
 
     traces: (N,) each: "time" in s; "reference" and each estimator's lean in degrees, > 0 to the right. notices: remarks
@@ -47,10 +47,10 @@ class Comparison:
     name: str
     scores: dict[str, RealScore]
     traces: dict[str, NDArray[np.float64]]
-    notices: list[Notice] = field(default_factory=list)
+    notices: list[Message] = field(default_factory=list)
 
 
-def compare(path: Path) -> Comparison:
+def compare(path: Path) -> RecordingScores:
     """Run every estimator over a recorded ride with speed. Raises InputError if it cannot be used."""
     log = read_log(path)
     speed, calibration = _speed(log), fit_ride(log).calibration
@@ -63,7 +63,7 @@ def compare(path: Path) -> Comparison:
         for name, lean in shown.items()
     }
     notices = [*log.notices, *remarks(log, calibration, axes=False)]
-    return Comparison(path.name, scores, {"time": time, "reference": reference, **shown}, notices)
+    return RecordingScores(path.name, scores, {"time": time, "reference": reference, **shown}, notices)
 
 
 def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64]:

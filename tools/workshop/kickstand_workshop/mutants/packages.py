@@ -42,10 +42,11 @@ PACKAGES = {
         "rides/test_block rides/test_recording rides/test_ring rides/test_stream rides/test_card_trial",
     ),
     "live": _package("firmware/kickstand/live/*.py", "live/test_live_packets live/test_live_device"),
+    "published": _package("tools/kickstand_tools/calibration/published.py", "drive_alignment/test_published"),
     "aligning": _package(
-        "tools/kickstand_tools/calibration/*.py",
-        "drive_alignment/test_published drive_alignment/test_parts calibration/test_sensor_fit"
-        " calibration/test_cli_calibration_file calibration/test_cli_calibrate drive_alignment/test_cli_drive",
+        "tools/kickstand_tools/calibration/[!p]*.py tools/kickstand_tools/calibration/p[or]*.py",
+        "calibration/test_sensor_fit calibration/test_cli_calibration_file calibration/test_cli_calibrate"
+        " drive_alignment/test_cli_drive",
     ),
     "logs": _package("tools/kickstand_tools/logs/*.py", "logs/test_[!cm]* logs/test_c*"),
     "imports": _package("tools/kickstand_tools/imports/**/*.py", "imports/test_apps imports/test_[!a]*"),

@@ -32,7 +32,7 @@ MAX_GROWTH = 3000  # blocks of memory from the second minute of a trip to its en
 
 
 @dataclass
-class Figures:
+class Tallies:
     """Counts of what was tried, and the worst figures. found: one line per broken invariant."""
 
     seed: int
@@ -53,7 +53,7 @@ class Figures:
         self.worst[name] = max(self.worst.get(name, 0.0), value)
 
 
-class Bike:
+class SoakBoard:
     """A board with its sensor and its config.py. flash: the directory used as its flash."""
 
     def __init__(self, chance: random.Random, flash: Path) -> None:
@@ -87,13 +87,13 @@ class Bike:
         self.store().save(calibration)
 
 
-def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: None) -> Figures:
+def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: None) -> Tallies:
     """Run trips for this total of the board's time. say: called with the progress, each hour of it. The same seed gives
     the same trips. It works in a temporary directory."""
-    figures = Figures(seed)
+    figures = Tallies(seed)
     begun, said_h = time.monotonic(), 0.0
     chance = random.Random(seed)
-    bike: Bike | None = None
+    bike: SoakBoard | None = None
     before = os.getcwd()
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -102,7 +102,7 @@ def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: 
                     flash = Path(folder, str(figures.trips))
                     flash.mkdir()
                     os.chdir(flash)
-                    bike = Bike(chance, flash)
+                    bike = SoakBoard(chance, flash)
                     with _board_of(bike, None):
                         bike.do_six_positions()
                 assert bike
@@ -116,7 +116,7 @@ def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: 
     return figures
 
 
-def _board_of(bike: Bike, trip: Trip | None) -> Board:
+def _board_of(bike: SoakBoard, trip: Trip | None) -> Board:
     world = bike.part.world(trip.ride.motion) if trip else (lambda t_s: (0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
     board = Board(world)
     if trip:
@@ -131,7 +131,7 @@ def _board_of(bike: Bike, trip: Trip | None) -> Board:
     return board
 
 
-def _run(bike: Bike, trip: Trip, figures: Figures) -> None:
+def _run(bike: SoakBoard, trip: Trip, figures: Tallies) -> None:
     """Run one trip, from power-on to power-off, and record its results."""
     board = _board_of(bike, trip)
     readings = 0
@@ -190,7 +190,7 @@ def _blocks() -> int:
     return sys.getallocatedblocks()
 
 
-def _check_calibration(bike: Bike, watch: Watch, figures: Figures) -> None:
+def _check_calibration(bike: SoakBoard, watch: Watch, figures: Tallies) -> None:
     """Check that after a power cut at any moment there is the old calibration or a new one, never none."""
     calibration = bike.store().load()
     if bike.aligned and not calibration.aligned:
@@ -202,7 +202,7 @@ def _check_calibration(bike: Bike, watch: Watch, figures: Figures) -> None:
     bike.aligned = calibration.aligned
 
 
-def _count(figures: Figures, trip: Trip, watch: Watch, lasted_s: float, saves_cut: int) -> None:
+def _count(figures: Tallies, trip: Trip, watch: Watch, lasted_s: float, saves_cut: int) -> None:
     figures.trips += 1
     figures.hours += lasted_s / 3600
     figures.rides[trip.kind] += 1

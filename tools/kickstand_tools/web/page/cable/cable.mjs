@@ -158,8 +158,7 @@ export async function overCable(port, tell, use, restarted = false) {
     return null;
   }
   try {
-    // A line that is not USB, such as a bridge to an emulated board, gets the longer time-outs of `kickstand flash`
-    return await use(line, port.getInfo?.().usbVendorId ? "this port" : "socket:this port");
+    return await use(line, "this port");
   } catch (error) {
     console.error(error);
     tell(`This went wrong: ${error.message.trim().split("\n").at(-1)}. Load the page again.`);
@@ -167,12 +166,4 @@ export async function overCable(port, tell, use, restarted = false) {
   } finally {
     await line.close();
   }
-}
-
-/** A line of the command's, in these pages' words. */
-export function inPages(text) {
-  return text
-    .replaceAll("socket:", "")
-    .replace(/this port: connection lost \(.*?\)/, "connection lost")
-    .replace(/kickstand flash (puts|brings)/, "the page Install $1");
 }

@@ -1,7 +1,7 @@
 // Installs the firmware and its config.py on a board at the browser's serial port with `kickstand flash`, and shows the
 // output of `kickstand status` and `check`, on CPython for WebAssembly (web/install_guest.py).
 
-import { ASKING, choosePort, inPages, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
+import { ASKING, choosePort, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
 import { connectImage } from "./image.mjs";
 import { Fields } from "./fields.mjs";
@@ -34,7 +34,7 @@ async function look() {
   atWork(false);
   if (!said) return;
   const { refused, board: name, settings, usual, by_hand, others } = JSON.parse(said);
-  if (refused) return tell(`Not installed: ${inPages(refused)}.`);
+  if (refused) return tell(`Not installed: ${refused}.`);
   board = { port, guest };
   byHand = by_hand;
   byId("by-hand").textContent = byHand ? `The board’s own ${byHand}. It stays as it is.` : "";
@@ -75,7 +75,7 @@ async function install() {
 
 function showResult({ refused, board: name, copied, kept, config_kept }) {
   if (refused) {
-    tell(`Not installed: ${inPages(refused)}.`);
+    tell(`Not installed: ${refused}.`);
     return;
   }
   byId("config").hidden = true;
@@ -107,7 +107,7 @@ async function report(asks) {
   atWork(false);
   if (!said) return;
   const { text, refused } = JSON.parse(said);
-  say(refused ? `${inPages(refused)}.` : "The board has restarted.");
+  say(refused ? `${refused}.` : "The board has restarted.");
   byId("status-text").textContent = text ?? "";
   byId("status-shown").hidden = !text;
 }

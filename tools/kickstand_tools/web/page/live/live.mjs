@@ -1,7 +1,7 @@
 // Shows a board's stream, keeps it as a log, and fetches recorded rides from the board: `kickstand record` and
 // `kickstand pull` on CPython for WebAssembly (web/cable_guest.py).
 
-import { ASKING, choosePort, inPages, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
+import { ASKING, choosePort, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
 import { Riding } from "./bluetooth/riding.mjs";
 import { Chart } from "./chart.mjs";
@@ -16,7 +16,7 @@ const gauge = new Gauge(byId("gauge"));
 const chart = new Chart(byId("chart"));
 const player = new Player();
 const guests = loadOnce(async () => (await python(true)).pyimport("kickstand_tools.web.cable_guest")); // no board is posed here
-let live; // the running Live of cable_guest.py, or null
+let live; // the LiveStream of cable_guest.py, or null
 let stopped = false;
 let awake = null; // a WakeLockSentinel
 let aligned = false;
@@ -41,7 +41,7 @@ async function start() {
     player.restart();
     furthest = [0, 0];
     tell("The board starts …");
-    live = guest.Live();
+    live = guest.LiveStream();
     said = JSON.parse(await overCable(port, tell, (line, name) => live.run.callPromising(line, name, received), again));
     keep(live);
     live = null;
@@ -152,7 +152,7 @@ async function pull() {
 
 /** Lines of the commands, one after the other. */
 function sentences(lines) {
-  return lines.map((line) => inPages(line).replace(/^./, (first) => first.toUpperCase())).join(". ") + ".";
+  return lines.map((line) => line.replace(/^./, (first) => first.toUpperCase())).join(". ") + ".";
 }
 
 /** From Python's [(name, bytes)]. */
