@@ -184,8 +184,8 @@ def _divergence_notice(block: Block, at: int) -> Message:
 
 
 def _lean_along(along: MeterAlong, block: Block, shown: bool) -> tuple[dict[str, Array], Array, Bools]:
-    """The arguments of channels(), computed by the firmware's meter, the variance of its lean (rad2), < 0 if it
-    diverged, and where it named the sensor, because its readings do not fit.
+    """The arguments of channels(), computed by the firmware's meter; the variance of its lean (rad2), < 0 if it
+    diverged, and True where it named the sensor, because its readings do not fit.
 
     shown: compute the lean that was shown; otherwise it and sure are 0, which saves a tenth of the time.
     """

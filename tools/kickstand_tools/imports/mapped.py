@@ -379,6 +379,6 @@ def _unit(units: Mapping[str, str], keys: tuple[str, ...], column: str) -> str:
     return next((units[key] for key in keys if key in units), unit_in(column) or findings.stated_unit(column))
 
 
-def _sign_is_changed(units: Mapping[str, str]) -> bool:
+def _sign_changed(units: Mapping[str, str]) -> bool:
     """True if the user has asked for a change of sign. It is then not checked."""
     return any(units.get(key, "").startswith("-") for key in ("a", *ACCEL))
