@@ -141,7 +141,7 @@ def readings(offset=(0.0,) * 3, slope=(1.0,) * 3, forces: ArrayLike = AXES):
     return ((np.asarray(forces) - offset) / slope).tolist()
 
 
-def test_six_poses_of_which_two_are_one_and_the_same_give_no_parameters():
+def test_six_poses_with_a_duplicate_give_no_parameters():
     """Though each axis changes enough."""
     poses = AXES.copy()
     poses[0] = poses[2] = [0.9, 0.9, 0.0]

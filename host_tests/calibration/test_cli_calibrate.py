@@ -119,12 +119,12 @@ def six_refused(tmp_path, poses, words):
 
 
 @pytest.mark.parametrize("count", [1, 5, 8])
-def test_six_wants_six_or_seven(tmp_path, six_poses, free_pose, count):
+def test_six_requires_six_or_seven_poses(tmp_path, six_poses, free_pose, count):
     poses = ([*six_poses, free_pose] * 2)[:count]
     six_refused(tmp_path, poses, f"{count} captures given")
 
 
-def test_a_side_done_twice_and_the_one_missing_are_named(tmp_path, six_poses):
+def test_a_repeated_side_and_the_missing_side_are_named(tmp_path, six_poses):
     shutil.copy(six_poses[2], tmp_path / "again.csv")
     line = six_refused(tmp_path, [*six_poses[:5], tmp_path / "again.csv"], "side -z is missing")
     assert "side +y is there 2 times" in line

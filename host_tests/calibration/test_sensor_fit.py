@@ -210,7 +210,7 @@ def late(rates):
     ],
     ids=["half", "double", "mirrored", "dead", "dead but noisy", "late", "clipped"],
 )
-def test_an_ill_axis_of_the_gyro_cannot_pass(axis, change, code):
+def test_a_faulty_gyro_axis_is_refused(axis, change, code):
     with pytest.raises(RefusedInput) as refusal:
         fit_procedure(with_axis(axis, change))
     if code:
@@ -219,7 +219,7 @@ def test_an_ill_axis_of_the_gyro_cannot_pass(axis, change, code):
         assert refusal.value.values[0] == "xyz"[axis]
 
 
-def test_an_axis_that_no_turn_has_shown_is_not_proved():
+def test_an_axis_that_no_turn_has_measured_is_unproved():
     fit = fitted()
     fit.__init__(fit._poses, [None] * 6, [0.0] * 3, [1.0] * 3)
     fit.finish()

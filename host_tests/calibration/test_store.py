@@ -113,7 +113,7 @@ def test_the_matrices_are_kept_through_a_new_alignment(store):
     assert loaded.whole
 
 
-def test_a_cut_or_damaged_record_with_matrices_leaves_the_one_before(store, tmp_path):
+def test_a_damaged_record_with_matrices_leaves_the_previous_one(store, tmp_path):
     store.save(calibration(1))
     store.save(whole(9))
     written = newest_file(tmp_path, store)
@@ -150,7 +150,7 @@ def test_implausible_matrices_are_not_loaded(store, index, value):
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_what_is_wrong_with_a_record_is_reported(store, tmp_path, content, problem):
+def test_the_fault_of_a_record_is_reported(store, tmp_path, content, problem):
     (tmp_path / FILES[1]).write_bytes(content)
     assert not store.load().aligned
     assert store.message == f"not calibrated: {FILES[1]} {problem}"
@@ -209,7 +209,7 @@ def test_implausible_values_are_not_used(store, tmp_path, field, value):
     assert "out of range" in store.message
 
 
-def test_flash_that_does_not_keep_what_is_written(store, tmp_path, monkeypatch):
+def test_a_flash_that_loses_writes_is_reported(store, tmp_path, monkeypatch):
     store.save(calibration(1))
 
     def forgetful(path, mode):
@@ -224,7 +224,7 @@ def test_flash_that_does_not_keep_what_is_written(store, tmp_path, monkeypatch):
     assert mark_of(store.load()) == 1
 
 
-def test_a_trim_may_be_stored_beside_a_record_that_never_was_this_sensors(store, tmp_path):
+def test_a_trim_may_be_stored_beside_a_foreign_record(store, tmp_path):
     """Such as that of another chip, or one that a power cut left empty."""
     store.save(calibration(1))
     store.save(calibration(2))

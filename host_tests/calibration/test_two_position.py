@@ -100,7 +100,7 @@ def test_after_the_six_positions_a_pose_reads_1_g_more_closely(pose, size):
     assert refusal.value.values[0] == ("kickstand", "upright")[pose]
 
 
-def test_an_alignment_keeps_offset_and_slope_and_takes_the_gyros_bias_from_the_kickstand():
+def test_an_alignment_keeps_offset_and_slope_and_sets_the_bias():
     """A stand holds the bike stiller than a rider does."""
     before = Calibration()
     before.set_accel((0.05, -0.02, 0.0), (1.02, 0.98, 1.0))

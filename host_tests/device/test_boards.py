@@ -32,7 +32,7 @@ ESP32_PINS = [4, 18, 19, 21, 22]
         ("esp32", {}, {**CARD, "SD_MISO": 39}, None),
     ],
 )
-def test_it_measures(machine, board, config, touched, tmp_path):
+def test_other_boards_measure(machine, board, config, touched, tmp_path):
     """With the board's usual pins or others, either driver of an ESP32, one bus or two. It touches no other pin."""
     plan = {"lean": LEANING, "board": {"machine": machine, **board}, "config": config, "until": 3}
     record = device_plans.run("cpython", tmp_path, plan)
@@ -109,9 +109,7 @@ def test_a_board_with_psram_has_no_usual_pins_for_a_gps_receiver(tmp_path, capsy
         *[("pico", {"LCD_SDA": 2, "LCD_SCL": 3}, {name: "GP2"}, {2, 3}) for name in ("LCD_SDA", "LCD_SCL")],
     ],
 )
-def test_a_display_with_wrong_pins_leaves_the_usual_and_all_others_alone(
-    machine, config, wrong, touched, tmp_path, capsys
-):
+def test_a_display_with_wrong_pins_drives_no_other_pin(machine, config, wrong, touched, tmp_path, capsys):
     plan = {"board": {"machine": machine, **WIRED}, "config": {**config, **wrong}, "until": 3}
     record = device_plans.run("cpython", tmp_path, plan, capsys)
     assert record.ends == ["returned"]
@@ -157,7 +155,7 @@ def on(machine, function, until_s):
 
 
 @pytest.mark.parametrize("machine", ["pico", "esp32", "s3"])
-def test_a_watchdog_at_rest_lets_the_console_be_open_for_days(machine):
+def test_a_stopped_watchdog_allows_an_open_console_for_days(machine):
     """An ESP32's cannot be stopped, and a soft reset does not stop it either."""
 
     def use_the_console(board):
@@ -173,7 +171,7 @@ def test_a_watchdog_at_rest_lets_the_console_be_open_for_days(machine):
     assert on(machine, use_the_console, 1e6)[0] == "returned"
 
 
-def test_status_says_which_pins_are_missing(tmp_path, monkeypatch, capsys):
+def test_status_lists_the_missing_pins(tmp_path, monkeypatch, capsys):
     def report(board):
         from kickstand import status_report
 

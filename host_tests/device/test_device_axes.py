@@ -44,7 +44,7 @@ def spoilt(monkeypatch):
     ("column", "value", "said"),
     [(3, 0.0, "Gyro x dead"), (5, -1 / 65.5, "Gyro z dead"), (2, 0.5, "Accel z stuck"), (4, 600.0, "Gyro clips")],
 )
-def test_an_ill_axis_is_named_and_the_lean_comes_back_with_it(column, value, said, spoilt, aligned, capsys):
+def test_a_faulty_axis_is_reported_and_the_lean_returns_with_it(column, value, said, spoilt, aligned, capsys):
     spoilt(column, value, FAULT_S, END_S)
     record = device_plans.run("cpython", aligned, {"lean": [[0, STATIC]], "until": 12}, capsys)
     assert record.lean_at(FAULT_S - 0.1) == STATIC

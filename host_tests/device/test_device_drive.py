@@ -60,7 +60,7 @@ def forward_error_deg(calibration, seed=None):
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
-def test_a_car_finds_its_alignment_and_says_what_it_waits_for(engine, tmp_path):
+def test_a_car_finds_its_alignment_and_shows_the_next_step(engine, tmp_path):
     """On MicroPython, with its floats and its heap: the other drives are CPython's."""
     record = device_plans.run(engine, tmp_path, car("gps", 5, presses=[[60, SHORT], [65, SHORT]]))
     assert record.at(3.0) == ["Brakings   0/5  ", "stop needed     "]
@@ -162,7 +162,7 @@ def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
     assert record.at(shown_s + 2.0) == record.at(shown_s)  # until it is answered, or the ride goes on
 
 
-def test_what_was_wrong_with_both_poses_is_found_while_riding(tmp_path):
+def test_errors_of_both_poses_are_found_while_riding(tmp_path):
     """Two degrees of pitch on the kickstand give a yaw error of almost ten: forward is refined at a stop, and at most
     1.5 are left. The upright pose was 2 degrees off: that trim outlives the new alignment. The maxima are kept."""
     plan = bike("wheel", 8, kickstand=(-12.0, 2.0))
@@ -178,7 +178,7 @@ def test_what_was_wrong_with_both_poses_is_found_while_riding(tmp_path):
     assert record.first("Max right +(19|2[0-9])°", POSES_S + 232.0) < math.inf
 
 
-def test_the_display_says_that_the_mount_has_moved_and_another_message_does_not_bring_the_lean_back(tmp_path):
+def test_a_moved_mount_hides_the_lean_despite_other_messages(tmp_path):
     """The wheel's wire breaks later, and nobody has answered the first message."""
     record = device_plans.run(
         "cpython", tmp_path, bike("wheel", 6, remount=[POSES_S + 60.0, 8], wheel={"until_s": 130.0})
@@ -189,7 +189,7 @@ def test_the_display_says_that_the_mount_has_moved_and_another_message_does_not_
     assert not record.leans(moved, 500.0)
 
 
-def test_asked_for_on_a_motorcycle_it_keeps_the_old_alignment_until_the_new_one_is_ready(tmp_path):
+def test_a_requested_drive_keeps_the_old_alignment_until_ready(tmp_path):
     """The rider asks for it in the menu, for a sensor that was mounted anew. A fault of the sensor during the drive
     does no harm."""
     device_plans.align(tmp_path)
@@ -216,13 +216,13 @@ def test_asked_for_on_a_motorcycle_it_keeps_the_old_alignment_until_the_new_one_
         ("wheel", {"until_s": 40.0}, {}, 3, "Speed stuck at"),
     ],
 )
-def test_a_speed_that_cannot_be_used_is_reported_and_nothing_is_stored(source, model, config, blocks, said, tmp_path):
+def test_an_unusable_speed_is_reported_and_nothing_is_stored(source, model, config, blocks, said, tmp_path):
     record = device_plans.run("cpython", tmp_path, {**car(source, blocks, config=config), source: model})
     assert record.first(said) < math.inf, {tuple(f[1:]) for f in record.frames}
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_speed_that_fails_for_a_while_is_reported_and_does_no_harm(tmp_path):
+def test_a_temporary_loss_of_speed_is_reported_and_harmless(tmp_path):
     faults = [["unplugged", 15, 30], ["garbled", 45, 62]]
     record = device_plans.run("cpython", tmp_path, car("gps", 6, gps={"faults": faults}))
     assert record.first("GPS silent") == pytest.approx(21.0, abs=3.0)
@@ -312,7 +312,7 @@ def test_ctrl_c_keeps_the_worst_for_the_status(tmp_path, monkeypatch, capsys):
     assert 15 <= int(found[2]) <= 25
 
 
-def test_a_press_for_another_page_does_not_answer_a_hidden_question(asked, tmp_path):
+def test_a_press_for_a_page_does_not_answer_a_hidden_question(asked, tmp_path):
     """The information page is in front of the question."""
     plan = bike("gps", 3, kickstand=(12.0,))
     to_info = [[asked - 14.0, LONG], *([asked - 12.0 + t, SHORT] for t in range(3)), [asked - 9.0, LONG]]

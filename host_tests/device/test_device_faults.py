@@ -36,7 +36,7 @@ def standing(faults, until=10, **more):
         ([["all_ones", [FAULT_S, LASTS_S]]], "Sensor frozen"),
     ],
 )
-def test_a_fault_that_lasts(faults, said, aligned):
+def test_a_lasting_fault_is_shown_until_it_ends(faults, said, aligned):
     record = device_plans.run("cpython", aligned, standing(faults))
     assert record.lean_at(FAULT_S - 0.1) == STATIC
     assert record.first(said, FAULT_S) < FAULT_S + 0.4
@@ -57,14 +57,14 @@ def test_a_fault_that_lasts(faults, said, aligned):
     ],
     ids=str,
 )
-def test_a_fault_of_a_moment(engine, fault, aligned):
+def test_a_short_fault_recovers_soon(engine, fault, aligned):
     record = device_plans.run(engine, aligned, standing([fault], until=8))
     assert record.lean_at(FAULT_S + 0.1 + RECOVERY_S + 0.1) == STATIC
     assert set(record.leans(0, 8)) == {STATIC}
     assert record.ends == ["off"]
 
 
-def test_a_sample_that_a_supply_dip_has_torn_is_not_shown(aligned):
+def test_a_sample_damaged_by_a_supply_dip_is_not_shown(aligned):
     dips = [["supply_dip", [FAULT_S + 1.013 * k, "torn"]] for k in range(20)]
     record = device_plans.run("cpython", aligned, standing(dips, until=30))
     assert set(record.leans(0, 30)) == {STATIC}
@@ -116,7 +116,7 @@ def in_turn_300(monkeypatch):
     return replace
 
 
-def test_an_exception_is_said_and_the_board_restarts(aligned, in_turn_300, capsys):
+def test_an_exception_is_reported_and_the_board_restarts(aligned, in_turn_300, capsys):
     in_turn_300(lambda: 1 / 0)
     held = {"presses": [[3.0, 5.0]]}  # the button, all that time: no safe mode, which is for power-up
     record = device_plans.run("cpython", aligned, standing([], until=12, **held), capsys)
@@ -163,7 +163,7 @@ def test_a_fifo_out_of_step_is_noticed(aligned, monkeypatch):
     assert record.last[0].startswith("Lean  25° right")
 
 
-def test_a_range_that_changed_by_itself_is_put_right(aligned, monkeypatch):
+def test_a_changed_range_is_repaired(aligned, monkeypatch):
     """The readings still come and look like readings, so that only the register shows it."""
     install, boards = simulator.Board.install, []
 

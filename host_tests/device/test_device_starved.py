@@ -46,7 +46,7 @@ def too_old(record, from_s=FROM_S - 5.0):
 
 
 @pytest.mark.parametrize("engine, name", [("cpython", n) for n in STARVED] + [("micropython", "a hang")])
-def test_no_lean_stands_that_is_too_old(engine, name, tmp_path):
+def test_no_lean_on_the_display_is_too_old(engine, name, tmp_path):
     faults, config = STARVED[name]
     record = run(engine, tmp_path, faults, config)
     assert record.ends == ["off"]

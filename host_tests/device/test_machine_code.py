@@ -56,7 +56,7 @@ def imported(tmp_path, path="", name="", error=""):
     return done.stdout.splitlines()
 
 
-def test_right_machine_code_is_used(tmp_path):
+def test_correct_machine_code_is_used(tmp_path):
     """That of every viper function."""
     found = [
         (path.relative_to(firmware_path.PACKAGE).as_posix(), name)
@@ -90,7 +90,7 @@ def test_machine_code_that_cannot_be_loaded_is_not_used(tmp_path, path, error):
 
 
 @pytest.mark.chip
-def test_a_pico_says_in_its_status_that_its_machine_code_is_wrong(tmp_path):
+def test_a_picos_status_reports_wrong_machine_code(tmp_path):
     path = "imu/fifo_frames_viper.py"
     write_broken(path, "add_up", tmp_path / "broken.py")
     wrong = {f"/kickstand/{path[:-3]}.mpy": bytecode.cross_compiled(tmp_path / "broken.py")}

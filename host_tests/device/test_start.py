@@ -43,7 +43,7 @@ def test_incomplete_firmware_ends_at_the_prompt_and_says_so(module, board, monke
 
 @pytest.mark.parametrize("charge_us", [0, 7_000, 75_000])
 @pytest.mark.parametrize("held", [False, True])
-def test_a_capacitor_at_the_button_does_not_pass_for_a_press_at_power_on(held, charge_us, board, capsys):
+def test_a_capacitor_at_the_button_is_no_press_at_power_on(held, charge_us, board, capsys):
     """The pull-up of the pin needs its time to charge it. A button that is held starts nothing all the same."""
     from kickstand import start
 
@@ -108,7 +108,7 @@ def choose(board, at_s, place):
     ("module", "place"),
     [("align_wizard", ALIGN), ("pose_taker", SIX), ("recorder", RECORD)],
 )
-def test_what_a_menu_entry_cannot_import_is_reported_and_the_meter_goes_on(module, place, without, board, capsys):
+def test_a_failed_import_of_the_menu_is_reported(module, place, without, board, capsys):
     """Each time that it is chosen, and never before."""
     from kickstand import start
 
@@ -128,7 +128,7 @@ def test_what_a_menu_entry_cannot_import_is_reported_and_the_meter_goes_on(modul
 
 
 @pytest.mark.parametrize("module", ["recorder", "card_trial"])
-def test_a_board_that_is_to_record_from_power_on_and_cannot_shows_the_lean(module, without, board, monkeypatch):
+def test_a_board_that_cannot_record_still_shows_the_lean(module, without, board, monkeypatch):
     from kickstand import settings, start
 
     pins = {"SD_SPI": 0, "SD_SCK": 18, "SD_MOSI": 19, "SD_MISO": 16, "SD_CS": 17} if module == "card_trial" else {}
@@ -141,7 +141,7 @@ def test_a_board_that_is_to_record_from_power_on_and_cannot_shows_the_lean(modul
 
 @pytest.mark.parametrize("module", ["radio", "live"])
 @pytest.mark.parametrize("board", [{"machine": "pico w"}], indirect=True)
-def test_without_what_live_needs_the_lean_goes_on(module, without, board, monkeypatch, capsys):
+def test_without_lives_modules_the_lean_continues(module, without, board, monkeypatch, capsys):
     """Said once, and without a restart. The radio is off then."""
     from kickstand import settings, start
 
@@ -173,7 +173,7 @@ def test_without_its_pictures_an_oled_shows_lines(without, board, monkeypatch, c
 
 
 @pytest.mark.parametrize("board", [{"display": "ssd1306"}], indirect=True)
-def test_a_display_without_its_driver_is_asked_for_ever_more_seldom(without, board, monkeypatch, capsys):
+def test_a_display_without_its_driver_is_probed_less_often(without, board, monkeypatch, capsys):
     from kickstand import start
     from kickstand.board import display
 
@@ -185,7 +185,7 @@ def test_a_display_without_its_driver_is_asked_for_ever_more_seldom(without, boa
     assert 8 <= times <= 10 and board.boots == 1  # after 0.4, 0.8, 1.6, 3.2, 6.4 s, then every 6.4 s; once at the start
 
 
-def test_what_was_imported_in_vain_is_forgotten_and_can_be_tried_again(tmp_path):
+def test_a_failed_import_can_be_repeated(tmp_path):
     """MicroPython keeps a module whose import was broken off, without what it had not come to."""
     (tmp_path / "outer.py").write_text("import inner\n\n\nclass Outer:\n    inner = inner.Inner\n")
     (tmp_path / "inner.py").write_text("import memory\n\nmemory.take()\n\n\nclass Inner:\n    pass\n")

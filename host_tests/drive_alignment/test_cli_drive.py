@@ -99,7 +99,7 @@ def test_a_calibrated_accelerometer_keeps_its_parameters(tmp_path):
     assert result.out.count("car, method improved") == 1
 
 
-def test_what_is_noted_in_a_calibration_stays_in_it(tmp_path):
+def test_notes_in_a_calibration_are_kept(tmp_path):
     """As the board and the chip that a ride was recorded with."""
     log = record(tmp_path / "drive.csv", around(7), MOUNT)
     before = CalibrationFile(notes={"board": "Raspberry Pi Pico", "sensor": "MPU6050"})
@@ -108,7 +108,7 @@ def test_what_is_noted_in_a_calibration_stays_in_it(tmp_path):
     assert found.as_json()["board"] == "Raspberry Pi Pico"
 
 
-def test_several_logs_of_one_mount_are_put_together(tmp_path):
+def test_several_logs_of_one_mount_are_combined(tmp_path):
     """None of them is enough for itself."""
     logs = [record(tmp_path / f"{k}.csv", around(2), MOUNT) for k in range(3)]
     refused(tmp_path, "braking events in a straight line", logs[0])
@@ -116,7 +116,7 @@ def test_several_logs_of_one_mount_are_put_together(tmp_path):
     assert max(errors(matrix_in(tmp_path / "CAL.json"), MOUNT)) < 0.3
 
 
-def test_what_is_used_of_several_logs_is_reported_by_file_and_its_own_time(tmp_path):
+def test_the_used_parts_of_logs_are_reported_by_file_and_time(tmp_path):
     legs = {"a": around(3), "b": [[30.0, 0.0, 0.0]], "c": around(4)}
     logs = [record(tmp_path / f"{name}.csv", of, MOUNT) for name, of in legs.items()]
     said = command.works("calibrate", "drive", *logs, "--out", tmp_path / "CAL.json").out
@@ -196,7 +196,7 @@ def test_the_same_log_twice(tmp_path):
     refused(tmp_path, "is given twice", log, log)
 
 
-def test_a_log_too_slow(tmp_path):
+def test_a_log_with_too_few_samples_per_second_is_refused(tmp_path):
     rows = np.column_stack((np.arange(20) / 10.0, np.tile([0, 0, 1, 0, 0, 0], (20, 1))))
     log = tmp_path / "slow.csv"
     lines = [",".join(f"{v:.3f}" for v in row) + ",0.0" for row in rows]
@@ -218,7 +218,7 @@ def test_recorded_cars_remounted_at_random(tmp_path, shared_data, name):
 UPSIDE_DOWN = [0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0]  # rows left, up, forward: z points down
 
 
-def test_a_log_of_the_opposite_sign_looks_like_a_sensor_upside_down(tmp_path):
+def test_a_log_of_opposite_sign_looks_upside_down(tmp_path):
     """Nothing else in a car's log shows it: without the remark its mirror image would pass."""
     log, out = record(tmp_path / "drive.csv", around(8), UPSIDE_DOWN), tmp_path / "CAL.json"
     said = command.works("calibrate", "drive", log, "--out", out)
@@ -227,7 +227,7 @@ def test_a_log_of_the_opposite_sign_looks_like_a_sensor_upside_down(tmp_path):
     assert command.works("calibrate", "drive", right, "--out", out).err == ""
 
 
-def test_a_calibration_that_the_drive_contradicts(tmp_path):
+def test_a_calibration_that_contradicts_the_drive_is_reported(tmp_path):
     log, cal = record(tmp_path / "drive.csv", around(8), MOUNT), tmp_path / "CAL.json"
     command.works("calibrate", "drive", log, "--out", cal)
     again = "calibrate", "drive", log, "--vehicle", "car", "--out", tmp_path / "AGAIN.json"

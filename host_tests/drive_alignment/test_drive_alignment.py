@@ -84,7 +84,7 @@ def test_camber_at_the_stops_does_not_reach_forward(method, yaw_deg):
     assert total < max(2.3, 1.1 * abs(yaw))
 
 
-def test_it_says_what_it_waits_for():
+def test_it_reports_the_missing_step():
     """For a speed, a stop, a braking event. Then whether the braking event is straight, and that it is ready."""
     legs = [[2.0, 1.0, 0.0], [2.0, -1.0, 0.0], *around(2), [8.0, 1.5, 0.0], [4.0, -2.0, 15.0], *around(6, stands=False)]
     states = drive(legs)["states"]
@@ -130,7 +130,7 @@ def test_refusals_name_the_reason(engine):
         ({"scale": 0.9 / speed_check.MAX_FORCE_RATIO}, False),
     ],
 )
-def test_what_a_speed_may_be_like(source, fine):
+def test_only_usable_speeds_align(source, fine):
     result = drive(around(8), source=source)
     assert result["ready"] is fine, result.get("refused")
     if fine:
@@ -158,7 +158,7 @@ def test_a_mount_that_moved(axis, degrees, from_s, words):
 
 
 @pytest.mark.parametrize("silent_s", [200.0, 500.0])
-def test_however_late_the_first_speed_comes_the_first_braking_event_counts(silent_s):
+def test_the_first_braking_counts_after_any_late_first_speed(silent_s):
     """The history's time wraps round every nine minutes."""
     legs = [[silent_s, 0.0, 0.0], *around(6)]
     result = drive(legs, source={"every_s": 1.0, "silent": (-1.0, silent_s)})
@@ -167,7 +167,7 @@ def test_however_late_the_first_speed_comes_the_first_braking_event_counts(silen
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_last_speed_of_zero_is_no_standstill_once_the_source_is_silent(engine):
+def test_a_silent_source_at_zero_is_no_standstill(engine):
     """It drives off after the receiver has died, in long curves whose force is as steady as at a stop."""
     before = [*around(7), [8.0, -1.0, 0.0], STAND]
     legs = [*before, [4.0, 4.0, 0.0], [30.0, 0.0, 9.0]]

@@ -85,7 +85,7 @@ def test_bins_hold_every_sample_and_every_speed_once():
     assert force == pytest.approx(expected, rel=1e-9)
 
 
-def test_a_refusal_is_part_of_the_result_with_what_was_counted():
+def test_a_refusal_is_in_the_result_with_its_counts():
     log = drive(events=3)
     found = fit_logs([log], CALIBRATION, "car")
     assert (found.status, found.reason) == ("refused", "few-events")
@@ -93,7 +93,7 @@ def test_a_refusal_is_part_of_the_result_with_what_was_counted():
     assert found.calibration is CALIBRATION
 
 
-def test_a_vehicle_that_stands_at_another_slope_in_the_next_log_has_not_moved_its_mount():
+def test_another_slope_in_the_next_log_is_no_moved_mount():
     """Parked nose down at the end of the first log, nose up at the beginning of the second one."""
     mount = np.reshape(random_mounting(5), (3, 3))
     logs = []

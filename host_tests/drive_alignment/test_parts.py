@@ -99,7 +99,7 @@ def test_regression_is_weighted_least_squares(engine, count):
     assert 5 <= blocks <= 8
 
 
-def test_a_fit_made_while_another_is_half_done_changes_neither():
+def test_two_fits_at_the_same_time_do_not_interfere():
     """The loop may compare an alignment with the drive while the quality of the drive is being judged."""
     rng = np.random.default_rng(5)
     regression = ForwardRegression()
@@ -151,7 +151,7 @@ def level(pitch_deg, roll_deg=0.0):
     return [np.sin(r), np.cos(p) * np.cos(r), np.sin(p) * np.cos(r)]
 
 
-def test_the_vertical_is_the_mean_direction_of_stops_whatever_their_lengths():
+def test_each_stop_counts_once_in_the_vertical():
     standing = StandingVertical()
     for k, (pitch, seconds) in enumerate([(3.0, 300.0), (-3.0, 5.0), (2.0, 5.0), (-2.0, 5.0)]):
         stand(standing, level(pitch), seconds, rate=(0.1 * k, -0.2, 0.3))
@@ -163,7 +163,7 @@ def test_the_vertical_is_the_mean_direction_of_stops_whatever_their_lengths():
     assert not standing.moved
 
 
-def test_a_late_speed_is_not_taken_for_a_sensor_turned_while_standing():
+def test_a_late_speed_is_no_rotated_sensor():
     """A vehicle may speed up evenly for some seconds while a late speed still says zero. A sensor that was turned stays
     so for longer."""
     standing = StandingVertical()
@@ -175,7 +175,7 @@ def test_a_late_speed_is_not_taken_for_a_sensor_turned_while_standing():
     assert standing.moved
 
 
-def test_where_the_vertical_comes_from():
+def test_each_vehicle_has_its_source_of_the_vertical():
     """A car's: its stops, and with a fit the mean of both. A motorcycle's: the upright pose; else straight riding."""
     standing = types.SimpleNamespace(up=None)
     fit = types.SimpleNamespace(level=[2.0 * part for part in level(4.0)])
@@ -213,7 +213,7 @@ def test_a_bend_at_a_stuck_zero_is_no_stop(share, moved):
     ("seconds", "speed", "shake_g", "stops"),
     [(2.0, 0.0, 0.02, 0), (4.0, 0.0, 0.02, 1), (9.0, 1.0, 0.0, 0), (9.0, 0.0, 0.2, 0)],
 )
-def test_what_a_stop_is(seconds, speed, shake_g, stops):
+def test_a_stop_requires_stillness_and_time(seconds, speed, shake_g, stops):
     """Standing for three seconds, with no more than an engine's shaking."""
     standing = StandingVertical()
     for k in range(round(seconds * 10)):

@@ -103,7 +103,7 @@ class Drive:
 
 
 @pytest.mark.parametrize("every_s", [0.1, 0.5, 1.0, 2.0])
-def test_stops_and_three_brakings_give_the_mount_computed_by_hand(every_s):
+def test_stops_and_three_brakings_give_the_mount_by_hand(every_s):
     drive = Drive(every_s)
     for counted in range(3):
         assert drive.alignment.counted == counted and not drive.alignment.ready

@@ -102,7 +102,7 @@ HIGH_BYTE = [
 
 
 @pytest.mark.parametrize(("words", "spoil"), ILL + HIGH_BYTE)
-def test_an_ill_axis_is_named_at_once_and_comes_back(words, spoil):
+def test_a_faulty_axis_is_reported_at_once_and_recovers(words, spoil):
     """Within 1.2 s; a high byte that is stuck shows only as the counts run through it."""
     said = judged(spoil(ride(8)))
     assert [what for _, what in said] == [words, None]
@@ -112,7 +112,7 @@ def test_an_ill_axis_is_named_at_once_and_comes_back(words, spoil):
 
 @pytest.mark.parametrize("gyro_range", range(4))
 @pytest.mark.parametrize("dlpf", [1, 2, 3, 4, 5, 6])
-def test_the_quietest_chip_on_its_stand_is_not_ill(gyro_range, dlpf):
+def test_the_quietest_chip_at_rest_is_not_faulty(gyro_range, dlpf):
     """100 ug/sqrt(Hz) at 16 g, 0.004 deg/s/sqrt(Hz), each with a mean that makes the counts as quiet as they can be."""
     bandwidth = (None, 188, 98, 42, 20, 10, 5)[dlpf]
     per_g, per_dps = 2048, (131, 65.5, 32.8, 16.4)[gyro_range]
@@ -122,7 +122,7 @@ def test_the_quietest_chip_on_its_stand_is_not_ill(gyro_range, dlpf):
     assert judged(counts(20, dlpf, noise, bandwidth, rest), gyro_range, dlpf) == []
 
 
-def test_rides_are_not_ill(monkeypatch):
+def test_no_axis_is_faulty_in_a_ride(monkeypatch):
     """And their axes look so well that the judge, 2 KB of heap, is not imported."""
     monkeypatch.setattr(AxisWatch, "_load", lambda watch: pytest.fail("not well"))
     for seed in range(4):
@@ -130,7 +130,7 @@ def test_rides_are_not_ill(monkeypatch):
 
 
 @pytest.mark.parametrize(("column", "value", "words"), [(4, 32767, "Gyro"), (6, -32768, "Gyro"), (1, 32767, "Accel")])
-def test_the_end_of_the_range_clips_and_for_seconds_the_axis_is_ill(column, value, words):
+def test_seconds_at_the_end_of_the_range_make_an_axis_faulty(column, value, words):
     samples = ride(10)
     samples[400:1200, column] = value
     (first_s, first), (second_s, second), (_, last) = judged(samples)
@@ -139,14 +139,14 @@ def test_the_end_of_the_range_clips_and_for_seconds_the_axis_is_ill(column, valu
     assert first_s <= 2.9 and second_s <= 4.5
 
 
-def test_now_and_then_at_the_end_of_the_range_is_no_fault():
+def test_single_samples_at_the_end_of_the_range_are_no_fault():
     samples = ride(20)
     samples[np.random.default_rng(1).random(len(samples)) < 0.05, 1] = 32767
     assert judged(samples) == []
 
 
 @pytest.mark.parametrize(("accel_range", "said"), [(0, 0), (1, 0), (2, 2), (3, 2)])
-def test_hard_vibration_is_clipping_unless_the_range_is_small(accel_range, said):
+def test_hard_vibration_clips_unless_the_range_is_small(accel_range, said):
     """What the low-pass has left of it reaches half of 8 g or of 16 g for three seconds. In a range of 2 g bends do."""
     samples = ride(8)
     samples[400:1000, 1] += 17000 * np.sin(np.arange(600) * 2.2)

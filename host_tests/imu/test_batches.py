@@ -45,7 +45,7 @@ def test_a_frame_is_seven_big_endian_numbers(engine):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 @pytest.mark.parametrize("dead", [0, -1])
-def test_zeros_and_ones_are_no_readings(engine, dead):
+def test_all_zeros_or_ones_is_a_dead_frame(engine, dead):
     """Frames before such a reading count, whatever temperature and gyro say. A chip whose force is zero in two axes
     only is working."""
     samples = noise(4)
@@ -61,7 +61,7 @@ def test_zeros_and_ones_are_no_readings(engine, dead):
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
-def test_the_same_again_and_again_is_a_frozen_chip(engine):
+def test_repeated_readings_are_a_frozen_chip(engine):
     """Repetitions are counted from batch to batch. A change of any byte but the temperature's ends them."""
     still = np.repeat(noise(1), 12, axis=0)
     calls, expected = [[still[:3], still[3:7], still[7:]]], [[3, 2, 0]]
@@ -93,7 +93,7 @@ def test_a_sample_at_the_end_of_the_range_is_left_out(engine):
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
-def test_a_watch_notes_what_the_counts_have_shown(engine):
+def test_a_watch_records_the_low_bits_wraps_and_differences(engine):
     """The lowest four bits that have come, a changed high byte, a jump below it, and which axes differ."""
     samples = np.full((8, 7), 700) + np.arange(7)
     samples[:, 0] = 5, 6, 5, 6, 5, 6, 5, 6  # two values

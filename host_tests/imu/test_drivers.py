@@ -80,7 +80,7 @@ def test_presses(board, held_s, events):
     assert on(board, run) == events
 
 
-def test_ctrl_c_puts_the_watchdog_to_rest(board, monkeypatch, capsys, tmp_path):
+def test_ctrl_c_stops_the_watchdog(board, monkeypatch, capsys, tmp_path):
     """After Ctrl-C nothing feeds it, and a board that resets in the middle of a copy could not be deployed to."""
     from kickstand import app, start
 
@@ -104,7 +104,7 @@ def test_ctrl_c_puts_the_watchdog_to_rest(board, monkeypatch, capsys, tmp_path):
     assert "stopped" in capsys.readouterr().out
 
 
-def test_a_second_ctrl_c_while_the_ride_is_being_ended_leaves_the_watchdog_at_rest(board, monkeypatch, tmp_path):
+def test_a_second_ctrl_c_leaves_the_watchdog_stopped(board, monkeypatch, tmp_path):
     from kickstand import app, devices
     from kickstand.rides.recorder import Recorder
     from kickstand.settings import Settings
@@ -138,7 +138,7 @@ def test_a_second_ctrl_c_while_the_ride_is_being_ended_leaves_the_watchdog_at_re
     assert ended
 
 
-def test_status_shows_how_the_board_is(board, monkeypatch, capsys, tmp_path):
+def test_status_reports_on_the_board(board, monkeypatch, capsys, tmp_path):
     import gc
     import os
 

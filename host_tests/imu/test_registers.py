@@ -66,7 +66,7 @@ def started(wires, **settings):
     return chip
 
 
-def test_setup_writes_what_the_register_map_says(time):
+def test_setup_writes_the_values_of_the_register_map(time):
     wires = Wires(clock=time)
     chip = started(wires, accel_range_g=16, gyro_range_dps=1000, dlpf=2, rate_hz=100)
     assert wires.log == [
@@ -140,7 +140,7 @@ def test_a_fifo_that_does_not_start_fails_setup(register):
 
 
 @pytest.mark.parametrize("who_am_i", [0x68, MPU6500, MPU6886, 0x98])
-def test_whatever_register_changes_the_chip_is_no_longer_configured(who_am_i):
+def test_any_changed_register_ends_configured(who_am_i):
     wires = Wires(who_am_i)
     chip = started(wires)
     registers = [SMPLRT_DIV, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, FIFO_EN, USER_CTRL, PWR_MGMT_1]

@@ -89,7 +89,7 @@ def code(sensor):
     return sensor.fault and sensor.fault.code
 
 
-def test_the_chip_is_set_up_on_a_freed_bus_and_is_at_fault_until_its_first_sample(board):
+def test_a_new_chip_is_at_fault_until_its_first_sample(board):
     sensor, chip = made(board)
     assert code(sensor) == "starting"
     for now_ms in (0, 99, 100, 159, 160, 179):
@@ -113,7 +113,7 @@ def test_a_chip_that_is_prepared_starts_with_the_first_fetch(board):
     assert sensor.fetch(1100) == 1
 
 
-def test_a_set_up_that_fails_is_tried_again_50_ms_later(board):
+def test_a_failed_set_up_is_repeated_after_50_ms(board):
     from kickstand.imu.mpu6050 import UnknownChip
 
     sensor, chip = made(board)
@@ -158,7 +158,7 @@ def test_an_overflow_is_no_silence(board):
     assert code(sensor) == "sensor-silent"
 
 
-def test_readings_that_are_all_lost_for_half_a_second_are_a_fault(board):
+def test_half_a_second_of_lost_readings_is_a_fault(board):
     """The FIFO overflowed again and again: the board had no time to read."""
     sensor, chip, now_ms = running(board)
     for after_ms, said in ((300, None), (500, None), (502, "readings-lost")):
@@ -183,7 +183,7 @@ def test_two_lost_transfers_are_tolerated_and_three_are_a_fault(board):
     assert said == [None] * 5 + ["sensor-lost"]
 
 
-def test_the_fifo_is_emptied_after_a_transfer_that_broke_off(board):
+def test_the_fifo_is_emptied_after_a_failed_transfer(board):
     """It may have taken half a frame with it. Only once."""
     sensor, chip, now_ms = running(board)
     chip.waiting = [OSError(110), 1, 1]
@@ -247,7 +247,7 @@ def until_failed(sensor, chip, now_ms, since_ms):
     return now_ms + since_ms
 
 
-def test_the_fifo_is_tried_out_once_set_ups_do_not_help(board):
+def test_the_fifo_is_tested_if_set_ups_do_not_help(board):
     """At the third fault in a row, each soon after a set-up."""
     from kickstand.errors import Notice
 
@@ -274,7 +274,7 @@ def test_faults_far_apart_do_not_question_the_fifo(board):
         now_ms = set_up(sensor, now_ms)
 
 
-def test_lost_readings_are_the_fifos_fault_where_it_has_one(board):
+def test_a_broken_fifo_explains_lost_readings(board):
     from kickstand.errors import Notice
 
     sensor, chip, now_ms = running(board, lambda chip, error: (Notice("sensor-fifo", "stays full"), []))

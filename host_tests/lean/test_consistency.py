@@ -33,7 +33,7 @@ def test_vibration_is_no_reason_to_doubt():
     assert not judge.doubt
 
 
-def test_much_is_doubted_within_a_second_and_little_after_some():
+def test_large_misfits_are_doubted_sooner_than_small_ones():
     for name in ("left", "up"):
         for size, least_s, most_s in ((4.0, 0.4, 1.0), (1.5, 1.0, 3.2), (0.6, 5.0, 20.0)):
             judge = Consistency()
@@ -64,7 +64,7 @@ def test_a_doubtful_fit_is_no_fit():
     assert judge.doubt
 
 
-def test_what_does_not_fit_again_and_again_is_named():
+def test_repeated_misfits_are_reported():
     assert doubted(2).odd is None
     judge = doubted(3)
     assert judge.odd == consistency.last_odd == "odd-left"
@@ -91,7 +91,7 @@ def test_a_doubt_is_forgotten_after_a_minute_that_fits():
     assert judge.doubts == 0
 
 
-def test_after_a_gap_it_has_to_fit_first_or_to_rest():
+def test_after_a_gap_it_must_fit_or_rest_first():
     judge = Consistency()
     judge.gap()
     windows(judge, 3.0)
@@ -159,7 +159,7 @@ def test_a_mirrored_roll_rate_is_hidden_and_named():
     assert shown.odd in ("odd-left", "odd-up", "odd-pitch")
 
 
-def test_a_lean_that_no_bike_has_does_not_stay():
+def test_an_impossible_lean_does_not_last():
     """As after a blow that the gyro could not measure: 150 degrees, while the force says that the bike is upright."""
     shown = riding()
     shown.filter._x[0] += radians(150.0)

@@ -93,7 +93,7 @@ def held_from_side_to_side(seconds):
 
 
 @pytest.mark.parametrize("gain", [0.99, 1.01])
-def test_in_held_turns_the_gyros_scale_is_found_from_the_force_up(gain):
+def test_held_turns_show_the_gyros_scale_by_the_force_up(gain):
     """3 % between the rates about left and up are 0.8 degrees of lean at 38; the accelerometer's own error, which would
     be as much, is seen at rest."""
     lean, speed = held_from_side_to_side(190.0)
@@ -107,7 +107,7 @@ def test_in_held_turns_the_gyros_scale_is_found_from_the_force_up(gain):
         assert np.abs(np.mean(error[turn])) < 0.35
 
 
-def test_in_a_wheelie_a_sensor_that_is_turned_about_up_shows_no_lean():
+def test_a_wheelie_with_a_yaw_error_shows_no_lean():
     """30 degrees of pitch would be 2.5 of lean with the forward axis 5 degrees to the side."""
     t = np.arange(35 * HZ) / HZ
     speed = 3.0 * np.clip(t - 10.0, 0.0, 8.0)
@@ -167,7 +167,7 @@ def test_an_even_braking_on_a_smooth_road_is_no_rest(braking_mps2):
     assert abs(ridden.pitch_deg) < 1.0
 
 
-def test_the_work_on_a_window_has_as_many_pieces_as_are_counted_on():
+def test_the_work_on_a_window_has_WORK_STEPS_pieces():
     """One in each sample; at rest there are fewer."""
     lean, speed = held_turns(60.0)
     estimator, taken, pieces = lean_filter.LeanFilter(), 0, {True: set(), False: set()}
@@ -181,7 +181,7 @@ def test_the_work_on_a_window_has_as_many_pieces_as_are_counted_on():
     assert max(pieces[True]) < lean_filter.WORK_STEPS
 
 
-def test_a_pose_that_was_not_upright_is_found_in_turns_without_a_straight():
+def test_turns_alone_find_a_pose_that_was_not_upright():
     lean, speed = held_from_side_to_side(190.0)
     force, rate = shaken(*balanced(190.0, lean, speed))
     off = np.radians(1.5)
@@ -201,7 +201,7 @@ def test_a_measured_speed_makes_no_long_bend_worse():
     assert np.sqrt(np.mean(with_it**2)) < 1.03 * np.sqrt(np.mean(without**2))
 
 
-def test_the_error_of_the_lean_is_as_large_as_is_said():
+def test_the_stated_sigma_fits_the_error_of_the_lean():
     """Two thirds of the time it is within one standard deviation, on a ride of the other simulator."""
     ride = drawn_ride(2, 100.0, ["firm"], "street")
     shown = replay(ride.logs[0], ride.calibrations[0])

@@ -64,7 +64,7 @@ def act(dice, phone, radio):
         phone.write(dice.choice(("filter", "rate", "now", "board")), nonsense(dice))
 
 
-def test_random_acts():
+def test_random_acts_of_a_phone_do_no_harm():
     for drops in (True, False):  # what it cannot send, as an ESP32, or keeps it, as a Pico W
         board = Board(Sensor(seed=3).world(standing([[0, 10]])))
         board.radio = radio = Radio(board.clock, drops)

@@ -46,7 +46,7 @@ def places(block):
 
 
 @pytest.mark.parametrize("length", range(700, 720))
-def test_however_full_a_block_is_the_worst_turn_and_a_position_fit(length):
+def test_the_worst_turn_and_a_position_fit_into_any_block(length):
     """After quiet turns, each of few bits, every number of a violent one takes the longest code."""
     quiet = [800] * 7, 8, 40_000
     count = 0
@@ -69,7 +69,7 @@ def test_however_full_a_block_is_the_worst_turn_and_a_position_fit(length):
     assert len(read.turns) == count - 1 > 90
 
 
-def test_a_block_begins_without_anything_of_the_one_before():
+def test_a_block_contains_nothing_of_the_previous_one():
     """Each can be read without the others. What is left of a longer one is overwritten with zeros."""
     first, again = ride_writer.begun(4096), RideBlock(5000)
     for turn in some_turns(150):
@@ -99,13 +99,13 @@ def test_the_temperature_is_that_of_the_last_turns_mean():
 
 
 @pytest.mark.parametrize("index", [1, 2, 3, 4, 6, 8, 96, 1 << 12])
-def test_a_block_of_littlefs_begins_with_a_pointer_for_each_halving(index):
+def test_a_littlefs_block_begins_with_a_pointer_per_halving(index):
     pointers = 1 + max(k for k in range(20) if index % (1 << k) == 0)
     assert block_length(index) == 4096 - 4 * pointers
     assert block_length(0) == 4096
 
 
-def test_the_first_position_of_all_is_left_out_where_no_room_was_kept_for_it():
+def test_the_first_position_is_dropped_if_it_has_no_room():
     """From then on there is room in each block, however full it is."""
     block = RideBlock(5000)
     for sequence in range(3):

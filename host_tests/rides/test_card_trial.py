@@ -32,12 +32,12 @@ def tried(root, monkeypatch, **failing):
     return recorder.problem
 
 
-def test_a_card_is_tried_out_before_it_is_needed(root, monkeypatch):
+def test_a_card_is_tested_before_it_is_needed(root, monkeypatch):
     assert tried(root, monkeypatch) is None
     assert os.listdir("card") == []  # what was written is gone
 
 
-def test_whatever_a_card_does_in_the_trial_is_its_own_refusal(root, monkeypatch):
+def test_any_error_in_the_trial_is_a_refusal_of_the_card(root, monkeypatch):
     refusal = CardError("no-driver")
     with monkeypatch.context() as patch:
         assert tried(root, patch, mount=refusal) is refusal
@@ -49,7 +49,7 @@ def test_whatever_a_card_does_in_the_trial_is_its_own_refusal(root, monkeypatch)
         assert problem.values == (str(error),)
 
 
-def test_a_card_that_reads_other_than_it_was_written_is_refused(root, monkeypatch):
+def test_a_card_that_does_not_read_back_is_refused(root, monkeypatch):
     from kickstand.rides import card_trial
 
     class Wrong(io.BytesIO):

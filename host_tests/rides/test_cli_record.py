@@ -182,7 +182,7 @@ def test_a_car_shows_g_and_no_lean(aligned, streaming, tmp_path, monkeypatch):
     assert len(read_log(tmp_path / "ride.csv").time_us) > 100
 
 
-def test_a_disturbed_byte_in_the_name_of_the_vehicle_ends_no_recording(streaming, tmp_path):
+def test_a_disturbed_vehicle_name_does_not_end_the_recording(streaming, tmp_path):
     board = streaming(half_seconds(3)[0], "ctrl-c")
     board.serial.data = b"vehicle \xff\r\n" + board.serial.data
     command.works("record", "--out", tmp_path / "ride.csv")
@@ -206,7 +206,7 @@ def calibration(made, aligned, _trim_deg):
     return made
 
 
-def test_a_terminal_that_goes_away_costs_nothing(streaming, tmp_path, monkeypatch):
+def test_a_closed_terminal_loses_nothing(streaming, tmp_path, monkeypatch):
     data, turns = half_seconds(6)
     streaming(data, "ctrl-c")
     terminal = Watched()
@@ -240,7 +240,7 @@ def test_a_board_without_the_firmware_is_reported_alike(arguments, streaming, tm
 
 
 @pytest.mark.parametrize("arguments", [["record", "--out", "ride.csv"], ["pull"]])
-def test_a_board_with_an_older_version_has_to_be_updated(arguments, streaming, tmp_path, monkeypatch):
+def test_a_board_with_an_older_version_must_be_updated(arguments, streaming, tmp_path, monkeypatch):
     """As 0.2.0, whose modules are all in one folder."""
     monkeypatch.chdir(tmp_path)
     board = streaming([], None)
@@ -258,7 +258,7 @@ def test_a_board_with_an_older_version_has_to_be_updated(arguments, streaming, t
         ("silence", "the board says nothing any more"),
     ],
 )
-def test_what_came_until_the_stream_broke_off_is_kept(end, words, streaming, tmp_path):
+def test_the_data_before_a_broken_stream_are_kept(end, words, streaming, tmp_path):
     data, turns = half_seconds(3)
     streaming(data, end)
     result = command.works("record", "--out", tmp_path / "ride.csv.gz")
@@ -290,7 +290,7 @@ def test_after_a_new_alignment_the_log_ends_and_the_board_stops(streaming, tmp_p
     assert json.loads((tmp_path / "ride.cal.json").read_text())["trim_deg"] == 0.0
 
 
-def test_a_block_that_came_over_damaged_leaves_a_gap(streaming, tmp_path):
+def test_a_damaged_block_leaves_a_gap(streaming, tmp_path):
     data, _ = half_seconds(6)
     data[3] = data[3][:200] + b"!" + data[3][201:]
     streaming(data, "ctrl-c")

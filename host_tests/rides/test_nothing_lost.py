@@ -229,7 +229,7 @@ KINDS += [(verb, fault) for verb in ("import", "smooth", "plot") for fault in ("
         *(pytest.param(*kind, ALL, marks=pytest.mark.nightly) for kind in KINDS),
     ],
 )
-def test_nothing_that_existed_is_lost(verb, fault, count, source, tmp_path):
+def test_no_existing_file_is_lost(verb, fault, count, source, tmp_path):
     """21 kinds, of which the nightly run has 10 moments each, 210 in all."""
     chance = random.Random(f"{verb} {fault}")
 
@@ -250,7 +250,7 @@ def test_nothing_that_existed_is_lost(verb, fault, count, source, tmp_path):
     assert lost == []
 
 
-def test_a_command_that_is_killed_loses_something_if_it_writes_in_place(source, tmp_path, monkeypatch):
+def test_a_killed_command_that_writes_in_place_loses_data(source, tmp_path, monkeypatch):
     """The test above notices: without a temporary file an earlier result is cut."""
 
     @contextlib.contextmanager

@@ -108,7 +108,7 @@ def times(keeper):
     return [turn.time_us for block in blocks(keeper) for turn in block.turns]
 
 
-def test_a_ride_that_an_alignment_begins_begins_as_its_replay_will(keeper):
+def test_a_ride_after_an_alignment_begins_like_its_replay(keeper):
     """A replay does not know that the bike has just been posed: the meter starts again without that."""
     from kickstand.rides.recording import Recording
 
@@ -128,7 +128,7 @@ def test_a_ride_that_an_alignment_begins_begins_as_its_replay_will(keeper):
     assert keeper.steps == ["begin", "restart", "end", "begin"]
 
 
-def test_the_first_start_makes_the_recorder_and_the_next_takes_the_same(root, clock):
+def test_the_second_start_reuses_the_recorder(root, clock):
     """Also where the menu was open for too short a time to prepare it."""
     from kickstand.rides.recording import Recording
 
@@ -145,7 +145,7 @@ def test_the_first_start_makes_the_recorder_and_the_next_takes_the_same(root, cl
     assert recording.recorder is made and made.active
 
 
-def test_a_block_is_written_by_pieces_of_256_bytes_one_a_turn(recorder, keeper):
+def test_a_block_is_written_256_bytes_per_turn(recorder, keeper):
     keeper.length = 700
     start(recorder)
     while "write" not in keeper.steps:
@@ -164,7 +164,7 @@ def test_a_block_is_written_by_pieces_of_256_bytes_one_a_turn(recorder, keeper):
     assert len(keeper.steps) == before  # nothing is waiting
 
 
-def test_all_blocks_follow_one_another_and_say_what_they_belong_to(recorder, keeper, clock):
+def test_all_blocks_have_their_ride_and_sequence(recorder, keeper, clock):
     start(recorder)
     add(recorder, 1500, clock)
     recorder.stop()
@@ -179,7 +179,7 @@ def test_all_blocks_follow_one_another_and_say_what_they_belong_to(recorder, kee
     assert found[0].calibration().aligned
 
 
-def test_a_turn_that_fills_a_block_waits_for_the_one_before(recorder, keeper):
+def test_a_turn_that_fills_a_block_waits_for_the_previous_one(recorder, keeper):
     """Where flash was slower than the ride no block may be lost."""
     start(recorder)
     add(recorder, 1500, tick=False)
@@ -213,7 +213,7 @@ def test_the_end_of_a_ride_closes_a_file_and_may_erase_flash(stops_interrupts, r
 
 
 @pytest.mark.parametrize(("waited_us", "step_us"), [(100_000, 500_001), (3_000_000, 3_000_000), (600_000_000, 1 << 29)])
-def test_after_a_gap_the_time_is_the_clocks_and_more_than_half_a_second(waited_us, step_us, recorder, keeper, clock):
+def test_after_a_gap_the_recorded_time_is_over_half_a_second(waited_us, step_us, recorder, keeper, clock):
     start(recorder)
     add(recorder, 4, clock)
     recorder.mark_gap()
@@ -241,7 +241,7 @@ def test_a_gap_belongs_to_its_own_ride(recorder, keeper, clock):
     assert [turn.speed_mps for turn in found] == [None] * 3
 
 
-def test_a_position_and_a_speed_go_with_the_next_turn_alone(recorder, keeper):
+def test_a_position_and_a_speed_belong_to_the_next_turn_only(recorder, keeper):
     """One without the other too; a speed of zero is one."""
     start(recorder)
     recorder.add_fix(None, ride_writer.place(0))
@@ -307,7 +307,7 @@ def test_whatever_fails_ends_the_ride_once_with_one_notice(step, error, recorder
     assert len(blocks(keeper)[-1].turns) == 3
 
 
-def test_a_card_that_is_refused_says_so_itself(recorder, keeper):
+def test_a_refused_card_has_its_own_message(recorder, keeper):
     keeper.fails, keeper.error = "begin", CardError("no-card", "no SD card")
     with contextlib.redirect_stdout(io.StringIO()):
         start(recorder)
@@ -316,7 +316,7 @@ def test_a_card_that_is_refused_says_so_itself(recorder, keeper):
     assert keeper.steps == ["begin"]
 
 
-def test_a_new_ride_ends_the_one_before(recorder, keeper):
+def test_a_new_ride_ends_the_previous_one(recorder, keeper):
     start(recorder)
     add(recorder, 3)
     start(recorder)
@@ -325,7 +325,7 @@ def test_a_new_ride_ends_the_one_before(recorder, keeper):
     assert recorder.seconds() == 0
 
 
-def test_what_is_not_ready_is_asked_again_in_the_next_turn(recorder, keeper):
+def test_a_writer_that_is_not_ready_is_asked_in_the_next_turn(recorder, keeper):
     start(recorder)
     keeper.is_ready = False
     while "ready" not in keeper.steps:

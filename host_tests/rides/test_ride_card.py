@@ -144,7 +144,7 @@ print(len(states))
 """
 
 
-def test_wherever_the_power_goes_a_card_keeps_all_but_the_last_block():
+def test_after_any_power_cut_a_card_loses_only_the_last_block():
     assert int(run_mpy(_CARD + _CUTS)) > 300
 
 
@@ -193,6 +193,6 @@ print(len(opened))
 """
 
 
-def test_a_folder_in_the_flash_does_not_pass_for_the_card():
+def test_a_folder_in_the_flash_is_not_the_card():
     """One called /sd, as a copy of a card's files leaves it: rides would go to the flash."""
     assert int(run_mpy(_FOLDER)) == 1

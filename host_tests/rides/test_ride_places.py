@@ -28,7 +28,7 @@ def found(blocks) -> list[tuple[int, tuple[float, float, float | None]]]:
 
 @pytest.mark.parametrize("length", [block_format.block_length, lambda _: 512], ids=["flash", "USB"])
 @pytest.mark.parametrize("every", [10, 1])
-def test_every_position_is_with_its_own_turn_and_every_turn_is_there(every, length):
+def test_no_turn_is_lost_and_positions_keep_their_turn(every, length):
     data, turns = ride_writer.blocks(12, length=length, speed=True, places_every=every)
     blocks, problems = block_reader.read(b"".join(data))
     assert problems == []
@@ -54,7 +54,7 @@ def said(*values: int) -> list:
     return found([ride_writer.ended(block)])
 
 
-def test_a_date_that_is_none_leaves_the_position_and_no_place_on_earth_is_left_out():
+def test_an_invalid_date_leaves_the_position():
     for date in (0, 5, 26 << 9 | 13 << 5 | 1, 26 << 9 | 2 << 5 | 30, 0xFFFF):
         ((_, (lat, lon, utc_s)),) = said(date, 1000, 6_000_000, -6_000_000)
         assert (lat, lon, utc_s) == (1.0, -1.0, None), date
@@ -64,7 +64,7 @@ def test_a_date_that_is_none_leaves_the_position_and_no_place_on_earth_is_left_o
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
-def test_a_recorded_ride_says_where_it_was(engine, tmp_path):
+def test_a_recorded_ride_has_positions(engine, tmp_path):
     """From the receiver's wire to the log, ten times a second; the speed of a motorcycle is not even confirmed yet."""
     place = [-33.5, -70.5, -1e-4, 2e-4]
     plan = {
@@ -88,7 +88,7 @@ def test_a_recorded_ride_says_where_it_was(engine, tmp_path):
     assert np.max(np.abs(log.lon_deg[placed] - (place[1] + place[3] * fix_s))) < 3e-6
 
 
-def test_a_log_has_the_columns_that_there_is_something_in(tmp_path):
+def test_a_log_has_no_empty_columns(tmp_path):
     for name, speed, every, columns in (
         ("none", False, 0, []),
         ("places", False, 10, ["lat_deg", "lon_deg", "utc_s"]),

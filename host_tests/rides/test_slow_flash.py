@@ -58,7 +58,7 @@ def run(request, tmp_path_factory):
     return record, seen.turns, blocks(flash), erase_s, fifo_s
 
 
-def test_each_is_a_gap_of_its_length_in_the_ride_and_is_counted(run):
+def test_each_loss_is_counted_and_is_a_gap_of_its_length(run):
     record, turns, recorded, erase_s, fifo_s = run
     missing_s = [seconds for block in recorded for seconds in block.missing_s()]
     assert 5 < len(missing_s) <= len(recorded) + 1
@@ -77,7 +77,7 @@ def test_each_is_a_gap_of_its_length_in_the_ride_and_is_counted(run):
     assert gaps <= set(range(6, len(missing_s) + 3)) and gaps
 
 
-def test_a_lean_that_is_wrong_for_it_is_not_shown_as_good(run):
+def test_a_lean_that_is_wrong_after_a_loss_is_not_shown(run):
     _, turns, _, _, _ = run
     ride = script.Ride([getattr(script, name)(*more) for name, *more in BENDS])
     rode = [turn for turn in turns if turn[0] > FROM_S]
@@ -90,7 +90,7 @@ def test_a_lean_that_is_wrong_for_it_is_not_shown_as_good(run):
     assert sum(dt for _, _, trusted, dt in errors if not trusted) < 0.5 * (UNTIL_S - FROM_S)  # it recovers
 
 
-def test_the_status_says_how_long_a_block_takes(tmp_path, monkeypatch, capsys):
+def test_the_status_shows_the_time_for_a_block(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(gc, "mem_free", lambda: 150_000, raising=False)
     with Board(lambda t_s: (0, 1, 0, 0, 0, 0)) as board:

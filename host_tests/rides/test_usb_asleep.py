@@ -31,7 +31,7 @@ def blocks(said):
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
-def test_the_stream_ends_itself_and_the_lean_goes_on(engine, tmp_path, capsys):
+def test_the_stream_ends_itself_and_the_lean_continues(engine, tmp_path, capsys):
     device_plans.align(tmp_path)
     capsys.readouterr()
     plan = {"stream": True, "lean": [[0, 0], [24, 20]], "faults": [["usb_asleep", [FROM_S, FOR_S]]], "until": 40}
@@ -45,7 +45,7 @@ def test_the_stream_ends_itself_and_the_lean_goes_on(engine, tmp_path, capsys):
     assert record.ends[-1] == "off"  # no watchdog
 
 
-def test_refusals_do_not_stall_the_loop_again_and_again():
+def test_refusals_do_not_stall_the_loop_repeatedly():
     """Whatever goes on failing: one slow print in a minute."""
     with Board(lambda t_s: (0, 1, 0, 0, 0, 0)) as board:
 

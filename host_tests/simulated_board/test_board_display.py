@@ -66,7 +66,7 @@ def on_each(hz=BUS_HZ, kinds=KINDS):
 
 
 @on_each()
-def test_it_shows_what_it_is_given_and_what_is_new(board, display):
+def test_it_shows_the_given_lines_and_their_changes(board, display):
     for lines in (NEW, ("", ""), ("0123456789ABCDEFGHI", "\xff\xff\x7e"), OLD):
         display.show(*lines)
         turns(board, display, 40)
@@ -77,7 +77,7 @@ def test_it_shows_what_it_is_given_and_what_is_new(board, display):
 
 
 @on_each()
-def test_no_turn_keeps_the_loop_waiting(board, display):
+def test_no_turn_delays_the_loop(board, display):
     for k in range(20):
         display.show(f"{k * 1234567:016d}", f"{k * 7654321:016d}")
         longest = turns(board, display, 10)
@@ -97,7 +97,7 @@ def test_nothing_is_sent_while_nothing_changes(board, display):
 
 
 @on_each((None,), ("lcd",))
-def test_only_what_has_changed_of_a_line_is_sent(board, display):
+def test_only_the_changed_part_of_a_line_is_sent(board, display):
     """An LCD takes four bytes a character, and four for its place; twice, if it is more than one character."""
     sent, original = [], board.lcd.write_byte
     board.lcd.write_byte = lambda value: sent.append(value) or original(value)
@@ -109,7 +109,7 @@ def test_only_what_has_changed_of_a_line_is_sent(board, display):
 
 
 @on_each()
-def test_unplugged_for_however_long_it_comes_back_and_shows_nothing_old(board, display):
+def test_after_any_unplug_it_returns_and_shows_nothing_old(board, display):
     for gap_turns, gone_ms in ((0, 1), (0, 50), (5, 1), (40, 1)):
         display.show(*OLD)
         turns(board, display, 40)
@@ -133,7 +133,7 @@ def test_unplugged_for_however_long_it_comes_back_and_shows_nothing_old(board, d
 
 
 @on_each((None,))
-def test_a_transfer_that_breaks_off_at_any_byte_is_made_good(board, display):
+def test_a_transfer_cut_at_any_byte_is_repaired(board, display):
     """And until then no lean is seen that is neither the old nor the new one."""
     address = board.lcd.address
     good = as_text(OLD)[0], as_text(NEW)[0]
@@ -177,7 +177,7 @@ def test_the_processor_is_reset_in_the_middle_of_a_part():
 
 
 @on_each((None,), ("lcd",))
-def test_an_lcd_out_of_step_is_put_right_by_the_next_initialisation(board, display):
+def test_the_next_initialisation_repairs_an_lcd_out_of_step(board, display):
     seen = set()
     board.lcd.slip()
     display.show(*NEW)
@@ -208,7 +208,7 @@ def test_any_address_of_a_backpack_is_found():
         assert on_board(run, 1e6, lcd_address=address)[0] == "returned"
 
 
-def test_the_kind_that_is_set_is_the_kind_that_is_used():
+def test_the_set_kind_is_used():
     """For controllers whose status says nothing, and displays at odd addresses."""
     for kind in KINDS:
 
@@ -222,7 +222,7 @@ def test_the_kind_that_is_set_is_the_kind_that_is_used():
 
 
 @on_each((None,))
-def test_another_display_in_its_place_is_taken(board, display):
+def test_a_replaced_display_is_detected(board, display):
     for kind in OLEDS + ("lcd", "lcd", "sh1106"):
         board.change_display(kind)
         display.show(*NEW)
@@ -231,7 +231,7 @@ def test_another_display_in_its_place_is_taken(board, display):
 
 
 @on_each((None,), ("ssd1306",))
-def test_a_status_that_never_says_on_keeps_no_oled_dark(board, display):
+def test_a_status_that_is_never_on_leaves_no_oled_dark(board, display):
     board.lcd.read_byte = lambda: 0xFF
     board.remove_lcd()
     board.fit_lcd()
@@ -314,7 +314,7 @@ def test_the_rows_of_a_larger_display_are_blanked():
 
 
 @on_each((None,), OLEDS)
-def test_noise_in_an_oled_s_ram_is_gone_after_ten_seconds_and_its_picture_moves(board, display):
+def test_an_oled_is_rewritten_every_ten_seconds_and_moves(board, display):
     board.lcd.ram[200] ^= 0xFF
     starts = set()
     for _ in range(25):
@@ -326,7 +326,7 @@ def test_noise_in_an_oled_s_ram_is_gone_after_ten_seconds_and_its_picture_moves(
 
 
 @on_each((None,))
-def test_plugging_hundreds_of_times_takes_no_memory(board, display):
+def test_hundreds_of_unplugs_take_no_memory(board, display):
     """Only MicroPython says how much is in use."""
     count = 300 if sys.implementation.name == "micropython" else 20
     used = []

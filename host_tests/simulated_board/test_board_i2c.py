@@ -18,7 +18,7 @@ def check(firmware, **fitted):
     return board
 
 
-def test_nobody_home():
+def test_a_missing_chip_gives_an_error():
     def firmware(board, sda, scl, number):
         i2c = I2C(0, sda=Pin(sda), scl=Pin(scl), freq=400_000)
         start = board.clock.now_us
@@ -49,7 +49,7 @@ def test_the_new_driver_of_an_esp32_counts_ticks_of_10_ms(board):
 
 
 @firmware(until_s=20.0, machine="esp32", i2c_driver="legacy")
-def test_the_legacy_driver_of_an_esp32_waits_longer_than_a_watchdog(board):
+def test_an_esp32s_old_driver_waits_longer_than_the_watchdog(board):
     i2c = I2C(0, sda=Pin(21), scl=Pin(22), timeout=5000)
     assert transfer_us(board, i2c, 14, None) == 390
     board.faults.timeout(0x68)
@@ -99,7 +99,7 @@ def test_interrupts_of_an_esp32_wait_for_the_end_of_a_transfer():
     assert during == 0 and len(after) in (8, 9)  # one more may have come since
 
 
-def test_a_classic_esp32_crashes_where_a_pin_of_its_flash_is_driven_and_some_pins_are_inputs_only():
+def test_a_classic_esp32_crashes_if_a_flash_pin_is_driven():
     def drive(number):
         Pin(number)  # which alone does no harm
         Pin(number, Pin.OPEN_DRAIN)

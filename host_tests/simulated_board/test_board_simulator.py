@@ -32,7 +32,7 @@ def test_power_is_lost_by_off_and_kept_by_reset():
     assert board.boots == 3 and board.clock.now_us == 3_000_000
 
 
-def test_the_watchdog_can_be_stopped_by_its_register_and_ends_with_the_run():
+def test_its_register_stops_the_watchdog():
     def firmware(board):
         WDT(timeout=1000)
         fake_machine.mem32[0x40058000 + 0x3000] = 1 << 30

@@ -125,7 +125,7 @@ def test_a_turn_of_the_loop_reads_64_bytes_at_most():
         assert wire.any() == 136
 
 
-def test_what_is_no_fix_is_no_speed():
+def test_an_invalid_fix_gives_no_speed():
     assert speeds_of(sentence(RMC % ("GP", 1, "V", "19.438", ",N"))) == []
     assert speeds_of(sentence(RMC % ("GP", 1, "A", "19.438", ",E"))) == []  # the last fix carried on
     assert speeds_of(sentence("GPRMC,,V,,,,,,,,,,N")) == []
@@ -150,7 +150,7 @@ def test_damaged_lines_are_refused_and_the_next_is_read():
     assert speeds_of("\x00\xff".encode() * 500 + b"\n" + good.encode()) == [10000]
 
 
-def test_any_pieces_will_do():
+def test_sentences_may_arrive_in_any_pieces():
     text = "".join(sentence(RMC % ("GP", i, "A", "%.3f" % (i * 1.9438), ",A")) for i in range(1, 6))
     for piece in (1, 7, 64, 500):
         assert speeds_of(text, piece, 1, 500) == [1000, 2000, 3000, 4000, 5000]
@@ -160,7 +160,7 @@ def test_the_same_fix_again_is_not_new():
     assert speeds_of(sentence(RMC % ("GP", 1, "A", "19.438", ",A")) * 5) == [10000]
 
 
-def test_a_fix_that_waited_in_the_receiver_is_refused_or_has_its_age():
+def test_a_delayed_fix_is_rejected_or_has_its_age():
     with Board(level):
         from kickstand.speed.gps import Gps
 
@@ -200,7 +200,7 @@ def gps_faults(kind, from_s, until_s):
     return drive({"SPEED": "gps"}, lambda b: b.fit_gps(constant, faults=faults), 30.0)
 
 
-def test_gps_faults_are_named_and_end():
+def test_gps_faults_are_reported_and_end():
     for kind, text in (
         ("unplugged", "GPS silent"),
         ("void", "GPS: no fix"),
@@ -248,7 +248,7 @@ def test_a_contact_that_bounces_is_counted_once():
     check_wheel(got, 0.5)
 
 
-def test_a_storm_of_pulses_is_named_and_the_speed_returns():
+def test_a_storm_of_pulses_is_reported_and_the_speed_returns():
     """Twice as long as the pause, so that the interrupt is tried in the middle of it."""
     for port, pulses_per_s in (("rp2", 50_000), ("esp32", 6_000)):
 
@@ -301,7 +301,7 @@ def test_a_contact_that_bounces_is_counted_once_on_an_esp32_too():
         assert abs(mean - speed) < 0.01 * speed, (speed, mean)
 
 
-def test_a_wheel_that_is_too_quick_for_an_esp32_is_named_and_gives_no_speed():
+def test_a_wheel_too_fast_for_an_esp32_is_reported():
     """A part of its pulses is lost, which would read as a speed that is too low."""
 
     def speed_of(t_s):
@@ -382,7 +382,7 @@ def test_u_blox_s_binary_protocol_is_named():
     assert fault_of(bytes(range(256))) == ("gps-garbled",)
 
 
-def test_a_date_that_cannot_be_is_none():
+def test_an_impossible_date_is_0():
     dates = (
         ("230394", 0),
         ("211126", 26 << 9 | 11 << 5 | 21),

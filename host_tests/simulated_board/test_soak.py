@@ -50,7 +50,7 @@ def trip(seconds, cut_save=None):
         (raises, trip(12.0), "ended with 'reset'"),
     ],
 )
-def test_it_notices_what_is_broken(broken, made, said, monkeypatch):
+def test_every_check_of_the_soak_can_fail(broken, made, said, monkeypatch):
     broken(monkeypatch)
     monkeypatch.setattr(soaking, "make_trip", lambda *_: made)
     figures = soak(hours=0.001)

@@ -90,7 +90,7 @@ def test_a_question_under_a_notice_is_not_answered_unread(drive, screen):
     assert drive.answers == [True]
 
 
-def test_a_fault_is_before_the_pages_and_the_menu_before_the_fault(sensor, screen):
+def test_a_fault_hides_the_pages_and_the_menu_the_fault(sensor, screen):
     sensor.fault = Notice("sensor-lost")
     assert screen.lines(0) == ("Sensor lost", "check wiring")
     screen.press(SHORT, 100)
