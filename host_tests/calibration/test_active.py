@@ -1,4 +1,4 @@
-"""The calibration in use: what is loaded, stored and put into use, and when the trim goes to flash."""
+"""The calibration in use: loading, saving and using it, and saving the trim to flash."""
 
 import pytest
 from kickstand.calibration.parameters import Calibration
@@ -7,7 +7,7 @@ from kickstand_tools.simulated_board.simulator import Board
 
 
 class Meter:
-    """new_trim: what keep_trim() finds, in degrees; None for nothing new."""
+    """new_trim: the result of keep_trim() in degrees, or None without a new one."""
 
     def __init__(self):
         self.calibration = Calibration()
@@ -33,7 +33,7 @@ class Chip:
 
 @pytest.fixture
 def made(tmp_path, monkeypatch):
-    """An ActiveCalibration that was made at 0 ms, its meter, and what changed() was given."""
+    """An ActiveCalibration created at 0 ms, its meter, and the arguments of changed()."""
     monkeypatch.chdir(tmp_path)
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):
         from kickstand.calibration.active import ActiveCalibration
@@ -84,7 +84,7 @@ def test_save_replaces_and_refine_corrects(made):
 
 
 def test_the_trim_is_saved_once_a_minute_at_most(made):
-    """Flash wears. Not in the first minute; where there was nothing to save, the next chance is taken."""
+    """Because flash wears. Not in the first minute. If there was nothing to save, the next chance is used."""
     active, meter, _ = made
     active.chip_started(Chip())
     active.save(aligned())

@@ -1,4 +1,4 @@
-"""CAL.json: what is refused, what is kept."""
+"""CAL.json: refused and accepted contents."""
 
 import json
 import os
@@ -92,7 +92,7 @@ def test_a_byte_order_mark_is_accepted(tmp_path):
 
 
 def test_an_unlabelled_identity_is_not_an_alignment(tmp_path):
-    """A file of another program need not say; only a matrix that was measured is an alignment."""
+    """Another program's file may lack the key `aligned`. Only a measured matrix is an alignment."""
     assert not read_calibration(command.write_cal(tmp_path / "CAL.json", vehicle_from_sensor=I)).aligned
     assert read_calibration(command.write_cal(tmp_path / "CAL.json", vehicle_from_sensor=I, aligned=True)).aligned
 
@@ -123,7 +123,7 @@ def test_harmful_outputs_are_refused(tmp_path, log):
 
 @pytest.mark.skipif(os.name == "nt", reason="named pipes are of Unix")
 def test_a_special_file_is_not_replaced(tmp_path, log):
-    """As /dev/null would be, for whoever has the right to; a pipe of our own stands in for it."""
+    """Such as /dev/null, for a user with the rights. The test uses its own pipe."""
     cal = command.write_cal(tmp_path / "CAL.json")
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
@@ -132,7 +132,7 @@ def test_a_special_file_is_not_replaced(tmp_path, log):
 
 
 def test_a_link_is_written_through(tmp_path, log):
-    """Whoever keeps CAL.json elsewhere finds it there afterwards."""
+    """A CAL.json kept elsewhere is still there afterwards."""
     (tmp_path / "kept").mkdir()
     (tmp_path / "LEAN.csv").symlink_to(tmp_path / "kept" / "LEAN.csv")
     cal = command.write_cal(tmp_path / "CAL.json")
@@ -142,7 +142,7 @@ def test_a_link_is_written_through(tmp_path, log):
 
 
 def whole():
-    """A calibration with matrices, and how its sensor sits."""
+    """A calibration with matrices and an alignment."""
     turned = np.array([[0.0, 0.6, -0.8], [1.0, 0.0, 0.0], [0.0, -0.8, -0.6]])
     return CalibrationFile(
         np.array([0.01, -0.02, 0.03]),

@@ -16,7 +16,7 @@ def taker():
 
 
 def step(taking, row):
-    """What step() returns, or the code of the CaptureError that it raises."""
+    """The result of step(), or the code of its CaptureError."""
     try:
         return taking.step(row)
     except CaptureError as error:

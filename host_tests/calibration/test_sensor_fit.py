@@ -1,4 +1,4 @@
-"""The gyro by the turns between still poses: the integration, the fit, what it proves, on the board's samples."""
+"""Calibration of the gyro by the turns between still poses: the integration, the fit, its proof."""
 
 import numpy as np
 import pytest
@@ -19,14 +19,14 @@ DIAGONAL = np.eye(3, dtype=bool)
 
 
 def handled(seed, hand=None):
-    """A random sensor, and its readings of the six positions in one go."""
+    """A random sensor, and its readings of the six positions in one log."""
     chance = np.random.default_rng([seed, 38])
     chip = Chip.random(chance)
     return chip, hands.procedure(chance, chip, np.array(list(poses.ups(chance))), 22.0, hand)
 
 
 def errors_left(chip, calibration):
-    """(3, 3) what remains of the gyro's errors, in the axes of the calibrated accelerometer."""
+    """The remaining errors of the gyro (3, 3), in the axes of the calibrated accelerometer."""
     a = calibration.accel_matrix @ np.diag(calibration.accel_slope) @ chip.accel_matrix
     u, _, v = np.linalg.svd(a)
     return calibration.gyro_matrix @ chip.gyro_matrix - u @ v
@@ -110,7 +110,7 @@ def test_rates_near_the_range_and_gaps_are_noticed(sums, dt_us, quick, lost):
 
 
 def made(seed):
-    """Poses, turns and the truth of a sensor without noise, made of rotations alone."""
+    """Poses, turns and true errors of a sensor without noise, from rotations alone."""
     rng = np.random.default_rng(seed)
     gyro = np.eye(3) + 0.01 * rng.normal(size=(3, 3))
     skew = 0.006 * rng.normal(size=3)
@@ -185,7 +185,7 @@ def test_micropython_finds_the_same():
 
 
 def with_axis(axis, change):
-    """The log of a procedure whose gyro axis is ill."""
+    """The log of a calibration with a faulty gyro axis."""
     _, readings = handled(5)
     bias = np.median(readings[:, 4 + axis])
     readings[:, 4 + axis] = bias + change(readings[:, 4 + axis] - bias)
@@ -202,7 +202,7 @@ def late(rates):
     [
         (lambda rates: 0.5 * rates, "gyro-scale"),
         (lambda rates: 2.0 * rates, "gyro-scale"),
-        (lambda rates: -rates, None),  # named where the turns were nearly about one axis
+        (lambda rates: -rates, None),  # named if the turns were nearly about one axis
         (lambda rates: 0.0 * rates, "dead-gyro"),
         (lambda rates: np.where(np.abs(rates) > 5.0, 0.0, rates), "dead-gyro"),  # but noisy
         (late, "gyro-misfit"),

@@ -1,5 +1,5 @@
-"""The rider's way through the device: press, press, ride; six positions; the menu; power-off; and what
-cannot go wrong."""
+"""The rider's use of the device: press, press, ride; six positions; the menu; power-off; and things that
+must not go wrong."""
 
 import math
 import re
@@ -119,7 +119,7 @@ UPS = [[1, 0, 0], [0, 0, -1], [0, 1, 0], [-1, 0, 0], [0, 0, 1], [0, -1, 0]]
 
 
 def six_positions(free, repeat=False):
-    """Menu, six sides 5 s each with a second of turning between, a free pose."""
+    """The menu, six sides of 5 s each with a second of turning between, and a free pose."""
     steps, t_s = [[0, None]], 6.0
     for up in [*UPS[:3], *([UPS[0]] if repeat else []), *UPS[3:], free]:
         steps += [[t_s, up], [t_s + 5, None]]
@@ -129,7 +129,7 @@ def six_positions(free, repeat=False):
 
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
 def test_six_positions_then_alignment_of_a_part_with_errors(engine, tmp_path):
-    """The main job end to end: calibrated by both wizards, the lean is right, errors of the part and all."""
+    """The main job end to end: after both wizards the lean is right despite the part's errors."""
     record = device_plans.run(engine, tmp_path, {**six_positions([0.5, 0.6, -0.7]), "seed": 3})
     assert record.first("any of the six") < math.inf
     assert record.first(r"Side \+x done") < 12
@@ -162,7 +162,7 @@ def test_a_fast_turn_is_reported_and_repeated(tmp_path):
 
 
 def ill(monkeypatch, change):
-    """Parts whose gyro reads about x what change() makes of it."""
+    """Parts whose gyro reads change(rate) about x."""
     read = sensor_errors.Sensor.read
 
     def changed(self, motion, t_s):
@@ -215,7 +215,7 @@ def test_six_positions_shows_the_next_step(tmp_path):
 
 
 def test_a_tilted_upright_pose_is_corrected_on_the_road(tmp_path):
-    """Two degrees to the right when pressed upright; after a ride it shows the true lean, after power-off too."""
+    """Two degrees to the right at the press for upright. After a ride it shows the true lean, also after power-off."""
     ride = [["kickstand", 8.0], ["upright", 14.0, 2.0], ["accelerate", 15.0, 6.0]]
     for _ in range(3):
         ride += [["turn", -25.0, 3.0], ["straight", 25.0], ["turn", 25.0, 3.0], ["straight", 25.0]]

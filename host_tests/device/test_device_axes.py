@@ -1,4 +1,4 @@
-"""An axis that is dead, in standby or at the end of its range, on the whole device: named, and no lean is shown."""
+"""A dead axis, in standby or at the end of its range, on the whole device: it is reported, and no lean is shown."""
 
 import math
 
@@ -73,7 +73,7 @@ def test_an_axis_that_dies_in_a_pose_ends_it(spoilt, tmp_path):
 
 
 def test_a_moment_at_the_end_of_the_range_hides_nothing_for_long(spoilt, aligned):
-    """Named, and right again at once: the bike stands."""
+    """Reported, and correct again at once: the bike is at rest."""
     spoilt(3, 600.0, FAULT_S, FAULT_S + 0.3)
     record = device_plans.run("cpython", aligned, {"lean": [[0, STATIC]], "until": 10})
     assert record.first("Gyro clips", FAULT_S) < FAULT_S + 0.5

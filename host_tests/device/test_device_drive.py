@@ -1,5 +1,5 @@
-"""The whole device aligned by driving: cars without any alignment before, motorcycles whose alignment is checked and
-refined, and speed sources that cannot be used."""
+"""The whole device aligned by driving: cars without an earlier alignment, motorcycles whose alignment is checked and
+refined, and unusable speed sources."""
 
 import math
 import re
@@ -28,7 +28,7 @@ def town(blocks):
 
 
 def stops(time_s, start_s):
-    """True while the vehicle stands, in a ride whose town() begins at start_s."""
+    """True while the vehicle is at rest, in a ride whose town() begins at start_s."""
     return time_s < start_s or (time_s - start_s) % 30.0 > 21.0
 
 
@@ -50,7 +50,7 @@ def stored(flash):
 
 
 def forward_error_deg(calibration, seed=None):
-    """The yaw error, which is what driving finds. seed: of the sensor's mount and errors."""
+    """The yaw error, which driving finds. seed: of the sensor's mount and errors."""
     true = sensor_errors.Sensor(seed=seed).vehicle_from_sensor
     up, forward = true[3:6], calibration.vehicle_from_sensor[6:9]
     left = sum(a * b for a, b in zip(true[0:3], forward, strict=True))
@@ -111,13 +111,13 @@ TURN_S = POSES_S + 30.0 * 2 + 9.0  # in a right turn of 20 degrees
 
 @pytest.fixture(scope="module")
 def unanswered(tmp_path_factory):
-    """The Record of a ride with the poses on the wrong side, in which nobody answers the question."""
+    """The Record of a ride with the poses on the wrong side, without an answer to the question."""
     return device_plans.run("cpython", tmp_path_factory.mktemp("asked"), bike("gps", 3, kickstand=(12.0,)))
 
 
 @pytest.fixture
 def asked(unanswered):
-    """When the display asks about the side."""
+    """The time when the display asks about the side."""
     return unanswered.first(QUESTION)
 
 
@@ -125,8 +125,8 @@ def test_a_wrong_kickstand_side_is_noticed(unanswered, asked):
     assert asked < POSES_S + 60.0 and stops(asked, POSES_S)
     assert unanswered.at(asked)[1] == "hold = fix      "
     away = unanswered.first("Lean", asked)
-    assert not stops(away, POSES_S)  # it does not stand in the way of riding
-    assert unanswered.lean_at(TURN_S) is None  # it would be the wrong way round
+    assert not stops(away, POSES_S)  # it does not disturb the ride
+    assert unanswered.lean_at(TURN_S) is None  # it would have the wrong sign
     assert unanswered.at(TURN_S) == ["Lean  --        ", "side was wrong? "]
 
 
@@ -150,8 +150,8 @@ def test_a_side_that_the_rider_confirms_is_not_asked_for_again(asked, tmp_path):
 
 @pytest.mark.parametrize(("model", "config"), [({"until_s": 65.0}, {}), ({}, {"PULSES_PER_METRE": 0.25})])
 def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
-    """A wire that breaks during the ride reads as standing still, a second magnet as twice the speed. The display says
-    so at a stop."""
+    """A wire that breaks during the ride reads as a standstill, a second magnet as twice the speed. The display reports
+    it at a stop."""
     plan = bike("wheel", 6, wheel=model, config={"SPEED": "wheel", **config})
     record = device_plans.run("cpython", tmp_path, plan)
     for town_round in range(6):
@@ -279,7 +279,7 @@ def test_status_shows_the_speed(config, fitted, said, capsys, monkeypatch, tmp_p
 
 
 def test_ctrl_c_keeps_the_worst_for_the_status(tmp_path, monkeypatch, capsys):
-    """Half a second in which something else took the processor: the FIFO was full, and a turn was that long."""
+    """For half a second other code used the processor: the FIFO was full, and a turn was that long."""
     monkeypatch.chdir(tmp_path)
 
     def interrupt():

@@ -1,4 +1,4 @@
-"""However the firmware ends, the display says so and keeps no lean."""
+"""At every end of the firmware the display says so and keeps no lean."""
 
 import pytest
 from kickstand_tools.simulated_board import simulator

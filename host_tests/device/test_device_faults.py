@@ -1,5 +1,5 @@
-"""Faults of sensor, bus, display and flash on the whole device: shown while they last, gone soon after,
-nothing wrong shown as good."""
+"""Faults of sensor, bus, display and flash on the whole device: shown while they last, cleared soon after,
+and nothing wrong is shown as good."""
 
 import math
 import time
@@ -21,7 +21,7 @@ def aligned(tmp_path):
 
 
 def standing(faults, until=10, **more):
-    """A bike that stands at 25 degrees, and what happens to the device."""
+    """A bike at rest at 25 degrees, and the faults of the device."""
     return {"lean": [[0, STATIC]], "faults": faults, "until": until, **more}
 
 
@@ -101,7 +101,7 @@ def test_a_sagging_supply_while_the_calibration_is_read(fault, aligned):
 
 @pytest.fixture
 def in_turn_300(monkeypatch):
-    """Call it with a function that takes the place of this turn of the app's loop, once."""
+    """Call it with a function that replaces this turn of the app's loop once."""
     from kickstand import app
 
     original, calls = app.App.turn, []
@@ -139,7 +139,7 @@ def test_a_loop_that_hangs_is_restarted_by_the_watchdog(aligned, in_turn_300):
 
 @pytest.mark.parametrize(("lean", "off_s"), [(-14, 0.507), (-30, 0.4)])
 def test_a_sensor_lost_in_a_turn(lean, off_s, tmp_path):
-    """A turn is as calm as standing and has no force to the side: coming back, it must not be taken for upright."""
+    """A turn is as calm as rest and has no force to the side: after the fault it must not be treated as upright."""
     ride = [["kickstand", 8.0], ["upright", 8.0], ["accelerate", 20.0, 8.0], ["turn", 25.0, 3.0], ["turn", lean, 20.0]]
     plan = {"ride": ride, "presses": [[2, 0.15], [12, 0.15]], "until": 53}
     record = device_plans.run("cpython", tmp_path, {**plan, "faults": [["unplug_sensor", [40.0, off_s]]]})
@@ -150,7 +150,7 @@ def test_a_sensor_lost_in_a_turn(lean, off_s, tmp_path):
 
 
 def test_a_fifo_out_of_step_is_noticed(aligned, monkeypatch):
-    """Stray bytes in the FIFO: frames out of step would be read as readings for ever."""
+    """Stray bytes in the FIFO: shifted frames would be read as readings forever."""
     install = simulator.Board.install
 
     def with_stray_bytes(board):
@@ -164,7 +164,7 @@ def test_a_fifo_out_of_step_is_noticed(aligned, monkeypatch):
 
 
 def test_a_changed_range_is_repaired(aligned, monkeypatch):
-    """The readings still come and look like readings, so that only the register shows it."""
+    """The readings continue and look normal: only the register shows the fault."""
     install, boards = simulator.Board.install, []
 
     def installed(board):

@@ -1,4 +1,4 @@
-"""What main.py runs, when something is missing or broken."""
+"""The start by main.py when something is missing or broken."""
 
 import builtins
 import os
@@ -25,7 +25,7 @@ def board(request, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("module", ["kickstand.app", "kickstand.lean.lean_filter"])
 def test_incomplete_firmware_ends_at_the_prompt_and_says_so(module, board, monkeypatch, capsys):
-    """Not in restarts for ever."""
+    """Not in endless restarts."""
     from time import sleep_ms  # pyright: ignore[reportAttributeAccessIssue]
 
     from kickstand import start
@@ -44,7 +44,7 @@ def test_incomplete_firmware_ends_at_the_prompt_and_says_so(module, board, monke
 @pytest.mark.parametrize("charge_us", [0, 7_000, 75_000])
 @pytest.mark.parametrize("held", [False, True])
 def test_a_capacitor_at_the_button_is_no_press_at_power_on(held, charge_us, board, capsys):
-    """The pull-up of the pin needs its time to charge it. A button that is held starts nothing all the same."""
+    """The pin's pull-up needs time to charge it. A held button still starts nothing."""
     from kickstand import start
 
     board.button.charge_us = charge_us
@@ -66,7 +66,7 @@ ALIGN, SIX, RECORD = 0, 1, 4  # places in the menu
 
 @pytest.fixture(params=["missing", "no memory"])
 def without(request, monkeypatch):
-    """Call it with the end of a module's name: from then on that cannot be imported. Returns what is said then."""
+    """Call it with the end of a module's name: it can then no longer be imported. Returns the message for that."""
 
     def take_away(ending):
         real = builtins.__import__
@@ -109,7 +109,7 @@ def choose(board, at_s, place):
     [("align_wizard", ALIGN), ("pose_taker", SIX), ("recorder", RECORD)],
 )
 def test_a_failed_import_of_the_menu_is_reported(module, place, without, board, capsys):
-    """Each time that it is chosen, and never before."""
+    """Each time that it is chosen, and never earlier."""
     from kickstand import start
 
     if module == "pose_taker":
@@ -142,7 +142,7 @@ def test_a_board_that_cannot_record_still_shows_the_lean(module, without, board,
 @pytest.mark.parametrize("module", ["radio", "live"])
 @pytest.mark.parametrize("board", [{"machine": "pico w"}], indirect=True)
 def test_without_lives_modules_the_lean_continues(module, without, board, monkeypatch, capsys):
-    """Said once, and without a restart. The radio is off then."""
+    """Reported once, without a restart. The radio is then off."""
     from kickstand import settings, start
 
     monkeypatch.setattr(settings, "load", lambda: settings.Settings(type("Config", (), {"LIVE": True})))
@@ -186,7 +186,7 @@ def test_a_display_without_its_driver_is_probed_less_often(without, board, monke
 
 
 def test_a_failed_import_can_be_repeated(tmp_path):
-    """MicroPython keeps a module whose import was broken off, without what it had not come to."""
+    """MicroPython keeps a module after an interrupted import, without its later definitions."""
     (tmp_path / "outer.py").write_text("import inner\n\n\nclass Outer:\n    inner = inner.Inner\n")
     (tmp_path / "inner.py").write_text("import memory\n\nmemory.take()\n\n\nclass Inner:\n    pass\n")
     (tmp_path / "memory.py").write_text(
@@ -215,7 +215,7 @@ print(attempt(use), len(made))
 
 
 def test_a_report_that_cannot_be_worded_gives_its_code(board, monkeypatch, capsys):
-    """A flash or a heap that has failed may not give the words: that must not end the ride."""
+    """After a failure of flash or heap the words may be missing: that must not end the ride."""
     errors.report(errors.StoreError("not-written", "EIO"))
     monkeypatch.setitem(sys.modules, "kickstand.console", None)
     errors.report(errors.StoreError("not-written", "EIO"))

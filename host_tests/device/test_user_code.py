@@ -1,4 +1,4 @@
-"""user.py, the owner's own code: called when it should be, and whatever it does the lean goes on."""
+"""user.py, the owner's own code: it is called at the right times, and the lean continues whatever it does."""
 
 import re
 import sys
@@ -133,6 +133,6 @@ def test_without_a_user_py_its_module_is_not_loaded(run, tmp_path):
 
 @pytest.mark.parametrize("name", ["__dir__", "__getattr__"])
 def test_a_module_that_raises_when_inspected_is_disabled(run, name):
-    """Only CPython asks a module for its names. The lean goes on, and the board does not restart."""
+    """Only CPython calls a module's __dir__(). The lean continues, and the board does not restart."""
     record = run(f"def {name}(*_):\n    raise ValueError('mine')\n", engine="cpython")
     assert goes_on(record)

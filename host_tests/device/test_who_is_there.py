@@ -1,4 +1,4 @@
-"""What the display and kickstand.status() say of a sensor that cannot be used, and who is on its bus."""
+"""The reports of the display and kickstand.status() about an unusable sensor and the devices on its bus."""
 
 import io
 from collections import Counter
@@ -20,7 +20,7 @@ def noisy(t_s):
 
 
 def shown(tmp_path, monkeypatch, fit, world=noisy, until_s=4.0, config=None, **fitted):
-    """The display's two lines after so long. fit(board): changes the board before power-on."""
+    """The display's two lines after this time. fit(board): changes the board before power-on."""
     return shows(tmp_path, monkeypatch, fit, world, [until_s], config, **fitted)[0]
 
 
@@ -128,7 +128,7 @@ def test_the_other_address_is_tried(mine, tmp_path, monkeypatch):
 
 
 def test_a_clock_that_has_the_sensors_address_is_not_set(tmp_path, monkeypatch):
-    """Nothing is written to it but the number of the register to read."""
+    """Only the number of the register to read is written to it."""
     clocks = []
 
     def fit(board):
@@ -233,7 +233,7 @@ def test_status_lists_both_buses(tmp_path, monkeypatch):
 
 
 def test_the_sensor_page_lists_the_devices(tmp_path, monkeypatch):
-    """It is opened from the menu, which a fault does not hide: its fourth entry without a speed source."""
+    """It is the menu's fourth entry without a speed source. A fault does not hide the menu."""
     fit = instead(Ds3231, Registers(0x57), Registers(0x77))
     presses = [(2.0, 1.0), (3.5,), (3.9,), (4.3,), (4.7, 1.0)]
     seen = shows(tmp_path, monkeypatch, fit, noisy, [6 + 0.5 * k for k in range(8)], presses=presses)
@@ -259,7 +259,7 @@ def test_a_nack_does_not_fail_the_set_up(nth, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("wiring", [1, 2, 3, 4])
 def test_status_finds_the_wiring_of_a_backpack(wiring, tmp_path, monkeypatch):
-    """Each is shown with its number: only that of the right one can be read, and is lit."""
+    """Each wiring is used to show its number: only the right one is readable and lit."""
     monkeypatch.chdir(tmp_path)
     board = Board(noisy)
     setattr(board.lcd, "wiring", wiring)  # noqa: B010 - of an Lcd, not of an Oled

@@ -1,4 +1,4 @@
-"""Each driver alone: what it sends on the bus, what the button makes of presses."""
+"""Each driver alone: its transfers on the bus, and the button's events."""
 
 import re
 import textwrap
@@ -16,7 +16,7 @@ def board():
 
 
 def on(board, function):
-    """Run a function on the board and give back what it returned."""
+    """Run a function on the board and return its result."""
     result = []
     assert board.run(lambda: result.append(function()), 1000) == "returned"
     return result[0]
@@ -29,7 +29,7 @@ def sensor_i2c():
 
 
 def test_the_example_in_the_drivers_docstring_runs(board, capsys):
-    """For a second: its name and temperature, then 200 samples, give or take those of the start and the end."""
+    """For a second: its name and temperature, then about 200 samples."""
     from kickstand.imu import mpu6050
 
     example = re.search(r"\n\n((?:    .*\n|\n)+)", mpu6050.__doc__ or "")
@@ -81,7 +81,7 @@ def test_presses(board, held_s, events):
 
 
 def test_ctrl_c_stops_the_watchdog(board, monkeypatch, capsys, tmp_path):
-    """After Ctrl-C nothing feeds it, and a board that resets in the middle of a copy could not be deployed to."""
+    """After Ctrl-C nothing feeds it, and a reset in the middle of a copy would break an installation."""
     from kickstand import app, start
 
     monkeypatch.chdir(tmp_path)

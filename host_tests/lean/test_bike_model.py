@@ -1,4 +1,4 @@
-"""The model's partial derivatives against numerical differentiation of its own equations."""
+"""The model's partial derivatives compared with numerical differentiation of its own equations."""
 
 import math
 
@@ -68,7 +68,7 @@ def linearised(x, force, rate):
 
 
 def left_out(x, rates):
-    """(6, STATES): what the model leaves out because pitch and yaw error are small."""
+    """(6, STATES): the terms that the model omits because pitch and yaw error are small."""
     (t, q, v), y = x[:3], x[YAW_ERROR]
     wx, wy, _ = rates
     s, c, tan = math.sin(t), math.cos(t), math.tan(q)

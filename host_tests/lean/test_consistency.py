@@ -1,4 +1,4 @@
-"""What the lean filter says of itself: innovations that do not fit, when it is believed again, and a name."""
+"""The lean filter's check of itself: misfits, the end of a doubt, and the code of repeated misfits."""
 
 from math import radians
 
@@ -11,8 +11,8 @@ WINDOW_S = 0.2
 
 
 def windows(judge, seconds, left=0.0, up=0.0, sideways=0.0, pitch=0.0, yaw_rate=0.0, shaken=0.0):
-    """How many of the windows of so many seconds were said not to fit any more. shaken: added to both forces, and taken
-    off in every other window."""
+    """The number of misfits in the windows of this many seconds. shaken: added to both forces, with alternating
+    sign."""
     failed = 0
     for _ in range(int(seconds / WINDOW_S + 0.5)):
         failed += judge.add(left + shaken, up + shaken, sideways, pitch, yaw_rate, WINDOW_S)
@@ -129,7 +129,8 @@ def riding():
 
 
 def longest_wrong_s(shown, **error):
-    """The longest time for which a lean over 8 degrees wrong is shown in 40 s of bends, and the share that is shown."""
+    """The longest time with a shown error of over 8 degrees in 40 s of bends, and the share of time with a shown
+    lean."""
     seen = [0.0, 0.0, 0]
 
     def look(lean_deg):

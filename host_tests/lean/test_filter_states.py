@@ -1,4 +1,4 @@
-"""The lean filter's states: start, rest, rolling, and what a restart keeps. Runs on MicroPython too."""
+"""The lean filter's states: start, rest, rolling, and the states kept by a restart. Also runs on MicroPython."""
 
 from math import atan2, cos, degrees, pi, radians, sin, sqrt
 
@@ -10,7 +10,7 @@ LEVEL, NO_RATE = [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]
 
 
 def hold(estimator, seconds, force=LEVEL, rate=NO_RATE, dt_us=DT_US):
-    """The same force and rate for so long; returns the last lean."""
+    """Apply the same force and rate for this time; return the last lean."""
     lean = 0.0
     for _ in range(int(seconds * 1e6 / dt_us + 0.5)):
         lean = estimator.update(force, rate, dt_us)
@@ -18,7 +18,7 @@ def hold(estimator, seconds, force=LEVEL, rate=NO_RATE, dt_us=DT_US):
 
 
 def sigma_deg(estimator):
-    """Of the lean without the trim, as the covariance has it."""
+    """The standard deviation of the lean without the trim, from the covariance."""
     return degrees(sqrt(estimator._p.rows[LEAN][LEAN] if estimator._p else pi * pi))
 
 

@@ -1,4 +1,4 @@
-"""The lean filter on rides made of its own equations: what vibration and the gyro's errors do to it."""
+"""The lean filter on rides from its own equations: the effects of vibration and the gyro's errors."""
 
 import math
 
@@ -41,7 +41,7 @@ def weaving(seconds):
 
 
 def leans(force, rate, speeds=None):
-    """What the filter shows, in degrees. speeds: measured ones, by sample."""
+    """The filter's lean in degrees. speeds: measured speeds by sample."""
     estimator = lean_filter.LeanFilter()
     shown = []
     for k, (f, w) in enumerate(zip(force, rate, strict=True)):
@@ -63,7 +63,7 @@ def slope(shown, true):
 
 
 def test_vibration_of_the_gyro_does_not_make_held_turns_read_low():
-    """Noise of the yaw rate must not pass for the rate that the speed is multiplied by."""
+    """Noise of the yaw rate must not be treated as the rate that the speed is multiplied by."""
     lean, speed = held_turns(240.0)
     force, rate = shaken(*balanced(240.0, lean, speed))
     shown = leans(force.tolist(), rate.tolist())
@@ -122,7 +122,7 @@ def test_a_wheelie_with_a_yaw_error_shows_no_lean():
 
 
 def test_a_smooth_straight_is_no_standstill():
-    """Not a tremor for nine seconds at 20 m/s: the speed must not be taken for zero."""
+    """No vibration for nine seconds at 20 m/s: the speed must not be set to zero."""
     lean, speed = held_turns(200.0)
     force, rate = balanced(200.0, lean, speed)
     shown = leans(force.tolist(), rate.tolist())
@@ -202,7 +202,7 @@ def test_a_measured_speed_makes_no_long_bend_worse():
 
 
 def test_the_stated_sigma_fits_the_error_of_the_lean():
-    """Two thirds of the time it is within one standard deviation, on a ride of the other simulator."""
+    """It is within one standard deviation for two thirds of the time, on a ride of the other simulator."""
     ride = drawn_ride(2, 100.0, ["firm"], "street")
     shown = replay(ride.logs[0], ride.calibrations[0])
     error = (shown.lean_deg - ride.true_lean(0)) / shown.lean_sigma_deg

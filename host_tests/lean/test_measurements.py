@@ -1,4 +1,4 @@
-"""What each measurement of the lean filter says, and what makes it less certain. Runs on MicroPython too.
+"""Each measurement of the lean filter, and the causes of more noise. Also runs on MicroPython.
 
 The figures that the variances come to are those of test_known_ride.py.
 """

@@ -1,4 +1,4 @@
-"""The meter: what it shows as certain, which maxima it keeps, what a gap does to it. Runs on MicroPython too."""
+"""The meter: the lean it shows as certain, its maxima, and the effect of gaps. Also runs on MicroPython."""
 
 from array import array
 from math import degrees, pi, radians
@@ -40,7 +40,7 @@ def test_with_the_nose_far_up_or_down_there_is_no_lean():
 
 
 def test_after_the_poses_the_first_bend_shows_its_lean():
-    """The poses have measured the gyro's bias, and it stood for them. After a power-on neither is known."""
+    """The poses have measured the gyro's bias, and the bike was at rest. After a power-on neither is known."""
     for posed in (True, False):
         shown = meter()
         shown.use(shown.calibration, posed)
@@ -254,7 +254,7 @@ def test_the_g_shown_follows_smoothly_whether_aligned_or_not():
 
 
 def test_a_smoothed_force_that_is_not_updated_is_nan():
-    """Left and up of an aligned motorcycle; they are back with a calibration that is not aligned."""
+    """Left and up of an aligned motorcycle. With an unaligned calibration they are updated again."""
     aligned, other = Calibration(), Calibration()
     aligned.aligned = True
     shown = meter(aligned)

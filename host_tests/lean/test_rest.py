@@ -7,7 +7,7 @@ NONE = (0.0, 0.0, 0.0)
 
 
 def rested_after(detector, seconds, rates=NONE, force=(0.0, 1.0, 0.0), bias=NONE, **rolling):
-    """Windows of the same means; after how many seconds it first was at rest, None if never."""
+    """Windows of the same means. Return the seconds until rest, or None if there was none."""
     found = None
     for k in range(int(seconds / WINDOW_S + 0.5)):
         left_over = [rate - error for rate, error in zip(rates, bias)]
@@ -21,7 +21,7 @@ def test_rest_takes_ten_seconds_if_the_bike_seems_to_roll():
     assert rested_after(RestDetector(), 12.0, rolling=True) == 10.0
     detector = RestDetector()
     rested_after(detector, 5.0, rolling=True)
-    assert rested_after(detector, 3.0) == 1.5  # from where nothing speaks for rolling any more
+    assert rested_after(detector, 3.0) == 1.5  # from the end of every sign of rolling
     assert rested_after(detector, 3.0, rolling=True) == 2.0  # ten seconds are enough either way
 
 

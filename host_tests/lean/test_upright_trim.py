@@ -1,4 +1,4 @@
-"""The trim of upright: what counts as balanced, how soon it is found, how sure it becomes. Runs on MicroPython too."""
+"""The trim: which motion counts as balanced, the time to find it, its uncertainty. Also runs on MicroPython."""
 
 from math import degrees, radians, sin, sqrt
 
@@ -23,7 +23,7 @@ def after_turns(sides, lean_share):
 
 
 def test_turns_to_both_sides_find_a_pose_error_of_2_degrees():
-    """Without a straight between them: what tyres and rider add is alike to both sides, and cancels."""
+    """Without a straight between them: the effect of tyres and rider is the same on both sides and cancels."""
     for lean_share in (0.0, 0.1, -0.1):
         near(degrees(after_turns((1, -1, 1, -1), lean_share).angle), 2.0, 0.4)
 

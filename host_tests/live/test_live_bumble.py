@@ -1,5 +1,5 @@
-"""The whole device on a virtual radio: bumble's Bluetooth LE stack on both sides, and a central that knows the
-published texts only."""
+"""The whole device on a virtual radio: bumble's Bluetooth LE stack on both sides, and a central that uses only the
+published documents."""
 
 import asyncio
 import collections
@@ -42,7 +42,7 @@ def on_air(tmp_path, monkeypatch, capsys):
 
 
 async def ask_racechrono(central):
-    """As the app: find, subscribe, deny all, allow two. Then all at once."""
+    """Like the app: find, subscribe, deny all, allow two. Then allow all at once."""
     await central.connect(await central.find(CHRONO))
     await central.subscribe(CHRONO, 0x0001, "chrono")
     await central.write(CHRONO, 0x0002, [0])
@@ -82,7 +82,7 @@ just_write = functools.partial(press_in, pair=False)
 
 
 def test_a_phone_must_enter_the_pin(on_air):
-    """By the stack itself: neither a phone that does not pair nor one with a wrong PIN gets a packet."""
+    """The stack itself enforces it: a phone gets no packet without pairing or with a wrong PIN."""
     visits = [(20, just_write, None), (26, press_in, 314159), (34, press_in, 271828)]
     (silent, wrong, right), _ = on_air(44, visits, machine="esp32", LIVE_PIN=271828)
     assert "INSUFFICIENT_" in str(silent.done.exception())

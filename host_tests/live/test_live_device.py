@@ -1,4 +1,4 @@
-"""The whole device sends its lean to a phone beside the simulated board. Decoded by firmware/docs/live.md alone."""
+"""The whole device sends its lean to a simulated phone, which decodes it by firmware/docs/live.md alone."""
 
 import collections
 import itertools
@@ -32,7 +32,7 @@ def run(request, tmp_path, capsys):
 
 
 def test_racechrono_gets_the_requested_packets(run):
-    """Deny all, then two packets at two paces; the numbers are those of the display. Then nothing, then everything."""
+    """Deny all, then two packets at two rates, with the numbers of the display. Then nothing, then everything."""
     acts = [[20.0, "connect"], [20.1, "write", "filter", [0]], [20.1, "write", "filter", [2, 0, 100, 0, 0, 0, 1]]]
     acts += [[20.2, "write", "filter", [2, 0, 40, 0, 0, 0, 2]], [20.2, "write", "filter", [2, 0, 40, 0, 0, 0, 77]]]
     acts += [[40.0, "write", "filter", [0]], [42.0, "write", "filter", [1, 0, 100]]]
@@ -130,7 +130,7 @@ def test_the_second_phone_waits_for_the_first(run):
 
 
 def test_the_loop_continues_if_the_phone_is_out_of_reach(run):
-    """The queue of an ESP32 is full then, which costs packets and nothing else."""
+    """The queue of an ESP32 is then full, which only loses packets."""
     acts = ASK + [[25.0, "away", True], [29.0, "away", False]]
     plan = {**device_plans.ALIGNED, **LIVE, "board": {"machine": "esp32"}, "phones": [acts]}
     record = run(plan)

@@ -1,4 +1,4 @@
-"""An SD card is tried out before it is needed."""
+"""An SD card is tested before it is needed."""
 
 import contextlib
 import io
@@ -11,7 +11,7 @@ from rings import CARD
 
 
 def tried(root, monkeypatch, **failing):
-    """The problem that the trial of a card finds. failing: what raises which error."""
+    """The problem found by the trial of a card. failing: the error of each failing function."""
     from kickstand.rides import card_trial
 
     def raised(error):
@@ -34,7 +34,7 @@ def tried(root, monkeypatch, **failing):
 
 def test_a_card_is_tested_before_it_is_needed(root, monkeypatch):
     assert tried(root, monkeypatch) is None
-    assert os.listdir("card") == []  # what was written is gone
+    assert os.listdir("card") == []  # the test file was removed
 
 
 def test_any_error_in_the_trial_is_a_refusal_of_the_card(root, monkeypatch):

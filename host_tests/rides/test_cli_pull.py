@@ -1,4 +1,4 @@
-"""kickstand pull, from an imagined board: rides become logs, damage is said, nothing unverified is deleted."""
+"""kickstand pull from a fake board: rides become logs, damage is reported, nothing unverified is deleted."""
 
 import errno
 import json
@@ -36,7 +36,7 @@ def put(board, name, blocks):
 
 
 def left(board):
-    """Everything that is in the directory of the rides."""
+    """The whole content of the directory of the rides."""
     return sorted(path.relative_to(board.root / "rides").as_posix() for path in board.root.glob("rides/**/*"))
 
 
@@ -74,7 +74,7 @@ def test_rides_become_logs_with_their_calibration(board, tmp_path):
     ("vehicle", "by_drive", "said"), [("car", True, "car"), ("car", False, None), ("motorcycle", True, None)]
 )
 def test_the_log_of_a_car_says_that_it_is_a_car(vehicle, by_drive, said, board, tmp_path, monkeypatch):
-    """Its log then shows no lean. What two poses have aligned was ridden before the board came into the car."""
+    """Its log then shows no lean. A ride aligned by two poses is older than the board's use in the car."""
     made = ride_writer.calibration()
     made.by_drive = by_drive
     monkeypatch.setattr(ride_writer, "calibration", lambda _trim_deg: made)
@@ -95,7 +95,7 @@ def test_another_ride_with_the_same_number_gets_its_own_file(board, tmp_path):
 
 
 def test_only_completely_pulled_rides_are_deleted(board, tmp_path):
-    """A ride cut short by the power is whole up to there."""
+    """A ride that a power cut has ended is complete up to that time."""
     data = {ride: ride_writer.blocks(4, ride=ride)[0] for ride in range(1, 5)}
     put(board, "000/01/00000.rid", data[1])
     put(board, "000/02/00000.rid", [data[2][0], data[2][1][:1000] + b"?" + data[2][1][1001:], *data[2][2:]])
@@ -174,7 +174,7 @@ class Altered:
 
 
 def ends_early(board, count):
-    """Reading a ride ends after so many bytes, as of a damaged FAT chain."""
+    """Reading a ride ends after this many bytes, as with a damaged FAT chain."""
     opened = board._open
     board._globals["__builtins__"]["open"] = lambda path, mode="r": (
         Altered(opened(path, mode), count) if mode == "rb" else opened(path, mode)

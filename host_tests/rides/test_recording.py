@@ -1,4 +1,4 @@
-"""The recorder at its limits, with nothing real behind it."""
+"""The recorder at its limits, with a fake writer."""
 
 import contextlib
 import io
@@ -14,8 +14,7 @@ TURN_US = 10_000
 
 
 class Keeper:
-    """Takes the place of a RideRing. steps: what was asked of it; taken: whole blocks. fails: the name of a step that
-    raises."""
+    """Replaces a RideRing. steps: the calls so far; taken: whole blocks. fails: the name of a step that raises."""
 
     stops_interrupts = True
     fails = ""
@@ -89,7 +88,7 @@ def start(recorder):
 
 
 def add(recorder, turns, clock=None, tick=True):
-    """So many turns of 10 ms with the same two samples."""
+    """Add this many turns of 10 ms with the same two samples."""
     for _ in range(turns):
         if clock:
             clock.advance(TURN_US)
@@ -129,7 +128,7 @@ def test_a_ride_after_an_alignment_begins_like_its_replay(keeper):
 
 
 def test_the_second_start_reuses_the_recorder(root, clock):
-    """Also where the menu was open for too short a time to prepare it."""
+    """Also if the menu was open for too short a time to prepare it."""
     from kickstand.rides.recording import Recording
 
     settings = SimpleNamespace(SD_SPI=None, RECORD=False, SAMPLE_HZ=200)
@@ -180,7 +179,7 @@ def test_all_blocks_have_their_ride_and_sequence(recorder, keeper, clock):
 
 
 def test_a_turn_that_fills_a_block_waits_for_the_previous_one(recorder, keeper):
-    """Where flash was slower than the ride no block may be lost."""
+    """No block may be lost if flash is slower than the ride."""
     start(recorder)
     add(recorder, 1500, tick=False)
     recorder.stop()
@@ -192,7 +191,7 @@ def test_a_turn_that_fills_a_block_waits_for_the_previous_one(recorder, keeper):
 @pytest.mark.parametrize(("ms", "slow"), [(9, False), (12, True)])
 @pytest.mark.parametrize(("step", "fails"), [("begin", ""), ("begin", "begin"), ("abandon", "begin"), ("write", "")])
 def test_a_step_of_over_10_ms_was_an_erase_of_the_flash(step, fails, ms, slow, stops_interrupts, recorder, keeper):
-    """Also of a ride that could not begin."""
+    """Also for a ride that could not begin."""
     keeper.stops_interrupts, keeper.fails = stops_interrupts, fails
     keeper.takes_ms = {step: ms}
     start(recorder)
@@ -242,7 +241,7 @@ def test_a_gap_belongs_to_its_own_ride(recorder, keeper, clock):
 
 
 def test_a_position_and_a_speed_belong_to_the_next_turn_only(recorder, keeper):
-    """One without the other too; a speed of zero is one."""
+    """Also one without the other. Zero is a valid speed."""
     start(recorder)
     recorder.add_fix(None, ride_writer.place(0))
     recorder.add_fix(None, ride_writer.place(1))  # the newest one counts
@@ -264,7 +263,7 @@ def test_a_position_and_a_speed_belong_to_the_next_turn_only(recorder, keeper):
 
 
 def test_time_and_room(recorder, keeper):
-    """A kilobyte a second, until it is known how many they are."""
+    """A kilobyte per second until the first block is measured."""
     start(recorder)
     assert recorder.seconds() == 0
     assert recorder.room_s() == 1_000_000 // 1024

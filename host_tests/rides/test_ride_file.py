@@ -1,4 +1,4 @@
-"""The format of recorded rides: exact on both engines; a damaged block is left out, and nothing else."""
+"""The format of recorded rides: exact on both engines; a damaged block is skipped, and nothing else."""
 
 import io
 import math
@@ -28,7 +28,7 @@ _EXTREMES = [
     ([1, -1, 4096, 0, 0, -1, 1], 2, 9999),
 ]
 
-# Random entries, most of them typical, coded by machine code and by Python: state and bytes have to be the same
+# Random entries, most of them typical, coded by machine code and by Python: state and bytes must be the same
 _BOTH = """
 import random
 from array import array
@@ -156,12 +156,12 @@ def test_any_damaged_byte_loses_only_its_block_and_is_reported():
 
 
 def sealed(data):
-    """With the check sum of these bytes, as somebody would write it who has bad intentions."""
+    """Add a valid check sum to these bytes, as an attacker would."""
     return data[:-4] + struct.pack("<I", crc32(data[:-4]))
 
 
 def test_a_block_with_impossible_values_is_bad(tmp_path):
-    """Whatever the reader takes can be written as a log, and shown live."""
+    """Every block that the reader accepts can be written as a log and shown live."""
     good = ride_writer.blocks(1, speed=True, places_every=50)[0][0]
     head = struct.calcsize(block_format.HEAD)
     start = head + store.BODY_LENGTH

@@ -58,7 +58,7 @@ def test_its_own_first_parts_are_removed_last(root):
 
 
 def test_the_oldest_rides_are_removed_first(root):
-    """One step removes one thing. What has no parts left is passed over, and what the owner put there stays."""
+    """One step removes one thing. Rides without parts are skipped, and the owner's files are kept."""
     for ride in (98, 99, 100, 300):
         old_ride(root, ride)
     (root.path / "rides/000/98/notes.txt").write_bytes(b"the rider's own")
@@ -108,7 +108,7 @@ def test_without_the_current_ride_there_is_no_room(root):
 
 
 class File:
-    """An open file. short: by how much each write falls short. closed: how often it was."""
+    """An open file. short: the bytes missing from each write. closed: number of calls of close()."""
 
     def __init__(self, short=0, error=None):
         self.short, self.error, self.closed = short, error, 0
@@ -161,7 +161,7 @@ def test_ending_closes_once_and_abandoning_raises_nothing(root, monkeypatch):
 
 
 def test_free_and_all_bytes_are_blocks_of_the_size_that_counts(monkeypatch):
-    """Of statvfs: block size, fragment size (in which blocks are counted), all, free."""
+    """The results of statvfs: block size, fragment size (the unit of the counts), all, free."""
     monkeypatch.setattr("os.statvfs", lambda path: (512, 4096, 300, 200, 190, 0, 0, 0, 0, 255), raising=False)
     assert flash_ring.free_bytes("") == 200 * 4096
     assert flash_ring.all_bytes("") == 300 * 4096
@@ -179,7 +179,7 @@ def test_numbers_of_rides_continue(root):
 
 
 def strays(root, *names):
-    """Directories and files among those of the rides, each file with a content of its own."""
+    """Other directories and files among the rides, each file with its own content."""
     for name in names:
         path = root.path / "rides" / name
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Rides on an SD card as cards are: busy for long, rejecting data, slow to start, slow to count, never ready again.
+"""Rides on realistic SD cards: busy for long, rejecting data, slow to start, slow to count, never ready again.
 The whole device on the simulated board, with MicroPython's own FAT."""
 
 import base64
@@ -15,7 +15,7 @@ RIDE = {"lean": [[0, 0], [8, 20]], "until": 35, "config": PINS}
 
 
 def run(flash, card=None, **plan):
-    """A ride with this card, on a board that was aligned before if the plan says so."""
+    """A ride with this card, on a board that is aligned if the plan says so."""
     return device_plans.run("micropython", flash, {**RIDE, "card": card or {}, **plan})
 
 
@@ -34,7 +34,7 @@ def missing_s(record):
 
 
 def leans_on(record, since_s):
-    """The display goes on changing: the board neither hangs nor restarts."""
+    """The display keeps changing: the board neither hangs nor restarts."""
     later = [record.at(since_s + 9.5 + 0.25 * k)[0] for k in range(8)]  # the notice of a loss may cover it
     return record.ends == ["off"] and any(line.startswith("Raw   20°") for line in later)
 
@@ -57,7 +57,7 @@ def test_without_a_card_nothing_waits_for_one(tmp_path):
 
 
 def test_a_card_busy_within_the_specification_loses_nothing(tmp_path):
-    """For 250 ms at each block, which is written every eight seconds: the chip's FIFO lasts longer."""
+    """Busy for 250 ms at each block, every eight seconds: the chip's FIFO lasts longer."""
     record = run(tmp_path, {"faults": [[5.0 + 8.0 * i, "busy_next_s", 0.25] for i in range(4)]})
     assert len(blocks(record)) >= 3
     assert missing_s(record) == []
@@ -108,7 +108,7 @@ def test_an_unusable_card_is_reported_without_a_restart(card, tmp_path):
 
 
 def test_a_card_that_failed_at_the_start_is_not_waited_for_again(tmp_path):
-    """The driver waits for seconds, in which the lean would stand. So it is said, also for a press that asks for it."""
+    """The driver waits for seconds, and the lean would freeze. So the failure is reported, also after a press."""
     menu = [[14, 1.2], *([16 + i, 0.15] for i in range(4)), [21, 1.2]]
     plan = {"config": {**PINS, "RECORD": False}, "presses": menu, "lean": [[0, 0], [23, 20]]}
     record = run(tmp_path, {"init_s": None}, **plan)

@@ -10,7 +10,7 @@ NOON = 12 * 3600 * 1000
 
 
 def places_of(text, piece=1000, step_ms=10, steps=60):
-    """Every position that Gps makes of this text, each as a list."""
+    """Every position that Gps reads from this text, each as a list."""
     with Board(level):
         from kickstand.speed.gps import Gps
 
@@ -74,7 +74,7 @@ def test_midnight_and_ten_a_second():
 
 
 def test_an_old_position_is_not_returned_as_new():
-    """After VTG alone, and after a silence whose end is no fix."""
+    """After only VTG, and after a silence that ends without a fix."""
     with Board(level):
         from kickstand.speed.gps import Gps
 

@@ -81,6 +81,6 @@ def test_a_press_bounces_and_then_holds(board):
 
 
 def test_cpython_has_no_machine_code():
-    """From Python 3.14 on viper's types are no error by themselves: as plain Python it would give other results."""
+    """From Python 3.14 on viper's types alone raise no error, but as plain Python the code would give other results."""
     if sys.implementation.name == "cpython":
         assert isinstance(raised(sys.modules["micropython"].viper, None), NameError)

@@ -1,4 +1,4 @@
-"""What is known of the gyro's bias after the two presses."""
+"""The gyro's bias after the two presses."""
 
 from types import SimpleNamespace
 

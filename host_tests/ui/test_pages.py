@@ -1,4 +1,4 @@
-"""What each page says: units, signs, rounding, and 16 characters a line."""
+"""The text of each page: units, signs, rounding, and 16 characters per line."""
 
 import types
 
@@ -163,7 +163,7 @@ def test_the_formula_is_shown_beside_the_filter():
 
 
 def test_before_alignment_tilt_and_g_are_the_sensors_own():
-    """Two seconds each: that it is not aligned, and what to do."""
+    """Two seconds each: "Not aligned", and the next step."""
     shown = meter(smooth_force=[0.5, 0.866, -0.25])
     lines = [pages.not_aligned(shown, seconds) for seconds in range(5)]
     assert {line for line, _ in lines} == {f"Raw   30{DEGREE} -0.25g"}

@@ -1,4 +1,4 @@
-"""The stack of views: what is in front is shown, a press is for it, and what has ended is gone at once."""
+"""The stack of views: the front view is shown and gets the press, and an ended view is removed at once."""
 
 import types
 
@@ -53,7 +53,7 @@ def first_line(screen, now_ms):
 
 
 def test_a_cancelled_alignment_gets_no_more_samples(screen):
-    """Not even those of the 100 ms until the display is written again: the last one would save it."""
+    """Not even during the 100 ms until the next page: the last sample would save it."""
     screen.press(LONG, 0)
     screen.press(LONG, 100)
     assert screen.wizard is not None
