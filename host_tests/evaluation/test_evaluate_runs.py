@@ -77,9 +77,11 @@ def test_a_receivers_course_is_late_at_one_hertz(swept):
     assert quick.slope == pytest.approx(1.0, abs=0.15)
 
 
-def test_the_calibration_is_from_the_poses_alone():
+@pytest.mark.parametrize("calibrated", [runs.calibrated_by_poses, runs.calibrated_by_log])
+def test_the_calibration_is_from_the_poses_alone(calibrated):
     made = ride("street", 2, 60.0, pitch_change_deg=0.0, share=0.0)
-    calibration = runs.calibrated_by_poses(made)
+    calibration = calibrated(made)
+    assert np.any(calibration.gyro_sigma) == (calibrated is runs.calibrated_by_log)
     matrix = calibration.vehicle_from_sensor
     turned = np.degrees(np.arccos((np.trace(matrix @ made.vehicle_from_sensor.T) - 1.0) / 2.0))
     assert turned < 1.5  # forward by what a hand holds and the ground slopes

@@ -130,5 +130,5 @@ def test_pitch_seen_by_the_yaw_error_is_not_lean(lean, pitch):
     x = np.zeros(STATES)
     x[[LEAN, PITCH, YAW_ERROR]] = math.atan2(left, up), math.asin(forward), yaw_error
     share = Linearisation(x, np.zeros(3), 0.0).lean_by_pitch(x)
-    assert x[LEAN] - share == pytest.approx(lean, abs=math.radians(0.25))
+    assert x[LEAN] - share == pytest.approx(lean, abs=math.radians(0.12))
     assert abs(x[LEAN] - lean) > math.radians(0.75)

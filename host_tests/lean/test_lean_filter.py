@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from kickstand.lean import lean_filter
+from kickstand.lean.bike_model import SCALE_LEFT, STATES
 from kickstand.lean.meter import MAX_VARIANCE
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.api import replay
@@ -209,3 +210,16 @@ def test_the_stated_sigma_fits_the_error_of_the_lean():
     error = np.abs(error[ride.riding(0) & ~np.isnan(error)])
     assert 0.5 < np.mean(error < 1.0) < 0.9
     assert np.mean(error < 2.0) > 0.85
+
+
+@pytest.mark.parametrize("doubts", [1, 2])
+def test_a_doubt_keeps_what_the_six_positions_measured(doubts):
+    """The gyro's scale and cross-axis errors, whether the other errors are remembered or forgotten."""
+    tested = lean_filter.LeanFilter(gyro_variances=[1e-5] * 5)
+    for _ in range(HZ):
+        tested.update((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), DT_US)
+    tested.consistency.doubts = doubts
+    tested._doubt()
+    for _ in range(HZ):
+        tested.update((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), DT_US)
+    assert tested._p and max(tested._p.rows[i][i] for i in range(SCALE_LEFT, STATES)) < 1.01e-5

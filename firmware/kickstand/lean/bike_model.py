@@ -23,10 +23,11 @@ Equations, with ' for the derivative by time
                              f_x = cos q sin t + (v (w_y - d sin t) + psi v' - h cos t w_z') / g   (4)
                              f_y = cos q cos t - (v (w_x + d cos t) + h w_z^2) / g                 (5)
     roads are level          0 = q + psi sin t  on average                             (6)
-    lean of the bike itself  t - psi cos t (q + psi sin t)                             (7)
+    lean of the bike itself  t - psi cos t (tan q + 1/2 psi sin t)                     (7)
 
 t and q refer to the sensor's axes, which psi has turned: they contain a part of the bike's own pitch, q + psi sin t. On
-a slope of 10 % a yaw error of 5 degrees causes half a degree of lean.
+a slope of 10 % a yaw error of 5 degrees causes half a degree of lean. (7) is of second order in psi. On a level road q is
+-psi sin t, and (7) agrees with tan(lean of the bike) = tan t / cos psi.
 
 d is the part of the pitch rate q' from the springs and not from the road: the wheels do not rise with it. Braking
 causes most of it; dive.py has (8).
@@ -37,7 +38,7 @@ proportion. There the ratio of two rates gives the lean: pitch does not change, 
 tan t. At the beginning of a turn the earlier speed is still valid, and (4) with this speed gives the lean.
 """
 
-from math import cos, radians, sin, sqrt
+from math import cos, radians, sin, sqrt, tan
 
 from ..units import STANDARD_GRAVITY, const
 
@@ -194,4 +195,4 @@ class Linearisation:
     def lean_by_pitch(self, x):
         """(7): the part of the state's lean (rad) that is the bike's own pitch, seen as lean because of the yaw
         error."""
-        return x[YAW_ERROR] * self.cos_lean * (x[PITCH] + x[YAW_ERROR] * self.sin_lean)
+        return x[YAW_ERROR] * self.cos_lean * (tan(x[PITCH]) + 0.5 * x[YAW_ERROR] * self.sin_lean)

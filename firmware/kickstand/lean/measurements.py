@@ -99,7 +99,7 @@ MEASURED_SPEED_EVERY_S = 0.3
 # ratio: standard deviation of the lean's errors over that of the covariance. The noises above are wide, because
 # disturbances last, and the lean is nearer than they say: on simulated rides of both simulators, even seeds, two thirds
 # of the errors are within this share. Larger: the stated sigma is larger. The lean stays.
-SIGMA_SHARE = 0.48
+SIGMA_SHARE = 0.46
 
 # Assumptions that take the place of measurements
 SIGMA_SLOPE = radians(1.6)  # rad: slopes of roads. Larger: slopes are followed better, bends are found less well.

@@ -1,9 +1,10 @@
 """Rides whose road, bike, rider, mount and sensor are drawn at random, each from what is real: a second opinion.
 
-On the second simulator (other_bike.py), so that nothing is shared with kickstand_tools.simulation. Parameters of the
-estimators are fitted with even seeds only, and figures are reported of odd ones:
+On the second simulator (other_bike.py), so that nothing is shared with kickstand_tools.simulation. The one exception is
+the data sheet's sensor with its six positions, where a caller asks for it. Parameters of the estimators are fitted with
+even seeds only, and figures are reported of odd ones:
 
-    OMP_NUM_THREADS=1 .venv/bin/python -m support.recordings.drawn_rides odd 100
+    OMP_NUM_THREADS=1 PYTHONPATH=host_tests .venv/bin/python -m support.recordings.drawn_rides odd 100
 """
 
 import sys
@@ -11,7 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.calibration.poses import fit_two_positions
+from kickstand_tools.calibration.procedure import fit_procedure
 from kickstand_tools.logs.log import Log
+from kickstand_tools.simulation import hands, poses
+from kickstand_tools.simulation.hands import Hand
+from kickstand_tools.simulation.physics.chip import GYRO_DPS_PER_G, Chip
 
 from support.recordings.other_bike import FINE_HZ, KINDS, G, _about, _course, _mounting, _noise, _readings, _tolerances
 from support.recordings.smoothed_rides import Known, rms
@@ -81,8 +87,10 @@ def hills(chance):
 DRAWN = {**KINDS, "street": street, "city": city, "hills": hills}
 
 
-def drawn_ride(seed, seconds=150.0, mounts=None, kind=None):
-    """mounts: of each device on the bike, drawn for one if None. kind: drawn if None."""
+def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
+    """mounts: of each device on the bike, drawn for one if None. kind: drawn if None. sheet: the sensor has all errors
+    of its data sheet, and is calibrated by one log of the six positions and by two poses; else it has those that are
+    left."""
     chance = np.random.default_rng([seed, 24])
     drawn = str(chance.choice(list(DRAWN)))
     kind = kind or drawn
@@ -126,7 +134,8 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None):
     for mount in used:
         place = chance.uniform(0.2, 0.8), chance.uniform(0.1, 1.0)
         force, rates = _readings(v, yaw_rate, slope, chassis, pitch, place[0], slip, rear, place[1])
-        log, calibration = _device(chance, mount, force, np.degrees(rates), v, engine, turns)
+        sensor = np.random.default_rng([seed, 26, len(logs)]) if sheet else None
+        log, calibration = _device(chance, mount, force, np.degrees(rates), v, engine, turns, sensor)
         logs.append(log)
         calibrations.append(calibration)
     step = FINE_HZ // 200
@@ -140,8 +149,9 @@ def _dive(chance, push):
     return np.radians(np.where(push < 0.0, braking, chance.uniform(0.0, 3.0))) * push
 
 
-def _device(chance, mount, force, rates, v, engine, turns):
-    """What a sensor on the bike reads, and its calibration by six positions and two poses that were not quite right."""
+def _device(chance, mount, force, rates, v, engine, turns, sensor):
+    """What a sensor on the bike reads, and its calibration by six positions and two poses that were not quite right.
+    sensor: the source of randomness for one with all errors of its data sheet, or None."""
     n, rough = len(v), np.clip(v / 5.0, 0.1, 1.0)[:, None]
     for order in (1.0, 2.0):
         phases, weights = chance.uniform(0.0, 2.0 * np.pi, 6), chance.uniform(0.2, 1.0, 6)
@@ -177,17 +187,43 @@ def _device(chance, mount, force, rates, v, engine, turns):
     rate_hz = FINE_HZ / step
     middle = np.asarray((np.arange(count) + 0.5) / rate_hz, dtype=np.float64)
     drift = np.cumsum(chance.standard_normal((count, 3)), axis=0) * 0.004 / np.sqrt(rate_hz)
-    rates = rates @ gyro.T + chance.uniform(-0.3, 0.3, 3) + drift
-    force = force @ accel.T + chance.normal(0.0, 0.002, 3)
+    bias, offset = chance.uniform(-0.3, 0.3, 3), chance.normal(0.0, 0.002, 3)
+    if sensor is None:
+        rates, force = rates @ gyro.T + bias, force @ accel.T + offset
+    rates = rates + drift
     if mount == "drifting":
         force = force + chance.uniform(-0.03, 0.03, 3) * (1.0 - np.exp(-middle / 120.0))[:, None]
     roll = np.radians(chance.uniform(-1.5, 1.5))
     yaw = np.radians(chance.uniform(-1.0, 1.0)) / np.tan(np.radians(chance.uniform(8.0, 14.0)))
     mounting = _mounting(chance)
+    if sensor is not None:
+        return _of_the_sheet(sensor, middle, force @ mounting, rates @ mounting + bias, mounting)
     calibration = CalibrationFile(
         vehicle_from_sensor=_about(2, roll) @ _about(1, yaw) @ mounting, aligned=True, six_done=True, gyro_delay_s=0.0
     )
     return Log(middle, force @ mounting, rates @ mounting), calibration
+
+
+def _of_the_sheet(chance, time, force, rates, mounting):
+    """The log and the calibration of a sensor that turns these true forces and rates in its own axes into readings with
+    all errors of the data sheet. The upright pose is 1.5 degrees off, as is the pitch between both by up to 1."""
+    chip, home_c = Chip.random(chance), chance.uniform(18.0, 25.0)
+    hand = Hand(detour_deg=chance.uniform(5.0, 30.0), push_g=chance.uniform(0.03, 0.2))
+    six = hands.procedure(chance, chip, np.array(list(poses.ups(chance))), home_c, hand)
+    upright, stand = 1.5 * chance.choice((-1.0, 1.0)), -chance.uniform(8.0, 15.0)
+    slope, change = chance.uniform(-0.5, 0.5), chance.uniform(-1.0, 1.0)
+    two = [
+        poses.standing(chance, chip, mounting, lean, pitch, home_c, held)
+        for lean, pitch, held in ((stand, slope + change, False), (upright, slope, True))
+    ]
+    calibration = fit_two_positions(
+        Log.from_readings(two[0], 200.0, "KICKSTAND.csv"),
+        Log.from_readings(two[1], 200.0, "UPRIGHT.csv"),
+        fit_procedure(Log.from_readings(six, 200.0, "SIX.csv")).calibration,
+    ).calibration
+    calibration.gyro_delay_s = 0.0
+    rates = rates @ chip.gyro_matrix.T + chip.gyro_bias + GYRO_DPS_PER_G * force
+    return Log(time, force @ chip.accel_matrix.T + chip.accel_offset, rates), calibration
 
 
 def _road(chance, v, wheelbase, roughness):

@@ -108,6 +108,11 @@ class CalibrationFile:
         self.to_firmware().apply(readings, force, rate)
         return np.column_stack(force), np.column_stack(rate)
 
+    def gyro_sigma_in_vehicle(self) -> Array:
+        """(3, 3): gyro_sigma along left, up, forward, where the errors of its entries are independent."""
+        squared = self.vehicle_from_sensor**2
+        return np.sqrt(squared @ self.gyro_sigma**2 @ squared.T)
+
     def delay_s(self) -> float:
         """gyro_delay_s, or that of the default DLPF."""
         return DELAY_S if self.gyro_delay_s is None else self.gyro_delay_s

@@ -3,7 +3,7 @@
 Lean t, pitch q, velocity of the sensor to the left, up and forward (l, u, v), in level axes that yaw with the bike at
 the rate p. Rates w and forces f are the readings without the sensor's errors:
 
-    w = w_m + rotation x w_m + GYRO w_m - bias        f = f_m + rotation x f_m + ACCEL f_m + offset
+    w = R w_m + GYRO w_m - bias        f = R f_m + ACCEL f_m + offset        R: ROTATION, to second order
     p = (w_x sin t + w_y cos t) / cos q        t' = w_z - p sin q        q' = w_y sin t - w_x cos t
     l' = a_l - p v        v' = a_f + p l        u' = a_u        a: the force in level axes, less 1 g upwards
 
@@ -95,14 +95,16 @@ def corrected_rates(rate: Array, x: Array, warm: Array) -> Array:
 
 
 def _corrected(readings: Array, p: Array, errors: slice) -> Array:
-    """readings (3, n) + rotation x readings + errors readings."""
+    """readings (3, n), turned by the rotation, + errors readings."""
     x, y, z = readings
     a, b, c = p[of.ROTATION]
     e = p[errors]
+    # to second order: without it a yaw of 7 degrees lengthens the readings by 0.8 %, as an error of scale would
+    u, v, w = 0.5 * (b * z - c * y), 0.5 * (c * x - a * z), 0.5 * (a * y - b * x)
     return np.array(
         (
-            x + b * z - c * y + e[0] * x + e[1] * y + e[2] * z,
-            y + c * x - a * z + e[3] * x + e[4] * y + e[5] * z,
-            z + a * y - b * x + e[6] * x + e[7] * y + e[8] * z,
+            x + 2.0 * u + b * w - c * v + e[0] * x + e[1] * y + e[2] * z,
+            y + 2.0 * v + c * u - a * w + e[3] * x + e[4] * y + e[5] * z,
+            z + 2.0 * w + a * v - b * u + e[6] * x + e[7] * y + e[8] * z,
         )
     )

@@ -28,8 +28,8 @@ TOGETHER = 8  # this many segments are estimated together, with one before and o
 # Further standard deviations of the lean. LEANED_SHARE: times the lean, for errors outside the model, such as the
 # gyro's sensitivity to acceleration. TIMING_S: times the roll rate, for the delay of the gyro's low-pass and errors of
 # the samples' times
-LEANED_SHARE = 0.004
-TIMING_S = 0.004  # s
+LEANED_SHARE = 0.001
+TIMING_S = 0.002  # s
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps", "doubtful")
 DIGITS = 3, 3, 3, 3, 0
 DOUBTFUL = 0.2  # share of the riding; a larger share gives a remark
@@ -183,9 +183,10 @@ class Smoother:
             warm = np.interp(t_s, t_s[there], readings[there, 3]) - self._start_c
         force, rate = self._calibration.in_vehicle(readings)
         rate = np.radians(rate)
-        windows = windows_of(t_s, force, rate, speed, warm)
+        windows = windows_of(t_s, force, rate, speed, warm, aligned=True)
         try:
-            estimate = Estimate(windows, Prior.of_pose(self._calibration.six_done), ALL)
+            prior = Prior.of_pose(self._calibration.six_done, self._calibration.gyro_sigma_in_vehicle())
+            estimate = Estimate(windows, prior, ALL)
         except np.linalg.LinAlgError:
             return nothing  # readings that are not a ride's
         noise, mine = estimate.noise, np.unique(windows.number[own])

@@ -35,6 +35,8 @@ MEAN, SIGMA = np.zeros(PARAMETERS), np.zeros(PARAMETERS)
 SIGMA[ROTATION], SIGMA[GYRO] = np.radians([1.5, 5.0, 2.0]), 0.012
 SIGMA[OFFSET], SIGMA[UP_SCALE] = (0.001, 0.003, 0.003), 0.004
 SIGMA[OFFSET_PER_C], SIGMA[BIAS_PER_C] = 0.0003, np.radians(0.06)  # an ordinary sensor's; the sheet allows thrice that
+# ratio: change of the gyro's errors with temperature since the six positions have measured them, as in the firmware
+GYRO_DRIFT = 0.002
 # Sigmas of OFFSET and UP_SCALE without the six positions
 WITHOUT_SIX_G, WITHOUT_SIX_SCALE = 0.04, 0.015
 MEAN[HEIGHT], SIGMA[HEIGHT] = 0.5, 0.3
@@ -56,10 +58,15 @@ class Prior:
     posed: bool
 
     @classmethod
-    def of_pose(cls, six_done: bool) -> "Prior":
-        """The prior for a sensor that was aligned by poses. six_done: its accelerometer was calibrated by six
-        positions."""
+    def of_pose(cls, six_done: bool, gyro_sigma: Array | None = None) -> "Prior":
+        """The prior for a sensor that was aligned by poses.
+
+        six_done: its accelerometer was calibrated by six positions. gyro_sigma (3, 3): standard errors that they left
+        in the gyro's scale and axes, along left, up, forward; None or zeros where the gyro was not measured.
+        """
         sigma = SIGMA.copy()
+        if gyro_sigma is not None and np.any(gyro_sigma):
+            sigma[GYRO] = np.minimum(np.hypot(gyro_sigma, GYRO_DRIFT).ravel(), sigma[GYRO])
         if not six_done:
             sigma[OFFSET], sigma[UP_SCALE] = WITHOUT_SIX_G, WITHOUT_SIX_SCALE
         return cls(MEAN, sigma, True)

@@ -77,11 +77,13 @@ class Windows:
         )
 
 
-def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array) -> Windows:
+def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array, aligned: bool = False) -> Windows:
     """The Windows of samples: t_s (s), force (samples, 3, g), rate (samples, 3, rad/s), speed (m/s, NaN for no new
     one), warm (C, see Windows).
 
     Each sample represents the time until half way to its neighbours. So the sum over a window is the integral.
+    aligned: the axes are left, up, forward. Then each sample counts along the axes that left and up have in the middle
+    of its window: where a bike rolls by 20 degrees in a window, means along axes that roll are half a percent small.
     """
     step = np.diff(t_s)
     usual = float(np.median(step)) if len(step) else WINDOW_S
@@ -99,6 +101,11 @@ def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array)
 
     there = np.flatnonzero(~np.isnan(speed))
     place = np.searchsorted(starts, np.arange(len(t_s)), side="right") - 1
+    if aligned:
+        rolled = np.cumsum(rate[:, 2] * weight)
+        whole = np.add.reduceat(rate[:, 2] * weight, starts)
+        rolled -= 0.5 * rate[:, 2] * weight + (np.cumsum(whole) - 0.5 * whole)[place]
+        force, rate = _rolled_back(force, rolled), _rolled_back(rate, rolled)
     in_window = np.full(len(starts), np.nan)
     in_window[place[there]] = speed[there]
     mean_rate = mean(rate)
@@ -118,3 +125,10 @@ def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array)
         before,
         after,
     )
+
+
+def _rolled_back(vectors: Array, roll: Array) -> Array:
+    """vectors (samples, 3: left, up, forward) along the axes before the bike rolled to the right by roll (samples,
+    rad)."""
+    (left, up, forward), c, s = vectors.T, np.cos(roll), np.sin(roll)
+    return np.column_stack((c * left - s * up, s * left + c * up, forward))
