@@ -1,7 +1,7 @@
 """Checks that the readings fit the model: the lean filter judges itself by its own innovations.
 
-A filter's covariance does not show a partly failed sensor, but its innovations do. The square of one over
-its expected variance, the normalised innovation squared, is 1 on average if everything fits (Y. Bar-Shalom and others,
+A filter's covariance does not show a partly failed sensor, but its innovations do. The square of an innovation over its
+expected variance, the normalised innovation squared, is 1 on average if everything fits (Y. Bar-Shalom and others,
 Estimation with Applications to Tracking and Navigation, section 5.4). Here the mean is of its root, with its sign.
 Vibration and bumps, which a good sensor has too, cancel in this mean. A dead or mirrored axis, half of the scale, a
 step of the bias and a slipped mount do not cancel. The forces to the left and up each have a short mean, which shows
@@ -40,8 +40,8 @@ _STEEP = const(0.21)  # rad: pitch
 # The limits of left and up grow with the spread, the root of this mean square: half the square of the change between
 # windows. Larger: more is hidden on the roughest roads.
 _SPREAD = const(0.4)  # standard deviations, squared
-# rad: mean lean after a doubt, and a larger one that the force up confirms. Larger, the first, and smaller, the second:
-# less is hidden in long bends, and on straights that are taken for bends.
+# rad: mean lean after a doubt, and a larger one that the force up confirms for a while. Larger, the first, and
+# smaller, the second: less is hidden in long bends, and on straights that are taken for bends.
 _ONE_SIDE = const(0.13)
 _SURE_LEAN = const(0.3)
 # ratio: of the mean square of the lean, above which it has been steady. Larger: as _ONE_SIDE.
@@ -97,8 +97,8 @@ class Consistency:
         lean = abs(self._lean)
         if not self.doubts or lean <= _ONE_SIDE:
             return False
-        steady = lean < _SURE_LEAN and lean * lean > _STEADY * self._lean_square
-        return steady or (self.doubts > 1 and self._mean_s >= _LONG_S)
+        steady, long = lean * lean > _STEADY * self._lean_square, self._mean_s >= _LONG_S
+        return (steady and (long or lean < _SURE_LEAN)) or (long and self.doubts > 1)
 
     def add(self, left, up, sideways, pitch, lean, yaw_rate, seconds):
         """Take a window of `seconds` while riding. left, up: the normalised innovations of these forces. sideways:

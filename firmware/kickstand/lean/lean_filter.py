@@ -340,7 +340,7 @@ class LeanFilter:
         self._straight_s = min(self._straight_s, seconds) + seconds
         if measured is not None and (self._last_speed is None or self._speed_s > measurements.MEASURED_SPEED_EVERY_S):
             # From the measured speeds alone: a pitch error would bias the estimated acceleration.
-            acceleration, since = 0.0, 2 * measurements.MEASURED_SPEED_S  # of the first: its errors count once
+            acceleration, since = 0.0, 2 * measurements.SPEED_SCALE_S  # of the first: its errors count once
             if self._last_speed is not None:
                 acceleration, since = (measured - self._last_speed) / self._speed_s, self._speed_s
             self._speed, self._last_speed, self._speed_s = None, measured, 0.0

@@ -90,7 +90,9 @@ _SIGMA_MEASURED_SPEED = const(1.0)  # m/s: speed by a receiver or a wheel sensor
 # ratio: scale error of that speed, by the tyre, which is smaller where the bike leans, by slip, and by the gyro's up
 # axis: speed x yaw rate has both errors. Larger: measured speeds count for less, most where the bike is fast.
 _SIGMA_SPEED_SCALE = const(0.05)
-MEASURED_SPEED_S = 4.0  # s: how long these errors last. Larger: measured speeds count for less.
+_MEASURED_SPEED_S = const(4.0)  # s: how long the first of these errors lasts. Larger: measured speeds count for less.
+# s: how long the error of scale lasts: a wheel is small for as long as a bend. Larger: as above, in long bends most.
+SPEED_SCALE_S = 40.0
 # s: delay that speed may have. Larger: it counts for less while speeding up and braking.
 _MEASURED_SPEED_LATE_S = const(1.0)
 # s: shorter after one measured speed the next is not used, so that straights count between them. Larger: older speeds.
@@ -201,8 +203,8 @@ def measured_speed(measured, speed, acceleration, seconds):
     seconds: since the previous measured speed. Ten speeds per second count as much as one."""
     late = _MEASURED_SPEED_LATE_S * acceleration
     scale = _SIGMA_SPEED_SCALE * measured
-    variance = _SIGMA_MEASURED_SPEED**2 + late * late + scale * scale
-    return ((SPEED, 1.0),), measured - speed, variance * max(1.0, 2 * MEASURED_SPEED_S / seconds)
+    variance = (_SIGMA_MEASURED_SPEED**2 + late * late) * max(1.0, 2 * _MEASURED_SPEED_S / seconds)
+    return ((SPEED, 1.0),), measured - speed, variance + scale * scale * max(1.0, 2 * SPEED_SCALE_S / seconds)
 
 
 def at_rest(model, means, speed, axis):

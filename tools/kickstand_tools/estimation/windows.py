@@ -82,8 +82,8 @@ def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array,
     one), warm (C, see Windows).
 
     Each sample represents the time until half way to its neighbours. So the sum over a window is the integral.
-    aligned: the axes are left, up, forward. Then each sample counts along the axes that left and up have in the middle
-    of its window: where a bike rolls by 20 degrees in a window, means along axes that roll are half a percent small.
+    aligned: the axes are left, up, forward. Then each sample is expressed along the axes that left and up have in the
+    middle of its window. If a bike rolls by 20 degrees in a window, means along axes that roll are 0.5 % small.
     """
     step = np.diff(t_s)
     usual = float(np.median(step)) if len(step) else WINDOW_S
