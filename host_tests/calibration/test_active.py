@@ -1,4 +1,4 @@
-"""The calibration in use: what is loaded, stored and put into use, and when the trim goes to flash."""
+"""The calibration in use: loading, saving and using it, and saving the trim to flash."""
 
 import pytest
 from kickstand.calibration.parameters import Calibration
@@ -7,7 +7,7 @@ from kickstand_tools.simulated_board.simulator import Board
 
 
 class Meter:
-    """new_trim: what keep_trim() finds, in degrees; None for nothing new."""
+    """new_trim: the result of keep_trim() in degrees, or None without a new one."""
 
     def __init__(self):
         self.calibration = Calibration()
@@ -33,7 +33,7 @@ class Chip:
 
 @pytest.fixture
 def made(tmp_path, monkeypatch):
-    """An ActiveCalibration that was made at 0 ms, its meter, and what changed() was given."""
+    """An ActiveCalibration created at 0 ms, its meter, and the arguments of changed()."""
     monkeypatch.chdir(tmp_path)
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):
         from kickstand.calibration.active import ActiveCalibration
@@ -53,7 +53,7 @@ def stored(who_am_i=0x68):
     return Store(who_am_i, 8).load()
 
 
-def test_what_is_stored_for_the_chip_is_loaded_once(made):
+def test_the_stored_calibration_of_the_chip_is_loaded_once(made):
     active, meter, changes = made
     Store(0x68, 8).save(aligned(0.125))
     assert not active.aligned
@@ -84,7 +84,7 @@ def test_save_replaces_and_refine_corrects(made):
 
 
 def test_the_trim_is_saved_once_a_minute_at_most(made):
-    """Flash wears. Not in the first minute; where there was nothing to save, the next chance is taken."""
+    """Because flash wears. Not in the first minute. If there was nothing to save, the next chance is used."""
     active, meter, _ = made
     active.chip_started(Chip())
     active.save(aligned())
@@ -113,7 +113,7 @@ def test_without_an_alignment_there_is_no_trim(made, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_restart_saves_the_trim_and_begins_with_what_is_stored(made):
+def test_a_restart_saves_the_trim_and_uses_the_stored_values(made):
     active, meter, changes = made
     active.chip_started(Chip())
     active.save(aligned())
@@ -126,7 +126,7 @@ def test_a_restart_saves_the_trim_and_begins_with_what_is_stored(made):
     assert meter.used == used + 2
 
 
-def test_no_trim_is_stored_over_a_record_that_misread_while_loading(made, tmp_path):
+def test_no_trim_overwrites_a_record_that_was_misread(made, tmp_path):
     active, meter, _ = made
     for offset in (0.1, 0.2):
         Store(0x68, 8).save(aligned(offset))
@@ -141,7 +141,7 @@ def test_no_trim_is_stored_over_a_record_that_misread_while_loading(made, tmp_pa
     assert stored().trim_deg == 0.0
 
 
-def test_a_flash_that_cannot_be_written_is_reported_and_not_tried_each_time(made, tmp_path, capsys):
+def test_an_unwritable_flash_is_reported_and_retried_later(made, tmp_path, capsys):
     active, meter, _ = made
     for name in FILES:
         (tmp_path / name).unlink(missing_ok=True)

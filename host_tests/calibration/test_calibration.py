@@ -14,7 +14,7 @@ AXES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0,
 
 
 def tipped(direction, angle_deg, rng):
-    """The direction turned by an angle about a random axis across it."""
+    """The direction rotated by an angle about a random axis at a right angle to it."""
     across = np.cross(direction, rng.normal(size=3))
     across /= np.linalg.norm(across)
     return np.asarray(direction) * np.cos(np.radians(angle_deg)) + across * np.sin(np.radians(angle_deg))
@@ -97,7 +97,7 @@ def test_every_side_is_found(engine):
 
 
 def still(rng, count=300, accel=(0.1, 0.97, -0.2), gyro=(12.0, -3.0, 0.4)):
-    """Samples of a still chip as the driver gives them: 8192 counts per g, 65.5 per deg/s."""
+    """Samples of a still chip in the driver's form: 8192 counts per g, 65.5 per deg/s."""
     samples = np.zeros((count, 7))
     samples[:, 0:3] = np.array(accel) * 8192 + rng.normal(scale=27, size=(count, 3))
     samples[:, 3] = -3000 + rng.normal(scale=5, size=count)
@@ -137,11 +137,11 @@ def test_a_pose_that_is_not_still_is_refused(engine, rows, column, more, reason)
 
 
 def readings(offset=(0.0,) * 3, slope=(1.0,) * 3, forces: ArrayLike = AXES):
-    """What a sensor with these errors reads of the forces."""
+    """The readings of the forces by a sensor with these errors."""
     return ((np.asarray(forces) - offset) / slope).tolist()
 
 
-def test_six_poses_of_which_two_are_one_and_the_same_give_no_parameters():
+def test_six_poses_with_a_duplicate_give_no_parameters():
     """Though each axis changes enough."""
     poses = AXES.copy()
     poses[0] = poses[2] = [0.9, 0.9, 0.0]

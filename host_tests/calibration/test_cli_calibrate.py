@@ -1,4 +1,4 @@
-"""kickstand calibrate: from captures to CAL.json, and every pose that cannot be used."""
+"""kickstand calibrate: from captures to CAL.json, and every unusable pose."""
 
 import json
 import shutil
@@ -15,12 +15,12 @@ BIAS = (4.0, -11.0, 0.7)
 
 
 def reads(force):
-    """What the sensor with these errors reads of a true force in its own axes."""
+    """The reading of a true force by a sensor with these errors, in its own axes."""
     return (np.asarray(force, float) - OFFSET) / SLOPE
 
 
 def leaned(angle_deg):
-    """Specific force (left, up, forward) of a standing bike leaned to the right by an angle."""
+    """Specific force (left, up, forward) of a bike at rest that leans to the right by an angle."""
     return np.array([np.sin(np.radians(angle_deg)), np.cos(np.radians(angle_deg)), 0.0])
 
 
@@ -33,7 +33,7 @@ def two_poses(directory, stand, upright=(0.0, 1.0, 0.0), bias=(0.0, 0.0, 0.0)):
 
 
 def aligned(poses, *more):
-    """calibrate two: what CAL.json holds, and what was said."""
+    """Run calibrate two; return the content of CAL.json and the output."""
     out = poses[0].parent / "CAL.json"
     result = command.works("calibrate", "two", *poses, *more, "--out", out)
     return json.loads(out.read_text()), result.out
@@ -41,7 +41,7 @@ def aligned(poses, *more):
 
 @pytest.fixture
 def six_poses(tmp_path):
-    """Each side up once, up to 10 degrees askew."""
+    """Each side up once, tilted by up to 10 degrees."""
     rng = np.random.default_rng(1)
     return [
         command.still(tmp_path / f"side{side}.csv", reads(tipped(axis, rng.uniform(0, 10), rng)), BIAS, seed=k)
@@ -108,7 +108,7 @@ def test_a_small_tilt_is_warned_of(tmp_path):
 
 
 def test_the_bias_of_the_six_positions_is_the_median(tmp_path, six_poses):
-    """A hand at the table in one pose does not count."""
+    """A hand at the table during one pose does not change it."""
     command.still(six_poses[2], reads(command.AXES["+y"]), np.array(BIAS) + 20.0, seed=2)
     command.works("calibrate", "six", *six_poses, "--out", tmp_path / "CAL.json")
     assert json.loads((tmp_path / "CAL.json").read_text())["gyro_bias_dps"] == pytest.approx(BIAS, abs=0.05)
@@ -119,12 +119,12 @@ def six_refused(tmp_path, poses, words):
 
 
 @pytest.mark.parametrize("count", [1, 5, 8])
-def test_six_wants_six_or_seven(tmp_path, six_poses, free_pose, count):
+def test_six_requires_six_or_seven_poses(tmp_path, six_poses, free_pose, count):
     poses = ([*six_poses, free_pose] * 2)[:count]
     six_refused(tmp_path, poses, f"{count} captures given")
 
 
-def test_a_side_done_twice_and_the_one_missing_are_named(tmp_path, six_poses):
+def test_a_repeated_side_and_the_missing_side_are_named(tmp_path, six_poses):
     shutil.copy(six_poses[2], tmp_path / "again.csv")
     line = six_refused(tmp_path, [*six_poses[:5], tmp_path / "again.csv"], "side -z is missing")
     assert "side +y is there 2 times" in line
@@ -149,7 +149,7 @@ def test_a_free_pose_that_is_not_1_g(tmp_path, six_poses):
 
 @pytest.mark.parametrize("which", ["six", "stand", "upright"])
 def test_a_spoilt_pose_is_refused_by_name(tmp_path, six_poses, which):
-    """What else spoils one: test_still_pose.py."""
+    """Other causes: test_still_pose.py."""
     poses = two_poses(tmp_path, leaned(-12))
     path = six_poses[3] if which == "six" else tmp_path / f"{which}.csv"
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:16]))
@@ -158,7 +158,7 @@ def test_a_spoilt_pose_is_refused_by_name(tmp_path, six_poses, which):
 
 
 def two_refused(poses, words, *more):
-    """calibrate two over an older CAL.json that has to stay."""
+    """calibrate two over an older CAL.json that must be kept."""
     directory = poses[0].parent
     (directory / "CAL.json").write_text("the one from yesterday\n")
     return command.refused(directory, "calibrate", "two", *poses, *more, "--out", directory / "CAL.json", words=words)

@@ -1,4 +1,4 @@
-"""CAL.json: what is refused, what is kept."""
+"""CAL.json: refused and accepted contents."""
 
 import json
 import os
@@ -54,7 +54,7 @@ def test_a_bad_calibration_is_refused(tmp_path, log, name):
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_what_is_no_calibration_is_refused(tmp_path, log, name):
+def test_other_files_are_refused_as_calibrations(tmp_path, log, name):
     (tmp_path / "CAL.json").write_bytes(BROKEN[name])
     out = tmp_path / "LEAN.csv"
     command.refused(tmp_path, "replay", log, "--calibration", tmp_path / "CAL.json", "--out", out, words="CAL.json")
@@ -65,7 +65,7 @@ def test_a_directory_or_nothing_is_refused(tmp_path, log):
         command.refused(tmp_path, "replay", log, "--calibration", place, "--out", tmp_path / "LEAN.csv")
 
 
-def test_what_is_written_reads_back(tmp_path):
+def test_a_written_file_reads_back_the_same(tmp_path):
     matrix = [0.6, 0.8, 0.0, -0.8, 0.6, 0.0, 0.0, 0.0, 1.0]
     written = CalibrationFile(
         np.array([0.012345678, -0.4, 0.0]),
@@ -85,14 +85,14 @@ def test_what_is_written_reads_back(tmp_path):
     assert data["vehicle_from_sensor"] == [matrix[0:3], matrix[3:6], matrix[6:9]]
 
 
-def test_a_byte_order_mark_is_no_hindrance(tmp_path):
+def test_a_byte_order_mark_is_accepted(tmp_path):
     cal = command.write_cal(tmp_path / "CAL.json")
     cal.write_bytes(b"\xef\xbb\xbf" + cal.read_bytes())
     assert read_calibration(cal).accel_slope.tolist() == [1.01, 0.99, 1.0]
 
 
-def test_without_word_of_it_an_identity_is_not_aligned(tmp_path):
-    """A file of another program need not say; only a matrix that was measured is an alignment."""
+def test_an_unlabelled_identity_is_not_an_alignment(tmp_path):
+    """Another program's file may lack the key `aligned`. Only a measured matrix is an alignment."""
     assert not read_calibration(command.write_cal(tmp_path / "CAL.json", vehicle_from_sensor=I)).aligned
     assert read_calibration(command.write_cal(tmp_path / "CAL.json", vehicle_from_sensor=I, aligned=True)).aligned
 
@@ -109,7 +109,7 @@ def test_a_write_that_fails_leaves_the_old_file_and_no_other(tmp_path, monkeypat
     command.refused(tmp_path, "replay", log, "--calibration", cal, "--out", out, words="No space left")
 
 
-def test_outputs_that_would_do_harm_are_refused(tmp_path, log):
+def test_harmful_outputs_are_refused(tmp_path, log):
     cal = command.write_cal(tmp_path / "CAL.json")
     (tmp_path / "link.csv").symlink_to(log)
     for out, words in (
@@ -122,8 +122,8 @@ def test_outputs_that_would_do_harm_are_refused(tmp_path, log):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="named pipes are of Unix")
-def test_what_is_no_ordinary_file_is_not_replaced_by_one(tmp_path, log):
-    """As /dev/null would be, for whoever has the right to; a pipe of our own stands in for it."""
+def test_a_special_file_is_not_replaced(tmp_path, log):
+    """Such as /dev/null, for a user with the rights. The test uses its own pipe."""
     cal = command.write_cal(tmp_path / "CAL.json")
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
@@ -132,7 +132,7 @@ def test_what_is_no_ordinary_file_is_not_replaced_by_one(tmp_path, log):
 
 
 def test_a_link_is_written_through(tmp_path, log):
-    """Whoever keeps CAL.json elsewhere finds it there afterwards."""
+    """A CAL.json kept elsewhere is still there afterwards."""
     (tmp_path / "kept").mkdir()
     (tmp_path / "LEAN.csv").symlink_to(tmp_path / "kept" / "LEAN.csv")
     cal = command.write_cal(tmp_path / "CAL.json")
@@ -142,7 +142,7 @@ def test_a_link_is_written_through(tmp_path, log):
 
 
 def whole():
-    """A calibration with matrices, and how its sensor sits."""
+    """A calibration with matrices and an alignment."""
     turned = np.array([[0.0, 0.6, -0.8], [1.0, 0.0, 0.0], [0.0, -0.8, -0.6]])
     return CalibrationFile(
         np.array([0.01, -0.02, 0.03]),

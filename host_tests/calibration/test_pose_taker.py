@@ -16,7 +16,7 @@ def taker():
 
 
 def step(taking, row):
-    """What step() returns, or the code of the CaptureError that it raises."""
+    """The result of step(), or the code of its CaptureError."""
     try:
         return taking.step(row)
     except CaptureError as error:
@@ -46,7 +46,7 @@ def test_half_a_second_of_stillness_then_three_seconds_are_taken():
     assert taking.pose.gyro == pytest.approx([LEVEL[i] / 65.5 for i in (4, 5, 6)])
 
 
-def test_stillness_is_waited_for_and_said_to_be_missing_after_a_second():
+def test_missing_stillness_is_reported_after_a_second():
     taking = taker()
     for k in range(100):
         assert taking.step(moving(k)) == SETTLING
@@ -71,7 +71,7 @@ def test_it_gives_up_after_10_seconds(code):
     assert not taking.restless
 
 
-def test_a_knock_while_averaging_spoils_the_pose_and_it_can_be_taken_again():
+def test_a_pose_spoilt_by_a_knock_can_be_repeated():
     taking = taker()
     rows = samples(100)
     rows[80][1] += 1000

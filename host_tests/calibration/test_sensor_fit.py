@@ -1,4 +1,4 @@
-"""The gyro by the turns between still poses: the integration, the fit, what it proves, on the board's samples."""
+"""Calibration of the gyro by the turns between still poses: the integration, the fit, its proof."""
 
 import numpy as np
 import pytest
@@ -18,14 +18,14 @@ DIAGONAL = np.eye(3, dtype=bool)
 
 
 def handled(seed, hand=None):
-    """A random sensor, and its readings of the six positions in one go."""
+    """A random sensor, and its readings of the six positions in one log."""
     chance = np.random.default_rng([seed, 38])
     chip = Chip.random(chance)
     return chip, hands.procedure(chance, chip, np.array(list(poses.ups(chance))), 22.0, hand)
 
 
 def errors_left(chip, calibration):
-    """(3, 3) what remains of the gyro's errors, in the axes of the calibrated accelerometer."""
+    """The remaining errors of the gyro (3, 3), in the axes of the calibrated accelerometer."""
     a = calibration.accel_matrix @ np.diag(calibration.accel_slope) @ chip.accel_matrix
     u, _, v = np.linalg.svd(a)
     return calibration.gyro_matrix @ chip.gyro_matrix - u @ v
@@ -109,7 +109,7 @@ def test_rates_near_the_range_and_gaps_are_noticed(sums, dt_us, quick, lost):
 
 
 def made(seed):
-    """Poses, turns and the truth of a sensor without noise, made of rotations alone."""
+    """Poses, turns and true errors of a sensor without noise, from rotations alone."""
     rng = np.random.default_rng(seed)
     gyro = np.eye(3) + 0.01 * rng.normal(size=(3, 3))
     skew = 0.006 * rng.normal(size=3)
@@ -184,7 +184,7 @@ def test_micropython_finds_the_same():
 
 
 def with_axis(axis, change):
-    """The log of a procedure whose gyro axis is ill."""
+    """The log of a calibration with a faulty gyro axis."""
     _, readings = handled(5)
     bias = np.median(readings[:, 4 + axis])
     readings[:, 4 + axis] = bias + change(readings[:, 4 + axis] - bias)
@@ -201,7 +201,7 @@ def late(rates):
     [
         (lambda rates: 0.5 * rates, "gyro-scale"),
         (lambda rates: 2.0 * rates, "gyro-scale"),
-        (lambda rates: -rates, None),  # named where the turns were nearly about one axis
+        (lambda rates: -rates, None),  # named if the turns were nearly about one axis
         (lambda rates: 0.0 * rates, "dead-gyro"),
         (lambda rates: np.where(np.abs(rates) > 5.0, 0.0, rates), "dead-gyro"),  # but noisy
         (late, "gyro-misfit"),
@@ -209,7 +209,7 @@ def late(rates):
     ],
     ids=["half", "double", "mirrored", "dead", "dead but noisy", "late", "clipped"],
 )
-def test_an_ill_axis_of_the_gyro_cannot_pass(axis, change, code):
+def test_a_faulty_gyro_axis_is_refused(axis, change, code):
     with pytest.raises(RefusedInput) as refusal:
         fit_procedure(with_axis(axis, change))
     if code:
@@ -218,7 +218,7 @@ def test_an_ill_axis_of_the_gyro_cannot_pass(axis, change, code):
         assert refusal.value.message.values[0] == "xyz"[axis]
 
 
-def test_an_axis_that_no_turn_has_shown_is_not_proved():
+def test_an_axis_that_no_turn_has_measured_is_unproved():
     fit = fitted()
     fit.__init__(fit._poses, [None] * 6, [0.0] * 3, [1.0] * 3)
     fit.finish()

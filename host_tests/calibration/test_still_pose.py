@@ -1,4 +1,5 @@
-"""A still pose, each axis by itself: 8192 counts per g, 65.5 per deg/s. What else spoils one: test_calibration.py."""
+"""A still pose, each axis alone: 8192 counts per g, 65.5 per deg/s. Other causes of a spoilt pose:
+test_calibration.py."""
 
 import math
 
@@ -10,7 +11,7 @@ LEVEL: tuple[int, ...] = (100, -200, 8192, -521, 65, -131, 655)
 
 
 def samples(count=100):
-    """At rest, with a count of noise in each reading, which has no mean in either half."""
+    """Samples at rest, with a count of noise in each reading. The noise has no mean in either half."""
     return [[value + (-1) ** k for value in LEVEL] for k in range(count)]
 
 
@@ -37,7 +38,7 @@ def problem_of(rows, **settings):
 @pytest.mark.parametrize("axis", [0, 1, 2, 4, 5, 6])
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_a_knock_about_or_along_any_axis_spoils_the_pose(axis, sign):
-    """From the first sample; it may come with any sample. One shock alone does not move the mean past other limits."""
+    """A difference from the first sample, in any sample. One shock alone does not move the mean past other limits."""
     peak = 0.08 * 8192 if axis < 3 else 5.0 * 65.5
     for at in (1, 50, 99):
         for share, code in ((0.8, None), (1.2, "moved")):

@@ -1,4 +1,5 @@
-"""The calibration records: whatever happens to the files, loading gives a whole calibration or none, and no crash."""
+"""The calibration records: after any damage to the files, loading gives a whole calibration or none, and never
+fails."""
 
 import io
 import struct
@@ -31,7 +32,7 @@ def store(tmp_path):
 
 
 def newest_file(tmp_path, store):
-    """The file that the next load would take."""
+    """The file that the next load would use."""
     contents = {name: (tmp_path / name).read_bytes() for name in FILES if (tmp_path / name).exists()}
     return tmp_path / max(contents, key=lambda name: struct.unpack_from("<I", contents[name], 8))
 
@@ -55,7 +56,7 @@ NUMBERS = [0.25, -0.125, 0.375, 1.125, 0.875, 1.0, 3.5, -2.5, 1.5, *IDENTITY, 2.
 
 
 def record(*, magic=b"KSTD", version=1, sequence=7, chip=(0x68, 8), six_done=1, how=1, numbers=NUMBERS):
-    """A record as every release since the first has written it: 96 bytes, little-endian."""
+    """A record as written by every release since the first: 96 bytes, little-endian."""
     body = struct.pack("<4sHHI", magic, version, 96, sequence) + struct.pack("<4B19f", *chip, six_done, how, *numbers)
     return body + struct.pack("<I", crc32(body))
 
@@ -93,7 +94,7 @@ def test_the_flash_of_a_board_with_0_4_0_is_read(store, tmp_path):
     assert loaded.matrices() == [*IDENTITY, *IDENTITY, *[0.0] * 9]
     assert loaded.six_done and loaded.aligned and not loaded.whole
     store.save(loaded)
-    assert len((tmp_path / FILES[1]).read_bytes()) == 96  # a board that goes back to 0.4.0 reads it
+    assert len((tmp_path / FILES[1]).read_bytes()) == 96  # a board downgraded to 0.4.0 reads it
 
 
 MATRICES = [1.0, 0.01, -0.02, 0.01, 1.0, 0.003, -0.02, 0.003, 1.0]
@@ -113,7 +114,7 @@ def test_the_matrices_are_kept_through_a_new_alignment(store):
     assert loaded.whole
 
 
-def test_a_cut_or_damaged_record_with_matrices_leaves_the_one_before(store, tmp_path):
+def test_a_damaged_record_with_matrices_leaves_the_previous_one(store, tmp_path):
     store.save(calibration(1))
     store.save(whole(9))
     written = newest_file(tmp_path, store)
@@ -150,7 +151,7 @@ def test_implausible_matrices_are_not_loaded(store, index, value):
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_what_is_wrong_with_a_record_is_reported(store, tmp_path, content, problem):
+def test_the_fault_of_a_record_is_reported(store, tmp_path, content, problem):
     (tmp_path / FILES[1]).write_bytes(content)
     assert not store.load().aligned
     assert store.message == f"not calibrated: {FILES[1]} {problem}"
@@ -160,7 +161,7 @@ def test_what_is_wrong_with_a_record_is_reported(store, tmp_path, content, probl
 
 
 def test_a_record_of_another_range_stays_valid(store, tmp_path):
-    """Boards in use measured up to 8 g when they were calibrated; 16 g became the default later."""
+    """Older boards were calibrated with a range of 8 g; 16 g became the default later."""
     (tmp_path / FILES[1]).write_bytes(record(chip=(0x68, 16)))
     assert store.load().aligned
     assert store.message == "record 7"
@@ -178,7 +179,7 @@ def test_power_cut_at_every_byte_of_a_save(store, tmp_path, saved_before):
         for name, content in before.items():
             (tmp_path / name).write_bytes(content)
         written.write_bytes(record[:cut])
-        assert mark_of(store.load()) == saved_before  # the one before, or none
+        assert mark_of(store.load()) == saved_before  # the previous one, or none
         store.save(calibration(5))  # and the next save works
         assert mark_of(store.load()) == 5
         assert store.load().aligned
@@ -209,7 +210,7 @@ def test_implausible_values_are_not_used(store, tmp_path, field, value):
     assert "out of range" in store.message
 
 
-def test_flash_that_does_not_keep_what_is_written(store, tmp_path, monkeypatch):
+def test_a_flash_that_loses_writes_is_reported(store, tmp_path, monkeypatch):
     store.save(calibration(1))
 
     def forgetful(path, mode):
@@ -224,8 +225,8 @@ def test_flash_that_does_not_keep_what_is_written(store, tmp_path, monkeypatch):
     assert mark_of(store.load()) == 1
 
 
-def test_a_trim_may_be_stored_beside_a_record_that_never_was_this_sensors(store, tmp_path):
-    """Such as that of another chip, or one that a power cut left empty."""
+def test_a_trim_may_be_stored_beside_a_foreign_record(store, tmp_path):
+    """Such as a record of another chip, or one left empty by a power cut."""
     store.save(calibration(1))
     store.save(calibration(2))
     other = Store(0x70, 8, str(tmp_path))

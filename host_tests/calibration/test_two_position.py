@@ -27,7 +27,7 @@ def rotation_angle_deg(a, b):
 
 
 def axis_aligned():
-    """All 24 rotations that take axes to axes."""
+    """All 24 rotations that map axes to axes."""
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1, -1), repeat=3):
             m = np.zeros((3, 3))
@@ -67,7 +67,7 @@ def test_every_mounting_is_recovered(engine, side):
 )
 def test_poses_that_fix_nothing_are_refused(engine, kickstand, upright, reason):
     answer = engines.run(engine, [("two_position", (kickstand, upright, "left"))])[0]
-    if kickstand == [0, -1, 0]:  # exactly antiparallel: upside down is no second pose
+    if kickstand == [0, -1, 0]:  # exactly antiparallel: upside down is not a second pose
         reason = "no kickstand"
     assert reason in engines.words(answer)
     assert all(len(line) <= 16 for line in answer["lcd"])
@@ -79,7 +79,7 @@ def at(angle_deg):
 
 
 class Pose:
-    """A finished one."""
+    """A finished StillPose."""
 
     def __init__(self, accel, gyro):
         self.accel, self.gyro = accel, gyro
@@ -100,7 +100,7 @@ def test_after_the_six_positions_a_pose_reads_1_g_more_closely(pose, size):
     assert refusal.value.values[0] == ("kickstand", "upright")[pose]
 
 
-def test_an_alignment_keeps_offset_and_slope_and_takes_the_gyros_bias_from_the_kickstand():
+def test_an_alignment_keeps_offset_and_slope_and_sets_the_bias():
     """A stand holds the bike stiller than a rider does."""
     before = Calibration()
     before.set_accel((0.05, -0.02, 0.0), (1.02, 0.98, 1.0))

@@ -1,4 +1,4 @@
-"""The whole device on boards other than a Pico: their pins, and how the I2C of each behaves."""
+"""The whole device on boards other than a Pico: their pins and their I2C."""
 
 import sys
 
@@ -27,12 +27,12 @@ ESP32_PINS = [4, 18, 19, 21, 22]
         *[(m, WIRED_TO_FREE, FREE, [6, 7, 8, 9, 10]) for m in ("pico", "xiao rp2040", "s2", "s3", "c6")],
         *[("c3", {**WIRED, "i2c_driver": driver}, PINS, [4, 5, 6, 7, 10]) for driver in ("legacy", "new")],
         ("c3", {**WIRED, "one_bus": True}, {**PINS, "LCD_SDA": 4, "LCD_SCL": 5}, [4, 5, 10]),
-        # what is only read may be on a pin that is an input only
+        # inputs may be on an input-only pin
         ("esp32", {}, {**SPEED, "GPS_RX": 34}, None),
         ("esp32", {}, {**CARD, "SD_MISO": 39}, None),
     ],
 )
-def test_it_measures(machine, board, config, touched, tmp_path):
+def test_other_boards_measure(machine, board, config, touched, tmp_path):
     """With the board's usual pins or others, either driver of an ESP32, one bus or two. It touches no other pin."""
     plan = {"lean": LEANING, "board": {"machine": machine, **board}, "config": config, "until": 3}
     record = device_plans.run("cpython", tmp_path, plan)
@@ -77,8 +77,8 @@ def test_the_refusal_is_shown_where_the_display_s_pins_are_set(config, lines, tm
     ],
 )
 def test_a_classic_esp32_keeps_its_flash_and_its_console(machine, name, pin, tmp_path, capsys):
-    """To drive a pin of the flash crashes the board, at each start. Pins that are inputs only have no pull-up: a button
-    there would be pressed at all times."""
+    """Driving a pin of the flash crashes the board at each start. Input-only pins have no pull-up: a button there would
+    always be pressed."""
     config = {**(CARD if name == "SD_CS" else {}), **({"SPEED": "wheel"} if name == "WHEEL_PIN" else {}), name: pin}
     if name == "GPS_TX":
         config = {**SPEED, **config}
@@ -92,7 +92,7 @@ def test_a_classic_esp32_keeps_its_flash_and_its_console(machine, name, pin, tmp
 
 
 def test_a_board_with_psram_has_no_usual_pins_for_a_gps_receiver(tmp_path, capsys):
-    """Its PSRAM takes them. So config.py has to name others, and the display says so."""
+    """Its PSRAM uses them. config.py must set others, and the display says so."""
     plan = {"lean": LEANING, "board": {"machine": "esp32 spiram"}, "config": {"SPEED": "gps"}, "until": 3}
     record = device_plans.run("cpython", tmp_path, plan, capsys)
     assert record.ends == ["returned"]
@@ -109,9 +109,7 @@ def test_a_board_with_psram_has_no_usual_pins_for_a_gps_receiver(tmp_path, capsy
         *[("pico", {"LCD_SDA": 2, "LCD_SCL": 3}, {name: "GP2"}, {2, 3}) for name in ("LCD_SDA", "LCD_SCL")],
     ],
 )
-def test_a_display_with_wrong_pins_leaves_the_usual_and_all_others_alone(
-    machine, config, wrong, touched, tmp_path, capsys
-):
+def test_a_display_with_wrong_pins_drives_no_other_pin(machine, config, wrong, touched, tmp_path, capsys):
     plan = {"board": {"machine": machine, **WIRED}, "config": {**config, **wrong}, "until": 3}
     record = device_plans.run("cpython", tmp_path, plan, capsys)
     assert record.ends == ["returned"]
@@ -135,14 +133,14 @@ def test_a_bus_that_stalls_never_stops_the_loop_of_an_esp32(driver, tmp_path):
 
 @pytest.mark.parametrize("bits", [8, 60])
 def test_a_device_that_hangs_on_an_esp32_is_freed(bits, tmp_path):
-    """SoftI2C does not notice that SDA is held. Its own clocks free the device, or what it reads is not believed."""
+    """SoftI2C does not notice that SDA is held. Its own clocks free the device, or its readings are rejected."""
     faults = [["stuck_sda", [3.0, bits]], ["stuck_sda", [3.0, bits, True]]]
     plan = {"lean": [[0, 25], [3.2, 35]], "board": {"machine": "esp32"}, "faults": faults, "until": 5}
     record = device_plans.run("cpython", tmp_path, plan)
     assert record.ends == ["off"]
     assert record.first("Raw   3[1-5]°", 3.2) < 4.0
     shown = {int(line[5:8]) for t_s, line, _ in record.frames if t_s > 1.0 and line.startswith("Raw")}
-    assert shown <= set(range(25, 36))  # never what was read meanwhile
+    assert shown <= set(range(25, 36))  # never a reading from that time
 
 
 def on(machine, function, until_s):
@@ -157,8 +155,8 @@ def on(machine, function, until_s):
 
 
 @pytest.mark.parametrize("machine", ["pico", "esp32", "s3"])
-def test_a_watchdog_at_rest_lets_the_console_be_open_for_days(machine):
-    """An ESP32's cannot be stopped, and a soft reset does not stop it either."""
+def test_a_stopped_watchdog_allows_an_open_console_for_days(machine):
+    """An ESP32's watchdog cannot be stopped, not even by a soft reset."""
 
     def use_the_console(board):
         from time import sleep_ms  # pyright: ignore[reportAttributeAccessIssue]
@@ -173,7 +171,7 @@ def test_a_watchdog_at_rest_lets_the_console_be_open_for_days(machine):
     assert on(machine, use_the_console, 1e6)[0] == "returned"
 
 
-def test_status_says_which_pins_are_missing(tmp_path, monkeypatch, capsys):
+def test_status_lists_the_missing_pins(tmp_path, monkeypatch, capsys):
     def report(board):
         from kickstand import status_report
 

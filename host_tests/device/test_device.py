@@ -1,5 +1,5 @@
-"""The rider's way through the device: press, press, ride; six positions; the menu; power-off; and what
-cannot go wrong."""
+"""The rider's use of the device: press, press, ride; six positions; the menu; power-off; and things that
+must not go wrong."""
 
 import math
 import re
@@ -13,7 +13,7 @@ from support.device_plans import ALIGNED, LEFT_S, PRESSES, RIDE, RIGHT_S, STRAIG
 
 
 @pytest.mark.parametrize(("engine", "seed"), [("cpython", None), ("micropython", 3)])
-def test_press_press_ride(engine, seed, tmp_path):
+def test_two_presses_and_a_ride(engine, seed, tmp_path):
     """seed None is a perfect part mounted straight; 3 has the data sheet's errors and any mounting, here not
     calibrated."""
     record = device_plans.run(engine, tmp_path, {**ALIGNED, "seed": seed})
@@ -55,7 +55,7 @@ def test_a_kickstand_on_the_right(tmp_path):
     ("lean", "complaint"),
     [([[0, -3], [8, 0]], "Tilt only 3.0°"), ([[0, -65], [8, 0]], "Tilt 65°: over"), ([[0, 0]], "Same pose twice")],
 )
-def test_poses_that_do_not_serve_are_refused_and_asked_for_again(lean, complaint, tmp_path):
+def test_unusable_poses_are_refused_and_repeated(lean, complaint, tmp_path):
     record = device_plans.run(
         "cpython", tmp_path, {"lean": lean, "presses": [[2, 0.15], [9, 0.15], [14, 0.15]], "until": 16}
     )
@@ -119,7 +119,7 @@ UPS = [[1, 0, 0], [0, 0, -1], [0, 1, 0], [-1, 0, 0], [0, 0, 1], [0, -1, 0]]
 
 
 def six_positions(free, repeat=False):
-    """Menu, six sides 5 s each with a second of turning between, a free pose."""
+    """The menu, six sides of 5 s each with a second of turning between, and a free pose."""
     steps, t_s = [[0, None]], 6.0
     for up in [*UPS[:3], *([UPS[0]] if repeat else []), *UPS[3:], free]:
         steps += [[t_s, up], [t_s + 5, None]]
@@ -129,7 +129,7 @@ def six_positions(free, repeat=False):
 
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
 def test_six_positions_then_alignment_of_a_part_with_errors(engine, tmp_path):
-    """The main job end to end: calibrated by both wizards, the lean is right, errors of the part and all."""
+    """The main job end to end: after both wizards the lean is right despite the part's errors."""
     record = device_plans.run(engine, tmp_path, {**six_positions([0.5, 0.6, -0.7]), "seed": 3})
     assert record.first("any of the six") < math.inf
     assert record.first(r"Side \+x done") < 12
@@ -148,7 +148,7 @@ def test_the_six_positions_calibrate_the_gyro_too(tmp_path):
     assert all(0.0 < sigma < 0.02 for sigma in stored.gyro_sigma)
 
 
-def test_a_quick_turn_is_complained_of_and_another_pose_asked_for(tmp_path):
+def test_a_fast_turn_is_reported_and_repeated(tmp_path):
     """All turns take a tenth of a second: no axis of the gyro is proved."""
     plan = six_positions([0.5, 0.6, -0.7])
     steps = plan["poses"]
@@ -162,7 +162,7 @@ def test_a_quick_turn_is_complained_of_and_another_pose_asked_for(tmp_path):
 
 
 def ill(monkeypatch, change):
-    """Parts whose gyro reads about x what change() makes of it."""
+    """Parts whose gyro reads change(rate) about x."""
     read = sensor_errors.Sensor.read
 
     def changed(self, motion, t_s):
@@ -182,7 +182,7 @@ def ill(monkeypatch, change):
     ],
     ids=["half", "mirrored", "dead"],
 )
-def test_the_six_positions_refuse_an_ill_gyro(tmp_path, monkeypatch, capsys, change, words):
+def test_the_six_positions_refuse_a_faulty_gyro(tmp_path, monkeypatch, capsys, change, words):
     ill(monkeypatch, change)
     record = device_plans.run("cpython", tmp_path, {**six_positions([0.5, 0.6, -0.7]), "seed": 3}, capsys)
     assert record.first(words) < math.inf
@@ -191,7 +191,7 @@ def test_the_six_positions_refuse_an_ill_gyro(tmp_path, monkeypatch, capsys, cha
 
 
 @pytest.mark.parametrize(("share", "aligned"), [(0.5, False), (-1.0, False), (0.95, True), (1.05, True)])
-def test_the_two_presses_refuse_a_gyro_that_is_ill(tmp_path, monkeypatch, capsys, share, aligned):
+def test_the_two_presses_refuse_a_faulty_gyro(tmp_path, monkeypatch, capsys, share, aligned):
     """The bike's roll is about the sensor's z in a part without a mounting."""
     read = sensor_errors.Sensor.read
 
@@ -207,15 +207,15 @@ def test_the_two_presses_refuse_a_gyro_that_is_ill(tmp_path, monkeypatch, capsys
     assert ("not aligned: between the poses are 12.0 degrees" in record.console) != aligned
 
 
-def test_six_positions_says_what_it_wants(tmp_path):
+def test_six_positions_shows_the_next_step(tmp_path):
     record = device_plans.run("cpython", tmp_path, {**six_positions([0.1, 0.1, 1.0], repeat=True), "seed": 3})
     assert record.first(r"Side \+x is done") < math.inf
     assert record.first("Slant it more") < math.inf
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_upright_pose_that_was_not_upright_is_trimmed_on_the_road_and_stays_so(tmp_path):
-    """Two degrees to the right when pressed upright; after a ride it shows the true lean, after power-off too."""
+def test_a_tilted_upright_pose_is_corrected_on_the_road(tmp_path):
+    """Two degrees to the right at the press for upright. After a ride it shows the true lean, also after power-off."""
     ride = [["kickstand", 8.0], ["upright", 14.0, 2.0], ["accelerate", 15.0, 6.0]]
     for _ in range(3):
         ride += [["turn", -25.0, 3.0], ["straight", 25.0], ["turn", 25.0, 3.0], ["straight", 25.0]]

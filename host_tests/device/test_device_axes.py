@@ -1,4 +1,4 @@
-"""An axis that is dead, in standby or at the end of its range, on the whole device: named, and no lean is shown."""
+"""A dead axis, in standby or at the end of its range, on the whole device: it is reported, and no lean is shown."""
 
 import math
 
@@ -44,7 +44,7 @@ def spoilt(monkeypatch):
     ("column", "value", "said"),
     [(3, 0.0, "Gyro x dead"), (5, -1 / 65.5, "Gyro z dead"), (2, 0.5, "Accel z stuck"), (4, 600.0, "Gyro clips")],
 )
-def test_an_ill_axis_is_named_and_the_lean_comes_back_with_it(column, value, said, spoilt, aligned, capsys):
+def test_a_faulty_axis_is_reported_and_the_lean_returns_with_it(column, value, said, spoilt, aligned, capsys):
     spoilt(column, value, FAULT_S, END_S)
     record = device_plans.run("cpython", aligned, {"lean": [[0, STATIC]], "until": 12}, capsys)
     assert record.lean_at(FAULT_S - 0.1) == STATIC
@@ -73,7 +73,7 @@ def test_an_axis_that_dies_in_a_pose_ends_it(spoilt, tmp_path):
 
 
 def test_a_moment_at_the_end_of_the_range_hides_nothing_for_long(spoilt, aligned):
-    """Named, and right again at once: the bike stands."""
+    """Reported, and correct again at once: the bike is at rest."""
     spoilt(3, 600.0, FAULT_S, FAULT_S + 0.3)
     record = device_plans.run("cpython", aligned, {"lean": [[0, STATIC]], "until": 10})
     assert record.first("Gyro clips", FAULT_S) < FAULT_S + 0.5

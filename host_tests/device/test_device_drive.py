@@ -1,5 +1,5 @@
-"""The whole device aligned by driving: cars without any alignment before, motorcycles whose alignment is checked and
-refined, and speed sources that cannot be used."""
+"""The whole device aligned by driving: cars without an earlier alignment, motorcycles whose alignment is checked and
+refined, and unusable speed sources."""
 
 import math
 import re
@@ -28,7 +28,7 @@ def town(blocks):
 
 
 def stops(time_s, start_s):
-    """True while the vehicle stands, in a ride whose town() begins at start_s."""
+    """True while the vehicle is at rest, in a ride whose town() begins at start_s."""
     return time_s < start_s or (time_s - start_s) % 30.0 > 21.0
 
 
@@ -50,7 +50,7 @@ def stored(flash):
 
 
 def forward_error_deg(calibration, seed=None):
-    """The yaw error, which is what driving finds. seed: of the sensor's mount and errors."""
+    """The yaw error, which driving finds. seed: of the sensor's mount and errors."""
     true = sensor_errors.Sensor(seed=seed).vehicle_from_sensor
     up, forward = true[3:6], calibration.vehicle_from_sensor[6:9]
     left = sum(a * b for a, b in zip(true[0:3], forward, strict=True))
@@ -60,7 +60,7 @@ def forward_error_deg(calibration, seed=None):
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
-def test_a_car_finds_its_alignment_and_says_what_it_waits_for(engine, tmp_path):
+def test_a_car_finds_its_alignment_and_shows_the_next_step(engine, tmp_path):
     """On MicroPython, with its floats and its heap: the other drives are CPython's."""
     record = device_plans.run(engine, tmp_path, car("gps", 5, presses=[[60, SHORT], [65, SHORT]]))
     assert record.at(3.0) == ["Brakings   0/5  ", "stop needed     "]
@@ -111,13 +111,13 @@ TURN_S = POSES_S + 30.0 * 2 + 9.0  # in a right turn of 20 degrees
 
 @pytest.fixture(scope="module")
 def unanswered(tmp_path_factory):
-    """The Record of a ride with the poses on the wrong side, in which nobody answers the question."""
+    """The Record of a ride with the poses on the wrong side, without an answer to the question."""
     return device_plans.run("cpython", tmp_path_factory.mktemp("asked"), bike("gps", 3, kickstand=(12.0,)))
 
 
 @pytest.fixture
 def asked(unanswered):
-    """When the display asks about the side."""
+    """The time when the display asks about the side."""
     return unanswered.first(QUESTION)
 
 
@@ -125,8 +125,8 @@ def test_a_wrong_kickstand_side_is_noticed(unanswered, asked):
     assert asked < POSES_S + 60.0 and stops(asked, POSES_S)
     assert unanswered.at(asked)[1] == "hold = fix      "
     away = unanswered.first("Lean", asked)
-    assert not stops(away, POSES_S)  # it does not stand in the way of riding
-    assert unanswered.lean_at(TURN_S) is None  # it would be the wrong way round
+    assert not stops(away, POSES_S)  # it does not disturb the ride
+    assert unanswered.lean_at(TURN_S) is None  # it would have the wrong sign
     assert unanswered.at(TURN_S) == ["Lean  --        ", "side was wrong? "]
 
 
@@ -150,8 +150,8 @@ def test_a_side_that_the_rider_confirms_is_not_asked_for_again(asked, tmp_path):
 
 @pytest.mark.parametrize(("model", "config"), [({"until_s": 65.0}, {}), ({}, {"PULSES_PER_METRE": 0.25})])
 def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
-    """A wire that breaks during the ride reads as standing still, a second magnet as twice the speed. The display says
-    so at a stop."""
+    """A wire that breaks during the ride reads as a standstill, a second magnet as twice the speed. The display reports
+    it at a stop."""
     plan = bike("wheel", 6, wheel=model, config={"SPEED": "wheel", **config})
     record = device_plans.run("cpython", tmp_path, plan)
     for town_round in range(6):
@@ -162,7 +162,7 @@ def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
     assert record.at(shown_s + 2.0) == record.at(shown_s)  # until it is answered, or the ride goes on
 
 
-def test_what_was_wrong_with_both_poses_is_found_while_riding(tmp_path):
+def test_errors_of_both_poses_are_found_while_riding(tmp_path):
     """Two degrees of pitch on the kickstand give a yaw error of almost ten: forward is refined at a stop, and at most
     1.5 are left. The upright pose was 2 degrees off: that trim outlives the new alignment. The maxima are kept."""
     plan = bike("wheel", 8, kickstand=(-12.0, 2.0))
@@ -178,7 +178,7 @@ def test_what_was_wrong_with_both_poses_is_found_while_riding(tmp_path):
     assert record.first("Max right +(19|2[0-9])°", POSES_S + 232.0) < math.inf
 
 
-def test_the_display_says_that_the_mount_has_moved_and_another_message_does_not_bring_the_lean_back(tmp_path):
+def test_a_moved_mount_hides_the_lean_despite_other_messages(tmp_path):
     """The wheel's wire breaks later, and nobody has answered the first message."""
     record = device_plans.run(
         "cpython", tmp_path, bike("wheel", 6, remount=[POSES_S + 60.0, 8], wheel={"until_s": 130.0})
@@ -189,7 +189,7 @@ def test_the_display_says_that_the_mount_has_moved_and_another_message_does_not_
     assert not record.leans(moved, 500.0)
 
 
-def test_asked_for_on_a_motorcycle_it_keeps_the_old_alignment_until_the_new_one_is_ready(tmp_path):
+def test_a_requested_drive_keeps_the_old_alignment_until_ready(tmp_path):
     """The rider asks for it in the menu, for a sensor that was mounted anew. A fault of the sensor during the drive
     does no harm."""
     device_plans.align(tmp_path)
@@ -216,13 +216,13 @@ def test_asked_for_on_a_motorcycle_it_keeps_the_old_alignment_until_the_new_one_
         ("wheel", {"until_s": 40.0}, {}, 3, "Speed stuck at"),
     ],
 )
-def test_a_speed_that_cannot_be_used_is_reported_and_nothing_is_stored(source, model, config, blocks, said, tmp_path):
+def test_an_unusable_speed_is_reported_and_nothing_is_stored(source, model, config, blocks, said, tmp_path):
     record = device_plans.run("cpython", tmp_path, {**car(source, blocks, config=config), source: model})
     assert record.first(said) < math.inf, {tuple(f[1:]) for f in record.frames}
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_speed_that_fails_for_a_while_is_reported_and_does_no_harm(tmp_path):
+def test_a_temporary_loss_of_speed_is_reported_and_harmless(tmp_path):
     faults = [["unplugged", 15, 30], ["garbled", 45, 62]]
     record = device_plans.run("cpython", tmp_path, car("gps", 6, gps={"faults": faults}))
     assert record.first("GPS silent") == pytest.approx(21.0, abs=3.0)
@@ -279,7 +279,7 @@ def test_status_shows_the_speed(config, fitted, said, capsys, monkeypatch, tmp_p
 
 
 def test_ctrl_c_keeps_the_worst_for_the_status(tmp_path, monkeypatch, capsys):
-    """Half a second in which something else took the processor: the FIFO was full, and a turn was that long."""
+    """For half a second other code used the processor: the FIFO was full, and a turn was that long."""
     monkeypatch.chdir(tmp_path)
 
     def interrupt():
@@ -312,7 +312,7 @@ def test_ctrl_c_keeps_the_worst_for_the_status(tmp_path, monkeypatch, capsys):
     assert 15 <= int(found[2]) <= 25
 
 
-def test_a_press_for_another_page_does_not_answer_a_hidden_question(asked, tmp_path):
+def test_a_press_for_a_page_does_not_answer_a_hidden_question(asked, tmp_path):
     """The information page is in front of the question."""
     plan = bike("gps", 3, kickstand=(12.0,))
     to_info = [[asked - 14.0, LONG], *([asked - 12.0 + t, SHORT] for t in range(3)), [asked - 9.0, LONG]]

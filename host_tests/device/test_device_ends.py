@@ -1,4 +1,4 @@
-"""However the firmware ends, the display says so and keeps no lean."""
+"""At every end of the firmware the display says so and keeps no lean."""
 
 import pytest
 from kickstand_tools.simulated_board import simulator
@@ -29,7 +29,7 @@ def boards(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("kind", ["KeyboardInterrupt", "GeneratorExit", "Enough"])
-def test_what_user_py_raises_leaves_no_lean(kind, boards, tmp_path, monkeypatch):
+def test_after_an_error_in_user_py_no_lean_is_shown(kind, boards, tmp_path, monkeypatch):
     (tmp_path / "user.py").write_text(_USER.format(kind))
     monkeypatch.syspath_prepend(str(tmp_path))
     try:

@@ -1,5 +1,5 @@
-"""Faults of sensor, bus, display and flash on the whole device: shown while they last, gone soon after,
-nothing wrong shown as good."""
+"""Faults of sensor, bus, display and flash on the whole device: shown while they last, cleared soon after,
+and nothing wrong is shown as good."""
 
 import math
 import time
@@ -21,7 +21,7 @@ def aligned(tmp_path):
 
 
 def standing(faults, until=10, **more):
-    """A bike that stands at 25 degrees, and what happens to the device."""
+    """A bike at rest at 25 degrees, and the faults of the device."""
     return {"lean": [[0, STATIC]], "faults": faults, "until": until, **more}
 
 
@@ -36,7 +36,7 @@ def standing(faults, until=10, **more):
         ([["all_ones", [FAULT_S, LASTS_S]]], "Sensor frozen"),
     ],
 )
-def test_a_fault_that_lasts(faults, said, aligned):
+def test_a_lasting_fault_is_shown_until_it_ends(faults, said, aligned):
     record = device_plans.run("cpython", aligned, standing(faults))
     assert record.lean_at(FAULT_S - 0.1) == STATIC
     assert record.first(said, FAULT_S) < FAULT_S + 0.4
@@ -57,14 +57,14 @@ def test_a_fault_that_lasts(faults, said, aligned):
     ],
     ids=str,
 )
-def test_a_fault_of_a_moment(engine, fault, aligned):
+def test_a_short_fault_recovers_soon(engine, fault, aligned):
     record = device_plans.run(engine, aligned, standing([fault], until=8))
     assert record.lean_at(FAULT_S + 0.1 + RECOVERY_S + 0.1) == STATIC
     assert set(record.leans(0, 8)) == {STATIC}
     assert record.ends == ["off"]
 
 
-def test_a_sample_that_a_supply_dip_has_torn_is_not_shown(aligned):
+def test_a_sample_damaged_by_a_supply_dip_is_not_shown(aligned):
     dips = [["supply_dip", [FAULT_S + 1.013 * k, "torn"]] for k in range(20)]
     record = device_plans.run("cpython", aligned, standing(dips, until=30))
     assert set(record.leans(0, 30)) == {STATIC}
@@ -101,7 +101,7 @@ def test_a_sagging_supply_while_the_calibration_is_read(fault, aligned):
 
 @pytest.fixture
 def in_turn_300(monkeypatch):
-    """Call it with a function that takes the place of this turn of the app's loop, once."""
+    """Call it with a function that replaces this turn of the app's loop once."""
     from kickstand import app
 
     original, calls = app.App.turn, []
@@ -116,7 +116,7 @@ def in_turn_300(monkeypatch):
     return replace
 
 
-def test_an_exception_is_said_and_the_board_restarts(aligned, in_turn_300, capsys):
+def test_an_exception_is_reported_and_the_board_restarts(aligned, in_turn_300, capsys):
     in_turn_300(lambda: 1 / 0)
     held = {"presses": [[3.0, 5.0]]}  # the button, all that time: no safe mode, which is for power-up
     record = device_plans.run("cpython", aligned, standing([], until=12, **held), capsys)
@@ -139,7 +139,7 @@ def test_a_loop_that_hangs_is_restarted_by_the_watchdog(aligned, in_turn_300):
 
 @pytest.mark.parametrize(("lean", "off_s"), [(-14, 0.507), (-30, 0.4)])
 def test_a_sensor_lost_in_a_turn(lean, off_s, tmp_path):
-    """A turn is as calm as standing and has no force to the side: coming back, it must not be taken for upright."""
+    """A turn is as calm as rest and has no force to the side: after the fault it must not be treated as upright."""
     ride = [["kickstand", 8.0], ["upright", 8.0], ["accelerate", 20.0, 8.0], ["turn", 25.0, 3.0], ["turn", lean, 20.0]]
     plan = {"ride": ride, "presses": [[2, 0.15], [12, 0.15]], "until": 53}
     record = device_plans.run("cpython", tmp_path, {**plan, "faults": [["unplug_sensor", [40.0, off_s]]]})
@@ -150,7 +150,7 @@ def test_a_sensor_lost_in_a_turn(lean, off_s, tmp_path):
 
 
 def test_a_fifo_out_of_step_is_noticed(aligned, monkeypatch):
-    """Stray bytes in the FIFO: frames out of step would be read as readings for ever."""
+    """Stray bytes in the FIFO: shifted frames would be read as readings forever."""
     install = simulator.Board.install
 
     def with_stray_bytes(board):
@@ -163,8 +163,8 @@ def test_a_fifo_out_of_step_is_noticed(aligned, monkeypatch):
     assert record.last[0].startswith("Lean  25° right")
 
 
-def test_a_range_that_changed_by_itself_is_put_right(aligned, monkeypatch):
-    """The readings still come and look like readings, so that only the register shows it."""
+def test_a_changed_range_is_repaired(aligned, monkeypatch):
+    """The readings continue and look normal: only the register shows the fault."""
     install, boards = simulator.Board.install, []
 
     def installed(board):

@@ -1,5 +1,6 @@
-"""What takes the board's time away: an erase of the flash, slow USB, a storm of wheel pulses; and a display that fails
-in the middle of a line. No lean stands that is over half a second old, and none is ever half old and half new."""
+"""Events that take the board's time: an erase of the flash, slow USB, a storm of wheel pulses; and a display that fails
+in the middle of a line. The display never shows a lean over half a second old, nor one that is half old and half
+new."""
 
 import pytest
 from kickstand_tools.simulation.scripted import script
@@ -46,11 +47,11 @@ def too_old(record, from_s=FROM_S - 5.0):
 
 
 @pytest.mark.parametrize("engine, name", [("cpython", n) for n in STARVED] + [("micropython", "a hang")])
-def test_no_lean_stands_that_is_too_old(engine, name, tmp_path):
+def test_no_lean_on_the_display_is_too_old(engine, name, tmp_path):
     faults, config = STARVED[name]
     record = run(engine, tmp_path, faults, config)
     assert record.ends == ["off"]
-    # nothing that the program does can change the display while it hangs
+    # the program cannot change the display while it hangs
     hang_s = (FROM_S + 0.3, FROM_S + 0.3 + HANG_S + 0.05) if name == "a hang" else (0, 0)
     assert [found for found in too_old(record) if not hang_s[0] < found[0] < hang_s[1]] == []
     if name == "a hang":

@@ -1,4 +1,4 @@
-"""The whole device with each display: the same lean, and whatever happens to the display, it comes back."""
+"""The whole device with each display: the same lean, and the display recovers from everything."""
 
 import random
 

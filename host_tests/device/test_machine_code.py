@@ -1,5 +1,5 @@
-"""Machine code that gives wrong results is found out when its module is imported: then the plain function is used, and
-the console says so."""
+"""Wrong machine code is detected when its module is imported. Then the plain function is used, and the console says
+so."""
 
 import re
 import shutil
@@ -10,7 +10,7 @@ from kickstand_tools.common import firmware_path, unix_port
 from kickstand_tools.deploy import bytecode
 from support import emulated
 
-# What is chosen of each pair: (function, the plain one's name)
+# The choices of each pair: (function, the plain one's name)
 _CHOSEN = """
 from kickstand.calibration import transform
 from kickstand.imu import fifo_frames
@@ -39,8 +39,8 @@ def write_broken(path, name, target):
 
 
 def imported(tmp_path, path="", name="", error=""):
-    """What MicroPython prints when the firmware is imported, and then chosen, with a mistake in that function or with
-    an error that importing its module raises."""
+    """MicroPython's output when the firmware is imported and the function chosen, with a mistake in that function or an
+    error while importing its module."""
     if not unix_port.available():
         pytest.skip("no MicroPython unix port for this system")
     shutil.copytree(firmware_path.PACKAGE, tmp_path / "kickstand")
@@ -56,7 +56,7 @@ def imported(tmp_path, path="", name="", error=""):
     return done.stdout.splitlines()
 
 
-def test_right_machine_code_is_used(tmp_path):
+def test_correct_machine_code_is_used(tmp_path):
     """That of every viper function."""
     found = [
         (path.relative_to(firmware_path.PACKAGE).as_posix(), name)
@@ -83,14 +83,14 @@ def test_wrong_machine_code_is_not_used(tmp_path, path, name):
     ],
 )
 def test_machine_code_that_cannot_be_loaded_is_not_used(tmp_path, path, error):
-    """An ESP32 runs it from a memory of its own, of which there may be too little; the meter works all the same."""
+    """An ESP32 runs it from a separate memory, which may be too small. The meter still works."""
     without = [name for other, name in MISTAKES if other == path]
     chosen = imported(tmp_path, path, error=error)
     assert chosen == [f"{name} {'plain' if name in without else 'quick'}" for name in NAMES]
 
 
 @pytest.mark.chip
-def test_a_pico_says_in_its_status_that_its_machine_code_is_wrong(tmp_path):
+def test_a_picos_status_reports_wrong_machine_code(tmp_path):
     path = "imu/fifo_frames_viper.py"
     write_broken(path, "add_up", tmp_path / "broken.py")
     wrong = {f"/kickstand/{path[:-3]}.mpy": bytecode.cross_compiled(tmp_path / "broken.py")}

@@ -1,4 +1,4 @@
-"""What main.py runs, when something is missing or broken."""
+"""The start by main.py when something is missing or broken."""
 
 import builtins
 import os
@@ -25,7 +25,7 @@ def board(request, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("module", ["kickstand.app", "kickstand.lean.lean_filter"])
 def test_incomplete_firmware_ends_at_the_prompt_and_says_so(module, board, monkeypatch, capsys):
-    """Not in restarts for ever."""
+    """Not in endless restarts."""
     from time import sleep_ms  # pyright: ignore[reportAttributeAccessIssue]
 
     from kickstand import start
@@ -43,8 +43,8 @@ def test_incomplete_firmware_ends_at_the_prompt_and_says_so(module, board, monke
 
 @pytest.mark.parametrize("charge_us", [0, 7_000, 75_000])
 @pytest.mark.parametrize("held", [False, True])
-def test_a_capacitor_at_the_button_does_not_pass_for_a_press_at_power_on(held, charge_us, board, capsys):
-    """The pull-up of the pin needs its time to charge it. A button that is held starts nothing all the same."""
+def test_a_capacitor_at_the_button_is_no_press_at_power_on(held, charge_us, board, capsys):
+    """The pin's pull-up needs time to charge it. A held button still starts nothing."""
     from kickstand import start
 
     board.button.charge_us = charge_us
@@ -66,7 +66,7 @@ ALIGN, SIX, RECORD = 0, 1, 4  # places in the menu
 
 @pytest.fixture(params=["missing", "no memory"])
 def without(request, monkeypatch):
-    """Call it with the end of a module's name: from then on that cannot be imported. Returns what is said then."""
+    """Call it with the end of a module's name: it can then no longer be imported. Returns the message for that."""
 
     def take_away(ending):
         real = builtins.__import__
@@ -108,8 +108,8 @@ def choose(board, at_s, place):
     ("module", "place"),
     [("align_wizard", ALIGN), ("pose_taker", SIX), ("recorder", RECORD)],
 )
-def test_what_a_menu_entry_cannot_import_is_reported_and_the_meter_goes_on(module, place, without, board, capsys):
-    """Each time that it is chosen, and never before."""
+def test_a_failed_import_of_the_menu_is_reported(module, place, without, board, capsys):
+    """Each time that it is chosen, and never earlier."""
     from kickstand import start
 
     if module == "pose_taker":
@@ -128,7 +128,7 @@ def test_what_a_menu_entry_cannot_import_is_reported_and_the_meter_goes_on(modul
 
 
 @pytest.mark.parametrize("module", ["recorder", "card_trial"])
-def test_a_board_that_is_to_record_from_power_on_and_cannot_shows_the_lean(module, without, board, monkeypatch):
+def test_a_board_that_cannot_record_still_shows_the_lean(module, without, board, monkeypatch):
     from kickstand import settings, start
 
     pins = {"SD_SPI": 0, "SD_SCK": 18, "SD_MOSI": 19, "SD_MISO": 16, "SD_CS": 17} if module == "card_trial" else {}
@@ -141,8 +141,8 @@ def test_a_board_that_is_to_record_from_power_on_and_cannot_shows_the_lean(modul
 
 @pytest.mark.parametrize("module", ["radio", "live"])
 @pytest.mark.parametrize("board", [{"machine": "pico w"}], indirect=True)
-def test_without_what_live_needs_the_lean_goes_on(module, without, board, monkeypatch, capsys):
-    """Said once, and without a restart. The radio is off then."""
+def test_without_lives_modules_the_lean_continues(module, without, board, monkeypatch, capsys):
+    """Reported once, without a restart. The radio is then off."""
     from kickstand import settings, start
 
     monkeypatch.setattr(settings, "load", lambda: settings.Settings(type("Config", (), {"LIVE": True})))
@@ -173,7 +173,7 @@ def test_without_its_pictures_an_oled_shows_lines(without, board, monkeypatch, c
 
 
 @pytest.mark.parametrize("board", [{"display": "ssd1306"}], indirect=True)
-def test_a_display_without_its_driver_is_asked_for_ever_more_seldom(without, board, monkeypatch, capsys):
+def test_a_display_without_its_driver_is_probed_less_often(without, board, monkeypatch, capsys):
     from kickstand import start
     from kickstand.board import display
 
@@ -185,8 +185,8 @@ def test_a_display_without_its_driver_is_asked_for_ever_more_seldom(without, boa
     assert 8 <= times <= 10 and board.boots == 1  # after 0.4, 0.8, 1.6, 3.2, 6.4 s, then every 6.4 s; once at the start
 
 
-def test_what_was_imported_in_vain_is_forgotten_and_can_be_tried_again(tmp_path):
-    """MicroPython keeps a module whose import was broken off, without what it had not come to."""
+def test_a_failed_import_can_be_repeated(tmp_path):
+    """MicroPython keeps a module after an interrupted import, without its later definitions."""
     (tmp_path / "outer.py").write_text("import inner\n\n\nclass Outer:\n    inner = inner.Inner\n")
     (tmp_path / "inner.py").write_text("import memory\n\nmemory.take()\n\n\nclass Inner:\n    pass\n")
     (tmp_path / "memory.py").write_text(
@@ -215,7 +215,7 @@ print(attempt(use), len(made))
 
 
 def test_a_report_that_cannot_be_worded_gives_its_code(board, monkeypatch, capsys):
-    """A flash or a heap that has failed may not give the words: that must not end the ride."""
+    """After a failure of flash or heap the words may be missing: that must not end the ride."""
     errors.report(errors.StoreError("not-written", "EIO"))
     monkeypatch.setitem(sys.modules, "kickstand.console", None)
     errors.report(errors.StoreError("not-written", "EIO"))

@@ -1,4 +1,4 @@
-"""user.py, the owner's own code: called when it should be, and whatever it does the lean goes on."""
+"""user.py, the owner's own code: it is called at the right times, and the lean continues whatever it does."""
 
 import re
 import sys
@@ -58,7 +58,7 @@ def test_each_function_is_called(run, engine):
     assert goes_on(record, device_plans.LEFT_S)
 
 
-def test_its_pages_are_behind_the_others_and_before_alignment_in_the_menu(run):
+def test_its_pages_follow_the_others_and_are_in_the_menu(run):
     # the menu: Own pages is its sixth entry
     presses = [[2, 1.2]] + [[4 + 0.5 * k, 0.15] for k in range(5)] + [[8, 1.2], [10, 0.15], [11, 0.15]]
     record = run(WHOLE, POSES | {"presses": presses, "until": 13})
@@ -84,14 +84,14 @@ def test_its_pages_are_behind_the_others_and_before_alignment_in_the_menu(run):
         ("def on_lean(*a):\n    raise MemoryError", "user.py left out", "it leaves too little memory (on_lean)"),
     ],
 )
-def test_what_goes_wrong_is_said_once_and_the_lean_goes_on(run, source, shown, said):
+def test_an_error_is_reported_once_and_the_lean_continues(run, source, shown, said):
     record = run(source)
     assert record.first(shown) < 12
     assert record.console.count(said) == 1, record.console
     assert goes_on(record)
 
 
-def test_one_that_is_slow_now_and_then_stays_and_a_number_is_no_page(run):
+def test_a_function_that_is_slow_at_times_is_kept(run):
     source = "import time\npage_number = 3\ncalls = []\ndef on_lean(*a):\n    calls.append(0)\n"
     record = run(source + "    if len(calls) % 20 == 0:\n        time.sleep_ms(60)")
     assert record.console.count("on_lean took 6") == 1 and "on_lean is left out" not in record.console
@@ -106,7 +106,7 @@ def test_one_that_is_slow_now_and_then_stays_and_a_number_is_no_page(run):
         ("ssd1306", "return 5, 6, (lambda canvas: 1 / 0,)", "picture is left out"),
     ],
 )
-def test_a_page_that_is_none_is_left_out(run, display, body, said):
+def test_an_invalid_page_is_disabled(run, display, body, said):
     plan = PLAN | {"turn_to": [[3, "own"], [7.5, "lean"]], "board": {"display": display}}
     record = run(f"def page(app):\n    {body}", plan)
     assert record.console.count("user.py: page is left out") + record.console.count("picture is left out") == 1
@@ -114,7 +114,7 @@ def test_a_page_that_is_none_is_left_out(run, display, body, said):
     assert goes_on(record)
 
 
-def test_what_allocates_without_end_is_forgotten_before_the_lean_meter_runs_out(run):
+def test_user_py_is_disabled_before_memory_runs_out(run):
     record = run("kept = []\ndef on_lean(*a):\n    kept.append(bytearray(40000))")
     assert record.first("user.py left out") < 30
     assert record.console.count("it leaves too little memory") == 1
@@ -132,7 +132,7 @@ def test_without_a_user_py_its_module_is_not_loaded(run, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["__dir__", "__getattr__"])
-def test_a_module_that_raises_when_it_is_looked_at_is_left_out(run, name):
-    """Only CPython asks a module for its names. The lean goes on, and the board does not restart."""
+def test_a_module_that_raises_when_inspected_is_disabled(run, name):
+    """Only CPython calls a module's __dir__(). The lean continues, and the board does not restart."""
     record = run(f"def {name}(*_):\n    raise ValueError('mine')\n", engine="cpython")
     assert goes_on(record)

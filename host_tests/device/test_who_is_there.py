@@ -1,4 +1,4 @@
-"""What the display and kickstand.status() say of a sensor that cannot be used, and who is on its bus."""
+"""The reports of the display and kickstand.status() about an unusable sensor and the devices on its bus."""
 
 import io
 from collections import Counter
@@ -20,7 +20,7 @@ def noisy(t_s):
 
 
 def shown(tmp_path, monkeypatch, fit, world=noisy, until_s=4.0, config=None, **fitted):
-    """The display's two lines after so long. fit(board): changes the board before power-on."""
+    """The display's two lines after this time. fit(board): changes the board before power-on."""
     return shows(tmp_path, monkeypatch, fit, world, [until_s], config, **fitted)[0]
 
 
@@ -128,7 +128,7 @@ def test_the_other_address_is_tried(mine, tmp_path, monkeypatch):
 
 
 def test_a_clock_that_has_the_sensors_address_is_not_set(tmp_path, monkeypatch):
-    """Nothing is written to it but the number of the register to read."""
+    """Only the number of the register to read is written to it."""
     clocks = []
 
     def fit(board):
@@ -165,7 +165,7 @@ def test_an_unknown_chip_is_named_with_its_number(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("port", ["rp2", "esp32"])
-def test_exchanged_wires_are_named(port, tmp_path, monkeypatch):
+def test_exchanged_wires_are_reported(port, tmp_path, monkeypatch):
     pins = {"rp2": (5, 4), "esp32": (22, 21)}[port]
     config = {} if port == "rp2" else {
         "SENSOR_SDA": 21, "SENSOR_SCL": 22, "LCD_SDA": 18, "LCD_SCL": 19, "BUTTON_PIN": 4
@@ -195,7 +195,7 @@ def always_full(board):
 
 
 @pytest.mark.parametrize(("fit", "how"), [(never_fills, "stays empty"), (always_full, "stays full")])
-def test_a_fifo_that_does_not_work_is_named_for_good_and_presses_count(fit, how, tmp_path, monkeypatch):
+def test_a_broken_fifo_stays_reported_and_presses_work(fit, how, tmp_path, monkeypatch):
     """The menu opens, though the sensor is set up again and again."""
     times = [3 + 0.1 * k for k in range(40)]
     seen = shows(tmp_path, monkeypatch, fit, noisy, [*times, 8.5], presses=[(7.5, 0.9)])
@@ -221,7 +221,7 @@ def wires(sda, scl):
         (None, LOW, ("SCL stays low", "check wiring"), "SCL (GPIO 5) stays low"),
     ],
 )
-def test_a_wire_that_is_open_or_low_is_named(sda, scl, lines, said, tmp_path, monkeypatch):
+def test_an_open_or_low_wire_is_reported(sda, scl, lines, said, tmp_path, monkeypatch):
     assert shown(tmp_path, monkeypatch, wires(sda, scl)) == lines
     assert said in status(tmp_path, monkeypatch, wires(sda, scl))[2]
 
@@ -232,8 +232,8 @@ def test_status_lists_both_buses(tmp_path, monkeypatch):
     assert "Display bus  SDA 6, SCL 7: 0x27 display" in lines
 
 
-def test_the_sensor_page_lists_who_answers(tmp_path, monkeypatch):
-    """It is opened from the menu, which a fault does not hide: its fourth entry without a speed source."""
+def test_the_sensor_page_lists_the_devices(tmp_path, monkeypatch):
+    """It is the menu's fourth entry without a speed source. A fault does not hide the menu."""
     fit = instead(Ds3231, Registers(0x57), Registers(0x77))
     presses = [(2.0, 1.0), (3.5,), (3.9,), (4.3,), (4.7, 1.0)]
     seen = shows(tmp_path, monkeypatch, fit, noisy, [6 + 0.5 * k for k in range(8)], presses=presses)
@@ -241,7 +241,7 @@ def test_the_sensor_page_lists_who_answers(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("nth", range(1, 24, 2))
-def test_a_nack_in_the_set_up_costs_no_set_up(nth, tmp_path, monkeypatch):
+def test_a_nack_does_not_fail_the_set_up(nth, tmp_path, monkeypatch):
     def fit(board):
         board.faults.nack(0x68, nth)
 
@@ -259,7 +259,7 @@ def test_a_nack_in_the_set_up_costs_no_set_up(nth, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("wiring", [1, 2, 3, 4])
 def test_status_finds_the_wiring_of_a_backpack(wiring, tmp_path, monkeypatch):
-    """Each is shown with its number: only that of the right one can be read, and is lit."""
+    """Each wiring is used to show its number: only the right one is readable and lit."""
     monkeypatch.chdir(tmp_path)
     board = Board(noisy)
     setattr(board.lcd, "wiring", wiring)  # noqa: B010 - of an Lcd, not of an Oled

@@ -1,4 +1,4 @@
-"""kickstand calibrate drive: what it finds on made-up and on recorded drives, and what it refuses."""
+"""kickstand calibrate drive: its results on simulated and recorded drives, and its refusals."""
 
 import csv
 import gzip
@@ -29,7 +29,7 @@ RECORDED = {
 
 
 def record(path, legs, mount, bias=(0.0, 0.0, 0.0), source=None, speed=True, **how):
-    """Write a made-up drive as a log."""
+    """Write a simulated drive as a log."""
     gps = driving_runs.SpeedSource(**(source or {}))
     with path.open("w", newline="") as file:
         rows = csv.writer(file)
@@ -43,7 +43,7 @@ def record(path, legs, mount, bias=(0.0, 0.0, 0.0), source=None, speed=True, **h
 
 
 def remount(source, path, q):
-    """Copy a recorded log with all samples turned by q, as if the sensor had been stuck on another way."""
+    """Copy a recorded log with all samples rotated by q, as if the sensor had been mounted differently."""
     with gzip.open(source, "rt") as file:
         lines = file.read().splitlines()
     cells = [line.split(",") for line in lines[1:]]
@@ -99,8 +99,8 @@ def test_a_calibrated_accelerometer_keeps_its_parameters(tmp_path):
     assert result.out.count("car, method improved") == 1
 
 
-def test_what_is_noted_in_a_calibration_stays_in_it(tmp_path):
-    """As the board and the chip that a ride was recorded with."""
+def test_notes_in_a_calibration_are_kept(tmp_path):
+    """Such as the board and the chip of a recorded ride."""
     log = record(tmp_path / "drive.csv", around(7), MOUNT)
     before = CalibrationFile(notes={"board": "Raspberry Pi Pico", "sensor": "MPU6050"})
     found = fit_drive([log], before).calibration
@@ -108,15 +108,15 @@ def test_what_is_noted_in_a_calibration_stays_in_it(tmp_path):
     assert found.as_json()["board"] == "Raspberry Pi Pico"
 
 
-def test_several_logs_of_one_mount_are_put_together(tmp_path):
-    """None of them is enough for itself."""
+def test_several_logs_of_one_mount_are_combined(tmp_path):
+    """None of them is enough alone."""
     logs = [record(tmp_path / f"{k}.csv", around(2), MOUNT) for k in range(3)]
     refused(tmp_path, "braking events in a straight line", logs[0])
     command.works("calibrate", "drive", *logs, "--out", tmp_path / "CAL.json")
     assert max(errors(matrix_in(tmp_path / "CAL.json"), MOUNT)) < 0.3
 
 
-def test_what_is_used_of_several_logs_is_reported_by_file_and_its_own_time(tmp_path):
+def test_the_used_parts_of_logs_are_reported_by_file_and_time(tmp_path):
     legs = {"a": around(3), "b": [[30.0, 0.0, 0.0]], "c": around(4)}
     logs = [record(tmp_path / f"{name}.csv", of, MOUNT) for name, of in legs.items()]
     said = command.works("calibrate", "drive", *logs, "--out", tmp_path / "CAL.json").out
@@ -143,7 +143,7 @@ def test_a_log_without_speed_among_others(tmp_path):
 
 
 def test_a_drive_that_begins_in_motion_counts_from_its_beginning(tmp_path):
-    """The gyro's bias, known from the stop at its end only, is taken off."""
+    """The gyro's bias, known only from the stop at the end, is subtracted."""
     legs = [*around(6, stands=False)[1:], [20.0, -1.0, 0.0], list(STAND)]
     log = record(tmp_path / "drive.csv", legs, MOUNT, (5.0, -9.0, 3.0), start_mps=12.0)
     command.works("calibrate", "drive", log, "--out", tmp_path / "CAL.json")
@@ -152,7 +152,8 @@ def test_a_drive_that_begins_in_motion_counts_from_its_beginning(tmp_path):
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_a_motorcycle_whose_pitch_changed_on_the_kickstand(tmp_path, side):
-    """2 degrees of pitch: the two poses are 8 degrees off, brakings bring it within 1.5. On the wrong side: said."""
+    """With 2 degrees of pitch the two poses are 8 degrees off; braking reduces that to 1.5. A wrong side is
+    reported."""
     ride = simulate("city", 3, tmp_path, 320.0, pitch_change_deg=2.0, speed=True)
     poses = [tmp_path / f"POSE_{k}.csv" for k in range(1, 8)]
     six, two, out = tmp_path / "SIX.json", tmp_path / "TWO.json", tmp_path / "CAL.json"
@@ -186,7 +187,7 @@ def refused(tmp_path, words, *arguments):
     ],
 )
 def test_refusals(tmp_path, method, words, legs, how):
-    """What the improved method refuses besides is in test_drive_alignment.py."""
+    """Other refusals of the improved method: test_drive_alignment.py."""
     log = record(tmp_path / "drive.csv", legs, MOUNT, **how)
     refused(tmp_path, words, log, "--method", method)
 
@@ -196,7 +197,7 @@ def test_the_same_log_twice(tmp_path):
     refused(tmp_path, "is given twice", log, log)
 
 
-def test_a_log_too_slow(tmp_path):
+def test_a_log_with_too_few_samples_per_second_is_refused(tmp_path):
     rows = np.column_stack((np.arange(20) / 10.0, np.tile([0, 0, 1, 0, 0, 0], (20, 1))))
     log = tmp_path / "slow.csv"
     lines = [",".join(f"{v:.3f}" for v in row) + ",0.0" for row in rows]
@@ -206,7 +207,7 @@ def test_a_log_too_slow(tmp_path):
 
 @pytest.mark.parametrize("name", RECORDED)
 def test_recorded_cars_remounted_at_random(tmp_path, shared_data, name):
-    """Yaw within 1.6 degrees, all within 3 of a reference that is good to 1 or 2."""
+    """Yaw within 1.6 degrees and the total error within 3 degrees of a reference that is good to 1 or 2."""
     q = np.reshape(random_mounting(1), (3, 3))
     log = remount(shared_data / f"{name}.csv.gz", tmp_path / "log.csv", q)
     command.works("calibrate", "drive", log, "--out", tmp_path / "CAL.json")
@@ -218,8 +219,8 @@ def test_recorded_cars_remounted_at_random(tmp_path, shared_data, name):
 UPSIDE_DOWN = [0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0]  # rows left, up, forward: z points down
 
 
-def test_a_log_of_the_opposite_sign_looks_like_a_sensor_upside_down(tmp_path):
-    """Nothing else in a car's log shows it: without the remark its mirror image would pass."""
+def test_a_log_of_opposite_sign_looks_upside_down(tmp_path):
+    """Nothing else in a car's log shows it: without the notice its mirror image would be accepted."""
     log, out = record(tmp_path / "drive.csv", around(8), UPSIDE_DOWN), tmp_path / "CAL.json"
     said = command.works("calibrate", "drive", log, "--out", out)
     assert "the sensor's z points down: if it is not mounted upside down, all accelerations are of the" in said.err
@@ -227,7 +228,7 @@ def test_a_log_of_the_opposite_sign_looks_like_a_sensor_upside_down(tmp_path):
     assert command.works("calibrate", "drive", right, "--out", out).err == ""
 
 
-def test_a_calibration_that_the_drive_contradicts(tmp_path):
+def test_a_calibration_that_contradicts_the_drive_is_reported(tmp_path):
     log, cal = record(tmp_path / "drive.csv", around(8), MOUNT), tmp_path / "CAL.json"
     command.works("calibrate", "drive", log, "--out", cal)
     again = "calibrate", "drive", log, "--vehicle", "car", "--out", tmp_path / "AGAIN.json"

@@ -1,4 +1,4 @@
-"""Alignment by driving on made-up drives: what it finds, what it refuses and why; on CPython and MicroPython."""
+"""Alignment by driving on simulated drives: results, refusals and their reasons; on CPython and MicroPython."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from support import driving_runs, engines
 from support.driving_runs import STAND, around
 from support.engines import ENGINES, run
 
-MOUNT = [0.48, 0.36, 0.8, -0.6, 0.8, 0.0, -0.64, -0.48, 0.6]  # no axis of the sensor near one of the vehicle
+MOUNT = [0.48, 0.36, 0.8, -0.6, 0.8, 0.0, -0.64, -0.48, 0.6]  # no axis of the sensor is near an axis of the vehicle
 PLAIN = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
 
 
@@ -25,7 +25,7 @@ def drive(legs, mount=MOUNT, **options):
 
 
 def turned(m, axis, degrees):
-    """The mount m turned about the vehicle's axis 0 (left), 1 (up) or 2 (forward)."""
+    """The mount m rotated about the vehicle's axis 0 (left), 1 (up) or 2 (forward)."""
     angle = np.radians(degrees)
     r = np.eye(3)
     i, j = [k for k in range(3) if k != axis]
@@ -36,7 +36,7 @@ def turned(m, axis, degrees):
 
 @pytest.mark.parametrize("engine", [*ENGINES, "published"])
 def test_a_car_is_aligned(engine):
-    """By the published method on CPython alone."""
+    """The published method, only on CPython."""
     options = {"method": "published"} if engine == "published" else {}
     calls = [("drive", (around(), MOUNT, options | {"gyro_bias": [6.0, -5.0, 1.0]}))]
     [result] = run("cpython" if options else engine, calls)
@@ -48,7 +48,7 @@ def test_a_car_is_aligned(engine):
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("known", [True, False])
 def test_a_motorcycle_is_aligned(engine, known):
-    """With the upright pose's vertical and without it. It moves from the start: a motorcycle needs no stop."""
+    """With and without the vertical of the upright pose. It moves from the start: a motorcycle needs no stop."""
     options = {"vehicle": "motorcycle", "up": MOUNT[3:6] if known else None, "bias": [0.0, 0.0, 0.0]}
     options["samples"] = {"start_mps": 5.0}
     [result] = run(engine, [("drive", (around(stands=False), MOUNT, options))])
@@ -84,7 +84,7 @@ def test_camber_at_the_stops_does_not_reach_forward(method, yaw_deg):
     assert total < max(2.3, 1.1 * abs(yaw))
 
 
-def test_it_says_what_it_waits_for():
+def test_it_reports_the_missing_step():
     """For a speed, a stop, a braking event. Then whether the braking event is straight, and that it is ready."""
     legs = [[2.0, 1.0, 0.0], [2.0, -1.0, 0.0], *around(2), [8.0, 1.5, 0.0], [4.0, -2.0, 15.0], *around(6, stands=False)]
     states = drive(legs)["states"]
@@ -97,7 +97,7 @@ def test_it_says_what_it_waits_for():
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_refusals_name_the_reason(engine):
-    """Every refusal, each with two lines that fit the display."""
+    """Every refusal has two lines that fit the display."""
     eight = [list(STAND), [6.0, 1.0, 0.0], *[[10.0, 0.1, 30.0], [8.0, -0.6, -40.0], [2.0, -1.2, -40.0]] * 6]
     cases = {
         "it only stood still": ([[120.0, 0.0, 0.0]], {}),
@@ -130,7 +130,7 @@ def test_refusals_name_the_reason(engine):
         ({"scale": 0.9 / speed_check.MAX_FORCE_RATIO}, False),
     ],
 )
-def test_what_a_speed_may_be_like(source, fine):
+def test_only_usable_speeds_align(source, fine):
     result = drive(around(8), source=source)
     assert result["ready"] is fine, result.get("refused")
     if fine:
@@ -151,15 +151,15 @@ def test_what_a_speed_may_be_like(source, fine):
 )
 def test_a_mount_that_moved(axis, degrees, from_s, words):
     """Ten braking events, the last one from 137 s on."""
-    legs = [*around(10), [4.0, 1.5, 20.0], [4.0, -1.5, 20.0]]  # events in turns do not make it right again
+    legs = [*around(10), [4.0, 1.5, 20.0], [4.0, -1.5, 20.0]]  # events in turns do not repair it
     result = drive(legs, moved=[from_s, turned(MOUNT, axis, degrees)])
     assert result["ready"] is (words is None), result
     assert words is None or words in engines.words(result)
 
 
 @pytest.mark.parametrize("silent_s", [200.0, 500.0])
-def test_however_late_the_first_speed_comes_the_first_braking_event_counts(silent_s):
-    """The history's time wraps round every nine minutes."""
+def test_the_first_braking_counts_after_any_late_first_speed(silent_s):
+    """The history's time wraps every nine minutes."""
     legs = [[silent_s, 0.0, 0.0], *around(6)]
     result = drive(legs, source={"every_s": 1.0, "silent": (-1.0, silent_s)})
     assert result["counted"] == 6  # all braking events; all acceleration is in turns
@@ -167,8 +167,8 @@ def test_however_late_the_first_speed_comes_the_first_braking_event_counts(silen
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_last_speed_of_zero_is_no_standstill_once_the_source_is_silent(engine):
-    """It drives off after the receiver has died, in long curves whose force is as steady as at a stop."""
+def test_a_silent_source_at_zero_is_no_standstill(engine):
+    """It drives off after the receiver has failed, in long curves with a force as steady as at a stop."""
     before = [*around(7), [8.0, -1.0, 0.0], STAND]
     legs = [*before, [4.0, 4.0, 0.0], [30.0, 0.0, 9.0]]
     seconds = sum(leg[0] for leg in before)
@@ -179,7 +179,7 @@ def test_a_last_speed_of_zero_is_no_standstill_once_the_source_is_silent(engine)
 
 
 def test_a_silent_source_is_not_a_stuck_one():
-    """In a straight tunnel with stop and go there is no speed; before and after it there is."""
+    """There is no speed in a straight tunnel with stop-and-go traffic, only before and after it."""
     tunnel = [[seconds, acceleration, 0.0] for seconds, acceleration, _ in around(6, pause_s=3.0, stands=False)]
     before = around(3)
     begin = sum(leg[0] for leg in before)
@@ -190,7 +190,7 @@ def test_a_silent_source_is_not_a_stuck_one():
 
 
 def test_nothing_is_joined_across_missing_samples():
-    """With gaps of 1.5 s every 25 s it is aligned as well."""
+    """With gaps of 1.5 s every 25 s it is still aligned."""
     drive = alignment.DriveAlignment("car")
     source = driving_runs.SpeedSource()
     gap = 0

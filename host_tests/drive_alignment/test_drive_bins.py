@@ -1,4 +1,4 @@
-"""A log that is summed by numpy gives the same alignment as its samples one by one, as on the board."""
+"""A log summed by numpy gives the same alignment as its single samples on the board."""
 
 from array import array
 
@@ -17,7 +17,7 @@ CALIBRATION = CalibrationFile(accel_offset_g=np.array([0.02, -0.01, 0.03]), acce
 
 
 def drive(rate_hz=100, every_s=0.5, events=7, seed=5, before=()):
-    """A made-up drive as a Log whose times are uneven; a speed each every_s, anywhere within a bin. before: legs."""
+    """A simulated drive as a Log with uneven times; a speed every every_s, anywhere within a bin. before: legs."""
     mount = np.reshape(random_mounting(seed), (3, 3))
     made = list(driving_runs.samples([*before, *driving_runs.around(events)], tilt_deg=1.0))[:: 100 // rate_hz]
     n = len(made)
@@ -30,7 +30,7 @@ def drive(rate_hz=100, every_s=0.5, events=7, seed=5, before=()):
 
 
 def as_on_the_board(log, bias):
-    """The matrix of a DriveAlignment that is given each sample by itself."""
+    """The matrix of a DriveAlignment that gets each single sample."""
     alignment, firmware = DriveAlignment("car", None, bias), CALIBRATION.to_firmware()
     force, rate, previous = [0.0] * 3, [0.0] * 3, 0
     for now, reading, speed in log.rows():
@@ -85,7 +85,7 @@ def test_bins_hold_every_sample_and_every_speed_once():
     assert force == pytest.approx(expected, rel=1e-9)
 
 
-def test_a_refusal_is_part_of_the_result_with_what_was_counted():
+def test_a_refusal_is_in_the_result_with_its_counts():
     log = drive(events=3)
     found = fit_logs([log], CALIBRATION, "car")
     assert (found.status, found.reason) == ("refused", "few-events")
@@ -93,8 +93,8 @@ def test_a_refusal_is_part_of_the_result_with_what_was_counted():
     assert found.calibration is CALIBRATION
 
 
-def test_a_vehicle_that_stands_at_another_slope_in_the_next_log_has_not_moved_its_mount():
-    """Parked nose down at the end of the first log, nose up at the beginning of the second one."""
+def test_another_slope_in_the_next_log_is_no_moved_mount():
+    """Parked nose down at the end of the first log, nose up at the beginning of the second."""
     mount = np.reshape(random_mounting(5), (3, 3))
     logs = []
     for slope_deg, first in ((-4.5, False), (4.5, True)):

@@ -1,4 +1,4 @@
-"""The steps of alignment by driving, one by one, against numpy where there is something to compute."""
+"""The single steps of alignment by driving, compared with numpy if they compute something."""
 
 import types
 
@@ -22,7 +22,7 @@ def unit(rng):
 
 @pytest.mark.parametrize("off_deg", [0.0, 0.01, 45.0, 89.9, 90.1, 179.99, 180.0])
 def test_rotation_between_is_safe_at_every_angle(off_deg):
-    """It is a rotation and takes a to b, within 1e-12, even where a and b are exactly antiparallel."""
+    """It is a rotation from a to b within 1e-12, even if a and b are exactly antiparallel."""
     rng = np.random.default_rng(3)
     off = np.radians(off_deg)
     for axis, b in ((0, published.UP), (2, published.UP), (1, published.BACKWARD)):
@@ -83,7 +83,7 @@ def test_history_is_exact_and_wraps_round():
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("count", [60, 300])
 def test_regression_is_weighted_least_squares(engine, count):
-    """Forward and level as numpy finds them, however often blocks were joined."""
+    """Forward and level agree with numpy for any number of joined blocks."""
     rng = np.random.default_rng(count)
     seconds = rng.uniform(0.4, 1.1, count)
     a, c = rng.normal(0, 0.1, count), rng.normal(0, 0.03, count)
@@ -99,7 +99,7 @@ def test_regression_is_weighted_least_squares(engine, count):
     assert 5 <= blocks <= 8
 
 
-def test_a_fit_made_while_another_is_half_done_changes_neither():
+def test_two_fits_at_the_same_time_do_not_interfere():
     """The loop may compare an alignment with the drive while the quality of the drive is being judged."""
     rng = np.random.default_rng(5)
     regression = ForwardRegression()
@@ -151,7 +151,7 @@ def level(pitch_deg, roll_deg=0.0):
     return [np.sin(r), np.cos(p) * np.cos(r), np.sin(p) * np.cos(r)]
 
 
-def test_the_vertical_is_the_mean_direction_of_stops_whatever_their_lengths():
+def test_each_stop_counts_once_in_the_vertical():
     standing = StandingVertical()
     for k, (pitch, seconds) in enumerate([(3.0, 300.0), (-3.0, 5.0), (2.0, 5.0), (-2.0, 5.0)]):
         stand(standing, level(pitch), seconds, rate=(0.1 * k, -0.2, 0.3))
@@ -163,9 +163,9 @@ def test_the_vertical_is_the_mean_direction_of_stops_whatever_their_lengths():
     assert not standing.moved
 
 
-def test_a_late_speed_is_not_taken_for_a_sensor_turned_while_standing():
-    """A vehicle may speed up evenly for some seconds while a late speed still says zero. A sensor that was turned stays
-    so for longer."""
+def test_a_late_speed_is_no_rotated_sensor():
+    """A vehicle may accelerate evenly for some seconds while a late speed is still zero. A rotated sensor stays so for
+    longer."""
     standing = StandingVertical()
     stand(standing, level(0.0), 5.0)
     stand(standing, level(15.0), 2.5)
@@ -175,8 +175,9 @@ def test_a_late_speed_is_not_taken_for_a_sensor_turned_while_standing():
     assert standing.moved
 
 
-def test_where_the_vertical_comes_from():
-    """A car's: its stops, and with a fit the mean of both. A motorcycle's: the upright pose; else straight riding."""
+def test_each_vehicle_has_its_source_of_the_vertical():
+    """A car uses its stops, and with a fit the mean of both. A motorcycle uses the upright pose, else straight
+    riding."""
     standing = types.SimpleNamespace(up=None)
     fit = types.SimpleNamespace(level=[2.0 * part for part in level(4.0)])
 
@@ -200,7 +201,7 @@ def test_where_the_vertical_comes_from():
 
 @pytest.mark.parametrize(("share", "moved"), [(0.9, True), (1.1, False)])
 def test_a_bend_at_a_stuck_zero_is_no_stop(share, moved):
-    """In a bend the rate is further from the bias of the stop before than warming up can change that bias."""
+    """In a bend the rate differs from the last stop's bias by more than warming up can change it."""
     standing = StandingVertical()
     stand(standing, level(0.0), 5.0, rate=(1.0, -4.0, 2.0))
     stand(standing, level(0.0), 3.0, speed=10.0)
@@ -213,7 +214,7 @@ def test_a_bend_at_a_stuck_zero_is_no_stop(share, moved):
     ("seconds", "speed", "shake_g", "stops"),
     [(2.0, 0.0, 0.02, 0), (4.0, 0.0, 0.02, 1), (9.0, 1.0, 0.0, 0), (9.0, 0.0, 0.2, 0)],
 )
-def test_what_a_stop_is(seconds, speed, shake_g, stops):
+def test_a_stop_requires_stillness_and_time(seconds, speed, shake_g, stops):
     """Standing for three seconds, with no more than an engine's shaking."""
     standing = StandingVertical()
     for k in range(round(seconds * 10)):
@@ -225,7 +226,7 @@ def test_what_a_stop_is(seconds, speed, shake_g, stops):
     ("speeds", "yaw_dps", "stuck"), [((7.0, 7.0), 0.0, True), ((7.0, 7.1), 0.0, False), ((7.0, 7.0), 10.0, False)]
 )
 def test_a_speed_that_stays_the_same_in_a_lively_ride_is_stuck(speeds, yaw_dps, stuck):
-    """Not one that changes, nor that of a steady drive through bends."""
+    """But not a changing speed, nor a steady one through bends."""
     check = SpeedCheck()
     for k in range(30):
         check.measure(speeds[k % 6 // 3])

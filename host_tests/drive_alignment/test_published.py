@@ -111,7 +111,7 @@ class Drive:
 @pytest.mark.parametrize(
     ("every_s", "mount"), [(0.1, MOUNT), (0.5, MOUNT), (1.0, MOUNT), (2.0, MOUNT), (0.5, TURNED_MOUNT)]
 )
-def test_stops_and_three_brakings_give_the_mount_computed_by_hand(every_s, mount):
+def test_stops_and_three_brakings_give_the_mount_by_hand(every_s, mount):
     drive = Drive(every_s, mount)
     for counted in range(3):
         assert drive.alignment.counted == counted and not drive.alignment.ready

@@ -1,4 +1,4 @@
-"""Which axes the driver calls ill by their counts, and which it must not."""
+"""The driver finds faulty axes by their counts, and only those."""
 
 from array import array
 
@@ -7,7 +7,7 @@ import pytest
 from kickstand.imu.fifo_frames import DUE, AxisWatch, add_up
 
 RATE_HZ = 200
-REST = (0, 0, 4096, -3920, 10, -500, 300)  # counts of a chip at rest, at 8 g and 500 deg/s
+REST = (0, 0, 4096, -3920, 10, -500, 300)  # counts of a chip at rest, for 8 g and 500 deg/s
 NOISE = (13, 13, 13, 3, 2.66, 2.66, 2.66)  # by the data sheet at DLPF 3; see sensor.ACCEL_NOISE_G
 
 
@@ -39,7 +39,7 @@ def ride(seconds, seed=0):
 
 
 def judged(samples, gyro_range=1, dlpf=3, accel_range=3):
-    """What is said, [(seconds, words or None), ...], each change of it."""
+    """Each change of the notice: [(seconds, words or None), ...]."""
     axes = AxisWatch(RATE_HZ, accel_range, gyro_range, dlpf, 20)
     sums = array("i", [0] * 7)
     said: list[tuple[float, str | None]] = [(0.0, None)]
@@ -55,7 +55,7 @@ def judged(samples, gyro_range=1, dlpf=3, accel_range=3):
 
 
 def stuck(column, value):
-    """A fault of one column from second 2 to 5. value: of the samples' column makes what is read in place of it."""
+    """A fault of one column from second 2 to 5. value: a function from the column's samples to the faulty readings."""
 
     def spoil(samples):
         part = samples[2 * RATE_HZ : 5 * RATE_HZ]
@@ -102,8 +102,8 @@ HIGH_BYTE = [
 
 
 @pytest.mark.parametrize(("words", "spoil"), ILL + HIGH_BYTE)
-def test_an_ill_axis_is_named_at_once_and_comes_back(words, spoil):
-    """Within 1.2 s; a high byte that is stuck shows only as the counts run through it."""
+def test_a_faulty_axis_is_reported_at_once_and_recovers(words, spoil):
+    """Within 1.2 s. A stuck high byte shows only when the counts pass through it."""
     said = judged(spoil(ride(8)))
     assert [what for _, what in said] == [words, None]
     assert 2.3 < said[0][0] <= (3.7 if (words, spoil) in HIGH_BYTE else 3.2)
@@ -112,7 +112,7 @@ def test_an_ill_axis_is_named_at_once_and_comes_back(words, spoil):
 
 @pytest.mark.parametrize("gyro_range", range(4))
 @pytest.mark.parametrize("dlpf", [1, 2, 3, 4, 5, 6])
-def test_the_quietest_chip_on_its_stand_is_not_ill(gyro_range, dlpf):
+def test_the_quietest_chip_at_rest_is_not_faulty(gyro_range, dlpf):
     """100 ug/sqrt(Hz) at 16 g, 0.004 deg/s/sqrt(Hz), each with a mean that makes the counts as quiet as they can be."""
     bandwidth = (None, 188, 98, 42, 20, 10, 5)[dlpf]
     per_g, per_dps = 2048, (131, 65.5, 32.8, 16.4)[gyro_range]
@@ -122,15 +122,15 @@ def test_the_quietest_chip_on_its_stand_is_not_ill(gyro_range, dlpf):
     assert judged(counts(20, dlpf, noise, bandwidth, rest), gyro_range, dlpf) == []
 
 
-def test_rides_are_not_ill(monkeypatch):
-    """And their axes look so well that the judge, 2 KB of heap, is not imported."""
+def test_no_axis_is_faulty_in_a_ride(monkeypatch):
+    """Their axes also look so good that the judge (2 KB of heap) is not imported."""
     monkeypatch.setattr(AxisWatch, "_load", lambda watch: pytest.fail("not well"))
     for seed in range(4):
         assert judged(ride(20, seed)) == []
 
 
 @pytest.mark.parametrize(("column", "value", "words"), [(4, 32767, "Gyro"), (6, -32768, "Gyro"), (1, 32767, "Accel")])
-def test_the_end_of_the_range_clips_and_for_seconds_the_axis_is_ill(column, value, words):
+def test_seconds_at_the_end_of_the_range_make_an_axis_faulty(column, value, words):
     samples = ride(10)
     samples[400:1200, column] = value
     (first_s, first), (second_s, second), (_, last) = judged(samples)
@@ -139,15 +139,15 @@ def test_the_end_of_the_range_clips_and_for_seconds_the_axis_is_ill(column, valu
     assert first_s <= 2.9 and second_s <= 4.5
 
 
-def test_now_and_then_at_the_end_of_the_range_is_no_fault():
+def test_single_samples_at_the_end_of_the_range_are_no_fault():
     samples = ride(20)
     samples[np.random.default_rng(1).random(len(samples)) < 0.05, 1] = 32767
     assert judged(samples) == []
 
 
 @pytest.mark.parametrize(("accel_range", "said"), [(0, 0), (1, 0), (2, 2), (3, 2)])
-def test_hard_vibration_is_clipping_unless_the_range_is_small(accel_range, said):
-    """What the low-pass has left of it reaches half of 8 g or of 16 g for three seconds. In a range of 2 g bends do."""
+def test_hard_vibration_clips_unless_the_range_is_small(accel_range, said):
+    """After the low-pass it still reaches half of 8 g or of 16 g for three seconds. In a range of 2 g bends do."""
     samples = ride(8)
     samples[400:1000, 1] += 17000 * np.sin(np.arange(600) * 2.2)
     assert [words for _, words in judged(samples, accel_range=accel_range)] == ["Accel", None][:said]

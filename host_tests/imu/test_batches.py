@@ -1,5 +1,5 @@
-"""The samples of one turn of the loop, added up and transformed together: against numpy on CPython and MicroPython, and
-machine code against Python."""
+"""The samples of one turn of the loop are added up and transformed together. Compared with numpy on CPython and
+MicroPython; machine code is compared with Python."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,8 @@ def noise(count, seed=0):
 
 
 def added(engine, batches):
-    """How many of each batch add_up() takes, and their sums; add_up_python() must give the same and note the same."""
+    """The number of samples that add_up() takes from each batch, and their sums. add_up_python() must return and note
+    the same."""
     chosen, python = engines.run(engine, [("add_up", (batches, LIMIT))])[0]
     assert chosen == python
     return [answer[:2] for answer in chosen]
@@ -27,7 +28,7 @@ def added(engine, batches):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_sums(engine):
-    """Of no sample, of one, of eight, and near the ends of the range."""
+    """For zero, one and eight samples, and near the ends of the range."""
     ends = np.array([[-32699] * 7, [32699] * 7, [-32699] * 7, [32697] * 7])
     batches = [noise(0), noise(1), noise(8), ends]
     answers = added(engine, [frames(batch) for batch in batches])
@@ -45,9 +46,9 @@ def test_a_frame_is_seven_big_endian_numbers(engine):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 @pytest.mark.parametrize("dead", [0, -1])
-def test_zeros_and_ones_are_no_readings(engine, dead):
-    """Frames before such a reading count, whatever temperature and gyro say. A chip whose force is zero in two axes
-    only is working."""
+def test_all_zeros_or_ones_is_a_dead_frame(engine, dead):
+    """Frames before such a reading count, for any temperature and rate. A chip with zero force in only two axes
+    works."""
     samples = noise(4)
     samples[2, 0:3] = dead
     alive = noise(1)
@@ -61,7 +62,7 @@ def test_zeros_and_ones_are_no_readings(engine, dead):
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
-def test_the_same_again_and_again_is_a_frozen_chip(engine):
+def test_repeated_readings_are_a_frozen_chip(engine):
     """Repetitions are counted from batch to batch. A change of any byte but the temperature's ends them."""
     still = np.repeat(noise(1), 12, axis=0)
     calls, expected = [[still[:3], still[3:7], still[7:]]], [[3, 2, 0]]
@@ -79,7 +80,7 @@ def test_the_same_again_and_again_is_a_frozen_chip(engine):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_a_sample_at_the_end_of_the_range_is_left_out(engine):
-    """Of any axis, at either end, but not of the temperature. The good samples move up."""
+    """For any axis, at either end, but not for the temperature. The good samples move up."""
     samples = noise(8) // 2
     samples[2, 1], samples[3, 6], samples[5, 0], samples[5, 4], samples[6, 3] = 32700, -32768, -32700, 32767, 32767
     good = samples[[0, 1, 4, 6, 7]]
@@ -93,8 +94,8 @@ def test_a_sample_at_the_end_of_the_range_is_left_out(engine):
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
-def test_a_watch_notes_what_the_counts_have_shown(engine):
-    """The lowest four bits that have come, a changed high byte, a jump below it, and which axes differ."""
+def test_a_watch_records_the_low_bits_wraps_and_differences(engine):
+    """The values of the lowest four bits, a changed high byte, a jump below it, and the axes that differ."""
     samples = np.full((8, 7), 700) + np.arange(7)
     samples[:, 0] = 5, 6, 5, 6, 5, 6, 5, 6  # two values
     samples[:, 1] = 2, 194, 5, 6, 7, 198, 9, 8  # jumps within one high byte

@@ -1,4 +1,4 @@
-"""Each driver alone: what it sends on the bus, what the button makes of presses."""
+"""Each driver alone: its transfers on the bus, and the button's events."""
 
 import re
 import textwrap
@@ -16,7 +16,7 @@ def board():
 
 
 def on(board, function):
-    """Run a function on the board and give back what it returned."""
+    """Run a function on the board and return its result."""
     result = []
     assert board.run(lambda: result.append(function()), 1000) == "returned"
     return result[0]
@@ -29,7 +29,7 @@ def sensor_i2c():
 
 
 def test_the_example_in_the_drivers_docstring_runs(board, capsys):
-    """For a second: its name and temperature, then 200 samples, give or take those of the start and the end."""
+    """For a second: its name and temperature, then about 200 samples."""
     from kickstand.imu import mpu6050
 
     example = re.search(r"\n\n((?:    .*\n|\n)+)", mpu6050.__doc__ or "")
@@ -80,8 +80,8 @@ def test_presses(board, held_s, events):
     assert on(board, run) == events
 
 
-def test_ctrl_c_puts_the_watchdog_to_rest(board, monkeypatch, capsys, tmp_path):
-    """After Ctrl-C nothing feeds it, and a board that resets in the middle of a copy could not be deployed to."""
+def test_ctrl_c_stops_the_watchdog(board, monkeypatch, capsys, tmp_path):
+    """After Ctrl-C nothing feeds it, and a reset in the middle of a copy would break an installation."""
     from kickstand import app, start
 
     monkeypatch.chdir(tmp_path)
@@ -104,7 +104,7 @@ def test_ctrl_c_puts_the_watchdog_to_rest(board, monkeypatch, capsys, tmp_path):
     assert "stopped" in capsys.readouterr().out
 
 
-def test_a_second_ctrl_c_while_the_ride_is_being_ended_leaves_the_watchdog_at_rest(board, monkeypatch, tmp_path):
+def test_a_second_ctrl_c_leaves_the_watchdog_stopped(board, monkeypatch, tmp_path):
     from kickstand import app, devices
     from kickstand.rides.recorder import Recorder
     from kickstand.settings import Settings
@@ -138,7 +138,7 @@ def test_a_second_ctrl_c_while_the_ride_is_being_ended_leaves_the_watchdog_at_re
     assert ended
 
 
-def test_status_shows_how_the_board_is(board, monkeypatch, capsys, tmp_path):
+def test_status_reports_on_the_board(board, monkeypatch, capsys, tmp_path):
     import gc
     import os
 

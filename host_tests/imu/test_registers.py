@@ -1,4 +1,4 @@
-"""The driver against registers that stand still: what it writes, what it checks, what it makes of the FIFO's count.
+"""The driver with constant registers: its writes, its checks, and its use of the FIFO's count.
 
 The values are those of the register map, RM-MPU-6000A rev 4.2, and of the other chips' data sheets.
 """
@@ -21,8 +21,8 @@ def time():
 
 
 class Wires:
-    """A machine.I2C with nothing but registers behind it. stuck: those that keep their value whatever is written.
-    log: what was written, [(register, value), ...], at times_us by clock. waiting: bytes in the FIFO."""
+    """A machine.I2C with only registers behind it. stuck: registers that keep their value on a write.
+    log: the writes, [(register, value), ...], at times_us of the clock. waiting: bytes in the FIFO."""
 
     def __init__(self, who_am_i=0x68, stuck=(), clock=None):
         self.registers = bytearray(128)
@@ -66,7 +66,7 @@ def started(wires, **settings):
     return chip
 
 
-def test_setup_writes_what_the_register_map_says(time):
+def test_setup_writes_the_values_of_the_register_map(time):
     wires = Wires(clock=time)
     chip = started(wires, accel_range_g=16, gyro_range_dps=1000, dlpf=2, rate_hz=100)
     assert wires.log == [
@@ -83,7 +83,7 @@ def test_setup_writes_what_the_register_map_says(time):
     ]
     assert (chip.accel_lsb_per_g, chip.gyro_lsb_per_dps) == (2048, 32.8)
     reset, awake, configured, *_ = wires.times_us
-    assert awake - reset >= 100_000  # what a reset takes at most (p. 41)
+    assert awake - reset >= 100_000  # longest time of a reset (p. 41)
     assert configured - awake >= 30_000  # the gyro's start-up time (PS-MPU-6000A, 6.1)
     assert wires.times_us[6] - wires.times_us[5] >= 4 * 4800  # four delays of the slowest low-pass that is usual
     assert wires.times_us[-1] - reset < 200_000
@@ -140,7 +140,7 @@ def test_a_fifo_that_does_not_start_fails_setup(register):
 
 
 @pytest.mark.parametrize("who_am_i", [0x68, MPU6500, MPU6886, 0x98])
-def test_whatever_register_changes_the_chip_is_no_longer_configured(who_am_i):
+def test_any_changed_register_ends_configured(who_am_i):
     wires = Wires(who_am_i)
     chip = started(wires)
     registers = [SMPLRT_DIV, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, FIFO_EN, USER_CTRL, PWR_MGMT_1]
@@ -204,8 +204,7 @@ def test_a_number_that_reads_differently_each_time_is_an_error():
 
 
 def test_the_simulated_board_models_every_chip_of_the_driver():
-    """Without a model of its own a chip would be tested as an MPU6050. The driver may use less of a FIFO than there
-    is."""
+    """A chip without its own model would be tested as an MPU6050. The driver may use less than the whole FIFO."""
     from kickstand.imu.mpu6050 import CHIPS
 
     assert set(CHIPS) == set(VARIANTS)
@@ -269,7 +268,7 @@ def test_a_frame_that_is_being_written_is_waited_for_once():
 
 @pytest.mark.parametrize(("rate_hz", "good"), [(200, 20), (100, 10)])
 def test_readings_that_repeat_for_100_ms_are_frozen(rate_hz, good):
-    """The first of them is new. After a set-up the count begins again."""
+    """The first one is new. The count restarts after a set-up."""
     wires = Wires()
     chip = started(wires, rate_hz=rate_hz)
     wires.waiting = 14

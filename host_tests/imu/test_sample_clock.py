@@ -1,4 +1,4 @@
-"""When samples were taken: the chip's even rate, put right by a clock that it does not share."""
+"""The times of the samples: the chip's even rate, corrected with the board's clock."""
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ def test_samples_are_a_period_apart():
 
 @pytest.mark.parametrize("error", [0.01, 0.0, -0.01])
 def test_a_chip_that_is_1_percent_off_keeps_the_boards_time(error):
-    """Over 20 s, looked at at random moments, up to 10 ms apart."""
+    """Over 20 s, read at random moments up to 10 ms apart."""
     rng = np.random.default_rng(1)
     samples_us = (np.arange(4000) * PERIOD_US / (1 + error)).astype(int)
     looks_us = np.cumsum(rng.integers(2000, 10_000, 3000))
@@ -54,7 +54,7 @@ def test_a_chip_that_is_1_percent_off_keeps_the_boards_time(error):
 
 @pytest.mark.parametrize(("late_us", "counted"), [(2 * PERIOD_US, False), (2 * PERIOD_US + 1, True)])
 def test_a_gap_of_lost_samples_is_spanned(late_us, counted):
-    """More than two periods late, samples were lost; up to there the clocks may differ, and are brought together."""
+    """Samples were lost if the last one is over two periods late. Up to that the clocks differ and are adjusted."""
     own = clock()
     own.step(1, 0)
     own.emptied(PERIOD_US // 2 + late_us)
@@ -79,7 +79,7 @@ def test_ticks_that_begin_again_at_0_are_no_gap():
 
 
 def test_a_sample_is_half_a_period_old_on_average():
-    """The first look comes just when a sample is taken; the later ones at any time, evenly spread over the period."""
+    """The first look is at the moment of a sample; the later ones are evenly spread over the period."""
     rng = np.random.default_rng(2)
     errors = []
     samples_us = np.arange(1200) * PERIOD_US

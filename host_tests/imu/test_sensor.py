@@ -1,4 +1,4 @@
-"""Sensor, which keeps the chip working, with a chip that does what the test says."""
+"""Sensor, which keeps the chip working, with a chip controlled by the test."""
 
 import pytest
 from kickstand_tools.simulated_board.simulator import Board
@@ -11,8 +11,8 @@ def board():
 
 
 class Chip:
-    """waiting: what the next fetches find, samples or an exception; then always one sample. bad: how many samples are
-    spoilt. setups: what set-ups raise in their last step, None for nothing. calls: what was done."""
+    """waiting: results of the next fetches, samples or an exception; then always one sample. bad: number of spoilt
+    samples. setups: exceptions of the set-ups in their last step, or None. calls: the calls so far."""
 
     def __init__(self):
         from kickstand.imu.fifo_frames import AxisWatch
@@ -68,7 +68,7 @@ def made(board, explain=None):
 
 
 def set_up(sensor, now_ms):
-    """Let the chip be set up from now_ms on, in turns of 10 ms; return when that is done."""
+    """Let the chip be set up from now_ms on, in turns of 10 ms; return the time of the end."""
     for _ in range(19):
         assert sensor.fetch(now_ms) == 0
         now_ms += 10
@@ -76,7 +76,7 @@ def set_up(sensor, now_ms):
 
 
 def running(board, explain=None):
-    """A sensor whose chip runs, and the time in ms: its first sample has just come."""
+    """A sensor whose chip runs, and the time in ms of its first sample."""
     sensor, chip = made(board, explain)
     now_ms = set_up(sensor, 0)
     assert sensor.fetch(now_ms) == 1
@@ -89,7 +89,7 @@ def code(sensor):
     return sensor.fault and sensor.fault.code
 
 
-def test_the_chip_is_set_up_on_a_freed_bus_and_is_at_fault_until_its_first_sample(board):
+def test_a_new_chip_is_at_fault_until_its_first_sample(board):
     sensor, chip = made(board)
     assert code(sensor) == "starting"
     for now_ms in (0, 99, 100, 159, 160, 179):
@@ -103,7 +103,7 @@ def test_the_chip_is_set_up_on_a_freed_bus_and_is_at_fault_until_its_first_sampl
 
 
 def test_a_chip_that_is_prepared_starts_with_the_first_fetch(board):
-    """So that no samples wait that were taken before the loop began."""
+    """So no samples from before the loop are waiting."""
     sensor, chip = made(board)
     for now_ms in range(0, 1000, 15):
         sensor.prepare(now_ms)
@@ -113,7 +113,7 @@ def test_a_chip_that_is_prepared_starts_with_the_first_fetch(board):
     assert sensor.fetch(1100) == 1
 
 
-def test_a_set_up_that_fails_is_tried_again_50_ms_later(board):
+def test_a_failed_set_up_is_repeated_after_50_ms(board):
     from kickstand.imu.mpu6050 import UnknownChip
 
     sensor, chip = made(board)
@@ -129,7 +129,7 @@ def test_a_set_up_that_fails_is_tried_again_50_ms_later(board):
     for now_ms in (420, 520, 580, 600):
         sensor.fetch(now_ms)
     assert (chip.calls.count("configure"), sensor.restarts) == (3, 1)
-    assert code(sensor) == "unknown-chip"  # until a sample has come
+    assert code(sensor) == "unknown-chip"  # until the first sample
     sensor.fetch(605)
     assert code(sensor) is None
 
@@ -145,7 +145,7 @@ def test_silence_is_a_fault_after_100_ms(board):
 
 
 def test_an_overflow_is_no_silence(board):
-    """The FIFO was emptied just now, whatever time the loop has read before."""
+    """The FIFO was emptied just now, even if the loop has read an earlier time."""
     sensor, chip, now_ms = running(board)
     board.clock.advance(now_ms * 1000 + 400_000)
     chip.waiting = [0, 0, 0]
@@ -158,7 +158,7 @@ def test_an_overflow_is_no_silence(board):
     assert code(sensor) == "sensor-silent"
 
 
-def test_readings_that_are_all_lost_for_half_a_second_are_a_fault(board):
+def test_half_a_second_of_lost_readings_is_a_fault(board):
     """The FIFO overflowed again and again: the board had no time to read."""
     sensor, chip, now_ms = running(board)
     for after_ms, said in ((300, None), (500, None), (502, "readings-lost")):
@@ -166,7 +166,7 @@ def test_readings_that_are_all_lost_for_half_a_second_are_a_fault(board):
         chip.waiting, chip.overflows = [0], chip.overflows + 1
         assert sensor.fetch(now_ms + after_ms) == 0
         assert code(sensor) == said
-    assert sensor.restarts == 2  # what comes does not follow on from what was before
+    assert sensor.restarts == 2  # there is a gap before the next samples
     assert sensor.fetch(now_ms + 510) == 1
     assert code(sensor) is None
 
@@ -183,7 +183,7 @@ def test_two_lost_transfers_are_tolerated_and_three_are_a_fault(board):
     assert said == [None] * 5 + ["sensor-lost"]
 
 
-def test_the_fifo_is_emptied_after_a_transfer_that_broke_off(board):
+def test_the_fifo_is_emptied_after_a_failed_transfer(board):
     """It may have taken half a frame with it. Only once."""
     sensor, chip, now_ms = running(board)
     chip.waiting = [OSError(110), 1, 1]
@@ -229,7 +229,7 @@ def test_a_check_that_is_lost_counts_as_a_lost_transfer(board):
 
 
 def test_nothing_is_judged_after_a_lost_transfer(board):
-    """Restarting the FIFO may have failed half way. The next transfer that succeeds ends this."""
+    """Restarting the FIFO may be incomplete. The next successful transfer ends this."""
     sensor, chip, now_ms = running(board)
     chip.waiting, chip.states = [OSError(5)], [False, False]
     sensor.fetch(now_ms + 10)
@@ -241,13 +241,13 @@ def test_nothing_is_judged_after_a_lost_transfer(board):
 
 
 def until_failed(sensor, chip, now_ms, since_ms):
-    """Let a chip that is set up give nothing for since_ms; return when it is at fault."""
+    """Let a chip that is set up give no samples for since_ms; return the time of its fault."""
     chip.waiting = [0] * 20
     sensor.fetch(now_ms + since_ms)
     return now_ms + since_ms
 
 
-def test_the_fifo_is_tried_out_once_set_ups_do_not_help(board):
+def test_the_fifo_is_tested_if_set_ups_do_not_help(board):
     """At the third fault in a row, each soon after a set-up."""
     from kickstand.errors import Notice
 
@@ -274,7 +274,7 @@ def test_faults_far_apart_do_not_question_the_fifo(board):
         now_ms = set_up(sensor, now_ms)
 
 
-def test_lost_readings_are_the_fifos_fault_where_it_has_one(board):
+def test_a_broken_fifo_explains_lost_readings(board):
     from kickstand.errors import Notice
 
     sensor, chip, now_ms = running(board, lambda chip, error: (Notice("sensor-fifo", "stays full"), []))

@@ -1,4 +1,4 @@
-"""What a sensor on a bike measures, by the equations of motion alone: for tests that MicroPython runs too."""
+"""The readings of a sensor on a bike, from the equations of motion alone. For tests that also run on MicroPython."""
 
 from math import cos, degrees, pi, radians, sin, tan
 
@@ -33,7 +33,7 @@ def meter(calibration=None, **options):
 
 
 def ride(shown, seconds, speed_mps=None, **motion):
-    """A steady motion; speed_mps shows in the readings only, it is not measured by another sensor."""
+    """A steady motion. speed_mps only affects the readings; no other sensor measures it."""
     readings = reading(*force_and_rate(speed_mps=speed_mps or 0.0, **motion))
     for _ in range(int(seconds / DT_S + 0.5)):
         shown.update(readings, DT_US)
@@ -41,7 +41,7 @@ def ride(shown, seconds, speed_mps=None, **motion):
 
 
 def roll(shown, from_deg, to_deg, speed_mps=0.0, dps=60.0):
-    """Lean it over, at so many degrees a second."""
+    """Change the lean, at this many degrees per second."""
     steps = int(abs(to_deg - from_deg) / (dps * DT_S) + 0.5)
     rate = (to_deg - from_deg) / (steps * DT_S)
     for k in range(steps):
@@ -51,7 +51,7 @@ def roll(shown, from_deg, to_deg, speed_mps=0.0, dps=60.0):
 
 
 def speed_up(shown, from_mps, to_mps, seconds):
-    """Straight on, from one speed to another."""
+    """Ride straight from one speed to another."""
     rate = (to_mps - from_mps) / seconds
     steps = int(seconds / DT_S + 0.5)
     for k in range(steps):
@@ -60,7 +60,7 @@ def speed_up(shown, from_mps, to_mps, seconds):
 
 
 def nose_up(shown, from_deg, to_deg, dps=30.0):
-    """Pitch a bike that stands or rolls evenly, upright."""
+    """Pitch an upright bike at rest or at a steady speed."""
     steps = int(abs(to_deg - from_deg) / (dps * DT_S) + 0.5)
     rate = (to_deg - from_deg) / (steps * DT_S) * pi / 180.0
     for k in range(steps):

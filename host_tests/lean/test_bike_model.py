@@ -1,4 +1,4 @@
-"""The model's partial derivatives against numerical differentiation of its own equations."""
+"""The model's partial derivatives compared with numerical differentiation of its own equations."""
 
 import math
 
@@ -68,7 +68,7 @@ def linearised(x, force, rate):
 
 
 def left_out(x, rates):
-    """(6, STATES): what the model leaves out because pitch and yaw error are small."""
+    """(6, STATES): the terms that the model omits because pitch and yaw error are small."""
     (t, q, v), y = x[:3], x[YAW_ERROR]
     wx, wy, _ = rates
     s, c, tan = math.sin(t), math.cos(t), math.tan(q)
@@ -95,7 +95,7 @@ def rates_at(lean, speed, left=0.0, up=0.0):
 
 
 @pytest.mark.parametrize("lean", [-0.8, -0.3, 0.4, 0.9])
-def test_near_balance_the_turn_rates_are_those_at_which_no_force_goes_to_the_side(lean):
+def test_near_balance_the_turn_rates_give_no_force_to_the_side(lean):
     speed = 20.0
     balanced = -STANDARD_GRAVITY * math.sin(lean) / speed
     left, up = rates_at(lean, speed, 0.0, balanced + 0.05)
@@ -106,7 +106,7 @@ def test_near_balance_the_turn_rates_are_those_at_which_no_force_goes_to_the_sid
     assert x[PITCH] == pytest.approx(0.0, abs=1e-12)  # and the rates are about the vertical
 
 
-def test_far_from_balance_and_when_slow_the_turn_rates_are_the_measured_ones():
+def test_slow_or_far_from_balance_turn_rates_are_measured():
     assert rates_at(0.5, 20.0, 0.1, 0.4) == (0.1, 0.4)  # a turn to the other side
     assert rates_at(0.5, 3.0, 0.1, -1.6) == (0.1, -1.6)
 
@@ -121,7 +121,7 @@ def test_the_state_stays_within_its_bounds():
 
 @pytest.mark.parametrize("lean", [-0.6, 0.0, 0.6])
 @pytest.mark.parametrize("pitch", [-0.2, 0.2])
-def test_what_the_yaw_error_shows_of_the_pitch_is_no_lean_of_the_bike(lean, pitch):
+def test_pitch_seen_by_the_yaw_error_is_not_lean(lean, pitch):
     """(7): the vertical along the bike's axes, then along those of a sensor that is turned about up."""
     yaw_error = 0.1
     left, up, forward = math.cos(pitch) * math.sin(lean), math.cos(pitch) * math.cos(lean), math.sin(pitch)

@@ -1,4 +1,4 @@
-"""What the lean filter says of itself: innovations that do not fit, when it is believed again, and a name."""
+"""The lean filter's check of itself: misfits, the end of a doubt, and the code of repeated misfits."""
 
 from math import radians
 
@@ -11,8 +11,8 @@ WINDOW_S = 0.2
 
 
 def windows(judge, seconds, left=0.0, up=0.0, sideways=0.0, pitch=0.0, lean=0.0, yaw_rate=0.0, shaken=0.0):
-    """How many of the windows of so many seconds were said not to fit any more. shaken: added to both forces, and taken
-    off in every other window."""
+    """The number of misfits in the windows of this many seconds. shaken: added to both forces, with alternating
+    sign."""
     failed = 0
     for _ in range(int(seconds / WINDOW_S + 0.5)):
         failed += judge.add(left + shaken, up + shaken, sideways, pitch, lean, yaw_rate, WINDOW_S)
@@ -41,7 +41,7 @@ def test_on_a_rougher_road_larger_means_are_sound():
         assert not windows(judge, 30.0, **{name: 0.55}, shaken=1.5)
 
 
-def test_much_is_doubted_within_a_second_and_little_after_some():
+def test_large_misfits_are_doubted_sooner_than_small_ones():
     for name in ("left", "up"):
         for size, least_s, most_s in ((4.0, 0.4, 1.0), (1.5, 1.0, 3.2), (0.6, 5.0, 20.0)):
             judge = Consistency()
@@ -102,7 +102,7 @@ def test_bends_to_either_side_and_deep_ones_are_believed():
     assert judge.one_sided
 
 
-def test_what_does_not_fit_again_and_again_is_named():
+def test_repeated_misfits_are_reported():
     assert doubted(2).odd is None
     judge = doubted(3)
     assert judge.odd == consistency.last_odd == "odd-left"
@@ -129,7 +129,7 @@ def test_a_doubt_is_forgotten_after_a_minute_that_fits():
     assert judge.doubts == 0
 
 
-def test_after_a_gap_it_has_to_fit_first_or_to_rest():
+def test_after_a_gap_it_must_fit_or_rest_first():
     judge = Consistency()
     judge.gap()
     windows(judge, 3.0)
@@ -167,7 +167,8 @@ def riding():
 
 
 def longest_wrong_s(shown, **error):
-    """The longest time for which a lean over 8 degrees wrong is shown in 40 s of bends, and the share that is shown."""
+    """The longest time with a shown error of over 8 degrees in 40 s of bends, and the share of time with a shown
+    lean."""
     seen = [0.0, 0.0, 0]
 
     def look(lean_deg):
@@ -197,7 +198,7 @@ def test_a_mirrored_roll_rate_is_hidden_and_named():
     assert shown.odd in ("odd-left", "odd-up", "odd-pitch")
 
 
-def test_a_lean_that_no_bike_has_does_not_stay():
+def test_an_impossible_lean_does_not_last():
     """As after a blow that the gyro could not measure: 150 degrees, while the force says that the bike is upright."""
     shown = riding()
     shown.filter._x[0] += radians(150.0)

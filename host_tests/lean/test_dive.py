@@ -1,4 +1,5 @@
-"""Suspension dive: what braking does to the pitch is found, and is no acceleration. Runs on MicroPython too."""
+"""Suspension dive: the effect of braking on the pitch is found and not treated as acceleration. Also runs on
+MicroPython."""
 
 from math import cos, degrees, radians, sin
 

@@ -1,4 +1,4 @@
-"""The lean filter's states: start, rest, rolling, and what a restart keeps. Runs on MicroPython too."""
+"""The lean filter's states: start, rest, rolling, and the states kept by a restart. Also runs on MicroPython."""
 
 from math import atan2, cos, degrees, pi, radians, sin, sqrt
 
@@ -10,7 +10,7 @@ LEVEL, NO_RATE = [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]
 
 
 def hold(estimator, seconds, force=LEVEL, rate=NO_RATE, dt_us=DT_US):
-    """The same force and rate for so long; returns the last lean."""
+    """Apply the same force and rate for this time; return the last lean."""
     lean = 0.0
     for _ in range(int(seconds * 1e6 / dt_us + 0.5)):
         lean = estimator.update(force, rate, dt_us)
@@ -18,7 +18,7 @@ def hold(estimator, seconds, force=LEVEL, rate=NO_RATE, dt_us=DT_US):
 
 
 def sigma_deg(estimator):
-    """Of the lean without the trim, as the covariance has it."""
+    """The standard deviation of the lean without the trim, from the covariance."""
     return degrees(sqrt(estimator._p.rows[LEAN][LEAN] if estimator._p else pi * pi))
 
 
@@ -58,7 +58,7 @@ def speed_sigma_mps(forward_g, before_mps, now_mps):
     return sqrt(estimator._p.rows[SPEED][SPEED])
 
 
-def test_a_measured_speed_may_be_late_while_the_measured_ones_change_whatever_the_force_is():
+def test_a_changing_measured_speed_counts_less():
     """A pitch error looks like a force forward, and the speed that would contradict it must not have less weight."""
     steady, changing = speed_sigma_mps(0.0, 12.0, 12.0), speed_sigma_mps(0.0, 6.0, 12.0)
     assert changing > steady + 0.2
@@ -93,7 +93,7 @@ def biased(bias_dps, seconds=30.0):
     return estimator, rate
 
 
-def test_at_rest_the_bias_of_every_axis_is_found_and_a_restart_keeps_it():
+def test_rest_shows_every_bias_and_a_restart_keeps_it():
     """Then the bike is rocked: a bias that was not found would be seen as a lean."""
     bias_dps = (1.2, -0.9, 1.5)
     for restarted in (False, True):
@@ -113,7 +113,7 @@ def test_at_rest_the_bias_of_every_axis_is_found_and_a_restart_keeps_it():
         assert worst < 0.7, worst
 
 
-def test_values_that_are_no_numbers_are_forgotten():
+def test_values_that_are_not_numbers_are_dropped():
     estimator = LeanFilter()
     hold(estimator, 3.0)
     forgotten = False
@@ -153,7 +153,7 @@ def test_a_large_correction_is_made_once():
     assert max(leans) < 30.5
 
 
-def test_a_bias_that_is_far_off_is_put_right_at_once_where_rest_is_seen():
+def test_rest_corrects_a_large_bias_at_once():
     """Of 5 deg/s, on a bike that stands at 20 degrees: neither lean nor pitch drifts from then on."""
     force, _ = force_and_rate(20.0)
     for axis in range(3):
@@ -165,7 +165,7 @@ def test_a_bias_that_is_far_off_is_put_right_at_once_where_rest_is_seen():
             near(estimator.pitch_deg, 0.0, 0.2)
 
 
-def test_a_sensor_whose_forward_axis_points_up_or_down_comes_to_rest():
+def test_a_sensor_pointing_up_or_down_comes_to_rest():
     """A board on the table, not aligned: where pitch is a right angle, lean has no meaning, but nothing may fail."""
     for forward in (1.0, -1.0):
         for left, up in ((0.0, 0.0), (1e-5, 0.0), (1e-4, -1e-4), (0.01, 0.02), (0.0, -0.3)):
@@ -186,7 +186,7 @@ def test_after_a_restart_a_smooth_turn_is_no_rest():
         assert not estimator.at_rest
 
 
-def test_the_first_lean_is_that_of_the_force_of_the_first_twentieth_of_a_second():
+def test_the_first_lean_comes_from_the_first_twentieth_second():
     estimator = LeanFilter()
     shown = [estimator.update([sin(radians(a)), cos(radians(a)), 0.0], NO_RATE, DT_US) for a in (10, 12, 14, 16)]
     near(shown[3], 13.0, 0.01)

@@ -43,7 +43,7 @@ def test_motion_is_F_P_F_transposed_and_its_noise(terms):
 
 
 @pytest.mark.parametrize("terms", [1, 2, 3, 4, 5])
-def test_measurements_give_the_gain_of_the_textbook_one_after_the_other(terms):
+def test_sequential_measurements_give_the_textbooks_gain(terms):
     p, matrix = some()
     x = np.zeros(N)
     for measured, h in ((0.4, H[:terms]), (-0.3, RATES[:terms])):

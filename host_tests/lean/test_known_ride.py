@@ -1,4 +1,4 @@
-"""The lean filter's figures over one ride: whatever changes them changes every rider's lean, so it has to be meant.
+"""The lean filter's results for one ride. A change of them changes every rider's lean, so it must be intended.
 
 The ride has all that the filter knows: rest, bias, a yaw error, scale errors, slopes, vibration, turns, slow samples,
 measured speeds, lost samples, a restart under way. Other tests say what each parameter does; this one notices that

@@ -1,4 +1,4 @@
-"""The lean filter on rides made of its own equations: what vibration and the gyro's errors do to it."""
+"""The lean filter on rides from its own equations: the effects of vibration and the gyro's errors."""
 
 import math
 
@@ -42,7 +42,7 @@ def weaving(seconds):
 
 
 def leans(force, rate, speeds=None):
-    """What the filter shows, in degrees. speeds: measured ones, by sample."""
+    """The filter's lean in degrees. speeds: measured speeds by sample."""
     estimator = lean_filter.LeanFilter()
     shown = []
     for k, (f, w) in enumerate(zip(force, rate, strict=True)):
@@ -64,7 +64,7 @@ def slope(shown, true):
 
 
 def test_vibration_of_the_gyro_does_not_make_held_turns_read_low():
-    """Noise of the yaw rate must not pass for the rate that the speed is multiplied by."""
+    """Noise of the yaw rate must not be treated as the rate that the speed is multiplied by."""
     lean, speed = held_turns(240.0)
     force, rate = shaken(*balanced(240.0, lean, speed))
     shown = leans(force.tolist(), rate.tolist())
@@ -94,7 +94,7 @@ def held_from_side_to_side(seconds):
 
 
 @pytest.mark.parametrize("gain", [0.99, 1.01])
-def test_in_held_turns_the_gyros_scale_is_found_from_the_force_up(gain):
+def test_held_turns_show_the_gyros_scale_by_the_force_up(gain):
     """3 % between the rates about left and up are 0.8 degrees of lean at 38; the accelerometer's own error, which would
     be as much, is seen at rest."""
     lean, speed = held_from_side_to_side(190.0)
@@ -108,7 +108,7 @@ def test_in_held_turns_the_gyros_scale_is_found_from_the_force_up(gain):
         assert np.abs(np.mean(error[turn])) < 0.35
 
 
-def test_in_a_wheelie_a_sensor_that_is_turned_about_up_shows_no_lean():
+def test_a_wheelie_with_a_yaw_error_shows_no_lean():
     """30 degrees of pitch would be 2.5 of lean with the forward axis 5 degrees to the side."""
     t = np.arange(35 * HZ) / HZ
     speed = 3.0 * np.clip(t - 10.0, 0.0, 8.0)
@@ -123,7 +123,7 @@ def test_in_a_wheelie_a_sensor_that_is_turned_about_up_shows_no_lean():
 
 
 def test_a_smooth_straight_is_no_standstill():
-    """Not a tremor for nine seconds at 20 m/s: the speed must not be taken for zero."""
+    """No vibration for nine seconds at 20 m/s: the speed must not be set to zero."""
     lean, speed = held_turns(200.0)
     force, rate = balanced(200.0, lean, speed)
     shown = leans(force.tolist(), rate.tolist())
@@ -168,7 +168,7 @@ def test_an_even_braking_on_a_smooth_road_is_no_rest(braking_mps2):
     assert abs(ridden.pitch_deg) < 1.0
 
 
-def test_the_work_on_a_window_has_as_many_pieces_as_are_counted_on():
+def test_the_work_on_a_window_has_WORK_STEPS_pieces():
     """One in each sample; at rest there are fewer."""
     lean, speed = held_turns(60.0)
     estimator, taken, pieces = lean_filter.LeanFilter(), 0, {True: set(), False: set()}
@@ -182,7 +182,7 @@ def test_the_work_on_a_window_has_as_many_pieces_as_are_counted_on():
     assert max(pieces[True]) < lean_filter.WORK_STEPS
 
 
-def test_a_pose_that_was_not_upright_is_found_in_turns_without_a_straight():
+def test_turns_alone_find_a_pose_that_was_not_upright():
     lean, speed = held_from_side_to_side(190.0)
     force, rate = shaken(*balanced(190.0, lean, speed))
     off = np.radians(1.5)
@@ -202,8 +202,8 @@ def test_a_measured_speed_makes_no_long_bend_worse():
     assert np.sqrt(np.mean(with_it**2)) < 1.03 * np.sqrt(np.mean(without**2))
 
 
-def test_the_error_of_the_lean_is_as_large_as_is_said():
-    """Two thirds of the time it is within one standard deviation, on a ride of the other simulator."""
+def test_the_stated_sigma_fits_the_error_of_the_lean():
+    """It is within one standard deviation for two thirds of the time, on a ride of the other simulator."""
     ride = drawn_ride(2, 100.0, ["firm"], "street")
     shown = replay(ride.logs[0], ride.calibrations[0])
     error = (shown.lean_deg - ride.true_lean(0)) / shown.lean_sigma_deg

@@ -1,4 +1,4 @@
-"""What each measurement of the lean filter says, and what makes it less certain. Runs on MicroPython too.
+"""Each measurement of the lean filter, and the causes of more noise. Also runs on MicroPython.
 
 The figures that the variances come to are those of test_known_ride.py.
 """
@@ -35,7 +35,7 @@ def test_the_forces_are_the_differences_from_what_was_expected():
     near(up[1], -0.2, 1e-12)
 
 
-def test_vibration_rolling_and_pitching_make_the_forces_less_certain():
+def test_vibration_roll_and_pitch_rates_raise_the_forces_noise():
     for at, changed in (
         ({}, {"mean8": 0.2**2}),
         ({"lean_deg": 30.0}, {"roll_acceleration": radians(100.0)}),
@@ -49,18 +49,18 @@ def test_vibration_rolling_and_pitching_make_the_forces_less_certain():
     assert forces(mean8=-1e-6)[0][2] > 0.0  # rounding may make less than nothing of the vibration
 
 
-def test_a_sensor_above_the_roll_axis_has_the_roll_taken_off_its_forces():
+def test_roll_is_subtracted_above_the_roll_axis():
     for sign in (1.0, -1.0):
         left, _ = forces(roll_acceleration=sign * radians(100.0))
         assert 0.05 < sign * left[1] < 0.1
         assert 0.1 < forces(mean4=sign * radians(100.0))[1][1] < 0.15  # centripetal, to whichever side it rolls
 
 
-def test_the_accelerometers_error_at_rest_is_taken_off_the_force_up():
+def test_the_error_at_rest_is_subtracted_from_the_force_up():
     near(forces(scale_error=-0.01, mean6=1.2)[1][1], 0.012, 1e-9)
 
 
-def test_roads_are_level_and_a_wheelie_is_pulled_down_less_than_a_hill():
+def test_a_wheelie_is_pulled_to_level_less_than_a_hill():
     """The pull on the pitch is innovation over variance: of 30 degrees it is smaller than of 6."""
     x, here = model(lean_deg=30.0, pitch_deg=2.0, speed_mps=15.0, yaw_error_deg=4.0)
     row, innovation, _ = measurements.level_road(here, x, WINDOW_S)
@@ -75,7 +75,7 @@ def test_roads_are_level_and_a_wheelie_is_pulled_down_less_than_a_hill():
     assert pulls[1] < pulls[2] < 0.0
 
 
-def test_on_a_straight_the_bike_is_upright_and_elsewhere_its_speed_is_the_usual_one():
+def test_straights_assume_upright_and_turns_a_usual_speed():
     for lean_deg, mps, yaw_dps, straight in (
         (5.0, 15.0, 1.0, True),
         (-5.0, 15.0, -1.0, True),
@@ -100,14 +100,14 @@ def test_a_measured_speed_is_less_certain_while_it_changes():
         assert measurements.measured_speed(12.0, 10.0, change, 1.0)[2] > 2.0 * steady
 
 
-def test_ten_measured_speeds_a_second_count_as_much_as_one():
+def test_ten_measured_speeds_per_second_count_as_one():
     """They share their errors: delay, the tyre's radius, the scale of the gyro's up axis."""
     once, often = (measurements.measured_speed(20.0, 20.0, 0.0, seconds)[2] for seconds in (1.0, 0.4))
     near(often, once / 0.4, 1e-3 * often)
     assert measurements.measured_speed(40.0, 40.0, 0.0, 1.0)[2] > 2.0 * once  # errors of scale
 
 
-def test_at_rest_there_is_no_speed_the_rates_are_bias_and_the_force_is_the_vertical():
+def test_rest_measures_speed_bias_and_the_vertical():
     means = [0.01, 0.0, 0.003, -0.004, 0.005, 0.2, 0.97, 0.06, 0.0]
     _, here = model(lean_deg=12.0, pitch_deg=3.0, speed_mps=0.5, rates=means[2:5], forward=means[7])
     for axis in range(3):
@@ -122,14 +122,14 @@ def test_at_rest_there_is_no_speed_the_rates_are_bias_and_the_force_is_the_verti
         near(forward[1], 0.06 - sin(radians(3.0)), 1e-6)
 
 
-def test_the_springs_pitch_is_taken_off_the_forces_of_a_bike_that_leans():
+def test_the_springs_pitch_is_subtracted_from_the_forces():
     at = {"lean_deg": 30.0, "speed_mps": 15.0}
     left, up = measurements.forces(model(**at)[1], STILL, 0.0, 0.0, 0.1)
     near(left[1], 0.1 * sin(radians(30.0)), 1e-7)
     near(up[1], 0.1 * cos(radians(30.0)), 1e-7)
 
 
-def test_pitching_makes_the_force_to_the_left_of_a_leaning_bike_less_certain():
+def test_pitch_rate_and_lean_raise_the_left_forces_noise():
     pitching = {"speed_mps": 15.0, "rates": (radians(-5.0), 0.0, 0.0)}
     near(forces(pitching)[0][2], forces()[0][2], 1e-12)
     leaning = forces({"lean_deg": 30.0, "speed_mps": 15.0})[0][2]

@@ -1,4 +1,4 @@
-"""The meter: what it shows as certain, which maxima it keeps, what a gap does to it. Runs on MicroPython too."""
+"""The meter: the lean it shows as certain, its maxima, and the effect of gaps. Also runs on MicroPython."""
 
 from array import array
 from math import degrees, pi, radians
@@ -18,7 +18,7 @@ def test_the_first_g_is_shown_at_once_also_after_a_gap():
     near(shown.smooth_force[2], -0.3, 1e-12)
 
 
-def test_a_lean_is_shown_once_it_is_certain_and_no_longer_when_it_is_not():
+def test_a_lean_is_shown_only_while_it_is_certain():
     """Power-on on a straight at 20 m/s after a bump: uncertain at first, more certain with each second."""
     shown, trusted, sigmas = meter(), [], []
     shown.update(reading([0.0, 1.0, 0.5], [0.0, 0.0, 0.0]), 0)
@@ -39,8 +39,8 @@ def test_with_the_nose_far_up_or_down_there_is_no_lean():
         assert nose_up(shown, sign * 25.0, 0.0).trusted
 
 
-def test_a_bike_that_sets_off_right_after_the_poses_shows_its_lean_in_the_first_bend():
-    """The poses have measured the gyro's bias, and it stood for them. After a power-on neither is known."""
+def test_after_the_poses_the_first_bend_shows_its_lean():
+    """The poses have measured the gyro's bias, and the bike was at rest. After a power-on neither is known."""
     for posed in (True, False):
         shown = meter()
         shown.use(shown.calibration, posed)
@@ -49,7 +49,7 @@ def test_a_bike_that_sets_off_right_after_the_poses_shows_its_lean_in_the_first_
         near(shown.lean_deg, 30.0, 0.3 if posed else 8.0)
 
 
-def test_a_bike_that_moves_right_after_the_poses_is_not_taken_to_stand():
+def test_a_bike_moving_right_after_the_poses_is_not_at_rest():
     shown = meter()
     shown.use(shown.calibration, True)
     ride(shown, 1.0, 15.0, lean_deg=30.0)
@@ -87,7 +87,7 @@ def test_the_lean_of_a_fall_is_no_maximum():
     assert shown.max_right_deg < 65.0
 
 
-def test_maxima_are_the_largest_of_each_side_until_they_are_reset():
+def test_maxima_are_the_largest_leans_until_a_reset():
     shown = ride(meter(), 3.0)
     for lean_from, lean_to in ((0.0, 20.0), (20.0, -10.0), (-10.0, 8.0), (8.0, -30.0), (-30.0, 0.0)):
         ride(roll(shown, lean_from, lean_to), 0.3, lean_deg=lean_to)
@@ -107,7 +107,7 @@ def test_maxima_are_the_largest_of_each_side_until_they_are_reset():
     assert shown.max_right_deg == shown.max_left_deg == shown.max_accel_g == shown.max_brake_g == 0.0
 
 
-def test_the_lean_is_distrusted_for_a_reason_and_is_no_maximum_until_it_is_trusted_again():
+def test_a_distrusted_lean_is_not_a_maximum():
     shown = ride(meter(), 3.0)
     shown.distrust("mount has moved")
     assert shown.suppressed_reason == "mount has moved"
@@ -130,7 +130,7 @@ def test_a_reason_for_distrust_belongs_to_one_calibration():
     assert shown.suppressed_reason is None
 
 
-def test_what_lasts_less_than_150_ms_is_no_maximum():
+def test_a_lean_shorter_than_150_ms_is_not_a_maximum():
     """A pothole that jerks the sensor by 18 degrees, to either side."""
     shown = ride(roll(ride(meter(), 3.0), 0.0, 20.0), 0.3, lean_deg=20.0)
     for sign in 1.0, -1.0:
@@ -146,7 +146,7 @@ def test_what_lasts_less_than_150_ms_is_no_maximum():
     near(shown.max_right_deg, 30.0, 0.5)
 
 
-def test_a_short_gap_is_bridged_and_after_a_long_one_the_filter_begins_anew():
+def test_only_a_long_gap_restarts_the_filter():
     """The movement during a bridged gap is taken from the rate at its end."""
     shown = ride(meter(), 3.0)
     shown.update(reading(*force_and_rate(4.0, roll_dps=10.0)), 400_000)
@@ -197,7 +197,7 @@ def test_no_trim_is_kept_while_it_rides():
     assert shown.calibration.trim_deg == 0.0
 
 
-def test_the_delay_of_the_low_pass_is_made_up_for():
+def test_the_delay_of_the_low_pass_is_compensated():
     """Rolling to the right at 60 deg/s, what is measured is some milliseconds old: the lean is larger by now."""
     now, late = ride(meter(delay_s=0.0), 3.0), ride(meter(delay_s=0.02), 3.0)
     for k in range(10):
@@ -207,7 +207,7 @@ def test_the_delay_of_the_low_pass_is_made_up_for():
     near(now.lean_deg, 6.0, 0.2)
 
 
-def test_another_calibration_or_a_restart_forgets_the_ride_and_keeps_the_maxima():
+def test_a_restart_resets_the_ride_and_keeps_the_maxima():
     shown = ride(roll(ride(meter(), 3.0), 0.0, 20.0), 0.2, lean_deg=20.0)
     assert shown.trusted
     shown.restart()
@@ -253,8 +253,8 @@ def test_the_g_shown_follows_smoothly_whether_aligned_or_not():
             near(value, force, 0.01)
 
 
-def test_a_smoothed_force_that_is_not_kept_up_is_no_number():
-    """Left and up of an aligned motorcycle; they are back with a calibration that is not aligned."""
+def test_a_smoothed_force_that_is_not_updated_is_nan():
+    """Left and up of an aligned motorcycle. With an unaligned calibration they are updated again."""
     aligned, other = Calibration(), Calibration()
     aligned.aligned = True
     shown = meter(aligned)
@@ -267,7 +267,7 @@ def test_a_smoothed_force_that_is_not_kept_up_is_no_number():
     near(shown.smooth_force[1], 1.0, 1e-6)
 
 
-def test_a_speed_below_zero_is_no_news():
+def test_a_negative_speed_is_ignored():
     given, alone = meter(), meter()
     for shown in (given, alone):
         ride(speed_up(ride(shown, 3.0), 0.0, 20.0, 6.0), 1.0, speed_mps=20.0)

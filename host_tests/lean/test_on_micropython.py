@@ -1,4 +1,4 @@
-"""The tests of this folder that need nothing but the firmware, once more under MicroPython."""
+"""Repeats the tests of this folder that need only the firmware under MicroPython."""
 
 from pathlib import Path
 

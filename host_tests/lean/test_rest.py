@@ -7,7 +7,7 @@ NONE = (0.0, 0.0, 0.0)
 
 
 def rested_after(detector, seconds, rates=NONE, force=(0.0, 1.0, 0.0), bias=NONE, **rolling):
-    """Windows of the same means; after how many seconds it first was at rest, None if never."""
+    """Windows of the same means. Return the seconds until rest, or None if there was none."""
     found = None
     for k in range(int(seconds / WINDOW_S + 0.5)):
         left_over = [rate - error for rate, error in zip(rates, bias)]
@@ -17,11 +17,11 @@ def rested_after(detector, seconds, rates=NONE, force=(0.0, 1.0, 0.0), bias=NONE
     return found
 
 
-def test_where_it_seems_to_roll_rest_takes_ten_seconds():
+def test_rest_takes_ten_seconds_if_the_bike_seems_to_roll():
     assert rested_after(RestDetector(), 12.0, rolling=True) == 10.0
     detector = RestDetector()
     rested_after(detector, 5.0, rolling=True)
-    assert rested_after(detector, 3.0) == 1.5  # from where nothing speaks for rolling any more
+    assert rested_after(detector, 3.0) == 1.5  # from the end of every sign of rolling
     assert rested_after(detector, 3.0, rolling=True) == 2.0  # ten seconds are enough either way
 
 
@@ -46,7 +46,7 @@ def test_after_a_movement_the_count_begins_again():
     assert rested_after(detector, 14.0, force=(0.0, 1.0, 0.03), rolling=True) == 0.5 + 10.0
 
 
-def test_a_steady_rate_is_bias_before_the_first_rest_and_a_turn_after_it():
+def test_a_steady_rate_is_bias_only_before_the_first_rest():
     for axis in range(3):
         rates = [0.05 * (axis == i) for i in range(3)]
         assert rested_after(RestDetector(), 3.0, rates) == 1.5
@@ -57,12 +57,12 @@ def test_a_steady_rate_is_bias_before_the_first_rest_and_a_turn_after_it():
         assert rested_after(RestDetector(), 12.0, [3.0 * rate for rate in rates]) is None  # no gyro is off by so much
 
 
-def test_the_bias_that_is_known_is_no_turn():
+def test_the_known_bias_is_not_a_turn():
     assert rested_after(RestDetector(False), 3.0, rates=(0.05, -0.04, 0.03), bias=(0.04, -0.03, 0.02)) == 1.5
     assert rested_after(RestDetector(False), 12.0, rates=(0.05, -0.04, 0.03), bias=(0.04, -0.03, 0.0)) is None
 
 
-def test_an_estimate_of_the_bias_that_went_astray_does_not_hide_a_rest():
+def test_a_wrong_estimate_of_the_bias_does_not_hide_rest():
     """The rate is small without it: so the calibration's bias was right."""
     assert rested_after(RestDetector(False), 3.0, bias=(0.05, 0.0, 0.0)) == 1.5
     assert rested_after(RestDetector(False), 12.0, rates=(0.03, 0.0, 0.0), bias=(0.06, 0.0, 0.0)) is None

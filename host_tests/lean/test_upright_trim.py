@@ -1,4 +1,4 @@
-"""The trim of upright: what counts as balanced, how soon it is found, how sure it becomes. Runs on MicroPython too."""
+"""The trim: which motion counts as balanced, the time to find it, its uncertainty. Also runs on MicroPython."""
 
 from math import degrees, radians, sin, sqrt
 
@@ -22,19 +22,19 @@ def after_turns(sides, lean_share):
     return trim
 
 
-def test_turns_to_both_sides_find_a_pose_that_was_off_by_two_degrees():
-    """Without a straight between them: what tyres and rider add is alike to both sides, and cancels."""
+def test_turns_to_both_sides_find_a_pose_error_of_2_degrees():
+    """Without a straight between them: the effect of tyres and rider is the same on both sides and cancels."""
     for lean_share in (0.0, 0.1, -0.1):
         near(degrees(after_turns((1, -1, 1, -1), lean_share).angle), 2.0, 0.4)
 
 
-def test_turns_to_one_side_do_not_separate_the_pose_from_the_tyres():
+def test_turns_to_one_side_do_not_separate_pose_and_tyres():
     one, both = after_turns((1, 1), 0.1), after_turns((1, -1), 0.1)
     assert sigma_deg(one) > 2.0 * sigma_deg(both)
     assert sigma_deg(one) > 1.5
 
 
-def test_half_a_minute_of_straights_finds_a_pose_that_was_off_by_two_degrees():
+def test_straights_find_a_pose_error_of_2_degrees():
     trim = UprightTrim(0.0)
     for _ in range(150):
         trim.update(sin(radians(2.0)), radians(2.0), 0.0, WINDOW_S)
@@ -44,7 +44,7 @@ def test_half_a_minute_of_straights_finds_a_pose_that_was_off_by_two_degrees():
     near(sigma_deg(trim), 2.5 * sqrt(1.0 - share), 0.02)
 
 
-def test_a_bike_that_is_pushed_to_the_side_is_not_balanced():
+def test_a_bike_pushed_to_the_side_is_not_balanced():
     for sign in (1.0, -1.0):
         trim = UprightTrim(0.0)
         trim.update(sign * 0.15, 0.0, 0.0, WINDOW_S)

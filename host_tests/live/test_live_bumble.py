@@ -1,5 +1,5 @@
-"""The whole device on a virtual radio: bumble's Bluetooth LE stack on both sides, and a central that knows the
-published texts only."""
+"""The whole device on a virtual radio: bumble's Bluetooth LE stack on both sides, and a central that uses only the
+published documents."""
 
 import asyncio
 import collections
@@ -42,7 +42,7 @@ def on_air(tmp_path, monkeypatch, capsys):
 
 
 async def ask_racechrono(central):
-    """As the app: find, subscribe, deny all, allow two. Then all at once."""
+    """Like the app: find, subscribe, deny all, allow two. Then allow all at once."""
     await central.connect(await central.find(CHRONO))
     await central.subscribe(CHRONO, 0x0001, "chrono")
     await central.write(CHRONO, 0x0002, [0])
@@ -55,7 +55,7 @@ async def ask_racechrono(central):
     return begun
 
 
-def test_racechrono_finds_it_filters_and_decodes(on_air):
+def test_racechrono_finds_the_board_filters_and_decodes(on_air):
     (central,), record = on_air(44, [(20, ask_racechrono, None)], RECORD=True)
     assert central.done.result() == 0  # denied all, it sent nothing
     counts = collections.Counter(data[0] for _, _, data in central.heard)
@@ -81,8 +81,8 @@ async def press_in(central, pair=True):
 just_write = functools.partial(press_in, pair=False)
 
 
-def test_a_pin_is_asked_for(on_air):
-    """By the stack itself: neither a phone that does not pair nor one with a wrong PIN gets a packet."""
+def test_a_phone_must_enter_the_pin(on_air):
+    """The stack itself enforces it: a phone gets no packet without pairing or with a wrong PIN."""
     visits = [(20, just_write, None), (26, press_in, 314159), (34, press_in, 271828)]
     (silent, wrong, right), _ = on_air(44, visits, machine="esp32", LIVE_PIN=271828)
     assert "INSUFFICIENT_" in str(silent.done.exception())

@@ -1,4 +1,4 @@
-"""The whole device sends its lean to a phone beside the simulated board. Decoded by firmware/docs/live.md alone."""
+"""The whole device sends its lean to a simulated phone, which decodes it by firmware/docs/live.md alone."""
 
 import collections
 import itertools
@@ -31,8 +31,8 @@ def run(request, tmp_path, capsys):
     return lambda plan: device_plans.run(getattr(request, "param", "cpython"), tmp_path, plan, capsys)
 
 
-def test_racechrono_gets_what_it_asks_for(run):
-    """Deny all, then two packets at two paces; the numbers are those of the display. Then nothing, then everything."""
+def test_racechrono_gets_the_requested_packets(run):
+    """Deny all, then two packets at two rates, with the numbers of the display. Then nothing, then everything."""
     acts = [[20.0, "connect"], [20.1, "write", "filter", [0]], [20.1, "write", "filter", [2, 0, 100, 0, 0, 0, 1]]]
     acts += [[20.2, "write", "filter", [2, 0, 40, 0, 0, 0, 2]], [20.2, "write", "filter", [2, 0, 40, 0, 0, 0, 77]]]
     acts += [[40.0, "write", "filter", [0]], [42.0, "write", "filter", [1, 0, 100]]]
@@ -60,7 +60,7 @@ def test_racechrono_gets_what_it_asks_for(run):
 
 
 @pytest.mark.parametrize("run", ENGINES, indirect=True)
-def test_our_page_gets_it_all_and_nothing_else_suffers(run):
+def test_our_page_gets_every_packet_without_side_effects(run):
     record = run({**device_plans.ALIGNED, **LIVE, "phones": [ASK + [[21.5, "read", "board"], [21.5, "read", "ride"]]]})
     (phone,) = record.phones
     assert record.ends == ["off"]
@@ -108,7 +108,7 @@ def test_a_lean_that_is_not_trusted_is_never_a_number(run):
         assert (seen["lean"] is None) == (not seen["state"] & 2), t_s
 
 
-def test_phones_in_turn(run):
+def test_the_second_phone_waits_for_the_first(run):
     """The second waits until the first has gone; what the first asked for is forgotten. One that asks for nothing
     makes room. The display says who is there."""
     first = [[22.0, "connect", 1], [22.1, "write", "filter", [1, 0, 100]], [26.0, "leave"]]
@@ -128,8 +128,8 @@ def test_phones_in_turn(run):
     assert record.at(25.0)[1].split() == ["20", "packets/s"]
 
 
-def test_out_of_reach_the_loop_goes_on(run):
-    """The queue of an ESP32 is full then, which costs packets and nothing else."""
+def test_the_loop_continues_if_the_phone_is_out_of_reach(run):
+    """The queue of an ESP32 is then full, which only loses packets."""
     acts = ASK + [[25.0, "away", True], [29.0, "away", False]]
     plan = {**device_plans.ALIGNED, **LIVE, "board": {"machine": "esp32"}, "phones": [acts]}
     record = run(plan)
@@ -140,7 +140,7 @@ def test_out_of_reach_the_loop_goes_on(run):
     assert abs(record.lean_at(27.0) + 30) <= 1
 
 
-def test_the_menu_ends_it(run):
+def test_the_menu_switches_live_off(run):
     """Reset maxima, and the entries behind it, to the last but one."""
     presses = device_plans.PRESSES + [[22.0, 1.0]] + [[23.5 + 0.4 * k, 0.15] for k in range(5)] + [[26.0, 1.0]]
     record = run(
@@ -173,7 +173,7 @@ def test_a_car_has_no_lean_and_its_speed(run):
         ("pico w", {"LIVE_PIN": 271828}, ["LIVE_PIN: not   ", "on this board   "], "cannot ask for a PIN"),
     ],
 )
-def test_a_board_that_cannot_says_so_and_the_lean_goes_on(run, machine, config, shown, said):
+def test_a_board_without_radio_says_so_and_shows_the_lean(run, machine, config, shown, said):
     plan = {**device_plans.ALIGNED, "config": {"LIVE": True, **config}, "board": {"machine": machine}}
     record = run({**plan, "until": 32})
     assert shown in [frame[1:] for frame in record.frames]
@@ -181,7 +181,7 @@ def test_a_board_that_cannot_says_so_and_the_lean_goes_on(run, machine, config, 
     assert abs(record.lean_at(device_plans.LEFT_S) + 30) <= 1
 
 
-def test_a_pin_keeps_strangers_out_and_is_asked_for_once(run):
+def test_the_pin_is_required_once_per_phone(run):
     """Also after power-off; another PIN makes the same phone a stranger."""
     stranger = [[20.0, "connect", 1], [20.1, "write", "rate", [40, 0]], [20.2, "read", "ride"], [20.3, "read", "board"]]
     stranger += [[20.4, "give_pin", 314159], [20.5, "write", "filter", [1, 0, 40]], [22, "leave"]]
@@ -199,7 +199,7 @@ def test_a_pin_keeps_strangers_out_and_is_asked_for_once(run):
     assert answers(later.phones[0], "write") == [False]
 
 
-def test_switched_off_nothing_more_is_imported(tmp_path, monkeypatch):
+def test_with_live_off_nothing_more_is_imported(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     device = Device(_world(device_plans.ALIGNED)[0], machine="pico w")
     seen = set()

@@ -1,5 +1,5 @@
-"""Hundreds of connects, writes and disconnects at random, most of them nonsense, leave the device running and, on
-MicroPython, its memory as it was: test_live_micropython.py runs this there."""
+"""Hundreds of random connects, writes and disconnects, most of them invalid. The device continues, and on MicroPython
+uses no more memory: test_live_micropython.py runs this there."""
 
 import gc
 import random
@@ -10,9 +10,9 @@ from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 from support.device_runs import standing
 from support.simulated_phones import PLACES, Phone
 
-WARM = 200  # acts until everything has been imported and every buffer has its size
+WARM = 200  # acts until everything is imported and every buffer has its size
 ACTS = 400
-GROWTH = 2048  # bytes: what the collector's accuracy may hide
+GROWTH = 2048  # bytes: the uncertainty of the collector
 
 
 def used():
@@ -23,7 +23,7 @@ def used():
 
 
 class Forgetful(Phone):
-    """Keeps nothing of what it hears."""
+    """A phone that stores nothing it receives."""
 
     def heard(self, handle, data):
         self.packets = [data]
@@ -33,7 +33,7 @@ class Forgetful(Phone):
 
 
 def nonsense(dice):
-    """What a phone may write: right commands, wrong lengths, unknown commands, long ones."""
+    """Possible writes of a phone: valid commands, wrong lengths, unknown commands, long ones."""
     kind = dice.randrange(6)
     if kind == 0:
         return bytes([1, 0, dice.randrange(256)])
@@ -43,7 +43,7 @@ def nonsense(dice):
 
 
 def act(dice, phone, radio):
-    """One of them."""
+    """Do one random act."""
     kind = dice.randrange(12)
     if radio.phone is None:
         phone.connect(dice.randrange(256))
@@ -64,7 +64,7 @@ def act(dice, phone, radio):
         phone.write(dice.choice(("filter", "rate", "now", "board")), nonsense(dice))
 
 
-def test_random_acts():
+def test_random_acts_of_a_phone_do_no_harm():
     for drops in (True, False):  # what it cannot send, as an ESP32, or keeps it, as a Pico W
         board = Board(Sensor(seed=3).world(standing([[0, 10]])))
         board.radio = radio = Radio(board.clock, drops)

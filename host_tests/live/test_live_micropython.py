@@ -1,4 +1,4 @@
-"""What needs no pytest, on MicroPython."""
+"""Runs the tests that need no pytest on MicroPython."""
 
 from pathlib import Path
 

@@ -26,7 +26,7 @@ def test_racechrono_gets_each_number_back(buffer):
     assert channels(buffer[:size]) == pytest.approx({"speed": 33.33})
 
 
-def test_our_own_too(buffer):
+def test_our_page_gets_each_number_back(buffer):
     state = packets.ALIGNED + packets.TRUSTED + packets.NO_READINGS
     size = packets.now(buffer, 70_000, 12.345, 0.44, [0.5, 1.0, -0.25], [-1.0, 2.0, 3.0], None, state)
     found = own("now", buffer[:size])
@@ -41,7 +41,7 @@ def test_our_own_too(buffer):
     assert list(ride.values()) == [1, 3, 413, 0, 457, 900, -150, 65535]
 
 
-def test_what_does_not_fit_is_as_large_as_it_can_be_and_never_unknown(buffer):
+def test_too_large_values_are_limited_and_never_unknown(buffer):
     size = packets.now(buffer, 0, 9999.0, 9999.0, [99.0, -99.0, 0.0], [9999.0, -9999.0, 0.0], 9999.0, 0)
     found = own("now", buffer[:size])
     assert None not in found.values()
@@ -59,14 +59,14 @@ def test_what_does_not_fit_is_as_large_as_it_can_be_and_never_unknown(buffer):
         ([2, 0, 50, 1, 0, 0, 1], [0, 0, 0]),
     ],
 )
-def test_commands(data, asked):
+def test_commands_set_the_intervals(data, asked):
     intervals = [0, 0, 0, 77]
     assert packets.take_filter(bytes(data), intervals)
     assert intervals == [*asked, 77]
 
 
 @pytest.mark.parametrize("data", [[], [0, 0], [1], [1, 0], [1, 0, 1, 0], [2, 0, 50, 0, 0, 1], [3], [255] * 20])
-def test_what_is_no_command_changes_nothing(data):
+def test_invalid_commands_change_nothing(data):
     intervals = [40, 50, 60, 70]
     assert not packets.take_filter(bytes(data), intervals)
     assert intervals == [40, 50, 60, 70]

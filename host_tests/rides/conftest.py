@@ -1,4 +1,4 @@
-"""A clock, and a directory that stands for flash, for what the rides' modules do at their limits."""
+"""A clock, and a directory that simulates flash, for tests of the rides' modules at their limits."""
 
 import types
 
@@ -21,7 +21,7 @@ def clock(monkeypatch):
 
 @pytest.fixture
 def root(tmp_path, monkeypatch):
-    """A directory that stands for flash, of which space.free bytes of space.all are free."""
+    """A directory that simulates flash: space.free bytes of space.all are free."""
     space = types.SimpleNamespace(free=400 * KB_4, all=500 * KB_4, path=tmp_path)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(flash_ring, "free_bytes", lambda _path: space.free)

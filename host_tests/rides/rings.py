@@ -1,4 +1,4 @@
-"""What the tests of rides in flash and on a card have in common."""
+"""Common helpers for the tests of rides in flash and on a card."""
 
 import types
 

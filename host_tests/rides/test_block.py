@@ -1,4 +1,4 @@
-"""The blocks of a ride at their limits: how they are filled, and the format."""
+"""The blocks of a ride at their limits: filling them, and the format."""
 
 import types
 from binascii import crc32
@@ -10,18 +10,18 @@ from support.recordings import ride_writer
 
 
 def some_turns(count):
-    """Turns that are the same in any version of Python."""
+    """Turns that are the same in every version of Python."""
     for i in range(count):
         n = (2, 2, 3, 1, 8, 2)[i % 6]
         yield [n * (i * k * 7919 % 4001 - 2000) for k in range(1, 8)], n, n * 5000 + i * 37 % 400 - 200
 
 
-FORMAT_1 = 1672459265  # the check sum of what the test below writes
+FORMAT_1 = 1672459265  # the check sum of the bytes written by the test below
 
 
 def test_the_bytes_of_a_block_are_those_of_format_1(monkeypatch):
-    """Rides that were recorded by an older firmware have to be readable: whoever changes these bytes has to change the
-    format's number, and to keep a reader for the old ones."""
+    """Rides of older firmware must stay readable. If you change these bytes, change the format's number and keep a
+    reader for the old one."""
     monkeypatch.setattr(block_format, "__version__", "0.0.0")
     block = RideBlock(5000)
     block.begin(4092, 7, 3, 123456789012, ride_writer.CHIP, 200, bytes(range(80)))
@@ -46,13 +46,13 @@ def places(block):
 
 
 @pytest.mark.parametrize("length", range(700, 720))
-def test_however_full_a_block_is_the_worst_turn_and_a_position_fit(length):
+def test_the_worst_turn_and_a_position_fit_into_any_block(length):
     """After quiet turns, each of few bits, every number of a violent one takes the longest code."""
     quiet = [800] * 7, 8, 40_000
     count = 0
     for violent in (False, True):  # first to see how many quiet ones there are, then with the last one violent
         block = RideBlock(5000)
-        for sequence in range(2):  # in the first block room was not kept from the beginning
+        for sequence in range(2):  # the first block did not keep room from its beginning
             ride_writer.begun(length, sequence, block)
             block.add_place(ride_writer.place(0))
             while not block.full() and (not violent or not sequence or block.count < count - 1):
@@ -69,8 +69,8 @@ def test_however_full_a_block_is_the_worst_turn_and_a_position_fit(length):
     assert len(read.turns) == count - 1 > 90
 
 
-def test_a_block_begins_without_anything_of_the_one_before():
-    """Each can be read without the others. What is left of a longer one is overwritten with zeros."""
+def test_a_block_contains_nothing_of_the_previous_one():
+    """Each can be read without the others. The rest of a longer one is overwritten with zeros."""
     first, again = ride_writer.begun(4096), RideBlock(5000)
     for turn in some_turns(150):
         first.add_speed(900)
@@ -99,14 +99,14 @@ def test_the_temperature_is_that_of_the_last_turns_mean():
 
 
 @pytest.mark.parametrize("index", [1, 2, 3, 4, 6, 8, 96, 1 << 12])
-def test_a_block_of_littlefs_begins_with_a_pointer_for_each_halving(index):
+def test_a_littlefs_block_begins_with_a_pointer_per_halving(index):
     pointers = 1 + max(k for k in range(20) if index % (1 << k) == 0)
     assert block_length(index) == 4096 - 4 * pointers
     assert block_length(0) == 4096
 
 
-def test_the_first_position_of_all_is_left_out_where_no_room_was_kept_for_it():
-    """From then on there is room in each block, however full it is."""
+def test_the_first_position_is_dropped_if_it_has_no_room():
+    """From then on every block keeps room for one, however full it is."""
     block = RideBlock(5000)
     for sequence in range(3):
         ride_writer.begun(512, sequence, block)

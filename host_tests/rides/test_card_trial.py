@@ -1,4 +1,4 @@
-"""An SD card is tried out before it is needed."""
+"""An SD card is tested before it is needed."""
 
 import contextlib
 import io
@@ -11,7 +11,7 @@ from rings import CARD
 
 
 def tried(root, monkeypatch, **failing):
-    """The problem that the trial of a card finds. failing: what raises which error."""
+    """The problem found by the trial of a card. failing: the error of each failing function."""
     from kickstand.rides import card_trial
 
     def raised(error):
@@ -32,12 +32,12 @@ def tried(root, monkeypatch, **failing):
     return recorder.problem
 
 
-def test_a_card_is_tried_out_before_it_is_needed(root, monkeypatch):
+def test_a_card_is_tested_before_it_is_needed(root, monkeypatch):
     assert tried(root, monkeypatch) is None
-    assert os.listdir("card") == []  # what was written is gone
+    assert os.listdir("card") == []  # the test file was removed
 
 
-def test_whatever_a_card_does_in_the_trial_is_its_own_refusal(root, monkeypatch):
+def test_any_error_in_the_trial_is_a_refusal_of_the_card(root, monkeypatch):
     refusal = CardError("no-driver")
     with monkeypatch.context() as patch:
         assert tried(root, patch, mount=refusal) is refusal
@@ -49,7 +49,7 @@ def test_whatever_a_card_does_in_the_trial_is_its_own_refusal(root, monkeypatch)
         assert problem.values == (str(error),)
 
 
-def test_a_card_that_reads_other_than_it_was_written_is_refused(root, monkeypatch):
+def test_a_card_that_does_not_read_back_is_refused(root, monkeypatch):
     from kickstand.rides import card_trial
 
     class Wrong(io.BytesIO):

@@ -1,4 +1,4 @@
-"""kickstand pull, from an imagined board: rides become logs, damage is said, nothing unverified is deleted."""
+"""kickstand pull from a fake board: rides become logs, damage is reported, nothing unverified is deleted."""
 
 import errno
 import json
@@ -36,7 +36,7 @@ def put(board, name, blocks):
 
 
 def left(board):
-    """Everything that is in the directory of the rides."""
+    """The whole content of the directory of the rides."""
     return sorted(path.relative_to(board.root / "rides").as_posix() for path in board.root.glob("rides/**/*"))
 
 
@@ -73,8 +73,8 @@ def test_rides_become_logs_with_their_calibration(board, tmp_path):
 @pytest.mark.parametrize(
     ("vehicle", "by_drive", "said"), [("car", True, "car"), ("car", False, None), ("motorcycle", True, None)]
 )
-def test_the_drive_of_a_car_is_known_as_one(vehicle, by_drive, said, board, tmp_path, monkeypatch):
-    """Its log then shows no lean. What two poses have aligned was ridden before the board came into the car."""
+def test_the_log_of_a_car_says_that_it_is_a_car(vehicle, by_drive, said, board, tmp_path, monkeypatch):
+    """Its log then shows no lean. A ride aligned by two poses is older than the board's use in the car."""
     made = ride_writer.calibration()
     made.by_drive = by_drive
     monkeypatch.setattr(ride_writer, "calibration", lambda _trim_deg: made)
@@ -85,7 +85,7 @@ def test_the_drive_of_a_car_is_known_as_one(vehicle, by_drive, said, board, tmp_
     assert json.loads(path.read_text()).get("vehicle") == said
 
 
-def test_another_ride_of_the_same_number_gets_a_file_of_its_own(board, tmp_path):
+def test_another_ride_with_the_same_number_gets_its_own_file(board, tmp_path):
     for trim in (0.0, 0.5):
         put(board, "000/01/00000.rid", ride_writer.blocks(1, trim_deg=trim)[0])
         for _ in range(2):
@@ -94,8 +94,8 @@ def test_another_ride_of_the_same_number_gets_a_file_of_its_own(board, tmp_path)
     assert len(logs(tmp_path)) == 2
 
 
-def test_only_what_came_over_whole_is_deleted(board, tmp_path):
-    """A ride cut short by the power is whole up to there."""
+def test_only_completely_pulled_rides_are_deleted(board, tmp_path):
+    """A ride that a power cut has ended is complete up to that time."""
     data = {ride: ride_writer.blocks(4, ride=ride)[0] for ride in range(1, 5)}
     put(board, "000/01/00000.rid", data[1])
     put(board, "000/02/00000.rid", [data[2][0], data[2][1][:1000] + b"?" + data[2][1][1001:], *data[2][2:]])
@@ -115,7 +115,7 @@ def test_only_what_came_over_whole_is_deleted(board, tmp_path):
     assert max(np.diff(log.time_us)) > 1_000_000
 
 
-def test_emptied_directories_go_too_unless_something_else_is_in_them(board, tmp_path):
+def test_emptied_directories_are_removed_unless_in_use(board, tmp_path):
     for ride in (99, 100, 200):
         put(board, f"{ride // 100:03}/{ride % 100:02}/00000.rid", ride_writer.blocks(1, ride=ride)[0])
     for stray in ("002/00/notes.txt", "00007-0000.ride", "000/5/00000.rid"):
@@ -126,7 +126,7 @@ def test_emptied_directories_go_too_unless_something_else_is_in_them(board, tmp_
     assert left(board) == ["000", "000/5", "000/5/00000.rid", "00007-0000.ride", "002", "002/00", "002/00/notes.txt"]
 
 
-def test_a_ride_whose_beginning_is_gone(board, tmp_path):
+def test_a_ride_without_its_beginning_is_pulled(board, tmp_path):
     put(board, "000/01/00003.rid", ride_writer.blocks(2, sequence=48, time_us=300_000_000)[0])
     result = command.works("pull", "--out", tmp_path / "out")
     assert "ride 1: its beginning had to make room" in result.err
@@ -174,7 +174,7 @@ class Altered:
 
 
 def ends_early(board, count):
-    """Reading a ride ends after so many bytes, as of a damaged FAT chain."""
+    """Reading a ride ends after this many bytes, as with a damaged FAT chain."""
     opened = board._open
     board._globals["__builtins__"]["open"] = lambda path, mode="r": (
         Altered(opened(path, mode), count) if mode == "rb" else opened(path, mode)
@@ -208,7 +208,7 @@ def on_the_cable(board, change, times=99):
         lambda board: on_the_cable(board, lambda content: content.replace(b"A", b"B", 1)),
     ],
 )
-def test_a_ride_that_came_over_short_stays_on_the_board(trouble, board, tmp_path):
+def test_an_incompletely_pulled_ride_stays_on_the_board(trouble, board, tmp_path):
     put(board, "000/03/00000.rid", ride_writer.blocks(4, ride=3)[0])
     trouble(board)
     result = command.works("pull", "--out", tmp_path / "out", "--delete")
@@ -224,7 +224,7 @@ def test_a_transfer_that_was_disturbed_once_is_repeated(board, tmp_path):
     assert left(board) == []
 
 
-def test_what_was_pulled_is_not_replaced_by_less(board, tmp_path):
+def test_a_pulled_log_is_not_replaced_by_a_shorter_one(board, tmp_path):
     blocks, _ = ride_writer.blocks(4, ride=3)
     put(board, "000/03/00000.rid", blocks)
     command.works("pull", "--out", tmp_path / "out")

@@ -1,4 +1,4 @@
-"""kickstand record, from an imagined board that streams: a log as it comes, ended by Ctrl-C or by the board."""
+"""kickstand record from a fake board that streams: the log grows with the stream, and Ctrl-C or the board ends it."""
 
 import base64
 import contextlib
@@ -22,7 +22,7 @@ from support.watched_stderr import Watched, watched
 
 
 class Clocks:
-    """`time` of a computer on which only waiting takes time, and that may sleep: its monotonic clock stands then."""
+    """`time` of a computer where only waiting takes time. It may sleep; its monotonic clock then stops."""
 
     waited_s = asleep_s = 0.0
 
@@ -40,8 +40,8 @@ class Clocks:
 
 
 class Stream(fake_board.Serial):
-    """A serial port: what the board says, and what it does then. At the end: "ctrl-c" or another signal, "error",
-    "unplug", "silence", "asleep"."""
+    """A serial port with the board's output, and an event at its end: "ctrl-c" or another signal, "error", "unplug",
+    "silence", "asleep"."""
 
     def __init__(self, blocks, end, last=b""):
         super().__init__()
@@ -104,7 +104,7 @@ def half_seconds(count):
 
 @pytest.fixture
 def signals():
-    """Whatever a test leaves of them is put right; by default these would end pytest itself."""
+    """Restore the handlers after each test. With the default handlers these signals would end pytest itself."""
     numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
     before = [signal.signal(number, lambda *_: None) for number in numbers]
     yield
@@ -115,7 +115,7 @@ def signals():
 @pytest.mark.parametrize("before", [signal.default_int_handler, signal.SIG_IGN], ids=["shell", "background"])
 @pytest.mark.usefixtures("signals")
 def test_ctrl_c_ends_a_whole_log(before, streaming, tmp_path):
-    """Also where a shell has started it with the signal ignored; it is left as it was found."""
+    """Also if a shell has started it with the signal ignored. The handler is restored afterwards."""
     signal.signal(signal.SIGINT, before)
     data, turns = half_seconds(9)
     board = streaming(data[:-1], "ctrl-c", _said(data[-1]))
@@ -124,7 +124,7 @@ def test_ctrl_c_ends_a_whole_log(before, streaming, tmp_path):
     assert board.serial.written == b"\x03\x01"
     assert board.resets == 1
     log = read_log(tmp_path / "ride.csv")
-    assert len(log.time_us) == len(turns)  # what the board said after Ctrl-C is in it
+    assert len(log.time_us) == len(turns)  # it includes the board's output after Ctrl-C
     assert log.time_us[-1] == sum(dt for _, _, dt in turns) - turns[0][2]
     cal = json.loads((tmp_path / "ride.cal.json").read_text())
     assert cal["accel_slope"] == pytest.approx([1.01, 0.99, 1.0])
@@ -169,7 +169,7 @@ def test_the_lean_is_shown_live_once_it_is_known(aligned, still, words, streamin
 
 @pytest.mark.parametrize("aligned", [True, False])
 def test_a_car_shows_g_and_no_lean(aligned, streaming, tmp_path, monkeypatch):
-    """Nor does its log, whose calibration says that it is a car's."""
+    """Its log has no lean either: its calibration says that it is a car."""
     monkeypatch.setattr(ride_writer, "calibration", functools.partial(calibration, ride_writer.calibration(), aligned))
     monkeypatch.setattr(ride_writer, "turns", braking_in_a_left_bend)
     board = streaming(half_seconds(3)[0], "ctrl-c")
@@ -182,7 +182,7 @@ def test_a_car_shows_g_and_no_lean(aligned, streaming, tmp_path, monkeypatch):
     assert len(read_log(tmp_path / "ride.csv").time_us) > 100
 
 
-def test_a_disturbed_byte_in_the_name_of_the_vehicle_ends_no_recording(streaming, tmp_path):
+def test_a_disturbed_vehicle_name_does_not_end_the_recording(streaming, tmp_path):
     board = streaming(half_seconds(3)[0], "ctrl-c")
     board.serial.data = b"vehicle \xff\r\n" + board.serial.data
     command.works("record", "--out", tmp_path / "ride.csv")
@@ -190,13 +190,13 @@ def test_a_disturbed_byte_in_the_name_of_the_vehicle_ends_no_recording(streaming
 
 
 def at_rest(count, seed=0):
-    """As ride_writer.turns(), upright on a quiet stand."""
+    """Like ride_writer.turns(), upright on a quiet stand."""
     for i in range(count):
         yield [2 * mean for mean in (-40, 83, 4096, 0, i % 2, 98, 0)], 2, 10_000
 
 
 def braking_in_a_left_bend(count, seed=0):
-    """Of a car: 0.2 and 0.3 g."""
+    """The turns of a car: 0.2 and 0.3 g."""
     for _ in range(count):
         yield [2 * mean for mean in (-851, 1324, 4096, 0, 0, 98, 0)], 2, 10_000
 
@@ -206,12 +206,12 @@ def calibration(made, aligned, _trim_deg):
     return made
 
 
-def test_a_terminal_that_goes_away_costs_nothing(streaming, tmp_path, monkeypatch):
+def test_a_closed_terminal_loses_nothing(streaming, tmp_path, monkeypatch):
     data, turns = half_seconds(6)
     streaming(data, "ctrl-c")
     terminal = Watched()
     terminal.closed_after = 300
-    with contextlib.suppress(OSError):  # its last words have nowhere to go
+    with contextlib.suppress(OSError):  # its last output cannot be written
         watched(monkeypatch, terminal, "record", "--out", tmp_path / "ride.csv")
     assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
 
@@ -240,8 +240,8 @@ def test_a_board_without_the_firmware_is_reported_alike(arguments, streaming, tm
 
 
 @pytest.mark.parametrize("arguments", [["record", "--out", "ride.csv"], ["pull"]])
-def test_a_board_with_an_older_version_has_to_be_updated(arguments, streaming, tmp_path, monkeypatch):
-    """As 0.2.0, whose modules are all in one folder."""
+def test_a_board_with_an_older_version_must_be_updated(arguments, streaming, tmp_path, monkeypatch):
+    """Like 0.2.0, with all modules in one folder."""
     monkeypatch.chdir(tmp_path)
     board = streaming([], None)
     board.modules["kickstand"] = types.SimpleNamespace(settings=types.SimpleNamespace(load=lambda: None))
@@ -258,7 +258,7 @@ def test_a_board_with_an_older_version_has_to_be_updated(arguments, streaming, t
         ("silence", "the board says nothing any more"),
     ],
 )
-def test_what_came_until_the_stream_broke_off_is_kept(end, words, streaming, tmp_path):
+def test_the_data_before_a_broken_stream_are_kept(end, words, streaming, tmp_path):
     data, turns = half_seconds(3)
     streaming(data, end)
     result = command.works("record", "--out", tmp_path / "ride.csv.gz")
@@ -269,7 +269,7 @@ def test_what_came_until_the_stream_broke_off_is_kept(end, words, streaming, tmp
 
 
 def test_a_computer_that_slept_is_reported(streaming, tmp_path, monkeypatch):
-    """The board has stopped streaming by itself. That is not waited for as long as a sensor that is off."""
+    """The board has stopped streaming. The wait for that is shorter than for a sensor that is off."""
     monkeypatch.setattr(board_console, "_AWAY_SILENT_S", 0.1)
     data, turns = half_seconds(3)
     streaming(data, "asleep")
@@ -290,7 +290,7 @@ def test_after_a_new_alignment_the_log_ends_and_the_board_stops(streaming, tmp_p
     assert json.loads((tmp_path / "ride.cal.json").read_text())["trim_deg"] == 0.0
 
 
-def test_a_block_that_came_over_damaged_leaves_a_gap(streaming, tmp_path):
+def test_a_damaged_block_leaves_a_gap(streaming, tmp_path):
     data, _ = half_seconds(6)
     data[3] = data[3][:200] + b"!" + data[3][201:]
     streaming(data, "ctrl-c")

@@ -1,7 +1,7 @@
-"""Power cuts, full disks and pulled cables at random moments: nothing that existed before is lost.
+"""Power cuts, full disks and pulled cables at random moments: no existing data are lost.
 
-Each case is a fork of this process that runs a command and is ended by the kernel (a timer whose signal has no handler,
-as kill -9), or whose disk or cable fails. What it leaves is then judged here.
+Each case is a fork of this process that runs a command. The kernel ends it (a timer whose signal has no handler, like
+kill -9), or its disk or cable fails. The test then examines the remaining files.
 """
 
 import contextlib
@@ -29,12 +29,12 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has
 
 WEATHER = b"# my weather station\nwhile True: pass\n"
 OFTEN = [("record", "full"), ("pull", "kill"), ("pull", "cable"), ("flash", "cable"), ("smooth", "kill")]
-FAST, ALL = 2, 10  # moments of each of these, and at night of each command with each fault
+FAST, ALL = 2, 10  # moments of each case, and nightly of each command with each fault
 
 
 class Scene:
-    """What a command works on. arguments: its command line.  plug(monkeypatch): connects its board, in the fork.
-    lost(): what has been lost since the scene was made, as words."""
+    """The files and board of a command. arguments: its command line.  plug(monkeypatch): connects its board in the
+    fork. lost(): the losses since the scene was created, as words."""
 
     def __init__(self, place: Path):
         self.place = place
@@ -114,7 +114,7 @@ class Record(Scene):
 
 
 class Flash(Scene):
-    """A used board with somebody's program, notes, rides and calibration."""
+    """A used board with a user's program, notes, rides and calibration."""
 
     def __init__(self, place):
         super().__init__(place)
@@ -137,7 +137,7 @@ class Flash(Scene):
 
 
 class Computed(Scene):
-    """A command that writes over what an earlier run has left. source: the folder of a simulated ride."""
+    """A command that overwrites the results of an earlier run. source: the folder of a simulated ride."""
 
     def __init__(self, place, source, verb):
         super().__init__(place)
@@ -163,14 +163,14 @@ def source(tmp_path_factory):
     place = tmp_path_factory.mktemp("source")
     command.works("simulate", "--profile", "street", "--seconds", 20, "--out", place)
     command.works("calibrate", "two", place / "KICKSTAND.csv", place / "UPRIGHT.csv", "--out", place / "RIDE.cal.json")
-    for verb in ("import", "smooth"):  # so that not each fork has to import their modules
+    for verb in ("import", "smooth"):  # import their modules once, not in each fork
         (made := place / verb).mkdir()
         command.works(*Computed(made, place, verb).arguments)
     return place
 
 
 def in_a_fork(scene, fault, share, usual_s=1.0):
-    """Run the scene's command in a fork, with a fault at a share of its way. Returns its duration in s."""
+    """Run the scene's command in a fork, with a fault after a share of its duration. Return its duration in s."""
     begun_s = time.monotonic()
     child = os.fork()
     if not child:
@@ -199,7 +199,7 @@ def in_a_fork(scene, fault, share, usual_s=1.0):
 
 
 def cut(board, share):
-    """The cable is pulled after a share of the changes of the board's flash, or of what it says."""
+    """The cable is pulled after a share of the changes to the board's flash, or of its output."""
     left = [round(share * (30 if isinstance(board.serial, Stream) else 300))]
 
     def pulled(*_):
@@ -229,7 +229,7 @@ KINDS += [(verb, fault) for verb in ("import", "smooth", "plot") for fault in ("
         *(pytest.param(*kind, ALL, marks=pytest.mark.nightly) for kind in KINDS),
     ],
 )
-def test_nothing_that_existed_is_lost(verb, fault, count, source, tmp_path):
+def test_no_existing_file_is_lost(verb, fault, count, source, tmp_path):
     """21 kinds, of which the nightly run has 10 moments each, 210 in all."""
     chance = random.Random(f"{verb} {fault}")
 
@@ -250,8 +250,8 @@ def test_nothing_that_existed_is_lost(verb, fault, count, source, tmp_path):
     assert lost == []
 
 
-def test_a_command_that_is_killed_loses_something_if_it_writes_in_place(source, tmp_path, monkeypatch):
-    """The test above notices: without a temporary file an earlier result is cut."""
+def test_a_killed_command_that_writes_in_place_loses_data(source, tmp_path, monkeypatch):
+    """Proof that the test above can fail: without a temporary file an earlier result is cut."""
 
     @contextlib.contextmanager
     def in_place(path):

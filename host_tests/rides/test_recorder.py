@@ -17,12 +17,12 @@ SHORT, LONG = 0.15, 1.2
 
 
 def menu(from_s):
-    """Through the menu to "Record ride" or "Stop recording", in 8 s."""
+    """Presses for "Record ride" or "Stop recording" in the menu, in 8 s."""
     return [[from_s, LONG], *([from_s + i, SHORT] for i in (2, 3, 4, 5)), [from_s + 6, LONG]]
 
 
 def rides(flash):
-    """Whole blocks of each ride by its number, and every problem."""
+    """The whole blocks of each ride by its number, and every problem."""
     found, problems = {}, []
     for path in sorted((flash / "rides").glob("*/*/*.rid")):
         blocks, bad = block_reader.read(path.read_bytes())
@@ -40,7 +40,7 @@ def replayed(blocks, directory):
 
 
 def lean_matches(record, blocks, leans, slack_s=0.4):
-    """Each lean on the display has to be one that the replay gave within slack_s before; return how many there were."""
+    """Each lean on the display must be one from the replay in the last slack_s. Return their number."""
     begun = blocks[0].time_us / 1e6
     times = [turn.time_us / 1e6 for block in blocks for turn in block.turns]
     compared = 0
@@ -70,7 +70,7 @@ def computed(monkeypatch):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_a_recorded_ride_replays_as_the_display_showed(engine, tmp_path, computed):
-    """Recorded from power-on: one ride before the alignment and one after it, which a power cut ends."""
+    """Recorded from power-on: one ride before the alignment and one after it. A power cut ends the second."""
     flash = tmp_path / "flash"
     flash.mkdir()
     record = device_plans.run(engine, flash, {**ALIGNED, "seed": 2, "config": {"RECORD": True}})
@@ -92,7 +92,7 @@ def test_a_recorded_ride_replays_as_the_display_showed(engine, tmp_path, compute
 
 
 def test_a_fault_of_the_sensor_in_a_ride_is_replayed(tmp_path, computed):
-    """The sensor is set up again, the filter starts again, and the ride goes on in the same file."""
+    """The sensor is set up again, the filter restarts, and the ride continues in the same file."""
     device_plans.align(tmp_path)
     plan = {
         "ride": [["upright", 4.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 5.0], ["turn", 40.0, 5.0]],
@@ -113,7 +113,7 @@ def test_a_fault_of_the_sensor_in_a_ride_is_replayed(tmp_path, computed):
 
 
 def test_a_wheel_is_not_misread_while_flash_is_erased(tmp_path, monkeypatch):
-    """Interrupts are off for 45 ms once a block. Of the edges in that time only one is noticed, and late."""
+    """Interrupts are off for 45 ms once per block. Only one of the edges in that time is noticed, and late."""
     boards, writes = [], []
     fit, write = Board.fit_wheel, RideRing.write
 

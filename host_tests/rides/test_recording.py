@@ -1,4 +1,4 @@
-"""The recorder at its limits, with nothing real behind it."""
+"""The recorder at its limits, with a fake writer."""
 
 import contextlib
 import io
@@ -14,8 +14,7 @@ TURN_US = 10_000
 
 
 class Keeper:
-    """Takes the place of a RideRing. steps: what was asked of it; taken: whole blocks. fails: the name of a step that
-    raises."""
+    """Replaces a RideRing. steps: the calls so far; taken: whole blocks. fails: the name of a step that raises."""
 
     stops_interrupts = True
     fails = ""
@@ -89,7 +88,7 @@ def start(recorder):
 
 
 def add(recorder, turns, clock=None, tick=True):
-    """So many turns of 10 ms with the same two samples."""
+    """Add this many turns of 10 ms with the same two samples."""
     for _ in range(turns):
         if clock:
             clock.advance(TURN_US)
@@ -108,7 +107,7 @@ def times(keeper):
     return [turn.time_us for block in blocks(keeper) for turn in block.turns]
 
 
-def test_a_ride_that_an_alignment_begins_begins_as_its_replay_will(keeper):
+def test_a_ride_after_an_alignment_begins_like_its_replay(keeper):
     """A replay does not know that the bike has just been posed: the meter starts again without that."""
     from kickstand.rides.recording import Recording
 
@@ -128,8 +127,8 @@ def test_a_ride_that_an_alignment_begins_begins_as_its_replay_will(keeper):
     assert keeper.steps == ["begin", "restart", "end", "begin"]
 
 
-def test_the_first_start_makes_the_recorder_and_the_next_takes_the_same(root, clock):
-    """Also where the menu was open for too short a time to prepare it."""
+def test_the_second_start_reuses_the_recorder(root, clock):
+    """Also if the menu was open for too short a time to prepare it."""
     from kickstand.rides.recording import Recording
 
     settings = SimpleNamespace(SD_SPI=None, RECORD=False, SAMPLE_HZ=200)
@@ -145,7 +144,7 @@ def test_the_first_start_makes_the_recorder_and_the_next_takes_the_same(root, cl
     assert recording.recorder is made and made.active
 
 
-def test_a_block_is_written_by_pieces_of_256_bytes_one_a_turn(recorder, keeper):
+def test_a_block_is_written_256_bytes_per_turn(recorder, keeper):
     keeper.length = 700
     start(recorder)
     while "write" not in keeper.steps:
@@ -164,7 +163,7 @@ def test_a_block_is_written_by_pieces_of_256_bytes_one_a_turn(recorder, keeper):
     assert len(keeper.steps) == before  # nothing is waiting
 
 
-def test_all_blocks_follow_one_another_and_say_what_they_belong_to(recorder, keeper, clock):
+def test_all_blocks_have_their_ride_and_sequence(recorder, keeper, clock):
     start(recorder)
     add(recorder, 1500, clock)
     recorder.stop()
@@ -179,8 +178,8 @@ def test_all_blocks_follow_one_another_and_say_what_they_belong_to(recorder, kee
     assert found[0].calibration().aligned
 
 
-def test_a_turn_that_fills_a_block_waits_for_the_one_before(recorder, keeper):
-    """Where flash was slower than the ride no block may be lost."""
+def test_a_turn_that_fills_a_block_waits_for_the_previous_one(recorder, keeper):
+    """No block may be lost if flash is slower than the ride."""
     start(recorder)
     add(recorder, 1500, tick=False)
     recorder.stop()
@@ -192,7 +191,7 @@ def test_a_turn_that_fills_a_block_waits_for_the_one_before(recorder, keeper):
 @pytest.mark.parametrize(("ms", "slow"), [(9, False), (12, True)])
 @pytest.mark.parametrize(("step", "fails"), [("begin", ""), ("begin", "begin"), ("abandon", "begin"), ("write", "")])
 def test_a_step_of_over_10_ms_was_an_erase_of_the_flash(step, fails, ms, slow, stops_interrupts, recorder, keeper):
-    """Also of a ride that could not begin."""
+    """Also for a ride that could not begin."""
     keeper.stops_interrupts, keeper.fails = stops_interrupts, fails
     keeper.takes_ms = {step: ms}
     start(recorder)
@@ -213,7 +212,7 @@ def test_the_end_of_a_ride_closes_a_file_and_may_erase_flash(stops_interrupts, r
 
 
 @pytest.mark.parametrize(("waited_us", "step_us"), [(100_000, 500_001), (3_000_000, 3_000_000), (600_000_000, 1 << 29)])
-def test_after_a_gap_the_time_is_the_clocks_and_more_than_half_a_second(waited_us, step_us, recorder, keeper, clock):
+def test_after_a_gap_the_recorded_time_is_over_half_a_second(waited_us, step_us, recorder, keeper, clock):
     start(recorder)
     add(recorder, 4, clock)
     recorder.mark_gap()
@@ -241,8 +240,8 @@ def test_a_gap_belongs_to_its_own_ride(recorder, keeper, clock):
     assert [turn.speed_mps for turn in found] == [None] * 3
 
 
-def test_a_position_and_a_speed_go_with_the_next_turn_alone(recorder, keeper):
-    """One without the other too; a speed of zero is one."""
+def test_a_position_and_a_speed_belong_to_the_next_turn_only(recorder, keeper):
+    """Also one without the other. Zero is a valid speed."""
     start(recorder)
     recorder.add_fix(None, ride_writer.place(0))
     recorder.add_fix(None, ride_writer.place(1))  # the newest one counts
@@ -264,7 +263,7 @@ def test_a_position_and_a_speed_go_with_the_next_turn_alone(recorder, keeper):
 
 
 def test_time_and_room(recorder, keeper):
-    """A kilobyte a second, until it is known how many they are."""
+    """A kilobyte per second until the first block is measured."""
     start(recorder)
     assert recorder.seconds() == 0
     assert recorder.room_s() == 1_000_000 // 1024
@@ -307,7 +306,7 @@ def test_whatever_fails_ends_the_ride_once_with_one_notice(step, error, recorder
     assert len(blocks(keeper)[-1].turns) == 3
 
 
-def test_a_card_that_is_refused_says_so_itself(recorder, keeper):
+def test_a_refused_card_has_its_own_message(recorder, keeper):
     keeper.fails, keeper.error = "begin", CardError("no-card", "no SD card")
     with contextlib.redirect_stdout(io.StringIO()):
         start(recorder)
@@ -316,7 +315,7 @@ def test_a_card_that_is_refused_says_so_itself(recorder, keeper):
     assert keeper.steps == ["begin"]
 
 
-def test_a_new_ride_ends_the_one_before(recorder, keeper):
+def test_a_new_ride_ends_the_previous_one(recorder, keeper):
     start(recorder)
     add(recorder, 3)
     start(recorder)
@@ -325,7 +324,7 @@ def test_a_new_ride_ends_the_one_before(recorder, keeper):
     assert recorder.seconds() == 0
 
 
-def test_what_is_not_ready_is_asked_again_in_the_next_turn(recorder, keeper):
+def test_a_writer_that_is_not_ready_is_asked_in_the_next_turn(recorder, keeper):
     start(recorder)
     keeper.is_ready = False
     while "ready" not in keeper.steps:

@@ -1,4 +1,4 @@
-"""How long a board records, as firmware/docs/rides.md says, from the firmware's own numbers."""
+"""The recording times in firmware/docs/rides.md, checked with the firmware's own numbers."""
 
 import re
 import types
@@ -22,7 +22,7 @@ def rows():
 
 
 def room_s(monkeypatch, tmp_path, spi, size, used):
-    """How long an empty board, or a card, says that it has room."""
+    """The time that an empty board or card reports as left."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("os.ilistdir", lambda _path: iter(()), raising=False)
     monkeypatch.setattr(ride_paths, "directory", lambda _settings: "rides")

@@ -1,4 +1,4 @@
-"""Rides on a card with MicroPython's own FAT: no step reads much, however many rides there are; power cuts."""
+"""Rides on a card with MicroPython's own FAT: no step reads much, for any number of rides; power cuts."""
 
 import json
 
@@ -89,8 +89,8 @@ def test_no_turn_waits_long_for_a_card(rides, parts):
     assert all(sectors * SECTOR_S < TURN_S for sectors in worst.values()), worst
 
 
-# Four rides of three blocks, where the first ride has to make room for the fourth. Then the power is cut before each
-# write of a sector: the blocks that were ended before are there, and the next ride is recorded
+# Four rides of three blocks; the first ride must make room for the fourth. Then the power is cut before each write of a
+# sector: completed blocks are kept, and the next ride is recorded
 _CUTS = """
 states = []
 safe = {}  # blocks of each ride
@@ -144,7 +144,7 @@ print(len(states))
 """
 
 
-def test_wherever_the_power_goes_a_card_keeps_all_but_the_last_block():
+def test_after_any_power_cut_a_card_loses_only_the_last_block():
     assert int(run_mpy(_CARD + _CUTS)) > 300
 
 
@@ -193,6 +193,6 @@ print(len(opened))
 """
 
 
-def test_a_folder_in_the_flash_does_not_pass_for_the_card():
-    """One called /sd, as a copy of a card's files leaves it: rides would go to the flash."""
+def test_a_folder_in_the_flash_is_not_the_card():
+    """A folder called /sd, left by a copy of a card's files: rides would be written to the flash."""
     assert int(run_mpy(_FOLDER)) == 1

@@ -1,4 +1,4 @@
-"""The format of recorded rides: exact on both engines; a damaged block is left out, and nothing else."""
+"""The format of recorded rides: exact on both engines; a damaged block is skipped, and nothing else."""
 
 import io
 import math
@@ -28,7 +28,7 @@ _EXTREMES = [
     ([1, -1, 4096, 0, 0, -1, 1], 2, 9999),
 ]
 
-# Random entries, most of them typical, coded by machine code and by Python: state and bytes have to be the same
+# Random entries, most of them typical, coded by machine code and by Python: state and bytes must be the same
 _BOTH = """
 import random
 from array import array
@@ -100,7 +100,7 @@ def test_a_ride_of_version_0_3_0_has_no_delay(tmp_path):
     assert (cal.gyro_delay_s, cal.delay_s()) == (None, 0.0048)
 
 
-def test_a_replay_takes_off_the_delay_of_the_ride(tmp_path):
+def test_a_replay_subtracts_the_delay_of_the_ride(tmp_path):
     cal = read_calibration(ride_log.write(tmp_path / "ride.csv", [block_reader.parse(ride_writer.blocks(1)[0][0])]))
     assert cal.gyro_delay_s == 0.0134  # DLPF 5
     late, early = (replay(tmp_path / "ride.csv", replace(cal, gyro_delay_s=delay_s)) for delay_s in (None, 0.0134))
@@ -115,7 +115,7 @@ def test_machine_code_codes_as_python_does():
     assert run_mpy(_BOTH) == "equal\n"
 
 
-def test_blocks_hold_speeds_and_the_calibration_and_are_never_overfilled():
+def test_blocks_have_speeds_and_calibration_and_never_overflow():
     data, turns = ride_writer.blocks(20, speed=True, trim_deg=1.25)
     assert [len(block) for block in data] == [4096, 4092, 4088, 4092, 4084] + [
         4096 - 4 * ((i & -i).bit_length()) for i in range(5, 20)
@@ -140,7 +140,7 @@ def test_a_file_cut_anywhere_in_its_last_block_keeps_the_others():
         assert problems == ([] if end == len(data[0]) else [block_reader.CUT_SHORT]), end
 
 
-def test_any_damaged_byte_costs_its_own_block_and_is_said():
+def test_any_damaged_byte_loses_only_its_block_and_is_reported():
     data, _ = ride_writer.blocks(3)
     for at in [*range(0, 160, 3), *range(160, len(data[1]), 197), *range(len(data[1]) - 10, len(data[1]))]:
         spoilt = bytearray(data[1])
@@ -156,12 +156,12 @@ def test_any_damaged_byte_costs_its_own_block_and_is_said():
 
 
 def sealed(data):
-    """With the check sum of these bytes, as somebody would write it who has bad intentions."""
+    """Add a valid check sum to these bytes, as an attacker would."""
     return data[:-4] + struct.pack("<I", crc32(data[:-4]))
 
 
-def test_a_block_of_impossible_values_is_bad_however_right_its_check_sum(tmp_path):
-    """Whatever the reader takes can be written as a log, and shown live."""
+def test_a_block_with_impossible_values_is_bad(tmp_path):
+    """Every block that the reader accepts can be written as a log and shown live."""
     good = ride_writer.blocks(1, speed=True, places_every=50)[0][0]
     head = struct.calcsize(block_format.HEAD)
     start = head + store.BODY_LENGTH

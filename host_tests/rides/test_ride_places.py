@@ -1,4 +1,4 @@
-"""Positions in recorded rides: exact in each block, with the turn they came with, and nothing lost by them."""
+"""Positions in recorded rides: exact in each block, with their own turn, and without other losses."""
 
 import struct
 
@@ -28,7 +28,7 @@ def found(blocks) -> list[tuple[int, tuple[float, float, float | None]]]:
 
 @pytest.mark.parametrize("length", [block_format.block_length, lambda _: 512], ids=["flash", "USB"])
 @pytest.mark.parametrize("every", [10, 1])
-def test_every_position_is_with_its_own_turn_and_every_turn_is_there(every, length):
+def test_no_turn_is_lost_and_positions_keep_their_turn(every, length):
     data, turns = ride_writer.blocks(12, length=length, speed=True, places_every=every)
     blocks, problems = block_reader.read(b"".join(data))
     assert problems == []
@@ -43,18 +43,18 @@ def test_every_position_is_with_its_own_turn_and_every_turn_is_there(every, leng
     assert [turn.speed_mps for block in blocks for turn in block.turns][:101:100] == [0.0, 1.0]
     for block, content in zip(blocks, data):
         free = content[: -6 - 16 * sum(bool(turn.place) for turn in block.turns)]
-        assert len(free) - len(free.rstrip(b"\0")) < 16 + 60  # no more room is left than for the worst turn
+        assert len(free) - len(free.rstrip(b"\0")) < 16 + 60  # the free room is only for the worst turn
 
 
 def said(*values: int) -> list:
-    """What a block says whose only position is these: date, ms, latitude, longitude."""
+    """The content of a block whose only position is this: date, ms, latitude, longitude."""
     block = ride_writer.begun(1024)
     block.add_place(values)
     block.add([0, 0, 8192, 0, 0, 0, 0], 2, 10_000)
     return found([ride_writer.ended(block)])
 
 
-def test_a_date_that_is_none_leaves_the_position_and_no_place_on_earth_is_left_out():
+def test_an_invalid_date_leaves_the_position():
     for date in (0, 5, 26 << 9 | 13 << 5 | 1, 26 << 9 | 2 << 5 | 30, 0xFFFF):
         ((_, (lat, lon, utc_s)),) = said(date, 1000, 6_000_000, -6_000_000)
         assert (lat, lon, utc_s) == (1.0, -1.0, None), date
@@ -64,8 +64,8 @@ def test_a_date_that_is_none_leaves_the_position_and_no_place_on_earth_is_left_o
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
-def test_a_recorded_ride_says_where_it_was(engine, tmp_path):
-    """From the receiver's wire to the log, ten times a second; the speed of a motorcycle is not even confirmed yet."""
+def test_a_recorded_ride_has_positions(engine, tmp_path):
+    """From the receiver's wire to the log, ten times per second, even before a motorcycle's speed is confirmed."""
     place = [-33.5, -70.5, -1e-4, 2e-4]
     plan = {
         "ride": [["upright", 4.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 5.0]],
@@ -88,7 +88,7 @@ def test_a_recorded_ride_says_where_it_was(engine, tmp_path):
     assert np.max(np.abs(log.lon_deg[placed] - (place[1] + place[3] * fix_s))) < 3e-6
 
 
-def test_a_log_has_the_columns_that_there_is_something_in(tmp_path):
+def test_a_log_has_no_empty_columns(tmp_path):
     for name, speed, every, columns in (
         ("none", False, 0, []),
         ("places", False, 10, ["lat_deg", "lon_deg", "utc_s"]),
@@ -103,7 +103,7 @@ def test_a_log_has_the_columns_that_there_is_something_in(tmp_path):
 
 
 def test_an_older_reader_finds_all_but_the_positions():
-    """It takes the number of positions for a byte of the version's name, and their bytes for zeros."""
+    """It reads the number of positions as a byte of the version's name, and their bytes as zeros."""
     data, _ = ride_writer.blocks(3, places_every=10)
     for content in data:
         fields = struct.unpack_from("<4sHHIIqhHHH11sB", content)

@@ -39,7 +39,7 @@ def test_room_is_made_exactly_when_a_part_does_not_fit(root):
         ring.end()
 
 
-def test_its_own_first_parts_go_last_and_then_there_is_no_room(root):
+def test_its_own_first_parts_are_removed_last(root):
     root.free = flash_ring.RESERVE + 18 * KB_4
     old_ride(root, 1)
     ring = RideRing(FLASH)
@@ -57,8 +57,8 @@ def test_its_own_first_parts_go_last_and_then_there_is_no_room(root):
     assert not (root.path / "rides/000/01").exists()
 
 
-def test_the_oldest_go_ride_by_ride_and_group_by_group(root):
-    """One step removes one thing. What has no parts left is passed over, and what the owner put there stays."""
+def test_the_oldest_rides_are_removed_first(root):
+    """One step removes one thing. Rides without parts are skipped, and the owner's files are kept."""
     for ride in (98, 99, 100, 300):
         old_ride(root, ride)
     (root.path / "rides/000/98/notes.txt").write_bytes(b"the rider's own")
@@ -97,7 +97,7 @@ def test_the_oldest_go_ride_by_ride_and_group_by_group(root):
     assert len(gone) == 2 + 4 * 3 + 2 + 1
 
 
-def test_where_somebody_has_removed_the_ride_there_is_no_room(root):
+def test_without_the_current_ride_there_is_no_room(root):
     root.free = 0
     ring = RideRing(FLASH)
     ring.begin()
@@ -108,7 +108,7 @@ def test_where_somebody_has_removed_the_ride_there_is_no_room(root):
 
 
 class File:
-    """An open file. short: by how much each write falls short. closed: how often it was."""
+    """An open file. short: the bytes missing from each write. closed: number of calls of close()."""
 
     def __init__(self, short=0, error=None):
         self.short, self.error, self.closed = short, error, 0
@@ -132,7 +132,7 @@ def begun(file, monkeypatch):
     return ring
 
 
-def test_a_write_that_is_cut_short_says_that_there_is_no_room(root, monkeypatch):
+def test_an_incomplete_write_means_no_room(root, monkeypatch):
     begun(File(), monkeypatch).write(b"abc")
     ring = begun(File(short=1), monkeypatch)
     with pytest.raises(OSError) as error:
@@ -161,13 +161,13 @@ def test_ending_closes_once_and_abandoning_raises_nothing(root, monkeypatch):
 
 
 def test_free_and_all_bytes_are_blocks_of_the_size_that_counts(monkeypatch):
-    """Of statvfs: block size, fragment size (in which blocks are counted), all, free."""
+    """The results of statvfs: block size, fragment size (the unit of the counts), all, free."""
     monkeypatch.setattr("os.statvfs", lambda path: (512, 4096, 300, 200, 190, 0, 0, 0, 0, 255), raising=False)
     assert flash_ring.free_bytes("") == 200 * 4096
     assert flash_ring.all_bytes("") == 300 * 4096
 
 
-def test_numbers_of_rides_go_on(root):
+def test_numbers_of_rides_continue(root):
     Path("rides").mkdir()
     assert ride_paths.newest_ride("rides") == 0
     old_ride(root, 99)
@@ -179,7 +179,7 @@ def test_numbers_of_rides_go_on(root):
 
 
 def strays(root, *names):
-    """Directories and files among those of the rides, each file with a content of its own."""
+    """Other directories and files among the rides, each file with its own content."""
     for name in names:
         path = root.path / "rides" / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -217,7 +217,7 @@ def test_no_stray_name_makes_a_ride_overwrite_another(names, root):
     assert found == {number: 100 + k for k, number in enumerate(numbers)}  # pull lists each
 
 
-def test_a_part_that_is_there_is_never_opened_for_writing(root):
+def test_an_existing_part_is_never_opened_for_writing(root):
     ring = RideRing(FLASH)
     number = ring.begin()
     path = root.path / ride_paths.part_path("rides", number, 0)

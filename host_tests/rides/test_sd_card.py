@@ -1,4 +1,4 @@
-"""Rides on an SD card as cards are: busy for long, rejecting data, slow to start, slow to count, never ready again.
+"""Rides on realistic SD cards: busy for long, rejecting data, slow to start, slow to count, never ready again.
 The whole device on the simulated board, with MicroPython's own FAT."""
 
 import base64
@@ -15,7 +15,7 @@ RIDE = {"lean": [[0, 0], [8, 20]], "until": 35, "config": PINS}
 
 
 def run(flash, card=None, **plan):
-    """A ride with this card, on a board that was aligned before if the plan says so."""
+    """A ride with this card, on a board that is aligned if the plan says so."""
     return device_plans.run("micropython", flash, {**RIDE, "card": card or {}, **plan})
 
 
@@ -34,12 +34,12 @@ def missing_s(record):
 
 
 def leans_on(record, since_s):
-    """The display goes on changing: the board neither hangs nor restarts."""
+    """The display keeps changing: the board neither hangs nor restarts."""
     later = [record.at(since_s + 9.5 + 0.25 * k)[0] for k in range(8)]  # the notice of a loss may cover it
     return record.ends == ["off"] and any(line.startswith("Raw   20°") for line in later)
 
 
-def test_a_card_records_and_costs_no_reading_and_little_time(tmp_path):
+def test_a_card_records_without_loss_in_little_time(tmp_path):
     """With the driver's default clock a block would take 25 ms, and the FAT of a card of 32 GB 25 s."""
     record = run(tmp_path)
     assert record.card_hz >= 8_000_000
@@ -56,15 +56,15 @@ def test_without_a_card_nothing_waits_for_one(tmp_path):
     assert shown == device_plans.run("micropython", tmp_path, plan).first("Raw") < 0.7
 
 
-def test_a_card_that_is_busy_as_cards_may_be_loses_nothing(tmp_path):
-    """For 250 ms at each block, which is written every eight seconds: the chip's FIFO lasts longer."""
+def test_a_card_busy_within_the_specification_loses_nothing(tmp_path):
+    """Busy for 250 ms at each block, every eight seconds: the chip's FIFO lasts longer."""
     record = run(tmp_path, {"faults": [[5.0 + 8.0 * i, "busy_next_s", 0.25] for i in range(4)]})
     assert len(blocks(record)) >= 3
     assert missing_s(record) == []
     assert leans_on(record, 9)
 
 
-def test_what_a_card_loses_that_is_busy_after_each_sector_is_said(tmp_path):
+def test_losses_of_a_very_slow_card_are_reported(tmp_path):
     record = run(tmp_path, {"faults": [[3.0, "busy_s", 0.25]]})
     assert len(blocks(record)) >= 2
     assert len(missing_s(record)) >= 2
@@ -72,14 +72,14 @@ def test_what_a_card_loses_that_is_busy_after_each_sector_is_said(tmp_path):
 
 
 @pytest.mark.parametrize("fault", [["rejects", 1], ["stuck", True]])
-def test_a_card_that_rejects_data_or_stays_busy_ends_the_ride_and_nothing_restarts(fault, tmp_path):
+def test_a_failing_card_ends_the_ride_without_a_restart(fault, tmp_path):
     record = run(tmp_path, {"faults": [[10.0, *fault]]}, until=32)
     assert 10 < record.first("card fault") < 19
     assert blocks(record)
     assert leans_on(record, 20)
 
 
-def test_a_card_whose_room_must_be_counted_is_counted_before_the_watchdog_runs(tmp_path):
+def test_a_cards_room_is_counted_before_the_watchdog_runs(tmp_path):
     """Its FSINFO is not valid, and reading its whole FAT takes longer than the watchdog waits."""
     record = run(tmp_path, {"sectors": 1 << 24, "read_s": 0.006, "fsinfo": False}, until=40)
     assert record.first("SD card") < 1.0
@@ -98,7 +98,7 @@ def test_a_card_whose_room_must_be_counted_is_counted_before_the_watchdog_runs(t
     ],
     ids=["never ready", "no file system", "no driver", "rejects all"],
 )
-def test_a_card_that_cannot_be_used_is_said_and_nothing_restarts(card, tmp_path):
+def test_an_unusable_card_is_reported_without_a_restart(card, tmp_path):
     record = run(tmp_path, card, until=24)
     assert record.first("No SD card|SD card:") < 12
     assert leans_on(record, 12)
@@ -108,7 +108,7 @@ def test_a_card_that_cannot_be_used_is_said_and_nothing_restarts(card, tmp_path)
 
 
 def test_a_card_that_failed_at_the_start_is_not_waited_for_again(tmp_path):
-    """The driver waits for seconds, in which the lean would stand. So it is said, also for a press that asks for it."""
+    """The driver waits for seconds, and the lean would freeze. So the failure is reported, also after a press."""
     menu = [[14, 1.2], *([16 + i, 0.15] for i in range(4)), [21, 1.2]]
     plan = {"config": {**PINS, "RECORD": False}, "presses": menu, "lean": [[0, 0], [23, 20]]}
     record = run(tmp_path, {"init_s": None}, **plan)

@@ -1,5 +1,5 @@
-"""A flash that takes 400 ms to erase a block, longer than the chip's FIFO lasts: what is lost is counted and said, and
-a lean that is wrong for it is not shown as good."""
+"""A flash that takes 400 ms to erase a block, longer than the chip's FIFO lasts. Losses are counted and reported, and a
+lean that is wrong after them is not shown."""
 
 import gc
 import re
@@ -14,12 +14,12 @@ from support import device_plans
 SHORT, LONG = 0.15, 1.2
 BENDS = device_plans.RIDE[:3] + [["turn", -40.0, 3.0], ["turn", 40.0, 3.0]] * 6 + [["straight", 6.0]]
 FROM_S, UNTIL_S = 22.0, 70.0
-# WHO_AM_I, how long an erase takes, and for how long the FIFO keeps the samples
+# WHO_AM_I, the duration of an erase, and the time for which the FIFO keeps samples
 PARTS = {"1024 bytes": (0x68, 0.40, 0.365), "512 bytes": (0x70, 0.25, 0.180)}
 
 
 class Seen:
-    """What the firmware computed in each turn: (time, lean, is it trusted, dt, n)."""
+    """The firmware's results of each turn: (time, lean, trusted, dt, n)."""
 
     def __init__(self, monkeypatch):
         self.turns, boards = [], []
@@ -58,7 +58,7 @@ def run(request, tmp_path_factory):
     return record, seen.turns, blocks(flash), erase_s, fifo_s
 
 
-def test_each_is_a_gap_of_its_length_in_the_ride_and_is_counted(run):
+def test_each_loss_is_counted_and_is_a_gap_of_its_length(run):
     record, turns, recorded, erase_s, fifo_s = run
     missing_s = [seconds for block in recorded for seconds in block.missing_s()]
     assert 5 < len(missing_s) <= len(recorded) + 1
@@ -77,12 +77,12 @@ def test_each_is_a_gap_of_its_length_in_the_ride_and_is_counted(run):
     assert gaps <= set(range(6, len(missing_s) + 3)) and gaps
 
 
-def test_a_lean_that_is_wrong_for_it_is_not_shown_as_good(run):
+def test_a_lean_that_is_wrong_after_a_loss_is_not_shown(run):
     _, turns, _, _, _ = run
     ride = script.Ride([getattr(script, name)(*more) for name, *more in BENDS])
     rode = [turn for turn in turns if turn[0] > FROM_S]
     errors = [(t, abs(lean - ride.truth(t)[0]), trusted, dt) for t, lean, trusted, dt, _ in rode]
-    assert max(error for _, error, _, _ in errors) > 4  # the gaps do harm
+    assert max(error for _, error, _, _ in errors) > 4  # the gaps cause errors
     # How the gaps fall into the bends decides, and ten microseconds decide that: 0 to 1.6 s with the parts 2 to 7
     assert sum(dt for _, error, trusted, dt in errors if trusted and error > 5) < 2.0
     assert max(error for _, error, trusted, _ in errors if trusted) < 12
@@ -90,7 +90,7 @@ def test_a_lean_that_is_wrong_for_it_is_not_shown_as_good(run):
     assert sum(dt for _, _, trusted, dt in errors if not trusted) < 0.5 * (UNTIL_S - FROM_S)  # it recovers
 
 
-def test_the_status_says_how_long_a_block_takes(tmp_path, monkeypatch, capsys):
+def test_the_status_shows_the_time_for_a_block(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(gc, "mem_free", lambda: 150_000, raising=False)
     with Board(lambda t_s: (0, 1, 0, 0, 0, 0)) as board:

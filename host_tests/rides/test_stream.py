@@ -7,7 +7,7 @@ from binascii import a2b_base64
 import pytest
 
 
-def test_the_stream_is_base64_in_lines_and_a_point_after_each_block(clock):
+def test_the_stream_is_base64_lines_with_a_point_per_block(clock):
     from kickstand.rides.usb_stream import RideStream
 
     stream = RideStream()

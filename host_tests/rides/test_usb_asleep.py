@@ -1,5 +1,5 @@
-"""The host sleeps while a ride is streamed to it: each print then takes half a second. The stream ends itself, and the
-lean goes on."""
+"""The computer sleeps while a ride is streamed to it: each print then takes half a second. The stream ends itself, and
+the lean continues."""
 
 import binascii
 import contextlib
@@ -19,7 +19,7 @@ def just_booted(monkeypatch):
 
 
 def blocks(said):
-    """The whole blocks in what the board has printed."""
+    """The whole blocks in the board's output."""
     data = b""
     for line in said.splitlines():
         if line == ".":
@@ -31,22 +31,22 @@ def blocks(said):
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
-def test_the_stream_ends_itself_and_the_lean_goes_on(engine, tmp_path, capsys):
+def test_the_stream_ends_itself_and_the_lean_continues(engine, tmp_path, capsys):
     device_plans.align(tmp_path)
     capsys.readouterr()
     plan = {"stream": True, "lean": [[0, 0], [24, 20]], "faults": [["usb_asleep", [FROM_S, FOR_S]]], "until": 40}
     record = device_plans.run(engine, tmp_path, plan, capsys)
     assert FROM_S < record.first("USB not read") < FROM_S + 3.0
     assert record.at(39)[0] == "Lean  20° right "
-    assert record.first("Lean  20° right ") < 28  # as soon as without the stream: it stalls no more
+    assert record.first("Lean  20° right ") < 28  # as soon as without the stream: no more delays
     streamed = list(blocks(record.console))
     assert [block.sequence for block in streamed] == list(range(len(streamed)))
     assert 35 < len(streamed) < 42
     assert record.ends[-1] == "off"  # no watchdog
 
 
-def test_refusals_do_not_stall_the_loop_again_and_again():
-    """Whatever goes on failing: one slow print in a minute."""
+def test_refusals_do_not_stall_the_loop_repeatedly():
+    """For any repeated failure: one slow print per minute."""
     with Board(lambda t_s: (0, 1, 0, 0, 0, 0)) as board:
 
         def main():

@@ -10,18 +10,18 @@ from support.board_access import level, raised
 def test_the_deadline_stops_the_clock_and_stays():
     clock, seen = Clock(), []
     clock.set_deadline(500)
-    clock.at(500, lambda: seen.append(1))  # what is due at the deadline still happens
+    clock.at(500, lambda: seen.append(1))  # events at the deadline still happen
     assert isinstance(raised(clock.advance, 1000), PowerOff)
     assert clock.now_us == 500 and seen == [1]
     assert isinstance(raised(clock.advance, 1), PowerOff)
     clock.set_deadline(None)
     clock.advance(1)
     assert clock.now_us == 501
-    assert not issubclass(PowerOff, Exception)  # firmware that catches every exception is switched off as well
+    assert not issubclass(PowerOff, Exception)  # also switches off firmware that catches every exception
 
 
 def test_pace_follows_the_host():
-    """Whose time passes only while it sleeps here."""
+    """Here the host's time passes only in sleep()."""
     before, slept_s = (clock_module._host_ns, clock_module._host_sleep), []
     clock_module._host_ns = lambda: 1_000_000_000_000 + round(1e9 * sum(slept_s))
     clock_module._host_sleep = slept_s.append

@@ -1,5 +1,4 @@
-"""What every display has to do, whatever it is: the same tests for the driver of each, on the model of each. Also run
-under MicroPython."""
+"""The same tests for each display's driver on the model of that display. Also run under MicroPython."""
 
 import gc
 import sys
@@ -28,7 +27,7 @@ def open_display(board, hz=None, kind="auto", wiring=1):
 
 
 def turns(board, display, count, after=lambda: None):
-    """So many turns of the loop; return the longest, in us."""
+    """Run this many turns of the loop; return the longest in us."""
     from time import sleep_us, ticks_diff, ticks_ms, ticks_us  # type: ignore[attr-defined]
 
     longest = 0
@@ -66,7 +65,7 @@ def on_each(hz=BUS_HZ, kinds=KINDS):
 
 
 @on_each()
-def test_it_shows_what_it_is_given_and_what_is_new(board, display):
+def test_it_shows_the_given_lines_and_their_changes(board, display):
     for lines in (NEW, ("", ""), ("0123456789ABCDEFGHI", "\xff\xff\x7e"), OLD):
         display.show(*lines)
         turns(board, display, 40)
@@ -77,7 +76,7 @@ def test_it_shows_what_it_is_given_and_what_is_new(board, display):
 
 
 @on_each()
-def test_no_turn_keeps_the_loop_waiting(board, display):
+def test_no_turn_delays_the_loop(board, display):
     for k in range(20):
         display.show(f"{k * 1234567:016d}", f"{k * 7654321:016d}")
         longest = turns(board, display, 10)
@@ -87,7 +86,7 @@ def test_no_turn_keeps_the_loop_waiting(board, display):
 
 @on_each()
 def test_nothing_is_sent_while_nothing_changes(board, display):
-    """But to ask whether it is there, five times a second."""
+    """Except the check that it is connected, five times per second."""
     address = board.lcd.address
     before = board.lcd_bus.transfers[address]
     for _ in range(20):
@@ -97,8 +96,8 @@ def test_nothing_is_sent_while_nothing_changes(board, display):
 
 
 @on_each((None,), ("lcd",))
-def test_only_what_has_changed_of_a_line_is_sent(board, display):
-    """An LCD takes four bytes a character, and four for its place; twice, if it is more than one character."""
+def test_only_the_changed_part_of_a_line_is_sent(board, display):
+    """An LCD takes four bytes per character plus four for its place; twice that for more than one character."""
     sent, original = [], board.lcd.write_byte
     board.lcd.write_byte = lambda value: sent.append(value) or original(value)
     for line, count in (("Lean  18\xdf right", 4 * 2), ("Lean   4\xdf left", 2 * 4 * (1 + 9))):
@@ -109,12 +108,12 @@ def test_only_what_has_changed_of_a_line_is_sent(board, display):
 
 
 @on_each()
-def test_unplugged_for_however_long_it_comes_back_and_shows_nothing_old(board, display):
+def test_after_any_unplug_it_returns_and_shows_nothing_old(board, display):
     for gap_turns, gone_ms in ((0, 1), (0, 50), (5, 1), (40, 1)):
         display.show(*OLD)
         turns(board, display, 40)
         display.show(*NEW)
-        turns(board, display, gap_turns % 7)  # perhaps in the middle of a transfer of the new lines
+        turns(board, display, gap_turns % 7)  # possibly during a transfer of the new lines
         for begun in (0, 12) if isinstance(board.lcd, Lcd) else (0,):  # once more while it is initialised
             turns(board, display, begun)
             board.remove_lcd()
@@ -133,8 +132,8 @@ def test_unplugged_for_however_long_it_comes_back_and_shows_nothing_old(board, d
 
 
 @on_each((None,))
-def test_a_transfer_that_breaks_off_at_any_byte_is_made_good(board, display):
-    """And until then no lean is seen that is neither the old nor the new one."""
+def test_a_transfer_cut_at_any_byte_is_repaired(board, display):
+    """Until then no lean is visible except the old and the new one."""
     address = board.lcd.address
     good = as_text(OLD)[0], as_text(NEW)[0]
     for byte in range(1, 40, 3):
@@ -157,7 +156,7 @@ def test_a_stuck_bus_is_freed(board, display):
 
 
 def test_the_processor_is_reset_in_the_middle_of_a_part():
-    """The display keeps its power and what it shows; the next start must replace it."""
+    """The display keeps its power and its text; the next start must replace it."""
     for kind in KINDS:
         for count in range(1, 12, 2):
 
@@ -177,7 +176,7 @@ def test_the_processor_is_reset_in_the_middle_of_a_part():
 
 
 @on_each((None,), ("lcd",))
-def test_an_lcd_out_of_step_is_put_right_by_the_next_initialisation(board, display):
+def test_the_next_initialisation_repairs_an_lcd_out_of_step(board, display):
     seen = set()
     board.lcd.slip()
     display.show(*NEW)
@@ -208,8 +207,8 @@ def test_any_address_of_a_backpack_is_found():
         assert on_board(run, 1e6, lcd_address=address)[0] == "returned"
 
 
-def test_the_kind_that_is_set_is_the_kind_that_is_used():
-    """For controllers whose status says nothing, and displays at odd addresses."""
+def test_the_set_kind_is_used():
+    """For controllers without a useful status, and displays at unusual addresses."""
     for kind in KINDS:
 
         def run(board, kind=kind):
@@ -222,7 +221,7 @@ def test_the_kind_that_is_set_is_the_kind_that_is_used():
 
 
 @on_each((None,))
-def test_another_display_in_its_place_is_taken(board, display):
+def test_a_replaced_display_is_detected(board, display):
     for kind in OLEDS + ("lcd", "lcd", "sh1106"):
         board.change_display(kind)
         display.show(*NEW)
@@ -231,7 +230,7 @@ def test_another_display_in_its_place_is_taken(board, display):
 
 
 @on_each((None,), ("ssd1306",))
-def test_a_status_that_never_says_on_keeps_no_oled_dark(board, display):
+def test_a_status_that_is_never_on_leaves_no_oled_dark(board, display):
     board.lcd.read_byte = lambda: 0xFF
     board.remove_lcd()
     board.fit_lcd()
@@ -242,7 +241,7 @@ def test_a_status_that_never_says_on_keeps_no_oled_dark(board, display):
 
 
 def test_no_status_leaves_an_oled_dark():
-    """It tells the two apart, but each gets the supply commands of both. A picture may be two columns off."""
+    """The status distinguishes the two, but each gets the supply commands of both. A picture may be two columns off."""
     for kind in OLEDS:
         for identity in range(16):
 
@@ -297,7 +296,7 @@ def test_each_wiring_of_a_backpack_works():
 
 
 def test_the_rows_of_a_larger_display_are_blanked():
-    """Of a 20x4 the third and fourth row are the memory behind the first two; a program before may have used it."""
+    """The third and fourth row of a 20x4 are the memory behind the first two. An earlier program may have used it."""
 
     def run(board):
         board.lcd.ddram[0x10:0x28] = board.lcd.ddram[0x50:0x68] = b"x" * 24
@@ -314,20 +313,20 @@ def test_the_rows_of_a_larger_display_are_blanked():
 
 
 @on_each((None,), OLEDS)
-def test_noise_in_an_oled_s_ram_is_gone_after_ten_seconds_and_its_picture_moves(board, display):
+def test_an_oled_is_rewritten_every_ten_seconds_and_moves(board, display):
     board.lcd.ram[200] ^= 0xFF
     starts = set()
     for _ in range(25):
         turns(board, display, 1010)
         starts.add(board.lcd.start_line)
         assert board.lcd.on and board.lcd.text() == as_text(OLD), board.lcd.text()
-        assert board.lcd.unknown == 0  # no command that it has not
+        assert board.lcd.unknown == 0  # no unknown command
     assert starts == {0, 1, 2}
 
 
 @on_each((None,))
-def test_plugging_hundreds_of_times_takes_no_memory(board, display):
-    """Only MicroPython says how much is in use."""
+def test_hundreds_of_unplugs_take_no_memory(board, display):
+    """Only MicroPython reports the memory in use."""
     count = 300 if sys.implementation.name == "micropython" else 20
     used = []
     for k in range(count):

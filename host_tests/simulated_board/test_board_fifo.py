@@ -68,7 +68,7 @@ def test_overflow_loses_the_oldest_and_the_alignment():
         assert waiting(chip) == size
         assert read(chip, 0x3A)[0] & 0x10
         assert read(chip, 0x3A)[0] & 0x10 == 0, "cleared by reading"
-        # The oldest frame has lost its head: what is read first is the middle of it
+        # The oldest frame has lost its beginning: the first byte read is from its middle
         lost = (whole + 1) * frame - size
         read(chip, 0x74, frame - lost)
         clock.advance(0)

@@ -12,13 +12,13 @@ def open_sensor(freq=400_000, timeout=5000):
 
 
 def check(firmware, **fitted):
-    """The firmware must get to its end."""
+    """The firmware must reach its end."""
     outcome, board = on_board(firmware, **fitted)
     assert outcome == "returned"
     return board
 
 
-def test_nobody_home():
+def test_a_missing_chip_gives_an_error():
     def firmware(board, sda, scl, number):
         i2c = I2C(0, sda=Pin(sda), scl=Pin(scl), freq=400_000)
         start = board.clock.now_us
@@ -31,7 +31,7 @@ def test_nobody_home():
 
 
 def transfer_us(board, i2c, count, error_number):
-    """How long a burst of count bytes takes; it must end with this error, None for none."""
+    """The duration of a burst of count bytes. It must end with this error, or None without one."""
     start = board.clock.now_us
     error = raised(i2c.readfrom_mem_into, 0x68, 0x3B, bytearray(count))
     assert (error.args[0] if error else None) == error_number, error
@@ -49,7 +49,7 @@ def test_the_new_driver_of_an_esp32_counts_ticks_of_10_ms(board):
 
 
 @firmware(until_s=20.0, machine="esp32", i2c_driver="legacy")
-def test_the_legacy_driver_of_an_esp32_waits_longer_than_a_watchdog(board):
+def test_an_esp32s_old_driver_waits_longer_than_the_watchdog(board):
     i2c = I2C(0, sda=Pin(21), scl=Pin(22), timeout=5000)
     assert transfer_us(board, i2c, 14, None) == 390
     board.faults.timeout(0x68)
@@ -58,7 +58,7 @@ def test_the_legacy_driver_of_an_esp32_waits_longer_than_a_watchdog(board):
 
 @firmware(machine="esp32")
 def test_soft_i2c_does_not_notice_that_sda_is_held(board):
-    """Its clocks free the device; one that holds on reads as zeros."""
+    """Its clocks free the device. A device that keeps holding SDA reads as zeros."""
     i2c = SoftI2C(sda=Pin(21), scl=Pin(22))
     for bits, freed in ((1, True), (8, True), (60, False)):
         board.sensor_bus.hang(bits)
@@ -73,7 +73,7 @@ def test_soft_i2c_does_not_notice_that_sda_is_held(board):
 
 
 def edges_in_a_transfer(machine, pulses_per_s):
-    """How many interrupts came in 10 ms of a transfer, and the levels that those saw that came after it, in 0.3 ms."""
+    """The number of interrupts during a transfer of 10 ms, and the levels seen by those in the 0.3 ms after it."""
     seen, counted = [], []
 
     def firmware(board):
@@ -91,7 +91,7 @@ def edges_in_a_transfer(machine, pulses_per_s):
 
 
 def test_interrupts_of_an_esp32_wait_for_the_end_of_a_transfer():
-    """Eight at most, and they see the level that the pin has then. On a Pico they come at once."""
+    """At most eight, and they see the pin's level of that time. On a Pico they come at once."""
     assert edges_in_a_transfer("pico", 300)[0] in (5, 6, 7)
     during, after = edges_in_a_transfer("esp32", 300)
     assert during == 0 and len(after) in (5, 6, 7) and len(set(after)) == 1
@@ -99,7 +99,7 @@ def test_interrupts_of_an_esp32_wait_for_the_end_of_a_transfer():
     assert during == 0 and len(after) in (8, 9)  # one more may have come since
 
 
-def test_a_classic_esp32_crashes_where_a_pin_of_its_flash_is_driven_and_some_pins_are_inputs_only():
+def test_a_classic_esp32_crashes_if_a_flash_pin_is_driven():
     def drive(number):
         Pin(number)  # which alone does no harm
         Pin(number, Pin.OPEN_DRAIN)

@@ -37,7 +37,7 @@ def ready():
     return lcd
 
 
-def test_home_takes_long_and_what_comes_meanwhile_is_lost():
+def test_bytes_during_the_long_home_command_are_lost():
     lcd = ready()
     for letter in "abc":
         send(lcd, ord(letter), RS)

@@ -1,4 +1,4 @@
-"""What may differ under MicroPython, once more there: floats and long integers, the heap, and its own framebuf."""
+"""Repeats tests under MicroPython that may differ there: floats and long integers, the heap, its own framebuf."""
 
 from pathlib import Path
 

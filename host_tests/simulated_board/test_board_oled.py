@@ -19,7 +19,7 @@ def send(oled, control, *values):
 
 
 def ready(kind):
-    """On, seen the right way round, and blank."""
+    """A display that is on, upright and blank."""
     oled = Oled(Clock(), kind=kind)
     send(oled, 0x00, *SUPPLY[kind], 0xA1, 0xC8, 0xAF)
     for page in range(8):
@@ -46,7 +46,7 @@ def test_a_byte_is_eight_rows_of_a_column():
 
 
 def test_the_fake_framebuf_draws_as_micropython_s_own():
-    """Where there is none, what it draws is at least what its name says."""
+    """Without MicroPython's framebuf only the basic drawing is checked."""
     module = fake
     if sys.implementation.name == "micropython":
         import framebuf as module  # pyright: ignore[reportMissingImports]

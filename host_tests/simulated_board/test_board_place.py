@@ -10,7 +10,7 @@ NOON = 12 * 3600 * 1000
 
 
 def places_of(text, piece=1000, step_ms=10, steps=60):
-    """Every position that Gps makes of this text, each as a list."""
+    """Every position that Gps reads from this text, each as a list."""
     with Board(level):
         from kickstand.speed.gps import Gps
 
@@ -43,7 +43,7 @@ def test_as_many_digits_as_a_receiver_sends():
         assert places_of(rmc("4807." + digits + ",N"))[0][2] == 288700000 + part
 
 
-def test_what_is_no_position_is_none_and_hurts_nothing():
+def test_an_invalid_position_is_none_and_does_no_harm():
     for lat in (",", ",N", "4807038,N", "48:07.038,N", "-4807.03,N", "4807.0.38,N", "9" * 30 + ".0,N", "nan,N"):
         assert places_of(rmc(lat)) == [], lat
     assert places_of(rmc(lon=",")) == []
@@ -73,8 +73,8 @@ def test_midnight_and_ten_a_second():
     assert [place[0] for place in found] == [last] * 5 + [first] * 5
 
 
-def test_an_old_position_is_not_taken_for_new():
-    """After VTG alone, and after a silence whose end is no fix."""
+def test_an_old_position_is_not_returned_as_new():
+    """After only VTG, and after a silence that ends without a fix."""
     with Board(level):
         from kickstand.speed.gps import Gps
 

@@ -32,7 +32,7 @@ def test_power_is_lost_by_off_and_kept_by_reset():
     assert board.boots == 3 and board.clock.now_us == 3_000_000
 
 
-def test_the_watchdog_can_be_stopped_by_its_register_and_ends_with_the_run():
+def test_its_register_stops_the_watchdog():
     def firmware(board):
         WDT(timeout=1000)
         fake_machine.mem32[0x40058000 + 0x3000] = 1 << 30
@@ -81,6 +81,6 @@ def test_a_press_bounces_and_then_holds(board):
 
 
 def test_cpython_has_no_machine_code():
-    """From Python 3.14 on viper's types are no error by themselves: as plain Python it would give other results."""
+    """From Python 3.14 on viper's types alone raise no error, but as plain Python the code would give other results."""
     if sys.implementation.name == "cpython":
         assert isinstance(raised(sys.modules["micropython"].viper, None), NameError)

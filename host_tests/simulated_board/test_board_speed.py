@@ -8,7 +8,7 @@ STEP_US = 10_000
 
 
 class Listing:
-    """A UART that has these bytes to give, no more than a piece at a time."""
+    """A UART with these bytes to read, at most a piece at a time."""
 
     def __init__(self, data, piece=1000):
         self._data = data
@@ -23,7 +23,7 @@ class Listing:
 
 
 def speeds_of(text, piece=1000, step_ms=10, steps=60):
-    """Every speed that Gps makes of this text, rounded to mm/s."""
+    """Every speed that Gps reads from this text, rounded to mm/s."""
     with Board(level):
         from kickstand.speed.gps import Gps
 
@@ -33,7 +33,7 @@ def speeds_of(text, piece=1000, step_ms=10, steps=60):
 
 
 def busy_with_transfers():
-    """Call it in each turn of the loop: what an ESP32's SoftI2C sends and receives there, 1.3 ms and each 100 ms 12."""
+    """Call it in each turn of the loop. It simulates an ESP32's SoftI2C transfers: 1.3 ms, and 12 ms every 100 ms."""
     from machine import Pin, SoftI2C  # type: ignore[import-not-found]
 
     sensor = SoftI2C(Pin(22), Pin(21), freq=250_000)
@@ -49,8 +49,8 @@ def busy_with_transfers():
 
 
 def drive(config, fit, until_s, port="rp2"):
-    """[(t_s, m/s, age_us), ...] that the firmware's Speed gives, and {t_s: fault} each second. On an ESP32 while sensor
-    and display are read and written."""
+    """The results of the firmware's Speed, [(t_s, m/s, age_us), ...], and {t_s: fault} each second. On an ESP32 during
+    transfers to sensor and display."""
     board = Board(level, port=port)
     fit(board)
     got, faults = [], {}
@@ -125,14 +125,14 @@ def test_a_turn_of_the_loop_reads_64_bytes_at_most():
         assert wire.any() == 136
 
 
-def test_what_is_no_fix_is_no_speed():
+def test_an_invalid_fix_gives_no_speed():
     assert speeds_of(sentence(RMC % ("GP", 1, "V", "19.438", ",N"))) == []
     assert speeds_of(sentence(RMC % ("GP", 1, "A", "19.438", ",E"))) == []  # the last fix carried on
     assert speeds_of(sentence("GPRMC,,V,,,,,,,,,,N")) == []
     assert speeds_of(sentence(RMC % ("GP", 1, "A", "", ",A"))) == []
     assert speeds_of(sentence("GPVTG,,,,,,,,,N")) == []
     void = sentence(RMC % ("GP", 1, "V", "", ",N"))
-    assert speeds_of(void + sentence("GPVTG,84.4,T,,M,19.438,N,36.0,K,A")) == []  # not round the void
+    assert speeds_of(void + sentence("GPVTG,84.4,T,,M,19.438,N,36.0,K,A")) == []  # not used instead of the void
 
 
 def test_damaged_lines_are_refused_and_the_next_is_read():
@@ -141,7 +141,7 @@ def test_damaged_lines_are_refused_and_the_next_is_read():
     for at in range(len(good) - 2):
         bad = good[:at] + chr(ord(good[at]) ^ 1) + good[at + 1 :]
         assert speeds_of(bad + later, piece=37) in ([5000], [10000, 5000]), bad
-        # a damaged talker or star is no loss; whatever is read is true
+        # a damaged talker or star is no loss; every speed read is true
         assert (10000 in speeds_of(bad)) <= (at in (1, 2)), bad
     for at in range(1, len(good) - 3):
         assert speeds_of(good[at:] + later) == [5000]  # begun in the middle
@@ -150,7 +150,7 @@ def test_damaged_lines_are_refused_and_the_next_is_read():
     assert speeds_of("\x00\xff".encode() * 500 + b"\n" + good.encode()) == [10000]
 
 
-def test_any_pieces_will_do():
+def test_sentences_may_arrive_in_any_pieces():
     text = "".join(sentence(RMC % ("GP", i, "A", "%.3f" % (i * 1.9438), ",A")) for i in range(1, 6))
     for piece in (1, 7, 64, 500):
         assert speeds_of(text, piece, 1, 500) == [1000, 2000, 3000, 4000, 5000]
@@ -160,7 +160,7 @@ def test_the_same_fix_again_is_not_new():
     assert speeds_of(sentence(RMC % ("GP", 1, "A", "19.438", ",A")) * 5) == [10000]
 
 
-def test_a_fix_that_waited_in_the_receiver_is_refused_or_has_its_age():
+def test_a_delayed_fix_is_rejected_or_has_its_age():
     with Board(level):
         from kickstand.speed.gps import Gps
 
@@ -200,7 +200,7 @@ def gps_faults(kind, from_s, until_s):
     return drive({"SPEED": "gps"}, lambda b: b.fit_gps(constant, faults=faults), 30.0)
 
 
-def test_gps_faults_are_named_and_end():
+def test_gps_faults_are_reported_and_end():
     for kind, text in (
         ("unplugged", "GPS silent"),
         ("void", "GPS: no fix"),
@@ -227,7 +227,7 @@ def ride(t_s):
 
 
 def check_wheel(got, tolerance):
-    assert not [1 for t_s, _, _ in got if t_s < 5.0]  # a wheel that never turned may be unplugged
+    assert not [1 for t_s, _, _ in got if t_s < 5.0]  # a wheel that has never turned may be unplugged
     for t_s, speed, age_us in got:
         true = ride(t_s - age_us / 1e6)
         assert abs(speed - true) < tolerance or true < 1.5 or t_s > 45.0, (t_s, speed, true)
@@ -248,8 +248,8 @@ def test_a_contact_that_bounces_is_counted_once():
     check_wheel(got, 0.5)
 
 
-def test_a_storm_of_pulses_is_named_and_the_speed_returns():
-    """Twice as long as the pause, so that the interrupt is tried in the middle of it."""
+def test_a_storm_of_pulses_is_reported_and_the_speed_returns():
+    """It lasts twice as long as the pause: the interrupt is tried in the middle of it."""
     for port, pulses_per_s in (("rp2", 50_000), ("esp32", 6_000)):
 
         def fit(board, pulses_per_s=pulses_per_s):
@@ -286,7 +286,7 @@ def wheel_on_an_esp32(pulses_per_metre, speed_mps, seconds=21.0, **kind):
 
 
 def test_an_esp32_counts_pulses_that_fall_into_a_transfer():
-    """Its interrupts wait meanwhile: of a contact that closed and opened again only the opening is seen, twice."""
+    """Its interrupts wait meanwhile. If a contact closes and opens, two interrupts see only the open contact."""
     for pulses, hz in ((0.5, 13.3), (3.0, 149.3), (50.0, 290.0)):
         mean, deviation, faults = wheel_on_an_esp32(pulses, hz / pulses)
         assert abs(mean * pulses - hz) < 0.025 * hz, (pulses, hz, mean)
@@ -295,14 +295,14 @@ def test_an_esp32_counts_pulses_that_fall_into_a_transfer():
 
 
 def test_a_contact_that_bounces_is_counted_once_on_an_esp32_too():
-    """Also where it bounces during a transfer: at any speed, and at any time of the loop's turn."""
+    """Also if it bounces during a transfer, at any speed and at any time of the loop's turn."""
     for speed in (1.3, 7.77, 33.3):
         mean, _, _ = wheel_on_an_esp32(0.5, speed, bounce_us=2000)
         assert abs(mean - speed) < 0.01 * speed, (speed, mean)
 
 
-def test_a_wheel_that_is_too_quick_for_an_esp32_is_named_and_gives_no_speed():
-    """A part of its pulses is lost, which would read as a speed that is too low."""
+def test_a_wheel_too_fast_for_an_esp32_is_reported():
+    """Some of its pulses are lost, which would give a speed that is too low."""
 
     def speed_of(t_s):
         return 20.0 if 4.0 < t_s < 7.0 else 5.0
@@ -347,7 +347,7 @@ def test_jumps_that_no_vehicle_makes_are_refused_until_they_last():
 
 
 def fault_of(data, seconds=8):
-    """The code and the values of the fault of a Gps that is sent these bytes once a second."""
+    """The code and values of a Gps's fault when it gets these bytes once per second."""
     with Board(level):
         from kickstand.speed.gps import Gps
 
@@ -382,7 +382,7 @@ def test_u_blox_s_binary_protocol_is_named():
     assert fault_of(bytes(range(256))) == ("gps-garbled",)
 
 
-def test_a_date_that_cannot_be_is_none():
+def test_an_impossible_date_is_0():
     dates = (
         ("230394", 0),
         ("211126", 26 << 9 | 11 << 5 | 21),
@@ -419,7 +419,7 @@ DAYS = 6.3, 9.0, 12.4, 12.5, 19.0
 
 
 def later(days, seconds=0):
-    """ticks_ms() so long after 1000."""
+    """ticks_ms() this long after 1000."""
     return (1000 + round(86_400_000 * days) + 1000 * seconds) & 0x3FFFFFFF
 
 
@@ -468,7 +468,7 @@ def test_a_receiver_stays_silent_for_days():
 
 
 def test_a_wheel_that_stood_for_days_turns_again():
-    """Also one that never turned."""
+    """Also a wheel that has never turned."""
 
     class Line:
         IRQ_FALLING = IRQ_RISING = 0

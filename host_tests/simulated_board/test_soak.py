@@ -1,4 +1,4 @@
-"""The soak: some minutes of it, and that each of its checks can fail."""
+"""A few minutes of the soak, and proof that each of its checks can fail."""
 
 import pytest
 from kickstand_tools.simulation.scripted import script
@@ -35,7 +35,7 @@ def raises(monkeypatch):
 
 
 def trip(seconds, cut_save=None):
-    """Both poses, 12 degrees to the right for a while, and one transfer that fails."""
+    """Both poses, a lean of 12 degrees to the right for a while, and one failed transfer."""
     ride = script.Ride([script.kickstand(8.0), script.upright(8.0), script.upright(seconds, 12.0)])
     presses = [(3.0, SHORT_S), (13.0, SHORT_S)]
     return Trip("poses", ride, ride.seconds, presses, [], [("nack_for", (SENSOR, 20.0, 0.01))], cut_save=cut_save)
@@ -50,7 +50,7 @@ def trip(seconds, cut_save=None):
         (raises, trip(12.0), "ended with 'reset'"),
     ],
 )
-def test_it_notices_what_is_broken(broken, made, said, monkeypatch):
+def test_every_check_of_the_soak_can_fail(broken, made, said, monkeypatch):
     broken(monkeypatch)
     monkeypatch.setattr(soaking, "make_trip", lambda *_: made)
     figures = soak(hours=0.001)

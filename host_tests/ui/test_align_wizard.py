@@ -1,4 +1,4 @@
-"""What is known of the gyro's bias after the two presses."""
+"""The gyro's bias after the two presses."""
 
 from types import SimpleNamespace
 
@@ -7,7 +7,7 @@ from kickstand_tools.simulated_board.simulator import Board
 
 
 @pytest.mark.parametrize(("waited_ms", "fresh"), [(5_000, True), (100_000, False)])
-def test_a_bias_that_was_measured_long_ago_is_not_taken_for_known(monkeypatch, waited_ms, fresh):
+def test_an_old_bias_is_not_treated_as_known(monkeypatch, waited_ms, fresh):
     saved, chip = [], SimpleNamespace(accel_lsb_per_g=4096, gyro_lsb_per_dps=65.5, SATURATED=32700)
     calibration = SimpleNamespace(value=None, save=lambda new, posed: saved.append(posed))
     with Board(lambda t_s: (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 25.0)):

@@ -1,4 +1,4 @@
-"""Every reason that the firmware can give has words for the display and for a terminal, and no words are left over."""
+"""Every code of the firmware has words for the display and for a terminal, and no words are unused."""
 
 import ast
 import re
@@ -14,12 +14,12 @@ from kickstand_tools.common import firmware_path
 POSES = {"CaptureError", "SickSensor", "CalibrationError", "GyroError"}  # raised by what the tools run as well
 
 CLASSES = {name for name in vars(errors) if name[0].isupper()}
-# Codes that a name or a call gives, not a text beside the class
+# Codes from a name or a call, not from a text beside the class
 INDIRECT = {"other-side", "mount-moved", "incomplete", "no-memory", "out-of-memory", "out-of-room"}
 INDIRECT |= {"sensor-lost", "sensor-frozen", "sensor-silent", "sensor-reset", "flash-fault", "card-fault", "usb-fault"}
-# Of these the display names the setting
+# For these the display shows the setting's name
 OTHER_SETTINGS = {"not-allowed", "card-pins", "one-i2c", "no-such-pin", "i2c-pins", "uart-pins", "aliasing"}
-CONSOLE_ONLY = {"wrong-code"}  # found while modules are imported, before there is a display
+CONSOLE_ONLY = {"wrong-code"}  # reported during imports, before there is a display
 # Values that fit the words of any code: numbers, names, and long ones of both
 VALUES = {"dead-axis": ("x", 0.1), "odd-axis": ("x", 0.1, 1.0), "side-tilted": ("+x", 25.0, 20.0)}
 VALUES |= {"not-one-g": ("kickstand", 1.23), "mount-moved": ("between-stops", 12.0), "few-events": (4, 5, 12)}
@@ -36,7 +36,7 @@ VALUES |= {"speed-late": (2.5,), "aligned": (9.9,)}
 
 
 def codes():
-    """Every code given to one of the classes in errors.py, by the class."""
+    """Every code used with one of the classes in errors.py, by class."""
     found = {}
     for path in firmware_path.PACKAGE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -48,7 +48,7 @@ def codes():
 
 
 def worded(table):
-    """The codes of a table of words, each of which is there once."""
+    """The codes of a table of words. Each must be unique."""
     found = [line.split("|")[0] for line in table.split("\n") if line]
     assert len(set(found)) == len(found)
     return set(found)

@@ -1,4 +1,4 @@
-"""What each page says: units, signs, rounding, and 16 characters a line."""
+"""The text of each page: units, signs, rounding, and 16 characters per line."""
 
 import types
 
@@ -19,7 +19,7 @@ def bar(lean_deg):
 
 
 @pytest.mark.parametrize("what", ["left", "up", "tilt"])
-def test_a_sensor_that_is_odd_is_named_in_place_of_its_lean(what):
+def test_an_odd_sensor_is_reported_instead_of_its_lean(what):
     code = "odd-pitch" if what == "tilt" else "odd-" + what
     assert pages.unsure(code) == ("Lean  --", "sensor odd: " + what)
     assert len(pages.unsure(code)[1]) <= 16
@@ -42,7 +42,7 @@ def measured(counts, calibrate=None):
     return shown
 
 
-def test_the_raw_page_shows_g_and_degrees_a_second_in_the_sensors_own_axes():
+def test_the_raw_page_shows_g_and_rates_in_the_sensors_axes():
     counts = [2048, -4096, 1024, 0, 6550, -655, 131]
     assert pages.raw(measured(counts)) == (" 0.50-1.00 0.25g", f" 100 -10   2 {DEGREE}/s")
 
@@ -100,7 +100,7 @@ def test_progress_fills_sixteen_cells(done, total, cells):
     assert pages.progress_bar(done, total) == "\xff" * cells
 
 
-def test_progress_of_nothing_or_more_than_all_stays_on_the_display():
+def test_progress_beyond_its_limits_fits_the_display():
     assert pages.progress_bar(0, 0) == pages.progress_bar(5, 0) == ""
     assert pages.progress_bar(300, 100) == "\xff" * 16
 
@@ -120,7 +120,7 @@ def recorder(seconds, room_s):
         (3661, 36_000, ("Rec        61:01", "room 10 h")),
     ],
 )
-def test_recording_tells_minutes_and_room(seconds, room_s, lines):
+def test_recording_shows_its_duration_and_the_time_left(seconds, room_s, lines):
     assert pages.recording(recorder(seconds, room_s)) == lines
 
 
@@ -157,13 +157,13 @@ def test_a_car_has_a_side_and_an_up(left, line):
     assert pages.cornering(meter(smooth_force=[left, 1.02, 0.3])) == (line, "Up       1.02 g")
 
 
-def test_the_formula_stands_beside_the_filter():
+def test_the_formula_is_shown_beside_the_filter():
     shown = pages.formula(meter(lean_formula_deg=-7.6, lean_deg=12.4))
     assert shown == (f"Formula     -8{DEGREE}", f"Filter      12{DEGREE}")
 
 
 def test_before_alignment_tilt_and_g_are_the_sensors_own():
-    """Two seconds each: that it is not aligned, and what to do."""
+    """Two seconds each: "Not aligned", and the next step."""
     shown = meter(smooth_force=[0.5, 0.866, -0.25])
     lines = [pages.not_aligned(shown, seconds) for seconds in range(5)]
     assert {line for line, _ in lines} == {f"Raw   30{DEGREE} -0.25g"}
@@ -171,7 +171,7 @@ def test_before_alignment_tilt_and_g_are_the_sensors_own():
     assert pages.not_aligned(shown, 3, "Drive: brake")[1] == "Drive: brake"
 
 
-def test_the_sensor_page_of_a_fault_says_who_answers():
+def test_the_sensor_page_of_a_fault_lists_the_devices():
     sensor = types.SimpleNamespace(fault=Notice("no-sensor"), found=[0x27, 0x68, 0x77])
     seen = [pages.sensor_info(sensor, 0, meter(), seconds) for seconds in range(5)]
     fault, there = ("No sensor", "check wiring"), ("On its I2C bus:", "27 68 77")

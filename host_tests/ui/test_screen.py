@@ -1,4 +1,4 @@
-"""The stack of views: what is in front is shown, a press is for it, and what has ended is gone at once."""
+"""The stack of views: the front view is shown and gets the press, and an ended view is removed at once."""
 
 import types
 
@@ -53,7 +53,7 @@ def first_line(screen, now_ms):
 
 
 def test_a_cancelled_alignment_gets_no_more_samples(screen):
-    """Not even those of the 100 ms until the display is written again: the last one would save it."""
+    """Not even during the 100 ms until the next page: the last sample would save it."""
     screen.press(LONG, 0)
     screen.press(LONG, 100)
     assert screen.wizard is not None
@@ -90,7 +90,7 @@ def test_a_question_under_a_notice_is_not_answered_unread(drive, screen):
     assert drive.answers == [True]
 
 
-def test_a_fault_is_before_the_pages_and_the_menu_before_the_fault(sensor, screen):
+def test_a_fault_hides_the_pages_and_the_menu_the_fault(sensor, screen):
     sensor.fault = Notice("sensor-lost")
     assert screen.lines(0) == ("Sensor lost", "check wiring")
     screen.press(SHORT, 100)

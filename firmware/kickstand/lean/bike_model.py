@@ -26,8 +26,8 @@ Equations, with ' for the derivative by time
     lean of the bike itself  t - psi cos t (tan q + 1/2 psi sin t)                     (7)
 
 t and q refer to the sensor's axes, which psi has turned: they contain a part of the bike's own pitch, q + psi sin t. On
-a slope of 10 % a yaw error of 5 degrees causes half a degree of lean. (7) is to second order of psi. On the level,
-where q is -psi sin t, it is that of tan(lean of the bike) = tan t / cos psi.
+a slope of 10 % a yaw error of 5 degrees causes half a degree of lean. (7) is correct to second order in psi. On a level
+road q is -psi sin t, and (7) agrees with tan(lean of the bike) = tan t / cos psi.
 
 d is the part of the pitch rate q' from the springs and not from the road: the wheels do not rise with it. Braking
 causes most of it; dive.py has (8).

@@ -13,8 +13,8 @@ and a steep pitch.
 Each mean is judged by its own spread, as in Student's t: on a road that is rougher than the filter expects the
 innovations are large, of either sign, and so are their means.
 
-After a doubt one thing more is asked. A gyro that is wrong about up makes a straight a bend that does not end, with all
-forces as they should be. So a lean that has stayed on one side for long is not shown then.
+One more check follows a doubt. With a gyro that is wrong about up, a straight seems to be an endless bend, and all
+forces are as expected. So after a doubt a lean that has stayed on one side for long is not shown.
 
 After a misfit the lean is doubted, and hidden until everything has fitted for a while. Repeated misfits are a fault of
 the sensor.
@@ -93,8 +93,7 @@ class Consistency:
 
     @property
     def one_sided(self):
-        """True where it did not fit lately, and the lean has been on one side: steadily, or after a second doubt, for
-        long."""
+        """True after a recent misfit if the lean has been on one side: steadily, or for long after a second doubt."""
         lean = abs(self._lean)
         if not self.doubts or lean <= _ONE_SIDE:
             return False
@@ -103,8 +102,8 @@ class Consistency:
 
     def add(self, left, up, sideways, pitch, lean, yaw_rate, seconds):
         """Take a window of `seconds` while riding. left, up: the normalised innovations of these forces. sideways:
-        force to the side over force up. pitch and lean in rad, yaw_rate in rad/s. Return True if a misfit not
-        fit any more."""
+        force to the side over force up. pitch and lean in rad, yaw_rate in rad/s. Return True if a misfit has just
+        begun."""
         gain, long_gain = min(1.0, seconds / _SHORT_S), min(1.0, seconds / _LONG_S)
         left, up = max(-_MOST, min(_MOST, left)), max(-_MOST, min(_MOST, up))
         self._left += gain * (left - self._left)
