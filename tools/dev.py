@@ -26,17 +26,17 @@ REPORT_S = 5  # a line this often while installing
 COMPILE = "from kickstand_emulator import native; native.build()"  # the emulated Pico is then twice as fast
 
 
-class Stop(Exception):
+class SetupStopped(Exception):
     """Set-up cannot go on; the text is one line: why, and what to do."""
 
 
 def main(arguments):
     if sys.version_info < OLDEST:
-        raise Stop(
+        raise SetupStopped(
             "Python 3.11 or newer is needed, this is %d.%d: start it with a newer python3" % sys.version_info[:2]
         )
     if not arguments or arguments[0] not in ("demo", "test", "mutants"):
-        raise Stop("say what to do: %s demo, test or mutants" % sys.argv[0])
+        raise SetupStopped("say what to do: %s demo, test or mutants" % sys.argv[0])
     name, rest = arguments[0], arguments[1:]
     prepare("" if name == "demo" else name)
     if name == "test":
@@ -107,11 +107,15 @@ def make_venv():
         errors="replace",
     )
     if "ensurepip" in made.stdout or "No module named venv" in made.stdout:
-        raise Stop("this Python has no venv and pip: on Debian or Ubuntu install python3-venv, then repeat this")
+        raise SetupStopped(
+            "this Python has no venv and pip: on Debian or Ubuntu install python3-venv, then repeat this"
+        )
     if made.returncode != 0:
-        raise Stop(".venv cannot be made: %s" % last_line(made.stdout))
+        raise SetupStopped(".venv cannot be made: %s" % last_line(made.stdout))
     if not has_pip():
-        raise Stop("there is no pip in the new .venv: on Debian or Ubuntu install python3-venv, then repeat this")
+        raise SetupStopped(
+            "there is no pip in the new .venv: on Debian or Ubuntu install python3-venv, then repeat this"
+        )
 
 
 def has_pip():
@@ -135,7 +139,7 @@ def install(extra):
     if watched(pip + what) != 0:
         errors = [line[6:].strip() for line in read(LOG).split("\n") if line.startswith("ERROR:")]
         why = errors[-1] if errors else last_line(read(LOG))
-        raise Stop("installing failed: %s (is there a network? all that pip said is in %s)" % (why, LOG))
+        raise SetupStopped("installing failed: %s (is there a network? all that pip said is in %s)" % (why, LOG))
 
 
 def own_index():
@@ -183,7 +187,7 @@ def say(text):
 if __name__ == "__main__":
     try:
         sys.exit(main(sys.argv[1:]))
-    except Stop as stop:
+    except SetupStopped as stop:
         sys.exit("dev.py: %s" % stop)
     except KeyboardInterrupt:
         sys.exit(130)

@@ -11,7 +11,7 @@ from kickstand.errors import Notice
 from kickstand_tools.analysis.alignment_quality import Quality
 from kickstand_tools.analysis.overview import Overview, overview
 from kickstand_tools.analysis.plot import interactive, page, picture
-from kickstand_tools.analysis.plot.charts import Bars, Cells, Dots, Line, charts, envelope, title
+from kickstand_tools.analysis.plot.charts import Bars, CellMap, Dots, Line, charts, envelope, title
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.summary import Peak
 from kickstand_tools.calibration.file import CalibrationFile
@@ -68,7 +68,7 @@ def test_lean_to_the_left_is_below_and_on_the_left(seen, panels, drawn):
 
 def test_g_against_g(seen, panels, drawn):
     """The turn: 0.7 g for 5 s, and its beginning and end. The stop: 0.5 g for 3 s. Nothing above and on the right."""
-    (cells,) = (trace for trace in chart(seen, "g against").traces if isinstance(trace, Cells))
+    (cells,) = (trace for trace in chart(seen, "g against").traces if isinstance(trace, CellMap))
     middle = (cells.edges[1:] + cells.edges[:-1]) / 2.0
     x, y = np.meshgrid(middle, middle)
     over = {"left": x < -0.3, "right": x > 0.3, "below": y < -0.3, "above": y > 0.3}

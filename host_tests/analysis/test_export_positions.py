@@ -10,7 +10,7 @@ import pytest
 from kickstand_tools import api
 from kickstand_tools.analysis.channels import downsampled
 from kickstand_tools.analysis.export import export_gpx
-from kickstand_tools.analysis.track import Track
+from kickstand_tools.analysis.track import LogTrack
 from kickstand_tools.logs.csv_lines import write_log
 from support import command
 from support.recordings import app_exports
@@ -143,7 +143,7 @@ def test_without_the_time_of_the_satellites_a_track_has_the_logs_own(tmp_path):
 
 
 def test_a_track_across_180_degrees_goes_the_short_way():
-    track = Track(np.arange(3.0), np.full(3, -10.0), np.array([179.9999, -179.9999, -179.9997]))
+    track = LogTrack(np.arange(3.0), np.full(3, -10.0), np.array([179.9999, -179.9999, -179.9997]))
     lat, lon = track.at(np.array([0.25, 0.75, 1.5, 2.1, -0.1]))
     assert lon == pytest.approx([179.99995, -179.99995, -179.9998, np.nan, np.nan], abs=1e-7, nan_ok=True)
     assert lat[:3] == pytest.approx(-10.0)
@@ -159,10 +159,10 @@ def test_of_positions_in_a_short_time_the_last_one_stays():
 
 
 def test_a_position_alone_is_a_place_and_none_is_nowhere():
-    lat, lon = Track(np.array([5.0]), np.array([1.0]), np.array([2.0])).at(np.array([4.9, 5.0, 5.1]))
+    lat, lon = LogTrack(np.array([5.0]), np.array([1.0]), np.array([2.0])).at(np.array([4.9, 5.0, 5.1]))
     assert lat == pytest.approx([np.nan, 1.0, np.nan], nan_ok=True)
     assert lon == pytest.approx([np.nan, 2.0, np.nan], nan_ok=True)
-    assert np.all(np.isnan(Track(np.zeros(0), np.zeros(0), np.zeros(0)).at(np.array([1.0]))))
+    assert np.all(np.isnan(LogTrack(np.zeros(0), np.zeros(0), np.zeros(0)).at(np.array([1.0]))))
 
 
 def test_the_command_writes_a_track_or_says_why_not(tmp_path, monkeypatch):

@@ -6,7 +6,7 @@ import numpy as np
 from kickstand_tools.checks.cells import CellTable, LogCells
 from kickstand_tools.logs.log import Log
 from kickstand_tools.refusals import sentence
-from kickstand_tools.simulation.ride import Ride, ride
+from kickstand_tools.simulation.ride import SimulatedRide, ride
 
 
 def cells_of(log: Log, accel=None, gyro=None, speed=True) -> LogCells:
@@ -27,7 +27,7 @@ def words(notice) -> str:
 
 
 @functools.cache
-def made_up(profile: str) -> Ride:
+def made_up(profile: str) -> SimulatedRide:
     """A ride by an MPU6050 with the errors that its data sheet allows. In the upright pose the bike leaned by 3.5
     degrees, to the right or to the left."""
     return ride(profile, 3, 150.0, 3.5 * (-1) ** len(profile))

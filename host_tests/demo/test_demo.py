@@ -11,7 +11,7 @@ import time
 import pytest
 from kickstand_tools.common import unix_port
 from kickstand_tools.demo.demo import DeviceStopped, demo
-from kickstand_tools.demo.device_process import Device
+from kickstand_tools.demo.device_process import DeviceProcess
 from kickstand_tools.simulated_board.lcd import shown_lean
 from support.command import run
 from support.terminal import Terminal
@@ -101,7 +101,7 @@ def test_by_hand_needs_a_terminal():
 
 @pytest.mark.parametrize(("engine", "how"), [("cpython", "quit"), ("micropython", "closed")])
 def test_the_device_ends_when_it_is_sent_quit_or_left_alone(engine, how):
-    with Device(engine, "hand", 1.0) as device:
+    with DeviceProcess(engine, "hand", 1.0) as device:
         if how == "quit":
             device.send("quit")
         else:

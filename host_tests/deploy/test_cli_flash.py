@@ -180,7 +180,7 @@ def test_no_board_and_several(tmp_path, monkeypatch, verb, found, words):
 def test_a_named_port_is_taken_as_it_is(board, monkeypatch):
     opened = []
     monkeypatch.setattr(list_ports, "comports", list)
-    monkeypatch.setattr(connection, "Board", lambda name, timeout: opened.append(name) or board)
+    monkeypatch.setattr(connection, "ConnectedBoard", lambda name, timeout: opened.append(name) or board)
     command.works("flash", "--port", "rfc2217://10.0.0.9:2217")
     assert opened == ["rfc2217://10.0.0.9:2217"]
 

@@ -110,7 +110,7 @@ class Endless:
 @pytest.mark.parametrize("said", [b"x", b"\n", b">"])
 def test_an_answer_without_end_is_given_up(monkeypatch, ending, said):
     monkeypatch.setattr(connection, "MOST_BYTES", 5000)
-    board = connection.Board.__new__(connection.Board)
+    board = connection.ConnectedBoard.__new__(connection.ConnectedBoard)
     board.serial = Endless(said)
     board.is_pty = False
     with pytest.raises(TransportError, match="does not end"):

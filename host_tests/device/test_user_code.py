@@ -9,7 +9,7 @@ from support import device_plans, engines
 POSES = {"ride": device_plans.RIDE, "presses": device_plans.PRESSES, "until": device_plans.LEFT_S + 0.5}
 # With an alignment in flash: a turn to the left; presses through all pages, back to the first
 PLAN = {"ride": [["upright", 2.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 6.0]], "until": 14.0}
-PLAN["presses"] = [[3 + k, 0.15] for k in range(5)]
+PLAN["turn_to"] = [[3, "raw"], [7.5, "lean"]]
 WHOLE = """
 import gc
 calls = []
@@ -66,9 +66,9 @@ def test_its_pages_are_behind_the_others_and_before_alignment_in_the_menu(run):
     assert record.at(9.8)[0].startswith("My page")
     assert record.at(10.8)[0].startswith("Page two")
     assert "press" in record.at(12.9)[1] or "Not aligned" in record.at(12.9)[1]
-    presses = [[t, 0.15] for t in (2, 12, 20, 21, 22, 23, 24, 25)]
-    record = run(WHOLE, POSES | {"presses": presses, "until": 28})
-    assert record.at(24.8)[0].startswith("My page") and record.at(24.8)[1].strip().isdigit()
+    presses = [*device_plans.PRESSES, [26, 0.15]]
+    record = run(WHOLE, POSES | {"presses": presses, "turn_to": [[20, "own"]], "until": 28})
+    assert record.at(25.8)[0].startswith("My page") and record.at(25.8)[1].strip().isdigit()
     assert record.at(27)[0].startswith("Page two")
 
 
@@ -107,8 +107,8 @@ def test_one_that_is_slow_now_and_then_stays_and_a_number_is_no_page(run):
     ],
 )
 def test_a_page_that_is_none_is_left_out(run, display, body, said):
-    presses = [*PLAN["presses"], [10, 0.15]]
-    record = run(f"def page(app):\n    {body}", PLAN | {"presses": presses, "board": {"display": display}})
+    plan = PLAN | {"turn_to": [[3, "own"], [7.5, "lean"]], "board": {"display": display}}
+    record = run(f"def page(app):\n    {body}", plan)
     assert record.console.count("user.py: page is left out") + record.console.count("picture is left out") == 1
     assert said in record.console
     assert goes_on(record)

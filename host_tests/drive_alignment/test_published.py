@@ -3,6 +3,8 @@ accelerometer and vehicle" (S. Liem and E. Poeze): R = I + sin t (u.L) + (1 - co
 t the angle between a and b. The article has z down and x forward; here the axes are left, up, forward, so the reading
 of gravity is (0, 1, 0) and that of braking (0, 0, -1)."""
 
+from array import array
+
 import numpy as np
 import pytest
 from kickstand.errors import AlignmentError
@@ -97,9 +99,9 @@ class Drive:
 
     @property
     def matrix(self):
-        out = np.zeros(9)
+        out = array("f", [0.0] * 9)
         self.alignment.matrix(out)
-        return out.reshape(3, 3)
+        return np.array(out).reshape(3, 3)
 
 
 @pytest.mark.parametrize("every_s", [0.1, 0.5, 1.0, 2.0])

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from kickstand_workshop.evaluation.metrics import Score, lag_ms, score, slope, straights
+from kickstand_workshop.evaluation.metrics import LeanScore, lag_ms, score, slope, straights
 from kickstand_workshop.evaluation.picture import ZOOM_S, zoom_start
 from kickstand_workshop.evaluation.report import pooled
 
@@ -76,8 +76,8 @@ def test_the_bias_is_of_the_last_straights_alone():
 
 
 def test_pooling_keeps_the_worst():
-    one = Score(1.0, 2.0, 3.0, 0.9, 5.0, 0.1)
-    two = Score(3.0, 4.0, 9.0, 1.1, float("nan"), -0.6)
+    one = LeanScore(1.0, 2.0, 3.0, 0.9, 5.0, 0.1)
+    two = LeanScore(3.0, 4.0, 9.0, 1.1, float("nan"), -0.6)
     found = pooled([one, two])
     assert found["rms"] == pytest.approx(math.sqrt(5.0))
     assert found["worst_ride_rms"] == 3.0
@@ -89,7 +89,7 @@ def test_pooling_keeps_the_worst():
 
 def test_a_ride_without_a_corner_does_not_hide_the_others():
     nothing = float("nan")
-    flat, bent = Score(1.0, 2.0, 3.0, nothing, nothing, nothing), Score(1.0, 2.0, 3.0, 0.9, 5.0, 0.1)
+    flat, bent = LeanScore(1.0, 2.0, 3.0, nothing, nothing, nothing), LeanScore(1.0, 2.0, 3.0, 0.9, 5.0, 0.1)
     for scores in [flat, bent], [bent, flat]:
         found = pooled(scores)
         assert [found[name] for name in ("slope", "slope_low", "slope_high")] == [0.9] * 3

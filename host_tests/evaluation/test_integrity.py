@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from kickstand_workshop.evaluation import faults, integrity
 from kickstand_workshop.evaluation.faults import FAULTS, Fault
-from kickstand_workshop.evaluation.integrity import Job, Trace
+from kickstand_workshop.evaluation.integrity import FaultJob, Trace
 from support.command import refused, works
 
 STEP_S = 0.1
@@ -31,7 +31,7 @@ def during(*spans):
 
 def test_what_stands_for_over_a_second_misleads():
     error = np.where(during((12, 12.9), (20, 22), (30, 33)), 9.0, 7.9)
-    outcome = integrity.judge(Job(None, 0), trace(error))
+    outcome = integrity.judge(FaultJob(None, 0), trace(error))
     assert outcome.misleading_s == pytest.approx(5.0)
     assert outcome.longest_s == pytest.approx(3.0)
     assert outcome.available == 1.0
@@ -39,7 +39,7 @@ def test_what_stands_for_over_a_second_misleads():
 
 def test_a_hidden_lean_does_not_mislead():
     wrong = during((20, 30))
-    outcome = integrity.judge(Job(None, 0), trace(30.0 * wrong, ~wrong))
+    outcome = integrity.judge(FaultJob(None, 0), trace(30.0 * wrong, ~wrong))
     assert outcome.misleading_s == 0.0
     assert outcome.available == pytest.approx(5 / 6)
     assert outcome.hidden_after_s == pytest.approx(10.0)
@@ -50,8 +50,8 @@ def test_a_hidden_lean_does_not_mislead():
 @pytest.mark.parametrize(("back_s", "right"), [(28.0, True), (29.8, False)])
 def test_recovered_is_right_ten_seconds_after_the_end(back_s, right):
     shown = ~during((15, back_s))
-    assert integrity.judge(Job(None, 0), trace(0.0, shown, end_s=20.0)).recovered is right
-    assert integrity.judge(Job(None, 0), trace(0.0, shown)).recovered is None
+    assert integrity.judge(FaultJob(None, 0), trace(0.0, shown, end_s=20.0)).recovered is right
+    assert integrity.judge(FaultJob(None, 0), trace(0.0, shown)).recovered is None
 
 
 def readings(seconds=60.0, up_g=1.0):
@@ -82,13 +82,13 @@ def test_a_slip_turns_force_and_rate_alike():
 
 
 def test_a_ride_without_a_fault_shows_its_lean():
-    outcome = integrity.run(Job(None, 1, 60.0))
+    outcome = integrity.run(FaultJob(None, 1, 60.0))
     assert outcome.misleading_s == 0.0
     assert outcome.available > 0.99
 
 
 def test_a_mirrored_axis_does_not_mislead_for_long():
-    outcome = integrity.run(Job(NAMED["gyro axis mirrored"], 1, 60.0))
+    outcome = integrity.run(FaultJob(NAMED["gyro axis mirrored"], 1, 60.0))
     assert outcome.misleading_s < 3.0
     assert outcome.hidden_after_s < 20.0
 
@@ -99,7 +99,7 @@ def test_a_reading_at_the_end_of_the_range_counts_as_lost():
 
 
 def test_on_the_whole_device_the_display_is_judged():
-    outcome = integrity.run(Job(NAMED["gyro axis at the end of its range"], 0, 20.0, device=True))
+    outcome = integrity.run(FaultJob(NAMED["gyro axis at the end of its range"], 0, 20.0, device=True))
     assert outcome.misleading_s == 0.0
     assert outcome.hidden_after_s < 2.0
     assert 0.0 < outcome.named_after_s < 5.0

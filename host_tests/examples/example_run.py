@@ -1,6 +1,6 @@
 """Runs one program of firmware/examples on the simulated board, under MicroPython.
 
-As a script: reads {"program", "until", "presses"} as JSON from standard input and runs it in the current directory (the
+As a script: reads {"program", "until", "turn_to"} as JSON from standard input and runs it in the current directory (the
 board's flash), on a bike that is aligned and rides a long right turn. Without a program the lean meter is run, with
 what is in flash. What the program prints comes first, then on the last line, as JSON, {"frames": what the display said
 every second, "sent": what went to a UART, "lamp": the level of GPIO 16 every second}.
@@ -29,26 +29,43 @@ def save_calibration(part, directory=""):
     Store(0x68, 8, directory).save(calibration)
 
 
-def run(program, until_s, presses):
-    """See above. until_s: s. presses: when the button is pressed, in seconds."""
+def run(program, until_s, turn_to):
+    """See above. until_s: s. turn_to: [[at_s, name of a view], ...]: from then on it presses the button until that
+    view is shown."""
     part = Sensor(seed=3)
     board = Board(part.world(Ride(RIDE).motion))
     board.install()
     save_calibration(part)
-    for at_s in presses:
-        board.press(at_s)
+    wanted, apps = [], []
+    for at_s, name in turn_to:
+        board.at(at_s, lambda name=name: wanted.append(name))
+
+    def turn_page():
+        if wanted and apps and apps[0].state()["view"] == wanted[0]:
+            wanted.pop(0)
+        if wanted:
+            board.press()
+
+    def run_app(app):
+        apps.append(app)
+        app.run()
+
+    board.every(0.5, turn_page)
     board.volts[26] = 12.6 / 11
     frames, lamp = [], []
     board.every(1.0, lambda: frames.append(board.lcd.text()))
     board.every(1.0, lambda: lamp.append(board.pin_level(16)))
-    source = "from kickstand.start import main; main()"
     if program:
         with open(program, encoding="utf-8") as file:
             source = file.read()
-    board.run(lambda: exec(source, {"__name__": "__main__"}), until_s)
+        board.run(lambda: exec(source, {"__name__": "__main__"}), until_s)
+    else:
+        from kickstand.start import main
+
+        board.run(lambda: main(run_app), until_s)
     return {"frames": frames, "lamp": lamp, "sent": board.sent.decode()}
 
 
 if __name__ == "__main__":
     plan = json.load(sys.stdin)
-    print("\n" + json.dumps(run(plan["program"], plan["until"], plan["presses"])))
+    print("\n" + json.dumps(run(plan["program"], plan["until"], plan["turn_to"])))

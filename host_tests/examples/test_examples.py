@@ -13,19 +13,19 @@ EXAMPLES = SCRIPT.parents[2] / "firmware" / "examples"
 TURN_DEG = 35.0  # of example_run.py's ride
 
 
-def run(flash, name, until, presses=()):
+def run(flash, name, until, turn_to=()):
     """What the program printed, and the display's two lines each second. One that is a user.py runs as such."""
-    printed, seen = run_all(flash, name, until, presses)
+    printed, seen = run_all(flash, name, until, turn_to)
     return printed, seen["frames"]
 
 
-def run_all(flash, name, until, presses=()):
+def run_all(flash, name, until, turn_to=()):
     """What the program printed, and what example_run.py says of it. name: None for the user.py that is in flash."""
     program = name and str(EXAMPLES / name)
     if name and name.startswith("user_"):
         (flash / "user.py").write_bytes((EXAMPLES / name).read_bytes())
         program = None
-    plan = json.dumps({"program": program, "until": until, "presses": presses})
+    plan = json.dumps({"program": program, "until": until, "turn_to": turn_to})
     said = run_mpy(SCRIPT, heap=BOARD_HEAP, stdin=plan, directory=flash)
     printed, _, frames = said.rstrip("\n").rpartition("\n")
     return printed, json.loads(frames)
@@ -61,12 +61,12 @@ def test_print_lean(tmp_path):
 
 
 def test_user_page(tmp_path):
-    """Five usual pages before it, and the first again behind it."""
-    _, frames = run(tmp_path, "user_page.py", 12.0, presses=[4, 5, 6, 7, 8])
+    """The usual pages come before it, and the first comes again after it."""
+    _, frames = run(tmp_path, "user_page.py", 12.0, turn_to=[(4, "own")])
     shown = re.fullmatch(r"Load     (\d\.\d\d) x", frames[-1][0].rstrip())
     assert shown and float(shown[1]) == pytest.approx(1.22, abs=0.05)  # 1 / cos(35 degrees)
     assert re.fullmatch(r"Lean  3\d deg *", frames[-1][1])
-    _, frames = run(tmp_path, "user_page.py", 10.0, presses=[4, 5, 6, 7, 8, 9])
+    _, frames = run(tmp_path, "user_page.py", 10.0, turn_to=[(4, "own"), (8.5, "lean")])
     assert frames[-1][0].startswith("Lean")
 
 
@@ -95,7 +95,7 @@ def test_user_uart(tmp_path):
 
 
 def test_user_battery(tmp_path):
-    _, frames = run(tmp_path, "user_battery.py", 12.0, presses=[4, 5, 6, 7, 8])
+    _, frames = run(tmp_path, "user_battery.py", 12.0, turn_to=[(4, "own")])
     assert frames[-1] == ["Battery  12.6 V ", "ok              "]
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from kickstand_fleet import evidence
-from kickstand_fleet.simulation.vehicle import Sensor, random_sensor
+from kickstand_fleet.simulation.vehicle import VehicleSensor, random_sensor
 from kickstand_tools.logs.log import Log
 from made_fleet import drive
 
@@ -25,7 +25,7 @@ def test_a_g_of_each_is_a_g_however_often_the_speed_comes(every_s):
 
 
 def test_a_motorcycle_s_force_grows_along_its_own_up_in_turns():
-    exact = Sensor(random_sensor(np.random.default_rng(1)).mount, np.zeros(3), np.ones(3), np.zeros(3))
+    exact = VehicleSensor(random_sensor(np.random.default_rng(1)).mount, np.zeros(3), np.ones(3), np.zeros(3))
     log, sensor = drive(42, "motorcycle", sensor=exact)
     found, varied = shown(log, "motorcycle")
     level, forward, left = found[:3] @ sensor.mount.T

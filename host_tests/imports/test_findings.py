@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from kickstand_tools import api
 from kickstand_tools.common.errors import InputError
+from kickstand_tools.imports import findings
 from support import command
 from support.recordings import drawn_tables
 
@@ -159,3 +160,17 @@ def test_of_tables_drawn_at_random_none_is_wrong(tmp_path, count):
     results = [judged(seed, tmp_path / "log.csv") for seed in range(1, 2 * count, 2)]  # odd ones were not looked at
     assert [result for result in results if result not in ("right", "refused")] == []
     assert results.count("right") >= 0.99 * count
+
+
+@pytest.mark.parametrize(
+    ("per_g", "unit", "why"),
+    [
+        (1.0, "g", "gravity at rest is 1 long"),
+        (G, "m/s2", "gravity at rest is 9.807 long"),
+        (8192.0, "counts/8192", "gravity at rest is 8192 long: raw counts of a sensor with 8192 counts (LSB) per g"),
+    ],
+)
+def test_the_unit_of_an_accelerometer_is_explained(per_g, unit, why):
+    values = np.round(per_g * np.tile([0.0, 0.6, 0.8], (200, 1)), 0 if per_g > 1000.0 else 6)
+    found = findings.accelerometer(values, np.arange(200) / 50.0)
+    assert (found.unit, found.why, found.certain) == (unit, why, True)

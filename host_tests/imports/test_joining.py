@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from kickstand_tools import api
 from kickstand_tools.imports.join import join, on_clock
-from kickstand_tools.imports.recording import Recording, Sensor, Track
+from kickstand_tools.imports.recording import AppRecording, ReceiverTrack, RecordedSensor
 from support import command
 from support.recordings import app_exports
 from support.recordings.app_exports import riding
@@ -12,15 +12,15 @@ from support.recordings.app_exports import riding
 MS = 10**6
 
 
-def sensor(name: str, t_s: np.ndarray, column: np.ndarray | None = None) -> Sensor:
+def sensor(name: str, t_s: np.ndarray, column: np.ndarray | None = None) -> RecordedSensor:
     """One whose values are the time itself, times 1, 2 and 3."""
     values = t_s if column is None else column
-    return Sensor(name, np.rint(t_s * 1e9).astype(np.int64), np.outer(values, [1.0, 2.0, 3.0]))
+    return RecordedSensor(name, np.rint(t_s * 1e9).astype(np.int64), np.outer(values, [1.0, 2.0, 3.0]))
 
 
 def test_a_slower_gyro_is_interpolated_and_only_within_its_own_time():
     accel = sensor("accelerometer", np.arange(0.0, 2.0, 0.01))
-    log, _ = join(Recording("none", accel, sensor("gyro", np.arange(0.333, 1.5, 0.025))), "log")
+    log, _ = join(AppRecording("none", accel, sensor("gyro", np.arange(0.333, 1.5, 0.025))), "log")
     at_s = log.start_s + log.t_s
     assert at_s[[0, -1]] == pytest.approx([0.34, 1.48])
     assert np.allclose(log.gyro_dps, np.outer(at_s, [1.0, 2.0, 3.0]), atol=1e-9)
@@ -42,27 +42,27 @@ def test_nothing_is_made_up_in_a_gap_of_either_sensor():
     t_s = np.arange(0.0, 4.0, 0.01)
     accel = sensor("accelerometer", t_s[(t_s < 1.0) | (t_s > 1.5)])
     gyro = sensor("gyro", t_s[(t_s < 2.0) | (t_s > 2.6)])
-    log, _ = join(Recording("none", accel, gyro), "log")
+    log, _ = join(AppRecording("none", accel, gyro), "log")
     steps_s = np.diff(log.t_s)
     assert steps_s[steps_s > 0.02] == pytest.approx([0.52, 0.62], abs=0.02)
 
 
 def test_a_gyro_that_misses_a_sample_or_two_is_no_gap():
     t_s = np.arange(0.0, 2.0, 0.01)
-    log, _ = join(Recording("none", sensor("a", t_s), sensor("g", t_s[(t_s < 1.0) | (t_s > 1.1)])), "log")
+    log, _ = join(AppRecording("none", sensor("a", t_s), sensor("g", t_s[(t_s < 1.0) | (t_s > 1.1)])), "log")
     assert len(log.t_s) == len(t_s)
 
 
 def test_a_fix_stands_in_the_row_nearest_to_it_and_nowhere_else():
     t_s = np.arange(0.0, 5.0, 0.01)
     fix_s = np.array([-3.0, 0.504, 1.5, 2.507, 9.0])
-    track = Track(
+    track = ReceiverTrack(
         np.rint(fix_s * 1e9).astype(np.int64),
         fix_s + 10.0,
         np.full(5, 52.0),
         np.array([13.0, 13.1, np.nan, 13.3, 13.4]),
     )
-    log, _ = join(Recording("none", sensor("a", t_s), sensor("g", t_s), track, utc_ns=10**18), "log")
+    log, _ = join(AppRecording("none", sensor("a", t_s), sensor("g", t_s), track, utc_ns=10**18), "log")
     rows = np.flatnonzero(np.isfinite(log.speed_mps))
     assert rows.tolist() == [50, 150, 251]
     assert log.speed_mps[rows] == pytest.approx([10.504, 11.5, 12.507])
@@ -73,7 +73,7 @@ def test_a_fix_stands_in_the_row_nearest_to_it_and_nowhere_else():
 def test_speeds_and_places_that_mean_none():
     """A phone writes -1 for a speed that it does not know; 0, 0 is in the sea."""
     t_ns = np.arange(4) * 10**9
-    track = Track(
+    track = ReceiverTrack(
         t_ns, np.array([-1.0, 3.0, -1.0, 4.0]), np.array([0.0, 52.0, 91.0, 52.1]), np.array([0.0, 13.0, 13.0, 13.1])
     )
     assert track.speed_mps.tolist() == [3.0, 4.0]
@@ -82,7 +82,7 @@ def test_speeds_and_places_that_mean_none():
 
 def test_a_standstill_is_said_once_a_second():
     """A logger that repeats its receiver's values in each row says nothing new with them."""
-    track = Track(np.arange(80) * 50 * MS, np.repeat([0.0, 5.0], 40), np.full(80, 52.0), np.full(80, 13.0))
+    track = ReceiverTrack(np.arange(80) * 50 * MS, np.repeat([0.0, 5.0], 40), np.full(80, 52.0), np.full(80, 13.0))
     assert (track.time_ns // MS).tolist() == [0, 1000, 2000, 3000]
     assert track.speed_mps.tolist() == [0.0, 0.0, 5.0, 5.0]
 

@@ -10,12 +10,12 @@ from kickstand.lean.lean_filter import LeanFilter
 WINDOW_S = 0.2
 
 
-def windows(judge, seconds, left=0.0, up=0.0, sideways=0.0, pitch=0.0, yaw_rate=0.0, shaken=0.0):
+def windows(judge, seconds, left=0.0, up=0.0, sideways=0.0, pitch=0.0, lean=0.0, yaw_rate=0.0, shaken=0.0):
     """How many of the windows of so many seconds were said not to fit any more. shaken: added to both forces, and taken
     off in every other window."""
     failed = 0
     for _ in range(int(seconds / WINDOW_S + 0.5)):
-        failed += judge.add(left + shaken, up + shaken, sideways, pitch, yaw_rate, WINDOW_S)
+        failed += judge.add(left + shaken, up + shaken, sideways, pitch, lean, yaw_rate, WINDOW_S)
         shaken = -shaken
     return failed
 
@@ -31,6 +31,14 @@ def test_vibration_is_no_reason_to_doubt():
     judge = Consistency()
     assert windows(judge, 60.0, shaken=3.0) == 0
     assert not judge.doubt
+
+
+def test_on_a_rougher_road_larger_means_are_sound():
+    for name in ("left", "up"):
+        judge = Consistency()
+        assert windows(judge, 30.0, **{name: 0.55})
+        judge = Consistency()
+        assert not windows(judge, 30.0, **{name: 0.55}, shaken=1.5)
 
 
 def test_much_is_doubted_within_a_second_and_little_after_some():
@@ -62,6 +70,34 @@ def test_a_doubtful_fit_is_no_fit():
     assert not windows(judge, 0.8, left=2.0)
     windows(judge, consistency.HOLDS_S[0] - 0.4)
     assert judge.doubt
+
+
+def test_after_a_doubt_a_straight_that_seems_a_bend_is_hidden():
+    judge = doubted()
+    windows(judge, 20.0, lean=radians(9.0))
+    assert judge.doubt and judge.one_sided
+    windows(judge, 20.0)
+    assert not judge.doubt and not judge.one_sided
+    windows(judge, 20.0, lean=radians(9.0))
+    assert judge.one_sided
+    judge = Consistency()
+    windows(judge, 60.0, lean=radians(9.0))
+    assert not judge.one_sided
+
+
+def test_bends_to_either_side_and_deep_ones_are_believed():
+    judge = doubted()
+    for lean_deg in (30.0, -20.0, 30.0, -20.0):
+        windows(judge, 3.0, lean=radians(lean_deg))
+        assert not judge.one_sided
+    judge = doubted()
+    windows(judge, 10.0, lean=radians(35.0))
+    assert not judge.one_sided
+    judge = doubted(2)
+    windows(judge, 8.0, lean=radians(35.0))
+    assert not judge.one_sided
+    windows(judge, 4.0, lean=radians(35.0))
+    assert judge.one_sided
 
 
 def test_what_does_not_fit_again_and_again_is_named():

@@ -222,4 +222,4 @@ def test_a_doubt_keeps_what_the_six_positions_measured(doubts):
     tested._doubt()
     for _ in range(HZ):
         tested.update((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), DT_US)
-    assert max(tested._p.rows[i][i] for i in range(SCALE_LEFT, STATES)) < 1.01e-5
+    assert tested._p and max(tested._p.rows[i][i] for i in range(SCALE_LEFT, STATES)) < 1.01e-5

@@ -114,8 +114,7 @@ def test_phones_in_turn(run):
     first = [[22.0, "connect", 1], [22.1, "write", "filter", [1, 0, 100]], [26.0, "leave"]]
     second = [[24.0, "connect", 2], [27.5, "connect", 2], [30.0, "write", "rate", [100, 0]], [33.0, "leave"]]
     third = [[35.0, "connect", 3]]
-    presses = device_plans.PRESSES + [[19.8 + 0.4 * k, 0.15] for k in range(5)]
-    plan = {**device_plans.ALIGNED, **LIVE, "phones": [first, second, third], "presses": presses, "until": 100}
+    plan = {**device_plans.ALIGNED, **LIVE, "phones": [first, second, third], "turn_to": [[18.0, "live"]], "until": 100}
     record = run(plan)
     one, two, three = record.phones
     assert 70 <= len(of(one, "chrono")) <= 80 and not of(one, "now")

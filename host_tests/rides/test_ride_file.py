@@ -186,5 +186,5 @@ def test_a_block_of_impossible_values_is_bad_however_right_its_check_sum(tmp_pat
             continue
         taken += 1
         ride_log.write(tmp_path / "ride.csv", [block])
-        stream.Recording(threading.Event(), lambda reading: None).write(io.StringIO(), iter([block]), [])
+        stream.StreamLog(threading.Event(), lambda reading: None).write(io.StringIO(), iter([block]), [])
     assert taken > 10

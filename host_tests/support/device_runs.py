@@ -15,6 +15,7 @@ from kickstand_tools.simulation.scripted import script, sensor_errors
 from support import sd_cards, simulated_phones
 
 FRAME_S = 0.1
+PRESS_EVERY_S = 0.4  # while a page is looked for
 
 
 class CarRide(script.Ride):
@@ -90,6 +91,12 @@ class Device:
         self.board = Board(world, **fitted)
         self.frames, self.ends = [], []
         self.phones = []
+        self._app = None
+        self._wanted = []  # the names of views, in this order
+
+    def turn_to(self, at_s, name):
+        """From at_s on, press the button until the view has this name: see kickstand/state.py."""
+        self.board.at(at_s, lambda: self._wanted.append(name))
 
     def fit_speed(self, source, ride, place=None, **model):
         """A "gps" or "wheel" that measures the speed of the ride. place: [latitude, longitude, degrees north a second,
@@ -109,6 +116,7 @@ class Device:
         """Run the firmware with these settings; after each of the times off_s its power is switched off and on again.
         streams: as `kickstand record` starts it."""
         self.board.every(FRAME_S, self._watch)
+        self.board.every(PRESS_EVERY_S, self._turn_page)
         self.board.install()
         before = take_firmware() if self.board.poses else {}  # it needs firmware that is imported on it
         try:
@@ -117,7 +125,7 @@ class Device:
             load = settings.load
             settings.load = lambda: settings.Settings(_config(config))
             for until_s in off_s:
-                self._run_until(until_s, _stream if streams else start.main)
+                self._run_until(until_s, _stream if streams else lambda: start.main(self._run_app))
             settings.load = load
             if self.ends[-1] == "returned":  # with power on: what it leaves on the display
                 self._watch()
@@ -126,6 +134,16 @@ class Device:
             if self.board.poses:
                 take_firmware()
                 sys.modules.update(before)
+
+    def _run_app(self, app):
+        self._app = app
+        app.run()
+
+    def _turn_page(self):
+        if self._wanted and self._app and self._app.state()["view"] == self._wanted[0]:
+            self._wanted.pop(0)
+        if self._wanted:
+            self.board.press(for_s=0.15)
 
     def record(self):
         """What was seen, as JSON can hold it."""
@@ -196,8 +214,9 @@ def run_device(plan):
     or "poses" as for poses_of; "seed" of the part (None: perfect); "presses" [[at_s, for_s], ...];
     "faults" [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...];
     "gps", "wheel" and "card": arguments of Device's methods; config "VEHICLE" "car": the ride is a car's; "remount"
-    [at_s, seed of the mounting from then on]; "phones": [[[at_s, what a simulated Phone does, arguments...], ...],
-    ...], one after the other; "stream" True: as `kickstand record` starts it.
+    [at_s, seed of the mounting from then on]; "turn_to" [[at_s, name of a view], ...], as for Device.turn_to();
+    "phones": [[[at_s, what a simulated Phone does, arguments...], ...], ...], one after the other; "stream" True: as
+    `kickstand record` starts it.
     """
     world, ride = _world(plan)
     device = Device(world, **plan.get("board", {}))
@@ -210,6 +229,8 @@ def run_device(plan):
         device.phones.append(simulated_phones.Phone(device.board, acts))
     for at_s, for_s in plan.get("presses", []):
         device.board.press(at_s, for_s)
+    for at_s, name in plan.get("turn_to", []):
+        device.turn_to(at_s, name)
     for method, arguments in plan.get("faults", []):
         getattr(device.board.faults, method)(*arguments)
     device.run(plan.get("config", {}), plan.get("power", []) + [plan["until"]], "stream" in plan)

@@ -21,7 +21,7 @@ PICO_PORT = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
 def plug_in(monkeypatch: pytest.MonkeyPatch, board: Any) -> Any:
     """Make a board, which is returned, the only one that is plugged in, and let it restart at once."""
     monkeypatch.setattr(list_ports, "comports", lambda: [PICO_PORT])
-    monkeypatch.setattr(connection, "Board", lambda name, timeout: board)
+    monkeypatch.setattr(connection, "ConnectedBoard", lambda name, timeout: board)
     monkeypatch.setattr(connection, "_RESTART_S", 0)
     return board
 

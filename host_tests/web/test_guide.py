@@ -8,6 +8,7 @@ import pytest
 from support.mpy import run_mpy
 
 # Waits and presses of a rider, each a generator of (s, name, value); the names are those of Device.act()
+# turn_to: presses until a view is shown
 DRIVE = """
 import json, sys
 from kickstand_tools.web.device import PageDevice
@@ -34,6 +35,10 @@ def press(seconds):
     run(0.4)
 
 def do(name, value):
+    if name == "turn_to":
+        while device.state()["view"] != value:
+            press(0.15)
+        return
     if name in ("press", "wait"):
         return press(value) if name == "press" else run(value)
     device.order(name, value)
@@ -131,11 +136,11 @@ def test_the_wire_is_pulled_while_the_menu_is_open(stages):
 def test_each_page_is_named(stages):
     stages(
         (RIDING, "not sure", 5, "That is all", ""),
-        ([SHORT], "maxima", 5, "the largest lean", ""),
-        ([SHORT], "g", 5, "acceleration and braking", ""),
-        ([SHORT], "formula", 5, "formula", ""),
-        ([SHORT], "readings", 5, "the sensor itself", ""),
-        ([SHORT], "not sure", 5, "That is all", ""),
+        ([("turn_to", "maxima")], "maxima", 5, "the largest lean", ""),
+        ([("turn_to", "acceleration")], "g", 5, "acceleration and braking", ""),
+        ([("turn_to", "formula")], "formula", 5, "formula", ""),
+        ([("turn_to", "raw")], "readings", 5, "the sensor itself", ""),
+        ([("turn_to", "lean")], "not sure", 5, "That is all", ""),
         ([LONG, *[SHORT] * 3], "the menu", 0, "The menu", ""),
         ([LONG], "sensor info", 0, "the sensor, and what is calibrated", ""),
         ([SHORT], "not sure", 5, "That is all", ""),

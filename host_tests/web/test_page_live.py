@@ -150,7 +150,7 @@ def test_the_rides_of_a_board_are_what_the_command_pulls(line, rider, board, tmp
     assert "Ride 4, part 0: damaged at byte 4096: left out" in said
     files = saved(rider, tmp_path)
     assert board.resets == 1
-    monkeypatch.setattr(connection, "Board", lambda name, timeout: board)
+    monkeypatch.setattr(connection, "ConnectedBoard", lambda name, timeout: board)
     monkeypatch.setattr(connection, "_RESTART_S", 0)
     pull("the same board", tmp_path / "out")
     pulled = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}

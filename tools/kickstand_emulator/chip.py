@@ -42,7 +42,7 @@ class EmulatedClock:
         self._clock.create_alarm(function).schedule(max(0.0, due_us * 1000.0 - self._clock.nanos))
 
 
-class Chip:
+class EmulatedChip:
     """rp2040: rp2040py's chip with its flash and I2C controllers replaced. run() advances the time."""
 
     def __init__(self, image: Path) -> None:

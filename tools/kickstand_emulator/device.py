@@ -22,7 +22,7 @@ class GuestError(Exception):
     """The code passed to exec() raised an exception. The text is the board's traceback."""
 
 
-class Device(ABC):
+class EmulatedDevice(ABC):
     """An emulated board. It is off until power_on(). `with` switches it on, and off at the end. Times are emulated
     seconds; they continue through resets and power cycles.
 

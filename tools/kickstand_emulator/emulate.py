@@ -25,7 +25,7 @@ from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 from rich.live import Live
 
 from .console_server import ConsoleServer
-from .device import Device
+from .device import EmulatedDevice
 
 if TYPE_CHECKING:
     from .esp32 import Esp32
@@ -62,7 +62,7 @@ class ScriptedBike:
         """See script.Ride.motion()."""
         return self._ride.motion(0.0 if self.begun_s is None else t_s - self.begun_s)
 
-    def follow(self, device: Device) -> None:
+    def follow(self, device: EmulatedDevice) -> None:
         """Begin the ride once the display is on, and press the button at the script's times."""
         if self.begun_s is None and device.board.lcd.on:
             self.begun_s = device.time_s
@@ -93,14 +93,14 @@ def emulate(port: int, say: Callable[[str], None], chip: str = "rp2040", display
         server.close()
 
 
-def _run(device: Device, server: ConsoleServer) -> None:
+def _run(device: EmulatedDevice, server: ConsoleServer) -> None:
     """Advance the time by a step, not faster than real time: the time-outs of mpremote use the host's clock."""
     begun, before = time.monotonic(), device.time_s
     device.run(_STEP_S, server.poll)
     time.sleep(max(0.0, device.time_s - before - (time.monotonic() - begun)))
 
 
-def _watch(device: Device, server: ConsoleServer, bike: HandBike, address: str) -> None:
+def _watch(device: EmulatedDevice, server: ConsoleServer, bike: HandBike, address: str) -> None:
     with keyboard() as pressed, Live(screen=True, auto_refresh=False) as live:
         while True:
             for key in pressed(0.0):
@@ -123,7 +123,7 @@ def below(on: bool, address: str) -> str:
     return _HELP if on else _NO_FIRMWARE.format(address) + _HELP
 
 
-def _print(device: Device, server: ConsoleServer, bike: ScriptedBike, say: Callable[[str], None]) -> None:
+def _print(device: EmulatedDevice, server: ConsoleServer, bike: ScriptedBike, say: Callable[[str], None]) -> None:
     shown: list[str] = device.lcd()
     while True:
         _run(device, server)

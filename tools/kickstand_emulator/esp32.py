@@ -20,7 +20,7 @@ from kickstand_tools.simulated_board.i2c import Bus
 from kickstand_tools.simulated_board.simulator import Board
 
 from . import esp32_library, flash_image
-from .device import LEVEL, Device
+from .device import LEVEL, EmulatedDevice
 from .esp32_machine import (
     COMMAND,
     GO,
@@ -53,7 +53,7 @@ class Stopped(Exception):
     """QEMU has ended unexpectedly."""
 
 
-class Esp32(Device):
+class Esp32(EmulatedDevice):
     """See Device."""
 
     NAME, FLASH, MPY = "ESP32", flash_image.ESP32, bytecode.ESP32

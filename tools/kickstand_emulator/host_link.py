@@ -9,7 +9,7 @@ from typing import Any
 from rp2040py.memory_map import RAM_START_ADDRESS
 from rp2040py.peripherals.peripheral import BasePeripheral
 
-from .chip import Chip
+from .chip import EmulatedChip
 
 _PLACE = 0x40068  # address >> 12, reserved on the chip
 _COUNT, _FILL, _TAKE = 0x0, 0x4, 0x8
@@ -37,7 +37,7 @@ class HostLink(BasePeripheral):
     """source: the bytes that Source.read() on the Pico returns, in order. sink: called with the bytes passed to
     Sink.write()."""
 
-    def __init__(self, chip: Chip, source: bytes, sink: Callable[[bytes], Any]) -> None:
+    def __init__(self, chip: EmulatedChip, source: bytes, sink: Callable[[bytes], Any]) -> None:
         super().__init__(chip.rp2040, "HOST_LINK")
         self._source = source
         self._sink = sink

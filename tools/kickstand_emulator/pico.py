@@ -9,15 +9,15 @@ from kickstand_tools.simulated_board.simulator import Board
 from rp2040py.gpio_pin import GPIOPinState
 
 from . import flash_image, image
-from .chip import Chip, EmulatedClock
+from .chip import EmulatedChip, EmulatedClock
 from .console import QuietConsole
-from .device import LEVEL, Device
+from .device import LEVEL, EmulatedDevice
 from .flash_memory import PowerCut
 from .host_link import GUEST, HostLink
 from .i2c_wires import Wires
 
 
-class Pico(Device):
+class Pico(EmulatedDevice):
     """See Device."""
 
     NAME, FLASH, MPY, SINK = "Pico", flash_image.PICO, bytecode.PICO, GUEST
@@ -25,7 +25,7 @@ class Pico(Device):
     def __init__(
         self, world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any
     ) -> None:
-        self.chip = Chip(image.find())
+        self.chip = EmulatedChip(image.find())
         super().__init__(Board(world or (lambda t_s: LEVEL), clock=EmulatedClock(self.chip.clock), **fitted))
         self._wires = [self._wired(bus) for bus in self.board.buses]
         for bus in self.board.buses:

@@ -57,7 +57,7 @@ from .replay.replay import LeanTable as LeanTable, replay as replay
 from .simulation import ride as _simulation
 from .web.site import site_files as site_files, write_site as write_site
 
-SimulatedRide, simulate_ride = _simulation.Ride, _simulation.ride
+SimulatedRide, simulate_ride = _simulation.SimulatedRide, _simulation.ride
 
 # All of the above: without it pydoc leaves out what is imported
 __all__ = [name for name in dir() if not name.startswith("_")]  # pyright: ignore[reportUnsupportedDunderAll]

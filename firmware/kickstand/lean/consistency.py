@@ -11,9 +11,17 @@ seconds.
 Two more means are of what no road and no rider does for long: a force to the side, because a bike is in balance, and a
 steep pitch.
 
+Each mean is judged by its own spread, as in Student's t: on a road that is rougher than the filter expects the
+innovations are large, of either sign, and so are their means.
+
+After a doubt one thing more is asked. A gyro that is wrong about up makes a straight a bend that does not end, with all
+forces as they should be. So a lean that has stayed on one side for long is not shown then.
+
 What does not fit is doubted, and the lean hidden until all has fitted for a while. What does not fit again and again is
 a fault of the sensor.
 """
+
+from math import sqrt
 
 from ..units import const
 
@@ -25,8 +33,20 @@ _MOST = const(4.0)  # standard deviations: a larger innovation counts as this. L
 # mounts they reach .4, .25, .7, .25, .12 and 8 degrees.
 LEFT_SHORT, LEFT_LONG = 0.75, 0.5  # standard deviations
 UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations
+# ratio: the limits of up are wider by this without the six positions, as the data sheet allows the accelerometer
+# 3 % of scale error and 80 mg of offset, and only rest shows them. Larger: less is hidden, also of what is wrong.
+_UNMEASURED = const(2.0)
 _SIDEWAYS = const(0.15)  # ratio: force to the side over force up, less the trim
 _STEEP = const(0.21)  # rad: pitch
+# The limits of left and up grow with the spread, the root of this mean square: half the square of the change between
+# windows. Larger: more is hidden on the roughest roads.
+_SPREAD = const(0.4)  # standard deviations, squared
+# rad: mean lean after a doubt, and a larger one that the force up confirms. Larger, the first, and smaller, the second:
+# less is hidden in long bends, and on straights that are taken for bends.
+_ONE_SIDE = const(0.13)
+_SURE_LEAN = const(0.3)
+# ratio: of the mean square of the lean, above which it has been steady. Larger: as _ONE_SIDE.
+_STEADY = const(0.75)
 _MOST_SIDEWAYS = const(0.5)  # ratio: more counts as this. Larger: a blow counts for more.
 _STRICT = const(0.85)  # ratio: share of the limits after a doubt. Larger: a fault that is still there is seen later.
 # ratio: share of the limits in which the means have to stay while doubted. Larger: shown again sooner.
@@ -45,9 +65,12 @@ last_odd = None  # the last code of `odd`, for the status report
 
 class Consistency:
     """Read only: doubt: the lean is not to be shown. doubts: how often it did not fit, less those that are forgotten.
-    odd: None, or the code of what did not fit again and again: "odd-left", "odd-up" (forces) or "odd-pitch"."""
+    odd: None, or the code of what did not fit again and again: "odd-left", "odd-up" (forces) or "odd-pitch".
 
-    def __init__(self):
+    measured: the six positions have measured the sensor."""
+
+    def __init__(self, measured=True):
+        self._up_share = 1.0 if measured else _UNMEASURED
         self.doubt = False
         self.odd = None
         self.doubts = 0
@@ -58,6 +81,8 @@ class Consistency:
 
     def _forget_means(self):
         self._left = self._left_long = self._up = self._up_long = self._side = self._pitch = 0.0
+        self._lean = self._lean_square = self._mean_s = 0.0
+        self._left_before = self._up_before = self._left_square = self._up_square = 0.0
 
     def gap(self, in_rest=True):
         """Doubt until it has fitted for a while, because the filter has just begun. in_rest: rest counts as fitting."""
@@ -66,10 +91,20 @@ class Consistency:
         self._fits_s = 0.0
         self._forget_means()
 
-    def add(self, left, up, sideways, pitch, yaw_rate, seconds):
+    @property
+    def one_sided(self):
+        """True where it did not fit lately, and the lean has been on one side: steadily, or after a second doubt for
+        long."""
+        lean = abs(self._lean)
+        if not self.doubts or lean <= _ONE_SIDE:
+            return False
+        steady = lean < _SURE_LEAN and lean * lean > _STEADY * self._lean_square
+        return steady or (self.doubts > 1 and self._mean_s >= _LONG_S)
+
+    def add(self, left, up, sideways, pitch, lean, yaw_rate, seconds):
         """Take a window of `seconds` while riding. left, up: the normalised innovations of these forces. sideways:
-        force to the side over force up. pitch in rad, yaw_rate in rad/s. Returns True if just now it does not fit any
-        more."""
+        force to the side over force up. pitch and lean in rad, yaw_rate in rad/s. Returns True if just now it does not
+        fit any more."""
         gain, long_gain = min(1.0, seconds / _SHORT_S), min(1.0, seconds / _LONG_S)
         left, up = max(-_MOST, min(_MOST, left)), max(-_MOST, min(_MOST, up))
         self._left += gain * (left - self._left)
@@ -78,8 +113,19 @@ class Consistency:
         self._up_long += long_gain * (up - self._up_long)
         self._side += long_gain * (max(-_MOST_SIDEWAYS, min(_MOST_SIDEWAYS, sideways)) - self._side)
         self._pitch += long_gain * (pitch - self._pitch)
-        left = max(abs(self._left) / LEFT_SHORT, abs(self._left_long) / LEFT_LONG, abs(self._side) / _SIDEWAYS)
+        change = left - self._left_before
+        self._left_square += long_gain * (0.5 * change * change - self._left_square)
+        change = up - self._up_before
+        self._up_square += long_gain * (0.5 * change * change - self._up_square)
+        self._left_before, self._up_before = left, up
+        self._mean_s = min(self._mean_s + seconds, _LONG_S)
+        gain = seconds / self._mean_s
+        self._lean += gain * (lean - self._lean)
+        self._lean_square += gain * (lean * lean - self._lean_square)
+        left = max(abs(self._left) / LEFT_SHORT, abs(self._left_long) / LEFT_LONG)
+        left = max(left / sqrt(max(1.0, self._left_square / _SPREAD)), abs(self._side) / _SIDEWAYS)
         up = max(abs(self._up) / UP_SHORT, abs(self._up_long) / UP_LONG)
+        up /= self._up_share * sqrt(max(1.0, self._up_square / _SPREAD))
         pitch = abs(self._pitch) / _STEEP
         worst = max(left, up, pitch)
         self._since_s += seconds
@@ -91,7 +137,7 @@ class Consistency:
             return True
         elif self.doubt and worst > _FIT:
             self._fits_s = 0.0
-        elif self.doubts <= MILD or abs(yaw_rate) > _TURNING:
+        elif (self.doubts <= MILD or abs(yaw_rate) > _TURNING) and not self.one_sided:
             self._fit(seconds)
         return False
 

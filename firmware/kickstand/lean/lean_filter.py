@@ -60,7 +60,7 @@ class LeanFilter:
         # rest, where it should read 1 g
         self._force_error = 0.0
         self.dive = Dive()
-        self.consistency = Consistency()
+        self.consistency = Consistency(gyro_variances is not None)
         self._failed = False  # just now the readings do not fit any more
         # the sensor's errors (from BIAS_LEFT on) some time ago, and less long ago, while all fitted
         self._good = self._next_good = [0.0] * (STATES - BIAS_LEFT)
@@ -331,7 +331,8 @@ class LeanFilter:
         if x[SPEED] < measurements.BALANCE_SPEED or p.rows[SPEED][SPEED] > measurements.SIGMA_BALANCE_SPEED**2:
             sideways = 0.0
         if abs(means[7]) < measurements.MOST_FORWARD * abs(means[6]):  # else the sensor is on no bike
-            self._failed = self.consistency.add(misfit, p.misfit, sideways, x[PITCH], model.yaw_rate, seconds)
+            lean = x[LEAN] - self._upright
+            self._failed = self.consistency.add(misfit, p.misfit, sideways, x[PITCH], lean, model.yaw_rate, seconds)
         self._remember(seconds)
         yield from p.update(*measurements.level_road(model, x, seconds))
         lean, speed, measured = x[LEAN] - self._upright, x[SPEED], self._speed

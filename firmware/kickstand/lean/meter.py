@@ -101,8 +101,8 @@ class LeanMeter:
         if self.suppressed_reason:
             return False
         lean = self.filter
-        doubts = lean.consistency.doubts
-        if lean.consistency.doubt or abs(lean.pitch_deg) >= _WHEELIE_DEG:
+        fits, doubts = lean.consistency, lean.consistency.doubts
+        if fits.doubt or fits.one_sided or abs(lean.pitch_deg) >= _WHEELIE_DEG:
             return False
         return 0.0 <= lean.variance <= (MAX_VARIANCE if doubts < MILD else DOUBTED_VARIANCE)
 

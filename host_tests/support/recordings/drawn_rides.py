@@ -217,7 +217,8 @@ def _of_the_sheet(chance, time, force, rates, mounting):
         for lean, pitch, held in ((stand, slope + change, False), (upright, slope, True))
     ]
     calibration = fit_two_positions(
-        *(Log.from_readings(pose, 200.0, name) for pose, name in zip(two, ("KICKSTAND.csv", "UPRIGHT.csv"))),
+        Log.from_readings(two[0], 200.0, "KICKSTAND.csv"),
+        Log.from_readings(two[1], 200.0, "UPRIGHT.csv"),
         fit_procedure(Log.from_readings(six, 200.0, "SIX.csv")).calibration,
     ).calibration
     calibration.gyro_delay_s = 0.0

@@ -78,8 +78,8 @@ def refusal(chance, fault=None, six_done=False, axis=0):
         turn.add(row, 1, 5000)
     turn.end()
     try:
-        align(calibration, *poses, "left")
-        check_turn(calibration, *poses, turn)
+        align(calibration, poses[0], poses[1], "left")
+        check_turn(calibration, poses[0], poses[1], turn)
     except AlignmentError as error:
         return error.code, share
     except GyroError as error:

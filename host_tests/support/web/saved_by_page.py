@@ -6,7 +6,7 @@ import threading
 
 from kickstand_tools.calibration.file import write_calibration
 from kickstand_tools.rides import block_reader, ride_log
-from kickstand_tools.rides.stream import Recording
+from kickstand_tools.rides.stream import StreamLog
 
 
 def saved(rider, tmp_path):
@@ -24,7 +24,7 @@ def saved(rider, tmp_path):
 def recorded(blocks):
     """[log, calibration] that `kickstand record` makes of these blocks."""
     log, calibration = io.StringIO(), io.StringIO()
-    recording = Recording(threading.Event())
+    recording = StreamLog(threading.Event())
     recording.write(log, iter(map(block_reader.parse, blocks)), [])
     assert recording.first
     write_calibration(calibration, ride_log.calibration(recording.first))

@@ -21,7 +21,7 @@ _COUNT_G, _COUNT_DPS = 1.0 / 16384.0, 1.0 / 131.0
 
 
 @dataclass
-class Sensor:
+class VehicleSensor:
     """mount (3, 3): vehicle from sensor, rows left, up, forward; offset_g, slope, bias_dps (3): its errors."""
 
     mount: Array
@@ -41,17 +41,17 @@ class Receiver:
     until_s: float = float("inf")
 
 
-def random_sensor(chance: np.random.Generator) -> Sensor:
+def random_sensor(chance: np.random.Generator) -> VehicleSensor:
     """A sensor in a random mounting, with random errors of an ordinary, uncalibrated MPU6050."""
     errors = (chance.normal(mean, sigma, 3) for mean, sigma in ((0.0, 0.01), (1.0, 0.01), (0.0, 1.0)))
-    return Sensor(random_rotation(chance), *errors)
+    return VehicleSensor(random_rotation(chance), *errors)
 
 
 def drive_log(
     chance: np.random.Generator,
     kind: str,
     route: Route,
-    sensor: Sensor,
+    sensor: VehicleSensor,
     receiver: Receiver,
     start_utc_s: float,
     moved: tuple[float, Array] | None = None,

@@ -12,7 +12,7 @@ GAP_S = 5.0  # after a longer time without a position the place is unknown
 
 
 @dataclass
-class Track:
+class LogTrack:
     """m positions. t_s: seconds since the log's first sample; lat_deg, lon_deg: degrees north and east."""
 
     t_s: Array
@@ -34,13 +34,13 @@ class Track:
         return np.where(known, lat, np.nan), np.where(known, (lon + 180.0) % 360.0 - 180.0, np.nan)
 
 
-def track(part: Channels | Block) -> Track:
+def track(part: Channels | Block) -> LogTrack:
     """The positions in one block of a ride or of a log, or in a whole course."""
     there = np.isfinite(part.lat_deg) & np.isfinite(part.lon_deg)
-    return Track(part.t_s[there], part.lat_deg[there], part.lon_deg[there])
+    return LogTrack(part.t_s[there], part.lat_deg[there], part.lon_deg[there])
 
 
-def joined(tracks: list[Track]) -> Track:
+def joined(tracks: list[LogTrack]) -> LogTrack:
     """The tracks of successive blocks as one."""
-    columns = ([getattr(one, field.name) for one in tracks] for field in fields(Track))
-    return Track(*(np.concatenate(column) for column in columns))
+    columns = ([getattr(one, field.name) for one in tracks] for field in fields(LogTrack))
+    return LogTrack(*(np.concatenate(column) for column in columns))

@@ -39,7 +39,7 @@ COMMANDS = {
 }
 
 
-class Commands(click.Group):
+class CommandGroup(click.Group):
     """The commands of COMMANDS, and those that other packages add: see added.py."""
 
     def list_commands(self, ctx: click.Context | None) -> list[str]:
@@ -59,7 +59,7 @@ class Commands(click.Group):
 
 
 @click.group(
-    cls=Commands,
+    cls=CommandGroup,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
 )

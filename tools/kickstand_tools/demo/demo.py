@@ -10,7 +10,7 @@ from rich.live import Live
 
 from ..common import unix_port
 from ..common.errors import InputError
-from .device_process import Device
+from .device_process import DeviceProcess
 from .keyboard import BIKE_KEYS, keyboard
 from .score import Score, table
 from .screen import lcd_lines, lean_text, oled_lines, screen
@@ -26,7 +26,7 @@ class DeviceStopped(Exception):
     """The device ended before its time was up. Its text is what the device wrote to its console."""
 
 
-def _watch(device: Device, engine: str, by_hand: bool, score: Score) -> None:
+def _watch(device: DeviceProcess, engine: str, by_hand: bool, score: Score) -> None:
     """Draw until the device ends or the user quits."""
     keys = _HAND_HELP if by_hand else _HELP
     known = _KEYS | BIKE_KEYS if by_hand else _KEYS
@@ -46,7 +46,7 @@ def _watch(device: Device, engine: str, by_hand: bool, score: Score) -> None:
                 live.update(screen(state, f"Kickstand on a simulated board, {engine}", keys, paused), refresh=True)
 
 
-def _print(device: Device, score: Score, console: bool) -> None:
+def _print(device: DeviceProcess, score: Score, console: bool) -> None:
     """Print each frame of the display when it changes. console: also what the board prints."""
     said, said_s = [""], 0.0
     while not device.ended:
@@ -83,7 +83,7 @@ def demo(hand: bool = False, cpython: bool = False, display: str = "lcd", user: 
         print("No MicroPython package for this system: the same firmware runs on CPython instead.")
     score = Score()
     speed = HAND_SPEED if hand else SCRIPT_SPEED if watched else 0.0
-    with Device(engine.lower(), "hand" if hand else "script", speed, display, user) as device:
+    with DeviceProcess(engine.lower(), "hand" if hand else "script", speed, display, user) as device:
         with contextlib.suppress(KeyboardInterrupt):
             if watched:
                 _watch(device, engine, hand, score)

@@ -14,7 +14,7 @@ from ..common import firmware_path, unix_port
 from .score import State
 
 
-class Device:
+class DeviceProcess:
     """The firmware on the simulated board. Use it in a `with` statement and call ticks() until ended.
 
     engine: "micropython" or "cpython". kind, speed, display: the arguments of device.py. user: its user.py.
@@ -52,7 +52,7 @@ class Device:
         )
         threading.Thread(target=self._read, daemon=True).start()
 
-    def __enter__(self) -> "Device":
+    def __enter__(self) -> "DeviceProcess":
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
-from .connection import Board
+from .connection import ConnectedBoard
 
 _CTRL_A, _CTRL_C = b"\x01", b"\x03"
 _END = b"\x04"  # ends the program's output, and its error
@@ -24,7 +24,7 @@ class BrokenOff(Exception):
 
 
 def lines(
-    transport: Board,
+    transport: ConnectedBoard,
     code: str,
     silent_s: float,
     stopped: threading.Event | None = None,

@@ -41,7 +41,7 @@ VENDORS = {
 _DEBUG_PROBE = (0x2E8A, 0x000C)  # a device of the same vendor that is not a board
 
 
-class Board(SerialTransport):
+class ConnectedBoard(SerialTransport):
     """A board with a limit on the length of answers, because mpremote reads as long as bytes arrive. slower: factor on
     mpremote's limits of silence, for a board that runs slower than real time."""
 
@@ -75,16 +75,16 @@ class Board(SerialTransport):
         return bytes(said)
 
 
-class _EmulatedBoard(Board):
+class _EmulatedBoard(ConnectedBoard):
     slower = _SLOWER
 
 
 # The name of a board's port, a board at an open port, or None for the only board that is plugged in
-Port = str | Board | None
+Port = str | ConnectedBoard | None
 
 
 @contextlib.contextmanager
-def connected(port: Port) -> Iterator[tuple[Board, str]]:
+def connected(port: Port) -> Iterator[tuple[ConnectedBoard, str]]:
     """A context with a board at its raw prompt, its program interrupted, and the name of its port.
 
     Raises InputError, also for errors of the connection inside the with block.
@@ -119,8 +119,8 @@ def connected(port: Port) -> Iterator[tuple[Board, str]]:
             transport.close()  # its port may be gone or restarting
 
 
-def _opened(name: str) -> Board:
-    kind = _EmulatedBoard if name.startswith(_EMULATED) else Board
+def _opened(name: str) -> ConnectedBoard:
+    kind = _EmulatedBoard if name.startswith(_EMULATED) else ConnectedBoard
     try:
         return kind(name, timeout=ANSWER_S * (_SLOWER if kind is _EmulatedBoard else 1))
     except (TransportError, ValueError):
@@ -161,7 +161,7 @@ def why_closed(port: str) -> InputError:
     return InputError(f"{port} could not be opened at first, and now can: try again")
 
 
-def restart(transport: Board) -> None:
+def restart(transport: ConnectedBoard) -> None:
     """Reset the board: it starts as after power-on. Its USB port disappears for a moment."""
     transport.exec_raw_no_follow("import time, machine\ntime.sleep_ms(100)\nmachine.reset()")
     transport.wait(_RESTART_S)

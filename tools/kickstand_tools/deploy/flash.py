@@ -11,7 +11,7 @@ from ..common.errors import InputError
 from . import bytecode, config_check, others
 from .board_files import fingerprint, survey
 from .config_text import cleaned
-from .connection import Board, Port, Progress, ask, connected, describe, restart
+from .connection import ConnectedBoard, Port, Progress, ask, connected, describe, restart
 from .firmware_files import CONFIG, contents, unfinished
 from .update import Update, plan, refuse_without_room
 
@@ -54,7 +54,7 @@ def flash(
     port: Port,
     replace_config: bool = False,
     progress: Progress | None = None,
-    describe: Callable[[Board, str], str] = describe,
+    describe: Callable[[ConnectedBoard, str], str] = describe,
     compiler: bytecode.Compiler | None = None,
     judge: Callable[[Path, str, str], config_check.Judged] | None = None,
     agree: Callable[[list[str]], None] | None = None,

@@ -100,10 +100,14 @@ def _contents(path: Path) -> Iterator[tuple[str, bytes]]:
 
 def _unpacked_file(path: Path) -> bytes:
     with open_input(path) as file:
-        if path.suffix != ".gz":
-            return _read(file)
-        with gzip.GzipFile(fileobj=file) as unpacked:
-            return _read(unpacked)  # type: ignore[arg-type] - it has read()
+        return _without_gzip(path.name, file)
+
+
+def _without_gzip(name: str, file: IO[bytes]) -> bytes:
+    if not name.endswith(".gz"):
+        return _read(file)
+    with gzip.GzipFile(fileobj=file) as unpacked:
+        return _read(unpacked)  # type: ignore[arg-type] - it has read()
 
 
 def _check_directory(file: IO[bytes], path: Path) -> None:
@@ -133,7 +137,7 @@ def _unpacked(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, path: Path) -> b
         if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise NotImplementedError
         with archive.open(entry) as file:
-            return _read(file)
+            return _without_gzip(entry.filename, file)
     except RuntimeError as error:  # NotImplementedError is one, too
         raise InputError(f"{path} is packed with a password, or in another way: unpack it first") from error
     except (OSError, ValueError) as error:  # an entry that points out of the file

@@ -58,7 +58,7 @@ _SLOWEST_S, _QUICKEST_S = 1.0, 1e-4  # between samples of a recording
 
 
 @dataclass
-class Finding:
+class ColumnFinding:
     """columns: the names in the table. unit: their unit. why: the reason in words. certain: False if the user should
     check it."""
 
@@ -74,7 +74,7 @@ class Findings:
     quantities that are missing, in words. single: columns of single axes, by the keys of REQUIRED, of a sensor that
     lacks another axis. remarks: problems of the existing columns."""
 
-    found: dict[str, Finding] = field(default_factory=dict)
+    found: dict[str, ColumnFinding] = field(default_factory=dict)
     lacking: list[str] = field(default_factory=list)
     single: dict[str, str] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
@@ -133,7 +133,7 @@ def find(sheet: Sheet) -> Findings:
 # Time
 
 
-def _time(sheet: Sheet) -> Finding | None:
+def _time(sheet: Sheet) -> ColumnFinding | None:
     """The column of the time: an increasing one. Of several, the ones with such a name count; of these, the finest."""
     usable = []
     for place, name in enumerate(sheet.columns):
@@ -161,11 +161,11 @@ def _time(sheet: Sheet) -> Finding | None:
     numbers = sheet.numbers(place)
     found = time_unit(sheet.cells[place])
     if stated in ("s", "ms", "us", "ns") and _step_fits(numbers, stated):
-        return Finding([name], stated, f"{name} says {stated}")
+        return ColumnFinding([name], stated, f"{name} says {stated}")
     if found == DATES:
-        return Finding([name], "", "dates or times of day")
+        return ColumnFinding([name], "", "dates or times of day")
     hz = 1.0 / max(_mean_step(numbers) * _SECONDS[found], 1e-9)
-    return Finding([name], found, f"in {found} it is {hz:.3g} samples per second")
+    return ColumnFinding([name], found, f"in {found} it is {hz:.3g} samples per second")
 
 
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -181,7 +181,7 @@ def _step_fits(numbers: Array, name: str) -> bool:
     return _QUICKEST_S / 2.0 < _mean_step(numbers) * _SECONDS[name] < _SLOWEST_S
 
 
-def _seconds(sheet: Sheet, time: Finding | None) -> Array | None:
+def _seconds(sheet: Sheet, time: ColumnFinding | None) -> Array | None:
     """(n) seconds since the first time; None without a time column."""
     if time is None:
         return None
@@ -339,7 +339,7 @@ def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> 
         findings.lacking.append("gyro")
         return
     names = _names(sheet, rates)
-    findings.found["g"] = Finding(names, stated_unit(names[0]), "by name", False)
+    findings.found["g"] = ColumnFinding(names, stated_unit(names[0]), "by name", False)
     if accel is not None:
         found = gyro(accel.values, rates.values, findings.found["a"], seconds, stated_unit(names[0]))
         found.columns = names
@@ -395,7 +395,7 @@ def _gravities() -> dict[str, float]:
     return gravities | {f"counts/{size:g}": size for size in COUNTS_PER_G}
 
 
-def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> Finding:
+def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> ColumnFinding:
     """Find the unit of accelerations (n, 3) from the length of gravity. stated: the unit in their names. The finding's
     columns are empty."""
     length = calm_length(values, seconds)
@@ -405,10 +405,10 @@ def accelerometer(values: Array, seconds: Array | None, stated: str = "") -> Fin
     off = max(length / gravities[near], gravities[near] / length)
     why = f"gravity at rest is {length:.4g} long"
     if stated in gravities and max(length / gravities[stated], gravities[stated] / length) < NEAR:
-        return Finding([], stated, f"{why}, as its name says")
+        return ColumnFinding([], stated, f"{why}, as its name says")
     if near.startswith("counts"):
         why += f": raw counts of a sensor with {near.partition('/')[2]} counts (LSB) per g"
-    return Finding([], near, why, off < NEAR and stated in ("", near, "counts"))
+    return ColumnFinding([], near, why, off < NEAR and stated in ("", near, "counts"))
 
 
 def _are_whole(values: Array) -> bool:
@@ -416,7 +416,7 @@ def _are_whole(values: Array) -> bool:
     return len(good) > 0 and bool(np.all(good == np.rint(good))) and float(np.max(np.abs(good))) > 20.0
 
 
-def gyro(force: Array, rates: Array, accel: Finding, seconds: Array | None, stated: str = "") -> Finding:
+def gyro(force: Array, rates: Array, accel: ColumnFinding, seconds: Array | None, stated: str = "") -> ColumnFinding:
     """Find the unit of rates (n, 3): from the turns of gravity, from their names, otherwise from their size. accel: the
     finding of the accelerometer. The finding's columns are empty."""
     fit = RateFit() if seconds is None else fit_rates(seconds, force, rates)
@@ -425,18 +425,18 @@ def gyro(force: Array, rates: Array, accel: Finding, seconds: Array | None, stat
     if stated in RATES:
         also = f", and so do the turns of gravity: {by_fit}" if by_fit == stated else ""
         against = f", but gravity turns as by {by_fit}" if by_fit not in ("", stated) else ""
-        return Finding([], stated, f"its name says so{also}{against}", not against)
+        return ColumnFinding([], stated, f"its name says so{also}{against}", not against)
     if by_fit:
-        return Finding([], by_fit, "in it the rates turn gravity as it turns")
+        return ColumnFinding([], by_fit, "in it the rates turn gravity as it turns")
     if "deg/s" not in candidates:
         usual = f"counts/{_usual_counts(accel):g}"
-        return Finding(
+        return ColumnFinding(
             [], usual, "raw counts whose range nothing shows: the usual one with this accelerometer's", False
         )
-    return Finding([], *_by_size(rates, force), certain=False)
+    return ColumnFinding([], *_by_size(rates, force), certain=False)
 
 
-def gyro_units(rates: Array, accel: Finding) -> dict[str, float]:
+def gyro_units(rates: Array, accel: ColumnFinding) -> dict[str, float]:
     """The possible units of rates (n, 3), with their factors to deg/s. Counts are possible if the accelerometer has
     counts."""
     if counts_per(accel.unit) and _are_whole(rates):
@@ -444,7 +444,7 @@ def gyro_units(rates: Array, accel: Finding) -> dict[str, float]:
     return dict(RATES)
 
 
-def _usual_counts(accel: Finding) -> float:
+def _usual_counts(accel: ColumnFinding) -> float:
     """Counts per deg/s of an MPU6050 whose accelerometer has this unit: usually both ranges have the same setting."""
     size = counts_per(accel.unit)
     return COUNTS_PER_DPS[COUNTS_PER_G.index(size)] if size in COUNTS_PER_G else COUNTS_PER_DPS[0]
@@ -468,7 +468,7 @@ def _by_size(rates: Array, force: Array) -> tuple[str, str]:
 # Speed and position
 
 
-def _speed(sheet: Sheet) -> Finding | None:
+def _speed(sheet: Sheet) -> ColumnFinding | None:
     for place, name in enumerate(sheet.columns):
         bare = plain(name)
         if re.search(r"speed|velocity|kmh|kph", bare) and not re.search(
@@ -478,16 +478,16 @@ def _speed(sheet: Sheet) -> Finding | None:
                 continue
             stated = stated_unit(name)
             stated = stated if stated in SPEEDS else next((u for w, u in _SPEED_WORDS if w in bare), "")
-            return Finding([name], stated, "by its name", bool(stated))
+            return ColumnFinding([name], stated, "by its name", bool(stated))
     return None
 
 
 _SPEED_WORDS = (("kmh", "km/h"), ("kph", "km/h"), ("mph", "mph"), ("mps", "m/s"), ("knot", "knots"))
 
 
-def _named(sheet: Sheet, words: str) -> Finding | None:
+def _named(sheet: Sheet, words: str) -> ColumnFinding | None:
     for place, name in enumerate(sheet.columns):
         bare = plain(name)
         if re.search(words, bare) and "acc" not in bare and np.any(np.isfinite(sheet.numbers(place))):
-            return Finding([name], "", "by its name")
+            return ColumnFinding([name], "", "by its name")
     return None

@@ -21,11 +21,12 @@ from . import mapped
 from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, sensor_logger, sensorlog, vbo
 from .files import RecordingFile, read_files
 from .join import GAP_NS, join
-from .recording import Recording, Taken
+from .recording import AppRecording, Taken
 from .units import ACCELERATIONS, factor
 
 # Each is a module with NAME, the app's name; find_recordings(files), which returns one list of files per recording of
-# this app; and read(files, name), which returns the Recording of such a list (see recording.py) or raises InputError.
+# this app; and read(files, name), which returns the AppRecording of such a list (see recording.py) or raises
+# InputError.
 # If the module has ASKS, the quantities whose unit the user may give, its function is read(files, name, units). Each
 # module gets the files that no earlier module has claimed. phyphox is last, because it only looks at names of columns.
 _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
@@ -112,7 +113,7 @@ def import_of_app(source: Path) -> Imported | None:
     return _imported(_recording(files, str(source), None, {}), str(source)) if known else None
 
 
-def _imported(recording: Recording, name: str, start_s: float | None = None, end_s: float | None = None) -> Imported:
+def _imported(recording: AppRecording, name: str, start_s: float | None = None, end_s: float | None = None) -> Imported:
     log, damaged = join(recording, name)
     _check_sign(recording, log)
     if damaged:
@@ -140,7 +141,7 @@ def write_imported(path: Path | str, imported: Imported) -> None:
 
 def _recording(
     files: list[RecordingFile], name: str, columns: Mapping[str, str] | None, units: dict[str, str]
-) -> Recording:
+) -> AppRecording:
     found = recordings(files)
     if columns is not None:
         return mapped.read_mapped(mapped.sheet_of(files, name, columns), columns, units)
@@ -180,7 +181,7 @@ def recordings(files: list[RecordingFile]) -> list[tuple[Any, list[RecordingFile
     return found
 
 
-def _check_sign(recording: Recording, log: Log) -> None:
+def _check_sign(recording: AppRecording, log: Log) -> None:
     """Change the sign of an accelerometer if it was uncertain and the track shows that it is mirrored.
 
     A known sign is kept: reading the log gives a remark about it.
@@ -197,7 +198,7 @@ def _check_sign(recording: Recording, log: Log) -> None:
         _note_sign(recording, "-1 g up, by the turns of the track: sign turned")
 
 
-def _note_sign(recording: Recording, sign: str) -> None:
+def _note_sign(recording: AppRecording, sign: str) -> None:
     for taken in recording.accel.taken:
         taken.sign = sign if taken.quantity == "accelerometer" else taken.sign
 

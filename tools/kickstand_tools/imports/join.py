@@ -12,7 +12,7 @@ from ..logs.cells import MOST_DPS, MOST_G, TRACK
 from ..logs.even_times import even_times
 from ..logs.log import Log
 from ..signals import Array, Bools, Ints
-from .recording import Recording, Sensor, Track
+from .recording import AppRecording, ReceiverTrack, RecordedSensor
 
 MOST_MPS = 200.0  # largest speed, and largest degrees of a position
 GAP_NS = LOST_US * 1000  # no interpolation between samples that are further apart
@@ -23,7 +23,7 @@ LATE_STEPS, MOST_LATE = 4.0, 0.02  # and if at most a share of MOST_LATE is late
 MOST_HZ = 10_000.0  # highest rate of an inertial sensor; the fastest have 8,000
 
 
-def join(recording: Recording, name: str) -> tuple[Log, int]:
+def join(recording: AppRecording, name: str) -> tuple[Log, int]:
     """Return the log on the accelerometer's clock, from its first sample, and the number of damaged rows that are left
     out.
 
@@ -51,7 +51,7 @@ def join(recording: Recording, name: str) -> tuple[Log, int]:
     return log, lost
 
 
-def in_order(sensor: Sensor, name: str) -> Sensor:
+def in_order(sensor: RecordedSensor, name: str) -> RecordedSensor:
     """Return the sensor with increasing times; rounded ones are spread evenly. Raises InputError if that is
     impossible."""
     if len(sensor.time_ns) < 2:
@@ -96,7 +96,7 @@ def _damaged(time_ns: Ints) -> Bools:
     return wrong
 
 
-def on_clock(sensor: Sensor, clock_ns: Ints, period_ns: float) -> Array:
+def on_clock(sensor: RecordedSensor, clock_ns: Ints, period_ns: float) -> Array:
     """A sensor's values (n, 3) at the times of another clock (n); NaN outside its own and in its gaps.
 
     Values are interpolated along straight lines. If the sensor is faster than the clock, they are averaged over
@@ -123,7 +123,7 @@ def _between(at: Array, since: Array, values: Array) -> Array:
     return np.interp(at, since[there], values[there], left=np.nan, right=np.nan)
 
 
-def _averaged(sensor: Sensor, over_ns: float) -> Array:
+def _averaged(sensor: RecordedSensor, over_ns: float) -> Array:
     """A sensor's values (n, 3) averaged over over_ns around each."""
     half = round(over_ns / 2.0)
     begin, end = (np.searchsorted(sensor.time_ns, sensor.time_ns + side, side="right") for side in (-half, half))
@@ -134,8 +134,8 @@ def _averaged(sensor: Sensor, over_ns: float) -> Array:
 
 
 def with_gravity(
-    there: Container[str], sensor: Callable[[str], Sensor], name: str, whose: str, remedy: str, none: str
-) -> Sensor:
+    there: Container[str], sensor: Callable[[str], RecordedSensor], name: str, whose: str, remedy: str, none: str
+) -> RecordedSensor:
     """The accelerometer, with gravity. there: the existing ones of "total" (with gravity), "user" (without) and
     "gravity".
 
@@ -152,18 +152,18 @@ def with_gravity(
     user.taken[0].sign = "without gravity: gravity added"
     values = user.values + on_clock(gravity, user.time_ns, _period_ns(user))
     taken = [*user.taken, *gravity.taken]
-    return Sensor(user.name, user.time_ns, values, max(user.damaged, gravity.damaged), taken)
+    return RecordedSensor(user.name, user.time_ns, values, max(user.damaged, gravity.damaged), taken)
 
 
 def _most(accel_g: Array, rates_dps: Array) -> str:
     return f"up to {np.max(np.abs(accel_g)):.3g} g and {np.max(np.abs(np.nan_to_num(rates_dps))):.3g} deg/s"
 
 
-def _period_ns(sensor: Sensor) -> float:
+def _period_ns(sensor: RecordedSensor) -> float:
     return float(np.median(np.diff(sensor.time_ns)))
 
 
-def _on_rows(track: Track | None, time_ns: Ints, utc_ns: int | None) -> dict[str, Any]:
+def _on_rows(track: ReceiverTrack | None, time_ns: Ints, utc_ns: int | None) -> dict[str, Any]:
     """Speed, latitude, longitude and UTC (n each): each value of the track is in the row nearest in time."""
     found = {name: np.full(len(time_ns), np.nan) for name in TRACK}
     if utc_ns is not None:

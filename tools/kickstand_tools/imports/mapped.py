@@ -15,7 +15,7 @@ from .files import RecordingFile
 from .findings import ACCEL, GYRO, OPTIONAL, REQUIRED, Findings
 from .layout import FEWEST_CELLS, joined_sheet, sheet_in
 from .rate_fit import fit_rates, turns_too_far
-from .recording import Recording, Sensor, Sheet, Taken, plain, rate_hz, track_of, unit_in
+from .recording import AppRecording, RecordedSensor, Sheet, Taken, plain, rate_hz, track_of, unit_in
 from .speeds import unit_by_positions
 from .units import (
     ACCELERATIONS,
@@ -45,7 +45,7 @@ _TIMES_OFF = 3.0  # a unit is refused if the turns of gravity show another unit 
 
 
 @dataclass
-class Table:
+class MappedTable:
     """A table of sensors of an unknown app, with its probable columns. joined: True if made of several files."""
 
     name: str
@@ -98,7 +98,7 @@ class Table:
 
 def read_mapped(
     sheet: Sheet, columns: Mapping[str, str], units: Mapping[str, str], why: Findings | None = None
-) -> Recording:
+) -> AppRecording:
     """Read a table with given columns: t, ax to az, gx to gz and optionally speed, lat, lon and temp.
 
     columns: for each of these keys the column's name in the file, or its number as #1, #2 ... units: keys t, a (for ax
@@ -124,14 +124,14 @@ def read_mapped(
     track = track_of(sheet, time_ns, speed, places.get("lat"), places.get("lon"), speed_unit, (lat, lon))
     temp_c = sheet.numbers(places["temp"]) if "temp" in places else None
     utc_ns = 0 if len(time_ns) and int(np.median(time_ns)) > EPOCH_NS else None
-    recording = Recording(NAME, accel, gyro, track, temp_c, notices, utc_ns=utc_ns, sign_known=_turned(units))
+    recording = AppRecording(NAME, accel, gyro, track, temp_c, notices, utc_ns=utc_ns, sign_known=_turned(units))
     if why is not None:
         for taken, key in zip(recording.taken, ("t", "a", "g")):
             taken.why = why.found[key].why
     return recording
 
 
-def table_in(files: list[RecordingFile]) -> Table | None:
+def table_in(files: list[RecordingFile]) -> MappedTable | None:
     """The table in these files; of several that do not belong together, the largest. None if it is not a table of
     sensors."""
     largest = max(files, key=lambda file: len(file.text))
@@ -141,10 +141,10 @@ def table_in(files: list[RecordingFile]) -> Table | None:
         joined = joined_sheet(files)
         of_all = None if joined is None else findings.find(joined)
         if joined and of_all and (found is None or len(of_all.lacking) < len(found.lacking)):
-            return Table(joined.name, joined, of_all, True)
+            return MappedTable(joined.name, joined, of_all, True)
     if sheet is None or found is None or not ({"a", "g"} & set(found.found) or len(sheet.columns) >= len(REQUIRED)):
         return None
-    return Table(largest.name, sheet, found)
+    return MappedTable(largest.name, sheet, found)
 
 
 def sheet_of(files: list[RecordingFile], name: str, columns: Mapping[str, str]) -> Sheet:
@@ -158,7 +158,7 @@ def sheet_of(files: list[RecordingFile], name: str, columns: Mapping[str, str]) 
     return sheet
 
 
-def read_table(table: Table, units: Mapping[str, str]) -> Recording | None:
+def read_table(table: MappedTable, units: Mapping[str, str]) -> AppRecording | None:
     """The recording of a table whose columns and units are certain, or given in units; otherwise None.
 
     Raises InputError.
@@ -170,7 +170,7 @@ def read_table(table: Table, units: Mapping[str, str]) -> Recording | None:
     return read_mapped(table.sheet, found.columns, found.units | dict(units), found)
 
 
-def unknown(files: list[RecordingFile], source: str, table: Table | None = None) -> InputError:
+def unknown(files: list[RecordingFile], source: str, table: MappedTable | None = None) -> InputError:
     """The error for a file of an unknown app: missing columns, its columns, and the command line to type."""
     table = table or table_in(files)
     if table is None:
@@ -207,7 +207,7 @@ def unknown(files: list[RecordingFile], source: str, table: Table | None = None)
     )
 
 
-def _typed(table: Table, key: str) -> str:
+def _typed(table: MappedTable, key: str) -> str:
     """The column of a key as the user types it: its number if its name would be misread, ? for none."""
     name = table.found.get(key, "?")
     if name != "?" and (any(mark in name for mark in ",=") or table.columns.count(name) > 1):
@@ -341,7 +341,7 @@ def _sensor(
     units: Mapping[str, str],
     quantity: str,
     values: Array,
-) -> Sensor:
+) -> RecordedSensor:
     axes = ACCEL if quantity == "accelerometer" else GYRO
     names = [_unit(units, (axis, axis[0]), sheet.columns[places[axis]]) for axis in axes]
     scale = _factors(sheet, places, units, axes)
@@ -349,7 +349,7 @@ def _sensor(
     sign = "as it is" if np.all(scale > 0.0) else "turned" if np.all(scale < 0.0) else "turned in part"
     shown = ", ".join(dict.fromkeys(text.lstrip("-") for text in names))
     hz = rate_hz(time_ns[np.all(np.isfinite(values), axis=1)])
-    return Sensor(quantity, time_ns, values, sheet.left_out, [Taken(quantity, source, shown, hz, sign)])
+    return RecordedSensor(quantity, time_ns, values, sheet.left_out, [Taken(quantity, source, shown, hz, sign)])
 
 
 def _check_units(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, str]) -> None:

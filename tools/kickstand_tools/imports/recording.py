@@ -132,7 +132,7 @@ def rate_hz(time_ns: Nanoseconds) -> float:
 
 
 @dataclass
-class Sensor:
+class RecordedSensor:
     """n samples: time_ns (n) of the recorder's clock, values (n, 3): g, +1 where the axis points up at rest, or deg/s,
     right-handed. name: for messages. damaged: number of rows of its file that are left out, because they have too many
     cells, or a time or value that cannot be read. A row without any value belongs to another sensor. taken: its
@@ -159,16 +159,16 @@ def sensor_of(
     unit: str,
     sign: str,
     turn: float | Array = 1.0,
-) -> Sensor:
+) -> RecordedSensor:
     """Three columns of a sheet. quantity: "accelerometer" or "gyro"; sign: their sign, in words. turn: -1 if a log has
     the opposite sign, one number or one per axis. Raises InputError for an unknown unit."""
     scale = turn * factor(unit, ACCELERATIONS if quantity == "accelerometer" else RATES, sheet.name)
     taken = Taken(quantity, sheet.named(places), unit, rate_hz(time_ns), sign)
-    return Sensor(quantity, time_ns, sheet.table(places) * scale, sheet.left_out, [taken])
+    return RecordedSensor(quantity, time_ns, sheet.table(places) * scale, sheet.left_out, [taken])
 
 
 @dataclass
-class Track:
+class ReceiverTrack:
     """A satellite receiver's m values on the same clock: speed in m/s, degrees north and east; NaN for none."""
 
     time_ns: Nanoseconds
@@ -204,7 +204,7 @@ def track_of(
     lon: int | None,
     speed_unit: str = "m/s",
     per_degree: tuple[float, float] = (1.0, 1.0),
-) -> Track | None:
+) -> ReceiverTrack | None:
     """Speed and position of a sheet, by the numbers of their columns; None if it has neither.
 
     per_degree: factors on latitude and longitude.
@@ -212,7 +212,7 @@ def track_of(
     if speed is None and (lat is None or lon is None):
         return None
     speed_mps = sheet.numbers(speed) * factor(speed_unit, SPEEDS, "speed")
-    track = Track(time_ns, speed_mps, sheet.numbers(lat) * per_degree[0], sheet.numbers(lon) * per_degree[1])
+    track = ReceiverTrack(time_ns, speed_mps, sheet.numbers(lat) * per_degree[0], sheet.numbers(lon) * per_degree[1])
     hz = rate_hz(track.time_ns)
     if speed is not None:
         track.taken.append(Taken("speed", sheet.named([speed]), speed_unit, hz))
@@ -222,7 +222,7 @@ def track_of(
 
 
 @dataclass
-class Recording:
+class AppRecording:
     """app: the app's name. utc_ns: UTC minus the recorder's clock, ns since 1970; None if unknown.
 
     vehicle_axes: True if x already points left, y up and z forward on the vehicle, provided that the logger was mounted
@@ -231,9 +231,9 @@ class Recording:
     """
 
     app: str
-    accel: Sensor
-    gyro: Sensor
-    track: Track | None = None
+    accel: RecordedSensor
+    gyro: RecordedSensor
+    track: ReceiverTrack | None = None
     temp_c: Array | None = None
     notices: list[Notice] = field(default_factory=list)
     utc_ns: int | None = None

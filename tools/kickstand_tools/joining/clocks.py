@@ -14,7 +14,7 @@ from ..common.errors import InputError
 from ..signals import Array, Bools, correlations, log_likelihood_ratio, moving_mean, peaks, rotation_vector
 from .fit import USUAL_DRIFT
 from .match import LEAST_EVIDENCE, LEAST_LEAD, LEAST_S, MOST_DRIFT
-from .motion import STEP_S, Motion
+from .motion import STEP_S, CellMotion
 
 _SMOOTH = 5  # rates are averaged over this many cells, to find their derivatives
 _MOST_DPS = 60.0  # higher rates, caused by jolts, are cut to this
@@ -42,7 +42,7 @@ class Clocks:
         return (a_s - self.later_s) * (1.0 - self.drift)
 
 
-def clocks(a: Motion, b: Motion, axes_a: CalibrationFile, axes_b: CalibrationFile) -> Clocks:
+def clocks(a: CellMotion, b: CellMotion, axes_a: CalibrationFile, axes_b: CalibrationFile) -> Clocks:
     """The Clocks of two recordings. Raises InputError if they are not of one ride, or if that cannot be shown. Callers
     put both names in front of its text."""
     size = [_size(one) for one in (a, b)]
@@ -76,18 +76,18 @@ def clocks(a: Motion, b: Motion, axes_a: CalibrationFile, axes_b: CalibrationFil
     return made
 
 
-def _size(motion: Motion) -> Array:
+def _size(motion: CellMotion) -> Array:
     """(n) the magnitude of the rates minus its mean, deg/s."""
     size = moving_mean(np.minimum(np.linalg.norm(motion.rate_dps, axis=1), _MOST_DPS), _SMOOTH)
     return size - np.mean(size[motion.there])
 
 
-def _along(motion: Motion, axes: Array) -> Array:
+def _along(motion: CellMotion, axes: Array) -> Array:
     """(n, 3) rates about the rows of axes (3, 3), smoothed."""
     return moving_mean(np.clip(motion.rate_dps @ axes.T, -_MOST_DPS, _MOST_DPS), _SMOOTH)
 
 
-def _rotation(a: Motion, b: Motion, later_s: float) -> Array:
+def _rotation(a: CellMotion, b: CellMotion, later_s: float) -> Array:
     """(3, 3): A's axes from B's: the rotation that brings B's rates nearest to A's (Kabsch's algorithm)."""
     both = _valid_at(b, a.t_s - later_s) & a.there
     one, other = _along(a, np.eye(3))[both], _interpolated_at(b.t_s, _along(b, np.eye(3)), a.t_s[both] - later_s)
@@ -95,7 +95,7 @@ def _rotation(a: Motion, b: Motion, later_s: float) -> Array:
     return left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
 
 
-def _fitted(a: Motion, b: Motion, of_a: Array, of_b: Array, later_s: float) -> Clocks:
+def _fitted(a: CellMotion, b: CellMotion, of_a: Array, of_b: Array, later_s: float) -> Clocks:
     """The Clocks, found by Gauss-Newton steps from a rough shift."""
     at_s, drift = a.t_s, 0.0
     derivative = np.gradient(of_b, STEP_S, axis=0)
@@ -125,7 +125,9 @@ def _fitted(a: Motion, b: Motion, of_a: Array, of_b: Array, later_s: float) -> C
     return Clocks(float(later_s), float(drift), _correlation_at(a, b, of_a, of_b, later_s, drift), common_s)
 
 
-def _correlation_at(a: Motion, b: Motion, of_a: Array, of_b: Array, later_s: float, drift: float = 0.0) -> float:
+def _correlation_at(
+    a: CellMotion, b: CellMotion, of_a: Array, of_b: Array, later_s: float, drift: float = 0.0
+) -> float:
     """The correlation of rates (n, 3) and (m, 3) about the same axes."""
     on_b = (a.t_s - later_s) * (1.0 - drift)
     both = _valid_at(b, on_b) & a.there
@@ -134,7 +136,7 @@ def _correlation_at(a: Motion, b: Motion, of_a: Array, of_b: Array, later_s: flo
     return float(np.sum(one * other) / max(np.sqrt(np.sum(one**2) * np.sum(other**2)), 1e-9))
 
 
-def _valid_at(motion: Motion, at_s: Array) -> Bools:
+def _valid_at(motion: CellMotion, at_s: Array) -> Bools:
     place = np.rint(at_s / STEP_S - 0.5).astype(np.int64)
     inside = (place >= 0) & (place < len(motion.there))
     return inside & motion.there[np.clip(place, 0, len(motion.there) - 1)]

@@ -4,7 +4,7 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
 from ..signals import Array, moving_mean
-from .motion import STEP_S, Motion
+from .motion import STEP_S, CellMotion
 from .track import Course, Segments, without_trend
 
 _MOST_SINE = 0.87  # largest sine of the lean; over 60 degrees the speed or the rate is wrong
@@ -16,7 +16,7 @@ class Comparison:
     given: the segments of the track that are within the ride for every shift within margin_s.
     """
 
-    def __init__(self, motion: Motion, course: Course, segments: Segments, shift_s: float, margin_s: float) -> None:
+    def __init__(self, motion: CellMotion, course: Course, segments: Segments, shift_s: float, margin_s: float) -> None:
         begin_s, end_s = segments.begin_s[:, 0] - shift_s, segments.end_s[:, -1] - shift_s
         within = (begin_s > margin_s) & (end_s < motion.seconds - margin_s)
         missing = np.append(0, np.cumsum(~motion.there))
@@ -48,7 +48,7 @@ class Comparison:
         return np.array(means)
 
 
-def _double_sums(motion: Motion, course: Course, shift_s: float) -> Array:
+def _double_sums(motion: CellMotion, course: Course, shift_s: float) -> Array:
     """(n + 1, 6): integrals over time of the rotation (degrees; about up and two axes across it) and of the integrated
     force (m/s; the sensor's axes): their differences are means between two times.
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..signals import Array
 from .compare import Comparison
-from .motion import Motion
+from .motion import CellMotion
 from .track import Course, Segments
 
 AROUND_S = 6.0  # largest distance of the shift from the rough one, including the drift at the ends of the ride
@@ -30,7 +30,7 @@ _STEPS_ALIKE = 4.0  # number of neighbouring steps with the same error, because 
 
 
 @dataclass
-class Fit:
+class TrackFit:
     """shift_s: the track's time at the ride's first sample, s since the track's first point. drift: seconds per second
     that the ride's clock loses. sigma_s: standard deviation of the time of a track point in the ride, at the end of the
     ride where it is larger. correlation: that of the courses' changes. evidence: natural logarithm of the ratio of the
@@ -46,7 +46,7 @@ class Fit:
     segments: int
 
 
-def fitted(motion: Motion, course: Course, segments: Segments, rough_s: float) -> Fit | None:
+def fitted(motion: CellMotion, course: Course, segments: Segments, rough_s: float) -> TrackFit | None:
     """The best fit within AROUND_S of a rough shift. None if the two hardly overlap there."""
     compared = Comparison(motion, course, segments, rough_s, AROUND_S + 1.0)
     if len(compared.given.begin_s) < _FEWEST:
@@ -55,7 +55,7 @@ def fitted(motion: Motion, course: Course, segments: Segments, rough_s: float) -
     return _refine(Comparison(motion, course, segments, shift_s, 2.0), shift_s, drift, evidence)
 
 
-def cost_of_one_shift(motion: Motion, course: Course, segments: Segments, fit: Fit) -> float:
+def cost_of_one_shift(motion: CellMotion, course: Course, segments: Segments, fit: TrackFit) -> float:
     """The reduction of the cost per segment if each segment gets its own shift, in units of an error's cost.
 
     It is under 2 if the track belongs to the ride, and over 4 for the same road at another time.
@@ -121,7 +121,7 @@ class _Step:
     inverse: Array
 
 
-def _refine(compared: Comparison, shift_s: float, drift: float, evidence: float) -> Fit:
+def _refine(compared: Comparison, shift_s: float, drift: float, evidence: float) -> TrackFit:
     """The best fit by Gauss-Newton steps, in each of which outliers are down-weighted."""
     given = compared.given
     forward = _least(compared.sped_up(shift_s, drift), given.speed_mps, given.speed_weight)
@@ -158,7 +158,7 @@ def _step(compared: Comparison, now: Array) -> _Step:
     return _Step(model_deg, pulls, np.asarray(np.linalg.inv(curvature), dtype=float))
 
 
-def _with_sigma(compared: Comparison, evidence: float, now: Array, step: _Step) -> Fit:
+def _with_sigma(compared: Comparison, evidence: float, now: Array, step: _Step) -> TrackFit:
     """The Fit with its standard deviation. Errors within a segment may be correlated. So the variance comes from the
     scatter of the segments' gradients at the solution."""
     given, count, drift = compared.given, len(step.pulls), float(now[1])
@@ -168,7 +168,7 @@ def _with_sigma(compared: Comparison, evidence: float, now: Array, step: _Step) 
     variance = max(float(np.array([1.0, end]) @ covariance @ np.array([1.0, end])) for end in ends_s)
     weight = given.course_weight
     size = np.sqrt((weight * given.turned_deg**2).sum() * (weight * step.model_deg**2).sum())
-    return Fit(
+    return TrackFit(
         (float(now[0]) - drift * compared.middle_s) / (1.0 - drift),
         drift,
         float(np.hypot(np.sqrt(variance), _SAME_TRACK_S)),

@@ -8,8 +8,8 @@ from kickstand.units import STANDARD_GRAVITY
 from ..common.errors import InputError
 from ..refusals import OPPOSITE_SIGN
 from ..signals import Array, Bools, correlations, log_likelihood_ratio, moving_mean, peaks
-from .fit import AROUND_S, Fit, cost_of_one_shift, fitted
-from .motion import STEP_S, Motion
+from .fit import AROUND_S, TrackFit, cost_of_one_shift, fitted
+from .motion import STEP_S, CellMotion
 from .track import LONGEST_S, SLOWEST_MPS, STEPS, Course, Track, course, segments
 
 _GRID_S = 0.5
@@ -45,14 +45,14 @@ class Match:
         return (utc_s - self.start_utc_s) * (1.0 - self.drift)
 
 
-def match(motion: Motion, track: Track) -> Match:
+def match(motion: CellMotion, track: Track) -> Match:
     """The Match of a track with a ride. Raises InputError if the track does not belong to the ride, or if that cannot
     be shown. Callers put both names in front of its text."""
     track = track.once_a_second()
     steps = course(track)
     parts = segments(steps)
     _check_turns(motion, steps)
-    found: list[Fit] = []
+    found: list[TrackFit] = []
     mirrored, rough = _rough_shifts(motion, steps)
     for shift_s in rough:
         fit = fitted(motion, steps, parts, shift_s)
@@ -91,7 +91,7 @@ _LONGER = "a longer ride with more bends is needed, or a track with a point ever
 _OTHER = "is it the track of another ride or another day?"
 
 
-def _check_turns(motion: Motion, steps: Course) -> None:
+def _check_turns(motion: CellMotion, steps: Course) -> None:
     if motion.seconds < LEAST_S:
         raise InputError(f"the ride lasts {motion.seconds:.0f} s: at least {LEAST_S:.0f} s with bends are needed")
     moving_s = float((steps.end_s - steps.begin_s)[steps.good].sum())
@@ -106,7 +106,7 @@ def _check_turns(motion: Motion, steps: Course) -> None:
         raise InputError(f"the ride turns by {turned_deg:.0f} degrees in all: too few bends to tell where it was when")
 
 
-def _rough_shifts(motion: Motion, steps: Course) -> tuple[bool, list[float]]:
+def _rough_shifts(motion: CellMotion, steps: Course) -> tuple[bool, list[float]]:
     """True if the ride would fit better with the opposite sign of yaw; and the shifts that fit best."""
     of_track, track_good = _changes_of_track(steps)
     of_ride, ride_good = _changes_of_ride(motion)
@@ -133,7 +133,7 @@ def _changes_of_track(steps: Course) -> tuple[Array, Bools]:
     return change * np.cos(np.arctan(speed * np.radians(change / _SPAN_S) / STANDARD_GRAVITY)), known
 
 
-def _changes_of_ride(motion: Motion) -> tuple[Array, Bools]:
+def _changes_of_ride(motion: CellMotion) -> tuple[Array, Bools]:
     """The same for the ride: its rotation about its up within _SPAN_S, degrees, and True where it is known."""
     at_s, half = np.arange(0.0, motion.seconds, _GRID_S), _SPAN_S / 2.0
     edges_s = np.arange(len(motion.there) + 1) * STEP_S

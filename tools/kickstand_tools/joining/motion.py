@@ -20,7 +20,7 @@ _LONGEST_S = 100 * 3600.0  # longest ride, limited by memory
 
 
 @dataclass
-class Motion:
+class CellMotion:
     """A ride in n cells of STEP_S from its first sample.
 
     force_g, rate_dps (n, 3): means in the sensor's axes, rates minus the gyro's bias. there (n): False without samples
@@ -51,7 +51,7 @@ class Motion:
         return up / max(float(np.linalg.norm(up)), 1e-9)
 
 
-def motion(ride: Source, progress: Progress | None = None, notices: list[Notice] | None = None) -> Motion:
+def motion(ride: Source, progress: Progress | None = None, notices: list[Notice] | None = None) -> CellMotion:
     """The Motion of a log (see read_log). progress, notices: see read_blocks(). Raises InputError."""
     table, speed, positions = Cells(STEP_S), False, False
     for block in read_blocks(ride, 2, progress, notices):
@@ -69,4 +69,4 @@ def motion(ride: Source, progress: Progress | None = None, notices: list[Notice]
     means = np.vstack((missing, cells.means - np.append(np.zeros(3), np.nanmedian(cells.means[:, 3:], axis=0))))
     there = np.append(missing[:, 0], cells.count) > 0
     means[~there] = 0.0
-    return Motion(means[:, :3], means[:, 3:], there, speed, positions)
+    return CellMotion(means[:, :3], means[:, 3:], there, speed, positions)

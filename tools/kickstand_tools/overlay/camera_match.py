@@ -4,7 +4,7 @@ camera points."""
 import numpy as np
 
 from ..common.errors import InputError
-from ..joining.motion import STEP_S, Motion
+from ..joining.motion import STEP_S, CellMotion
 from ..signals import Array, correlations, log_likelihood_ratio, moving_mean, peak_offset, peaks
 from .gpmf import Telemetry
 
@@ -16,7 +16,7 @@ _LEAST_EVIDENCE, _LEAST_LEAD, _LEAST_CORRELATION = 15.0, 6.0, 0.5
 _APART_S = 2.0
 
 
-def camera_offset_s(ride: Motion, camera: Telemetry) -> tuple[float, float]:
+def camera_offset_s(ride: CellMotion, camera: Telemetry) -> tuple[float, float]:
     """The ride's time at the video's first picture, s since the ride's first sample, and the correlation there.
 
     A camera on the bike turns with the bike. A camera on a helmet also turns with the head, and may not match: then

@@ -25,7 +25,7 @@ def drawings(display: str, shifted: str) -> dict[str, str]:
     }
 
 
-def shifter(board: wiring.Board, display: str) -> str:
+def shifter(board: wiring.DrawnBoard, display: str) -> str:
     """A 5 V display at a board: the level shifter in SDA and SCL, VCC at 5 V. display: an SVG of one."""
     pins = wiring.pin_names(board)
     five = pins["5V"]

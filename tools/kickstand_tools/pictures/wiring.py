@@ -8,7 +8,7 @@ from ..simulated_board import simulator
 from .drawing import AMBER, BLACK, BLUE, RED, Drawing
 
 
-class Board(NamedTuple):
+class DrawnBoard(NamedTuple):
     """A board seen from above. Its pins from the top down: near, the side that faces the modules, and far."""
 
     title: str
@@ -20,7 +20,7 @@ class Board(NamedTuple):
     numbered: bool  # counted from the top down the near side, then up the other
 
 
-PICO = Board(
+PICO = DrawnBoard(
     "Raspberry Pi Pico",
     "pico",
     "GP",
@@ -29,7 +29,7 @@ PICO = Board(
     True,
     True,
 )
-ESP32 = Board(
+ESP32 = DrawnBoard(
     "ESP32-DevKitC",
     "esp32",
     "",
@@ -54,7 +54,7 @@ _CHANNELS = (320, 350)  # x of the two vertical wires to a module
 _GROUND_X, _SUPPLY_X, _OUTSIDE_X, _TOP_Y = 380, 866, 36, 36
 
 
-def connections(board: Board) -> list[tuple[str, dict[str, str]]]:
+def connections(board: DrawnBoard) -> list[tuple[str, dict[str, str]]]:
     """[(module, {its pin: the board's pin})], as draw() draws them."""
     near, far = ({name: row + 1 for row, name in enumerate(side)} for side in (board.near, board.far))
 
@@ -72,12 +72,12 @@ def connections(board: Board) -> list[tuple[str, dict[str, str]]]:
     ]
 
 
-def pin_names(board: Board) -> dict[str, str]:
+def pin_names(board: DrawnBoard) -> dict[str, str]:
     """The names of the board's pins for SDA and SCL of a display, and of the one that has USB's 5 V."""
     return _default_pins(board)["display"] | {"5V": board.far[0] if board.far[0] == "VBUS" else board.far[-1]}
 
 
-def draw(board: Board, display: str) -> str:
+def draw(board: DrawnBoard, display: str) -> str:
     """The drawing of a board with its modules. display: an SVG of a display, for decoration."""
     page = Drawing(_WIDTH, _HEIGHT, mirrored=board.near_is_left)
     pins = _default_pins(board)
@@ -116,7 +116,7 @@ def draw(board: Board, display: str) -> str:
 
 
 def _draw_signals(
-    page: Drawing, board: Board, pins: dict[str, str], places: tuple[int, ...], channels: tuple[int, ...]
+    page: Drawing, board: DrawnBoard, pins: dict[str, str], places: tuple[int, ...], channels: tuple[int, ...]
 ) -> list[str]:
     """A module's wires, in the order of the board's pins, so that they do not cross. That order, as the module's pins.
 
@@ -129,7 +129,7 @@ def _draw_signals(
     return order
 
 
-def _default_pins(board: Board) -> dict[str, dict[str, str]]:
+def _default_pins(board: DrawnBoard) -> dict[str, dict[str, str]]:
     """{module: {pin of the module: name of the board's pin}}, from port.py as it is on this board. Not while another
     simulated board is installed: this one takes its place."""
     with simulator.Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=board.machine):
@@ -164,7 +164,7 @@ def _draw_ground(page: Drawing, pin_y: int) -> None:
     page.disc(_GROUND_X, pin_y, 6, BLACK)
 
 
-def _draw_board(page: Drawing, board: Board, used_near: set[int], used_far: set[int]) -> None:
+def _draw_board(page: Drawing, board: DrawnBoard, used_near: set[int], used_far: set[int]) -> None:
     rows = len(board.near)
     top, height = _FIRST_PIN_Y - 18, _PITCH * (rows - 1) + 36
     middle = (_LEFT + _RIGHT) / 2

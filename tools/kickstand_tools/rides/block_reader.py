@@ -36,7 +36,7 @@ class Place:
 
 
 @dataclass
-class Turn:
+class StoredTurn:
     """One turn of the board's loop: sums of n samples' counts (ax ay az gx gy gz), and the time of the last one."""
 
     time_us: int
@@ -47,7 +47,7 @@ class Turn:
 
 
 @dataclass
-class Block:
+class StoredBlock:
     """One ride block: the fields of its head, and its turns. time_us: time of the last sample before it, since
     power-on. centidegrees: the temperature. delay_tenths_ms: delay of the gyro's low-pass, 0 if the firmware did not
     store it. body: the calibration's bytes. vehicle: that of the board's config.py, "" if unknown; blocks do not
@@ -64,7 +64,7 @@ class Block:
     delay_tenths_ms: int
     body: bytes
     crc: int
-    turns: list[Turn] = field(default_factory=list)
+    turns: list[StoredTurn] = field(default_factory=list)
     vehicle: str = ""
 
     @property
@@ -93,7 +93,7 @@ class Block:
         return found
 
 
-def read(content: bytes) -> tuple[list[Block], list[str]]:
+def read(content: bytes) -> tuple[list[StoredBlock], list[str]]:
     """The whole blocks of a file, and a text about each place without a whole block.
 
     CUT_SHORT, for an incomplete last block, is not damage.
@@ -113,7 +113,7 @@ def read(content: bytes) -> tuple[list[Block], list[str]]:
     return blocks, problems
 
 
-def parse(data: bytes) -> Block:
+def parse(data: bytes) -> StoredBlock:
     """One whole block. Raises BadBlock."""
     if not data.startswith(block_format.MAGIC[: len(data)]):
         raise BadBlock("not of a ride")
@@ -130,7 +130,7 @@ def parse(data: bytes) -> Block:
         raise BadBlock("damaged")
     firmware = firmware.rstrip(b"\0").decode("ascii", "replace")
     fields: list[Any] = [*rest, firmware, delay, data[_HEAD_LENGTH:start], crc]
-    block = Block(*fields)
+    block = StoredBlock(*fields)
     try:
         units = block.accel_lsb_per_g, block.gyro_lsb_tenths, block.sample_hz
         if not all(units) or not all(abs(value) <= _MOST for value in block.numbers()):
@@ -155,7 +155,7 @@ def _places(data: bytes) -> Iterator[tuple[int, Place]]:
         yield entry, Place(lat / _DEGREE, lon / _DEGREE, None if midnight_s is None else midnight_s + day_ms / 1000.0)
 
 
-def _turns(block: Block, data: bytes, count: int, places: dict[int, Place]) -> Iterator[Turn]:
+def _turns(block: StoredBlock, data: bytes, count: int, places: dict[int, Place]) -> Iterator[StoredTurn]:
     """Undo block_format.encode_python. places: by the number of their entry."""
     bits = bin(int.from_bytes(b"\x01" + data, "big"))[3:]
     before = [1] + [0] * (block_format.FIELDS - 1)
@@ -193,7 +193,7 @@ def _turns(block: Block, data: bytes, count: int, places: dict[int, Place]) -> I
             raise ValueError  # time increases, and counts have 16 bits
         now += dt_us
         before[0] = n
-        yield Turn(now, n, tuple(before[2:8]), speed, places.get(entry))
+        yield StoredTurn(now, n, tuple(before[2:8]), speed, places.get(entry))
         speed = None
 
 

@@ -15,9 +15,9 @@ from mpremote.transport import TransportExecError
 from ..common.errors import InputError
 from ..common.output import check_directory, make_directory
 from ..deploy.board_console import BrokenOff, lines
-from ..deploy.connection import Board, Port, Progress, connected, literal, printed, restart
+from ..deploy.connection import ConnectedBoard, Port, Progress, connected, literal, printed, restart
 from . import ride_log
-from .block_reader import CUT_SHORT, Block, missing_note, read
+from .block_reader import CUT_SHORT, StoredBlock, missing_note, read
 
 _SILENT_S = 60  # longest wait for an answer: an emulated board takes a while
 
@@ -130,7 +130,7 @@ def pull(
     return result
 
 
-def _list(transport: Board, name: str) -> tuple[str, str, dict[int, list[_Part]]]:
+def _list(transport: ConnectedBoard, name: str) -> tuple[str, str, dict[int, list[_Part]]]:
     """The directory of the rides, the vehicle in the board's config.py, and the parts of each ride by its number."""
     first, *lines = printed(transport, name, _LIST, "its rides").splitlines() or [b""]
     directory, vehicle = literal(first, (str, str))
@@ -141,11 +141,13 @@ def _list(transport: Board, name: str) -> tuple[str, str, dict[int, list[_Part]]
     return directory, vehicle, {ride: list(group) for ride, group in by_ride}
 
 
-def _pull_ride(transport: Board, number: int, parts: list[_Part], vehicle: str, out: Path, came: _Came) -> PulledRide:
+def _pull_ride(
+    transport: ConnectedBoard, number: int, parts: list[_Part], vehicle: str, out: Path, came: _Came
+) -> PulledRide:
     """Copy a ride and write its log. vehicle: that of the board's config.py. A ride aligned by two poses was a
     motorcycle's."""
     ride = PulledRide(number)
-    blocks: list[Block] = []
+    blocks: list[StoredBlock] = []
     for part in parts:
         title = f"ride {number}, part {part.part}"
         content, whole = _read(transport, part, title, came)
@@ -189,7 +191,7 @@ def _pull_ride(transport: Board, number: int, parts: list[_Part], vehicle: str, 
     return ride
 
 
-def _delete(transport: Board, directory: str, parts: list[_Part]) -> None:
+def _delete(transport: ConnectedBoard, directory: str, parts: list[_Part]) -> None:
     """Remove the parts of one ride, and then empty directories."""
     for part in parts:
         transport.fs_rmfile(part.path)
@@ -215,7 +217,7 @@ def _free_name(log: Path) -> Path:
     return next(path for n in itertools.count(2) if not (path := log.with_name(f"{stem}-{n}.csv.gz")).exists())
 
 
-def _read(transport: Board, part: _Part, title: str, came: _Came) -> tuple[bytes, bool]:
+def _read(transport: ConnectedBoard, part: _Part, title: str, came: _Came) -> tuple[bytes, bool]:
     """A file of the board, and True if all announced bytes arrived as the board read them."""
     content, whole = b"", False
     for attempt in range(_TRIES):
@@ -230,7 +232,7 @@ def _nothing(_what: str, _count: int) -> None:
     """The progress function of a second try, which is not shown."""
 
 
-def _copied(transport: Board, part: _Part, title: str, came: _Came) -> tuple[bytes, bool]:
+def _copied(transport: ConnectedBoard, part: _Part, title: str, came: _Came) -> tuple[bytes, bool]:
     """One attempt of _read()."""
     content = bytearray()
     there = None

@@ -18,8 +18,8 @@ from ..common.errors import InputError
 from ..common.output import check_output, whole_file
 from ..deploy.connection import connected, restart
 from . import ride_log
-from .block_reader import Block
-from .stream import LiveReading, Recording, blocks
+from .block_reader import StoredBlock
+from .stream import LiveReading, StreamLog, blocks
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def record(
             if begin:
                 begin(name)
             stopped = threading.Event()
-            recorded = Recording(stopped, live)
+            recorded = StreamLog(stopped, live)
             notes: list[str] = []
             # The calibration first: if the disk is full at the end, there would be no room for it
             with whole_file(out) as temporary, whole_file(beside) as calibration, _signals(stopped):
@@ -69,7 +69,7 @@ def record(
     return RecordResult(out, beside, recorded.seconds, recorded.count, notes)
 
 
-def _noting_first(blocks: Iterator[Block], calibration: Path) -> Iterator[Block]:
+def _noting_first(blocks: Iterator[StoredBlock], calibration: Path) -> Iterator[StoredBlock]:
     """Yield the blocks. Before the first one, write its calibration to the file `calibration`."""
     for i, block in enumerate(blocks):
         if i == 0:

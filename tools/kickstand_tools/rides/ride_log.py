@@ -8,7 +8,7 @@ import numpy as np
 from ..calibration.file import CalibrationFile, calibration_path, write_calibration
 from ..logs.cells import COLUMNS, TRACK
 from ..logs.csv_lines import write_table
-from .block_reader import Block, Turn
+from .block_reader import StoredBlock, StoredTurn
 
 
 def header(track: Sequence[str]) -> tuple[str, ...]:
@@ -16,7 +16,7 @@ def header(track: Sequence[str]) -> tuple[str, ...]:
     return (*COLUMNS, *track, "temp_c")
 
 
-def rows(blocks: Iterable[Block], track: Sequence[str], from_us: int = 0) -> Iterator[list[str]]:
+def rows(blocks: Iterable[StoredBlock], track: Sequence[str], from_us: int = 0) -> Iterator[list[str]]:
     """One row per turn of the board's loop: the mean of its samples at the time of the last one, in s since from_us.
 
     Values have enough digits to distinguish single counts of the chip. The temperature is in the first row of each
@@ -37,7 +37,7 @@ def rows(blocks: Iterable[Block], track: Sequence[str], from_us: int = 0) -> Ite
             temperature = ""
 
 
-def _track_cells(turn: Turn) -> dict[str, str]:
+def _track_cells(turn: StoredTurn) -> dict[str, str]:
     """The cells of TRACK: the values of the speed source in this turn."""
     cells: dict[str, str] = dict.fromkeys(TRACK, "")
     if turn.speed_mps is not None:
@@ -48,7 +48,7 @@ def _track_cells(turn: Turn) -> dict[str, str]:
     return cells
 
 
-def calibration(block: Block) -> CalibrationFile:
+def calibration(block: StoredBlock) -> CalibrationFile:
     """The calibration used for the lean on the display, with notes on board and chip."""
     c = block.calibration()
     notes = {"firmware": block.firmware, "who_am_i": f"{block.who_am_i:#04x}", "sample_hz": block.sample_hz}
@@ -69,7 +69,7 @@ def calibration(block: Block) -> CalibrationFile:
     )
 
 
-def write(path: Path, blocks: list[Block]) -> Path:
+def write(path: Path, blocks: list[StoredBlock]) -> Path:
     """Write NAME.csv.gz (or .csv) and NAME.cal.json beside it, whose path is returned."""
     turns = [turn for block in blocks for turn in block.turns]
     there = {

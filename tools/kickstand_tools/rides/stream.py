@@ -13,11 +13,11 @@ from kickstand.lean.meter import FALLEN_DEG
 from ..calibration.file import CalibrationFile
 from ..common.errors import InputError, cause
 from ..deploy.board_console import BrokenOff, lines
-from ..deploy.connection import Board, refuse_unfit_firmware
+from ..deploy.connection import ConnectedBoard, refuse_unfit_firmware
 from ..logs.cells import TRACK
 from ..replay.replay_engine import NO_SPEED, Replay
 from . import ride_log
-from .block_reader import BadBlock, Block, missing_note, parse
+from .block_reader import BadBlock, StoredBlock, missing_note, parse
 
 # Runs the app with display and button, and sends its turns over USB. Ctrl-C ends it.
 _START = """
@@ -61,7 +61,7 @@ class LiveReading:
     seconds: float
 
 
-class Recording:
+class StreamLog:
     """Writes blocks to a log. stopped: an event that is set if the log must end, which ends the stream. live: called
     with each block's LiveReading. A log that can no longer be written ends there, with a note.
 
@@ -70,13 +70,13 @@ class Recording:
 
     def __init__(self, stopped: threading.Event, live: Callable[[LiveReading], None] | None = None) -> None:
         self._stopped = stopped
-        self.first: Block | None = None
+        self.first: StoredBlock | None = None
         self.seconds = 0.0
         self.count = 0
         self.written = False
         self._live = live
 
-    def write(self, file: TextIOBase, blocks: Iterator[Block], notes: list[str]) -> None:
+    def write(self, file: TextIOBase, blocks: Iterator[StoredBlock], notes: list[str]) -> None:
         """Write all blocks as they arrive. notes: a line is appended for each gap. Raises InputError if there is no
         block."""
         missing, expected = 0, 0
@@ -141,7 +141,7 @@ class Recording:
             notes.append(missing_note(missing_s))
 
 
-def blocks(transport: Board, name: str, notes: list[str], stopped: threading.Event) -> Iterator[Block]:
+def blocks(transport: ConnectedBoard, name: str, notes: list[str], stopped: threading.Event) -> Iterator[StoredBlock]:
     """Yield the whole blocks that the board sends, until `stopped` is set or the connection is lost. name: the port's.
     notes: a line with the reason for the end is appended. Raises InputError."""
     parts: list[bytes] = []
@@ -160,7 +160,7 @@ def blocks(transport: Board, name: str, notes: list[str], stopped: threading.Eve
         parts = []
 
 
-def _lines(transport: Board, name: str, notes: list[str], stopped: threading.Event) -> Iterator[bytes]:
+def _lines(transport: ConnectedBoard, name: str, notes: list[str], stopped: threading.Event) -> Iterator[bytes]:
     """Yield the lines that the app on the board prints."""
     try:
         yield from lines(transport, _START, _SILENT_S, stopped)

@@ -33,7 +33,7 @@ class Leg:
 
 
 @dataclass
-class Commands:
+class RiderCommands:
     """Signals of n samples each, in s, m, m/s, rad. phase: index into `phases` of each sample."""
 
     rate_hz: float
@@ -51,7 +51,7 @@ class Commands:
     phases: list[str]
 
 
-def commands(legs: list[Leg], rate_hz: float) -> Commands:
+def commands(legs: list[Leg], rate_hz: float) -> RiderCommands:
     """The signals of successive legs from t = 0. The ride starts with the values of the first leg."""
     ends = np.cumsum([leg.seconds for leg in legs])
     starts = ends - [leg.seconds for leg in legs]
@@ -75,7 +75,7 @@ def commands(legs: list[Leg], rate_hz: float) -> Commands:
 
     phases = list(dict.fromkeys(leg.phase for leg in legs))
     which = np.searchsorted(ends, time, side="right").clip(0, len(legs) - 1)
-    return Commands(
+    return RiderCommands(
         rate_hz,
         time,
         speed,

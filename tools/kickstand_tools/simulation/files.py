@@ -12,7 +12,7 @@ from ..common.errors import InputError
 from ..common.output import check_directory, make_directory, whole_file
 from ..logs.cells import COLUMNS, TRACK
 from .profiles import check_profile
-from .ride import Ride, ride
+from .ride import SimulatedRide, ride
 
 _LOG = (*COLUMNS, "temp_c")
 _FORMATS = ["%.3f", *["%.6f"] * 6, "%.2f"]
@@ -30,7 +30,7 @@ def simulate(
     *,
     speed: bool = False,
     **conditions: Any,
-) -> Ride:
+) -> SimulatedRide:
     """Simulate a ride of exactly this length and write it to out_dir. conditions: see ride.ride. Raises InputError.
 
     Logs: POSE_1.csv to POSE_7.csv (the last one slanted), SIX.csv (seven poses in one log, with the turns between
@@ -54,14 +54,14 @@ def simulate(
     return made
 
 
-def _cut(made: Ride, seconds: float) -> Ride:
+def _cut(made: SimulatedRide, seconds: float) -> SimulatedRide:
     """The first seconds of a ride."""
     n = min(len(made.time), round(seconds * made.rate_hz))
     truth = {name: values[:n] for name, values in made.truth.items()}
     return replace(made, time=made.time[:n], readings=made.readings[:n], truth=truth, phase=made.phase[:n])
 
 
-def write_poses(directory: Path, made: Ride) -> tuple[list[Path], Path, Path]:
+def write_poses(directory: Path, made: SimulatedRide) -> tuple[list[Path], Path, Path]:
     """Write the seven poses, the kickstand pose and the upright one. Returns their paths in this order."""
     seven = [directory / f"POSE_{k}.csv" for k in range(1, 8)]
     pair = directory / "KICKSTAND.csv", directory / "UPRIGHT.csv"
@@ -74,7 +74,7 @@ def _write_readings(path: Path, readings: NDArray, rate_hz: float) -> None:
     _write(path, _LOG, _FORMATS, _log(np.arange(len(readings)) / rate_hz, readings))
 
 
-def positions(made: Ride) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def positions(made: SimulatedRide) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Latitude, longitude (degrees north and east) and Universal Time (s since 1970) of each reading, by integrating
     the true speed and yaw rate."""
     course = np.cumsum(np.radians(made.truth["yaw_rate_dps"])) / made.rate_hz  # rad from east, > 0 to the left
@@ -97,7 +97,7 @@ def _write(path: Path, names: Iterable[str], formats: list[str], table: NDArray,
             print(form % tuple(row), *more, sep=",", file=file)
 
 
-def write_ride(path: Path, made: Ride, speed: bool) -> None:
+def write_ride(path: Path, made: SimulatedRide, speed: bool) -> None:
     """Write its log. speed: with a speed and a position once per second."""
     log = _log(made.time, made.readings)
     if not speed:
@@ -108,6 +108,6 @@ def write_ride(path: Path, made: Ride, speed: bool) -> None:
     _write(path, (*_LOG, *TRACK), _FORMATS, log, cells)
 
 
-def _write_truth(path: Path, made: Ride) -> None:
+def _write_truth(path: Path, made: SimulatedRide) -> None:
     table = np.column_stack((made.time, *made.truth.values()))
     _write(path, ("t_s", *made.truth, "phase"), ["%.3f", *["%.4f"] * len(made.truth)], table, made.phase.tolist())

@@ -8,7 +8,7 @@ from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
 from . import hands, poses
-from .commands import Commands, commands
+from .commands import RiderCommands, commands
 from .physics.bike import Bike, roll, weave
 from .physics.chip import DIVIDER, RATE_HZ, Chip
 from .physics.engine import vibration
@@ -25,7 +25,7 @@ _IMPACT_G = 4.0  # peak of the impact at the end of a fall
 
 
 @dataclass
-class Ride:
+class SimulatedRide:
     """A simulated ride: the sensor's readings and the truth.
 
     poses, kickstand, upright, readings: each (n, 7) at rate_hz, in the chip's order: force (g), temperature (C), rate
@@ -67,7 +67,7 @@ def ride(
     mount: str | None = None,
     dive: tuple[float, float] | None = None,
     exact: bool = False,
-) -> Ride:
+) -> SimulatedRide:
     """Simulate a ride of about this length; a profile and a seed always give the same one.
 
     upright_error_deg: lean of the bike to the right in the upright pose. pitch_change_deg: pitch on the kickstand minus
@@ -129,7 +129,7 @@ def ride(
     lean = -chance.uniform(8.0, 15.0)
     seven = poses.seven(chance, chip, home_c)
     start_c = conditions.start_c
-    return Ride(
+    return SimulatedRide(
         RATE_HZ / DIVIDER,
         seven,
         poses.standing(chance, chip, mounting, lean, nose + change, start_c, held=False),
@@ -166,7 +166,7 @@ def random_rotation(chance: np.random.Generator) -> NDArray[np.float64]:
 
 
 def _motion(
-    chance: np.random.Generator, command: Commands, bike: Bike, conditions: Conditions
+    chance: np.random.Generator, command: RiderCommands, bike: Bike, conditions: Conditions
 ) -> tuple[Motion, Shaking]:
     n, rate = len(command.time), command.rate_hz
     command.crosswind += conditions.gust_mps2 * band_noise(chance, n, 0.05, 0.5, rate)
@@ -201,7 +201,7 @@ def _rough(chance: np.random.Generator, plan: Plan, conditions: Conditions, roug
         leg.bank_deg = (leg.bank_deg or 0.0) + float(chance.normal(0.0, _CAMBER_DEG))
 
 
-def _slip(chance: np.random.Generator, command: Commands, conditions: Conditions) -> NDArray[np.float64]:
+def _slip(chance: np.random.Generator, command: RiderCommands, conditions: Conditions) -> NDArray[np.float64]:
     """(n) m/s^2 to the left: the tyres slip and grip again, so the bike does not move exactly where it points."""
     if not conditions.slip_deg:
         return np.zeros(len(command.time))
@@ -214,7 +214,7 @@ def _sideways(lean: NDArray[np.float64], left: NDArray[np.float64]) -> NDArray[n
     return np.column_stack((left * np.cos(lean), -left * np.sin(lean), np.zeros_like(left)))
 
 
-def _places(command: Commands, phase: str, spacing_m: float) -> list[float]:
+def _places(command: RiderCommands, phase: str, spacing_m: float) -> list[float]:
     """The multiples of spacing_m at which the ride is in this phase."""
     if phase not in command.phases:
         return []
@@ -222,7 +222,7 @@ def _places(command: Commands, phase: str, spacing_m: float) -> list[float]:
     return sorted({float(k) * spacing_m for k in np.floor(met / spacing_m)})
 
 
-def _impact(chance: np.random.Generator, command: Commands) -> NDArray[np.float64]:
+def _impact(chance: np.random.Generator, command: RiderCommands) -> NDArray[np.float64]:
     """The impact at the end of a fall: (n, 3), m/s^2."""
     force = np.zeros((len(command.time), 3))
     if "lying" in command.phases:

@@ -39,7 +39,7 @@ _LEFT_OUT = ("/tests/", "/f2py/", "/random/", "/distutils/", "/testing/", "/incl
 _LICENCES = "info/licenses/"
 
 
-class _Finder(ModuleFinder):
+class _ToolsFinder(ModuleFinder):
     """Finds modules of kickstand_tools alone: where it is installed, other packages are beside it."""
 
     def find_module(self, name: str, path: Any, parent: Any = None) -> Any:
@@ -51,7 +51,7 @@ class _Finder(ModuleFinder):
 def tools(*modules: str) -> dict[str, Path]:
     """{path below the tools: file} of these modules of kickstand_tools, as "web/device.py", and of all that they
     import of it, also within functions; with the templates and scripts beside them."""
-    finder = _Finder([str(firmware_path.TOOLS)])
+    finder = _ToolsFinder([str(firmware_path.TOOLS)])
     for name in modules:
         finder.import_hook("kickstand_tools." + name.removesuffix(".py").replace("/", "."))
     found = {Path(path) for module in finder.modules.values() if (path := vars(module)["__file__"])}

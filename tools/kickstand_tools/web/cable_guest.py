@@ -17,7 +17,7 @@ from ..rides import pull as pulling, ride_log, stream
 from .serial_guest import BrowserBoard
 
 
-class Live:
+class LiveStream:
     """A board's stream, watched and kept."""
 
     def __init__(self):
@@ -33,7 +33,7 @@ class Live:
         Returns JSON: {"notes": lines on what is missing, "changed": the log ended because of another calibration} or
         {"refused": why}. What came until then is in files().
         """
-        self._recording = stream.Recording(self._stopped, lambda reading: live(json.dumps(vars(reading))))
+        self._recording = stream.StreamLog(self._stopped, lambda reading: live(json.dumps(vars(reading))))
         notes = []
         try:
             with connected(BrowserBoard(line, name)) as (transport, _):

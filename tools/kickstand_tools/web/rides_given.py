@@ -24,7 +24,7 @@ class GivenRide:
     files: list[str]
     calibration: str = ""
     track: str = ""
-    table: mapped.Table | None = None
+    table: mapped.MappedTable | None = None
 
 
 @dataclass

@@ -77,7 +77,7 @@ def rides(given, names):
     return {"rides": rides, "kinds": found.kinds, "why": refused}
 
 
-def asked_for(table: mapped.Table) -> dict[str, Any]:
+def asked_for(table: mapped.MappedTable) -> dict[str, Any]:
     """What the page asks about a table: {"columns": all, "keys": [[key, words, is it needed, column that seems to be
     it or ""], ...], "units": [[key, words, [[unit, words], ...], the one that seems right, why], ...],
     "lacking": what is not found, in words, "certain": nothing that is needed is uncertain, "picture":

@@ -4,7 +4,7 @@ import time
 
 from pyodide.ffi import run_sync  # waits for what JavaScript promises
 
-from ..deploy.connection import ANSWER_S, Board
+from ..deploy.connection import ANSWER_S, ConnectedBoard
 
 _POLL_S = 0.002
 _GONE = "nothing comes any more"
@@ -52,7 +52,7 @@ class Port:
         run_sync(self._line.sleep(1000 * seconds))
 
 
-class BrowserBoard(Board):
+class BrowserBoard(ConnectedBoard):
     """The board at a SerialLine that is open. name: of its port, for messages."""
 
     def __init__(self, line, name):

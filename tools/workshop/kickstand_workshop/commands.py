@@ -85,7 +85,7 @@ def _given(option: str) -> bool:
     return click.get_current_context().get_parameter_source(option) is click.core.ParameterSource.COMMANDLINE
 
 
-def _faults(jobs: list[integrity.Job], out: Path | None, as_json: bool) -> None:
+def _faults(jobs: list[integrity.FaultJob], out: Path | None, as_json: bool) -> None:
     """What `evaluate --faults` does."""
     if out is not None:
         picture.check()

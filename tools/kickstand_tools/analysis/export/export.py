@@ -17,7 +17,7 @@ from ...logs.source import Progress
 from ...signals import Array
 from ..channels import Channels, downsampled, rounded_to
 from ..ride import Ride
-from ..track import Track, joined, track
+from ..track import LogTrack, joined, track
 from . import export_columns, export_gpx, export_racechrono, export_vbo
 
 STEP_S = {"csv": 0.0, "gpx": 0.0, "parquet": 0.0, "racechrono": 0.001, "vbo": 0.01}  # the finest time that two hold
@@ -110,7 +110,7 @@ class _Whole:
     start_s: float
     seconds: float
     speeds: Array
-    places: Track
+    places: LogTrack
     utc_s: float | None
 
 

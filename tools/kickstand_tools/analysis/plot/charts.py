@@ -73,7 +73,7 @@ class Bars:
 
 
 @dataclass
-class Cells:
+class CellMap:
     """A map of n x n cells between the edges (n + 1) of both axes: darker for larger values. values (n, n): rows along
     y, 0 for nothing."""
 
@@ -82,7 +82,7 @@ class Cells:
     name: str
 
 
-Trace = Line | Sides | Dots | Bars | Cells
+Trace = Line | Sides | Dots | Bars | CellMap
 
 
 @dataclass
@@ -234,7 +234,7 @@ def _g_against_g(seen: Overview, lateral: Array, forward: Array) -> Chart:
     edges = np.arange(-bins, bins + 1, dtype=float) * GG_BIN_G
     moving = seen.course.resting < 0.5
     counts = np.histogram2d(forward[moving], -lateral[moving], bins=(edges, edges))[0]
-    cells = Cells(edges, counts * spacing_s(seen.course), "seconds")
+    cells = CellMap(edges, counts * spacing_s(seen.course), "seconds")
     angle = np.linspace(0.0, 2.0 * np.pi, 100)
     rings = [Line(r * np.cos(angle), r * np.sin(angle), GUIDE_COLOUR) for r in np.arange(0.5, edges[-1] + 0.01, 0.5)]
     span = (float(edges[0]), float(edges[-1]))

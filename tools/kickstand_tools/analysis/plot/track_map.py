@@ -11,7 +11,7 @@ import numpy as np
 
 from ...signals import EARTH_M, Array, Ints
 from ..overview import Overview
-from ..track import Track, track
+from ..track import LogTrack, track
 from .charts import LEFT_COLOUR, RIGHT_COLOUR, SPEED_COLOUR, lean_limit, shown_lean_deg
 from .interactive import PAPER, plain
 
@@ -115,7 +115,7 @@ def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
     return {"data": [track_line, {"type": "scattergl", "mode": "markers", "hoverinfo": "none"} | at], "layout": layout}
 
 
-def _times(places: Track, seconds: float) -> Array:
+def _times(places: LogTrack, seconds: float) -> Array:
     """The times of the points: at most POINTS, evenly over the ride."""
     first, last = float(places.t_s[0]), min(seconds, float(places.t_s[-1]))
     count = int(np.clip((last - first) / SHORTEST_S, 1, POINTS)) + 1

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...common.errors import InputError
 from ..files import RecordingFile
-from ..recording import Recording, names_in, plain, read_sheet, sensor_of, track_of, unit_in
+from ..recording import AppRecording, names_in, plain, read_sheet, sensor_of, track_of, unit_in
 from ..units import SPEEDS, unit
 
 NAME = "AiM"
@@ -23,7 +23,7 @@ def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     return [[file] for file in files if "AiM CSV File" in file.text[:200]]
 
 
-def read(files: list[RecordingFile], name: str) -> Recording:
+def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a missing column or sensor."""
     lines = [names_in(line) for line in files[0].text.split("\n", 60)[:60]]
     header = next(
@@ -60,4 +60,4 @@ def read(files: list[RecordingFile], name: str) -> Recording:
     if speed_unit not in SPEEDS:
         raise InputError(f"{name}: the unit of {plain(sheet.columns[speed or 0])} is not known: {speed_unit!a}")
     track = track_of(sheet, time_ns, speed, sheet.place("GPS Latitude"), sheet.place("GPS Longitude"), speed_unit)
-    return Recording(NAME, accel, gyro, track, vehicle_axes=True)
+    return AppRecording(NAME, accel, gyro, track, vehicle_axes=True)

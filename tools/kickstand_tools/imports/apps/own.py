@@ -12,7 +12,7 @@ from ...common.errors import InputError, extra
 from ...logs.cells import COLUMNS
 from ...logs.csv_reader import MOST_CELLS
 from ..files import RecordingFile
-from ..recording import Recording, Sheet, names_in, read_sheet, sensor_of, track_of
+from ..recording import AppRecording, Sheet, names_in, read_sheet, sensor_of, track_of
 from ..units import EPOCH_NS, Nanoseconds
 
 NAME = "Kickstand"
@@ -26,7 +26,7 @@ def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     return [[file] for file in files if _is_ours(file)]
 
 
-def read(files: list[RecordingFile], name: str) -> Recording:
+def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a replay's output, which does not contain all readings."""
     sheet = _sheet(files[0])
     time_ns = sheet.times(sheet.columns.index("t_s"))
@@ -45,7 +45,7 @@ def read(files: list[RecordingFile], name: str) -> Recording:
     temp_c = sheet.numbers(sheet.place("temp_c"))
     from_1970 = bool(len(time_ns)) and float(np.median(time_ns)) > EPOCH_NS
     utc_ns = 0 if from_1970 else _utc_ns(sheet, time_ns)
-    return Recording(NAME, accel, gyro, track, temp_c, utc_ns=utc_ns, vehicle_axes=bool(no_log))
+    return AppRecording(NAME, accel, gyro, track, temp_c, utc_ns=utc_ns, vehicle_axes=bool(no_log))
 
 
 def _utc_ns(sheet: Sheet, time_ns: Nanoseconds) -> int | None:

@@ -15,7 +15,18 @@ from ...common.errors import InputError
 from ...logs.csv_reader import as_text
 from ..files import RecordingFile
 from ..join import with_gravity
-from ..recording import Recording, Sensor, Sheet, Track, names_in, plain, read_sheet, sensor_of, track_of, unit_in
+from ..recording import (
+    AppRecording,
+    ReceiverTrack,
+    RecordedSensor,
+    Sheet,
+    names_in,
+    plain,
+    read_sheet,
+    sensor_of,
+    track_of,
+    unit_in,
+)
 from ..units import ACCELERATIONS, EPOCH_NS, RATES, Nanoseconds, of_seconds, unit
 
 NAME = "phyphox"
@@ -33,10 +44,10 @@ def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     return [group for group in by_folder.values() if any(_is_ours(file) for file in group)]
 
 
-def read(files: list[RecordingFile], name: str) -> Recording:
+def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a missing column or sensor."""
-    found: dict[str, Sensor] = {}
-    track: Track | None = None
+    found: dict[str, RecordedSensor] = {}
+    track: ReceiverTrack | None = None
     pauses = _Pauses(files)
     for file in files:
         if not _is_ours(file):
@@ -50,7 +61,7 @@ def read(files: list[RecordingFile], name: str) -> Recording:
     accel = with_gravity(found, found.__getitem__, name, "acceleration", remedy, none)
     if "gyro" not in found:
         raise InputError(f"{name}: no gyroscope: add it to the experiment, and give all files of the export")
-    return Recording(NAME, accel, found["gyro"], track, utc_ns=pauses.utc_ns)
+    return AppRecording(NAME, accel, found["gyro"], track, utc_ns=pauses.utc_ns)
 
 
 def _is_meta(file: RecordingFile) -> bool:
@@ -66,7 +77,7 @@ def _is_ours(file: RecordingFile) -> bool:
     return any(match and unit(match[3]) in ACCELERATIONS | RATES for match in known) or "latitude" in map(plain, first)
 
 
-def _sensors(sheet: Sheet, stem: str, pauses: "_Pauses") -> Iterator[tuple[str, Sensor]]:
+def _sensors(sheet: Sheet, stem: str, pauses: "_Pauses") -> Iterator[tuple[str, RecordedSensor]]:
     """Yield the sensors of one file, each with its kind. The time of a sensor is in the column before it."""
     groups: dict[tuple[int, str, str], dict[str, int]] = {}
     time_place = 0
@@ -92,7 +103,7 @@ def _kind(what: str) -> str:
     return "user" if _WITHOUT_GRAVITY in what or "without g" in what else "total"
 
 
-def _location(sheet: Sheet, pauses: "_Pauses") -> Track | None:
+def _location(sheet: Sheet, pauses: "_Pauses") -> ReceiverTrack | None:
     lat, lon = sheet.place("Latitude"), sheet.place("Longitude")
     speed = sheet.place("Velocity", "Speed")
     if lat is None and speed is None:

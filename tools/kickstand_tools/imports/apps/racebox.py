@@ -12,7 +12,7 @@ from kickstand.errors import Notice
 
 from ...common.errors import InputError
 from ..files import RecordingFile
-from ..recording import Recording, names_in, plain, read_sheet, sensor_of, track_of, unit_in
+from ..recording import AppRecording, names_in, plain, read_sheet, sensor_of, track_of, unit_in
 from ..speeds import unit_by_positions
 from ..units import SPEEDS, factor, unit
 
@@ -26,7 +26,7 @@ def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     return [[file] for file in files if _header(file) is not None]
 
 
-def read(files: list[RecordingFile], name: str, units: Mapping[str, str] = {}) -> Recording:
+def read(files: list[RecordingFile], name: str, units: Mapping[str, str] = {}) -> AppRecording:
     """Read a recording. units: "speed" is the unit of the column Speed; without it the positions show the unit. Raises
     InputError for a missing column and for a unit that is not one of speed."""
     said = units.get("speed", "")
@@ -53,7 +53,7 @@ def read(files: list[RecordingFile], name: str, units: Mapping[str, str] = {}) -
             notices.append(Notice("import-speed-unit", sheet.columns[speed]))
             speed = None
     track = track_of(sheet, time_ns, speed, lat, lon, speed_unit or "m/s")
-    return Recording(NAME, accel, gyro, track, notices=notices, utc_ns=0, vehicle_axes=True)
+    return AppRecording(NAME, accel, gyro, track, notices=notices, utc_ns=0, vehicle_axes=True)
 
 
 def _header(file: RecordingFile) -> int | None:

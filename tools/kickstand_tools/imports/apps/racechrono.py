@@ -9,7 +9,7 @@ Kickstand's own export has this form, too.
 
 from ...common.errors import InputError
 from ..files import RecordingFile
-from ..recording import Recording, names_in, plain, read_sheet, sensor_of, track_of
+from ..recording import AppRecording, names_in, plain, read_sheet, sensor_of, track_of
 
 NAME = "RaceChrono"
 _FIRST = "This file is created using RaceChrono"
@@ -21,7 +21,7 @@ def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     return [[file] for file in files if file.text[:200].lstrip().startswith(_FIRST)]
 
 
-def read(files: list[RecordingFile], name: str) -> Recording:
+def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a missing column or sensor."""
     lines = files[0].text.split("\n", 60)[:60]  # with blank ones, because line numbers count them
     header = next((k for k, line in enumerate(lines) if _is_header(line)), None)
@@ -43,7 +43,7 @@ def read(files: list[RecordingFile], name: str) -> Recording:
     accel_unit, rate_unit = units.get(accel[0], "g").lower(), units.get(gyro[0], "deg/s").lower()
     up = "left, up, forward" if by_kickstand else "+1 g up"
     speed = next((place for place, column in enumerate(sheet.columns) if _is_speed(column)), None)
-    return Recording(
+    return AppRecording(
         NAME,
         sensor_of(sheet, time_ns, accel, "accelerometer", accel_unit, up),
         sensor_of(sheet, time_ns, gyro, "gyro", rate_unit, "right-handed"),

@@ -10,7 +10,7 @@ import re
 from ...common.errors import InputError
 from ..files import RecordingFile
 from ..join import with_gravity
-from ..recording import Recording, Sensor, names_in, read_sheet, sensor_of
+from ..recording import AppRecording, RecordedSensor, names_in, read_sheet, sensor_of
 
 NAME = "Sensor Kinetics"
 _HEAD = ["time", "x_value", "y_value", "z_value"]
@@ -29,11 +29,11 @@ def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     return list(alike.values())
 
 
-def read(files: list[RecordingFile], name: str) -> Recording:
+def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a missing column or sensor."""
     by_kind = {_KINDS.get(_parts(file)[1], ""): file for file in files}
 
-    def sensor(kind: str) -> Sensor:
+    def sensor(kind: str) -> RecordedSensor:
         sheet = read_sheet(by_kind[kind])
         what = ("gyro", "rad/s", "right-handed") if kind == "gyro" else ("accelerometer", "m/s2", _UP)
         return sensor_of(sheet, sheet.times(0), [1, 2, 3], *what)
@@ -43,7 +43,7 @@ def read(files: list[RecordingFile], name: str) -> Recording:
     accel = with_gravity(by_kind, sensor, name, "linear acceleration", remedy, f"no accelerometer: {give}")
     if "gyro" not in by_kind:
         raise InputError(f"{name}: no gyroscope: {give}")
-    return Recording(NAME, accel, sensor("gyro"), sign_known=False)
+    return AppRecording(NAME, accel, sensor("gyro"), sign_known=False)
 
 
 def _parts(file: RecordingFile) -> tuple[str, str]:

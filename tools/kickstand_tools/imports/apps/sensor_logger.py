@@ -9,7 +9,7 @@ Frames" was on.
 from ...common.errors import InputError
 from ..files import RecordingFile
 from ..join import with_gravity
-from ..recording import Recording, Sensor, names_in, read_sheet, sensor_of, track_of
+from ..recording import AppRecording, RecordedSensor, names_in, read_sheet, sensor_of, track_of
 
 NAME = "Sensor Logger"
 _TOTAL, _RAW, _USER, _GRAVITY = "totalacceleration", "accelerometeruncalibrated", "accelerometer", "gravity"
@@ -23,7 +23,7 @@ def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     return [[file for file in files if file.folder == folder] for folder in folders]
 
 
-def read(files: list[RecordingFile], name: str) -> Recording:
+def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a missing column or sensor."""
     by_stem = {file.stem: file for file in files}
     apple, standard = _platform(by_stem)
@@ -35,7 +35,7 @@ def read(files: list[RecordingFile], name: str) -> Recording:
         )
     up = "iPhone, -1 g up: sign turned" if turned else "+1 g up, standardised" if apple else "Android, +1 g up"
 
-    def acceleration(kind: str) -> Sensor:
+    def acceleration(kind: str) -> RecordedSensor:
         stem = next(stem for stem in _KINDS[kind] if stem in by_stem)
         raw = turned and stem == _RAW
         return _sensor(by_stem[stem], "accelerometer", "g" if raw else "m/s2", up, -1.0 if turned else 1.0)
@@ -53,7 +53,7 @@ def read(files: list[RecordingFile], name: str) -> Recording:
         time_ns = sheet.times(sheet.place("time") or 0, "ns")
         speed, lat, lon = (sheet.place(column) for column in ("speed", "latitude", "longitude"))
         track = track_of(sheet, time_ns, speed, lat, lon)
-    return Recording(NAME, accel, _sensor(gyro_file, "gyro", "rad/s", "right-handed"), track, utc_ns=0)
+    return AppRecording(NAME, accel, _sensor(gyro_file, "gyro", "rad/s", "right-handed"), track, utc_ns=0)
 
 
 def _is_ours(file: RecordingFile) -> bool:
@@ -71,7 +71,7 @@ def _platform(by_stem: dict[str, RecordingFile]) -> tuple[bool | None, bool]:
     return (False, False) if _TOTAL in by_stem else (None, False)  # only Android has that file
 
 
-def _sensor(file: RecordingFile, quantity: str, unit: str, sign: str, turn: float = 1.0) -> Sensor:
+def _sensor(file: RecordingFile, quantity: str, unit: str, sign: str, turn: float = 1.0) -> RecordedSensor:
     sheet = read_sheet(file)
     places, missing = sheet.axes("time", "x", "y", "z")
     if missing:

@@ -10,7 +10,17 @@ import numpy as np
 from ...common.errors import InputError
 from ..files import RecordingFile
 from ..join import with_gravity
-from ..recording import Recording, Sensor, Sheet, Track, names_in, plain, read_sheet, sensor_of, track_of
+from ..recording import (
+    AppRecording,
+    ReceiverTrack,
+    RecordedSensor,
+    Sheet,
+    names_in,
+    plain,
+    read_sheet,
+    sensor_of,
+    track_of,
+)
 from ..units import NO_TIME, REPEATED, Nanoseconds
 
 NAME = "SensorLog"
@@ -28,18 +38,18 @@ def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     return [[file] for file in files if _is_ours(file)]
 
 
-def read(files: list[RecordingFile], name: str) -> Recording:
+def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a missing column or sensor."""
     sheet = read_sheet(files[0])
     places = {kind: _places(sheet, names) for kind, (_, names) in _KINDS.items()}
 
-    def acceleration(kind: str) -> Sensor:
+    def acceleration(kind: str) -> RecordedSensor:
         return sensor_of(sheet, _clock(sheet, _KINDS[kind][0]), places[kind], "accelerometer", "g", _UP, -1.0)
 
     there = [kind for kind, columns in places.items() if columns]
     remedy = "log the accelerometer, or gravity beside the user's acceleration"
     accel = with_gravity(there, acceleration, name, "acceleration", remedy, f"no acceleration: {remedy}")
-    return Recording(NAME, accel, _gyro(sheet, name), _location(sheet), utc_ns=_utc_ns(sheet))
+    return AppRecording(NAME, accel, _gyro(sheet, name), _location(sheet), utc_ns=_utc_ns(sheet))
 
 
 def _is_ours(file: RecordingFile) -> bool:
@@ -66,7 +76,7 @@ def _times(sheet: Sheet, sensor: str) -> Nanoseconds:
     return sheet.times(place)
 
 
-def _gyro(sheet: Sheet, name: str) -> Sensor:
+def _gyro(sheet: Sheet, name: str) -> RecordedSensor:
     for sensor, names in (("gyro", _GYRO), ("motion", _RATE)):
         places = _places(sheet, names)
         if places:
@@ -88,7 +98,7 @@ def _utc_ns(sheet: Sheet) -> int | None:
     return int(np.median(written[both] - own[both])) if np.any(both) else None
 
 
-def _location(sheet: Sheet) -> Track | None:
+def _location(sheet: Sheet) -> ReceiverTrack | None:
     """The positions and speeds. A fix is new in a row if its own time has changed."""
     row_ns = _times(sheet, "accelerometer" if _places(sheet, _ACCEL) else "motion")
     fix = sheet.place("locationTimestamp_since1970")

@@ -14,7 +14,7 @@ import numpy as np
 from ...common.errors import InputError
 from ...logs.csv_reader import columns_of
 from ..files import RecordingFile
-from ..recording import Recording, Sheet, plain, sensor_of, track_of
+from ..recording import AppRecording, Sheet, plain, sensor_of, track_of
 from ..units import ACCELERATIONS, RATES, SPEEDS, of_day, unit
 
 NAME = "VBO"
@@ -50,7 +50,7 @@ def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     return [[file] for file in files if "[column names]" in file.text[:20000].lower() and "[data]" in file.text]
 
 
-def read(files: list[RecordingFile], name: str) -> Recording:
+def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a missing section or column."""
     sections = _sections(files[0])
     sheet = _sheet(files[0].name, sections)
@@ -84,7 +84,7 @@ def read(files: list[RecordingFile], name: str) -> Recording:
     )
     for taken in track.taken if track else []:
         taken.unit = "minutes, west positive" if taken.quantity == "position" else taken.unit
-    return Recording(
+    return AppRecording(
         NAME,
         sensor_of(sheet, time_ns, places[:3], "accelerometer", accel_unit, up),
         sensor_of(sheet, time_ns, places[3:], "gyro", rate_unit, turned, turn),

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
-from ..commands import Commands
+from ..commands import RiderCommands
 from .signals import Signal, band_noise, derivative, second_order, smoothed, smoothstep
 
 _STEERING_S = 0.04  # smoothing of the steering, because its rate is limited
@@ -88,7 +88,7 @@ def chassis_lean(balance: Signal, bike: Bike, bank: Signal | float = 0.0, hang: 
     return balance + flank - np.arctan2(hang, arm)
 
 
-def weave(chance: np.random.Generator, command: Commands, riding_deg: float) -> Signal:
+def weave(chance: np.random.Generator, command: RiderCommands, riding_deg: float) -> Signal:
     """Random changes of the lean by the rider, rad.
 
     riding_deg: rms at speed. The changes are larger at walking pace and small with the feet down. In bends the rider's
@@ -103,7 +103,7 @@ def weave(chance: np.random.Generator, command: Commands, riding_deg: float) -> 
     return np.radians(moving + feet) + wander
 
 
-def roll(command: Commands, bike: Bike, unrest: Signal) -> Roll:
+def roll(command: RiderCommands, bike: Bike, unrest: Signal) -> Roll:
     """Lean and yaw rate for the commanded lean. The yaw rate p is the one that fulfils the pendulum's roll equation:
 
     pendulum * b'' = g_n sin b + ((1 + wheels) v p + wind) cos b

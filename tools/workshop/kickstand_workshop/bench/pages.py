@@ -24,7 +24,7 @@ RUNS = 3
 _PAINT = "performance.getEntriesByName('first-contentful-paint')[0].startTime"
 
 
-class Figures(NamedTuple):
+class PageFigures(NamedTuple):
     """Of a page that is opened for the first time. size: of the files that it has asked for until it is ready, as a
     server compresses them, bytes."""
 
@@ -33,7 +33,7 @@ class Figures(NamedTuple):
     size: int
 
 
-def measure(browser: Any, address: str, files: dict[str, bytes], name: str) -> Figures:
+def measure(browser: Any, address: str, files: dict[str, bytes], name: str) -> PageFigures:
     """name: one of READY. address, files: of a server of the site."""
     context = browser.new_context(service_workers="block", **PHONE)
     asked: set[str] = set()
@@ -44,7 +44,7 @@ def measure(browser: Any, address: str, files: dict[str, bytes], name: str) -> F
     page.wait_for_selector(READY[name])
     ready_ms = page.evaluate("performance.now()")
     size = sum(len(gzip.compress(files[path or "index.html"])) for path in asked if (path or "index.html") in files)
-    found = Figures(page.evaluate(_PAINT), ready_ms, size)
+    found = PageFigures(page.evaluate(_PAINT), ready_ms, size)
     context.close()
     return found
 

@@ -17,7 +17,7 @@ from kickstand_tools.common.errors import InputError
 from kickstand_tools.replay.replay_engine import NO_SPEED, Replay
 from kickstand_tools.simulation.physics.mount import MOUNTS
 from kickstand_tools.simulation.physics.road import CLASSES
-from kickstand_tools.simulation.ride import Ride, ride
+from kickstand_tools.simulation.ride import SimulatedRide, ride
 from numpy.typing import NDArray
 
 from .faults import FAULTS, SEEN, Fault, Ill, apply
@@ -39,7 +39,7 @@ ERROR_EDGES = np.array([0.0, 1.0, 2.0, 3.0, 5.0, WRONG_DEG, 12.0, 20.0, 40.0, 18
 
 
 @dataclass(frozen=True)
-class Job:
+class FaultJob:
     """A ride of this seed with a fault, or with none. road, mount: as for simulation.ride.ride(). profile: None for the
     seed's own of PROFILES. device: on the whole device, not on the meter alone."""
 
@@ -88,7 +88,7 @@ class Outcome:
     None for the others. diagram: seconds, a row for each of CLAIMS, by ERROR_EDGES.
     """
 
-    job: Job
+    job: FaultJob
     misleading_s: float
     longest_s: float
     available: float
@@ -104,7 +104,7 @@ def stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
-def judge(job: Job, trace: Trace) -> Outcome:
+def judge(job: FaultJob, trace: Trace) -> Outcome:
     """What a rider saw of it."""
     step = float(np.median(np.diff(trace.time)))
     off = int(np.argmax(trace.speed > 0.5)) if (trace.speed > 0.5).any() else 0
@@ -142,7 +142,9 @@ def _first(time: Array, mask: NDArray[np.bool_]) -> float:
 
 
 @lru_cache(maxsize=4)
-def _made(profile: str, seed: int, seconds: float, road: str | None, mount: str | None) -> tuple[Ride, CalibrationFile]:
+def _made(
+    profile: str, seed: int, seconds: float, road: str | None, mount: str | None
+) -> tuple[SimulatedRide, CalibrationFile]:
     made = ride(profile, seed, seconds, road=road, mount=mount)
     try:
         return made, calibrated_by_poses(made)
@@ -150,7 +152,7 @@ def _made(profile: str, seed: int, seconds: float, road: str | None, mount: str 
         return made, calibrated_by_poses(replace(made, poses=made.poses[:6]))
 
 
-def follow(job: Job) -> Trace:
+def follow(job: FaultJob) -> Trace:
     """The job's ride, as it was shown."""
     made, calibration = _made(
         job.profile or PROFILES[job.seed % len(PROFILES)], job.seed, job.seconds, job.road, job.mount
@@ -159,7 +161,7 @@ def follow(job: Job) -> Trace:
     return of(job, made.readings, made.rate_hz, calibration, made.truth["lean_deg"], made.truth["speed_mps"])
 
 
-def _ill(job: Job, readings: Array, rate_hz: float, calibration: CalibrationFile) -> Ill:
+def _ill(job: FaultJob, readings: Array, rate_hz: float, calibration: CalibrationFile) -> Ill:
     """The readings with the job's fault in them."""
     if not job.fault:
         return Ill(readings, np.zeros(len(readings), dtype=bool), 0, len(readings))
@@ -168,7 +170,7 @@ def _ill(job: Job, readings: Array, rate_hz: float, calibration: CalibrationFile
 
 
 def device_trace_of(
-    job: Job, readings: Array, rate_hz: float, calibration: CalibrationFile, true: Array, speed: Array
+    job: FaultJob, readings: Array, rate_hz: float, calibration: CalibrationFile, true: Array, speed: Array
 ) -> Trace:
     """trace_of() of the whole device, an entry for each tenth of a second; sigma is NaN."""
     ill = _ill(job, readings, rate_hz, calibration)
@@ -186,7 +188,7 @@ def device_trace_of(
 
 
 def trace_of(
-    job: Job, readings: Array, rate_hz: float, calibration: CalibrationFile, true: Array, speed: Array
+    job: FaultJob, readings: Array, rate_hz: float, calibration: CalibrationFile, true: Array, speed: Array
 ) -> Trace:
     """The firmware's meter alone, without the driver, over any ride: readings (n, 7) in the chip's order, true lean (n,
     degrees) and speed (n, m/s)."""
@@ -223,24 +225,26 @@ def trace_of(
     return Trace(time, lean, sigma, shown, true[last], speed[last], named_s, first / rate_hz, end / rate_hz)
 
 
-def run(job: Job) -> Outcome:
+def run(job: FaultJob) -> Outcome:
     """follow() and judge()."""
     return judge(job, follow(job))
 
 
-def jobs(seeds: int, first_seed: int = 0, seconds: float = 120.0, device: bool = False) -> list[Job]:
+def jobs(seeds: int, first_seed: int = 0, seconds: float = 120.0, device: bool = False) -> list[FaultJob]:
     """A ride of each seed with no fault, on good and bad mounts and roads, and one with each fault. device: all on the
     whole device; else those are whose fault the driver sees."""
     numbers = range(first_seed, first_seed + seeds)
     conditions: list[tuple[str | None, str | None]] = [(None, None), *[(None, road) for road in CLASSES]]
     conditions += [(mount, None) for mount in MOUNTS]
-    sound = [Job(None, seed, seconds, road, mount, device=device) for mount, road in conditions for seed in numbers]
+    sound = [
+        FaultJob(None, seed, seconds, road, mount, device=device) for mount, road in conditions for seed in numbers
+    ]
     return sound + [
-        Job(fault, seed, seconds, device=device or fault.kind == SEEN) for fault in FAULTS for seed in numbers
+        FaultJob(fault, seed, seconds, device=device or fault.kind == SEEN) for fault in FAULTS for seed in numbers
     ]
 
 
-def evaluate(jobs: list[Job], done: Callable[[], None] = lambda: None) -> list[Outcome]:
+def evaluate(jobs: list[FaultJob], done: Callable[[], None] = lambda: None) -> list[Outcome]:
     """run() for each job, on all processors, in the order of the jobs. done(): called after each."""
 
     def ride_of(k: int) -> tuple[int | str, ...]:

@@ -25,7 +25,7 @@ _UNKNOWN = "--"
 
 
 @dataclass
-class Summary:
+class FaultSummary:
     """All rides of one fault. misleading_s, most_s: mean and largest. available: share. hidden_s, named_s: medians, NaN
     where it never was; hidden, named: shares of the rides. recovered: share, NaN of a fault that does not end."""
 
@@ -42,7 +42,7 @@ class Summary:
     recovered: float
 
 
-def summaries(outcomes: list[Outcome]) -> list[Summary]:
+def summaries(outcomes: list[Outcome]) -> list[FaultSummary]:
     """In the order in which the faults first come."""
     groups: dict[tuple[str, str], list[Outcome]] = {}
     for outcome in outcomes:
@@ -51,11 +51,11 @@ def summaries(outcomes: list[Outcome]) -> list[Summary]:
     return [_summary(kind, title, rides) for (kind, title), rides in groups.items()]
 
 
-def _summary(kind: str, title: str, rides: list[Outcome]) -> Summary:
+def _summary(kind: str, title: str, rides: list[Outcome]) -> FaultSummary:
     misleading = np.array([o.misleading_s for o in rides])
     hidden, named = (np.array([getattr(o, f"{name}_after_s") for o in rides]) for name in ("hidden", "named"))
     recovered = [o.recovered for o in rides if o.recovered is not None]
-    return Summary(
+    return FaultSummary(
         kind,
         title,
         len(rides),

@@ -15,7 +15,7 @@ _STRAIGHT_DPS, _STRAIGHT_DEG, _STRAIGHT_MPS, _STRAIGHT_S = 2.0, 6.0, 5.0, 1.0
 
 
 @dataclass
-class Score:
+class LeanScore:
     """Errors in degrees. slope: shown over true lean. lag: > 0 if shown late. NaN where not observable."""
 
     rms_deg: float
@@ -66,7 +66,7 @@ def straights(truth: dict[str, NDArray], rate_hz: float) -> NDArray[np.bool_]:
     return since > _STRAIGHT_S * rate_hz
 
 
-def score(shown: NDArray, truth: dict[str, NDArray], rate_hz: float) -> Score:
+def score(shown: NDArray, truth: dict[str, NDArray], rate_hz: float) -> LeanScore:
     """Score a shown lean (N, degrees) from setting off to the end of the ride, or all of it if it never sets off.
 
     truth: (N,) each of lean_deg, speed_mps, yaw_rate_dps.
@@ -77,7 +77,7 @@ def score(shown: NDArray, truth: dict[str, NDArray], rate_hz: float) -> Score:
     error = (shown - true)[first:]
     late = straights(truth, rate_hz)
     late[: round(0.9 * len(late))] = False
-    return Score(
+    return LeanScore(
         rms(error),
         float(np.percentile(np.abs(error), 95.0)),
         float(np.max(np.abs(error))),

@@ -18,7 +18,7 @@ from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
 from kickstand_tools.replay.replay import replay
 from kickstand_tools.simulation.physics.chip import CALIBRATED_C, GYRO_DPS_PER_G
-from kickstand_tools.simulation.ride import Ride
+from kickstand_tools.simulation.ride import SimulatedRide
 from numpy.typing import NDArray
 
 NAME = "possible"
@@ -37,7 +37,7 @@ _ORACLE = {
 }
 
 
-def oracle(made: Ride) -> NDArray[np.float64]:
+def oracle(made: SimulatedRide) -> NDArray[np.float64]:
     """(N,) lean in degrees: the least error that a filter on this sensor can be asked for."""
     readings, chip = made.readings, made.chip
     warm = (readings[:, 3] - CALIBRATED_C)[:, None]
@@ -58,7 +58,7 @@ def _knowing() -> Iterator[None]:
         yield
 
 
-def gps_lean(made: Ride, rate_hz: float) -> NDArray[np.float64]:
+def gps_lean(made: SimulatedRide, rate_hz: float) -> NDArray[np.float64]:
     """(N,) lean in degrees as apps show it: atan(speed x change of course / g), held until the next position."""
     time, truth = made.time, made.truth
     chance = np.random.default_rng(len(time))
@@ -74,6 +74,6 @@ def gps_lean(made: Ride, rate_hz: float) -> NDArray[np.float64]:
     return lean[np.searchsorted(at, time, side="right").clip(1) - 1]
 
 
-def leans(made: Ride) -> dict[str, NDArray[np.float64]]:
+def leans(made: SimulatedRide) -> dict[str, NDArray[np.float64]]:
     """By name: the oracle's lean, and the GPS formula's at each of GPS_HZ."""
     return {NAME: oracle(made), **{f"GPS {rate_hz:g} Hz": gps_lean(made, rate_hz) for rate_hz in GPS_HZ}}

@@ -37,7 +37,7 @@ class RealScore:
 
 
 @dataclass
-class Comparison:
+class RecordingScores:
     """name: of the recording's file. scores: by estimator.
 
     traces: (N,) each: "time" in s; "reference" and each estimator's lean in degrees, > 0 to the right. notices: what is
@@ -50,7 +50,7 @@ class Comparison:
     notices: list[Notice] = field(default_factory=list)
 
 
-def compare(path: Path) -> Comparison:
+def compare(path: Path) -> RecordingScores:
     """Run every estimator over a recorded ride with speed. Raises InputError if it cannot be used."""
     log = read_log(path)
     speed, calibration = _speed(log), fit_ride(log).calibration
@@ -63,7 +63,7 @@ def compare(path: Path) -> Comparison:
         for name, lean in shown.items()
     }
     notices = [*log.notices, *remarks(log, calibration, axes=False)]
-    return Comparison(path.name, scores, {"time": time, "reference": reference, **shown}, notices)
+    return RecordingScores(path.name, scores, {"time": time, "reference": reference, **shown}, notices)
 
 
 def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64]:

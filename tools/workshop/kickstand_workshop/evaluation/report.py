@@ -11,7 +11,7 @@ from rich import box
 from rich.table import Table
 
 from . import picture, possible
-from .metrics import Score
+from .metrics import LeanScore
 from .real_ride import RealScore
 from .runs import Evaluation, Result
 
@@ -25,7 +25,7 @@ CAPTION = (
 _UNKNOWN = "--"
 
 
-def pooled(scores: list[Score]) -> dict[str, float]:
+def pooled(scores: list[LeanScore]) -> dict[str, float]:
     """One estimator's scores on one profile, pooled over the seeds: degrees, lag in ms. NaN where not observable."""
     rms = np.array([s.rms_deg for s in scores])
     slopes, lags, biases = (
@@ -128,7 +128,7 @@ def write(evaluation: Evaluation, directory: Path) -> tuple[Path, Path]:
     return figures, drawing
 
 
-def _scores(scores: Mapping[str, Score | RealScore]) -> dict[str, dict[str, float]]:
+def _scores(scores: Mapping[str, LeanScore | RealScore]) -> dict[str, dict[str, float]]:
     """The file's entries in degrees have no unit in their names."""
     return {name: {key.removesuffix("_deg"): value for key, value in asdict(s).items()} for name, s in scores.items()}
 

@@ -15,11 +15,11 @@ from kickstand_tools.calibration.procedure import fit_procedure
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs.log import Log
 from kickstand_tools.simulation.profiles import check_profile
-from kickstand_tools.simulation.ride import Ride, ride
+from kickstand_tools.simulation.ride import SimulatedRide, ride
 from numpy.typing import NDArray
 
 from . import estimators, possible, real_ride
-from .metrics import Score, score
+from .metrics import LeanScore, score
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Result:
     """
 
     job: Job
-    scores: dict[str, Score] = field(default_factory=dict)
+    scores: dict[str, LeanScore] = field(default_factory=dict)
     traces: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     refusal: str | None = None
 
@@ -60,7 +60,7 @@ class Evaluation:
     """results: of the simulated rides, by profile, then by seed. recorded: of the recorded ride, None without one."""
 
     results: list[Result]
-    recorded: real_ride.Comparison | None
+    recorded: real_ride.RecordingScores | None
 
 
 def evaluate(jobs: list[Job], recording: Path | None = None, done: Callable[[], None] = lambda: None) -> Evaluation:
@@ -104,25 +104,25 @@ def on_all_processors(function: Callable, jobs: list, chunk: int = 1, ordered: b
         yield from (pool.imap if ordered else pool.imap_unordered)(function, jobs, chunk)
 
 
-def calibrated_by_poses(made: Ride) -> CalibrationFile:
+def calibrated_by_poses(made: SimulatedRide) -> CalibrationFile:
     """`kickstand calibrate six` and `two` over the ride's poses, each a log of its own. Raises InputError."""
     seven = [Log.from_readings(pose, made.rate_hz, f"POSE_{k}.csv") for k, pose in enumerate(made.poses, 1)]
     return _aligned(made, fit_six_positions(seven).calibration)
 
 
-def calibrated_by_log(made: Ride) -> CalibrationFile:
+def calibrated_by_log(made: SimulatedRide) -> CalibrationFile:
     """`kickstand calibrate six` over one log of the whole procedure, as the board does it, and `two`. Raises
     InputError."""
     return _aligned(made, fit_procedure(Log.from_readings(made.procedure, made.rate_hz, "SIX.csv")).calibration)
 
 
-def _aligned(made: Ride, six: CalibrationFile) -> CalibrationFile:
+def _aligned(made: SimulatedRide, six: CalibrationFile) -> CalibrationFile:
     kickstand = Log.from_readings(made.kickstand, made.rate_hz, "KICKSTAND.csv")
     upright = Log.from_readings(made.upright, made.rate_hz, "UPRIGHT.csv")
     return fit_two_positions(kickstand, upright, six).calibration
 
 
-def as_log(made: Ride) -> Log:
+def as_log(made: SimulatedRide) -> Log:
     """The ride as if read from its file."""
     readings = made.readings
     return Log(made.time, readings[:, :3], readings[:, 4:], temperature_c=readings[:, 3], name="RIDE.csv")

@@ -3,7 +3,7 @@
 import io
 import re
 
-from kickstand_tools.demo.demo import Device
+from kickstand_tools.demo.demo import DeviceProcess
 from kickstand_tools.demo.score import State
 from kickstand_tools.demo.screen import WIDTH, screen
 from rich._export_format import CONSOLE_SVG_FORMAT
@@ -32,7 +32,7 @@ def draw() -> str:
 
 def _state() -> State:
     """The device's tick at MOMENT_S."""
-    with Device("cpython", "script", 0.0) as device:
+    with DeviceProcess("cpython", "script", 0.0) as device:
         while not device.ended:
             for state in device.ticks(1.0):
                 if state["t_s"] >= MOMENT_S:

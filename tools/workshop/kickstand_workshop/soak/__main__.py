@@ -4,7 +4,7 @@ import sys
 
 import click
 
-from .soak import Figures, soak
+from .soak import Tallies, soak
 
 _WORST = {
     "wrong_s": "longest time of a lean over 10 degrees wrong, s",
@@ -15,7 +15,7 @@ _WORST = {
 }
 
 
-def table(figures: Figures) -> str:
+def table(figures: Tallies) -> str:
     """As Markdown."""
     rows = [
         ("simulated time", f"{figures.hours:.1f} h in {figures.host_s / 60:.0f} minutes, seed {figures.seed}"),

@@ -32,7 +32,7 @@ MAX_GROWTH = 3000  # blocks of memory from the second minute of a trip to its en
 
 
 @dataclass
-class Figures:
+class Tallies:
     """Tallies of what was tried, and the worst figures. found: a line for each broken invariant."""
 
     seed: int
@@ -53,7 +53,7 @@ class Figures:
         self.worst[name] = max(self.worst.get(name, 0.0), value)
 
 
-class Bike:
+class SoakBoard:
     """A board with its sensor and its config.py. flash: the directory that stands for its flash."""
 
     def __init__(self, chance: random.Random, flash: Path) -> None:
@@ -87,14 +87,14 @@ class Bike:
         self.store().save(calibration)
 
 
-def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: None) -> Figures:
+def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: None) -> Tallies:
     """Run trips until they add up to so many hours of the board's time. say: called with its progress, each hour of it.
 
     The same seed gives the same trips. It works in a directory of its own, which is gone afterwards."""
-    figures = Figures(seed)
+    figures = Tallies(seed)
     begun, said_h = time.monotonic(), 0.0
     chance = random.Random(seed)
-    bike: Bike | None = None
+    bike: SoakBoard | None = None
     before = os.getcwd()
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -103,7 +103,7 @@ def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: 
                     flash = Path(folder, str(figures.trips))
                     flash.mkdir()
                     os.chdir(flash)
-                    bike = Bike(chance, flash)
+                    bike = SoakBoard(chance, flash)
                     with _board_of(bike, None):
                         bike.do_six_positions()
                 assert bike
@@ -117,7 +117,7 @@ def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: 
     return figures
 
 
-def _board_of(bike: Bike, trip: Trip | None) -> Board:
+def _board_of(bike: SoakBoard, trip: Trip | None) -> Board:
     world = bike.part.world(trip.ride.motion) if trip else (lambda t_s: (0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
     board = Board(world)
     if trip:
@@ -132,7 +132,7 @@ def _board_of(bike: Bike, trip: Trip | None) -> Board:
     return board
 
 
-def _run(bike: Bike, trip: Trip, figures: Figures) -> None:
+def _run(bike: SoakBoard, trip: Trip, figures: Tallies) -> None:
     """One trip, from power-on to power-off, and what was found in it."""
     board = _board_of(bike, trip)
     readings = 0
@@ -191,7 +191,7 @@ def _blocks() -> int:
     return sys.getallocatedblocks()
 
 
-def _check_calibration(bike: Bike, watch: Watch, figures: Figures) -> None:
+def _check_calibration(bike: SoakBoard, watch: Watch, figures: Tallies) -> None:
     """After a power cut at whatever moment there is the old calibration or a new one, never none."""
     calibration = bike.store().load()
     if bike.aligned and not calibration.aligned:
@@ -203,7 +203,7 @@ def _check_calibration(bike: Bike, watch: Watch, figures: Figures) -> None:
     bike.aligned = calibration.aligned
 
 
-def _count(figures: Figures, trip: Trip, watch: Watch, lasted_s: float, saves_cut: int) -> None:
+def _count(figures: Tallies, trip: Trip, watch: Watch, lasted_s: float, saves_cut: int) -> None:
     figures.trips += 1
     figures.hours += lasted_s / 3600
     figures.rides[trip.kind] += 1

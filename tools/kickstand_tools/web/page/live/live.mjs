@@ -16,7 +16,7 @@ const gauge = new Gauge(byId("gauge"));
 const chart = new Chart(byId("chart"));
 const player = new Player();
 const guests = loadOnce(async () => (await python(true)).pyimport("kickstand_tools.web.cable_guest")); // no board is posed here
-let live; // the Live of cable_guest.py that runs, or null
+let live; // the LiveStream of cable_guest.py that runs, or null
 let stopped = false;
 let awake = null; // a WakeLockSentinel
 let aligned = false;
@@ -41,7 +41,7 @@ async function start() {
     player.restart();
     furthest = [0, 0];
     tell("The board starts …");
-    live = guest.Live();
+    live = guest.LiveStream();
     said = JSON.parse(await overCable(port, tell, (line, name) => live.run.callPromising(line, name, received), again));
     keep(live);
     live = null;
