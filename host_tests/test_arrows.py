@@ -72,7 +72,7 @@ TOOL_ARROWS = {
     "checks": {"common", "signals", "logs.cells", "logs.log", "calibration.file"},
     "calibration": {"common", "signals", "logs", "checks.units"},
     "estimation": {"common", "signals", "logs", "checks", "calibration.file"},
-    "replay": {"common", "signals", "refusals", "logs", "calibration.file"},
+    "replay": {"common", "signals", "logs", "calibration.file"},
     "imports": {"common", "signals", "logs", "checks", "estimation.first_guess"},
     "joining": {"common", "signals", "logs", "calibration.file", "estimation", "replay"},
     "analysis": {
@@ -138,6 +138,7 @@ TOOL_ARROWS = {
     },
     "kickstand_fleet": {
         "checks.bends",
+        "checks.sensor",
         "common",
         "signals",
         "logs",

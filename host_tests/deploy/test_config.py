@@ -39,7 +39,7 @@ def test_installed_package_uses_config_of_the_current_folder(board, tmp_path, mo
     (package / "firmware" / "main.py").write_text("")
     (tmp_path / "mine").mkdir()
     monkeypatch.chdir(tmp_path / "mine")
-    monkeypatch.setattr(firmware_path, "__file__", str(package / "common" / "firmware_path.py"))
+    monkeypatch.setattr(firmware_path, "TOOLS", package.parent)
     said = command.works("flash", "--config").out
     assert f"config.py is {package / 'firmware' / 'config.py'}\n" in said
     assert "to change settings, copy that file into a folder of yours" in said

@@ -75,7 +75,7 @@ class PageRing:
 
     def _own_page(self):
         self.name = "own"
-        return self.own[self._own_at]()
+        return self.own[self._own_at or 0]()
 
     def lines(self, now_ms):
         if self._own_at is not None:

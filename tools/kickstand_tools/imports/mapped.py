@@ -125,7 +125,7 @@ def read_mapped(
     temp_c = sheet.numbers(places["temp"]) if "temp" in places else None
     utc_ns = 0 if len(time_ns) and int(np.median(time_ns)) > EPOCH_NS else None
     recording = AppRecording(
-        NAME, accel, gyro, track, temp_c, notices, utc_ns=utc_ns, sign_known=_sign_is_changed(units)
+        NAME, accel, gyro, track, temp_c, notices, utc_ns=utc_ns, sign_known=_sign_changed(units)
     )
     if why is not None:
         for taken, key in zip(recording.taken, ("t", "a", "g")):
