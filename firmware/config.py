@@ -1,62 +1,62 @@
-"""Your settings. Remove the '#' and the space behind it to change a line; what is not set has the default shown."""
+"""Your settings. To change a line, remove the '#' and the space after it. Unchanged lines keep the default shown."""
 
-# Which side does the kickstand lean the bike to?
+# On which side is the kickstand?
 # SIDE = "left"             # or "right"
 
 # Sensor
 # SAMPLE_HZ = 200           # readings per second: 50, 100, 125 or 200
-# ACCEL_RANGE_G = 16        # 2, 4, 8 or 16: a hard vibration beyond it makes the lean wrong
+# ACCEL_RANGE_G = 16        # 2, 4, 8 or 16: harder vibration makes the lean wrong
 # GYRO_RANGE_DPS = 500      # 250, 500, 1000 or 2000
-# DLPF = 3                  # low-pass of the chip, which has to keep what is faster than half of SAMPLE_HZ out:
+# DLPF = 3                  # low-pass of the chip, which must block frequencies over half of SAMPLE_HZ:
 #                           # 2 (98 Hz) to 6 (5 Hz) at 200; 3 (44 Hz) to 6 at 100 and 125; 4 (21 Hz) to 6 at 50
-# ACCEPT_WHO_AM_I = None    # the number on the display, to try a chip that is refused as unknown
-# SENSOR_ADDRESS = 0x68     # where it is looked for first; the other one is 0x69, with AD0 high
+# ACCEPT_WHO_AM_I = None    # the number on the display, to try a chip rejected as unknown
+# SENSOR_ADDRESS = 0x68     # the address to try first; the other one is 0x69, with AD0 high
 
-# Wiring (GPIO numbers; the defaults are for a Pico and Pico 2, those of a classic ESP32 in brackets). Every other
-# board needs the five pins of sensor, display and button named here: not each board has all pins, and some are taken.
-# SENSOR_I2C = 0            # (not used) on a Pico GP4 / GP5 belong to I2C 0, GP6 / GP7 to I2C 1, and so on by turns
+# Wiring (GPIO numbers; the defaults are for a Pico and Pico 2, those of a classic ESP32 in brackets). On every other
+# board set the five pins of sensor, display and button here: not every board has all pins, and some are in use.
+# SENSOR_I2C = 0            # (not used) on a Pico GP4 / GP5 belong to I2C 0, GP6 / GP7 to I2C 1, and so on alternately
 # SENSOR_SDA = 4            # (21)
 # SENSOR_SCL = 5            # (22)
 # SENSOR_BUS_HZ = 400_000   # (250_000 at most)
 # LCD_I2C = 1               # (not used)
-# LCD_SDA = 6               # (18) the same two pins as the sensor's put both on one bus, at the slower speed
+# LCD_SDA = 6               # (18) with the sensor's two pins both share one bus, at the slower speed
 # LCD_SCL = 7               # (19)
 # LCD_BUS_HZ = None         # None: 100_000 for a character display, 400_000 for an OLED
 # LCD_ADDRESSES = (0x27, 0x3F, 0x3C, 0x3D)
-# BUTTON_PIN = 15           # (4) between the pin and ground
+# BUTTON_PIN = 15           # (4) button between this pin and ground
 
 # Display
-# DISPLAY = "auto"          # what answers at 0x3C or 0x3D is an OLED; or "lcd" (HD44780), "ssd1306", "sh1106" (OLEDs
+# DISPLAY = "auto"          # a display at 0x3C or 0x3D is an OLED; or "lcd" (HD44780), "ssd1306", "sh1106" (OLEDs
 #                           # of 128x64 pixels), "ssd1306-32" (128x32)
-# LCD_WIRING = 1            # 1 to 4: how the backpack of an LCD that stays blank is wired; kickstand status --wirings
+# LCD_WIRING = 1            # 1 to 4: the wiring of the backpack, if an LCD stays blank; kickstand status --wirings
 # OLED_CONTRAST = 255       # 0 (dim) to 255
 # OLED_INVERTED = False     # True: dark on bright
 
 # Speed source and vehicle, to align by driving: a car, bus or trailer needs a source, a motorcycle may have one
 # VEHICLE = "motorcycle"    # or "car": anything that does not lean
-# SPEED = None              # or "gps": a receiver that sends NMEA; "wheel": a contact that closes as a wheel turns
+# SPEED = None              # or "gps": a receiver that sends NMEA; "wheel": a contact that a turning wheel closes
 # GPS_UART = 1              # (2)
-# GPS_RX = 9                # (16; with PSRAM none: name both, as 25 and 26) to the receiver's TX
-# GPS_TX = 8                # (17) stays open, but belongs to the UART
-# GPS_BAUD = 9600           # as the receiver sends
-# WHEEL_PIN = 14            # (27) reed contact or open-collector switch to ground, at most 4000 (300) pulses a second;
+# GPS_RX = 9                # (16; with PSRAM none: set both, for example 25 and 26) to the receiver's TX
+# GPS_TX = 8                # (17) not connected, but used by the UART
+# GPS_BAUD = 9600           # the receiver's baud rate
+# WHEEL_PIN = 14            # (27) reed contact or open-collector switch to ground, at most 4000 (300) pulses/s;
 #                           never 12 V. Near an ignition: 4.7 kOhm to 3V3 and 10 nF to ground at the pin
 # PULSES_PER_METRE = 0.5    # one magnet on a wheel of 2 m circumference: 0.5
 
-# Restart by itself when the program hangs
+# Restart automatically if the program hangs
 # WATCHDOG = True
 
-# Record every ride from power-on; without it the menu starts a recording
+# Record every ride from power-on; if False the menu starts a recording
 # RECORD = False
 
 # Live to a phone over Bluetooth LE: Pico W, Pico 2 W, ESP32 (not S2)
 # LIVE = False
-# LIVE_PIN = None           # six digits, as 271828, that a phone has to give once; ESP32 only
+# LIVE_PIN = None           # six digits, for example 271828, that a phone must enter once; ESP32 only
 
-# SD card for the rides, on SPI; without it they are kept in the board's flash. All five, and on a Pico its driver:
-# mpremote mip install sdcard
-# No defaults: these are for a Pico. ESP32: SD_SPI = 2 (the slot of machine.SDCard; 3 too on a classic one, S2 and S3)
-# and free pins, on a classic one as SCK 25, MOSI 26, MISO 33, CS 32
+# SD card for the rides, on SPI; without one they are stored in the board's flash. Set all five. A Pico also needs the
+# driver: mpremote mip install sdcard
+# There are no defaults: these values are for a Pico. ESP32: SD_SPI = 2 (the slot of machine.SDCard; also 3 on a
+# classic one, S2 and S3) and free pins, on a classic one for example SCK 25, MOSI 26, MISO 33, CS 32
 # SD_SPI = 0                # or 1
 # SD_SCK = 18
 # SD_MOSI = 19

@@ -66,23 +66,20 @@ DRIVERS = {"board", "imu", "speed", "devices", "diagnosis", "start", "live.radio
 # For the tools: a folder or module of kickstand_tools, or another package: what else of the tools it may import
 LEAVES = {"kickstand_fleet", "kickstand_emulator", "kickstand_workshop"}
 TOOL_ARROWS = {
-    "remedies": set(),
-    "common": {"remedies"},
-    "refusals": {"common", "remedies"},
+    "common": set(),
     "signals": set(),  # numpy only: no log, no file
     "logs": {"common", "signals", "checks", "calibration.file"},  # a log is checked while it is read
-    "checks": {"common", "signals", "refusals", "logs.cells", "logs.log", "calibration.file"},
-    "calibration": {"common", "signals", "refusals", "logs"},
-    "estimation": {"common", "signals", "refusals", "logs", "calibration.file"},
-    "replay": {"common", "signals", "logs", "calibration.file"},
+    "checks": {"common", "signals", "logs.cells", "logs.log", "calibration.file"},
+    "calibration": {"common", "signals", "logs", "checks.units"},
+    "estimation": {"common", "signals", "logs", "checks", "calibration.file"},
+    "replay": {"common", "signals", "refusals", "logs", "calibration.file"},
     "imports": {"common", "signals", "logs", "checks", "estimation.first_guess"},
-    "joining": {"common", "signals", "refusals", "logs", "calibration.file", "estimation", "replay"},
+    "joining": {"common", "signals", "logs", "calibration.file", "estimation", "replay"},
     "analysis": {
         "common",
         "signals",
-        "refusals",
-        "remedies",
         "logs",
+        "checks",
         "calibration.file",
         "estimation",
         "replay.meter_along",
@@ -96,8 +93,6 @@ TOOL_ARROWS = {
     "pictures": {"common", "simulated_board"},
     "web": {
         "common",
-        "refusals",
-        "remedies",
         "logs",
         "calibration",
         "estimation",
@@ -113,7 +108,6 @@ TOOL_ARROWS = {
     },
     "api": {
         "common",
-        "refusals",
         "logs",
         "calibration",
         "estimation",
@@ -127,7 +121,6 @@ TOOL_ARROWS = {
     },
     "cli": {
         "common",
-        "refusals",
         "logs",
         "checks",
         "calibration",
@@ -144,9 +137,9 @@ TOOL_ARROWS = {
         "web",
     },
     "kickstand_fleet": {
+        "checks.bends",
         "common",
         "signals",
-        "refusals",
         "logs",
         "calibration",
         "analysis",

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""One command each, on a machine with nothing but Python 3.11 or newer:
+"""One command per task, on a machine with only Python 3.11 or newer:
 
     python3 tools/dev.py demo         the firmware on a simulated board, live in the terminal
     python3 tools/dev.py test         ruff, pyright and every test; further arguments go to pytest
     python3 tools/dev.py mutants imu  which single changes of a package's code its tests do not notice
 
-They make .venv beside pyproject.toml and install into it, again only when pyproject.toml has changed.
+They create .venv beside pyproject.toml and install the project in it. They install again only if pyproject.toml has
+changed.
 """
 
 import hashlib
@@ -21,13 +22,13 @@ PYTHON = os.path.join(VENV, "Scripts", "python.exe") if os.name == "nt" else os.
 STAMP = os.path.join(VENV, "installed.txt")
 LOG = os.path.join(VENV, "install.log")
 OLDEST = (3, 11)
-EXTRAS = ("", "test", "mutants")  # of pyproject.toml; each has all of those before it
+EXTRAS = ("", "test", "mutants")  # of pyproject.toml; each contains the earlier ones
 REPORT_S = 5  # a line this often while installing
 COMPILE = "from kickstand_emulator import native; native.build()"  # the emulated Pico is then twice as fast
 
 
 class SetupStopped(Exception):
-    """Set-up cannot go on; the text is one line: why, and what to do."""
+    """Set-up cannot continue. The text is one line: the reason, and what to do."""
 
 
 def main(arguments):
@@ -47,14 +48,15 @@ def main(arguments):
 
 
 def test(arguments):
-    """Run ruff, ruff format, pytest and pyright, each even if one before it has failed; 0 if all succeed, else 1."""
-    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else each process that a test starts compiles what it imports
+    """Run ruff, ruff format, pytest and pyright, each even if an earlier one has failed. Returns 0 if all succeed,
+    otherwise 1."""
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # otherwise each process started by a test compiles its imports
     compiling = subprocess.Popen([PYTHON, "-c", COMPILE], cwd=ROOT)
-    # beside the others, because it uses a single processor for a minute
+    # at the same time as the others, because it uses only one processor for a minute
     pyright = subprocess.Popen(
         [PYTHON, "-m", "pyright"], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8"
     )
-    processes = str((os.cpu_count() or 1) + 1)  # one more than processors, because tests of pages wait for a clock
+    processes = str((os.cpu_count() or 1) + 1)  # one more than the processors, because tests of pages wait for a clock
     failed = []
     for tool, command in (
         ("ruff", ("-m", "ruff", "check", ".")),
@@ -76,7 +78,7 @@ def test(arguments):
 
 
 def prepare(extra):
-    """Make .venv and install what pyproject.toml asks for, unless that is done."""
+    """Create .venv and install the extra of pyproject.toml, unless done."""
     place = "Python %s in %s" % (sys.version.split()[0], ROOT)
     with open(os.path.join(ROOT, "pyproject.toml"), "rb") as file:
         version = hashlib.sha256(file.read()).hexdigest()
@@ -90,14 +92,14 @@ def prepare(extra):
     if (stamp[0] and stamp[0] != place) or not has_pip():
         make_venv()
     if os.path.exists(STAMP):
-        os.remove(STAMP)  # an installation broken off is begun again
+        os.remove(STAMP)  # an interrupted installation starts again
     install(extra)
     with open(STAMP, "w", encoding="utf-8") as file:
         file.write("%s\n%s %s\n" % (place, version, extra))
 
 
 def make_venv():
-    """A fresh .venv with pip in it."""
+    """Create a fresh .venv with pip."""
     say("making .venv with Python %s" % sys.version.split()[0])
     made = subprocess.run(
         [sys.executable, "-m", "venv", "--clear", VENV],
@@ -119,7 +121,7 @@ def make_venv():
 
 
 def has_pip():
-    """True if .venv is there and its pip runs."""
+    """True if .venv exists and its pip runs."""
     if not os.path.exists(PYTHON):
         return False
     command = [PYTHON, "-m", "pip", "--version"]
@@ -127,8 +129,8 @@ def has_pip():
 
 
 def install(extra):
-    """Install the project, editable: by uv, which takes a fifth of pip's time; by pip where pip is set to an index of
-    its own, which uv does not know, or where uv fails."""
+    """Install the project, editable. uv takes a fifth of pip's time. pip is used if its settings name another index,
+    which uv does not know, or if uv fails."""
     say("installing %sinto .venv: a few minutes at most" % ("with the %s tools " % extra if extra else ""))
     what = ["--editable", ".[%s]" % extra if extra else "."]
     pip = [PYTHON, "-m", "pip", "install", "--no-input", "--disable-pip-version-check"]
@@ -143,14 +145,14 @@ def install(extra):
 
 
 def own_index():
-    """True if pip takes packages from elsewhere than PyPI."""
+    """True if pip's settings name another index than PyPI."""
     settings = subprocess.run([PYTHON, "-m", "pip", "config", "list"], stdout=subprocess.PIPE).stdout
     return b".index-url=" in settings
 
 
 def watched(command):
-    """Run a command that may take minutes; its exit status. What it prints goes to install.log; the last line of that
-    goes to the terminal now and then."""
+    """Run a command that may take minutes and return its exit status. Its output goes to install.log, and the last line
+    of it regularly to the terminal."""
     begin = time.time()
     with open(LOG, "wb") as log:
         process = subprocess.Popen(command, cwd=ROOT, stdout=log, stderr=subprocess.STDOUT)
@@ -163,7 +165,7 @@ def watched(command):
 
 
 def run(*arguments):
-    """Run .venv's Python in the project's root; its exit status."""
+    """Run .venv's Python in the project's root and return its exit status."""
     return subprocess.call([PYTHON] + list(arguments), cwd=ROOT)
 
 

@@ -1,11 +1,11 @@
-"""Prints the lean of the bike, ten times a second: the lean meter's mathematics in a program of your own.
+"""Prints the lean of the bike ten times per second: the lean meter's mathematics in your own program.
 
 The firmware must be on the board (`kickstand flash`), and the bike aligned with it once. Then, on your computer,
 `mpremote run firmware/examples/print_lean.py` shows the lean, positive to the right, and the forward acceleration:
 
-    lean  +23.4 deg   forward -0.12 g     or, while the lean is not to be trusted, "not sure yet"
+    lean  +23.4 deg   forward -0.12 g     or "not sure yet" while the lean cannot be trusted
 
-Ctrl-C ends mpremote; the program runs on until `mpremote reset`, which starts the lean meter again.
+Ctrl-C ends mpremote. The program continues until `mpremote reset`, which starts the lean meter again.
 """
 
 from time import sleep_ms
@@ -18,10 +18,10 @@ from kickstand.lean.meter import LeanMeter
 
 config = settings.load()
 sensor = open_sensor(config)
-sensor.set_up()  # from now on the chip samples by itself, SAMPLE_HZ times a second
+sensor.set_up()  # from now on the chip samples on its own, SAMPLE_HZ times per second
 chip = sensor.chip
 
-calibration = Store(chip.who_am_i, chip.accel_range_g).load()  # what the lean meter has stored in flash
+calibration = Store(chip.who_am_i, chip.accel_range_g).load()  # stored in flash by the lean meter
 calibration.set_scale(chip.accel_lsb_per_g, chip.gyro_lsb_per_dps)
 if not calibration.aligned:
     print("Not aligned: this is the lean of the sensor, not of the bike.")

@@ -1,15 +1,15 @@
-"""Prints what the sensor measures, five times a second.
+"""Prints the sensor's readings five times per second.
 
 The firmware must be on the board (`kickstand flash`). Then, on your computer:
 
     mpremote run firmware/examples/print_sensor.py
 
-and you see acceleration, turning rate and temperature, the first two along the sensor's own x, y and z:
+It prints acceleration and turning rate along the sensor's own x, y and z, and the temperature:
 
     -0.01  +0.02  +1.01 g     +0.3   -1.2   +0.1 deg/s   25.3 C
 
 At rest the axis that points up shows about 1 g, and all three rates are small. The values are not calibrated.
-Ctrl-C ends mpremote; the program runs on until `mpremote reset`, which starts the lean meter again.
+Ctrl-C ends mpremote. The program continues until `mpremote reset`, which starts the lean meter again.
 """
 
 from time import sleep_ms

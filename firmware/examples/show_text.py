@@ -4,13 +4,13 @@ The firmware must be on the board (`kickstand flash`). Then, on your computer:
 
     mpremote run firmware/examples/show_text.py
 
-and the display says:
+The display shows:
 
     Hello, rider!
     on for 12 s
 
-You may unplug the display and plug it in again: it is found and set up by itself. `mpremote reset` starts the lean
-meter again.
+You may unplug the display and plug it in again: the program finds it and sets it up automatically. `mpremote reset`
+starts the lean meter again.
 """
 
 from time import sleep_ms, ticks_diff, ticks_ms
@@ -24,7 +24,7 @@ start_ms = ticks_ms()
 while True:
     now_ms = ticks_ms()
     seconds = ticks_diff(now_ms, start_ms) // 1000
-    # notes the text, sends nothing yet; for a degree sign write "\xdf"
+    # stores the text, sends nothing yet; for a degree sign write "\xdf"
     lcd.show("Hello, rider!", "on for %d s" % seconds)
-    lcd.tick(now_ms)  # sends what has changed, at most one line at a time
+    lcd.tick(now_ms)  # sends the changes, at most one line at a time
     sleep_ms(10)

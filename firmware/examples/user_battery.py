@@ -17,7 +17,7 @@ adc = ADC(Pin(26))
 
 
 def page(app):
-    """Two lines of at most 16 characters."""
+    """Return two lines of at most 16 characters."""
     volts = adc.read_u16() * 3.3 / 65_535 * DIVIDER
     word = "charging" if volts > 13.2 else "low!" if volts < 11.8 else "ok"
     return "Battery  %4.1f V" % volts, word

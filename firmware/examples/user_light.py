@@ -1,4 +1,4 @@
-"""A lamp that comes on when the bike leans more than 45 degrees to either side.
+"""A lamp that lights when the bike leans more than 45 degrees to either side.
 
 Copy it to the board as user.py, and restart (the firmware must be on the board; an update leaves user.py alone):
 
@@ -16,5 +16,5 @@ lamp = Pin(16, Pin.OUT, value=0)
 
 
 def on_lean(lean_deg, trusted, meter):
-    """Ten times a second. While the lean is not sure the lamp stays off."""
+    """Called ten times per second. While the lean is not sure the lamp stays off."""
     lamp.value(1 if trusted and abs(lean_deg) > LIMIT_DEG else 0)

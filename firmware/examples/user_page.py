@@ -1,20 +1,20 @@
-"""A page of your own: how heavy the bike is on its tyres in this turn, as text and, on an OLED, as a bar.
+"""A page of your own: the load on the tyres in this turn, as text and, on an OLED, as a bar.
 
 Copy it to the board as user.py, and restart (the firmware must be on the board; an update leaves user.py alone):
 
     mpremote cp firmware/examples/user_page.py :user.py
     mpremote reset
 
-Press the button until the page comes, after the last of the usual ones; before the bike is aligned choose Own pages in
-the menu. Without a board: kickstand try firmware/examples/user_page.py
+Press the button until the page appears, after the last of the usual pages. Before the bike is aligned choose Own pages
+in the menu. Without a board: kickstand try firmware/examples/user_page.py
 """
 
 from math import cos, radians
 
 
 def page(app):
-    """Two lines of at most 16 characters, and a picture for a display that draws."""
-    if not app.screen.pages.trusted:  # there is no lean to be relied on
+    """Return two lines of at most 16 characters, and a picture for a display that draws."""
+    if not app.screen.pages.trusted:  # there is no reliable lean
         return "Load     --", "not sure yet"
     meter = app.meter
     times = 1.0 / cos(radians(meter.lean_deg))  # weight and cornering force together, of a turn in balance

@@ -1,4 +1,4 @@
-"""Sends the lean to another controller, ten lines a second over a wire: 23.4 to the right, -23.4 to the left, ? while
+"""Sends the lean to another controller over a wire, ten lines per second: 23.4 to the right, -23.4 to the left, ? while
 it is not sure.
 
 Copy it to the board as user.py, and restart (the firmware must be on the board; an update leaves user.py alone):
@@ -16,5 +16,5 @@ uart = UART(0, baudrate=115_200, tx=Pin(0), rx=Pin(1))
 
 
 def on_lean(lean_deg, trusted, meter):
-    """Ten times a second. Who receives a ? must not act on the number before it."""
+    """Called ten times per second. After a ? the receiver must not use the number before it."""
     uart.write("%.1f\n" % lean_deg if trusted else "?\n")

@@ -1,12 +1,12 @@
 """The device: wires sensor, mathematics, button, flash and display, and owns the loop.
 
-sensor -> calibration and alignment -> lean -> page -> display, in one direction. The chip samples at SAMPLE_HZ by
-itself, and one pass of the loop ("a turn", App.turn()) takes the samples that have come in. App.step() is a turn with
-what belongs to its time: garbage collection, watchdog, and the wait for the next one.
+sensor -> calibration and alignment -> lean -> page -> display, in one direction. The chip samples at SAMPLE_HZ on its
+own. One pass of the loop ("a turn", App.turn()) takes the new samples. App.step() adds garbage collection, the watchdog
+and the wait for the next turn.
 
-The methods that last for most of a turn (step, turn, _pass_on, LeanMeter.update_sum, Sensor.fetch) need at most eleven
-words for locals and stack. MicroPython puts a larger frame on the heap. Freeing it moves the start of the allocator's
-next search back, in front of all garbage since the last collection: up to 1 ms a turn.
+The methods that take most of a turn (step, turn, _pass_on, LeanMeter.update_sum, Sensor.fetch) need at most eleven
+words for locals and stack. MicroPython puts a larger frame on the heap. Freeing it makes the allocator's next search
+start before all garbage since the last collection, which costs up to 1 ms per turn.
 """
 
 import gc
@@ -42,8 +42,8 @@ _FIRST_PAGE_MS = const(60)
 def fill_gaps(n):
     """Allocate n single blocks of the heap and drop them.
 
-    After a collection the heap has many single free blocks, and until these are in use again MicroPython scans past all
-    of them for each larger object. This costs 2 ms here and saves 0.4 ms in each of the first samples.
+    After a collection the heap has many single free blocks. Until they are used again MicroPython scans past all of
+    them for each larger object. This function takes 2 ms and saves 0.4 ms in each of the first samples.
     """
     value = 0.5
     for _ in range(n):
@@ -61,7 +61,7 @@ class App:
     settings: a Settings. lcd, sensor: from devices.open_lcd() and open_sensor(). keeper: see Recording. Raises
     SettingsError for pins that cannot be used.
 
-    live: a Live, once one is attached (see live/live.py), or None.
+    live: an attached Live (see live/live.py), or None.
     """
 
     def __init__(self, settings, lcd, sensor, keeper=None):
@@ -100,7 +100,7 @@ class App:
         return BackgroundAlignment(self.settings.leans, open_speed(self.settings), self.meter, self.calibration)
 
     def run(self):
-        """Loop until Ctrl-C, LOOP_US a turn. Whatever ends it, the display then says so: it must not keep a lean."""
+        """Loop until Ctrl-C, one turn per LOOP_US. At the end the display says so: it must not keep a lean."""
         try:
             self.begin()
             while True:
@@ -121,7 +121,7 @@ class App:
             raise
 
     def begin(self):
-        """Prepare the loop: read the SD card, start the watchdog. Then call step() again and again."""
+        """Prepare the loop: test the SD card, start the watchdog. Then call step() repeatedly."""
         if self.rides.on_card:
             self.lcd.show("SD card", "is being read")
             self.lcd.flush()
@@ -154,11 +154,11 @@ class App:
 
     @property
     def trusted(self):
-        """True if there is a lean that may be shown."""
+        """True if there is a lean to show."""
         return self.settings.leans and self.sensor.fault is None and self.screen.pages.trusted
 
     def state(self):
-        """What the app shows and knows, as data: see state.py."""
+        """The state of the app as data: see state.py."""
         from .state import state  # only for programs that ask
 
         return state(self)
@@ -168,8 +168,7 @@ class App:
         return port.turns_to_collect(_COLLECT_TURNS_DRIVING if few else _COLLECT_TURNS)
 
     def turn(self):
-        """Process the samples in the FIFO and one press, and do at most one transfer to the display. It waits for
-        nothing."""
+        """Process the samples in the FIFO and one press, and do at most one transfer to the display. It never waits."""
         now_us, now_ms = ticks_us(), ticks_ms()
         n = self.sensor.fetch(now_ms)
         if self.sensor.clipped:
@@ -182,7 +181,7 @@ class App:
             self._pass_on(n, dt_us, now_ms)
         if self.drive:
             self._poll_speed(now_ms)
-        if ticks_diff(now_ms, self._page_ms) >= 0:  # asked twice: a local would put this frame on the heap
+        if ticks_diff(now_ms, self._page_ms) >= 0:  # compared twice: a local would put this frame on the heap
             self.sensor.check(now_ms)
         if self.sensor.fault is not None:
             self.screen.interrupt(now_ms)
@@ -219,9 +218,8 @@ class App:
             recorder.add_fix(speed, self.drive.speed.source.place(now_ms))
 
     def _show(self, now_ms):
-        """Put the page onto the display, or a notice from recording or speed source. Also do what is due as often: a
-        step of preparing a recording while the menu is open, and, at standstill only, saving the roll-misalignment
-        correction."""
+        """Show the page, or a notice from recording or speed source. Also do the work of the same rate: while the menu
+        is open, a step of preparing a recording; at standstill, saving the roll-misalignment correction."""
         waiting_ms = 1000 * self.sensor.chip.frames_left // self.settings.SAMPLE_HZ
         self.screen.pages.late = (
             ticks_diff(now_ms, self._page_ms) + waiting_ms > _LATE_MS - _DRAWING_MS * self.lcd.draws
@@ -245,8 +243,8 @@ class App:
             self.calibration.keep_trim(now_ms)
 
     def _pass_on(self, n, dt_us, now_ms):
-        """Pass on n new samples: their sum to the meter, each one to a wizard. dt_us: from the last sample before them
-        to the last of them."""
+        """Pass on n new samples: their sum to the meter, each one to a wizard. dt_us: time from the last earlier sample
+        to the last new one."""
         chip = self.sensor.chip
         self.meter.update_sum(chip.sums, n, dt_us)
         if self.rides.recorder.active:
@@ -266,7 +264,7 @@ class App:
         wizard.follow(chip.sums, n, dt_us, now_ms)
 
     def _sensor_started(self):
-        """React to a chip that was set up, for the first time or again after a fault; it may be another chip."""
+        """Handle a chip that was set up, at the start or after a fault. It may be another chip."""
         self._restarts = self.sensor.restarts
         self.clock.restart()
         self.meter.restart()

@@ -1,17 +1,17 @@
-"""The sentences that a board prints on its USB console, by code (see errors.py).
+"""The sentences for the board's USB console, by code (see errors.py).
 
-Imported only when there is something to say: on most boards never.
+Imported only when there is something to print: on most boards never.
 """
 
 from .units import const
 
-# a longer print is slow. Most take a few ms, but 500 if the USB host sleeps: the chip's FIFO overflows
+# a longer print is slow. Most take a few ms, but 500 if the computer on USB sleeps: the chip's FIFO overflows
 _SLOW_MS = const(100)
 _QUIET_MS = const(60_000)  # after a slow print no refusal is printed for this time
 
 _slow_ms = None  # ticks_ms() of the last slow print
 
-# code|sentence; {0}, {1} ... are the refusal's values; {0} of a SettingsError is the setting's name
+# code|sentence; {0}, {1} ... are the refusal's values; for a SettingsError {0} is the setting's name
 _SENTENCES = """
 not-written|calibration not saved: {0}; the old one is kept
 read-back|calibration not saved: it reads back differently; the old one is kept
@@ -67,7 +67,7 @@ no-such-pin|config.py: {0} = {1} is no pin of this board ({2})
 i2c-pins|config.py: {1}_SDA = {2} and {1}_SCL = {3} do not belong to I2C {4} ({5})
 uart-pins|config.py: GPS_TX = {1} and GPS_RX = {2} do not belong to UART {3} ({4})
 """
-_RECORDING_STOPPED = "recording stopped: {0}"  # for all faults of a recording: only the display distinguishes them
+_RECORDING_STOPPED = "recording stopped: {0}"  # for all faults of a recording; only the display distinguishes them
 
 
 def sentence(refusal):
@@ -77,7 +77,7 @@ def sentence(refusal):
 
 def say(text, end="\n"):
     """Print text; return True if that took over _SLOW_MS."""
-    from time import ticks_diff, ticks_ms  # here, because the host's tools need the words only
+    from time import ticks_diff, ticks_ms  # imported here, because the host's tools need only the words
 
     global _slow_ms
     begun_ms = ticks_ms()

@@ -1,4 +1,4 @@
-"""Opens the display, the sensor and the button on the pins that config.py names. settings: a Settings."""
+"""Opens the display, the sensor and the button on the pins set in config.py. settings: a Settings."""
 
 from machine import Pin
 
@@ -11,8 +11,8 @@ from .imu.sensor import Sensor
 
 
 def open_lcd(settings, wiring=None):
-    """The Display. wiring: of a character display's backpack, if not the settings'. Its tick() raises SettingsError for
-    pins that the I2C controller cannot use."""
+    """Open the Display. wiring: of a character display's backpack; by default that of the settings. Its tick() raises
+    SettingsError for pins that the I2C controller cannot use."""
     return Display(
         lambda hz: open_bus(settings, "LCD", hz),
         settings.LCD_BUS_HZ,
@@ -25,7 +25,7 @@ def open_lcd(settings, wiring=None):
 
 
 def open_sensor(settings):
-    """The chip, as a Sensor. Its fetch() raises SettingsError for pins that the I2C controller cannot use."""
+    """Open the chip as a Sensor. Its fetch() raises SettingsError for pins that the I2C controller cannot use."""
     ranges = settings.ACCEL_RANGE_G, settings.GYRO_RANGE_DPS
     rates = settings.DLPF, settings.SAMPLE_HZ
     chip = Mpu6050(None, settings.SENSOR_ADDRESS, *ranges, *rates, settings.ACCEPT_WHO_AM_I)
@@ -37,7 +37,7 @@ def open_sensor(settings):
         said = []
 
         def look():
-            from .diagnosis import explain_sensor, fifo_fault  # 6 KB of heap, where most boards never need it
+            from .diagnosis import explain_sensor, fifo_fault  # 6 KB of heap; most boards never need it
 
             if error is None:
                 said.extend((fifo_fault(chip), []))
@@ -54,7 +54,7 @@ def open_sensor(settings):
 
 
 def open_button(settings):
-    """The button, a Button. Raises SettingsError for a pin that the board does not have."""
+    """Open the Button. Raises SettingsError for a pin that the board does not have."""
     try:
         return Button(Pin(settings.BUTTON_PIN, Pin.IN, Pin.PULL_UP))
     except ValueError as error:
@@ -62,10 +62,10 @@ def open_button(settings):
 
 
 def open_bus(settings, name, hz):
-    """A machine.I2C. name: "SENSOR" or "LCD", with which the names of its settings begin."""
+    """Open a machine.I2C. name: "SENSOR" or "LCD", the beginning of the names of its settings."""
     controller = getattr(settings, name + "_I2C")
     sda, scl = getattr(settings, name + "_SDA"), getattr(settings, name + "_SCL")
     try:
         return i2c_bus.open_i2c(controller, sda, scl, hz)
-    except (ValueError, TypeError) as error:  # a Pico's Pin(None), where no pin is set, is a TypeError
+    except (ValueError, TypeError) as error:  # a Pico's Pin(None), for a pin that is not set, raises TypeError
         raise SettingsError("i2c-pins", name + "_SDA / SCL", name, sda, scl, controller, str(error))

@@ -1,7 +1,7 @@
-"""Finds out why the sensor or the display cannot be used, and who answers on an I2C bus. Imported after a fault, and by
-kickstand.status() and kickstand check.
+"""Finds out why the sensor or the display cannot be used, and which devices answer on an I2C bus. Imported after a
+fault, and by kickstand.status() and kickstand check.
 
-sda, scl: GPIO numbers.  reopen: called to free the bus, returns it as a machine.I2C.  chip: an Mpu6050.
+sda, scl: GPIO numbers.  reopen(): frees the bus and returns it as a machine.I2C.  chip: an Mpu6050.
 """
 
 from time import sleep_ms, sleep_us
@@ -16,19 +16,19 @@ from .imu.other_chips import MOTION, OTHER, SUPPORTED, name_of, who_am_i
 
 _SENSOR_ADDRESSES = const((0x68, 0x69))
 MOTION_ADDRESSES = _SENSOR_ADDRESSES + (0x6A, 0x6B)
-_NOTHING = (0x00, 0xFF, -1)  # no chip of the MPU6050's family has this WHO_AM_I
-_FIRST, _LAST = 0x08, 0x77  # addresses that the standard leaves to devices (UM10204, table 4)
-_SETTLE_US = 100  # an internal pull of 80 kOhm charges the 400 pF that a bus may have in 32 us
+_NOTHING = (0x00, 0xFF, -1)  # no chip of the MPU6050's family has these values of WHO_AM_I
+_FIRST, _LAST = 0x08, 0x77  # addresses for devices (UM10204, table 4)
+_SETTLE_US = 100  # an internal pull-up of 80 kOhm charges the 400 pF allowed for a bus in 32 us
 _SLOW_HZ = 100_000
 _TIMEOUT_US = 1000
 _INT_ENABLE = const(0x38)  # register map p. 27: bit 0, a sample is ready
 _INT_STATUS = const(0x3A)  # p. 28
-_PERIODS = 4  # samples that the FIFO gets time for
+_PERIODS = 4  # sample periods that the FIFO gets to fill
 
 
 def wire_fault(sda, scl):
-    """None, or a Notice: a wire that stays low, or that nothing pulls up. The pull-ups are on the modules: without one
-    a wire is open, or the module has no power. Each pin's own weak pull-ups and pull-downs show it."""
+    """None, or a Notice: a wire stays low, or nothing pulls it up. The pull-ups are on the modules: without one a wire
+    is open or the module has no power. The test uses the pins' own weak pull-ups and pull-downs."""
     wires = (("SDA", sda), ("SCL", scl))
     fault = None
     for name, pin in wires:
@@ -36,7 +36,7 @@ def wire_fault(sda, scl):
             fault = fault or Notice("wire-low", name, pin)
     open_wires = [wire for wire in wires if not _level(wire[1], Pin.PULL_DOWN)]
     for _, pin in wires:
-        Pin(pin, Pin.IN, None)  # an ESP32 would keep the pull-down
+        Pin(pin, Pin.IN, None)  # or an ESP32 would keep the pull-down
     if fault or not open_wires:
         return fault
     return Notice("no-pull-ups", sda, scl) if len(open_wires) == 2 else Notice("no-pull-up", *open_wires[0])
@@ -49,7 +49,7 @@ def _level(pin, pull):
 
 
 def answering(i2c, addresses=range(_FIRST, _LAST + 1)):
-    """The addresses that answer on a machine.I2C, a list."""
+    """List the addresses that answer on a machine.I2C."""
     status = bytearray(1)
     found = []
     for address in addresses:
@@ -62,14 +62,14 @@ def answering(i2c, addresses=range(_FIRST, _LAST + 1)):
 
 
 def exchanged(sda, scl, addresses):
-    """True if one of these addresses answers with SDA and SCL in each other's place."""
+    """True if one of these addresses answers with SDA and SCL exchanged."""
     i2c = SoftI2C(Pin(sda), Pin(scl), freq=_SLOW_HZ, timeout=_TIMEOUT_US)  # its SCL comes first
     return bool(answering(i2c, addresses))
 
 
 def scan(sda, scl, reopen, addresses):
-    """(notice, devices): what is wrong with the wires of a bus, a Notice or None; who answers there, a list of
-    (address, name, kind), see other_chips.name_of(). addresses: where the device that is missed would be.
+    """Examine a bus. Return (notice, devices): the fault of its wires, a Notice or None; the devices that answer, a
+    list of (address, name, kind), see other_chips.name_of(). addresses: those of the missing device.
 
     Takes 0.1 s, and leaves the bus open. Raises what reopen() raises, except OSError."""
     notice = wire_fault(sda, scl)
@@ -87,7 +87,8 @@ def scan(sda, scl, reopen, addresses):
 
 
 def explain_sensor(sda, scl, reopen, chip, error):
-    """(notice, addresses): why the chip could not be set up, a Notice; the I2C addresses that answer on its bus.
+    """Explain a failed set-up. Return (notice, addresses): the reason, a Notice, and the I2C addresses that answer on
+    the bus.
 
     error: the OSError or UnknownChip of the attempt. Raises what reopen() raises, except OSError."""
     notice, devices = scan(sda, scl, reopen, MOTION_ADDRESSES)
@@ -100,8 +101,8 @@ def explain_sensor(sda, scl, reopen, chip, error):
 
 
 def _judged(devices, i2c, kept):
-    """The Notice for what answers on the sensor's bus, None if nothing there concerns the sensor. kept: False if a chip
-    was found and does not keep its settings; it is the first of the devices."""
+    """The Notice for the devices on the sensor's bus, or None if none of them concerns the sensor. kept: False if a
+    chip was found that does not keep its settings; it is the first of the devices."""
     if not kept and devices and devices[0][2] != MOTION and devices[0][1] != "clock":
         return Notice("not-kept", devices[0][0])
     for address, name, kind in devices:
@@ -121,11 +122,11 @@ def _judged(devices, i2c, kept):
 
 
 def fifo_fault(chip):
-    """None, or the Notice "sensor-fifo": a chip that is set up measures, but its FIFO does not work. values[0]: how.
+    """None, or the Notice "sensor-fifo": the chip measures, but its FIFO does not work. values[0]: its fault.
 
     It takes up to 0.3 s, and leaves the FIFO empty. Raises OSError from the bus."""
     chip.restart_fifo()
-    left = chip.waiting()  # not 0 if a sample came in between
+    left = chip.waiting()  # not 0 if a sample arrived meanwhile
     chip.write_register(_INT_ENABLE, 1)
     before = _reading(chip)
     sleep_ms(_PERIODS * chip.period_ms)
@@ -149,7 +150,7 @@ def _reading(chip):
 
 
 def _repeats(chip):
-    """True if the FIFO gives the same frame again and again, though the data registers change."""
+    """True if the FIFO repeats the same frame while the data registers change."""
     first = _reading(chip)
     frames = set()
     for _ in range(3):
@@ -161,13 +162,13 @@ def _repeats(chip):
 
 
 def bus_line(name, sda, scl, devices):
-    """The devices that scan() has found, as a line for people. name: of the bus."""
+    """The devices found by scan() as a line of text. name: of the bus."""
     words = ", ".join([("0x%02x %s" % (address, found)).strip() for address, found, _ in devices])
     return "%-13sSDA %d, SCL %d: %s" % (name + " bus", sda, scl, words or "nothing answers")
 
 
 def show_wirings(open_lcd, count, show_ms):
-    """Show the number of each wiring of a character display's backpack on it: the right one can be read.
+    """Show each wiring's number on a character display, using that wiring: only the right one is readable.
 
     open_lcd(number): returns a Display."""
     for number in range(1, count + 1):

@@ -1,27 +1,27 @@
-"""What is refused and what has failed: a code, and the numbers that belong to it.
+"""Errors and notices: a code, and the values that belong to it.
 
-A code is a name for programs, never shown. ui/messages.py words it for the display in 2 x 16 characters, console.py
-what a board says on its USB console, and the host's tools word it for a terminal.
+A code is a name for programs and is never shown. ui/messages.py has its words for the display (2 x 16 characters),
+console.py its sentence for the USB console, and the host's tools have its words for a terminal.
 """
 
 import gc
 import sys
 
-# What importing machine code raises where there can be none: CPython or a port without viper, an ESP32 that has no free
-# memory to run it from, a chip that it was not compiled for.
+# The errors of importing machine code that cannot run: on CPython or a port without viper, on an ESP32 without free
+# memory for it, or on a chip that it was not compiled for.
 NO_MACHINE_CODE = (ImportError, NameError, SyntaxError, MemoryError, ValueError)
 
 
 class Notice:
-    """Something to be reported. code: see above; values: its numbers and names, in the order in which the sentences for
-    this code use them."""
+    """Something to report. code: see above; values: its numbers and names, in the order of their use in the sentences
+    for this code."""
 
     def __init__(self, code, *values):
         self.code = code
         self.values = values
 
     def words(self, table, other=""):
-        """The words for this code from a table, with the values filled in. table: text, a line code|words for each
+        """The words for this code from a table, with the values filled in. table: text with one line code|words per
         code. other: the words for a code that is not in the table."""
         start = table.find("\n%s|" % self.code)
         if start >= 0:
@@ -31,7 +31,7 @@ class Notice:
 
 
 class Refusal(Exception):
-    """A request that cannot be carried out, with a code and values like a Notice."""
+    """A request that cannot be fulfilled. It has a code and values like a Notice."""
 
     def __init__(self, code, *values):
         super().__init__(code, *values)
@@ -42,8 +42,8 @@ class Refusal(Exception):
 
 
 def report(refusal):
-    """Print a refusal on the console, unless a print was slow lately: its sentence, or only its code where the module
-    with the sentences cannot be loaded (flash or heap has failed)."""
+    """Print a refusal on the console, unless a recent print was slow. It prints the sentence, or only the code if the
+    module with the sentences cannot be loaded (flash or heap has failed)."""
     try:
         from .console import tell
 
@@ -53,7 +53,7 @@ def report(refusal):
 
 
 def attempt(function, *arguments):
-    """tried(), whose Notice is reported."""
+    """Call tried(), and report its Notice."""
     problem = tried(function, *arguments)
     if problem:
         report(problem)
@@ -61,8 +61,8 @@ def attempt(function, *arguments):
 
 
 def tried(function, *arguments):
-    """Call function, which may import modules for the first time. Return None, or a Notice if there is no memory or the
-    firmware is incomplete. The modules that it began to import are then removed: MicroPython would keep half of one."""
+    """Call a function that may import modules. Return None, or a Notice if memory is short or the firmware is
+    incomplete. After a failure the modules that it began to import are removed: MicroPython would keep half of one."""
     before = None
     try:
         before = tuple(sys.modules)
@@ -76,8 +76,8 @@ def tried(function, *arguments):
 
 
 def checked(machine_code, plain, *arguments):
-    """Return the function machine_code, if it gives the same results as the function plain for copies of these
-    arguments; else return plain and print that on the console. MicroPython's compilers had errors on some boards."""
+    """Return the function machine_code if it gives the same results as the function plain for copies of these
+    arguments. Else return plain and report that on the console. MicroPython's compilers had errors on some boards."""
     copies = [a if isinstance(a, (int, bytes)) else a[:] for a in arguments]
     if machine_code(*arguments) == plain(*copies) and list(arguments) == copies:
         return machine_code
@@ -86,40 +86,40 @@ def checked(machine_code, plain, *arguments):
 
 
 class CaptureError(Refusal):
-    """A pose that was not held still, or readings that no still sensor gives."""
+    """A pose was not still, or its readings cannot come from a still sensor."""
 
 
 class SickSensor(CaptureError):
-    """Readings in a pose that only a defective sensor gives."""
+    """Readings in a pose can only come from a defective sensor."""
 
 
 class CalibrationError(Refusal):
-    """Six-position poses that give no plausible calibration."""
+    """Six poses give no plausible calibration."""
 
 
 class GyroError(Refusal):
-    """A gyro whose rates do not explain how the sensor turned between its poses."""
+    """The gyro's rates do not fit the sensor's turns between its poses."""
 
 
 class AlignmentError(Refusal):
-    """Two poses, or a drive, that do not show how the sensor is mounted."""
+    """Two poses, or a drive, do not show how the sensor is mounted."""
 
 
 class StoreError(Refusal):
-    """A record that could not be written and read back."""
+    """A record could not be written and read back."""
 
 
 class CardError(Refusal):
-    """No SD card that can be written, or no driver for it."""
+    """There is no writable SD card, or no driver for it."""
 
 
 class LiveError(Refusal):
-    """Why nothing goes to a phone."""
+    """Live cannot send to a phone."""
 
 
 class SettingsError(Refusal):
-    """A value in config.py that cannot be used. values[0]: the name of the setting.
+    """A value in config.py cannot be used. values[0]: the name of the setting.
 
-    settings: where settings.load() raises it, a Settings with the values that are right, to open the display with."""
+    settings: if settings.load() raises it, a Settings with the valid values, for opening the display."""
 
     settings = None

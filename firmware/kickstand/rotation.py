@@ -24,7 +24,7 @@ def dot(a, b):
 
 
 def cross(out, a, b):
-    """out = a x b, the cross product (Nicolae's equation 4, which is zero as it is printed)."""
+    """out = a x b, the cross product (Nicolae's equation 4, which is zero as printed)."""
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
@@ -36,7 +36,7 @@ def norm(a):
 
 
 def normalize(a):
-    """Scale a to length 1, in place; return the length it had. Raises ValueError for a null vector."""
+    """Scale a to length 1 in place; return its earlier length. Raises ValueError for a null vector."""
     length = norm(a)
     if not length > 1e-9:  # also catches not-a-number
         raise ValueError("null vector has no direction")
@@ -70,8 +70,8 @@ def is_identity(m):
 
 
 def frame(out, up, forward):
-    """Fill out, a matrix, with the rows left, up, forward of the axes with this up (length 1), whose forward is the
-    part of `forward` at a right angle to it. Raises ValueError if there is none."""
+    """Fill the matrix out with the rows left, up, forward. up: length 1. The row forward is the part of `forward` at a
+    right angle to up. Raises ValueError if that part is zero."""
     left, ahead = vector(), vector()
     cross(left, up, forward)
     normalize(left)
@@ -81,7 +81,7 @@ def frame(out, up, forward):
 
 
 def angle_deg(a, b):
-    """The angle between two vectors, 0 to 180 degrees. By atan2, because acos of a 32-bit float is useless near 0 and
+    """The angle between two vectors, 0 to 180 degrees. Uses atan2, because acos of a 32-bit float is useless near 0 and
     180."""
     c = vector()
     cross(c, a, b)

@@ -1,6 +1,6 @@
-"""Each setting of config.py with its default and its check. settings.py imports this for a moment only.
+"""Each setting of config.py with its default and its check. settings.py imports this only for a moment.
 
-To add one: a line in _TABLE or _PINS here, and one in config.py that says what it is for.
+To add one, write a line in _TABLE or _PINS here, and a line in config.py with its purpose.
 """
 
 from .board import port
@@ -35,10 +35,10 @@ def _pin(value):
 
 
 _INPUT = _pin, "a number from 0 to 48, no pin of the chip's own USB, flash or console"
-# a button needs a pull-up, which pins that are inputs only have not
+# a button needs a pull-up, which input-only pins do not have
 _PIN = (lambda v: _pin(v) and v not in port.INPUT_PINS), _INPUT[1] + ", and none that is an input only"
 _SD_PINS = ("SD_SCK", "SD_MOSI", "SD_MISO", "SD_CS")
-# The settings that name pins, for each speed source
+# The settings with pins, for each speed source
 _SPEED_PINS = {None: (), "gps": ("GPS_TX", "GPS_RX"), "wheel": ("WHEEL_PIN",)}
 
 # name: default, (check, what is allowed in words)
@@ -70,7 +70,7 @@ _TABLE = {
     "GPS_BAUD": (9600, _whole(4800, 115_200)),
     "PULSES_PER_METRE": (0.5, (_pulses, "pulses along a metre of road, from 0.1 to 100")),
 }
-# The same for pins: where one is wrong none is used, because the default pin may be connected to something else
+# The same for pins. A wrong pin is replaced by none, because the default pin may be connected to something else
 _PINS = {
     "SENSOR_SDA": (port.SENSOR_PINS[0], _PIN),
     "SENSOR_SCL": (port.SENSOR_PINS[1], _PIN),
@@ -89,8 +89,8 @@ _NAMES = set(_TABLE) | set(_PINS)
 
 
 def fill(settings, config, refusal):
-    """Give `settings`, a Settings, the values of the module config, and check them. Where one is wrong its default is
-    used, or no pin. Raises SettingsError, or refusal."""
+    """Check the values of the module config and set them in `settings`, a Settings. A wrong value is replaced by its
+    default, a wrong pin by none. Raises SettingsError, or refusal."""
     for table in (_TABLE, _PINS):
         for name, (default, (check, allowed)) in table.items():
             value = getattr(config, name, default)
@@ -102,7 +102,7 @@ def fill(settings, config, refusal):
     settings.one_bus = (
         (settings.SENSOR_SDA, settings.SENSOR_SCL) == (settings.LCD_SDA, settings.LCD_SCL) != (None, None)
     )
-    if settings.one_bus:  # a PCF8574 is made for 100 kHz, and sets the speed of a bus that it shares
+    if settings.one_bus:  # a PCF8574 allows 100 kHz, which limits a shared bus
         settings.LCD_I2C = settings.SENSOR_I2C
         lcd_hz = settings.LCD_BUS_HZ or (OLED_HZ if settings.DISPLAY not in ("auto", "lcd") else LCD_HZ)
         settings.SENSOR_BUS_HZ = settings.LCD_BUS_HZ = min(settings.SENSOR_BUS_HZ, lcd_hz)

@@ -1,4 +1,4 @@
-"""The settings of config.py, checked. Their defaults and checks are in setting_table.py."""
+"""Loads and checks the settings of config.py. Their defaults and checks are in setting_table.py."""
 
 import sys
 from io import StringIO
@@ -13,7 +13,7 @@ def load():
         import config
     except ImportError:
         pass
-    except Exception as error:  # config.py is the rider's: it may raise anything
+    except Exception as error:  # config.py is the rider's code and may raise anything
         refusal = SettingsError("unreadable", "config.py", _line_of(error), str(error))
     return Settings(config, refusal)
 
@@ -21,7 +21,7 @@ def load():
 def _line_of(error):
     """The place of an error in config.py: "line 3: ", or "" if the traceback does not have it."""
     text = StringIO()
-    # the stubs that check this know neither a StringIO's type nor its getvalue
+    # the type checker's stubs have neither a StringIO's type nor its getvalue
     sys.print_exception(error, text)  # type: ignore[arg-type]
     traceback = text.getvalue()  # type: ignore[attr-defined]
     _, found, rest = traceback.rpartition('config.py", line ')
@@ -29,8 +29,8 @@ def _line_of(error):
 
 
 class Settings:
-    """One attribute for each name in setting_table.py. config: the module config, or None for the defaults. refusal:
-    why there is no config. Raises SettingsError.
+    """The settings, one attribute per name in setting_table.py. config: the module config, or None for the defaults.
+    refusal: why there is no config. Raises SettingsError.
 
     one_bus: True if sensor and display share one I2C bus. leans: True if the vehicle leans (a motorcycle).
     """

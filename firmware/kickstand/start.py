@@ -1,7 +1,7 @@
-"""What main.py runs when the board gets power.
+"""Starts the lean meter. main.py runs it when the board gets power.
 
-Safe mode: with the button held at power-on nothing is started, so that new firmware can always be copied. After a reset
-the button does not count: a press while an error is shown must not leave the rider without a display.
+Safe mode: if the button is held at power-on nothing is started, and new firmware can always be copied. After a reset
+the button is ignored: a press while an error is shown must not leave the rider without a display.
 """
 
 import sys
@@ -18,8 +18,8 @@ from .units import __version__, const
 
 _CHARGE_MS = const(100)
 
-# The modules that the app imports, in this order: between two of them, display and chip are set up a step further. The
-# list repeats the import statements, because MicroPython has no hook between imports; a test compares both.
+# The modules that the app imports, in this order. Between two of them the next step of setting up display and chip is
+# done. The list repeats the import statements, because MicroPython has no hook between imports; a test compares both.
 STEPS = (
     "calibration.parameters calibration.store calibration.active calibration.transform lean.bike_model lean.kalman "
     "lean.measurements lean.rest lean.upright_trim lean.dive lean.lean_filter lean.meter ui.messages ui.pages "
@@ -34,8 +34,8 @@ def _show(lcd, line1, line2=""):
 
 
 def _held(button):
-    """True if the button is pressed, now and a moment later: the pin's weak pull-up first has to charge any capacitor
-    between pin and ground, such as one against bouncing (1 uF through 80 kOhm takes 75 ms)."""
+    """True if the button is pressed, now and a moment later. The pin's weak pull-up must first charge any capacitor
+    between pin and ground, such as a debouncing one (1 uF through 80 kOhm takes 75 ms)."""
     if button.held():
         sleep_ms(_CHARGE_MS)
     return button.held()
@@ -52,17 +52,17 @@ def main(loop=None):
             print("Kickstand %s: safe mode, the button was held at power-up." % __version__)
             _show(lcd, "Safe mode", "Ready for USB")
             return
-        lcd.show("Kickstand", "starting")  # replaces a lean from before a reset
+        lcd.show("Kickstand", "starting")  # replaces a lean shown before a reset
         run(chosen, lcd, loop)
     except SettingsError as error:
-        port.rest_watchdog()  # it may run: wrong pins show only when the app opens them
+        port.rest_watchdog()  # it may be running: the app may find wrong pins only when it opens them
         from .console import sentence
         from .ui.messages import lines
 
         print("Kickstand stopped. " + sentence(error))
         try:
             _show(lcd or open_lcd(error.settings), *lines(error))
-        except SettingsError:  # the display's own pins are wrong, or not set, which Pin() refuses
+        except SettingsError:  # the display's own pins are wrong or not set
             pass
     except KeyboardInterrupt:
         port.rest_watchdog()
@@ -72,7 +72,7 @@ def main(loop=None):
 
 
 def _live(function, *arguments):
-    """Do a step of LIVE. Return None, or what is reported of it: the lean goes on, and without a restart."""
+    """Do a step of LIVE. Return None, or the error to report: the lean meter continues, without a restart."""
     try:
         problem = tried(function, *arguments)
     except LiveError as error:
@@ -105,7 +105,7 @@ def run(chosen, lcd, loop=None):
     board restarts."""
     radio = []
     try:
-        # First: an ESP32-C3 may crash in switching its radio on once 40 KB are allocated
+        # First, because an ESP32-C3 may crash when its radio is switched on after 40 KB are allocated
         problem = _live(_open_radio, radio, chosen.LIVE_PIN) if chosen.LIVE else None
         sensor = open_sensor(chosen)
         for name in STEPS + ["app"]:
@@ -124,7 +124,7 @@ def run(chosen, lcd, loop=None):
         (loop or App.run)(app)
     except SettingsError:
         raise
-    except ImportError as error:  # an update was broken off: a restart would not help
+    except ImportError as error:  # an interrupted update: a restart would not help
         port.rest_watchdog()
         print("Kickstand stopped: incomplete firmware (%s). Run kickstand flash." % error)
         _show(lcd, "Incomplete:", "flash it again")

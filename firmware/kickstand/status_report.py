@@ -1,4 +1,4 @@
-"""What kickstand.status() prints: settings, sensor, display, speed source and calibration of this board."""
+"""Prints the report of kickstand.status(): settings, sensor, display, speed source and calibration of this board."""
 
 import gc
 import os
@@ -17,12 +17,12 @@ from .ui import messages
 from .units import __version__, const
 
 _LISTEN_MS = const(3500)
-# What did not fit, by the code of lean/consistency.py
+# The misfit, by the code of lean/consistency.py
 MEASURED = {"odd-left": "force to the left", "odd-up": "force up", "odd-pitch": "pitch"}
 _WIRINGS = const(4)  # of LCD_WIRING
-_WIRING_MS = const(4000)  # for each of them
+_WIRING_MS = const(4000)  # for each wiring
 _WATCH_MS = const(1400)  # for setting the sensor up and two looks at its axes
-_TRIAL = "trial.tmp"  # a file that is written to measure the flash, then removed
+_TRIAL = "trial.tmp"  # a file to measure the flash with, removed afterwards
 
 
 def _print(label, words, *values):
@@ -61,7 +61,7 @@ def report(wirings=False):
 
 
 def _write_ms():
-    """The time in ms to erase and write a flash block. If that is longer than the chip's FIFO lasts, readings get
+    """The time in ms to erase and write a flash block. If it is longer than the chip's FIFO lasts, readings are
     lost."""
     begun_ms = ticks_ms()
     with open(_TRIAL, "wb") as file:
@@ -72,7 +72,7 @@ def _write_ms():
 
 
 def _sensor(sensor, settings):
-    """Print which sensor answers and who else is on its bus; return its WHO_AM_I, or 0 if none does."""
+    """Print the sensor and the other devices on its bus. Return its WHO_AM_I, or 0 without a sensor."""
     chip = sensor.chip
     fault = None
     try:
@@ -97,7 +97,7 @@ def _sensor(sensor, settings):
 
 
 def _axes(sensor):
-    """Print what is wrong with the axes of a sensor that answers: their counts of a second show it."""
+    """Print the faults of the axes of a sensor that answers, from their counts during a second."""
     for _ in range(_WATCH_MS // 10):
         sensor.fetch(ticks_ms())
         sleep_ms(10)
@@ -105,7 +105,7 @@ def _axes(sensor):
 
 
 def _bus(label, settings, name, addresses):
-    """Print who answers on a bus, or what is wrong with its wires; return that, a Notice or None."""
+    """Print the devices on a bus, or the fault of its wires. Return the fault, a Notice or None."""
     sda, scl = getattr(settings, name + "_SDA"), getattr(settings, name + "_SCL")
     hz = getattr(settings, name + "_BUS_HZ") or LCD_HZ
     notice, devices = scan(sda, scl, lambda: open_bus(settings, name, hz), addresses)
@@ -126,7 +126,7 @@ def _display(lcd, settings):
 
 
 def _speed(settings):
-    """Print the speed or the fault of the speed source after _LISTEN_MS, in which it can detect each of its faults."""
+    """Print the speed or the fault of the speed source after _LISTEN_MS, long enough to detect each of its faults."""
     if settings.SPEED is None:
         _print("Speed", "no source: SPEED is not set, alignment by driving is off")
         return
@@ -150,7 +150,7 @@ def _speed(settings):
 
 
 def _worst(chip):
-    """Print what the app has noted, if it has run since the board was started. chip: an Mpu6050."""
+    """Print the app's records if it has run since the board was started. chip: an Mpu6050."""
     judge = sys.modules.get("kickstand.lean.consistency")
     if judge and judge.last_odd:
         words = "the readings did not fit, again and again: %s. Sensor, alignment or mount: align again"

@@ -1,5 +1,4 @@
-"""The owner's own code: the file user.py on the board, which no update touches. Its functions are called by name, where
-it has them:
+"""Runs the owner's code: the file user.py on the board, which updates leave alone. It may define these functions:
 
 setup(app)                          once, before the lean meter runs
 page(app), page_battery(app) ...    while this page is shown: two lines of 16 characters and, for a display that draws,
@@ -7,10 +6,10 @@ page(app), page_battery(app) ...    while this page is shown: two lines of 16 ch
 on_lean(lean_deg, trusted, meter)   ten times a second. trusted: False while the lean must not be used
 on_press(event)                     after each press: board.button.SHORT or LONG
 
-A function that raises, that takes longer than _TOO_SLOW_MS, or longer than _SLOW_MS for _MOST_SLOW times in a row, is
-left out from then on; display and console say so. Importing user.py and setup() may take any time. A MemoryError
-anywhere leaves out all of it.
-Imported only where there is a user.py.
+A function is disabled, with a notice on display and console, if it raises, takes longer than _TOO_SLOW_MS, or takes
+longer than _SLOW_MS for _MOST_SLOW times in a row. Importing user.py and setup() may take any time. A MemoryError
+anywhere disables all of user.py.
+Imported only if there is a user.py.
 """
 
 import gc
@@ -22,13 +21,13 @@ from .units import const
 
 _SLOW_MS = const(50)  # a slower call is reported, once per function
 _TOO_SLOW_MS = const(300)  # the sensor keeps its samples for no longer
-_MOST_SLOW = const(5)  # calls in a row that take longer than _SLOW_MS: the loop would never catch up with the samples
-_LEAST_FREE = const(20_000)  # bytes of heap: below, the lean meter's own work would fail next
+_MOST_SLOW = const(5)  # calls in a row longer than _SLOW_MS: the loop would never catch up with the samples
+_LEAST_FREE = const(20_000)  # bytes of heap: with less, the lean meter's own work would fail next
 _CALLED = ("setup", "on_lean", "on_press")
 
 
 def _functions_of(name):
-    """The functions of a module that are called, by name. A module's own __dir__() or __getattr__() may raise."""
+    """The functions of a module to call, by name. A module's own __dir__() or __getattr__() may raise."""
     module = __import__(name)
     found = {}
     for name in dir(module):
@@ -40,15 +39,15 @@ def _functions_of(name):
 
 
 class UserCode:
-    """app: the App. pages: a function without arguments for each page, which gives its lines."""
+    """The owner's code for an App. pages: one function without arguments per page, which returns its lines."""
 
     def __init__(self, app):
         self._app = app
         self._functions = {}
         self._functions["import"] = _functions_of  # _call() also guards the import
-        self._slow = {}  # how often in a row a function has been slow, once it has been
+        self._slow = {}  # number of slow calls in a row, per function
         self._problems = []
-        self._drawn = self._draw  # kept: each access makes a new bound method, and the display compares pictures by it
+        self._drawn = self._draw  # stored: each access makes a new bound method, and the display compares it
         sys.modules.pop("user", None)
         self._functions.update(self._call("import", "user") or {})
         pages = sorted([name for name in self._functions if name.startswith("page")])
@@ -60,21 +59,21 @@ class UserCode:
         return self._problems.pop(0) if self._problems else None
 
     def lean(self, trusted):
-        """Call on_lean. trusted: the lean is shown, too. To be called ten times a second."""
+        """Call on_lean, ten times per second. trusted: the lean is also shown."""
         meter = self._app.meter
         self._call("on_lean", meter.lean_deg, trusted, meter)
 
     def press(self, event):
-        """Call on_press. To be called after each press."""
+        """Call on_press, after each press."""
         self._call("on_press", event)
 
     def check_memory(self):
-        """Leave all of it out when it has used up the heap. To be called after gc.collect()."""
+        """Disable user.py if it has used up the heap. Call this after gc.collect()."""
         if self._functions and gc.mem_free() < _LEAST_FREE:
             self._forget("memory")
 
     def _call(self, name, *arguments):
-        """What the function returns; None if it is missing, left out or fails."""
+        """Call a function and return its result; None if it is missing, disabled or fails."""
         function = self._functions.get(name)
         if function is None:
             return None
@@ -105,7 +104,7 @@ class UserCode:
         self._report(Notice("user-failed", name, why))
 
     def _forget(self, name):
-        """Leave all of it out, and free what it holds."""
+        """Disable all functions of user.py and free their memory."""
         self._functions = {}
         sys.modules.pop("user", None)
         gc.collect()
@@ -123,12 +122,12 @@ class UserCode:
             line1, line2 = [line if isinstance(line, (str, bytes, bytearray)) else str(line) for line in shown[:2]]
             picture = (self._drawn, name) + tuple(shown[2]) if len(shown) > 2 and shown[2] else None
             return line1, line2, picture
-        except Exception:  # whatever its __str__ or __getitem__ raises
+        except Exception:  # its __str__ or __getitem__ may raise anything
             self._leave_out(name, "not two lines")
             return "user.py " + name, "not two lines"
 
     def _draw(self, canvas, name, draw, *values):
-        """In place of a page's own function, which may fail as well."""
+        """Return the lines of a page whose own function has failed."""
         self._functions["picture"] = draw
         self._call("picture", canvas, *values)
         if "picture" not in self._functions:

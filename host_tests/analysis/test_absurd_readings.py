@@ -1,4 +1,4 @@
-"""Readings that no vehicle gives: the lean is not trusted, a warning says where and what, and numpy says nothing."""
+"""Implausible readings: the lean is not trusted, a warning gives place and values, and numpy prints no warning."""
 
 import re
 import warnings
@@ -8,8 +8,8 @@ import pytest
 from kickstand_tools.analysis.channels import joined
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.common.messages import sentence
 from kickstand_tools.logs.log import Log
-from kickstand_tools.refusals import sentence
 
 
 def spinning(seed):
@@ -18,8 +18,8 @@ def spinning(seed):
     return Log(np.arange(600) / 100.0, np.tile([0.0, 1.0, 0.0], (600, 1)), rates, name="spin.csv")
 
 
-def test_readings_that_make_the_lean_filter_diverge():
-    """As it does in some of six rides."""
+def test_impossible_readings_give_a_warning_and_no_lean():
+    """They make the filter diverge in some of six rides."""
     diverged_in = 0
     for seed in range(6):
         notices = []
@@ -32,6 +32,6 @@ def test_readings_that_make_the_lean_filter_diverge():
         assert len(said) == np.any(lost)
         if said:
             diverged_in += 1
-            found = re.match(r"readings that no vehicle gives, at (\S+) s up to 2\d\d\d deg/s and 1.0 g", said[0])
+            found = re.match(r"implausible readings at (\S+) s, up to 2\d\d\d deg/s and 1.0 g", said[0])
             assert found and float(found[1]) == pytest.approx(ride.t_s[np.argmax(lost)], abs=0.06)
     assert diverged_in

@@ -1,17 +1,18 @@
-"""How far off the ride shows the alignment to be, what a report says that this costs, and what to do about it: where
-it is known how far off it is."""
+"""Alignment errors found from a ride, their cost in the report, and the remedy, compared with known errors."""
 
 import dataclasses
 import re
 
 import numpy as np
 import pytest
-from kickstand.errors import Notice
-from kickstand_tools import remedies
 from kickstand_tools.analysis import report
 from kickstand_tools.analysis.alignment_quality import Quality, lean_cost, yaw_cost_deg
 from kickstand_tools.analysis.report import angles
 from kickstand_tools.api import Log, fit_drive, fit_two_positions, open_ride, overview, simulate_ride, vehicle_channels
+from kickstand_tools.checks.bends import LeftHanded
+from kickstand_tools.checks.log import Mirrored
+from kickstand_tools.checks.mount import ForwardExchanged
+from kickstand_tools.estimation.smooth import PoseOff
 from kickstand_tools.signals import rotation_matrix
 from kickstand_tools.simulation.scripted import script
 from support import command
@@ -47,7 +48,7 @@ def ride(request):
 
 
 def error_deg(ride, calibration, from_share=0.0):
-    """rms of the shown lean where it is trusted and the bike moves."""
+    """rms error of the shown lean while it is trusted and the bike moves."""
     log, _, true, _ = ride
     shown = vehicle_channels(log, calibration)
     there = shown.trusted & (shown.resting < 0.5)
@@ -56,8 +57,8 @@ def error_deg(ride, calibration, from_share=0.0):
 
 
 @pytest.mark.parametrize(("name", "degrees"), [("yaw", 6.0), ("yaw", 15.0), ("pitch", 6.0), ("pitch", 12.0)])
-def test_yaw_and_pitch_cost_what_is_said(ride, name, degrees):
-    """Both ways round: an error may also make up for another one."""
+def test_yaw_and_pitch_cause_the_stated_lean_error(ride, name, degrees):
+    """In both directions, because an error may also compensate another one."""
     usual = error_deg(ride, ride[1])
     more = [error_deg(ride, turned(ride[1], name, angle)) for angle in (degrees, -degrees)]
     cost = np.sqrt(max(0.0, np.mean(np.square(more)) - usual**2))
@@ -70,13 +71,13 @@ def test_yaw_and_pitch_cost_what_is_said(ride, name, degrees):
     assert set(said.values()) == {0.0}
 
 
-def test_riding_takes_roll_out_up_to_a_limit(ride):
+def test_riding_corrects_roll_up_to_a_limit(ride):
     usual = error_deg(ride, ride[1], 0.5)
     assert error_deg(ride, turned(ride[1], "roll", 3.0), 0.5) < usual + 0.3
     assert not error_deg(ride, turned(ride[1], "roll", 12.0), 0.5) <= 7.0  # or no lean is shown at all
 
 
-def test_calibrate_drive_takes_yaw_out(ride):
+def test_calibrate_drive_corrects_yaw(ride):
     log, calibration, *_ = ride
     found = fit_drive([log], turned(calibration, "yaw", 9.0), "motorcycle").calibration
     before, after = (overview(open_ride(log, one)).quality.yaw_deg for one in (turned(calibration, "yaw", 9.0), found))
@@ -104,7 +105,7 @@ def scripted(tmp_path_factory):
 
 
 @pytest.mark.parametrize(("axis", "angle_deg"), list(zip(AXES, (-3.0, 2.0, -3.0), strict=True)))
-def test_an_error_of_the_alignment_is_seen(scripted, axis, angle_deg):
+def test_alignment_error_is_found(scripted, axis, angle_deg):
     quality = overview(open_ride(scripted, with_calibration(scripted, axis, angle_deg))).quality
     assert quality.straight_s > 30.0
     for name in AXES:
@@ -113,7 +114,7 @@ def test_an_error_of_the_alignment_is_seen(scripted, axis, angle_deg):
     assert quality.gravity_g == pytest.approx(1.0, abs=0.002)
 
 
-def test_a_ride_without_straights_does_not_show_it(tmp_path):
+def test_ride_without_straights_shows_no_alignment(tmp_path):
     path = analysis_rides.write(tmp_path, [script.upright(8)])
     quality = overview(open_ride(path, None)).quality
     assert (quality.roll_deg, quality.pitch_deg, quality.yaw_deg) == (None, None, None)
@@ -121,16 +122,18 @@ def test_a_ride_without_straights_does_not_show_it(tmp_path):
     assert "Alignment: not enough straight riding to know how far it is off." in said
 
 
-@pytest.mark.parametrize(("code", "fits"), [("mirrored", False), ("left-handed", False), ("forward-exchanged", True)])
-def test_a_log_that_contradicts_its_calibration_is_not_judged(scripted, code, fits):
-    """The angles of a mirrored one look right, but left and right are exchanged."""
+@pytest.mark.parametrize(
+    ("notice", "fits"), [(Mirrored(), False), (LeftHanded(), False), (ForwardExchanged(False, "left", 0.0), True)]
+)
+def test_a_log_that_contradicts_its_calibration_is_not_judged(scripted, notice, fits):
+    """The angles of a mirrored log look right, but left and right are exchanged."""
     seen = overview(open_ride(scripted, with_calibration(scripted, "yaw", 0.0)))
-    seen.notices.append(Notice(code, False, "left", 0.0))
+    seen.notices.append(notice)
     assert ("not judged" not in report.words(seen).alignment) == fits
     assert (report.as_data(seen)["alignment"]["roll_deg"] is not None) == fits
 
 
-def test_nothing_is_a_negative_nothing():
+def test_zero_is_never_shown_as_minus_zero():
     assert angles(Quality(-0.04, None, 2.04, None, 60.0, NONE, NONE)) == ["roll +0.0°", "yaw +2.0°"]
 
 
@@ -148,7 +151,7 @@ def test_nothing_is_a_negative_nothing():
         ("pitch", 4.0, r"pitch [+-]3\.\d°.* Pitch usually costs about 0\.3° of lean; calibrate ride takes it out, or"),
     ],
 )
-def test_a_report_says_what_it_costs_and_what_to_do(scripted, name, degrees, words):
+def test_report_gives_the_cost_of_an_error_and_the_remedy(scripted, name, degrees, words):
     seen = overview(open_ride(scripted, with_calibration(scripted, name, degrees)))
     assert re.search(words, report.words(seen).alignment)
     cost = report.as_data(seen)["lean_cost"][f"{name}_deg"]
@@ -158,7 +161,7 @@ def test_a_report_says_what_it_costs_and_what_to_do(scripted, name, degrees, wor
     assert "lean_cost" not in report.as_data(overview(open_ride(scripted, car)))  # it has none to lose
 
 
-def test_an_alignment_is_good_where_all_of_it_is_known_and_cheap(scripted):
+def test_alignment_is_good_if_fully_known_and_exact(scripted):
     seen = overview(open_ride(scripted, with_calibration(scripted, "yaw", 2.6)))
     assert report.words(seen).alignment.startswith("Alignment: good.")
     dear = dataclasses.replace(seen.quality, pitch_deg=2.0)  # 0.14 and 0.17 degrees of lean
@@ -166,20 +169,20 @@ def test_an_alignment_is_good_where_all_of_it_is_known_and_cheap(scripted):
         said = report.words(dataclasses.replace(seen, quality=quality)).alignment
         assert said.startswith("Alignment: it seems off by ")
     far = dataclasses.replace(seen.quality, roll_deg=11.0)
-    exchanged = Notice("forward-exchanged", False, "left", 11.0)
+    exchanged = ForwardExchanged(False, "left", 11.0)
     swapped = dataclasses.replace(seen, quality=far, notices=[exchanged])
     assert ": were the poses swapped?" in report.words(swapped).alignment
-    off = dataclasses.replace(seen, notices=[*seen.notices, Notice("pose-off", 2.0)])
+    off = dataclasses.replace(seen, notices=[*seen.notices, PoseOff(2.0)])
     assert not report.words(off).alignment.startswith("Alignment: good")
 
 
-def test_a_force_at_rest_that_is_not_1_g_asks_for_the_six_positions(scripted):
+def test_wrong_force_at_rest_asks_for_six_positions(scripted):
     cal = with_calibration(scripted, "yaw", 0.0, accel_slope=[1.05] * 3)
-    said = report.words(overview(open_ride(scripted, cal)), remedies.PAGE).alignment
+    said = report.words(overview(open_ride(scripted, cal)), on_page=True).alignment
     assert said.endswith("At rest the force is 1.051 g and not 1: the six positions of the sensor take that out.")
 
 
-def test_without_a_speed_calibrate_drive_is_no_help(scripted, tmp_path):
+def test_calibrate_drive_is_not_advised_without_a_speed(scripted, tmp_path):
     log = tmp_path / "RIDE.csv"
     log.write_text("\n".join(row.rpartition(",")[0] for row in scripted.read_text().splitlines()) + "\n")
     said = report.words(overview(open_ride(log, with_calibration(scripted, "yaw", 5.0)))).alignment

@@ -1,4 +1,4 @@
-"""What is vectorised is what the firmware says, step by step; thinning keeps what it should."""
+"""Vectorised values equal the firmware's, step by step; thinning keeps the means."""
 
 from dataclasses import fields
 
@@ -22,7 +22,7 @@ def course(ride) -> Channels:
     return joined(list(ride.blocks()))
 
 
-def test_a_smoothed_ride_differs_in_its_lean_alone(ride, course):
+def test_smoothed_ride_differs_only_in_its_lean(ride, course):
     smoothed = joined(open_ride(ride.log, ride.calibration, smoothed=True).blocks())
     other = {"lean_deg", "lean_sigma_deg", "lateral_g", "sure"}
     for name in (field.name for field in fields(Channels)):
@@ -31,8 +31,8 @@ def test_a_smoothed_ride_differs_in_its_lean_alone(ride, course):
     assert np.any(smoothed.trusted)
 
 
-def test_the_maxima_are_those_the_display_held(ride):
-    """Block by block, in whatever blocks."""
+def test_maxima_are_those_of_the_display(ride):
+    """For any division into blocks."""
     log = reader.read_log(ride.log)
     engine = replay_engine.Replay(ride.calibration.to_firmware())
     for row in log.rows():
@@ -67,7 +67,7 @@ def test_time_without_readings_does_not_count(course):
 
 
 @pytest.mark.parametrize("block", [100, 100_000])
-def test_thinning_is_the_mean_of_each_stretch_whatever_the_blocks(course, block):
+def test_thinned_ride_is_the_mean_of_each_stretch(course, block):
     parts = [course.part(slice(start, start + block)) for start in range(0, len(course.t_s), block)]
     thin = joined(list(downsampled(parts, 0.02)))
     n = len(course.t_s) // 4
@@ -89,8 +89,8 @@ def part(n=100, **changed) -> Channels:
     return Channels(**columns | {name: np.asarray(values, dtype=float) for name, values in changed.items()})
 
 
-def test_what_the_meter_is_not_sure_of_counts_as_unsure_alone():
-    """30 of 100 samples; among them the largest values of the ride. Fallen over, it is not sure either."""
+def test_uncertain_lean_counts_only_as_uncertain():
+    """30 of 100 samples, with the largest values of the ride. A fallen bike also counts as uncertain."""
     sure = np.ones(100)
     sure[20:50] = 0.0
     lean = np.where(sure > 0.0, 32.0, 50.0)
@@ -110,7 +110,7 @@ def test_what_the_meter_is_not_sure_of_counts_as_unsure_alone():
     assert total.riding_s == pytest.approx(0.99)
 
 
-def test_time_at_rest_is_none_of_the_ride():
+def test_time_at_rest_is_not_riding_time():
     resting = np.zeros(100)
     resting[60:] = 1.0
     total = Summary()
@@ -120,7 +120,7 @@ def test_time_at_rest_is_none_of_the_ride():
     assert total.duration_s == pytest.approx(0.99)
 
 
-def test_parts_are_joined_and_a_column_without_values_takes_no_memory(course):
+def test_empty_column_of_joined_parts_takes_no_memory(course):
     first, second, third = (course.part(slice(a, a + 1000)) for a in (0, 1000, 2000))
     first.temp_c = second.temp_c = third.temp_c = first.speed_mps = np.full(1000, np.nan)
     whole = joined(iter([first, second, third]))

@@ -1,5 +1,5 @@
-"""The charts of a ride: left is on the left and braking below, labels do not cover one another, and the picture and the
-page draw what the charts say."""
+"""The charts of a ride: left is on the left and braking below, labels do not overlap, and picture and page draw the
+same charts."""
 
 import itertools
 from dataclasses import replace
@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kickstand.errors import Notice
 from kickstand_tools.analysis.alignment_quality import Quality
 from kickstand_tools.analysis.overview import Overview, overview
 from kickstand_tools.analysis.plot import interactive, page, picture
@@ -15,6 +14,8 @@ from kickstand_tools.analysis.plot.charts import Bars, CellMap, Dots, Line, char
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.summary import Peak
 from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.checks.mount import UpOff
+from kickstand_tools.estimation.smooth import NotTheBikes
 from kickstand_tools.simulation.scripted import script
 from support.recordings import analysis_rides
 
@@ -24,7 +25,7 @@ pytest.importorskip("plotly")
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory) -> Overview:
-    """Left turns only, gentle acceleration and a hard stop; forward, so it is made up, is 10 degrees off."""
+    """Only left turns, gentle acceleration and a hard stop; forward is 10 degrees off on purpose."""
     ride = analysis_rides.write(
         tmp_path_factory.mktemp("ride"),
         [script.upright(4), script.accelerate(15, 12), script.turn(-35, 5), script.brake(0, 3), script.wait(4)],
@@ -66,7 +67,7 @@ def test_lean_to_the_left_is_below_and_on_the_left(seen, panels, drawn):
     assert shares.x[int(np.argmax(leaning))] < -25.0
 
 
-def test_g_against_g(seen, panels, drawn):
+def test_chart_of_g_against_g_has_the_right_sides(seen, panels, drawn):
     """The turn: 0.7 g for 5 s, and its beginning and end. The stop: 0.5 g for 3 s. Nothing above and on the right."""
     (cells,) = (trace for trace in chart(seen, "g against").traces if isinstance(trace, CellMap))
     middle = (cells.edges[1:] + cells.edges[:-1]) / 2.0
@@ -99,7 +100,7 @@ def test_the_straights_and_their_line(seen, panels, drawn):
 
 
 @pytest.mark.parametrize(("car", "speed"), [(False, True), (True, False), (False, False)])
-def test_a_car_has_no_lean_and_a_speed_is_drawn_where_there_is_one(seen, car, speed):
+def test_charts_of_car_and_speed_are_drawn_only_if_present(seen, car, speed):
     made = replace(seen, ride=replace(seen.ride, calibration=CalibrationFile(vehicle="car" if car else "motorcycle")))
     made = replace(made, summary=replace(seen.summary, speed_mps=seen.summary.speed_mps if speed else Peak()))
     wanted = charts(made)
@@ -120,8 +121,8 @@ def test_a_car_has_no_lean_and_a_speed_is_drawn_where_there_is_one(seen, car, sp
     assert picture.figure_of(made).get_size_inches()[1] == 5.5 + 2.5 * (not car) + 1.5 * speed
 
 
-def test_in_a_narrow_window_the_charts_stand_below_each_other(seen):
-    """In a wide one the last three beside each other; neither covers another."""
+def test_charts_are_stacked_in_a_narrow_window(seen):
+    """In a wide one the last three are side by side and do not overlap."""
     for kind, last_row in (("layout", 3), ("narrow", 1)):
         drawn = interactive.figure(charts(seen))[kind]
         axes = [name.removeprefix("xaxis") for name in drawn if name.startswith("xaxis")]
@@ -133,9 +134,9 @@ def test_in_a_narrow_window_the_charts_stand_below_each_other(seen):
                 assert x[0] >= other_x[1] or x[1] <= other_x[0] or y[1] <= other_y[0]
 
 
-def test_what_is_not_known_is_not_drawn(seen):
-    """As where nothing was sure enough; nor is an alignment that another mount's calibration cannot have."""
-    made = replace(seen, notices=[Notice("up-off", 20.0, False)], summary=replace(seen.summary))
+def test_unknown_values_are_not_drawn(seen):
+    """Nothing is sure enough; nor is an alignment drawn for another mount's calibration."""
+    made = replace(seen, notices=[UpOff(20.0, False)], summary=replace(seen.summary))
     made.summary.left_deg = made.summary.right_deg = made.summary.brake_g = made.summary.accel_g = Peak()
     assert title(made).endswith("lean as displayed -- left, -- right  ·  braking --, acceleration --")
     assert chart(made, "Lean").notes == []
@@ -144,8 +145,8 @@ def test_what_is_not_known_is_not_drawn(seen):
 
 
 @pytest.mark.parametrize("most", [(1.0, 1.0), (0.0, 6.0), (12.0, 11.0), (60.0, 60.0)])
-def test_labels_of_the_share_of_each_lean_do_not_stand_on_one_another(seen, most):
-    """However little the bike leaned."""
+def test_labels_of_the_lean_histogram_do_not_overlap(seen, most):
+    """For any small lean."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -170,9 +171,9 @@ def test_labels_of_the_share_of_each_lean_do_not_stand_on_one_another(seen, most
     assert len(tops) == 2 and max(tops) < corner.y0  # no line through the words
 
 
-def test_where_the_lean_is_doubtful_is_marked_and_warnings_are_drawn(seen, tmp_path):
+def test_doubtful_lean_and_warnings_are_drawn(seen, tmp_path):
     doubtful = ((seen.course.t_s > 5.0) & (seen.course.t_s < 9.0)).astype(float)
-    made = replace(seen, course=replace(seen.course, doubtful=doubtful), notices=[Notice("not-the-bikes", 80.0)])
+    made = replace(seen, course=replace(seen.course, doubtful=doubtful), notices=[NotTheBikes(80.0)])
     lean = chart(made, "Lean")
     assert "yellow: less exact" in lean.title and "yellow" not in chart(seen, "Lean").title
     _, line = lean.traces
@@ -207,7 +208,7 @@ def test_an_envelope_keeps_every_peak():
 
 
 @pytest.mark.parametrize("points", [10_000, 500])
-def test_a_line_is_broken_where_there_is_nothing(points):
+def test_line_is_broken_in_a_gap(points):
     """Readings are missing from 40 to 60 s, and the lean is not shown from 70 to 75."""
     time = np.concatenate((np.arange(0.0, 40.0, 0.02), np.arange(60.0, 100.0, 0.02)))
     values = np.where((time > 70.0) & (time < 75.0), np.nan, 5.0)

@@ -1,4 +1,4 @@
-"""kickstand export: every sample is in the file, and what is refused. The rest: test_export_formats.py."""
+"""kickstand export: every sample is in the file; refusals. The rest: test_export_formats.py."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ def ride(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def shown(ride) -> np.ndarray:
-    """What replay says of it."""
+    """The result of replay."""
     out = ride.with_name("LEAN.csv")
     command.works("replay", ride, "--calibration", ride.with_name("RIDE.cal.json"), "--out", out)
     return analysis_rides.table(out)
@@ -59,7 +59,7 @@ def test_a_car_has_no_lean_as_in_replay(ride, tmp_path):
     assert "acc" in vbo and "lean" not in vbo.partition("[data]")[0].partition("[header]")[2].partition("[comments]")[0]
 
 
-def test_what_cannot_be_exported_is_refused(ride, tmp_path, monkeypatch):
+def test_ride_that_cannot_be_exported_is_refused(ride, tmp_path, monkeypatch):
     """Without a calibration beside it, or with one that is not aligned; without pyarrow."""
     alone = tmp_path / "alone.csv"
     alone.write_bytes(ride.read_bytes())

@@ -1,4 +1,4 @@
-"""kickstand report and plot: what they say and draw of a ride, and what they refuse."""
+"""kickstand report and plot: their output for a ride, and their refusals."""
 
 import io
 import json
@@ -46,13 +46,13 @@ def test_a_report_has_the_ride_in_figures(ride):
     (stop,) = data["stops"]
     assert stop["speed_from"] == "log"
     assert stop["initial_speed_mps"] == pytest.approx(15.0, abs=0.3)
-    assert stop["distance_m"] == pytest.approx(21.0, abs=1.5)  # where it begins is a matter of taste
+    assert stop["distance_m"] == pytest.approx(21.0, abs=1.5)  # its start has no exact definition
     assert abs(stop["side_m"]) < 0.2
     assert data["alignment"]["gravity_g"] == pytest.approx(1.0, abs=0.002)
     assert abs(data["alignment"]["roll_deg"]) < 0.5
 
 
-def test_what_is_not_known_is_no_figure(ride, tmp_path):
+def test_unknown_figures_are_not_reported(ride, tmp_path):
     up_is_back = analysis_rides.calibration(
         tmp_path / "changed.json", vehicle_from_sensor=[[1, 0, 0], [0, 0, 1], [0, -1, 0]]
     )
@@ -65,7 +65,7 @@ def test_what_is_not_known_is_no_figure(ride, tmp_path):
     assert [rows[name] for name in names] == ["--"] * 6
 
 
-def test_time_without_readings_is_said(ride, tmp_path):
+def test_time_without_readings_is_reported(ride, tmp_path):
     assert json.loads(command.works("report", ride, "--live", "--json").out)["missing_s"] == 0.0
     assert "No readings" not in command.works("report", ride).out
     header, *rows = ride.read_text().splitlines()
@@ -78,7 +78,7 @@ def test_time_without_readings_is_said(ride, tmp_path):
     assert "No readings" in command.works("report", *given).out
 
 
-def test_the_page_says_the_same(ride, monkeypatch):
+def test_page_shows_the_same_report(ride, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     said = command.works("report", ride).out
     for words in "Max left", "Max right", "Over 40°", "Max braking", "MFDD", "km/h", "Alignment":
@@ -89,8 +89,8 @@ def test_the_page_says_the_same(ride, monkeypatch):
 
 
 @pytest.mark.parametrize(("unsure_s", "line"), [(0.9, ""), (1.0, "0:01"), (65.4, "1:05")])
-def test_how_long_the_lean_was_not_sure(ride, unsure_s, line):
-    """On the page from a second on, and always in the JSON."""
+def test_uncertain_time_is_reported_from_one_second(ride, unsure_s, line):
+    """On the page from one second on, and always in the JSON."""
     seen = overview(open_ride(ride, None))
     seen.summary.not_sure_s = unsure_s
     said = [row.split()[3:] for row in printed(seen) if row.startswith("Lean not sure")]
@@ -104,7 +104,7 @@ def test_without_a_speed_stops_are_marked(tmp_path):
     assert "* no speed in the log: integrated" in said
 
 
-def test_without_a_speed_it_may_be_that_nothing_is_known(tmp_path):
+def test_report_without_a_speed_may_know_no_stops(tmp_path):
     moving = [script.upright(4), script.accelerate(15, 5), script.straight(20)]
     for speed_hz, words in ((0, "Stops: not known, the log has no speed."), (1, "No stop from over 10 km/h found.")):
         ride = analysis_rides.write(tmp_path, moving, speed_hz=speed_hz)
@@ -112,7 +112,7 @@ def test_without_a_speed_it_may_be_that_nothing_is_known(tmp_path):
 
 
 def turned_round(directory, **changed):
-    """CAL.json with forward and left the wrong way."""
+    """CAL.json with forward and left reversed."""
     matrix = [[-1, 0, 0], [0, 1, 0], [0, 0, -1]]
     return analysis_rides.calibration(
         directory / "changed.json", vehicle_from_sensor=matrix, kickstand_side="left", **changed
@@ -126,7 +126,7 @@ def test_a_kickstand_on_the_other_side_is_noticed(ride, tmp_path):
     assert line in said.err
     assert "do all accelerations have the opposite sign?" in said.err
     assert "Stops: not known" in said.out
-    assert "MFDD" not in said.out  # of the wrong way round, no figure is right
+    assert "MFDD" not in said.out  # with reversed axes no figure is right
     data = report.as_data(overview(open_ride(ride, cal)))
     assert data["remark"].startswith(line)
     assert data["stops"] == []
@@ -137,7 +137,7 @@ def test_a_kickstand_on_the_other_side_is_noticed(ride, tmp_path):
     assert "Max left" not in said.out and "Max braking" in said.out  # a car has no lean
 
 
-def test_a_stop_that_only_the_speed_knows(ride, tmp_path):
+def test_stop_shown_only_by_the_speed_is_reported(ride, tmp_path):
     """Forward is across: neither right nor exchanged."""
     cal = analysis_rides.calibration(tmp_path / "changed.json", vehicle_from_sensor=[[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
     said = command.works("report", ride, "--calibration", cal, "--live").out
@@ -145,7 +145,7 @@ def test_a_stop_that_only_the_speed_knows(ride, tmp_path):
     assert "The speed falls to a stop, the force says otherwise" in " ".join(said.split())
 
 
-def test_pictures(ride, tmp_path):
+def test_picture_and_page_are_complete(ride, tmp_path):
     out = tmp_path / "new" / "pictures"
     command.works("plot", ride, "--out", out)
     png = (out / "RIDE.png").read_bytes()
@@ -158,14 +158,14 @@ def test_pictures(ride, tmp_path):
 
 
 @pytest.mark.parametrize("samples", [2, 30])
-def test_the_shortest_of_logs(tmp_path, samples):
+def test_shortest_logs_are_reported(tmp_path, samples):
     log = command.still(tmp_path / "log.csv", (0, 1, 0), seconds=samples / 100)
     analysis_rides.calibration(tmp_path / "log.cal.json")
     command.works("report", log)
     command.works("plot", log, "--out", tmp_path / "pictures")
 
 
-def test_pictures_go_into_a_directory_and_need_libraries(ride, tmp_path, monkeypatch):
+def test_plot_needs_a_directory_and_libraries(ride, tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
     command.refused(tmp_path, "plot", ride, "--out", tmp_path / "file", words="is a file")
     with monkeypatch.context() as patch:
@@ -174,7 +174,7 @@ def test_pictures_go_into_a_directory_and_need_libraries(ride, tmp_path, monkeyp
     command.refused(tmp_path, "plot", ride, "--out", tmp_path / "ride.html", words="give the directory")
 
 
-def test_broken_off_a_picture_leaves_no_empty_directory(ride, tmp_path, monkeypatch):
+def test_interrupted_plot_leaves_no_empty_directory(ride, tmp_path, monkeypatch):
     def ctrl_c(path, seen):
         raise KeyboardInterrupt
 

@@ -1,7 +1,7 @@
-"""Each format to the letter: which channel stands in which column, in which unit, with which sign and how many digits.
+"""The exact content of each format: channel, unit, sign and digits of each column.
 
-The columns and signs are those of the formats' own descriptions, named in the modules; the signs are checked once more
-on readings of a sensor that sits squarely in the vehicle.
+The columns and signs are those of the formats' own descriptions, named in the modules; the signs are also checked on
+readings of a sensor mounted square in the vehicle.
 """
 
 import time
@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from kickstand_tools.analysis.channels import Channels
 from kickstand_tools.analysis.export import export_columns, export_racechrono, export_vbo
-from kickstand_tools.analysis.export.export import export
+from kickstand_tools.analysis.export.export import RowsShare, export
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs import reader
@@ -47,7 +47,7 @@ NOWHERE = dict.fromkeys(("lat_deg", "lon_deg", "utc_s"), np.nan)
 
 
 def block(*times_s: float, **changed: float) -> Channels:
-    """Samples that have VALUES in every channel but for what is changed."""
+    """Samples with VALUES in every channel, except the changed ones."""
     columns = {"t_s": np.array(times_s)}
     columns |= {name: np.full(len(times_s), value) for name, value in (VALUES | changed).items()}
     return Channels(*(columns[field.name] for field in fields(Channels)))
@@ -99,8 +99,8 @@ def test_vbo_without_lean_speed_and_temperature(tmp_path):
     assert lines[-2] == row + " -2.345670E+00 +3.456780E+00"
 
 
-def test_vbo_decides_by_values_not_by_their_mean(tmp_path):
-    """A channel that has gaps in its first block is there, and 0 in the gaps."""
+def test_vbo_has_a_channel_with_gaps(tmp_path):
+    """A channel with gaps in its first block is present, with 0 in the gaps."""
     first = block(0.0, 0.1, speed_mps=np.nan)
     first.temp_c[1] = np.nan
     first.speed_mps[0] = 10.0
@@ -111,8 +111,8 @@ def test_vbo_decides_by_values_not_by_their_mean(tmp_path):
     assert lines[-2].endswith(" +0.000000E+00")
 
 
-def test_vbo_keeps_the_heading_of_a_vehicle_that_stands(tmp_path):
-    """North, east, and in the next block the same place and one 0.8 mm north of it, as a receiver's noise has it."""
+def test_vbo_keeps_the_heading_at_standstill(tmp_path):
+    """North, east, and in the next block the same place and one 0.8 mm north of it, like a receiver's noise."""
     ridden, stood = block(0.0, 1.0, 2.0), block(3.0, 4.0)
     ridden.lat_deg[1:] += 1e-5
     ridden.lon_deg[2] += 1e-5
@@ -127,7 +127,7 @@ SQUARE = CalibrationFile(aligned=True, vehicle="car")  # sensor axes left, up, f
 
 
 def squarely(seconds: float = 2.0, start_s: float = 0.0, speed_mps=()) -> Log:
-    """Braking in a left turn, each axis another reading."""
+    """Braking in a left turn, with a different reading on each axis."""
     n = round(seconds * RATE_HZ)
     force, rate = np.tile([0.2, 1.0, -0.4], (n, 1)), np.tile([5.0, 7.0, 9.0], (n, 1))
     return Log(start_s + np.arange(n) / RATE_HZ, force, rate, np.asarray(speed_mps, dtype=float))
@@ -153,7 +153,7 @@ def test_a_left_turn_under_braking_has_the_signs_of_each_format(tmp_path):
     assert [float(row[f"{name}_rate_dps"]) for name in ("pitch", "yaw", "roll")] == pytest.approx([-5.0, 7.0, 9.0])
 
 
-def test_the_lean_is_the_smoothed_one_or_with_live_the_displays(tmp_path):
+def test_exported_lean_is_smoothed_unless_live(tmp_path):
     ride = analysis_rides.short(tmp_path, rate_hz=50)
     for more, other in (((), "smooth"), (("--live",), "replay")):
         command.works("export", ride, "--to", "csv", *more, "--out", tmp_path / "export.csv")
@@ -181,14 +181,14 @@ def first_time(path: Path, form: str) -> float:
         (0.0, 1.0, 0.0),  # a computer whose clock was never set: not before 1970
     ],
 )
-def test_a_log_in_memory_without_a_clock_ended_now(tmp_path, monkeypatch, form, start_s, now_s, first_s):
+def test_log_in_memory_without_a_clock_ends_now(tmp_path, monkeypatch, form, start_s, now_s, first_s):
     monkeypatch.setattr(time, "time", lambda: now_s)
     export(open_ride(squarely(start_s=start_s), SQUARE), form, tmp_path / "out")
     assert first_time(tmp_path / "out", form) == pytest.approx(first_s % (86400 if form == "vbo" else 1e12), abs=0.006)
 
 
 def test_every_row_of_a_vbo_has_a_speed(tmp_path):
-    """Between two values those on the line between them; elsewhere the format leaves gaps."""
+    """Between two values speeds are interpolated; elsewhere the format leaves gaps."""
     speed = np.full(200, np.nan)
     speed[[50, 150]] = 10.0, 20.0
     ride = open_ride(squarely(speed_mps=speed), SQUARE)
@@ -202,8 +202,8 @@ def test_every_row_of_a_vbo_has_a_speed(tmp_path):
 
 
 @pytest.mark.parametrize(("form", "rows"), [("csv", 400), ("parquet", 400), ("racechrono", 400), ("vbo", 201)])
-def test_vbo_holds_a_hundred_a_second(tmp_path, form, rows):
-    """Counted are the rows that were written, in whatever blocks the log comes."""
+def test_vbo_has_at_most_100_rows_per_second(tmp_path, form, rows):
+    """The written rows are counted, for any blocks of the log."""
     if form == "parquet":
         pytest.importorskip("pyarrow")
     n = 400
@@ -226,7 +226,7 @@ def test_no_time_is_written_twice(tmp_path, form, step_s, columns, start_s):
     rows = [line.replace(" ", ",").split(",") for line in lines[-count:]]
     for column in columns:
         assert np.all(np.diff([float(row[column]) for row in rows]) > 0.0)
-    assert [notice.values for notice in notices if notice.code == "rows-share"] == [(len(t_s), count, step_s)]
+    assert [notice for notice in notices if notice.code == "rows-share"] == [RowsShare(len(t_s), count, step_s)]
 
 
 def test_progress_and_notices_are_passed_on(tmp_path):

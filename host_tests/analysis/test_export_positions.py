@@ -43,7 +43,7 @@ def exported(form: str, tmp_path: Path, ride: api.Log | api.Stretch | None = Non
 
 
 def away_m(lat, lon, t_s) -> np.ndarray:
-    """How far these places are from where the ride was at these times."""
+    """Distance of these places from the ride's true ones at these times."""
     ride = app_exports.riding()
     north = (np.asarray(lat) - np.interp(t_s, ride.t_s, ride.lat_deg)) * DEGREE_M
     east = (np.asarray(lon) - np.interp(t_s, ride.t_s, ride.lon_deg)) * DEGREE_M * np.cos(np.radians(52.5))
@@ -59,7 +59,7 @@ def values(points, name: str) -> np.ndarray:
     return np.array(found)
 
 
-def test_gpx_has_each_position_with_time_speed_and_lean(tmp_path):
+def test_gpx_has_all_positions_with_time_speed_and_lean(tmp_path):
     gpx = gpxpy.parse(exported("gpx", tmp_path).read_text())
     (track,) = gpx.tracks
     assert [len(segment.points) > 20 for segment in track.segments] == [True, True]  # no line across the gap
@@ -78,7 +78,7 @@ def test_gpx_has_each_position_with_time_speed_and_lean(tmp_path):
     assert gpx.version == "1.1"
 
 
-def test_a_lean_that_is_not_sure_is_not_in_a_track(tmp_path):
+def test_uncertain_lean_is_left_out_of_a_track(tmp_path):
     """A log that begins in a turn: the lean is unknown for some seconds. The positions are there."""
     later = log().part(log().t_s > 7.5)
     gpx = gpxpy.parse(exported("gpx", tmp_path, later).read_text())
@@ -96,7 +96,7 @@ def vbo_rows(path: Path) -> dict[str, np.ndarray]:
     return dict(zip(names, table.T))
 
 
-def test_every_row_of_a_vbo_has_the_place_on_the_line_between_positions(tmp_path):
+def test_vbo_interpolates_positions_for_every_row(tmp_path):
     rows = vbo_rows(exported("vbo", tmp_path))
     clock = rows["time"]
     midnight = datetime.fromtimestamp(START_S, UTC).replace(hour=0, minute=0, second=0, microsecond=0).timestamp()
@@ -119,7 +119,7 @@ def test_every_row_of_a_vbo_has_the_place_on_the_line_between_positions(tmp_path
 
 
 @pytest.mark.parametrize("form", ["gpx", "racechrono", "vbo"])
-def test_the_time_of_the_satellites_goes_before_any_other(tmp_path, form):
+def test_time_of_the_satellites_is_preferred(tmp_path, form):
     """A log whose own clock was set wrong, and a stretch of a log that begins within a second without a position."""
     for ride in (log(1.2e9), api.Stretch(log(), 12.5, 25.0)):
         out = exported(form, tmp_path, ride)
@@ -134,7 +134,7 @@ def test_the_time_of_the_satellites_goes_before_any_other(tmp_path, form):
             assert vbo_rows(out)["time"][0] == pytest.approx(float(f"{clock:%H%M%S.%f}"), abs=0.02)
 
 
-def test_without_the_time_of_the_satellites_a_track_has_the_logs_own(tmp_path):
+def test_track_without_satellite_time_uses_the_logs_time(tmp_path):
     given = log(1.2e9)
     bare = replace(given, utc_s=np.full(len(given.t_s), np.nan))
     point = gpxpy.parse(exported("gpx", tmp_path, bare).read_text()).tracks[0].segments[-1].points[-1]
@@ -149,7 +149,7 @@ def test_a_track_across_180_degrees_goes_the_short_way():
     assert lat[:3] == pytest.approx(-10.0)
 
 
-def test_of_positions_in_a_short_time_the_last_one_stays():
+def test_last_position_of_a_stretch_is_kept():
     """Their mean across 180 degrees would be on the other side of the earth."""
     few = log().part(log().t_s < 0.1)
     few.lon_deg[:] = np.nan
@@ -158,14 +158,14 @@ def test_of_positions_in_a_short_time_the_last_one_stays():
     assert (one.lat_deg[0], one.lon_deg[0], one.utc_s[0]) == (-10.0, -179.9998, START_S)
 
 
-def test_a_position_alone_is_a_place_and_none_is_nowhere():
+def test_single_position_is_interpolated_only_at_its_time():
     lat, lon = LogTrack(np.array([5.0]), np.array([1.0]), np.array([2.0])).at(np.array([4.9, 5.0, 5.1]))
     assert lat == pytest.approx([np.nan, 1.0, np.nan], nan_ok=True)
     assert lon == pytest.approx([np.nan, 2.0, np.nan], nan_ok=True)
     assert np.all(np.isnan(LogTrack(np.zeros(0), np.zeros(0), np.zeros(0)).at(np.array([1.0]))))
 
 
-def test_the_command_writes_a_track_or_says_why_not(tmp_path, monkeypatch):
+def test_command_writes_a_track_or_gives_the_reason(tmp_path, monkeypatch):
     ride, calibration = tmp_path / "ride.csv", tmp_path / "ride.cal.json"
     write_log(ride, log())
     api.write_calibration(calibration, ALIGNED)

@@ -41,8 +41,8 @@ def points_of(*place, **kind) -> track_map.MapPoints:
 
 
 @pytest.mark.parametrize("place", [(-33.9, 151.2), (69.6, 18.9), (47.6, 179.999), (-0.001, 0.001)])
-def test_a_metre_is_a_metre_to_the_north_and_to_the_east(place):
-    """On every latitude, on both sides of the equator and across the meridian of 180 degrees."""
+def test_metre_of_the_map_is_right_in_both_directions(place):
+    """At every latitude, on both sides of the equator and across the meridian of 180 degrees."""
     found = points_of(*place)
     ride = app_exports.riding()
     north = (ride.lat_deg - ride.lat_deg[0]) * np.radians(EARTH_M)
@@ -55,7 +55,7 @@ def test_a_metre_is_a_metre_to_the_north_and_to_the_east(place):
     assert np.min(moved) > 0.3  # where the bike stands there is one point
 
 
-def test_lean_and_speed_are_those_of_the_moment():
+def test_map_shows_lean_and_speed_at_each_moment():
     _, dots = track_map.figure(points_of(car=True), seen(car=True))["data"]
     assert isinstance(dots["marker"]["color"], str) and len(dots["x"]) > 50  # a car's track has no lean
     found, channels = points_of(), seen().course
@@ -67,7 +67,7 @@ def test_lean_and_speed_are_those_of_the_moment():
     assert found.speed_kmh == pytest.approx(3.6 * np.interp(found.t_s, ride.t_s, ride.speed_mps), abs=4.0)
 
 
-def test_the_line_is_broken_where_the_place_is_not_known():
+def test_line_of_the_map_is_broken_in_a_gap():
     found = points_of(gap=True)
     (gap,) = np.flatnonzero(np.isnan(found.east_m))
     assert found.t_s[gap - 1] < 10.0 < 16.0 < found.t_s[gap + 1]
@@ -76,7 +76,7 @@ def test_the_line_is_broken_where_the_place_is_not_known():
     assert np.all(np.isfinite(dots["x"]))
 
 
-def test_left_is_blue_and_right_is_orange_on_an_equal_scale_with_north_up():
+def test_map_has_left_blue_right_orange_and_north_up():
     made = track_map.figure(points_of(), seen())
     _, dots = made["data"]
     scale = dict(dots["marker"]["colorscale"])
@@ -101,7 +101,7 @@ def page_of(tmp_path: Path, which: Overview, tiles: bool = False) -> str:
 
 @pytest.mark.parametrize("positions", [0, 1])
 def test_without_positions_there_is_no_map(tmp_path, positions):
-    """One alone is no track."""
+    """A single position is not a track."""
     course = seen().course
     places = {name: np.where(np.arange(len(course.t_s)) < positions, 5.0, np.nan) for name in ("lat_deg", "lon_deg")}
     html = page_of(tmp_path, replace(seen(), course=replace(course, **places)))
@@ -110,7 +110,7 @@ def test_without_positions_there_is_no_map(tmp_path, positions):
     assert 'id="map"' in page_of(tmp_path, seen())
 
 
-def test_a_page_asks_for_nothing_unless_tiles_are_wanted(tmp_path):
+def test_page_loads_nothing_unless_tiles_are_requested(tmp_path):
     html = page_of(tmp_path, seen())
     assert not re.search(r"<(script|link|img)[^>]*(src|href)=", html)
     assert page.TILES_URL not in html
@@ -122,7 +122,7 @@ def test_a_page_asks_for_nothing_unless_tiles_are_wanted(tmp_path):
 
 
 @pytest.mark.parametrize("place", [(52.5, 13.4), (-33.9, 151.2), (47.6, -0.01)])
-def test_tiles_lie_where_the_track_is(place):
+def test_tiles_match_the_track(place):
     """The number of the start's tile by the map's metres, and by the formula of slippy maps."""
     found = points_of(*place)
     tiles = page.tiles_at(found)

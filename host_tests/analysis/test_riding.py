@@ -1,4 +1,4 @@
-"""How long a ride was ridden, and a log that holds too little of one."""
+"""The riding time of a ride, and logs with too little of a ride."""
 
 import numpy as np
 import pytest
@@ -33,21 +33,21 @@ def words_of(log):
     ],
     ids=["two samples", "engine off", "engine on", "engine on, with a speed", "engine on, the gyro's bias not known"],
 )
-def test_a_bike_that_stands_does_not_ride(log):
+def test_standing_bike_is_not_riding(log):
     said = words_of(log)
     assert said.ride[0][2] == "riding 0:00"
     assert said.too_little == f"{said.ride[0][1]} of log, all of it standing: too little for a report."
 
 
-def test_a_knock_as_the_log_begins_is_no_ride():
-    """As of the hand that switches it on: 0.4 g for 0.02 s, which are 0.008 g over a second."""
+def test_knock_at_the_start_is_not_riding():
+    """Like the hand that switches it on: 0.4 g for 0.02 s, which are 0.008 g over a second."""
     log = standing(40, 0.05, 1.5)
     log.accel_g[:2, 2] = 0.4
     assert words_of(log).ride[0][2] == "riding 0:00"
 
 
-def test_a_ride_is_ridden_but_for_its_standing(tmp_path):
-    """Four seconds before it and four after, of 37; with a speed and without."""
+def test_riding_time_excludes_standing(tmp_path):
+    """Of 37 s, four before and four after the ride are standing; with a speed and without."""
     for speed_hz in (0, 5):
         said = words_of(analysis_rides.short(tmp_path, speed_hz=speed_hz))
         minutes, seconds = said.ride[0][2].removeprefix("riding ").split(":")
@@ -58,7 +58,7 @@ def test_a_ride_is_ridden_but_for_its_standing(tmp_path):
 
 
 def test_a_speed_that_is_always_0_hides_no_ride(tmp_path):
-    """As that of a wheel whose contact is off: the time on the move is that of a ride without a speed."""
+    """For example with a broken wheel contact: the riding time is that of a ride without a speed."""
     log = read_log(analysis_rides.short(tmp_path))
     without = words_of(log)
     log.speed_mps[::20] = 0.0
@@ -67,12 +67,12 @@ def test_a_speed_that_is_always_0_hides_no_ride(tmp_path):
     assert said.stops or said.remark == "Stops: not known, the log has no speed."
 
 
-def test_a_stretch_without_speed_that_goes_straight_on_is_ridden():
-    """On a road that shakes, at a speed that does not change: not enough to say that a whole log stood still."""
+def test_straight_stretch_without_speed_counts_as_riding():
+    """On a rough road at constant speed: this does not prove that a whole log stood still."""
     assert words_of(Stretch(standing(40, 0.05, 1.5), 5.0, 30.0)).too_little == ""
 
 
-def test_a_log_that_was_cut_says_so_first(tmp_path):
+def test_report_of_a_cut_log_begins_with_that(tmp_path):
     path = analysis_rides.short(tmp_path)
     path.write_text("\n".join(path.read_text().splitlines()[:900]) + "\n")
     out = command.works("report", path).out

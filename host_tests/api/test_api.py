@@ -1,4 +1,4 @@
-"""kickstand_tools.api: the examples in the docstrings run, and the functions keep what the module promises."""
+"""kickstand_tools.api: the examples in the docstrings run, and the functions do what the module promises."""
 
 import doctest
 import gzip
@@ -11,6 +11,7 @@ import sys
 import numpy as np
 import pytest
 from kickstand_tools import api
+from kickstand_tools.calibration.pose_refusals import SamePose
 from kickstand_tools.simulation.files import simulate
 from support import command
 
@@ -18,7 +19,7 @@ FUNCTIONS = [name for name, public in vars(api).items() if inspect.isfunction(pu
 
 
 @pytest.mark.parametrize("name", FUNCTIONS + ["Log", "Stretch", "CalibrationFile"])
-def test_the_example_of_a_function_runs(name):
+def test_example_in_each_docstring_runs(name):
     public = getattr(api, name)
     module = sys.modules[public.__module__]
     found = [test for test in doctest.DocTestFinder(recurse=False).find(public, name, module=module) if test.examples]
@@ -27,7 +28,7 @@ def test_the_example_of_a_function_runs(name):
         assert doctest.DocTestRunner().run(test).failed == 0
 
 
-def test_pydoc_has_what_is_promised():
+def test_pydoc_lists_the_promised_functions():
     """It leaves out what a module without __all__ has only imported."""
     shown = pydoc.plain(pydoc.render_doc(api))
     for name in ("import_recording", "fit_ride", "open_ride", "export", "simulate_ride"):
@@ -78,8 +79,8 @@ def test_any_source_gives_the_same_log(directory):
     assert want.accel_g.shape == want.gyro_dps.shape == (len(want.t_s), 3)
 
 
-def test_stops_and_summary_of_arrays_are_those_of_the_report(directory):
-    """Read whole or block by block, from a file or from arrays."""
+def test_stops_and_summary_of_arrays_match_the_report(directory):
+    """For whole logs or blocks, files or arrays."""
     channels = api.vehicle_channels(api.read_log(directory / "RIDE.csv"), directory / "RIDE.cal.json")
     seen = api.overview(api.open_ride(directory / "RIDE.csv"))
     assert seen.stops == api.find_stops(channels) != []
@@ -103,12 +104,13 @@ def test_without_pandas_the_extra_is_named(monkeypatch):
         log.to_pandas()
 
 
-def test_a_refusal_has_its_code_and_values(directory):
+def test_a_refusal_has_its_code_and_fields(directory):
     pose = directory / "UPRIGHT.csv"
     with pytest.raises(api.RefusedInput) as raised:
         api.fit_two_positions(pose, api.read_log(pose))
     assert raised.value.code == "same-pose"
-    assert raised.value.values == pytest.approx((0.0,), abs=0.1)
+    assert isinstance(raised.value.message, SamePose)
+    assert raised.value.message.apart_deg == pytest.approx(0.0, abs=0.1)
     assert str(raised.value).startswith(f"{pose} and {pose}: both poses are the same")
 
 

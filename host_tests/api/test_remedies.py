@@ -1,48 +1,100 @@
-"""What to do about a refusal, said by others than the command in their own words."""
+"""Notices and refusals: each has a sentence, and what to do in the words of a terminal and of a page."""
 
+import json
 import pickle
+import re
+from dataclasses import fields
 
 import pytest
-from kickstand.errors import Notice, Refusal
-from kickstand_tools import api, refusals
-from kickstand_tools.common.errors import InputError
-from kickstand_tools.refusals import RefusedInput
-from kickstand_tools.remedies import COMMANDS
+from kickstand_tools import api
+from kickstand_tools.calibration.drive_refusals import MountMoved
+from kickstand_tools.checks.handedness import RatesMisfit
+from kickstand_tools.checks.mount import ForwardExchanged, ForwardOff, UpOff
+from kickstand_tools.cli.main import kickstand
+from kickstand_tools.common.errors import InputError, RefusedInput
+from kickstand_tools.common.messages import Message, Remedy, as_data, distinct
+from kickstand_tools.estimation.first_guess import NotLeaning
+from kickstand_tools.imports.importing import ImportSign
 
-OTHERS = {name: f"<{name}>" for name in COMMANDS} | {"name_units": "<{0}>", "other_side": "<{0}>"}
+SAMPLES = {"str": "x", "int": 3, "float": 160.0, "bool": False, "float | None": None, "Remedy": Remedy()}
+WHOLE = {RatesMisfit: RatesMisfit((0, 1, 0), (1, 0, 0), (0, 0, 1)), MountMoved: MountMoved("vertical", 12.0)}
+
+
+def classes(base=Message):
+    for one in base.__subclasses__():
+        yield from classes(one)
+        if one.code:
+            yield one
+
+
+CLASSES = sorted(classes(), key=lambda one: one.code)
+
+
+def sample(one):
+    return WHOLE.get(one) or one(*(SAMPLES[str(getattr(f.type, "__name__", f.type))] for f in fields(one)))
+
+
+def with_a_command(words):
+    names = "|".join(kickstand.list_commands(None))
+    return re.search(rf"(^|\s)--?\w|kickstand ({names})\b|\bcalibrate (two|six(?! pos)|ride|drive)\b", words)
+
+
+@pytest.mark.parametrize("one", CLASSES, ids=lambda one: one.code)
+def test_a_page_names_no_command(one):
+    message = sample(one)
+    for words in message.line(), message.line(page=True):
+        assert words == words.strip() and "{" not in words and "\n" not in words and not words.endswith(".")
+    assert not with_a_command(message.line(page=True)), message.line(page=True)
+
+
+def test_each_code_is_one_class():
+    codes = [one.code for one in CLASSES]
+    assert len(codes) == len(set(codes)) > 60
 
 
 @pytest.mark.parametrize(
-    ("error", "command", "other"),
+    ("error", "terminal", "page"),
     [
         (InputError("no such thing: look"), "no such thing: look", "no such thing: look"),
-        (InputError("{x} is a zip", "import_zip"), f"{{x}} is a zip: {COMMANDS['import_zip']}", "zip: <import_zip>"),
-        (InputError("units", "name_units", "a=g", "one of g"), "units: add --units a=g (one of g)", "units: <a=g>"),
+        (InputError("{x} is a zip", Remedy("import it")), "{x} is a zip: import it", "zip: import it"),
+        (InputError("units", Remedy("add --units a=g", "choose them")), "units: add --units a=g", "units: choose them"),
         (
-            RefusedInput(Refusal("not-leaning"), "A.csv", "!"),
-            f"as a car: {COMMANDS['align_car']}!",
-            "as a car: <align_car>!",
+            RefusedInput(NotLeaning(), "A.csv", "!"),
+            "as a car: with a speed in the log take kickstand calibrate drive --vehicle car!",
+            "as a car: this page aligns motorcycles only!",
         ),
     ],
 )
-def test_a_refusal_says_what_to_do_in_the_words_that_are_given(error, command, other):
+def test_an_error_has_the_words_of_terminal_and_page(error, terminal, page):
     for one in (error, pickle.loads(pickle.dumps(error))):
-        assert str(one).endswith(command)
-        assert one.said(OTHERS).endswith(other)
+        assert str(one).endswith(terminal)
+        assert one.line(page=True).endswith(page)
+        assert getattr(one, "code", "") in ("", "not-leaning")
 
 
-def test_notices_too():
-    for notice in Notice("up-off", 20.0, False), Notice("forward-off", 30.0, "speed", True), Notice("import-sign", "X"):
-        assert refusals.sentence(notice) != refusals.sentence(notice, OTHERS)
-        assert "<" in refusals.sentence(notice, OTHERS)
-    assert "calibrate two --side right?" in refusals.sentence(Notice("forward-exchanged", False, "left", 0.0))
-    assert "exchanged: <--side right>" in refusals.sentence(Notice("forward-exchanged", False, "left", 0.0), OTHERS)
+def test_a_notice_has_the_words_of_terminal_and_page():
+    for notice in UpOff(20.0, False), ForwardOff(30.0, "speed", True), ImportSign("X"):
+        assert api.sentence(notice) != api.sentence(notice, page=True)
+    assert "calibrate two --side right?" in ForwardExchanged(False, "left", 0.0).line()
+    assert "to the other side than SIDE" in ForwardExchanged(False, "left", 0.0).line(page=True)
 
 
-def test_a_calibration_that_is_none_is_refused_so(tmp_path):
+def test_the_data_of_a_notice_are_its_fields_in_order():
+    (data,) = as_data([ForwardExchanged(False, "left", float("nan"))])
+    assert (data["code"], data["values"]) == ("forward-exchanged", [False, "left", None])
+    (data,) = as_data([WHOLE[RatesMisfit]])
+    assert json.loads(json.dumps(data["values"])) == [[0, 1, 0], [1, 0, 0], [0, 0, 1]]
+
+
+def test_the_same_line_is_kept_once():
+    first, same, other = UpOff(20.04, False), UpOff(20.0, False), UpOff(20.0, True)
+    assert distinct([first, same, other]) == [first, other]
+
+
+def test_a_file_that_is_not_a_calibration_is_refused(tmp_path):
     path = tmp_path / "A.cal.json"
     path.write_text("[]")
     with pytest.raises(InputError) as caught:
         api.read_calibration(path)
     assert str(caught.value) == f"{path} is no calibration: give a file made by kickstand calibrate"
-    assert caught.value.said(OTHERS).startswith(f"{path} is no calibration: <give_calibration>")
+    assert caught.value.line(page=True) == f"{path} is no calibration: give the .cal.json of the ride"

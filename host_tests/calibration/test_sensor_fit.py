@@ -7,9 +7,8 @@ from kickstand.calibration.sensor_fit import SensorFit
 from kickstand.calibration.turn import Turn
 from kickstand.errors import GyroError
 from kickstand_tools.calibration.procedure import fit_procedure
-from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.errors import InputError, RefusedInput
 from kickstand_tools.logs.log import Log
-from kickstand_tools.refusals import RefusedInput
 from kickstand_tools.simulation import hands, poses
 from kickstand_tools.simulation.physics.chip import Chip
 from support.mpy import run_mpy
@@ -216,7 +215,7 @@ def test_an_ill_axis_of_the_gyro_cannot_pass(axis, change, code):
     if code:
         assert refusal.value.code == code
     if code in ("gyro-scale", "gyro-reversed", "dead-gyro"):
-        assert refusal.value.values[0] == "xyz"[axis]
+        assert refusal.value.message.values[0] == "xyz"[axis]
 
 
 def test_an_axis_that_no_turn_has_shown_is_not_proved():

@@ -4,8 +4,8 @@ import functools
 
 import numpy as np
 from kickstand_tools.checks.cells import CellTable, LogCells
+from kickstand_tools.common.messages import sentence
 from kickstand_tools.logs.log import Log
-from kickstand_tools.refusals import sentence
 from kickstand_tools.simulation.ride import SimulatedRide, ride
 
 

@@ -7,14 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from checked import cells_of, made_up, simulated, words
-from kickstand.errors import Notice
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.checks.cells import CellTable
-from kickstand_tools.checks.mount import contradiction
+from kickstand_tools.checks.mount import ForwardExchanged, ForwardOff, contradiction
+from kickstand_tools.common.messages import sentence
 from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.refusals import sentence
 from kickstand_tools.signals import rotation_matrix
 from kickstand_tools.simulation.profiles import PROFILES
 from kickstand_tools.simulation.scripted import script
@@ -73,9 +72,8 @@ def test_wrong_ones_are(profile, speed):
         assert line in said(log, other(calibration, "", **turns)), turns
     for angle, side in (90.0, "left"), (-90.0, "right"):
         notice = contradiction(cells_of(log), other(calibration, up=angle))
-        assert notice is not None
-        found, how, car = notice.values
-        assert (found, how, car) == (pytest.approx(angle, abs=8.0), by, False)
+        assert isinstance(notice, ForwardOff)
+        assert (notice.angle_deg, notice.by, notice.car) == (pytest.approx(angle, abs=8.0), by, False)
         assert f" degrees to the {side} of the calibration's" in sentence(notice)
     upside_down = Log(log.t_s, -log.accel_g, log.gyro_dps, log.speed_mps)
     assert "do all accelerations have the opposite sign? At rest up reads +1 g" in said(upside_down, calibration)
@@ -141,7 +139,7 @@ SIGN = " Or, if no board wrote this log, do all accelerations have the opposite 
 
 
 def exchanged_line(car, side, roll_deg=None):
-    return sentence(Notice("forward-exchanged", car, side, roll_deg))
+    return sentence(ForwardExchanged(car, side, roll_deg))
 
 
 def test_what_is_reported():

@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from kickstand_tools.analysis.overview import overview
+from kickstand_tools.analysis.ride import Ride
 from kickstand_tools.api import Log, replay, smooth
-from kickstand_tools.checks.sensor import NAMES, SensorHealth
-from kickstand_tools.refusals import sentence
+from kickstand_tools.checks.sensor import NAMES, AxisDead, GyroSaturated, SensorHealth
+from kickstand_tools.common.messages import sentence
 from kickstand_tools.signals import rotation_matrix
 from support.recordings.smoothed_rides import rms, simulated
 
@@ -30,12 +32,46 @@ def test_a_dead_axis_is_named_and_has_no_lean(street, axis):
 
     log = ill(street, die)
     for found in (smooth(log, street.calibration), replay(log, street.calibration)):
-        (notice,) = (n for n in found.notices if n.code == "axis-dead")
-        assert notice.values[0] == NAMES[axis]
-        assert notice.values[2] == pytest.approx(50.0, abs=2.0)
+        (notice,) = (n for n in found.notices if isinstance(n, AxisDead))
+        assert notice.name == NAMES[axis]
+        assert notice.begin_s == pytest.approx(50.0, abs=2.0)
         assert f"{NAMES[axis]} is dead" in sentence(notice)
         dead = (log.t_s > 52.0) & (log.t_s < 95.0)
         assert np.mean(np.isnan(found.lean_deg[dead])) > 0.9
+
+
+@pytest.mark.parametrize(("sensor", "begin_s"), [("gyro", -1.0), ("gyro", 50.0), ("accelerometer", 50.0)])
+def test_a_sensor_dead_in_all_axes_is_named_and_left_out(street, sensor, begin_s):
+    def die(time, force, rate):
+        (force if sensor == "accelerometer" else rate)[time > begin_s] = (0.25, -0.5, 0.75)
+
+    found = replay(ill(street, die), street.calibration)
+    names = [notice.values[0] for notice in found.notices if notice.code == "axis-dead"]
+    assert names == [name for name in NAMES if name.startswith(sensor)]
+    assert np.mean(np.isnan(found.lean_deg[(found.t_s > max(2.0, begin_s + 2.0)) & (found.t_s < 95.0)])) > 0.8
+
+
+def test_an_accelerometer_that_clips_is_said(street):
+    def clip(_, force, _rate):
+        force[:, 1] = (force[:, 1] + np.random.default_rng(3).normal(size=len(force))).clip(-2.0, 2.0)
+
+    (notice,) = (n for n in replay(ill(street, clip), street.calibration).notices if n.code == "accel-clipped")
+    assert notice.values[:2] == ("y", 2.0)
+    assert notice.values[2] >= 10
+    assert "accelerometer y is at the end of its range (2.0 g)" in sentence(notice)
+
+
+def test_a_bias_that_steps_is_said_by_replay_and_report(street):
+    def drift(time, _force, rate):
+        rate += 0.4 * np.maximum(0.0, time - 30.0)[:, None] * street.calibration.vehicle_from_sensor[2]
+
+    log = ill(street, drift)
+    seen = overview(Ride(log, street.calibration))
+    for notices in (replay(log, street.calibration).notices, seen.notices):
+        (notice,) = (n for n in notices if n.code == "readings-misfit")
+        assert notice.values[0] > 2.0
+        assert notice.values[1] > 30.0
+        assert "the readings do not fit together" in sentence(notice)
 
 
 def test_a_saturated_gyro_is_said_and_the_rest_of_the_ride_is_good(street):
@@ -44,9 +80,9 @@ def test_a_saturated_gyro_is_said_and_the_rest_of_the_ride_is_good(street):
 
     log = ill(street, saturate)
     found = smooth(log, street.calibration)
-    (notice,) = (n for n in found.notices if n.code == "gyro-saturated")
-    assert notice.values[:2] == ("y", 1)
-    assert notice.values[2] == pytest.approx(0.5, abs=0.02)
+    (notice,) = (n for n in found.notices if isinstance(n, GyroSaturated))
+    assert (notice.axis, notice.times) == ("y", 1)
+    assert notice.seconds == pytest.approx(0.5, abs=0.02)
     there = street.riding & (np.abs(log.t_s - 60.0) > 2.0)
     assert rms((found.lean_deg - street.lean_deg)[there]) < 0.4
     assert np.all(np.isnan(found.lean_deg[(log.t_s > 60.01) & (log.t_s < 60.49)]))
@@ -64,7 +100,8 @@ def test_a_gyro_of_half_the_scale_is_doubted(street, scale):
 
 def test_sound_sensors_are_not_called_ill(street):
     codes = {notice.code for notice in smooth(street.log, street.calibration).notices}
-    assert not codes & {"axis-dead", "gyro-saturated", "sensor-odd"}
+    assert not codes & {"axis-dead", "gyro-saturated", "accel-clipped", "sensor-odd"}
+    assert not replay(street.log, street.calibration).notices
 
 
 def test_rounding_and_a_standstill_are_no_dead_axis():

@@ -1,5 +1,5 @@
-"""A board is started once for all tests of a process that begin alike: each runs in a fork, with a copy of a Pico. QEMU
-cannot be copied: tests of the ESP32 leave it as it was, or take one of their own."""
+"""Starts a board once for all tests of a process that need the same start. Each test runs in a fork, with a copy of a
+Pico. QEMU cannot be copied: tests of the ESP32 restore its state, or use a separate one."""
 
 import os
 import traceback
@@ -32,7 +32,7 @@ def at_prompt():
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_pyfunc_call(pyfuncitem):
-    """Whatever such a test does to the board, the next one has it as it was."""
+    """Run such a test in a fork: the next one gets the board unchanged."""
     devices = [pyfuncitem.funcargs[name] for name in COPIED & set(pyfuncitem.fixturenames)]
     if not devices or devices[0].NAME == "ESP32":
         return None

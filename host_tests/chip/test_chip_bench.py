@@ -10,7 +10,7 @@ pytestmark = pytest.mark.chip
 
 @pytest.mark.long
 def test_the_loop_and_the_start_stay_within_their_limits():
-    """Nothing is lost, the heap does not shrink, and the first lean comes within 1.1 s."""
+    """No sample is lost, the heap does not shrink, and the first lean appears within 1.1 s."""
     pico()  # or skip
     from kickstand_workshop.bench import bench
 
@@ -31,7 +31,7 @@ def test_the_loop_and_the_start_stay_within_their_limits():
 
 @pytest.mark.nightly
 def test_bench(monkeypatch):
-    """A short run of all of it: the stages add up, and each figure has its place in the tables."""
+    """A short run of everything: the stages add up, and each figure is in the tables."""
     pico()  # or skip
     from kickstand_workshop.bench import bench
 

@@ -33,7 +33,7 @@ def board():
         yield emulated
 
 
-def test_quicker_division_is_rp2040pys_own():
+def test_fast_division_gives_the_results_of_rp2040py():
     """The same results, flags and cycles, also of a division by zero and of signed numbers."""
     device = pico()  # or skip
     from rp2040py.rp2040 import RP2040
@@ -54,7 +54,7 @@ def test_quicker_division_is_rp2040pys_own():
     assert results[0] == results[1]
 
 
-# Without the finder that looks for the modules compiled for this Python
+# Without the finder for the modules compiled for this Python
 _WHEELS_OWN = """
 import sys, kickstand_emulator
 del sys.meta_path[0]
@@ -63,8 +63,8 @@ print(emulated.begun(0.003))
 """
 
 
-def test_a_chip_does_the_same_on_every_host():
-    """Compiled for this Python or as it comes in the wheel, and on a slow host: the same cycles, the same memory."""
+def test_chip_runs_the_same_on_every_host():
+    """Compiled for this Python or from the wheel, and on a slow host: the same cycles, the same memory."""
     pico()  # or skip
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     other = subprocess.run([sys.executable, "-c", _WHEELS_OWN], env=environment, capture_output=True, text=True)
@@ -76,7 +76,7 @@ def ask(board, expression):
     return eval(board.exec(f"print(repr(({expression})))"))
 
 
-def test_bits_take_their_time(board):
+def test_i2c_bits_take_time(board):
     """156 bits at 400 kHz are 390 us, and MicroPython adds some; 69 bytes at 100 kHz are 6.2 ms."""
     us, _ = ask(board, "timed(sensor.readfrom_mem, 0x68, 0x3B, 14)")
     assert 390 < us < 500
@@ -84,7 +84,7 @@ def test_bits_take_their_time(board):
     assert 6210 < us < 6500
 
 
-def test_an_absent_device_is_a_quick_error_and_spoils_nothing(board):
+def test_absent_device_fails_fast_and_harms_no_transfer(board):
     for call in ("readfrom, 0x55, 1", "writeto, 0x55, b'1'"):
         us, number = ask(board, f"timed(sensor.{call})")
         assert number == 5
@@ -92,8 +92,8 @@ def test_an_absent_device_is_a_quick_error_and_spoils_nothing(board):
         assert ask(board, "timed(sensor.readfrom_mem, 0x68, 0x75, 1)")[1] == b"h"
 
 
-def test_held_wires_time_out_until_they_are_freed(board):
-    """As set: 5 ms. Then nine clocks by hand, and the chip answers again."""
+def test_held_wires_time_out_until_freed(board):
+    """The time-out is 5 ms as set. After nine manual clocks the chip answers again."""
     board.board.sensor_bus.hang()
     us, number = ask(board, "timed(sensor.readfrom_mem, 0x68, 0x75, 1)")
     assert number == 110
@@ -108,22 +108,22 @@ def test_held_wires_time_out_until_they_are_freed(board):
     assert ask(board, "sensor.readfrom_mem(0x68, 0x75, 1)") == b"h"
 
 
-def test_devices_answer_to_pins_too(board):
-    """MicroPython drives the pins itself for scan(), which writes 0 bytes, and for everything that SoftI2C does."""
+def test_devices_answer_bit_banged_pins(board):
+    """MicroPython drives the pins directly for scan(), which writes 0 bytes, and for SoftI2C."""
     assert ask(board, "sensor.scan(), lcd.scan()") == ([0x68], [0x27])
     board.exec("soft = SoftI2C(sda=Pin(4), scl=Pin(5), freq=100000)\nsoft.writeto_mem(0x68, 0x6B, b'\\x01')")
     assert ask(board, "soft.readfrom_mem(0x68, 0x6B, 1), soft.readfrom_mem(0x68, 0x75, 1)") == (b"\x01", b"h")
     board.exec("sensor = I2C(0, sda=Pin(4), scl=Pin(5), freq=400000, timeout=5000)")
 
 
-def test_flash_takes_its_time(board):
+def test_flash_operations_take_time(board):
     us, _ = ask(board, "timed(__import__('rp2').Flash().writeblocks, 300, bytes(4096))")
     assert 45_000 + 16 * 500 < us < 62_000
     us, _ = ask(board, "timed(__import__('rp2').Flash().writeblocks, 301, bytes(256), 0)")
     assert 500 < us < 1000
 
 
-def test_the_console_leaves_the_processor_alone(board):
+def test_idle_console_takes_no_processor_time(board):
     """A turn of an empty loop takes 3.1 us. With empty USB packets it would take three times as long."""
     code = (
         "def f():\n    t = ticks_us()\n    for i in range(1000): pass\n    return ticks_diff(ticks_us(), t)\nprint(f())"

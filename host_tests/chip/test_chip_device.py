@@ -1,5 +1,5 @@
-"""The whole device on the emulated boards: MicroPython's own image, its file system, floats and drivers; and what a
-fault does to its I2C, its FIFO's backlog, watchdog and reset. host_tests/device has every fault of the fault script."""
+"""The whole device on the emulated boards: MicroPython's own image, file system, floats and drivers; and the effect of
+faults on I2C, FIFO backlog, watchdog and reset. host_tests/device tests every fault of the fault script."""
 
 import re
 from typing import Any
@@ -22,10 +22,10 @@ FAULT_S = 0.6
 
 @pytest.mark.long
 @pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=[pytest.mark.esp32, pytest.mark.nightly])])
-def test_a_new_board_is_aligned_by_two_presses_and_keeps_it(chip):
+def test_two_presses_align_a_new_board_for_good(chip):
     """Uncalibrated, kickstand, upright, power-cycle, leaned: the display reads the lean."""
     ride = Ride([kickstand(5.5), upright(5.5), upright(1e6, lean_deg=LEAN_DEG)])
-    part = Sensor(seed=1, share=0.1)  # its accelerometer is not calibrated here: that shall cost no degrees
+    part = Sensor(seed=1, share=0.1)  # its accelerometer is not calibrated here: small errors cost no degrees
     device = CHIPS[chip](part.world(ride.motion), firmware(chip))
     device.power_on()
     shows(device, r"Raw.*\|(Not aligned|On stand: press)", 3.0)
@@ -57,7 +57,7 @@ def lean_is_right(device):
 
 
 def watch(device, seconds):
-    """Let time pass. Returns every text of the display; fails if one shows a wrong lean."""
+    """Advance the time. Returns every text of the display; fails if one shows a wrong lean."""
     texts = set()
     for _ in range(round(seconds / 0.02)):
         device.run(0.02)
@@ -68,7 +68,7 @@ def watch(device, seconds):
 
 
 def starts_again(device):
-    """After a reset: on a display that has lost what it showed, the right lean comes back."""
+    """After a reset the right lean appears again, on a display that has lost its content."""
     device.board.lcd.power_on()
     device.run_until(lambda: lean_is_right(device), 4.0)
 
@@ -82,8 +82,8 @@ def starts_again(device):
     ],
     ids=["EIO", "ETIMEDOUT", "SDA held"],
 )
-def test_errors_of_the_bus(riding, inject, request):
-    """It is said while it lasts; a wire that is soon freed may pass between two looks at the display."""
+def test_bus_errors_are_shown_while_they_last(riding, inject, request):
+    """The fault is shown while it lasts. A brief one may fall between two reads of the display."""
     inject(riding.board.faults, riding.time_s + 0.01)
     texts = watch(riding, 0.01 + FAULT_S + RECOVERY_S)
     assert lean_is_right(riding), riding.lcd()
@@ -92,8 +92,8 @@ def test_errors_of_the_bus(riding, inject, request):
 
 
 @pytest.mark.parametrize("riding", ["pico"], indirect=True)
-def test_a_stalled_processor(riding):
-    """45 ms, as a flash erase takes with interrupts off, and more lose no sample. Seconds overflow the FIFO: that is
+def test_stalled_processor_keeps_the_lean_right(riding):
+    """A stall of 45 ms (a flash erase with interrupts off) or more loses no sample. Seconds overflow the FIFO: this is
     counted, the sensor is not restarted, and the lean stays right."""
     samples = SampleCount(riding.board.sensor)
     samples.begin()
@@ -102,7 +102,7 @@ def test_a_stalled_processor(riding):
         watch(riding, 0.3)
     assert samples.taken() > 150
     assert samples.lost() == 0
-    for stall_s in (0.45, 2.0):  # shorter and longer than what the filter bridges
+    for stall_s in (0.45, 2.0):  # shorter and longer than the filter can bridge
         riding.stall(stall_s)
         texts = watch(riding, RECOVERY_S)
         assert lean_is_right(riding), riding.lcd()
@@ -110,8 +110,8 @@ def test_a_stalled_processor(riding):
     assert samples.lost() > 200
 
 
-def test_a_hung_program_is_restarted_by_the_watchdog(riding):
-    """Within 8.4 s, an ESP32 a second later, because it prints why; and then the lean is there again."""
+def test_watchdog_restarts_a_hung_program(riding):
+    """Within 8.4 s (an ESP32 a second later, because it prints the reason). Then the lean is shown again."""
     riding.exec("from time import sleep\nfrom kickstand.board import port")
     riding.send(b"port.start_watchdog()\nwhile True: sleep(10)\x04")
     resets = riding.resets
@@ -119,7 +119,7 @@ def test_a_hung_program_is_restarted_by_the_watchdog(riding):
     starts_again(riding)
 
 
-def test_a_reset_in_mid_read_frees_the_bus(riding):
+def test_reset_during_a_read_frees_the_bus(riding):
     """The sensor holds SDA; the restarted firmware clocks it free."""
     resets = riding.resets
     reset_in_a_read(riding, riding.time_s + 0.01)
@@ -136,7 +136,7 @@ def test_a_reset_in_mid_read_frees_the_bus(riding):
         pytest.param("esp32", "ssd1306", marks=[pytest.mark.esp32, pytest.mark.nightly]),
     ],
 )
-def test_an_oled_is_found_and_shows_the_lean_in_large_digits(chip, display):
+def test_oled_is_found_and_shows_the_lean_in_large_digits(chip, display):
     """With MicroPython's own framebuf, over a Pico's own I2C and an ESP32's pins."""
     with CHIPS[chip](leaning(LEAN_DEG), firmware(chip) | calibrated(), display=display) as device:
         device.run_until(lambda: shown_lean(device.lcd()) == LEAN_DEG, 3.0)

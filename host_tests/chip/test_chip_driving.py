@@ -1,4 +1,4 @@
-"""Alignment by driving on the chip: the same result as on the host, within the time a sample has, in fixed memory."""
+"""Alignment by driving on the chip: the same result as on the host, within the time of a sample, in constant memory."""
 
 import json
 import time
@@ -12,7 +12,8 @@ from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 
 pytestmark = pytest.mark.chip
 
-# mount, clock, elapsed and allocated are given; each update does one step of the work, so that all are timed alike
+# mount, clock, elapsed and allocated are defined outside. Each update does one step of the work, so all are timed in
+# the same way
 _DRIVE = """
 from kickstand.drive_alignment import alignment
 from kickstand.rotation import matrix
@@ -70,7 +71,7 @@ def test_alignment_by_driving_on_the_chip(at_prompt, monkeypatch):
     between = np.reshape(chip["matrix"], (3, 3)) @ np.reshape(host["result"]["matrix"], (3, 3)).T
     assert np.degrees(np.linalg.norm(rotation_vector(between))) < 0.05
     assert chip["longest"] < 2100, "microseconds"
-    # once each number has its place on the heap nothing is added
+    # after each number has its place on the heap, it does not grow
     later = chip["memory"][len(chip["memory"]) // 2 :]
     assert max(later) - min(later) < 400, chip["memory"]
     assert later[-1] - chip["memory"][0] < 3000

@@ -1,6 +1,4 @@
-"""What is special about the emulated ESP32, and what it takes a board of its own for. What is tested on both chips is
-in test_chip_device.py.
-"""
+"""Features of the emulated ESP32, and tests that need a separate board. Tests for both chips: test_chip_device.py."""
 
 import math
 import re
@@ -35,13 +33,13 @@ save(0)
 
 
 def board(config="", world=None, files=None):
-    """A calibrated one that is held at LEAN_DEG, without power yet. config: of config.py."""
+    """A calibrated board held at LEAN_DEG, still off. config: of config.py."""
     own = FILES | ({"/config.py": config.encode()} if config else {})
     return esp32(world or leaning(LEAN_DEG), (files or firmware("esp32")) | own)
 
 
-def test_ctrl_c_unplugged_parts_and_a_soft_reset():
-    """What an owner does with a board that runs."""
+def test_board_survives_ctrl_c_unplugging_and_soft_reset():
+    """Actions of an owner with a running board."""
     with board() as device:
         shows(device, LEAN, BOOT_S)
         faults = device.board.faults
@@ -89,7 +87,7 @@ def test_safe_mode_and_refused_pins():
 
 
 def states_of_flash(device, code):
-    """The file system before, and after each write to the flash while code runs. QEMU's flash takes no time, but the
+    """Yield the file system before, and after each flash write while code runs. QEMU's flash takes no time, but the
     program needs tens of microseconds between two writes."""
     device.exec("pass")
     device.send(code.encode() + b"\x04")
@@ -104,7 +102,7 @@ def states_of_flash(device, code):
 
 
 def test_old_or_new_wherever_a_save_is_cut(tmp_path):
-    """The power goes after each write of four saves: a board that starts with that flash has a whole calibration."""
+    """The power is cut after each write of four saves: a board that starts with that flash has a whole calibration."""
     with board(files=modules("esp32")) as device:
         device.exec(_SAVE)
         states, writes = [], 0
@@ -136,7 +134,7 @@ _SIDES = [[1, 0, 0], [0, 0, -1], [0, 1, 0], [-1, 0, 0], [0, 0, 1], [0, -1, 0], [
 
 @pytest.mark.nightly
 def test_six_positions_by_the_button():
-    """From the menu to a calibration that is stored, the last position a free one."""
+    """From the menu to a stored calibration; the last position is a free one."""
     steps = [[0, None]]
     for i, up in enumerate(_SIDES):
         steps += [[8.0 + 6.0 * i, up], [13.0 + 6.0 * i, None]]
@@ -152,8 +150,8 @@ def test_six_positions_by_the_button():
 
 
 @pytest.mark.nightly
-def test_wherever_the_power_goes_all_but_the_last_block_of_a_ride_is_kept():
-    """After each write to the flash; the calibration stays whatever happens."""
+def test_power_cut_loses_only_the_last_block_of_a_ride():
+    """The power is cut after each write to the flash. The calibration always survives."""
     with board(files=modules("esp32")) as device:
         device.exec(FEED + "recorder.start(Chip(), Calibration())")
         states = states_of_flash(device, "feed(3)\nrecorder.stop()")
@@ -169,8 +167,8 @@ def test_wherever_the_power_goes_all_but_the_last_block_of_a_ride_is_kept():
     assert seen >= 3
 
 
-def test_a_ride_makes_room_oldest_first():
-    """In a flash full of rides, so many of the first parts go as it takes, and not one more."""
+def test_ride_removes_the_oldest_parts_first():
+    """In a flash full of rides, only as many of the first parts as needed are removed."""
     parts = [part_path("rides", ride, number) for ride in (1, 2) for number in range(11)]
     full = dict.fromkeys(parts, bytes(PART_BLOCKS * BLOCK))
     with board(files=modules("esp32") | full) as device:
@@ -179,7 +177,7 @@ def test_a_ride_makes_room_oldest_first():
         device.exec("recorder.start(Chip(), Calibration())\nfeed(2)\nrecorder.stop()", 30.0)
         files = device.files()
     gone = [path for path in parts if path not in files]
-    short = needed - (before - 2 * BLOCK)  # of bytes, once the ride has its directory
+    short = needed - (before - 2 * BLOCK)  # missing bytes, after the ride has its directory
     assert short > 0
     assert gone == parts[: math.ceil(short / (PART_BLOCKS * BLOCK))]
     assert FILES.items() <= files.items()

@@ -109,7 +109,7 @@ print("".join("%%02x" %% byte for byte in block.buffer[:512]))
 """
 
 
-def test_a_position_is_exact_on_the_chip_quick_and_takes_little_heap(at_prompt):
+def test_position_on_the_chip_is_exact_fast_and_small(at_prompt):
     costs, block = at_prompt.exec(_PLACE % _SENTENCE.encode(), 20.0).split("\n")[:2]
     turn = block_reader.parse(bytes.fromhex(block.strip())).turns[0]
     assert turn.place == block_reader.Place(-89.0 - 59.99999 / 60, -179.0 - 59.99998 / 60, 1_798_761_599.97)

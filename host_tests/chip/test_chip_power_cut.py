@@ -7,7 +7,7 @@ from kickstand.calibration.store import Store
 
 pytestmark = pytest.mark.chip
 
-SAVES = 16  # littlefs writes a page at a time, and goes on to a block that it erases at every fifteenth save
+SAVES = 16  # littlefs writes a page at a time; at every fifteenth save it erases a new block
 
 # The calibrations differ in the gyro bias about x
 _TOOLS = """
@@ -25,7 +25,7 @@ save(0)
 
 
 def torn(before, after, share):
-    """The flash when only a share of what one operation changes was done."""
+    """The flash after only a share of one operation's change."""
     first = next(i for i in range(0, len(before), 256) if before[i : i + 256] != after[i : i + 256])
     last = next(i for i in range(len(before), 0, -256) if before[i - 256 : i] != after[i - 256 : i])
     while before[first] == after[first]:
@@ -35,7 +35,7 @@ def torn(before, after, share):
 
 
 def loaded(system, image, directory):
-    """The gyro bias that the firmware loads with this flash: it can be mounted, and the store finds a whole record."""
+    """The gyro bias that the firmware loads from this flash, which must have a whole record."""
     for name, content in system.read(image).items():
         if name.endswith(".cal"):
             (directory / name).write_bytes(content)
@@ -62,8 +62,8 @@ def test_old_or_new_wherever_a_save_is_cut(at_prompt, tmp_path):
 
 
 @pytest.mark.parametrize("operation", [8, *(pytest.param(n, marks=pytest.mark.nightly) for n in (1, 9, 10))])
-def test_a_board_starts_and_saves_after_a_cut(at_prompt, operation):
-    """The power really goes in the middle of an operation, and comes back. The eighth is an erase."""
+def test_board_starts_and_saves_after_a_power_cut(at_prompt, operation):
+    """The power is really cut in the middle of an operation, and restored. The eighth is an erase."""
     at_prompt.exec(_TOOLS)
     at_prompt.chip.flash.cut_power(operation, 0.5)
     del at_prompt.said[:]

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.chip
 
 RIDE = Ride([wait(1.0), accelerate(15.0, 2.0), turn(-30.0, 3.0), turn(35.0, 3.0)])
 
-# The app as it is, its lean of each turn kept: seconds of it, then the ride is ended
+# The unchanged app; the lean of each turn is recorded for some seconds, then the ride is ended
 _RUN = """
 from array import array
 from time import ticks_add, ticks_diff, ticks_ms
@@ -53,7 +53,7 @@ except KeyboardInterrupt:
 print(list(leans[:count]))
 """
 
-# Turns of a made-up ride as fast as they can be written
+# Turns of a simulated ride, written as fast as possible
 FEED = """
 import random
 from kickstand.rides.recorder import Recorder
@@ -79,7 +79,7 @@ def feed(blocks):
 
 
 def rides(files):
-    """Whole blocks by ride, in their order; nothing else may be in the files."""
+    """The blocks of each ride in order; the files must contain only whole blocks."""
     found = {}
     for name in sorted(files):
         if name.startswith("rides/"):
@@ -92,7 +92,7 @@ def rides(files):
 
 @pytest.mark.nightly  # on the simulated board: host_tests/rides/test_recorder.py, with slow flash test_slow_flash.py
 def test_a_recorded_ride_replays_as_it_was_shown(at_prompt, tmp_path):
-    """While it is recorded no sample is lost, and the display goes on."""
+    """During the recording no sample is lost, and the display keeps working."""
     begun_s, world = at_prompt.time_s, PART.world(RIDE.motion)
     at_prompt.board.sensor.world = lambda t_s: world(t_s - begun_s)
     samples = SampleCount(at_prompt.board.sensor)
@@ -118,8 +118,8 @@ def test_a_recorded_ride_replays_as_it_was_shown(at_prompt, tmp_path):
 
 
 @pytest.mark.nightly  # the next test cuts the power at one write, test_chip_power_cut.py at each write of a calibration
-def test_wherever_the_power_goes_all_but_the_last_block_is_kept(at_prompt):
-    """Before, within and after each operation on the flash; the calibration stays whatever happens."""
+def test_power_cut_loses_only_the_last_block(at_prompt):
+    """The power is cut before, within and after each flash operation. The calibration always survives."""
     at_prompt.exec(FEED)
     states = []
     at_prompt.chip.flash.before_operation = lambda: states.append((at_prompt.file_system, None))
@@ -150,7 +150,7 @@ def test_wherever_the_power_goes_all_but_the_last_block_is_kept(at_prompt):
 
 
 @pytest.mark.parametrize("operation", [2, pytest.param(37, marks=pytest.mark.nightly)])
-def test_a_board_records_again_after_a_cut(at_prompt, operation):
+def test_board_records_again_after_a_power_cut(at_prompt, operation):
     at_prompt.exec(FEED)
     at_prompt.chip.flash.cut_power(operation, 0.5)
     at_prompt.send(b"recorder.start(Chip(), Calibration())\nfeed(6)\x04")
@@ -165,7 +165,7 @@ def test_a_board_records_again_after_a_cut(at_prompt, operation):
 @pytest.mark.nightly
 @pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=pytest.mark.esp32)])
 def test_pull_and_record_through_mpremote(tmp_path, monkeypatch, chip):
-    """A ride that is being recorded, with an ESP32's GPS, is ended and pulled; then a log is streamed. Both replay."""
+    """The current ride, with an ESP32's GPS, is ended and pulled; then a log is streamed. Both can be replayed."""
     config = "RECORD = True\n" + {"pico": "", "esp32": 'SPEED = "gps"\n'}[chip]
     files = firmware(chip) | calibrated() | {"config.py": config.encode()}
     board: Any = CHIPS[chip](PART.world(RIDE.motion), files)
@@ -190,7 +190,7 @@ def test_pull_and_record_through_mpremote(tmp_path, monkeypatch, chip):
         assert np.isfinite(log.lat_deg).any() == (chip == "esp32")
 
         live = tmp_path / "live.csv"
-        device.run(2.0)  # an ESP32 that is starting does not hear its console, and would be asked again after 10 s
+        device.run(2.0)  # a starting ESP32 ignores its console, and would be asked again after 10 s
         ends.append(device.time_s + 5.0)
         result = command.works("record", "--port", emulated_port.NAME, "--out", live)
         assert result.err == ""

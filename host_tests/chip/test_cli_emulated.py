@@ -1,4 +1,4 @@
-"""`kickstand emulate`, and flash and status by mpremote onto the board that it emulates."""
+"""`kickstand emulate`, and flash and status with mpremote on the emulated board."""
 
 import math
 import queue
@@ -51,8 +51,8 @@ def test_without_its_library_an_esp32_is_refused(words, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("chip", ["rp2040", "esp32"])
-def test_emulate_says_at_once_that_it_starts(tmp_path, monkeypatch, chip):
-    """Also if it then finds that something is missing, which it says with where to get it and where to put it."""
+def test_emulate_reports_its_start_at_once(tmp_path, monkeypatch, chip):
+    """Also if a file is missing: the message says where to get it and where to put it."""
     monkeypatch.setattr(Path, "home", lambda: tmp_path)
     monkeypatch.setattr(image, "URL", "http://127.0.0.1:9/" + image.NAME)
     monkeypatch.setenv(esp32_library.VARIABLE, str(tmp_path))
@@ -117,8 +117,7 @@ class Emulating(threading.Thread):
 @pytest.mark.nightly  # like the page Install at an emulated Pico; with a made-up board: host_tests/deploy
 @pytest.mark.parametrize("chip", ["rp2040", pytest.param("esp32", marks=pytest.mark.esp32)])
 def test_flash_and_status_on_the_emulated_board(monkeypatch, chip):
-    """Onto an older version with an edited config; then the bike's ride begins, and the display says what is to be
-    done."""
+    """Over an older version with an edited config. Then the bike's ride begins, and the display shows what to do."""
     name = "esp32" if chip == "esp32" else "pico"
     names = {"rp2040": "Raspberry Pi Pico with RP2040", "esp32": "Generic ESP32 module with ESP32"}
     CHIPS[name]()  # or skip
@@ -133,7 +132,7 @@ def test_flash_and_status_on_the_emulated_board(monkeypatch, chip):
         clock = types.SimpleNamespace(monotonic=emulating.time_s, sleep=emulating.sleep)
         for module in (transport_serial, connection):
             monkeypatch.setattr(module, "time", clock)
-        emulating.sleep(2.0)  # an ESP32 that is starting does not hear its console
+        emulating.sleep(2.0)  # a starting ESP32 ignores its console
         flashed = command.works("flash", "--port", address[0]).out
         assert f"{names[chip]}, MicroPython 1.26.1 on {address[0]}" in flashed
         assert "kept: config.py" in flashed
@@ -155,5 +154,5 @@ def test_flash_and_status_on_the_emulated_board(monkeypatch, chip):
     assert emulating.device.files() == wanted
 
 
-def test_which_compiled_files_the_image_takes(at_prompt):
+def test_image_accepts_the_compiled_files(at_prompt):
     assert at_prompt.exec("import sys\nprint(sys.implementation._mpy)") == f"{bytecode.PICO}\n"

@@ -42,7 +42,7 @@ def installed(tmp_path, monkeypatch):
     return install
 
 
-def test_a_command_of_another_package(installed):
+def test_command_of_another_package_runs(installed):
     installed("lap-timer", "[kickstand.commands]\nlaps = lap_timer:laps_command\n", lap_timer=LAPS)
     assert command.works("laps").out == "three laps\n"
     assert "laps       Split a ride into laps." in command.works("--help").out
@@ -61,7 +61,7 @@ def test_a_command_of_another_package(installed):
     ],
 )
 def test_a_broken_command_is_one_line_with_its_package(installed, tmp_path, value, module, why):
-    """Other commands and the help work."""
+    """Other commands and the help still work."""
     installed("lap-timer", f"[kickstand.commands]\nlaps = {value}\n", lap_timer=module)
     said = command.refused(tmp_path, "laps", words="the command laps of the package lap-timer cannot be loaded (")
     assert why in said
@@ -70,31 +70,31 @@ def test_a_broken_command_is_one_line_with_its_package(installed, tmp_path, valu
     command.works("bench", "--help")
 
 
-def test_a_crash_is_reported_as_its_packages(installed, tmp_path):
+def test_crash_is_reported_with_its_package(installed, tmp_path):
     installed("lap-timer", "[kickstand.commands]\ncrash = lap_timer:crash_command\n", lap_timer=LAPS)
     said = command.run("crash").err
     assert said == "kickstand: unexpected ZeroDivisionError: division by zero: a fault in lap-timer, please report it\n"
 
 
-def test_a_crash_of_our_own_is_ours(monkeypatch):
+def test_crash_of_kickstand_is_reported_as_a_bug(monkeypatch):
     monkeypatch.setitem(main.COMMANDS, "report", (".no_such_module", ""))
     assert ": a fault in kickstand, please report it" in command.run("report").err
 
 
-def test_no_package_takes_a_command_of_kickstands(installed):
+def test_own_command_cannot_be_replaced(installed):
     installed("lap-timer", "[kickstand.commands]\nreport = lap_timer:laps_command\n", lap_timer=LAPS)
     assert "Split a ride into laps" not in command.works("report", "--help").out
     assert "Split a ride into laps" not in command.works("--help").out
 
 
-def test_metadata_that_cannot_be_read_adds_nothing(installed):
+def test_unreadable_metadata_adds_no_command(installed):
     installed("lap-timer", "[kickstand.commands]\nlaps\n")
     assert "laps " not in command.works("--help").out
     assert "No such command 'laps'" in command.run("laps").err
 
 
-def test_a_script_of_the_users_is_not_run(tmp_path):
-    """Whatever its name is."""
+def test_users_own_script_is_not_run(tmp_path):
+    """For any name."""
     (tmp_path / "kickstand_my_rides.py").write_text("raise RuntimeError('it was run')\n")
     started = [sys.executable, "-m", "kickstand_tools.cli", "--help"]
     done = subprocess.run(started, cwd=tmp_path, capture_output=True, text=True)
@@ -102,5 +102,5 @@ def test_a_script_of_the_users_is_not_run(tmp_path):
 
 
 def test_a_checkout_has_the_workshops_commands():
-    """The wheel has not: host_tests/deploy/test_cli_package.py."""
+    """The wheel does not have them: host_tests/deploy/test_cli_package.py."""
     assert {"bands", "bench", "evaluate"} <= set(main.kickstand.list_commands(None))

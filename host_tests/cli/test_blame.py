@@ -1,4 +1,4 @@
-"""A fault outside is called what it is: circles of links, nesting, escapes in names, signals, odd values."""
+"""External faults are named correctly: circles of links, nesting, escapes in names, signals, odd values."""
 
 import os
 import signal
@@ -45,7 +45,7 @@ def test_a_file_that_the_shell_has_opened_is_not_replaced(name, tmp_path):
 
 
 @pytest.mark.parametrize("error", [RecursionError("maximum recursion depth exceeded"), MemoryError()])
-def test_nesting_and_memory_are_no_fault_of_kickstand(error, monkeypatch, tmp_path):
+def test_deep_nesting_is_not_reported_as_a_bug(error, monkeypatch, tmp_path):
     def fails(*_args, **_more):
         raise error
 

@@ -23,7 +23,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("line", MISTAKES)
-def test_a_mistake_is_said_in_one_line(tmp_path, monkeypatch, line):
+def test_mistake_is_reported_in_one_line(tmp_path, monkeypatch, line):
     monkeypatch.chdir(tmp_path)
     result = command.run(*line.split())
     assert (result.status, result.out) == (2, "")
@@ -33,7 +33,7 @@ def test_a_mistake_is_said_in_one_line(tmp_path, monkeypatch, line):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_fault_of_its_own_is_one_line_too(tmp_path, monkeypatch):
+def test_bug_is_reported_in_one_line(tmp_path, monkeypatch):
     def broken(*_):
         raise KeyError("oops")
 
@@ -51,7 +51,7 @@ def test_the_convention_of_logs_is_in_the_help():
     assert "At rest the axis that points up reads +1 g, and a rate is positive right-handed about its axis." in words
 
 
-def test_from_a_shell(tmp_path):
+def test_shell_sees_one_line_on_standard_error_and_status_2(tmp_path):
     """Standard output empty, one line on standard error, status 2: as a script sees it."""
     arguments = "-m kickstand_tools.cli replay none.csv --calibration x --out y".split()
     done = subprocess.run([sys.executable, *arguments], cwd=tmp_path, capture_output=True, text=True)
@@ -64,21 +64,21 @@ def test_from_a_shell(tmp_path):
     "text, seconds",
     [("60", 60.0), ("12.5", 12.5), ("-30", -30.0), ("1:00", 60.0), ("-1:30.5", -90.5), ("1:02:03", 3723.0)],
 )
-def test_seconds_minutes_and_hours(text, seconds):
+def test_times_are_read_as_seconds_minutes_and_hours(text, seconds):
     assert TIME.convert(text, None, None) == seconds
 
 
 @pytest.mark.parametrize("text", ["", "early", "1:", ":30", "1:2:3:4", "1:-5", "1.5:00", "nan", "inf", "--5"])
-def test_what_is_no_time_is_refused_and_says_how(text):
+def test_invalid_time_is_refused_with_the_format(text):
     with pytest.raises(click.UsageError, match="is no time: give seconds such as 60"):
         TIME.convert(text, None, None)
 
 
-def test_a_ride_without_a_name_is_no_fault(tmp_path):
+def test_ride_without_a_name_is_accepted(tmp_path):
     command.refused(tmp_path, "smooth", "", "--out", tmp_path / "LEAN.csv", words=": ")
 
 
-def test_a_fleet_is_not_made_up_over_a_ride_and_has_no_profile(tmp_path):
+def test_fleet_is_not_simulated_over_a_ride(tmp_path):
     (tmp_path / "RIDE.csv").write_text("a ride")
     (tmp_path / "fleet").mkdir()
     (tmp_path / "fleet" / "MANIFEST.csv").write_text("a fleet")

@@ -6,7 +6,7 @@ from kickstand_tools.common.output import whole_file
 
 
 @pytest.mark.parametrize("error", [InputError("is the line cut?"), OSError(28, "no room"), KeyboardInterrupt()])
-def test_what_fails_leaves_the_file_that_was_there_and_nothing_else(tmp_path, error):
+def test_failed_write_leaves_only_the_earlier_file(tmp_path, error):
     path = tmp_path / "ride.vbo"
     path.write_text("old")
     with pytest.raises((InputError, KeyboardInterrupt)), whole_file(path) as temporary:

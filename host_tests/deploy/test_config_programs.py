@@ -1,4 +1,4 @@
-"""A config.py is a program: one that ends, hides or prolongs its own check is refused in one line."""
+"""A config.py is a program. One that ends, hides or delays its own check is refused in one line."""
 
 import pytest
 from kickstand_tools.deploy import config_check
@@ -25,10 +25,10 @@ _UNEQUAL = "class E:\n    def __eq__(self, other):\n        raise OSError\nVEHIC
         "input()\n",
     ],
 )
-def test_it_is_refused_in_one_line(tmp_path, monkeypatch, text):
+def test_config_that_escapes_its_check_is_refused_in_one_line(tmp_path, monkeypatch, text):
     monkeypatch.setattr(config_check, "LONGEST_S", 2)
     path = tmp_path / "config.py"
     path.write_text(text)
     fault = config_check.judge(path, "rp2", "Raspberry Pi Pico with RP2040").fault
-    assert fault and fault.startswith(str(path)) and fault.endswith("correct it and run this command again")
+    assert fault and fault.startswith(str(path)) and not fault.endswith(".")
     assert "\n" not in fault

@@ -1,4 +1,4 @@
-"""A config.py as a form has it: what is set is found, and changed without touching the rest."""
+"""A config.py in a form: settings are found, and changed without touching the rest."""
 
 import ast
 import re
@@ -26,7 +26,7 @@ def settings_of(text):
     return {name: value for name, value in made.items() if name.isupper()}
 
 
-def test_each_setting_of_the_firmware_s_own_file_can_be_set_and_unset():
+def test_each_setting_can_be_set_and_unset():
     text = (firmware_path.PACKAGE.parent / "config.py").read_text()
     names = re.findall(r"(?m)^# ([A-Z_0-9]+) = ", text)
     assert len(names) > 30 and config_text.values(text) == {}
@@ -37,7 +37,7 @@ def test_each_setting_of_the_firmware_s_own_file_can_be_set_and_unset():
     assert settings_of(config_text.with_values(whole, dict.fromkeys(names))) == {}
 
 
-def test_what_a_rider_has_set_stays():
+def test_riders_settings_are_kept():
     assert config_text.values(OWN)["SIDE"] == '"right"'
     changed = config_text.with_values(OWN, {"BUTTON_PIN": "2", "LCD_ADDRESSES": "(0x27,)"})
     changed = config_text.with_values(changed, {"RECORD": "True", "DLPF": "4"})
@@ -65,12 +65,12 @@ def test_what_a_rider_has_set_stays():
         ("SIDE = 'left'\nDLPF = 4\nSIDE = 'right'\n", "line 3 sets SIDE again"),
     ],
 )
-def test_more_than_settings_is_left_to_the_rider(text, words):
+def test_config_with_more_than_settings_is_refused(text, words):
     with pytest.raises(InputError, match=words):
         config_text.with_values(text, {"RECORD": "True"})
 
 
-def test_what_is_no_text_is_left_to_the_rider():
+def test_config_that_is_not_text_is_refused():
     assert config_text.decoded("# é\n".encode()) == "# é\n"
     with pytest.raises(InputError, match="not text in UTF-8"):
         config_text.decoded("# é\n".encode("latin-1"))

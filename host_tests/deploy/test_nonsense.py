@@ -1,4 +1,4 @@
-"""Boards that talk nonsense: each command that asks one says a line, whatever comes, and writes nothing outside."""
+"""Boards that send nonsense: each command prints one line for any answer, and writes nothing outside."""
 
 import binascii
 import contextlib
@@ -57,7 +57,7 @@ class Nonsense(fake_board.FakeBoard):
 
 @pytest.fixture
 def plug_in(tmp_path, monkeypatch):
-    """A function that makes a board the only one that is plugged in."""
+    """A function that makes a board the only connected one."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "flash").mkdir()
     (tmp_path / "out").mkdir()
@@ -75,7 +75,7 @@ def one_line(result):
 
 @pytest.mark.parametrize("content", NONSENSE.values(), ids=NONSENSE)
 @pytest.mark.parametrize("name", COMMANDS)
-def test_nonsense_is_one_line_and_writes_nothing(tmp_path, plug_in, name, content):
+def test_invalid_answer_gives_one_line_and_no_file(tmp_path, plug_in, name, content):
     for first in (0, 1, 3):
         plug_in(Nonsense(tmp_path / "flash", content, first))
         one_line(command.run(*COMMANDS[name]))
@@ -84,7 +84,7 @@ def test_nonsense_is_one_line_and_writes_nothing(tmp_path, plug_in, name, conten
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_a_mutated_answer_is_one_line(tmp_path, plug_in, name):
+def test_mutated_answer_gives_one_line(tmp_path, plug_in, name):
     good = b"('/rides', 'motorcycle')\n(1, 0, 700, '/rides/000/01/00000.rid')\n('micropython', '1.26.1', 'Pico')\n"
     for number in range(30):
         plug_in(Nonsense(tmp_path / "flash", broken_logs.broken([good], number)[1], number % 3))
@@ -93,7 +93,7 @@ def test_a_mutated_answer_is_one_line(tmp_path, plug_in, name):
 
 
 class Endless:
-    """A serial port that says the same for ever."""
+    """A serial port that repeats the same for ever."""
 
     def __init__(self, said):
         self._said, self.count = said, 0
@@ -108,7 +108,7 @@ class Endless:
 
 @pytest.mark.parametrize("ending", [b"\x04", b"raw REPL; CTRL-B to exit\r\n>"])
 @pytest.mark.parametrize("said", [b"x", b"\n", b">"])
-def test_an_answer_without_end_is_given_up(monkeypatch, ending, said):
+def test_endless_answer_is_abandoned(monkeypatch, ending, said):
     monkeypatch.setattr(connection, "MOST_BYTES", 5000)
     board = connection.ConnectedBoard.__new__(connection.ConnectedBoard)
     board.serial = Endless(said)
@@ -118,7 +118,7 @@ def test_an_answer_without_end_is_given_up(monkeypatch, ending, said):
     assert board.serial.count < 6000
 
 
-def test_a_ride_that_is_longer_than_announced_is_given_up(tmp_path, plug_in, monkeypatch):
+def test_ride_longer_than_announced_is_abandoned(tmp_path, plug_in, monkeypatch):
     listed = b"('/rides', 'car')\n(1, 0, 100, '/rides/000/01/00000.rid')\n"
 
     class Long(fake_board.FakeBoard):
@@ -167,7 +167,7 @@ def test_a_mutated_ride_gives_blocks_or_problems():
             parse(broken_logs.broken([blocks[0]], number)[1])
 
 
-def test_what_an_answer_may_be():
+def test_valid_answers_are_accepted():
     for text, shape in ((b"(1, 'a')\r\n", (int, str)), (b"('x', None)", (str, None))):
         connection.literal(text, shape)
     others = (b"(1, 'a')", (int, int)), (b"(True, 'a')", (int, str)), (b"(-1, 'a')", (int, str))

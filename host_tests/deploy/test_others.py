@@ -49,7 +49,7 @@ def own(board):
         ({"config": b'SIDE = "right"\n'}, []),
     ],
 )
-def test_files_of_another_project_are_kept_under_another_name(there, kept, board):
+def test_other_projects_files_are_renamed(there, kept, board):
     put(board, **there)
     result = command.works("flash", "--yes")
     now = own(board)
@@ -64,7 +64,7 @@ def test_files_of_another_project_are_kept_under_another_name(there, kept, board
     assert own(board) == now
 
 
-def test_without_yes_nothing_is_changed_and_the_flag_is_named(board, monkeypatch):
+def test_nothing_changes_without_yes(board, monkeypatch):
     put(board, main=WEATHER, config=WIFI)
     said = command.refused(board.root, "flash", words="kept as main-before-kickstand.py")
     assert "config-before-kickstand.py: run kickstand flash --yes for that" in said
@@ -75,7 +75,7 @@ def test_without_yes_nothing_is_changed_and_the_flag_is_named(board, monkeypatch
     assert own(board)["main-before-kickstand.py"] == WEATHER
 
 
-def test_a_name_that_is_taken_is_not_overwritten(board):
+def test_used_name_is_not_overwritten(board):
     put(board, main=WEATHER)
     board.path("main-before-kickstand.py").write_bytes(b"an earlier one")
     command.works("flash", "--yes")
@@ -94,7 +94,7 @@ def test_a_name_that_is_taken_is_not_overwritten(board):
         (b"SIDE = 'left'\nmatch 1:\n    case 1: pass\n", "MicroPython does not take it"),
     ],
 )
-def test_the_boards_own_config_is_judged_before_anything_is_changed(config, words, board):
+def test_boards_own_config_is_checked_before_any_change(config, words, board):
     command.works("flash")
     put(board, config=config)
     said = command.refused(board.root, "flash", words=words)
@@ -105,7 +105,7 @@ def test_the_boards_own_config_is_judged_before_anything_is_changed(config, word
 
 @pytest.mark.parametrize("content", [b'SIDE = "right"\r\n', SHIPPED])
 @pytest.mark.parametrize("encode", [lambda text: MARK + text, lambda text: text.decode().encode("utf-16")])
-def test_a_byte_order_mark_reaches_no_board(encode, content, board, tmp_path, monkeypatch):
+def test_byte_order_mark_is_never_copied(encode, content, board, tmp_path, monkeypatch):
     (tmp_path / "mine" / "firmware" / "kickstand").mkdir(parents=True)
     (tmp_path / "mine" / "firmware" / "config.py").write_bytes(encode(content))
     monkeypatch.chdir(tmp_path / "mine")
@@ -116,7 +116,7 @@ def test_a_byte_order_mark_reaches_no_board(encode, content, board, tmp_path, mo
     assert own(board)["config.py"] == content
 
 
-def test_every_main_that_kickstand_has_had_is_known():
+def test_every_earlier_main_of_kickstand_is_recognised():
     assert len(others._OWN_MAIN) >= 13
     assert others._is_own_main(MAIN)
 

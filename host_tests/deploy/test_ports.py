@@ -1,4 +1,4 @@
-"""Pico and ESP32: the firmware uses what both ports of MicroPython have, and compiles for both."""
+"""Pico and ESP32: the firmware only uses features of both ports of MicroPython, and compiles for both."""
 
 import ast
 import contextlib
@@ -33,7 +33,7 @@ UNTYPED = '"None"', 'for class "NoRec', 'for class "Settings', 'of type "ptr', "
 
 @pytest.fixture(scope="module", params=["rp2", "esp32"])
 def stubs(request):
-    """A port, and the directory with what its MicroPython offers; installed into .venv the first time."""
+    """A port, and the directory with the stubs of its MicroPython; installed in .venv at first use."""
     groups = tomllib.loads((ROOT / "pyproject.toml").read_text())["dependency-groups"]
     wanted = groups[f"stubs-{request.param}"]
     directory = Path(sys.prefix) / f"stubs-{request.param}-{hashlib.sha256(repr(wanted).encode()).hexdigest()[:8]}"
@@ -52,7 +52,7 @@ def stubs(request):
 
 
 def pyright(stubs, directory, scratch):
-    """What it says of a directory of firmware on a port: (file, line, message)."""
+    """pyright's messages for a directory of firmware on a port: (file, line, message)."""
     config = {
         "include": [os.path.relpath(directory, scratch)],
         "extraPaths": [str(directory)],
@@ -74,7 +74,7 @@ def pyright(stubs, directory, scratch):
     ]
 
 
-def test_each_port_has_what_is_used_and_what_it_has_not_is_noticed(stubs, tmp_path):
+def test_used_features_exist_on_each_port(stubs, tmp_path):
     port, directory = stubs
     shutil.copytree(FIRMWARE, tmp_path / "firmware")
     source = "import machine\nimport rp2\nimport esp32\nfrom typing import Any\nmachine.WDT(timeout=1).stop()\n"
@@ -103,7 +103,7 @@ def test_each_esp32_gets_its_own_machine_code(mpy):
 
 
 def knows_the_port(tree):
-    """What in a module is of one port only: imports of its modules, the name of the port, registers by address."""
+    """Parts of a module for one port only: imports of its modules, the name of the port, registers by address."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
             names = [alias.name for alias in node.names] + [getattr(node, "module", None) or ""]
@@ -122,7 +122,7 @@ def test_only_port_py_knows_the_port():
     assert not any(found.values()), found
 
 
-def test_a_device_on_an_esp32(tmp_path):
+def test_device_works_on_an_esp32(tmp_path):
     """Its pins, and its number for a device that does not answer, which is not the Pico's."""
     faults = [["unplug_sensor", [2.0, 1.0]], ["unplug_lcd", [4.0, 0.5]]]
     plan = {"lean": [[0, 25]], "board": {"machine": "esp32"}, "faults": faults, "until": 6}

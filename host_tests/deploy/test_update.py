@@ -1,4 +1,4 @@
-"""Updates of a board with an older version: what goes, broken off at any step, and the room that is needed."""
+"""Updates of a board with an older version: removed files, interruption at any step, and the required space."""
 
 import functools
 import hashlib
@@ -37,7 +37,7 @@ def wanted(ending):
 
 
 def before(which):
-    """What an older version has put on a board: flat or nested, its ending; or nothing."""
+    """The files of an older version on a board: flat or nested, with an ending; or none."""
     if which == "nothing":
         return {}
     layout, ending = which.split()
@@ -67,15 +67,15 @@ def plugged(monkeypatch):
 
 
 def fresh(port="rp2", ending=".mpy") -> Any:
-    """A board with nothing on it, that takes compiled files or only .py."""
+    """An empty board that accepts compiled files or only .py."""
     return LittlefsBoard(port, mpy=bytecode.PICO if ending == ".mpy" else 0)
 
 
 @pytest.mark.parametrize("ending", [".mpy", ".py"])
-def test_of_the_modules_in_one_folder_nothing_is_left(plugged, ending):
+def test_flat_modules_of_old_versions_are_removed(plugged, ending):
     board = plugged(fresh())
     board.put(before("flat " + ending) | NOTES | {"/kickstand/lean/old/older.py": b"pass", "/kickstand/own/a.txt": b""})
-    board.system.makedirs("/kickstand/errors")  # it would be imported in place of errors.mpy
+    board.system.makedirs("/kickstand/errors")  # it would be imported instead of errors.mpy
     result = command.works("flash")
     expected = wanted(".mpy") | NOTES | {"/kickstand/own/a.txt": b"", "/config.py": before("flat .py")["/config.py"]}
     assert board.files() == expected
@@ -86,7 +86,7 @@ def test_of_the_modules_in_one_folder_nothing_is_left(plugged, ending):
 
 
 @pytest.mark.parametrize("name", ["/kickstand/lean", "/kickstand/errors/notes.txt"])
-def test_a_file_in_the_way_is_reported_before_anything_is_touched(plugged, name):
+def test_file_in_the_way_is_reported_before_any_change(plugged, name):
     board = plugged(fresh())
     files = before("flat .mpy") | {name: b"mine"}
     board.put(files)
@@ -117,7 +117,7 @@ SMALL_NEW = {
 
 
 class Cut(ConnectionError):
-    """The cable is pulled, or the power goes."""
+    """The cable is pulled, or the power is cut."""
 
 
 def cut_at(board, number):
@@ -133,7 +133,7 @@ def cut_at(board, number):
     board.before_change = before_change
 
 
-def test_broken_off_before_any_change_of_the_flash_it_starts_nothing_and_can_be_flashed_again():
+def test_interrupted_update_starts_nothing_and_is_repeatable():
     number = 0
     while True:
         board = fresh()
@@ -164,8 +164,8 @@ def test_broken_off_before_any_change_of_the_flash_it_starts_nothing_and_can_be_
 @pytest.mark.parametrize("port", PORTS)
 @pytest.mark.parametrize("ending", [".mpy", ".py"])
 @pytest.mark.parametrize("which", ["nothing", "flat .mpy", "flat .py", "nested .mpy", "nested .py"])
-def test_the_room_that_is_reported_to_be_needed_is_enough(plugged, port, ending, which):
-    """With one block less it is refused with nothing touched; full of rides, it says what to do."""
+def test_reported_free_space_is_enough(plugged, port, ending, which):
+    """With one block less it is refused without changes. If the flash is full of rides, the message says what to do."""
     board = plugged(fresh(port, ending))
     board.put(before(which) | {"/rides/000/01/00000.rid": b"ride" * 4096})
     present = survey(board)
@@ -180,7 +180,7 @@ def test_the_room_that_is_reported_to_be_needed_is_enough(plugged, port, ending,
     assert advice in result.err
     assert result.err.count("\n") == 1
     assert board.files() == files
-    assert board.resets == 1  # what was on it goes on
+    assert board.resets == 1  # the earlier program runs again
 
     board.fill("/rides/000/01/00001.rid", blocks)
     command.works("flash")
@@ -191,42 +191,42 @@ def test_the_room_that_is_reported_to_be_needed_is_enough(plugged, port, ending,
 
 
 def on_board(files, free_blocks=0):
-    """A board with these files, as survey() gives it."""
+    """A board with these files, in the form of survey()."""
     folders = frozenset(str(folder) for path in files for folder in PurePosixPath(path).parents) - {"/"}
     return BoardFiles({path: fingerprint(data) for path, data in files.items()}, folders, BLOCK, free_blocks, True)
 
 
 @pytest.mark.parametrize("which", ["flat .mpy", "flat .py", "nested .mpy", "nested .py"])
 def test_a_board_full_of_rides_has_room_for_an_update(which):
-    """The ring of rides leaves RESERVE free: compiled firmware never has to wait for rides to be pulled."""
+    """The ring of rides leaves RESERVE free: compiled firmware never requires rides to be pulled first."""
     board = on_board(before(which))
     assert needed_blocks(plan(wanted(".mpy"), board, True), board) * BLOCK <= flash_ring.RESERVE
 
 
-def test_sources_in_place_of_compiled_firmware_may_have_to_wait_for_the_rides():
-    """They take twice the room, and are for computers without mpy-cross: the message says what to do."""
+def test_sources_may_need_rides_to_be_pulled_first():
+    """They take twice the space, and are for computers without mpy-cross. The message says what to do."""
     board = on_board(before("nested .mpy"), flash_ring.RESERVE // BLOCK)
     with pytest.raises(InputError, match="kickstand pull --delete, then flash again"):
         refuse_without_room(plan(wanted(".py"), board, True), board)
 
 
-def test_the_ring_of_rides_knows_what_the_firmware_takes():
-    """As littlefs lays it out, with its own two blocks; the ring takes what else is in flash for rides."""
+def test_ring_of_rides_knows_the_size_of_the_firmware():
+    """As littlefs arranges it, with its own two blocks. The ring treats everything else in flash as rides."""
     board = fresh()
     board.put(wanted(".mpy"))
     taken = board.system.used_block_count * BLOCK
     assert taken <= flash_ring.FIRMWARE <= taken + 10 * BLOCK
 
 
-def test_plain_mpremote_needs_the_room_that_the_readme_says():
-    """It puts each .py beside the .mpy, which stays."""
+def test_plain_mpremote_needs_the_space_in_the_readme():
+    """It copies each .py beside the .mpy, which is kept."""
     blocks = sum(update.most_blocks(len(data), BLOCK) for data in wanted(".py").values())
     assert 0.9 * 640 < blocks * BLOCK / 1024 <= 640
 
 
 @pytest.mark.parametrize("size", [0, 1, 512, 513, 4096, 4097, 8188, 8189, 12276, 100_000, 400_001])
 @pytest.mark.parametrize("port", PORTS)
-def test_a_file_takes_between_least_and_most(port, size):
+def test_file_takes_between_least_and_most_blocks(port, size):
     board = fresh(port)
     board.put({"/other": b""})
     free = board.free

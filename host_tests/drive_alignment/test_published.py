@@ -27,6 +27,9 @@ TURN = np.array([[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]])
 # TURN LEVEL, multiplied out by hand: a sensor that reads (2, 1, 2) / 3 at rest, and whose levelled reading of braking
 # is along (0.6, 0, -0.8)
 MOUNT = np.array([[1.0, -2.8, 0.4], [2, 1, 2], [-2.0, -0.4, 2.2]]) / 3
+# The same with braking along (0.6, 0, 0.8), over 90 degrees from backward: about up sin t = 0.6, cos t = -0.8, so the
+# turn is [[-0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, -0.8]]
+TURNED_MOUNT = np.array([[-2.2, 0.4, 2.0], [2, 1, 2], [-0.4, 2.8, -1.0]]) / 3
 BRAKES = (0.0, 1.0, -0.3)  # g, along left, up, forward
 STEADY = (0.0, 1.0, 0.0)
 G = 9.80665
@@ -71,26 +74,27 @@ def test_directions_without_a_mean_have_the_largest_dispersion():
 
 
 class Drive:
-    """A drive with a sensor mounted by MOUNT, a sample each 10 ms and a speed each every_s."""
+    """A drive with a sample each 10 ms and a speed each every_s."""
 
-    def __init__(self, every_s=0.5):
-        self.alignment = PublishedAlignment("car")
+    def __init__(self, every_s=0.5, mount=MOUNT):
+        self.alignment, self.mount = PublishedAlignment("car"), mount
         self.speed, self.every = 0.0, round(100 * every_s)
         self.go(STEADY, 6.0)
 
-    def go(self, force, seconds, mps2=0.0):
-        reading = np.array(force) @ MOUNT  # the transposed matrix: sensor from vehicle
-        for k in range(1, round(100 * seconds) + 1):
+    def go(self, forces, seconds, mps2=0.0):
+        """With each of the forces for an equal part of the time."""
+        readings = (np.atleast_2d(forces) @ self.mount).tolist()  # the transposed matrix: sensor from vehicle
+        samples = round(100 * seconds)
+        for k in range(samples):
             self.speed += 0.01 * mps2
-            self.alignment.update(reading.tolist(), (0.0, 0.0, 0.0), 10_000)
-            if k % self.every == 0:
+            self.alignment.update(readings[k * len(readings) // samples], (0.0, 0.0, 0.0), 10_000)
+            if (k + 1) % self.every == 0:
                 self.alignment.measure_speed(self.speed)
 
     def brake(self, *forces, seconds=2.0, mps2=-0.3 * G):
-        """From 15 m/s, with each of the forces for an equal part of the time, and on at a steady speed."""
+        """From 15 m/s, and on at a steady speed."""
         self.reach_15_mps()
-        for force in forces or (BRAKES,):
-            self.go(force, seconds / max(1, len(forces)), mps2)
+        self.go(forces or BRAKES, seconds, mps2)
         self.go(STEADY, 2.0)
 
     def reach_15_mps(self):
@@ -104,14 +108,16 @@ class Drive:
         return np.array(out).reshape(3, 3)
 
 
-@pytest.mark.parametrize("every_s", [0.1, 0.5, 1.0, 2.0])
-def test_stops_and_three_brakings_give_the_mount_computed_by_hand(every_s):
-    drive = Drive(every_s)
+@pytest.mark.parametrize(
+    ("every_s", "mount"), [(0.1, MOUNT), (0.5, MOUNT), (1.0, MOUNT), (2.0, MOUNT), (0.5, TURNED_MOUNT)]
+)
+def test_stops_and_three_brakings_give_the_mount_computed_by_hand(every_s, mount):
+    drive = Drive(every_s, mount)
     for counted in range(3):
         assert drive.alignment.counted == counted and not drive.alignment.ready
         drive.brake(seconds=4.0)
     assert drive.alignment.ready and drive.alignment.turned == 0
-    assert drive.matrix == pytest.approx(MOUNT, abs=1e-6)
+    assert drive.matrix == pytest.approx(mount, abs=1e-6)
 
 
 def test_forward_is_along_the_sum_of_the_brakings_forces():
@@ -148,6 +154,13 @@ def test_a_braking_whose_direction_spreads_does_not_count(side_g, counted):
     drive = Drive()
     drive.brake((side_g, 1.0, -0.3), (-side_g, 1.0, -0.3))
     assert (drive.alignment.counted, drive.alignment.turned) == (counted, 1 - counted)
+
+
+def test_a_shaking_of_ten_times_a_second_is_averaged_away():
+    """Each 50 ms it is 0.2 g to the other side: over 100 ms 0, over 50 ms a dispersion of (0.2 / 0.3)^2 = 0.44."""
+    drive = Drive()
+    drive.brake(*[(side, 1.0, -0.3) for side in (0.2, -0.2)] * 20)
+    assert (drive.alignment.counted, drive.alignment.turned) == (1, 0)
 
 
 @pytest.mark.parametrize(
@@ -207,8 +220,8 @@ def test_a_braking_with_a_gap_is_dropped_and_earlier_ones_stay(lost):
 
 
 def test_brakings_before_the_first_stop_show_no_direction():
-    drive = Drive.__new__(Drive)
-    drive.alignment, drive.speed, drive.every = PublishedAlignment("car"), 0.0, 50
+    drive = Drive()
+    drive.alignment = PublishedAlignment("car")
     drive.brake()
     assert drive.alignment.counted == 0
     with pytest.raises(AlignmentError, match="not-stopped"):

@@ -1,4 +1,4 @@
-"""kickstand calibrate ride: the alignment of a motorcycle from a ride without poses, and what is refused.
+"""kickstand calibrate ride: the alignment of a motorcycle from a ride without poses, and refusals.
 
 Simulated rides have a sensor mounted at random, with errors as the data sheet allows.
 """
@@ -55,7 +55,7 @@ def check(found, true, yaw_deg=3.0, roll_deg=1.5):
     ("profile", "seed", "speed"),
     [("street", 21, True), ("city", 21, True), ("track", 22, False), ("hills", 22, False), ("sweeper", 22, False)],
 )
-def test_a_ride_aligns_a_sensor_that_is_mounted_at_random(profile, seed, speed):
+def test_ride_aligns_a_randomly_mounted_sensor(profile, seed, speed):
     made = simulated(profile, seed, 240.0)
     found = api.fit_ride(log_of(made, speed))
     check(found, made.vehicle_from_sensor)
@@ -75,7 +75,7 @@ def test_the_display_shows_the_lean_with_this_alignment():
     assert np.sqrt(np.mean(off**2)) < 1.0  # 1.5 was asked for
 
 
-def test_it_is_no_worse_than_two_poses_of_a_sensor_without_six_positions():
+def test_ride_alignment_is_as_good_as_two_poses():
     """In yaw, which a kickstand pose hardly determines, and in roll, which an offset of the accelerometer falsifies."""
     made = simulated("hills", 22, 240.0)
     kickstand, upright = (api.Log.from_readings(pose, RATE_HZ) for pose in (made.kickstand, made.upright))
@@ -86,7 +86,7 @@ def test_it_is_no_worse_than_two_poses_of_a_sensor_without_six_positions():
 
 
 def test_the_offset_across_the_bike_is_found():
-    """Half of a tolerance of 50 mg would be 1.4 degrees of roll, which the same log must not have."""
+    """Half of a tolerance of 50 mg would be 1.4 degrees of roll: the result for the same log must be better."""
     made = simulated()
     log = log_of(made)
     across = made.vehicle_from_sensor[0]
@@ -98,7 +98,7 @@ def test_the_offset_across_the_bike_is_found():
         assert abs(calibrated[0]) < 0.02
 
 
-def test_axes_of_the_wrong_hand_are_refused():
+def test_left_handed_axes_are_refused():
     """Of the 48 exchanges and reversals of axes the 24 right-handed ones are only another mounting. Every fifth is
     tried here, all of them in checks/test_handedness.py."""
     log = log_of(simulated(), speed=False)
@@ -114,7 +114,7 @@ def test_axes_of_the_wrong_hand_are_refused():
             assert raised.value.code == "left-handed"
 
 
-def test_only_a_phones_mounting_shows_an_accelerometer_of_the_opposite_sign():
+def test_phones_mounting_shows_a_reversed_accelerometer():
     made = simulated()
     log = mounted(log_of(made), PHONES["portrait"][0].T @ made.vehicle_from_sensor)
     mirrored = replace(log, accel_g=-log.accel_g)
@@ -125,7 +125,7 @@ def test_only_a_phones_mounting_shows_an_accelerometer_of_the_opposite_sign():
 
 
 def test_a_phones_mounting_is_a_prior():
-    """A little: the ride knows better."""
+    """It has little weight against the ride."""
     made = simulated()
     tilted = rotation_matrix(np.radians([35.0, 0.0, 0.0])) @ PHONES["flat"][0]
     log = mounted(log_of(made, speed=False), tilted.T @ made.vehicle_from_sensor)
@@ -138,7 +138,7 @@ def test_a_phones_mounting_is_a_prior():
 
 @pytest.mark.parametrize("phone", PHONES)
 def test_a_phones_mounting_is_checked(phone):
-    """Within what a holder is tilted."""
+    """Within the usual tilt of a holder."""
     made = simulated()
     tilted = rotation_matrix(np.radians([35.0, 10.0, 0.0]))
     for mountings in PHONES.values():
@@ -154,7 +154,7 @@ def test_a_phones_mounting_is_checked(phone):
                 assert raised.value.code in ("phone-otherwise", "phone-upside-down")
 
 
-def test_a_sensor_in_the_hand_before_and_after_the_ride_is_left_out():
+def test_time_in_the_hand_around_the_ride_is_left_out():
     made = simulated()
     log = log_of(made, speed=False)
     n = 20 * RATE_HZ
@@ -168,7 +168,7 @@ def test_a_sensor_in_the_hand_before_and_after_the_ride_is_left_out():
     assert log.t_s[-1] - 40.0 < found.used_s[1] <= log.t_s[-1] - 20.0
 
 
-def test_frozen_absurd_and_missing_readings_are_left_out_and_a_late_rough_speed_will_do():
+def test_bad_readings_are_left_out_and_a_rough_speed_suffices():
     made = simulated()
     log = log_of(made)
     log.speed_mps[RATE_HZ::RATE_HZ] = np.round(made.truth["speed_mps"][:-RATE_HZ:RATE_HZ] * 3.6) / 3.6
@@ -220,14 +220,14 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_what_is_no_ride_of_a_mounted_sensor_is_refused(name):
+def test_log_without_a_mounted_sensors_ride_is_refused(name):
     change, code = WRONG[name]
     with pytest.raises(api.RefusedInput) as raised:
         api.fit_ride(change(log_of(simulated())))
     assert code is None or raised.value.code in code
 
 
-def test_few_samples_a_second_and_an_unknown_mounting_of_a_phone_are_refused():
+def test_slow_log_or_unknown_phone_mounting_is_refused():
     log = log_of(simulated())
     with pytest.raises(api.InputError, match=r"a sample every 0\.10 s: at least 20 a second"):
         api.fit_ride(log.part(slice(None, None, 20)))
@@ -236,7 +236,7 @@ def test_few_samples_a_second_and_an_unknown_mounting_of_a_phone_are_refused():
 
 
 def test_a_recorded_car_is_refused(shared_data):
-    """However it is mounted, with its speed and without."""
+    """In any mounting, with its speed and without."""
     rotation = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     rotation *= np.linalg.det(rotation)
     drives = sorted(shared_data.glob("car-*.csv.gz"))
@@ -249,7 +249,7 @@ def test_a_recorded_car_is_refused(shared_data):
             assert raised.value.code == "not-leaning"
 
 
-def test_a_recorded_motorcycle(shared_data):
+def test_recorded_motorcycle_is_aligned(shared_data):
     """Its forward, by braking between the same two lights, and the up of its first second are known to some degrees."""
     log = api.read_log(shared_data / "motorcycle-ride.csv.gz")
     rough = np.array([[0.9869, 0.1612, 0.0060], [-0.0137, 0.0466, 0.9988], [0.1608, -0.9858, 0.0482]])

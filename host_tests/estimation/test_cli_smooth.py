@@ -1,4 +1,4 @@
-"""kickstand smooth: what it writes, and what it refuses."""
+"""kickstand smooth: its output and its refusals."""
 
 import json
 
@@ -24,7 +24,7 @@ def ride(tmp_path_factory):
     return directory, known.lean_deg[::4], known.riding[::4]
 
 
-def test_a_row_for_each_sample_with_the_logs_own_time(ride, tmp_path):
+def test_each_sample_has_a_row_with_the_logs_own_time(ride, tmp_path):
     directory, lean, riding = ride
     out = tmp_path / "LEAN.csv"
     result = works("smooth", directory / "RIDE.csv", "--out", out)
@@ -37,7 +37,7 @@ def test_a_row_for_each_sample_with_the_logs_own_time(ride, tmp_path):
     assert np.all(got["lean_sigma_deg"] > 0.0)
 
 
-def test_a_calibration_that_does_not_serve_is_refused(ride, tmp_path):
+def test_unusable_calibration_is_refused(ride, tmp_path):
     log = ride[0] / "RIDE.csv"
     for change, words in ({"vehicle": "car"}, "a car does not lean"), ({"aligned": False}, "not aligned"):
         cal = command.write_cal(tmp_path / "CAL.json", **{"aligned": True, **change})
@@ -49,7 +49,7 @@ def test_the_ride_itself_is_not_overwritten(ride):
     refused(directory, "smooth", directory / "RIDE.csv", "--out", directory / "RIDE.csv", words="also an input")
 
 
-def test_accelerations_that_are_not_the_bikes_are_said_in_the_file_in_words_and_in_json(tmp_path):
+def test_doubtful_accelerations_are_reported_everywhere(tmp_path):
     drawn = drawn_ride(3028, 90.0, ["foreign"])
     log = drawn.logs[0]
     rows = np.column_stack((log.t_s, log.accel_g, log.gyro_dps))
@@ -66,7 +66,7 @@ def test_accelerations_that_are_not_the_bikes_are_said_in_the_file_in_words_and_
     assert remark["words"] in result.err.replace("\n", " ")
 
 
-def test_a_report_has_the_smoothed_lean_and_the_live_one_if_wanted(ride):
+def test_report_has_the_smoothed_or_the_live_lean(ride):
     directory, lean, _ = ride
     log = directory / "RIDE.csv"
     largest = {}
@@ -80,7 +80,7 @@ def test_a_report_has_the_smoothed_lean_and_the_live_one_if_wanted(ride):
     assert largest["smoothed"] != largest["live"]
 
 
-def test_a_log_of_few_samples_a_second_is_reported_as_the_display_had_it(tmp_path):
+def test_slow_log_is_reported_with_the_displayed_lean(tmp_path):
     """Its lean is the one that the display showed; smooth itself refuses such a log."""
     t_s = np.arange(0.0, 60.0, 0.2)
     noise = np.random.default_rng(1).normal(0.0, 0.01, (len(t_s), 6))

@@ -1,4 +1,4 @@
-"""The process model and the measurement model, against motions whose readings follow from geometry."""
+"""The process model and the measurement model, compared with motions whose readings follow from geometry."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def found(rate, force, states=(), parameters=(), speed=np.nan, warm=0.0):
 
 @pytest.mark.parametrize("lean", [-0.9, 0.0, 0.6])
 @pytest.mark.parametrize("yaw_rate", [-0.4, 0.5])
-def test_a_steady_turn_stays_as_it_is(lean, yaw_rate):
+def test_steady_turn_is_constant(lean, yaw_rate):
     """Nicolae's (22) and (23): the force of a turn at any lean, balanced or not."""
     speed, s, c = 17.0, np.sin(lean), np.cos(lean)
     across = speed * yaw_rate / G
@@ -38,7 +38,7 @@ def test_a_steady_turn_stays_as_it_is(lean, yaw_rate):
 
 @pytest.mark.parametrize("braking", [0.0, -0.5])
 @pytest.mark.parametrize("pitch", [-0.1, 0.0, 0.15])
-def test_at_rest_on_a_slope_and_braking_on_it(pitch, braking):
+def test_rest_and_braking_on_a_slope_fit_the_model(pitch, braking):
     lean = 0.2
     force = np.array([np.cos(pitch) * np.sin(lean), np.cos(pitch) * np.cos(lean), np.sin(pitch)])
     level = np.array([-np.sin(lean) * np.sin(pitch), -np.cos(lean) * np.sin(pitch), np.cos(pitch)])
@@ -48,7 +48,7 @@ def test_at_rest_on_a_slope_and_braking_on_it(pitch, braking):
 
 
 @pytest.mark.parametrize("lean", [-0.5, 0.0, 0.8])
-def test_a_sensor_above_the_roll_axis_moves_while_the_wheels_do_not_slide(lean):
+def test_sensor_above_the_roll_axis_moves_with_the_roll(lean):
     """It is 0.6 m above it and 0.7 m in front of the rear wheel, while the bike rolls and turns."""
     height, ahead, speed, roll, yaw = 0.6, 0.7, 15.0, 1.2, -0.3
     s, c = np.sin(lean), np.cos(lean)
@@ -70,7 +70,7 @@ def test_a_sensor_above_the_roll_axis_moves_while_the_wheels_do_not_slide(lean):
         (0.0, 0.5, {of.CAMBER: 0.01}),
     ],
 )
-def test_a_balanced_bike_has_a_force_to_the_side_by(force, lean, parameters):
+def test_balanced_bike_has_the_modelled_side_force(force, lean, parameters):
     assert abs(found([0.0] * 3, [force, 1.2, 0.0], {LEAN: lean}, parameters)[eq.BALANCED]) < 5e-5
 
 

@@ -1,4 +1,4 @@
-"""The smoothed lean: against the truth of rides of two simulators, and what rides may hold beside riding."""
+"""The smoothed lean: compared with the truth of two simulators, and rides with other parts than riding."""
 
 import functools
 from dataclasses import replace
@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kickstand_tools.api import Log, smooth
+from kickstand_tools.common.messages import sentence
 from kickstand_tools.estimation import smooth as module
 from kickstand_tools.estimation.least_squares import Estimate
+from kickstand_tools.estimation.smooth import PoseOff
 from kickstand_tools.estimation.unknowns import DIVE
-from kickstand_tools.refusals import sentence
 from kickstand_tools.signals import rotation_matrix
 from kickstand_tools.simulation.physics.bike import Bike
 from support.recordings.drawn_rides import drawn_ride, judged
@@ -46,14 +47,14 @@ def error(ride):
     return smooth(ride.log, ride.calibration).lean_deg - ride.lean_deg
 
 
-# each with something of its own; by night those that are nearest to another one too
+# each has a special feature; at night those similar to another one are also tested
 NIGHTLY = "banked", "warming up"
 NAMES = [pytest.param(name, marks=pytest.mark.nightly) if name in NIGHTLY else name for name in RIDES]
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_it_is_nearer_to_the_truth_than_the_display_and_its_standard_deviation_is_honest(name):
-    """The first turns included."""
+def test_smoothed_lean_beats_the_display_and_knows_its_error(name):
+    """Including the first turns."""
     ride, found = known(name), smoothed(name)
     off, sigma = (found.lean_deg - ride.lean_deg)[ride.riding], found.lean_sigma_deg[ride.riding]
     assert rms(off) < 0.6 * rms((ride.live() - ride.lean_deg)[ride.riding])
@@ -71,7 +72,7 @@ def test_forces_that_are_not_the_bikes_count_less():
 
 
 @pytest.mark.parametrize(("seed", "mount"), [(2018, "drifting"), (98, "holder")])
-def test_a_steady_ride_on_a_straight_is_no_standstill(seed, mount):
+def test_steady_ride_on_a_straight_is_not_a_standstill(seed, mount):
     """For 2 s both hardly move, at 22 and at 12 m/s. Taken for a standstill it made the lean worse than the live one:
     0.56 and 0.37 degrees."""
     live, off, _ = judged(drawn_ride(seed, mounts=[mount]))
@@ -85,15 +86,15 @@ def test_good_mounts_and_roads_are_not_doubted():
     assert "not-the-bikes" not in [notice.code for notice in found.notices]
 
 
-def test_tyres_push_to_the_side_in_proportion_to_the_force_up():
+def test_side_force_of_tyres_grows_with_the_force_up():
     """Taken for a share of gravity alone, bends of unequal lean shifted the whole lean: 0.44 degrees, and more than the
     display's."""
     ride = simulated("sweeper", 304, 200.0)
     assert rms(error(ride)[ride.riding]) < 0.2
 
 
-def test_wheelies_are_not_taken_for_a_soft_mount():
-    """They were, and the error was 0.4 degrees."""
+def test_wheelies_do_not_count_as_a_soft_mount():
+    """Before, they were, and the error was 0.4 degrees."""
     ride, found = known("wheelie"), smoothed("wheelie")
     assert not np.any(found.doubtful)
     assert rms((found.lean_deg - ride.lean_deg)[ride.riding]) < 0.17
@@ -101,7 +102,7 @@ def test_wheelies_are_not_taken_for_a_soft_mount():
 
 @pytest.mark.parametrize("dive_deg_per_g", [-1.5, 6.0])
 def test_the_dive_of_a_bike_is_learned(monkeypatch, dive_deg_per_g):
-    """Taken for the road's slope, or for an acceleration, it made the lean depend on the bike's fork."""
+    """Treated as the road's slope or as an acceleration, it made the lean depend on the bike's fork."""
     drawn, made = Bike.random, []
     dives = {"dive_deg_per_g": dive_deg_per_g, "squat_deg_per_g": dive_deg_per_g}
     monkeypatch.setattr(Bike, "random", staticmethod(lambda chance: replace(drawn(chance), **dives)))
@@ -112,16 +113,16 @@ def test_the_dive_of_a_bike_is_learned(monkeypatch, dive_deg_per_g):
 
 
 @pytest.mark.parametrize("wrong_deg", [-4.0, 4.0])
-def test_a_pose_that_was_not_upright_is_said(street, wrong_deg):
+def test_pose_that_was_not_upright_is_reported(street, wrong_deg):
     turned = rotation_matrix(np.radians([0.0, 0.0, -wrong_deg])) @ street.calibration.vehicle_from_sensor
     calibration = replace(street.calibration, vehicle_from_sensor=turned)
-    (notice,) = (n for n in smooth(street.log, calibration).notices if n.code == "pose-off")
-    assert np.sign(notice.values[0]) == np.sign(wrong_deg)
-    assert abs(abs(notice.values[0]) - 4.0) < 2.1  # the ride's own pose is 1.5 off
+    (notice,) = (n for n in smooth(street.log, calibration).notices if isinstance(n, PoseOff))
+    assert np.sign(notice.angle_deg) == np.sign(wrong_deg)
+    assert abs(abs(notice.angle_deg) - 4.0) < 2.1  # the ride's own pose is 1.5 off
     assert ("right" if wrong_deg > 0.0 else "left") in sentence(notice)
 
 
-def test_a_mount_that_slips_in_mid_ride_spoils_little_of_what_follows(street):
+def test_slipping_mount_has_little_effect_afterwards(street):
     """By 1.5 degrees about forward, within 0.3 s: the gyro measures it, and from then on straights seem to lean."""
     log, calibration = street.log, street.calibration
     angle = np.radians(1.5) * np.clip((log.t_s - 65.0) / 0.3, 0.0, 1.0)
@@ -141,7 +142,7 @@ def test_a_mount_that_slips_in_mid_ride_spoils_little_of_what_follows(street):
 
 
 def _turned(vectors, angle):
-    """As a sensor has them that has turned by angle (n, rad) to the right about forward. vectors (n, 3)."""
+    """vectors (n, 3) in the axes of a sensor turned by angle (n, rad) to the right about forward."""
     s, c = np.sin(angle), np.cos(angle)
     x, y, z = vectors.T
     return np.column_stack((c * x + s * y, c * y - s * x, z))
@@ -158,12 +159,12 @@ def test_a_mount_that_yields_makes_the_lean_less_sure():
 
 
 def test_a_wind_that_turns_makes_the_lean_less_sure():
-    """It looks like an upright pose that was not upright."""
+    """It looks like a wrong upright pose."""
     windy, calm = (np.mean(smoothed(name).lean_sigma_deg[-10_000:]) for name in ("crosswind", "street"))
     assert windy > 2.0 * calm
 
 
-def test_it_does_not_depend_on_how_the_sensor_sits(street):
+def test_smoothed_lean_is_independent_of_the_mounting(street):
     turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
     turn *= np.linalg.det(turn)
     log, calibration = street.log, street.calibration
@@ -177,13 +178,13 @@ def test_it_does_not_depend_on_how_the_sensor_sits(street):
     assert np.allclose(one.lean_deg, two.lean_deg, atol=0.01)
 
 
-def test_switched_on_and_off_while_riding(street):
+def test_log_may_start_and_end_while_riding(street):
     t = street.log.t_s
     part = street.part((t > 60.0) & (t < 110.0))
     assert np.max(np.abs(error(part))) < 2.0
 
 
-def test_a_gap_and_lost_readings_leave_the_rest_as_good(street):
+def test_gap_and_lost_readings_do_not_harm_the_rest(street):
     t = street.log.t_s
     part = street.part(((t < 70.0) | (t > 85.0)) & (t % 10.0 > 0.3))
     assert rms(error(part)[part.riding]) < 0.4
@@ -216,7 +217,7 @@ def test_a_pothole_leaves_no_lean_behind(street):
 
 
 def hand(seconds, rate_hz=200, seed=4):
-    """Force (n, 3, g) and rate (n, 3, deg/s) of a sensor that is turned about in the hand."""
+    """Force (n, 3, g) and rate (n, 3, deg/s) of a sensor turned in the hand."""
     rng = np.random.default_rng(seed)
     n = int(seconds * rate_hz)
     t = np.arange(n) / rate_hz
@@ -244,7 +245,7 @@ def test_time_in_the_hand_at_either_end_does_not_spoil_the_ride(street):
 
 
 @pytest.mark.parametrize("seconds", [0.015, 0.3, 2.0, 6.0])
-def test_a_short_log_has_a_lean_and_says_how_unsure_it_is(street, seconds):
+def test_short_log_has_a_lean_with_a_large_sigma(street, seconds):
     t = street.log.t_s
     part = street.part((t >= 60.0) & (t < 60.0 + seconds))
     found = smooth(part.log, part.calibration)
@@ -252,7 +253,7 @@ def test_a_short_log_has_a_lean_and_says_how_unsure_it_is(street, seconds):
     assert np.all(np.abs(found.lean_deg - part.lean_deg) < 3.0 * found.lean_sigma_deg)
 
 
-def test_a_long_ride_is_estimated_part_by_part(street, monkeypatch):
+def test_long_ride_is_estimated_in_parts(street, monkeypatch):
     """So that time grows with the length of the ride, and memory does not. Ends of parts are estimated twice, because
     they are known only with what follows; remarks count each second once."""
     whole, sizes, added = smoothed("street"), [], []
@@ -270,6 +271,6 @@ def test_a_long_ride_is_estimated_part_by_part(street, monkeypatch):
     assert len(sizes) > 2
     assert len(added) > 1 and sum(added) == pytest.approx(street.log.t_s[-1], abs=0.3 * len(added))
     assert max(sizes) <= 7 * 2000
-    assert sizes[-1] > 5 * 2000  # the end is not left by itself
+    assert sizes[-1] > 5 * 2000  # the end is estimated with earlier parts
     assert np.array_equal(parts.t_s, whole.t_s)
     assert rms((parts.lean_deg - street.lean_deg)[street.riding]) < 0.8

@@ -1,4 +1,4 @@
-"""Chains of blocks solved by elimination, against the same least squares solved at once."""
+"""Chains of blocks solved by elimination, compared with one direct least-squares solution."""
 
 import numpy as np
 import pytest
@@ -82,7 +82,7 @@ def test_the_likelihood_is_that_of_the_parameters_as_a_whole():
     assert found[1] - found[0] == pytest.approx(problem.at_once(1)[2] - problem.at_once(0)[2])
 
 
-def test_the_mean_of_hypotheses_is_as_uncertain_as_they_are_and_differ():
+def test_mean_of_hypotheses_includes_their_difference():
     variances = [0.01, 0.1], [1.0, 10.0]
     one, two = (Problem(3, 4, (each,)) for each in variances)
     both, weight = Problem(3, 4, variances), np.array([0.75, 0.25])

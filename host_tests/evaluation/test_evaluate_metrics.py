@@ -1,4 +1,4 @@
-"""The scores of an evaluation on errors that are known."""
+"""The scores of an evaluation for known errors."""
 
 import math
 
@@ -14,7 +14,7 @@ TIME = np.arange(N) / RATE
 
 
 def truth() -> dict[str, np.ndarray]:
-    """Leans of up to 35 degrees in the first 80 %, then straight on."""
+    """Leans of up to 35 degrees in the first 80 %, then straight ahead."""
     lean = 35.0 * np.sin(2.0 * np.pi * 0.13 * TIME) * np.sin(2.0 * np.pi * 0.031 * TIME)
     lean[int(0.8 * N) :] = 0.0
     return {
@@ -24,7 +24,7 @@ def truth() -> dict[str, np.ndarray]:
     }
 
 
-def test_a_constant_error():
+def test_constant_error_has_the_expected_scores():
     true = truth()
     found = score(true["lean_deg"] + 0.7, true, RATE)
     assert (found.rms_deg, found.p95_deg, found.worst_deg) == pytest.approx((0.7, 0.7, 0.7))
@@ -32,7 +32,7 @@ def test_a_constant_error():
     assert found.lag_ms == pytest.approx(0.0, abs=0.5)
 
 
-def test_noise_and_one_outlier():
+def test_noise_and_one_outlier_have_the_expected_scores():
     true = truth()
     noise = np.random.default_rng(1).normal(scale=2.0, size=N)
     noise[30000] = 50.0
@@ -51,22 +51,22 @@ def test_the_slope_is_the_share_shown_where_it_leans():
 
 
 @pytest.mark.parametrize("late_ms", [-42.5, 0.0, 7.5, 180.0])
-def test_the_lag_between_samples(late_ms):
+def test_lag_is_found_between_samples(late_ms):
     def lean(t):
         return 30.0 * np.sin(2.0 * np.pi * 0.21 * t) + 10.0 * np.sin(2.0 * np.pi * 0.53 * t)
 
-    assert math.isnan(lag_ms(np.zeros(N), np.zeros(N), RATE))  # what does not move has none
+    assert math.isnan(lag_ms(np.zeros(N), np.zeros(N), RATE))  # without motion there is no lag
     noise = np.random.default_rng(2).normal(scale=0.1, size=N)
     assert lag_ms(lean(TIME - late_ms / 1000.0) + noise, lean(TIME), RATE) == pytest.approx(late_ms, abs=1.0)
 
 
-def test_what_happens_before_setting_off_does_not_count():
+def test_time_before_setting_off_does_not_count():
     true = truth()
     shown = true["lean_deg"] + np.where(TIME < 4.9, 60.0, 0.0)
     assert score(shown, true, RATE).worst_deg == 0.0
 
 
-def test_the_bias_is_of_the_last_straights_alone():
+def test_bias_is_only_from_the_last_straights():
     true = truth()
     shown = true["lean_deg"] + np.where(TIME < 0.85 * TIME[-1], 5.0, -0.25)
     assert score(shown, true, RATE).straight_bias_deg == pytest.approx(-0.25)
@@ -87,7 +87,7 @@ def test_pooling_keeps_the_worst():
     assert found["lag_ms"] == 5.0
 
 
-def test_a_ride_without_a_corner_does_not_hide_the_others():
+def test_ride_without_corners_does_not_spoil_the_pool():
     nothing = float("nan")
     flat, bent = LeanScore(1.0, 2.0, 3.0, nothing, nothing, nothing), LeanScore(1.0, 2.0, 3.0, 0.9, 5.0, 0.1)
     for scores in [flat, bent], [bent, flat]:
@@ -96,7 +96,7 @@ def test_a_ride_without_a_corner_does_not_hide_the_others():
         assert (found["lag_ms"], found["straight_bias"]) == (5.0, 0.1)
 
 
-def test_the_zoom_is_where_it_leans():
+def test_zoom_shows_the_most_leaning():
     lean = np.zeros(N)
     lean[20000:24000] = 30.0
     start = zoom_start(TIME, lean)

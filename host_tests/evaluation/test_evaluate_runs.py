@@ -19,7 +19,7 @@ THERE = [name for name in estimators.OTHERS if estimators.PACKAGES.get(name) not
 
 
 def leaned(lean_deg: float, roll_s: float = 1.5) -> Samples:
-    """A bike at rest leaned slowly from upright to lean_deg, then held as long: no turn."""
+    """A bike at rest, leaned slowly from upright to lean_deg, then held for the same time: no turn."""
     n = int(roll_s * 200)
     lean = np.radians(np.concatenate((np.linspace(0.0, lean_deg, n), np.full(n, lean_deg))))
     rate = np.zeros((2 * n, 3))
@@ -51,7 +51,7 @@ def test_every_estimator_is_scored(swept):
 
 
 def test_filters_that_trust_the_force_decay_in_a_held_turn(swept):
-    """What riders complain of: the reason for all this."""
+    """Riders complain of this: it is the reason for this project."""
     assert swept.scores["complementary"].slope < 0.5
     assert 0.85 < swept.scores["formula"].slope < 1.1
     assert swept.scores["formula 0.3 s"].rms_deg < 0.5 * swept.scores["formula"].rms_deg
@@ -60,8 +60,8 @@ def test_filters_that_trust_the_force_decay_in_a_held_turn(swept):
     assert 0.9 < swept.scores["kickstand"].slope < 1.1
 
 
-def test_nothing_live_is_better_than_what_is_possible(swept):
-    """The oracle loses to the display as soon as it does not know one of the sensor's errors."""
+def test_no_live_filter_beats_the_oracle(swept):
+    """The oracle is worse than the display without one of the sensor's errors."""
     others = [score.rms_deg for name, score in swept.scores.items() if name not in ("possible", "smoothed")]
     assert swept.scores["possible"].rms_deg < min(0.25, 0.8 * min(others))
 
@@ -71,7 +71,7 @@ def test_best_gains_are_far_better_than_the_defaults(swept):
         assert swept.scores[name + " best"].rms_deg < 0.5 * swept.scores[name].rms_deg
 
 
-def test_a_receivers_course_is_late_at_one_hertz(swept):
+def test_course_of_a_receiver_is_late_at_one_hertz(swept):
     slow, quick = (swept.scores[f"GPS {hz} Hz"] for hz in (1, 10))
     assert slow.lag_ms > 300.0 > quick.lag_ms
     assert quick.slope == pytest.approx(1.0, abs=0.15)
@@ -91,11 +91,11 @@ def test_the_calibration_is_from_the_poses_alone(calibrated):
 
 @pytest.fixture
 def one_other(monkeypatch):
-    """Of the other filters one: each takes seconds."""
+    """Only one of the other filters, because each takes seconds."""
     monkeypatch.setattr(estimators, "OTHERS", {"complementary": estimators.OTHERS["complementary"]})
 
 
-def test_the_jobs_set_up_errors_are_ridden(one_other):
+def test_set_up_errors_of_the_job_are_simulated(one_other):
     jobs = [runs.Job("parked", 0, 60.0, error, pitch_change_deg=0.0, traces=True) for error in (0.0, 1.5)]
     fair, off = (runs.run(job).traces["complementary"] for job in jobs)
     assert np.mean(off - fair) == pytest.approx(-1.5, abs=0.3)
@@ -151,7 +151,7 @@ def test_a_recording_without_speed_is_refused():
         real_ride.reference_lean(log, MOUNTED)
 
 
-def test_the_recorded_motorcycle(shared_data):
+def test_recorded_motorcycle_has_its_known_scores(shared_data):
     """The complementary filter's share there is known to be 0.40 (measured with another calibration). With forward from
     braking and up from the first second the shown lean had 2.98 degrees rms and a slope of 1.226."""
     made = real_ride.compare(shared_data / "motorcycle-ride.csv.gz")
@@ -185,7 +185,7 @@ def test_an_unknown_profile_is_refused(tmp_path):
     refused(tmp_path, "evaluate", "--profiles", "street,moon", "--out", tmp_path / "x", words="no profile moon")
 
 
-def test_bands_of_simulated_rides_stand_beside_those_of_recordings(tmp_path):
+def test_bands_of_simulated_and_recorded_rides_are_shown(tmp_path):
     works("simulate", "--profile", "street", "--seed", "4", "--seconds", "120", "--road", "C", "--out", tmp_path)
     found = json.loads(works("bands", tmp_path / "RIDE.csv", "--seconds", 100, "--json").out)
     assert list(found["rides"]) == ["RIDE.csv", "street", *(f"street, road {road}" for road in "ABCD")]
@@ -199,7 +199,7 @@ def test_bands_of_a_recording_without_riding_are_refused(tmp_path):
 
 
 def test_simulate_states_both_leans_on_the_stand(tmp_path):
-    """The pose is not taken where the ride begins."""
+    """The pose is at another place than the start of the ride."""
     arguments = "--profile", "street", "--seconds", "20", "--pitch-change", "0", "--out", tmp_path
     said = works("simulate", *arguments).out.splitlines()[-1]
     pose, begin = (float(number) for number in re.findall(r"-\d+\.\d", said))

@@ -1,5 +1,5 @@
-"""Engine vibration beyond the accelerometer's range, which its low-pass hides: why the default range is 16 g, and that
-the driver notices what is beyond that too."""
+"""Engine vibration beyond the accelerometer's range, which its low-pass hides: the reason for the default range of 16
+g. The driver also notices larger vibration."""
 
 import dataclasses
 from array import array
@@ -15,7 +15,7 @@ from kickstand_workshop.evaluation.runs import as_log, calibrated_by_poses
 
 
 def shaken(monkeypatch, profile, seed, factor, range_g, seconds):
-    """A ride whose engine shakes so many times as hard, measured in this range, and the vibration, g rms an axis."""
+    """A ride with engine vibration times `factor`, measured in this range, and the vibration, g rms per axis."""
     rms = []
 
     def harder(*arguments):

@@ -1,4 +1,4 @@
-"""Whether a wrong lean is shown as good: how it is judged, the faults, and `kickstand evaluate --faults`."""
+"""Wrong leans shown as good: the judgement, the faults, and `kickstand evaluate --faults`."""
 
 import json
 
@@ -14,7 +14,7 @@ NAMED = {fault.title: fault for fault in FAULTS}
 
 
 def trace(error_deg, shown=None, first_s=10.0, end_s=100.0):
-    """60 s of riding with an error (600), shown (600) where it says so."""
+    """60 s of riding with an error (600); shown (600): True where the lean is shown."""
     n = 600
     time = np.linspace(0.0, STEP_S * (n - 1), n)
     shown = np.ones(n, dtype=bool) if shown is None else shown
@@ -29,7 +29,7 @@ def during(*spans):
     return mask
 
 
-def test_what_stands_for_over_a_second_misleads():
+def test_wrong_lean_over_a_second_misleads():
     error = np.where(during((12, 12.9), (20, 22), (30, 33)), 9.0, 7.9)
     outcome = integrity.judge(FaultJob(None, 0), trace(error))
     assert outcome.misleading_s == pytest.approx(5.0)
@@ -48,7 +48,7 @@ def test_a_hidden_lean_does_not_mislead():
 
 
 @pytest.mark.parametrize(("back_s", "right"), [(28.0, True), (29.8, False)])
-def test_recovered_is_right_ten_seconds_after_the_end(back_s, right):
+def test_recovery_is_judged_ten_seconds_after_the_end(back_s, right):
     shown = ~during((15, back_s))
     assert integrity.judge(FaultJob(None, 0), trace(0.0, shown, end_s=20.0)).recovered is right
     assert integrity.judge(FaultJob(None, 0), trace(0.0, shown)).recovered is None
@@ -74,7 +74,7 @@ def test_each_fault_changes_readings_while_it_lasts(fault):
     assert ill.end - ill.first == (12000 - ill.first if fault.seconds is None else round(200 * fault.seconds))
 
 
-def test_a_slip_turns_force_and_rate_alike():
+def test_slipping_mount_turns_force_and_rate_equally():
     before = readings()
     ill = faults.apply(NAMED["mount slips by 20 degrees"], before, 200.0, 20.0, 2, np.eye(3))
     assert np.linalg.norm(ill.readings[:, :3], axis=1) == pytest.approx(np.linalg.norm(before[:, :3], axis=1))
@@ -98,7 +98,7 @@ def test_a_reading_at_the_end_of_the_range_counts_as_lost():
     assert ill.saturated.sum() == 200
 
 
-def test_on_the_whole_device_the_display_is_judged():
+def test_whole_device_is_judged_by_its_display():
     outcome = integrity.run(FaultJob(NAMED["gyro axis at the end of its range"], 0, 20.0, device=True))
     assert outcome.misleading_s == 0.0
     assert outcome.hidden_after_s < 2.0

@@ -7,11 +7,11 @@ from kickstand_fleet import run
 
 @pytest.fixture(scope="session")
 def fleet(tmp_path_factory):
-    """A MadeFleet of nine vehicles, of which several have something wrong."""
+    """A MadeFleet of nine vehicles, several of which have a trouble."""
     return made_fleet.make(tmp_path_factory.mktemp("fleet"))
 
 
 @pytest.fixture
 def alone(monkeypatch):
-    """Vehicles are worked on in this process."""
+    """Process vehicles in this process."""
     monkeypatch.setattr(run, "run_tasks", made_fleet.in_this_process)

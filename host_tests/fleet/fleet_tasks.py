@@ -1,4 +1,4 @@
-"""Tasks for the workers of a fleet: some behave, some do not. In a module, because workers import them."""
+"""Tasks for the workers of a fleet, good and bad ones. They are in a module because workers import them."""
 
 import os
 import time
@@ -7,7 +7,7 @@ from pathlib import Path
 
 def task(number, behaviour="", note=""):
     """Returns its number. behaviour: "die" ends the worker, "hang" never returns, "raise" raises, "slow" takes a while.
-    note: a file that gets a line with the worker's process id each time that the task is begun."""
+    note: a file that gets a line with the worker's process id at each start of the task."""
     if note:
         with Path(note).open("a") as file:
             file.write(f"{number} {os.getpid()}\n")

@@ -1,4 +1,4 @@
-"""A small fleet that is made up, and drives of it in memory."""
+"""A small simulated fleet, and its drives in memory."""
 
 import csv
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from kickstand_fleet.simulation.vehicle import HANDLING, Receiver, drive_log, ra
 from kickstand_tools.logs.csv_lines import write_log
 from kickstand_tools.signals import rotation_matrix
 
-# what is wrong with each vehicle: a car, a bus and a motorcycle in turn
+# the trouble of each vehicle: a car, a bus and a motorcycle in turn
 TROUBLES = ["", "", "", "moved-between", "garbage", "moved-within", "km/h", "dead", "late"]
 
 
@@ -59,7 +59,7 @@ def yaw_deg(found, true):
 
 
 def worked_on(directory, *logs):
-    """What is found in these logs of one car."""
+    """The result for these logs of one car."""
     paths = tuple(str(directory / f"{k}.csv") for k in range(1, 1 + len(logs)))
     for path, log in zip(paths, logs):
         write_log(path, log)

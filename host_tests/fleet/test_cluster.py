@@ -1,4 +1,4 @@
-"""Dask's workers: what one task does to its worker costs no other task, and a run goes on where it was stopped."""
+"""Dask's workers: a bad task costs no other task, and a stopped run is resumed."""
 
 import json
 import os
@@ -32,13 +32,14 @@ def cluster():
 
 
 class Overdue(dict):
-    """When tasks began: task 5 long ago, so that it is ended at once, and no other one on a busy machine."""
+    """Start times of tasks: task 5 began long ago and is ended at once. No other one is ended, even on a busy
+    machine."""
 
     def __setitem__(self, key, began):
         super().__setitem__(key, (began[0] - 1000.0 * key.startswith("fleet-5-"), began[1]))
 
 
-def test_a_task_that_kills_its_worker_or_hangs_costs_itself_alone(cluster, tmp_path, monkeypatch):
+def test_bad_task_costs_no_other_task(cluster, tmp_path, monkeypatch):
     monkeypatch.setattr(cluster, "_started", Overdue())
     note = tmp_path / "began"
     behaviours = {2: "die", 4: "raise", 5: "hang"}
@@ -50,10 +51,10 @@ def test_a_task_that_kills_its_worker_or_hangs_costs_itself_alone(cluster, tmp_p
         5: (None, TIMED_OUT),
     }
     began = Counter(int(line.split()[0]) for line in note.read_text().splitlines())
-    assert began[2] == 2 and sum(began.values()) <= 14 + 6  # what was done is not computed again
+    assert began[2] == 2 and sum(began.values()) <= 14 + 6  # finished tasks are not computed again
 
 
-def test_a_worker_that_is_killed_costs_no_result(cluster, tmp_path):
+def test_killed_worker_costs_no_result(cluster, tmp_path):
     note = tmp_path / "began"
     items = [(k, "slow", str(note)) for k in range(8)]
 
@@ -69,7 +70,7 @@ def test_a_worker_that_is_killed_costs_no_result(cluster, tmp_path):
     assert found == [(k, k) for k in range(8)]
 
 
-def test_a_fleet_on_a_cluster_gives_tables_and_goes_on(cluster, fleet, tmp_path, monkeypatch):
+def test_fleet_on_a_cluster_is_resumed(cluster, fleet, tmp_path, monkeypatch):
     periods = read_manifest(str(fleet.manifest))
     worked = []
 
@@ -100,7 +101,7 @@ def test_a_fleet_on_a_cluster_gives_tables_and_goes_on(cluster, fleet, tmp_path,
     assert "://" not in page.replace("http://www.w3.org/2000/svg", "")
     assert all(row["vehicle"] in page for row in rows)
 
-    # a log that changed is worked on again, nothing else
+    # only a changed log is processed again
     path = Path(periods[0].paths[0])
     stat = path.stat()
     os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + 1_000_000))
@@ -116,7 +117,7 @@ def test_a_fleet_on_a_cluster_gives_tables_and_goes_on(cluster, fleet, tmp_path,
     assert [part.split("=")[0] for part in parts[:-1]] == ["vehicle", "day"]
 
 
-def test_a_run_that_is_stopped_keeps_what_it_has(tmp_path, monkeypatch):
+def test_stopped_run_keeps_its_results(tmp_path, monkeypatch):
     periods = [Period(f"v{k}", "", "car", ("none.csv",)) for k in range(5)]
 
     def stopped(_, items, *__):
@@ -134,7 +135,7 @@ def test_a_run_that_is_stopped_keeps_what_it_has(tmp_path, monkeypatch):
         assert [key in journal for key in keys] == [True, True, True, False, False]
 
 
-def test_a_journal_whose_end_was_cut_or_whose_disk_is_full_loses_no_line(tmp_path, monkeypatch):
+def test_cut_end_or_full_disk_loses_no_earlier_line(tmp_path, monkeypatch):
     path = tmp_path / "journal.jsonl"
     result = failed(Period("v", "", "car", ()), "unreadable", "x")
     with Journal(path) as journal:
@@ -149,7 +150,7 @@ def test_a_journal_whose_end_was_cut_or_whose_disk_is_full_loses_no_line(tmp_pat
         full = Journal(tmp_path / "full.jsonl")
         with full:
             full.add("a", result)
-            with monkeypatch.context() as patched, pytest.raises(InputError, match="the same command goes on"):
+            with monkeypatch.context() as patched, pytest.raises(InputError, match="run the same command again"):
                 patched.setattr(full, "_file", open("/dev/full", "wb"))
                 full.add("b", result)
         with Journal(tmp_path / "full.jsonl") as again:
@@ -166,8 +167,8 @@ def test_two_runs_do_not_share_a_journal(tmp_path):
         assert "a" in second
 
 
-def test_a_journal_that_is_removed_is_not_the_one_that_is_locked(tmp_path, monkeypatch):
-    """It is locked until it is gone; a run that has opened it meanwhile makes another."""
+def test_removed_journal_is_replaced_and_locked_again(tmp_path, monkeypatch):
+    """It is locked until it is removed. A run that has opened it meanwhile creates a new one."""
     fcntl = pytest.importorskip("fcntl", reason="files are not locked on this system")
     path = tmp_path / "journal.jsonl"
     locks, lock = [], fcntl.flock
@@ -186,7 +187,7 @@ def test_a_journal_that_is_removed_is_not_the_one_that_is_locked(tmp_path, monke
         assert "a" in again
 
 
-def test_a_damaged_line_of_a_journal_costs_that_line_and_is_counted_once(tmp_path):
+def test_damaged_line_is_dropped_and_counted_once(tmp_path):
     path = tmp_path / "journal.jsonl"
     names = ["a", "b", "c"]
     with Journal(path) as journal:
@@ -225,8 +226,8 @@ if __name__ == "__main__":
 @pytest.mark.nightly  # the next test's moment does not depend on how busy the machine is
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="Ctrl-C comes at once on this system")
 @pytest.mark.parametrize("after_s", [0.6, 1.6])
-def test_ctrl_c_while_workers_start_is_heard_when_they_have(tmp_path, after_s):
-    """Stopped at once they would print pages of what failed."""
+def test_ctrl_c_while_workers_start_is_deferred(tmp_path, after_s):
+    """Interrupted at once, they would print pages of errors."""
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)
     command, pipe = [sys.executable, str(program)], subprocess.PIPE
@@ -252,7 +253,7 @@ Client.register_plugin = interrupted
 
 
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="Ctrl-C comes at once on this system")
-def test_ctrl_c_while_this_process_connects_is_heard_when_it_has(tmp_path):
+def test_ctrl_c_while_connecting_is_deferred(tmp_path):
     program = tmp_path / "program.py"
     program.write_text(CONNECTING + PROGRAM)
     trouble = subprocess.run([sys.executable, str(program)], capture_output=True, text=True, timeout=120).stderr
@@ -260,7 +261,7 @@ def test_ctrl_c_while_this_process_connects_is_heard_when_it_has(tmp_path):
     assert trouble.endswith("KeyboardInterrupt\n")
 
 
-def test_a_vehicle_that_crashed_is_tried_again_by_the_next_run(tmp_path, monkeypatch):
+def test_next_run_retries_a_crashed_vehicle(tmp_path, monkeypatch):
     periods = [Period("v", "", "car", ("none.csv",))]
     monkeypatch.setattr(run, "run_tasks", lambda *_: iter([(0, None, CRASHED, "its worker died")]))
     first = run_fleet(periods, tmp_path)

@@ -1,4 +1,4 @@
-"""What names, other users of the computer and changing files may do to a fleet: cost their own row at most."""
+"""Names, other users of the computer and changing files cost a fleet at most their own row."""
 
 import http.client
 import os
@@ -17,9 +17,10 @@ from kickstand_fleet.manifest import Period, by_pattern, read_manifest
 from kickstand_fleet.period import failed, work_on_period
 from kickstand_fleet.run import run_fleet
 from kickstand_fleet.show import plot
+from kickstand_tools.calibration.drive_refusals import of_firmware
 from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import sentence
 from kickstand_tools.common.output import whole_file
-from kickstand_tools.refusals import sentence
 from support import command
 from support.recordings import broken_logs
 
@@ -37,7 +38,7 @@ def copied(source, *targets):
     return tuple(str(target) for target in targets)
 
 
-def test_signals_of_logs_of_one_name_and_of_two_mounts_do_not_overwrite_each_other(drive, tmp_path, alone):
+def test_signals_of_equally_named_logs_have_separate_files(drive, tmp_path, alone):
     name = drive.name
     paths = copied(drive, tmp_path / "d1" / name, tmp_path / "d2" / name)
     periods = [Period("v", "", "car", paths), Period("v", "second", "car", paths), Period("v second", "", "car", paths)]
@@ -59,7 +60,7 @@ def test_signals_of_logs_of_one_name_and_of_two_mounts_do_not_overwrite_each_oth
 NAMES = ["x" * 256, "x" * 257, 100 * "\u4e2d", "hid", ".hid", "..", "a/b", "con", "a%2Fb", "\x00", " ", "\u202e", "HID"]
 
 
-def test_every_name_has_files_of_its_own_that_any_file_system_takes():
+def test_file_names_are_unique_and_portable():
     for made in (
         [plot.file_name(name, "") for name in NAMES] + [plot.file_name(name, "m") for name in NAMES],
         [files.folder_value(name) for name in NAMES],
@@ -71,7 +72,7 @@ def test_every_name_has_files_of_its_own_that_any_file_system_takes():
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux has names that are no UTF-8")
-def test_a_file_name_that_is_no_utf8_costs_nothing(drive, tmp_path, alone):
+def test_file_name_that_is_not_utf8_is_processed(drive, tmp_path, alone):
     copied(drive, tmp_path / "good.csv")
     with open(os.fsencode(tmp_path) + b"/bad\xff.csv", "wb") as file:
         file.write(drive.read_bytes())
@@ -84,7 +85,7 @@ def test_a_file_name_that_is_no_utf8_costs_nothing(drive, tmp_path, alone):
     assert "bad\\udcff" in (tmp_path / "out" / "index.html").read_text()
 
 
-def test_a_log_that_is_replaced_during_the_run_is_noticed_and_worked_on_again(drive, tmp_path, alone, monkeypatch):
+def test_log_replaced_during_the_run_is_processed_again(drive, tmp_path, alone, monkeypatch):
     (log,) = copied(drive, tmp_path / "drive.csv")
 
     def replaced(period, signals_to):
@@ -102,7 +103,7 @@ def test_a_log_that_is_replaced_during_the_run_is_noticed_and_worked_on_again(dr
     assert (second.new, second.seen.errors) == (1, 0)
 
 
-def test_no_memory_and_no_disk_are_no_fault_of_kickstands(monkeypatch):
+def test_full_memory_or_disk_is_not_reported_as_a_bug(monkeypatch):
     for error, reason in ((MemoryError(), "no-memory"), (OSError(5, "Input/output error"), "unreadable")):
 
         def broken(path, error=error):
@@ -124,7 +125,7 @@ if __name__ == "__main__":
 """
 
 
-def test_only_this_computer_can_connect_and_nobody_but_the_run_can_run_code(tmp_path):
+def test_only_the_run_itself_can_run_code_on_its_workers(tmp_path):
     from distributed import Client
     from distributed.security import Security
 
@@ -162,7 +163,7 @@ def test_only_this_computer_can_connect_and_nobody_but_the_run_can_run_code(tmp_
         (b"\xff\xfe", "is no table"),
     ],
 )
-def test_a_hostile_manifest_is_one_line_or_a_row(tmp_path, alone, content, words):
+def test_hostile_manifest_gives_one_line_or_a_row(tmp_path, alone, content, words):
     path = tmp_path / "MANIFEST.csv"
     path.write_bytes(content)
     if words:
@@ -171,12 +172,14 @@ def test_a_hostile_manifest_is_one_line_or_a_row(tmp_path, alone, content, words
         assert run_fleet(read_manifest(str(path)), tmp_path / "out").seen.statuses["error"] == 1
 
 
-def test_a_mount_that_seems_to_have_moved_counts_though_nobody_knows_when(tmp_path, monkeypatch):
-    """As a motorcycle's does that is taken for a car: it leans on its stand. Names are short, and the kind is said."""
+def test_move_at_an_unknown_time_is_counted(tmp_path, monkeypatch):
+    """For example a motorcycle treated as a car: it leans on its stand. Names are short, and the kind is reported."""
 
     def moved(_, items, *__):
         for index, (period, _) in enumerate(items):
-            found = failed(period, "mount-moved", sentence(AlignmentError("mount-moved", "between-stops", 8.0)))
+            found = failed(
+                period, "mount-moved", sentence(of_firmware(AlignmentError("mount-moved", "between-stops", 8.0)))
+            )
             found.alignment["status"] = "refused"
             yield index, found, "", ""
 
@@ -191,7 +194,7 @@ def test_a_mount_that_seems_to_have_moved_counts_though_nobody_knows_when(tmp_pa
     assert "<td>a.csv</td><td>motorcycle</td>" in page and f"Names are those below {tmp_path}/" in page
 
 
-def test_what_is_left_out_of_a_log_is_reported_and_the_log_still_counts(fleet, tmp_path):
+def test_log_with_parts_left_out_is_reported_and_counts(fleet, tmp_path):
     paths = list(read_manifest(str(fleet.manifest))[0].paths)
     cut = tmp_path / "cut.csv"
     cut.write_bytes(Path(paths[0]).read_bytes()[:-9] + bytes(50))
@@ -201,7 +204,7 @@ def test_what_is_left_out_of_a_log_is_reported_and_the_log_still_counts(fleet, t
     assert all(row["log"] == str(cut) for row in found.errors)
 
 
-def test_a_mutated_manifest_is_read_or_refused_in_one_line(tmp_path):
+def test_mutated_manifest_is_read_or_refused_in_one_line(tmp_path):
     path = tmp_path / "MANIFEST.csv"
     content = b"vehicle,path,kind,mount\n" + b"".join(b"v%d,logs/%d.csv,car,m\n" % (k, k) for k in range(20))
     seen = set()
@@ -215,15 +218,15 @@ def test_a_mutated_manifest_is_read_or_refused_in_one_line(tmp_path):
     assert seen == {True, False}
 
 
-def test_a_pipe_is_no_manifest_and_no_log(tmp_path, alone):
+def test_pipe_is_refused_as_manifest_and_log(tmp_path, alone):
     os.mkfifo(tmp_path / "pipe.csv")
     command.refused(tmp_path, "fleet", tmp_path / "pipe.csv", "--out", tmp_path / "out", words="not an ordinary file")
     found = work_on_period(Period("v", "", "car", (str(tmp_path / "pipe.csv"),)))
     assert "not an ordinary file" in found.errors[0]["message"]
 
 
-def test_a_file_that_cannot_be_written_says_why(tmp_path, monkeypatch):
-    """On a read-only file system the temporary file cannot be removed either."""
+def test_unwritable_file_is_reported_with_its_reason(tmp_path, monkeypatch):
+    """On a read-only file system the temporary file cannot be removed."""
 
     def read_only(*_, **__):
         raise OSError(30, "Read-only file system")

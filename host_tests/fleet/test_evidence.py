@@ -1,4 +1,4 @@
-"""What the intervals of a drive show: level, forward and left, each 1 g for 1 g."""
+"""The intervals of a drive show level, forward and left, each 1 g for 1 g."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ def shown(log, kind="car", lag_s=0.3):
 
 
 @pytest.mark.parametrize("every_s", [0.2, 1.6])
-def test_a_g_of_each_is_a_g_however_often_the_speed_comes(every_s):
+def test_one_g_stays_one_g_at_any_rate_of_the_speed(every_s):
     log, sensor = drive(41, every_s=every_s)
     found, varied = shown(log)
     level, forward, left = found[:3] @ sensor.mount.T
@@ -24,7 +24,7 @@ def test_a_g_of_each_is_a_g_however_often_the_speed_comes(every_s):
     assert evidence.handedness(found, varied) == pytest.approx(1.0, abs=0.12)
 
 
-def test_a_motorcycle_s_force_grows_along_its_own_up_in_turns():
+def test_motorcycle_force_grows_along_its_up_in_turns():
     exact = VehicleSensor(random_sensor(np.random.default_rng(1)).mount, np.zeros(3), np.ones(3), np.zeros(3))
     log, sensor = drive(42, "motorcycle", sensor=exact)
     found, varied = shown(log, "motorcycle")

@@ -1,24 +1,24 @@
-"""Forward from whole logs: nearer than the device's, and as sure as it says."""
+"""Forward from whole logs: more exact than the device's, with a right standard error."""
 
 import dataclasses
 
 import numpy as np
 import pytest
-from kickstand.errors import AlignmentError
 from kickstand_fleet import evidence, forward, period
 from kickstand_fleet.forward import find_forward
 from kickstand_tools.calibration.drive import fit_logs, usable
+from kickstand_tools.calibration.drive_refusals import MountMoved
+from kickstand_tools.common.errors import RefusedInput
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.refusals import RefusedInput
 from kickstand_tools.signals import rotation_vector
 from made_fleet import drive, turn_of, worked_on, yaw_deg
 
-SEEDS = (101, 102, 106, 109)  # on which the device is off by about a degree
+SEEDS = (101, 102, 106, 109)  # with these the device is off by about a degree
 
 
 @pytest.fixture(scope="module")
 def buses():
-    """(the device's fit, what the whole log shows, the mount) of buses that brake some ten times, gently."""
+    """(the device's fit, the result of the whole log, the mount) of buses that brake gently some ten times."""
     found = []
     for seed in SEEDS:
         log, sensor = drive(seed, "bus", 150.0)
@@ -28,27 +28,27 @@ def buses():
     return found
 
 
-def test_forward_without_the_road_is_nearer_than_the_device_s(buses):
+def test_forward_without_the_road_beats_the_device(buses):
     device = [yaw_deg(fit.calibration.vehicle_from_sensor, mount) for fit, _, mount in buses]
     whole = [yaw_deg(known.frame, mount) for _, known, mount in buses]
     assert np.sqrt(np.mean(np.square(device))) > 0.95
     assert np.sqrt(np.mean(np.square(whole))) < 0.75
 
 
-def test_its_error_is_what_it_says(buses):
+def test_standard_error_of_forward_is_right(buses):
     sigmas = np.array([known.sigma_deg for _, known, _ in buses])
     errors = np.array([yaw_deg(known.frame, mount) for _, known, mount in buses])
     assert np.all(sigmas < 0.7) and np.all(np.abs(errors) < 2.0 * sigmas)
 
 
-def test_up_stays_the_device_s(buses):
+def test_up_is_the_devices(buses):
     for fit, known, _ in buses:
         assert known.frame[1] == pytest.approx(fit.calibration.vehicle_from_sensor[1], abs=1e-6)
         assert known.frame @ known.frame.T == pytest.approx(np.eye(3), abs=1e-6)
 
 
 @pytest.mark.parametrize(("seed", "doubt"), [(138, "uncertain"), (114, "parts-differ")])
-def test_what_the_device_doubts_is_aligned_where_the_whole_log_is_sure(tmp_path, seed, doubt):
+def test_sure_whole_log_overrides_the_devices_doubt(tmp_path, seed, doubt):
     log, sensor = drive(seed, "bus", 150.0)
     assert fit_logs([log], None, "car").reason == doubt
     found = worked_on(tmp_path, log)
@@ -58,7 +58,7 @@ def test_what_the_device_doubts_is_aligned_where_the_whole_log_is_sure(tmp_path,
 
 
 @pytest.mark.parametrize("limit", ["READY_DEG", "AGREE_DEG"])
-def test_forward_that_is_not_sure_is_reported_and_not_given(tmp_path, monkeypatch, limit):
+def test_uncertain_forward_is_reported_as_refused(tmp_path, monkeypatch, limit):
     monkeypatch.setattr(forward, limit, 0.1)
     found = worked_on(tmp_path, drive(4)[0])
     assert (found.alignment["status"], found.alignment["reason"]) == ("refused", "uncertain")
@@ -66,9 +66,9 @@ def test_forward_that_is_not_sure_is_reported_and_not_given(tmp_path, monkeypatc
     assert found.alignment["vehicle_from_sensor"] is None and not found.brake_tests
 
 
-def test_a_late_speed_that_looks_like_a_moved_mount_is_reported_as_late(tmp_path, monkeypatch):
+def test_late_speed_is_not_reported_as_a_moved_mount(tmp_path, monkeypatch):
     log, _ = drive(4)
-    moved = RefusedInput(AlignmentError("mount-moved", "between-stops", 8.0))
+    moved = RefusedInput(MountMoved("between-stops", 8.0))
     fit = dataclasses.replace(fit_logs([log], None, "car"), refusal=moved)
     for lag_s, reason in ((0.5, "mount-moved"), (2.5, "speed-late")):
         monkeypatch.setattr(period, "fit_logs", lambda *_, lag_s=lag_s: dataclasses.replace(fit, lag_s=lag_s))
@@ -99,7 +99,7 @@ def test_forward_of_recorded_drives(shared_data, name):
         assert 1.0 < sigma_deg < 1.6 and np.linalg.norm(off) < 1.5 * sigma_deg
 
 
-def test_a_device_that_contradicts_the_whole_log_makes_forward_uncertain(buses):
+def test_contradicting_device_makes_forward_uncertain(buses):
     fit, known, _ = buses[0]
     driven = [evidence.intervals(drive(SEEDS[0], "bus", 150.0)[0], "car", fit.lag_s or 0.0, fit.bias_dps)]
     turned = turn_of(10.0, [0.0, 1.0, 0.0]) @ fit.calibration.vehicle_from_sensor

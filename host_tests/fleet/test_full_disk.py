@@ -1,4 +1,4 @@
-"""A disk that fills up, in whatever is being written: no finished row is lost, and one line says so."""
+"""A disk that fills up during any write: no finished row is lost, and one line reports it."""
 
 import copy
 import errno
@@ -20,7 +20,7 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 @pytest.fixture
 def disk(tmp_path):
-    """The directory of a disk that resize() has made."""
+    """The directory of a disk made by resize()."""
     if not sys.platform.startswith("linux"):
         pytest.skip("tmpfs is of Linux")
     path = tmp_path / "disk"
@@ -30,7 +30,7 @@ def disk(tmp_path):
 
 
 def resize(path, kb):
-    """Make a disk of some kB there, or make it larger."""
+    """Create a disk of this size at path, or enlarge it."""
     option = "remount," if os.path.ismount(path) else ""
     mount = ["mount", "-t", "tmpfs", "-o", f"{option}size={kb}k", "tmpfs", str(path)]
     if subprocess.run(mount, capture_output=True, check=False).returncode:
@@ -51,9 +51,9 @@ def finished(directory, keys):
         return sum(key in journal for key in keys)
 
 
-# From a disk that has no room for a picture to one that has none for the last table beside all rows
+# From a disk without room for a picture to one without room for the last table beside all rows
 @pytest.mark.parametrize("kb", [8, 48, 80])
-def test_a_disk_of_any_size_loses_no_finished_row(disk, results, alone, monkeypatch, kb):
+def test_disk_of_any_size_loses_no_finished_row(disk, results, alone, monkeypatch, kb):
     known, periods = results
     monkeypatch.setattr(run, "work_on_period", lambda period, _: copy.deepcopy(known[period.vehicle]))
     resize(disk, kb)
@@ -72,7 +72,7 @@ def test_a_disk_of_any_size_loses_no_finished_row(disk, results, alone, monkeypa
     assert run_fleet(periods, out).new == 0
 
 
-def test_a_picture_that_cannot_be_written_costs_no_row(results, alone, tmp_path, monkeypatch):
+def test_unwritable_picture_costs_no_row(results, alone, tmp_path, monkeypatch):
     known, periods = results
     monkeypatch.setattr(run, "work_on_period", lambda period, _: copy.deepcopy(known[period.vehicle]))
 
@@ -84,10 +84,10 @@ def test_a_picture_that_cannot_be_written_costs_no_row(results, alone, tmp_path,
         run_fleet(periods, tmp_path)
     rows = parquet.read_table(tmp_path / "alignments.parquet").to_pylist()
     assert [(row["status"], row["plot"]) for row in rows] == [("aligned", "")]
-    assert run_fleet(periods, tmp_path).new == len(periods)  # the first one for its picture
+    assert run_fleet(periods, tmp_path).new == len(periods)  # the first one again, for its picture
 
 
-def test_signals_that_do_not_fit_stop_the_run_and_are_written_by_the_next(results, alone, tmp_path, monkeypatch):
+def test_signals_that_did_not_fit_are_written_by_the_next_run(results, alone, tmp_path, monkeypatch):
     _, periods = results
 
     def full(path, _):
@@ -95,7 +95,7 @@ def test_signals_that_do_not_fit_stop_the_run_and_are_written_by_the_next(result
 
     with monkeypatch.context() as patched:
         patched.setattr("kickstand_fleet.signals.write_bytes", full)
-        with pytest.raises(InputError, match="No space left on device; what is finished is kept, the same command"):
+        with pytest.raises(InputError, match="No space left on device; finished work is kept: run the same command"):
             run_fleet(periods[:2], tmp_path, with_signals=True)
     rows = parquet.read_table(tmp_path / "alignments.parquet").to_pylist()
     assert [row["status"] for row in rows] == ["aligned"]
@@ -112,6 +112,6 @@ def test_a_journal_that_cannot_reach_the_disk_is_reported(tmp_path, monkeypatch)
     monkeypatch.setattr(os, "fsync", full)
     with (
         Journal(tmp_path / "journal.jsonl") as journal,
-        pytest.raises(InputError, match="No space left on device; what is finished is kept, the same command goes on"),
+        pytest.raises(InputError, match="No space left on device; finished work is kept: run the same command"),
     ):
         journal.sync()

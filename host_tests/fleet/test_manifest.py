@@ -1,4 +1,4 @@
-"""What a manifest may say, and what `kickstand fleet` and `simulate --fleet` refuse."""
+"""Valid manifests, and refusals of `kickstand fleet` and `simulate --fleet`."""
 
 import pytest
 from kickstand_fleet.manifest import Period, by_pattern, is_pattern, read_manifest
@@ -39,12 +39,12 @@ def test_rows_of_a_vehicle_and_mount_are_one_period(tmp_path):
         ("vehicle,path,kind\n1,a.csv\n", "line 2: 2 cells, the first line has 3"),
     ],
 )
-def test_a_manifest_that_cannot_be_used(tmp_path, text, words):
+def test_bad_manifest_is_refused(tmp_path, text, words):
     with pytest.raises(InputError, match=words):
         read_manifest(manifest(tmp_path, text))
 
 
-def test_a_pattern_takes_each_file_for_a_vehicle(tmp_path):
+def test_pattern_makes_each_file_a_vehicle(tmp_path):
     for name in ("2.csv", "1.csv"):
         (tmp_path / name).touch()
     pattern = f"{tmp_path}/*.csv"
@@ -73,7 +73,7 @@ def test_the_command_refuses_in_one_line_and_writes_nothing(tmp_path, monkeypatc
         command.refused(tmp_path, "fleet", *arguments, words=words)
 
 
-def test_the_fleet_that_is_made_up_is_as_its_truth_says(fleet, tmp_path):
+def test_simulated_fleet_matches_its_truth(fleet, tmp_path):
     assert [made.trouble for made in fleet.vehicles] == TROUBLES
     periods = {period.vehicle: period for period in read_manifest(str(fleet.manifest))}
     for made in fleet.vehicles:

@@ -1,4 +1,4 @@
-"""Turns of a few degrees, found in what the car's body does, too; on made-up sums and on recorded drives."""
+"""Turns of a few degrees, also found from the motion of the car's body; on artificial sums and on recorded drives."""
 
 import copy
 
@@ -18,7 +18,8 @@ def driven(log, lag_s=0.3, bias_dps=(0.0, 0.0, 0.0)):
 
 
 def swaying(log, sensor, size_g=0.03, other_deg=0.0, seed=1):
-    """The log of a car whose body sways to its sides, 5 times a second; from the middle on other_deg further round."""
+    """The log of a car whose body sways to its sides, 5 times a second; from the middle on the direction differs by
+    other_deg."""
     chance = np.random.default_rng(seed)
     size = size_g * np.interp(log.t_s, np.arange(0.0, log.t_s[-1] + 1.0), chance.normal(size=int(log.t_s[-1]) + 2))
     sway = np.outer(size * np.sin(2.0 * np.pi * 5.0 * log.t_s), (1.0, 0.0, 0.0))
@@ -30,7 +31,7 @@ def swaying(log, sensor, size_g=0.03, other_deg=0.0, seed=1):
 
 
 def halves(log):
-    """How the mount is taken to have turned in the middle of a log, and its sigma."""
+    """The found turn of the mount in the middle of a log, and its sigma."""
     whole = evidence.blocks([driven(log)])
     middle = len(whole.log) // 2
     found = compare(whole.part(slice(0, middle)), whole.part(slice(middle, None)))
@@ -51,7 +52,7 @@ def test_the_sway_shows_yaw_where_there_is_little_braking(bus):
     assert (sigma[0], sigma[2]) == pytest.approx((without[0], without[2]), rel=0.1)
 
 
-def test_sway_that_contradicts_the_braking_is_not_believed(bus):
+def test_sway_that_contradicts_the_braking_is_ignored(bus):
     log, sensor = bus
     turn, sigma = halves(swaying(log, sensor, other_deg=25.0))
     assert abs(turn[1]) < 1.5 and sigma[1] == pytest.approx(halves(log)[1][1], rel=0.1)
@@ -69,7 +70,7 @@ def test_a_sensor_ahead_of_the_rear_axle_is_swung_and_not_turned(bus):
     assert halves(swung)[0] == pytest.approx(halves(log)[0], abs=0.5)
 
 
-def test_a_move_between_logs_is_not_taken_for_one_during_them():
+def test_move_between_logs_is_not_found_during_them():
     first, sensor = drive(31)
     sensor.mount = turn_of(25.0, (1.0, 0.3, 0.2)) @ sensor.mount
     second, _ = drive(32, sensor=sensor)
@@ -77,8 +78,8 @@ def test_a_move_between_logs_is_not_taken_for_one_during_them():
     assert (move.log, move.at_s) == (1, None) and move.angle_deg == pytest.approx(25.0, abs=2.0)
 
 
-def test_a_road_counts_once_however_many_intervals_are_on_it():
-    """Innovations: of a force that is the same error all along, only the first interval of a standstill counts."""
+def test_one_road_counts_once_for_all_its_intervals():
+    """Innovations: if the error of the force is constant, only the first interval of a standstill counts."""
     count = 50
     standing = evidence.Intervals(
         np.arange(count, dtype=float),
@@ -107,7 +108,7 @@ def pitched(log, sensor, degrees):
     return found
 
 
-def test_a_turn_is_sudden_and_a_hill_is_not():
+def test_turn_is_sudden_and_a_hill_is_not():
     log, sensor = drive(33, "car", 240.0)
     middle = log.t_s[-1] / 2.0
     (move,) = find_moves([driven(pitched(log, sensor, np.where(log.t_s > middle, 6.5, 0.0)))])

@@ -1,4 +1,4 @@
-"""What is found in the logs of one mount of one vehicle."""
+"""Results for the logs of one mount of one vehicle."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def results(fleet):
     return {period.vehicle: work_on_period(period) for period in read_manifest(str(fleet.manifest))}
 
 
-def test_each_vehicle_gets_what_it_has_to(fleet, results):
+def test_each_vehicle_gets_its_expected_result(fleet, results):
     assert len(results) == len(fleet.vehicles)
     for made in fleet.vehicles:
         row = results[made.name].alignment
@@ -52,7 +52,7 @@ def test_a_bad_log_costs_its_own_row_only(fleet, results):
     assert found.alignment["status"] == "aligned" and found.brake_tests
 
 
-def test_nothing_left_to_read_is_an_error_with_its_reason(tmp_path):
+def test_period_without_readable_logs_gets_an_error_row(tmp_path):
     bad = tmp_path / "bad.csv"
     bad.write_text("t_s,ax_g\n")
     found = work_on_period(Period("v", "m", "car", (str(bad), str(tmp_path / "none.csv.gz"))))
@@ -61,7 +61,7 @@ def test_nothing_left_to_read_is_an_error_with_its_reason(tmp_path):
     assert "none.csv.gz: there is no such file" in found.errors[1]["message"]
 
 
-def test_a_fault_of_ours_is_a_row_too(monkeypatch, fleet):
+def test_bug_in_kickstand_gets_an_error_row(monkeypatch, fleet):
     def broken(*_):
         raise ZeroDivisionError("on purpose")
 
@@ -96,7 +96,7 @@ def test_brake_tests_of_a_car_without_the_lean_filter(fleet, results):
 
 
 @pytest.mark.parametrize(("degrees", "axis"), [(5.5, (1, 0.3, 0)), (8.0, (0.2, 1, 0.3))])
-def test_a_small_turn_between_two_logs(tmp_path, degrees, axis):
+def test_small_turn_between_two_logs_is_found(tmp_path, degrees, axis):
     first, sensor = drive(21)
     sensor.mount = turn_of(degrees, axis) @ sensor.mount
     second, _ = drive(22, sensor=sensor)

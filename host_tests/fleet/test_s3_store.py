@@ -11,13 +11,13 @@ from kickstand_fleet.run import run_fleet
 from kickstand_fleet.tables import TABLES
 from kickstand_tools.common.errors import InputError
 
-WANTED = (0, 4)  # a car, and a bus with a log that is no text
+WANTED = (0, 4)  # a car, and a bus with a log that is not text
 TABLE_FILES = [f"{name}.parquet" for name in TABLES]
 
 
 @pytest.fixture
 def s3(alone, monkeypatch):
-    """A file system on a made-up S3 that has a bucket `fleet`."""
+    """A file system on a simulated S3 with a bucket `fleet`."""
     moto = pytest.importorskip("moto.server")
     s3fs = pytest.importorskip("s3fs")
     server = moto.ThreadedMotoServer(port=0, verbose=False)
@@ -39,7 +39,7 @@ def s3(alone, monkeypatch):
 
 
 def table(content, base):
-    """The rows of a table, with paths as seen from where the logs are."""
+    """The rows of a table, with paths relative to the logs."""
     rows = parquet.read_table(content).to_pylist()
     return [
         {name: value.replace(f"{base}/", "") if isinstance(value, str) else value for name, value in row.items()}
@@ -79,7 +79,7 @@ def test_logs_and_results_in_s3_give_the_same_as_files(s3, fleet, tmp_path):
     assert (again.new, again.seen.errors) == (1, here.seen.errors + 1)
 
 
-def test_a_run_into_s3_that_is_stopped_goes_on(s3, monkeypatch):
+def test_stopped_run_into_s3_is_resumed(s3, monkeypatch):
     periods = [run.Period(f"v{k}", "", "car", ("none.csv",)) for k in range(5)]
 
     def stopped(_, items, *__):
@@ -96,7 +96,7 @@ def test_a_run_into_s3_that_is_stopped_goes_on(s3, monkeypatch):
     assert (whole.new, whole.seen.reasons[("error", "unreadable")]) == (4, 5)
 
 
-def test_a_store_that_refuses_is_reported_in_one_line(s3):
+def test_store_that_refuses_is_reported_in_one_line(s3):
     with pytest.raises(InputError, match=r"^s3://nobody/results/.* cannot be written: [^\n]+$"):
         run_fleet([run.Period("v", "", "car", ("none.csv",))], "s3://nobody/results")
     with pytest.raises(InputError, match=r"^s3://nobody/MANIFEST.csv"):

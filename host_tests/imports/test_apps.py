@@ -1,5 +1,5 @@
-"""Each app's export is imported and replays as the ride that it was made from. Nothing in an export is copied: the
-writers in support/recordings/app_exports.py follow what the makers have published.
+"""Each app's export is imported and replays like the ride that it was made from. No export is copied: the writers in
+support/recordings/app_exports.py follow the makers' documentation.
 
 phyphox: https://github.com/phyphox/phyphox-ios, SimpleExperimentTemplete.swift and ExperimentExport.swift
 Sensor Logger: https://github.com/tszheichoi/awesome-sensor-logger, UNITS.md, COORDINATES.md and CROSSPLATFORM.md
@@ -44,7 +44,7 @@ def several(name: str, write: Callable[..., dict[str, str]], **options) -> Calla
     return lambda directory, ride: app_exports.into(directory / name, write(ride, **options))
 
 
-# what is exported, whose name begins with the app's: how it is written, and sampled each so many of 200 a second
+# name of the export, beginning with the app's: its writer, and the divider of 200 samples per second
 EXPORTS = {
     "phyphox zip": (several("p.zip", app_exports.phyphox), 2),
     "phyphox folder, ; and decimal comma": (several("p", app_exports.phyphox, separator=";", comma=True), 2),
@@ -68,7 +68,7 @@ EXPORTS = {
 }
 
 
-def test_each_app_is_tried_and_described():
+def test_each_app_has_a_test_and_a_description():
     untried = [name for name in NAMES if not any(key.startswith(name) for key in EXPORTS)]
     assert untried == ["Kickstand"], f"add to EXPORTS above an export of each but Kickstand: {untried}"
     table = PAGE.read_text(encoding="utf-8")
@@ -108,8 +108,8 @@ def test_an_export_replays_as_the_ride_it_was_made_from(tmp_path, name):
         assert np.max(np.abs(found.log.utc_s[known] - START_UTC_S - t_s[known])) < 0.02
 
 
-def test_one_file_with_all_sensors_of_phyphox(tmp_path):
-    """ "Raw Data.csv" of a combined experiment: each sensor has the time that stands before it."""
+def test_phyphox_file_with_all_sensors_is_read(tmp_path):
+    """ "Raw Data.csv" of a combined experiment: the time of each sensor is in the column before it."""
     ride = app_exports.riding().every(2)
     late = ride.every(2, 1)
     names = ["Time (s)", *[f"Acceleration {axis} (m/s^2)" for axis in "xyz"]]
@@ -127,7 +127,7 @@ def test_one_file_with_all_sensors_of_phyphox(tmp_path):
 
 
 def test_a_pause_of_phyphox_is_a_gap(tmp_path):
-    """The experiment's own time stands still in a pause; meta/time.csv says for how long."""
+    """The experiment's own time stops in a pause; meta/time.csv has its duration."""
     files = app_exports.phyphox(app_exports.riding().every(2))
     rows = [("START", 0.0, 0.0), ("PAUSE", 12.0, 12.0), ("START", 12.0, 72.0), ("PAUSE", 28.0, 88.0)]
     files["meta/time.csv"] = '"event","experiment time","system time","system time text"\n' + "\n".join(
@@ -139,7 +139,7 @@ def test_a_pause_of_phyphox_is_a_gap(tmp_path):
 
 
 @pytest.mark.parametrize("form", ["csv", "parquet", "racechrono"])
-def test_kickstands_own_exports_come_back(tmp_path, form):
+def test_kickstands_own_exports_are_read_back(tmp_path, form):
     if form == "parquet":
         pytest.importorskip("pyarrow")
     ride = app_exports.riding().every(2)
@@ -164,7 +164,7 @@ def test_kickstands_own_exports_come_back(tmp_path, form):
     assert np.allclose(found.log.utc_s[known] - START_UTC_S, t_s[known], rtol=0.0, atol=2e-3)
 
 
-def test_a_log_comes_back_as_it_was_also_from_a_spreadsheet(tmp_path):
+def test_log_saved_by_a_spreadsheet_is_read_back(tmp_path):
     """Semicolons, decimal commas, and the columns that only an imported log has."""
     ride = app_exports.riding().every(8)
     names = "t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps,speed_mps,temp_c,lat_deg,lon_deg".split(",")

@@ -1,4 +1,4 @@
-"""The command: what it took for what, and a log that every other command reads."""
+"""The command reports its choices, and writes a log that every other command reads."""
 
 import json
 
@@ -11,7 +11,7 @@ from support.recordings import app_exports
 from support.recordings.app_exports import riding
 
 
-def test_it_says_what_it_took_for_what_and_what_to_do_next(tmp_path):
+def test_import_reports_its_choices_and_the_next_step(tmp_path):
     ride = riding().every(2).without(10.0, 12.0)
     ride.t_s = 1.25 * ride.t_s  # long enough for an alignment
     source, out = app_exports.into(tmp_path / "p.zip", app_exports.phyphox(ride)), tmp_path / "RIDE.csv"
@@ -28,8 +28,8 @@ def test_it_says_what_it_took_for_what_and_what_to_do_next(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["EXPORT.zip", "EXPORT"])
-def test_a_report_needs_no_other_command(tmp_path, name):
-    """Imported and aligned on the way, and a line says so; with a calibration beside it, by that."""
+def test_report_reads_an_export_directly(tmp_path, name):
+    """The export is imported and aligned, and a line says so. A calibration beside it is used."""
     ride = riding().every(4)
     again = app_exports.Riding(*(np.concatenate([column] * 3) for column in vars(ride).values()))
     again.t_s = np.arange(len(again.t_s)) / 50.0
@@ -48,8 +48,8 @@ def test_a_report_needs_no_other_command(tmp_path, name):
     assert "aligned" not in command.works("report", source, "--json", "--live").err
 
 
-def test_an_export_that_is_one_file(tmp_path):
-    """RaceChrono's CSV is one, too; what nobody knows is refused as a log."""
+def test_export_of_one_file_is_read(tmp_path):
+    """RaceChrono's CSV is one, too. An unknown file is refused as a log."""
     (tmp_path / "r.csv").write_text(app_exports.racechrono(riding().every(4)))
     words = "s of riding: at least 30 s with bends are needed"
     assert "r.csv: only" in command.refused(tmp_path, "report", tmp_path / "r.csv", words=words)
@@ -65,7 +65,7 @@ def test_an_export_that_is_one_file(tmp_path):
     command.refused(tmp_path, "report", tmp_path / "any", words="any holds no recording")
 
 
-def test_vehicle_axes_are_reported_and_need_no_other_alignment(tmp_path):
+def test_export_in_vehicle_axes_needs_no_alignment(tmp_path):
     (tmp_path / "v.vbo").write_text(app_exports.vbo(riding().every(2)))
     result = command.works("import", tmp_path / "v.vbo", "--out", tmp_path / "RIDE.csv")
     assert "x is left, y up, z forward, as far as the logger was mounted so" in result.out
@@ -75,8 +75,8 @@ def test_vehicle_axes_are_reported_and_need_no_other_alignment(tmp_path):
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
-def test_a_mutated_export_ends_in_a_log_or_in_one_line(tmp_path):
-    """Never in a traceback, a warning of numpy's, or a log that cannot be read."""
+def test_mutated_export_gives_a_log_or_one_line(tmp_path):
+    """Never a traceback, a numpy warning, or an unreadable log."""
     ride = riding().every(8).every(1, 100)
     exports = [app_exports.racebox(ride), app_exports.vbo(ride), app_exports.aim(ride), app_exports.sensorlog(ride)]
     exports += [app_exports.racechrono(ride), app_exports.sensor_kinetics(ride)["Ride_accm.csv"]]
@@ -120,8 +120,8 @@ def test_no_output_destroys_a_file_of_the_export(tmp_path):
     command.refused(tmp_path, *given, words="Accelerometer.csv is also an input")
 
 
-def test_what_an_import_remarks_is_in_the_report_and_on_the_page(tmp_path):
-    """Once, though the imported log is checked again."""
+def test_remarks_of_an_import_are_in_report_and_page(tmp_path):
+    """They appear once, though the imported log is checked again."""
     source = aligned_export(tmp_path / "EXPORT", app_exports.sensor_kinetics(riding().every(4)))
     result = command.works("report", source, "--json", "--live")
     assert [remark["code"] for remark in json.loads(result.out)["remarks"]].count("import-sign") == 1

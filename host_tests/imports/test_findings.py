@@ -1,4 +1,4 @@
-"""What the columns of an unknown table are: found from its values, whatever its names, units, separators and times."""
+"""The columns of an unknown table are found from their values, for any names, units, separators and times."""
 
 import functools
 import re
@@ -18,7 +18,7 @@ HEAD = "t,ax,ay,az,gx,gy,gz"
 
 @functools.cache
 def hand(hz=50.0):
-    """A sensor turned about in a hand: (time, force, rates)."""
+    """A sensor turned in a hand: (time, force, rates)."""
     return drawn_tables.motion("hand", hz, np.random.default_rng(5))
 
 
@@ -83,7 +83,7 @@ def test_one_file_per_sensor_is_joined_by_time(tmp_path):
     found_as_it_is(api.import_recording(tmp_path, columns, {"t": "s", "a": "m/s2", "g": "rad/s"}))
 
 
-def test_micros_that_begin_again_are_one_recording(tmp_path):
+def test_micros_that_overflow_are_one_recording(tmp_path):
     t, force, rates = hand()
     micros = (4_290_000_000 + np.rint(1e6 * t).astype(np.int64)) % 2**32
     rows = [",".join(map(str, [at, *row])) for at, row in zip(micros, np.hstack((force, rates)).round(4).tolist())]
@@ -94,14 +94,14 @@ def test_micros_that_begin_again_are_one_recording(tmp_path):
 @pytest.mark.parametrize(
     ("typed", "much"), [("rad/s", "57[.0-9]* times too far"), ("mdeg/s", "1e\\+03 times too little")]
 )
-def test_a_unit_in_which_rates_do_not_turn_gravity(tmp_path, typed, much):
+def test_unit_that_does_not_turn_gravity_is_refused(tmp_path, typed, much):
     (tmp_path / "log.csv").write_text(lines(ROW, head=HEAD))
     columns = {name: name for name in HEAD.split(",")}
     with pytest.raises(InputError, match=f"in this unit the rates turn gravity {much}"):
         api.import_recording(tmp_path / "log.csv", columns, {"a": "g", "g": typed})
 
 
-def test_a_bias_that_would_turn_gravity_round_is_refused(tmp_path):
+def test_bias_that_would_turn_gravity_around_is_refused(tmp_path):
     rows = [f"{20 * k},0,0,1,-2.5,1,1" for k in range(300)]
     (tmp_path / "log.csv").write_text("\n".join([HEAD, *rows]) + "\n")
     columns = {name: name for name in HEAD.split(",")}
@@ -109,14 +109,14 @@ def test_a_bias_that_would_turn_gravity_round_is_refused(tmp_path):
         api.import_recording(tmp_path / "log.csv", columns, {"a": "g", "g": "rad/s"})
 
 
-def test_counts_are_a_unit_whose_range_is_found(tmp_path):
+def test_range_of_raw_counts_is_found(tmp_path):
     (tmp_path / "log.csv").write_text(lines(COUNT_ROW, 1000.0, 8192.0, 32.8, HEAD))
     columns = {name: name for name in HEAD.split(",")}
     for units in ({"a": "counts", "g": "counts"}, {"a": "counts/8192", "g": "LSB/32.8"}):
         found_as_it_is(api.import_recording(tmp_path / "log.csv", columns, {"t": "ms", **units}))
 
 
-def test_import_says_at_once_what_no_lean_can_be_found_from(tmp_path):
+def test_import_reports_at_once_why_no_lean_is_possible(tmp_path):
     t, force, rates = hand()
     rows = [ROW.format(*row) for row in np.column_stack((t, force, rates))[::5].tolist()]
     (tmp_path / "log.csv").write_text("\n".join([HEAD, *rows]) + "\n")
@@ -128,7 +128,7 @@ def test_import_says_at_once_what_no_lean_can_be_found_from(tmp_path):
 
 
 def judged(seed, path):
-    """How a drawn table is imported: "right", "refused", or what is wrong."""
+    """Result of importing a random table: "right", "refused", or the error."""
     drawn = drawn_tables.draw(seed)
     path.write_text(drawn.text)
     try:
@@ -156,8 +156,8 @@ def judged(seed, path):
 
 
 @pytest.mark.parametrize("count", [30, pytest.param(500, marks=pytest.mark.nightly)])
-def test_of_tables_drawn_at_random_none_is_wrong(tmp_path, count):
-    results = [judged(seed, tmp_path / "log.csv") for seed in range(1, 2 * count, 2)]  # odd ones were not looked at
+def test_no_random_table_is_imported_wrongly(tmp_path, count):
+    results = [judged(seed, tmp_path / "log.csv") for seed in range(1, 2 * count, 2)]  # odd ones were not used before
     assert [result for result in results if result not in ("right", "refused")] == []
     assert results.count("right") >= 0.99 * count
 

@@ -1,8 +1,9 @@
-"""Sensors at rates of their own on one clock: nothing across a gap, nothing where one of them is missing."""
+"""Sensors with different rates on one clock: no values across a gap, or if one of them is missing."""
 
 import numpy as np
 import pytest
 from kickstand_tools import api
+from kickstand_tools.imports.importing import ImportDamaged
 from kickstand_tools.imports.join import join, on_clock
 from kickstand_tools.imports.recording import AppRecording, ReceiverTrack, RecordedSensor
 from support import command
@@ -18,7 +19,7 @@ def sensor(name: str, t_s: np.ndarray, column: np.ndarray | None = None) -> Reco
     return RecordedSensor(name, np.rint(t_s * 1e9).astype(np.int64), np.outer(values, [1.0, 2.0, 3.0]))
 
 
-def test_a_slower_gyro_is_interpolated_and_only_within_its_own_time():
+def test_slower_gyro_is_interpolated_within_its_own_time():
     accel = sensor("accelerometer", np.arange(0.0, 2.0, 0.01))
     log, _ = join(AppRecording("none", accel, sensor("gyro", np.arange(0.333, 1.5, 0.025))), "log")
     at_s = log.start_s + log.t_s
@@ -28,7 +29,7 @@ def test_a_slower_gyro_is_interpolated_and_only_within_its_own_time():
 
 
 def test_a_faster_gyro_is_averaged_over_each_sample():
-    """Vibration between two samples would else become a slow rate."""
+    """Otherwise vibration between two samples would become a slow rate."""
     t_s = np.arange(0.0, 4.0, 0.0025)
     gyro = sensor("gyro", t_s, 10.0 * t_s + 50.0 * np.sin(2 * np.pi * 99.0 * t_s))
     clock = np.arange(100, 390) * 10 * MS
@@ -38,7 +39,7 @@ def test_a_faster_gyro_is_averaged_over_each_sample():
     assert np.std(found - clock * 1e-8) < 0.3 * np.std(point - clock * 1e-8)
 
 
-def test_nothing_is_made_up_in_a_gap_of_either_sensor():
+def test_gap_of_either_sensor_stays_a_gap():
     t_s = np.arange(0.0, 4.0, 0.01)
     accel = sensor("accelerometer", t_s[(t_s < 1.0) | (t_s > 1.5)])
     gyro = sensor("gyro", t_s[(t_s < 2.0) | (t_s > 2.6)])
@@ -47,13 +48,13 @@ def test_nothing_is_made_up_in_a_gap_of_either_sensor():
     assert steps_s[steps_s > 0.02] == pytest.approx([0.52, 0.62], abs=0.02)
 
 
-def test_a_gyro_that_misses_a_sample_or_two_is_no_gap():
+def test_two_missing_gyro_samples_are_no_gap():
     t_s = np.arange(0.0, 2.0, 0.01)
     log, _ = join(AppRecording("none", sensor("a", t_s), sensor("g", t_s[(t_s < 1.0) | (t_s > 1.1)])), "log")
     assert len(log.t_s) == len(t_s)
 
 
-def test_a_fix_stands_in_the_row_nearest_to_it_and_nowhere_else():
+def test_fix_is_only_in_the_nearest_row():
     t_s = np.arange(0.0, 5.0, 0.01)
     fix_s = np.array([-3.0, 0.504, 1.5, 2.507, 9.0])
     track = ReceiverTrack(
@@ -70,8 +71,8 @@ def test_a_fix_stands_in_the_row_nearest_to_it_and_nowhere_else():
     assert log.utc_s[rows] - 1e9 == pytest.approx([0.5, 1.5, 2.51])
 
 
-def test_speeds_and_places_that_mean_none():
-    """A phone writes -1 for a speed that it does not know; 0, 0 is in the sea."""
+def test_markers_of_unknown_speed_and_position_are_dropped():
+    """A phone writes -1 for an unknown speed; 0, 0 is in the sea."""
     t_ns = np.arange(4) * 10**9
     track = ReceiverTrack(
         t_ns, np.array([-1.0, 3.0, -1.0, 4.0]), np.array([0.0, 52.0, 91.0, 52.1]), np.array([0.0, 13.0, 13.0, 13.1])
@@ -80,8 +81,8 @@ def test_speeds_and_places_that_mean_none():
     assert track.lat_deg.tolist() == [52.0, 52.1]
 
 
-def test_a_standstill_is_said_once_a_second():
-    """A logger that repeats its receiver's values in each row says nothing new with them."""
+def test_repeated_values_at_standstill_are_kept_once_per_second():
+    """A logger may repeat its receiver's values in each row."""
     track = ReceiverTrack(np.arange(80) * 50 * MS, np.repeat([0.0, 5.0], 40), np.full(80, 52.0), np.full(80, 13.0))
     assert (track.time_ns // MS).tolist() == [0, 1000, 2000, 3000]
     assert track.speed_mps.tolist() == [0.0, 0.0, 5.0, 5.0]
@@ -96,7 +97,7 @@ def test_rounded_and_repeated_times_are_spread(tmp_path):
     assert len(found.log.t_s) >= len(ride.t_s) - 3
 
 
-def test_samples_that_come_late_are_put_in_order(tmp_path):
+def test_late_samples_are_sorted(tmp_path):
     ride = riding().every(4)
     lines = app_exports.any_table(ride).splitlines()
     lines[101], lines[103] = lines[103], lines[101]
@@ -106,8 +107,8 @@ def test_samples_that_come_late_are_put_in_order(tmp_path):
     assert np.allclose(found.log.accel_g, ride.phone_g, atol=1e-5)
 
 
-def test_a_damaged_row_costs_no_more_than_itself(tmp_path):
-    """A time from nowhere, a reading past any sensor's and a word are counted; a cut last line is left out."""
+def test_damaged_row_costs_only_itself(tmp_path):
+    """An impossible time, an impossible reading and a word are counted; a cut last line is left out."""
     ride = riding().every(4)
     lines = app_exports.racebox(ride).splitlines()
     lines[200] = lines[200].replace("2024-05-17", "2031-05-17")
@@ -117,7 +118,7 @@ def test_a_damaged_row_costs_no_more_than_itself(tmp_path):
     (tmp_path / "r.csv").write_text("\n".join(lines))
     found = api.import_recording(tmp_path / "r.csv")
     assert len(found.log.t_s) == len(ride.t_s) - 4
-    assert [(notice.code, notice.values) for notice in found.notices] == [("import-damaged", (3,))]
+    assert found.notices == [ImportDamaged(3)]
     assert np.max(np.abs(found.log.accel_g)) < 2.0
 
 

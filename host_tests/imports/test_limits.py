@@ -1,4 +1,4 @@
-"""What is too large, never ends or is no time is refused in one line; rows that are left out are counted."""
+"""Input that is too large, endless or not a time is refused in one line. Rows left out are counted."""
 
 import gzip
 import os
@@ -34,7 +34,7 @@ def imported(directory, content, *more, columns=NAMES, units=UNITS):
 
 
 def bomb(path: Path, kind: str) -> None:
-    """A small file that unpacks to more than is read."""
+    """Write a small file that unpacks to more than the limit."""
     part, parts = b"1,2,3\n" * 1_000_000, 48
     if kind == "gz":
         packed = gzip.compress(part, 9)
@@ -48,7 +48,7 @@ def bomb(path: Path, kind: str) -> None:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is limited as on Linux")
 @pytest.mark.parametrize("kind", ["gz", "deflate", "bz2"])
-def test_what_unpacks_to_very_much_is_refused_within_1_gb(tmp_path, kind):
+def test_zip_bomb_is_refused_within_1_gb_of_memory(tmp_path, kind):
     path = tmp_path / ("b.csv.gz" if kind == "gz" else "b.zip")
     bomb(path, kind)
     code = "from kickstand_tools.cli.main import main; main()"
@@ -63,7 +63,7 @@ def test_what_unpacks_to_very_much_is_refused_within_1_gb(tmp_path, kind):
     assert "too large: over 250 MB" in found.stderr or "packed with a password, or in another way" in found.stderr
 
 
-def test_a_zip_whose_size_is_not_what_it_says_and_a_directory_of_very_many_files(tmp_path, monkeypatch):
+def test_zip_with_a_false_size_or_many_files_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(files, "MOST_FILES", 20)
     with zipfile.ZipFile(tmp_path / "many.zip", "w") as archive:
         for k in range(400):
@@ -74,7 +74,7 @@ def test_a_zip_whose_size_is_not_what_it_says_and_a_directory_of_very_many_files
     command.refused(tmp_path, "import", tmp_path, "--out", tmp_path / "x.csv", words="over 20 files")
 
 
-def test_a_line_without_end_and_a_table_of_very_many_cells(tmp_path, monkeypatch):
+def test_endless_line_and_huge_table_are_refused(tmp_path, monkeypatch):
     names = ",".join(f"c{k}" for k in range(300_000))
     (tmp_path / "wide.csv").write_text(f"{names}\n{names}\n")
     out = ("--out", tmp_path / "x.csv")
@@ -83,7 +83,7 @@ def test_a_line_without_end_and_a_table_of_very_many_cells(tmp_path, monkeypatch
     command.refused(tmp_path, *imported(tmp_path, table(range(0, 90_000, 10))), words="the table is too large")
 
 
-def test_a_log_without_line_ends_or_of_very_many_samples_is_refused(tmp_path, monkeypatch):
+def test_log_without_line_ends_or_too_long_is_refused(tmp_path, monkeypatch):
     log = tmp_path / "log.csv"
     log.write_bytes(command.HEADER.encode() + b"\n" + b"1," * 9 * MB)
     with pytest.raises(InputError, match="16 MB without the end of a line"):
@@ -93,7 +93,7 @@ def test_a_log_without_line_ends_or_of_very_many_samples_is_refused(tmp_path, mo
         reader.read_log(command.still(log, (0, 1, 0)))
 
 
-def test_a_calibration_or_a_track_that_is_none_by_its_size(tmp_path, monkeypatch):
+def test_oversized_calibration_or_track_is_refused(tmp_path, monkeypatch):
     (tmp_path / "CAL.json").write_bytes(b"[" + b"1," * MB + b"1]")
     log = command.still(tmp_path / "log.csv", (0, 1, 0))
     words = "too large for a calibration"
@@ -126,7 +126,7 @@ def test_a_pipe_is_not_waited_for(tmp_path, name):
     assert "unexpected" not in found.err
 
 
-def test_a_folder_does_not_lead_out_of_itself(tmp_path):
+def test_links_out_of_a_folder_are_not_followed(tmp_path):
     (tmp_path / "secret.csv").write_text("the secret\n")
     inside = tmp_path / "export"
     inside.mkdir()
@@ -136,23 +136,23 @@ def test_a_folder_does_not_lead_out_of_itself(tmp_path):
 
 
 @pytest.mark.parametrize("times", [[*range(0, 500, 10)] * 40, [*range(0, 500, 10)] * 2])
-def test_times_that_run_back_again_and_again_are_refused(tmp_path, times):
+def test_times_that_often_run_back_are_refused(tmp_path, times):
     command.refused(tmp_path, *imported(tmp_path, table(times)), words="goes back")
 
 
-def test_a_column_that_is_no_time_is_refused_by_its_rate(tmp_path):
+def test_column_with_an_impossible_rate_is_not_a_time(tmp_path):
     words = "no sensor has over 10000"
     command.refused(tmp_path, *imported(tmp_path, table(range(3000)), units="t=us,a=m/s2,g=rad/s"), words=words)
 
 
-def test_rows_with_times_that_are_none_or_with_too_many_cells_are_counted(tmp_path):
+def test_rows_with_bad_times_or_extra_cells_are_counted(tmp_path):
     times = [10 * k if k % 2 else ("nan", "inf", "1e300", "-inf")[k // 2 % 4] for k in range(2000)]
     result = command.works(*imported(tmp_path, table(times).replace("\n10,", "\n10,1,2,3,4,5,6,7,8,", 1)))
     assert "damaged rows that are left out: 1001" in result.err
 
 
 @pytest.mark.parametrize("time", ["2026-05-17T09:30:00+99:99", "2026-05-17T09:30:00-24:00", "0000-00-00", "9999-12-31"])
-def test_a_gpx_time_from_nowhere_is_one_line(tmp_path, time):
+def test_impossible_gpx_time_is_refused_in_one_line(tmp_path, time):
     point = f'<trkpt lat="48.1" lon="11.0"><time>{time}</time></trkpt>'
     (tmp_path / "t.gpx").write_text(f'<gpx version="1.1" creator="x"><trk><trkseg>{point * 40}</trkseg></trk></gpx>')
     with pytest.raises(InputError, match=r"^[^\n]*$"):

@@ -1,4 +1,4 @@
-"""What cannot be imported is refused in one line that says what to do, and nothing is written."""
+"""Unusable input is refused in one line that says what to do, and nothing is written."""
 
 import zipfile
 
@@ -21,7 +21,7 @@ def refused(directory, source, words, *more):
     return command.refused(directory, "import", source, "--out", directory / "RIDE.csv", *more, words=words)
 
 
-def test_an_empty_folder_and_one_of_pictures(tmp_path):
+def test_folder_without_tables_is_refused(tmp_path):
     (tmp_path / "in").mkdir()
     refused(
         tmp_path, tmp_path / "in", "holds no recording: give the file, the folder or the zip that an app has exported"
@@ -35,13 +35,13 @@ DAMAGED += [lambda content: content[:2000] + bytes(50) + content[2050:]]
 
 
 @pytest.mark.parametrize("damage", DAMAGED)
-def test_a_cut_or_damaged_zip(tmp_path, ride, damage):
+def test_damaged_zip_is_refused(tmp_path, ride, damage):
     source = app_exports.into(tmp_path / "p.zip", app_exports.phyphox(ride))
     source.write_bytes(damage(source.read_bytes()))
     refused(tmp_path, source, "p.zip is damaged or cut short: copy it again")
 
 
-def test_two_recordings_in_one_folder(tmp_path, ride):
+def test_two_recordings_in_one_folder_are_refused(tmp_path, ride):
     """Of one app in two folders, of two apps, and of one app under two names."""
     monday = app_exports.into(tmp_path / "all" / "monday", app_exports.phyphox(ride))
     app_exports.into(tmp_path / "all" / "tuesday", app_exports.phyphox(ride))
@@ -54,7 +54,7 @@ def test_two_recordings_in_one_folder(tmp_path, ride):
     refused(tmp_path, app_exports.into(tmp_path / "k", files), "holds 2 recordings")
 
 
-def test_two_zips_in_a_folder_and_one(tmp_path, ride):
+def test_two_zips_in_a_folder_are_refused_and_one_is_read(tmp_path, ride):
     (tmp_path / "in").mkdir()
     app_exports.into(tmp_path / "in" / "a.zip", app_exports.phyphox(ride))
     assert api.import_recording(tmp_path / "in").app == "phyphox"
@@ -70,7 +70,7 @@ def test_other_files_in_the_folder_do_not_matter(tmp_path, ride):
     assert api.import_recording(folder).app == "phyphox"
 
 
-# what a recording lacks: its writer, the files or the word (and that in its place) that are taken out, what is said
+# missing part of a recording: its writer, the files or the word to remove (and its replacement), the message
 LACKING = {
     "phyphox": (app_exports.phyphox, ["Gyroscope.csv"], "no gyroscope: add it to the experiment"),
     "Sensor Logger, gyro": (app_exports.sensor_logger, ["Gyroscope.csv"], "no Gyroscope.csv: switch the gyroscope on"),
@@ -93,13 +93,13 @@ LACKING = {
 }
 
 
-def test_of_each_app_it_is_tried_what_lacks():
+def test_each_app_has_a_test_of_missing_parts():
     untried = [name for name in NAMES if not any(key.startswith(name) for key in LACKING)]
     assert untried == ["Kickstand"], f"add to LACKING above what each but Kickstand says of a missing sensor: {untried}"
 
 
 @pytest.mark.parametrize("name", LACKING)
-def test_what_a_recording_lacks_is_reported(tmp_path, ride, name):
+def test_missing_part_of_a_recording_is_reported(tmp_path, ride, name):
     write, taken, words = LACKING[name]
     written = write(ride)
     if isinstance(written, str):
@@ -110,7 +110,7 @@ def test_what_a_recording_lacks_is_reported(tmp_path, ride, name):
     refused(tmp_path, app_exports.into(tmp_path / "in.zip", files), words)
 
 
-def test_sensors_that_were_not_recorded_together(tmp_path, ride):
+def test_sensors_without_common_time_are_refused(tmp_path, ride):
     files = app_exports.sensor_kinetics(ride)
     later = app_exports.sensor_kinetics(ride)["Ride_gyrm.csv"].splitlines()
     rows = [f"{float(row.split(',')[0]) + 600:.4f},{row.partition(',')[2]}" for row in later[1:]]
@@ -118,7 +118,7 @@ def test_sensors_that_were_not_recorded_together(tmp_path, ride):
     refused(tmp_path, app_exports.into(tmp_path / "k", files), "have no time in common: were they recorded together?")
 
 
-def test_a_replays_output_and_kickstands_own_vbo(tmp_path, ride):
+def test_replay_output_and_own_vbo_are_refused(tmp_path, ride):
     log = api.Log(ride.t_s, ride.force_g, ride.rates_dps)
     calibration = api.CalibrationFile(aligned=True)
     api.export(api.open_ride(log, calibration), "vbo", tmp_path / "r.vbo")
@@ -130,13 +130,13 @@ def test_a_replays_output_and_kickstands_own_vbo(tmp_path, ride):
     refused(tmp_path, tmp_path / "LEAN.csv", "holds a lean, no readings: give the log")
 
 
-def test_units_that_are_known_are_not_asked_for(tmp_path, ride):
+def test_known_units_are_not_asked_for(tmp_path, ride):
     source = app_exports.into(tmp_path / "p.zip", app_exports.phyphox(ride))
     refused(tmp_path, source, "is phyphox's, whose units are known: leave --units out", "--units", "a=g")
     refused(tmp_path, source, "holds 6 files: give --columns with one, such as", "--columns", "t=a")
 
 
-def test_a_speed_whose_unit_nothing_shows_is_left_out_or_given(tmp_path, ride):
+def test_speed_of_unknown_unit_is_left_out_unless_given(tmp_path, ride):
     ride.lat_deg = ride.lon_deg = np.zeros(len(ride.t_s))
     (tmp_path / "r.csv").write_text(app_exports.racebox(ride))
     out = tmp_path / "RIDE.csv"
@@ -149,7 +149,7 @@ def test_a_speed_whose_unit_nothing_shows_is_left_out_or_given(tmp_path, ride):
     command.refused(tmp_path, "import", tmp_path / "r.csv", "--out", out, "--units", "speed=furlongs", words="km/h")
 
 
-def test_an_input_is_never_written_over(tmp_path, ride):
+def test_input_is_never_overwritten(tmp_path, ride):
     folder = app_exports.into(tmp_path / "in", app_exports.phyphox(ride))
     out = ["--out", folder / "Gyroscope.csv"]
     command.refused(tmp_path, "import", folder, *out, words="is also an input: give --out another name")
@@ -157,7 +157,7 @@ def test_an_input_is_never_written_over(tmp_path, ride):
     command.refused(tmp_path, "import", folder, *out, words="make it first")
 
 
-def test_a_zip_with_a_password(tmp_path):
+def test_zip_with_a_password_is_refused(tmp_path):
     with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
         archive.writestr("a.csv", "time,x\n0,1\n")
     content = bytearray((tmp_path / "a.zip").read_bytes())
@@ -179,7 +179,7 @@ def test_a_zip_with_a_password(tmp_path):
         ("old.xls", b"\xd0\xcf\x11\xe0" + bytes(600), "a table of Excel: export it as CSV"),
     ],
 )
-def test_what_is_no_recording_at_all(tmp_path, name, content, words):
+def test_file_that_is_not_a_recording_is_refused(tmp_path, name, content, words):
     if content is not None:
         (tmp_path / name).write_bytes(content)
     refused(tmp_path, tmp_path / name, words)

@@ -1,4 +1,4 @@
-"""At rest the axis that points up reads +1 g, whatever the app writes; and gravity is never missing."""
+"""At rest the axis that points up reads +1 g for every app, and gravity is never missing."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def test_without_the_platform_sensor_logger_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("app", ["phyphox", "sensor_logger", "sensor_kinetics", "sensorlog"])
-def test_acceleration_without_gravity_is_put_together_or_refused(tmp_path, app):
+def test_acceleration_without_gravity_is_completed_or_refused(tmp_path, app):
     ride = riding().every(4)
     if app == "sensorlog":
         whole = app_exports.sensorlog(ride, accelerometer=False)
@@ -62,7 +62,7 @@ def test_acceleration_without_gravity_is_put_together_or_refused(tmp_path, app):
 
 
 def test_a_table_without_gravity_is_refused(tmp_path):
-    """By its size, where no name says it."""
+    """It is detected by its size, without a name."""
     ride = riding().every(4)
     rows = np.column_stack((ride.t_s, ride.phone_g - ride.gravity_g, ride.phone_rad)).tolist()
     (tmp_path / "log.csv").write_text(app_exports.lines(list("tabcpqr"), rows))
@@ -71,14 +71,14 @@ def test_a_table_without_gravity_is_refused(tmp_path):
         api.import_recording(tmp_path / "log.csv", columns, {"a": "g", "g": "rad/s"})
 
 
-def test_a_unit_that_is_wrong_is_noticed(tmp_path):
+def test_wrong_unit_is_noticed(tmp_path):
     (tmp_path / "log.csv").write_text(app_exports.any_table(riding().every(4)))
     with pytest.raises(api.InputError, match=r"usually 1\d\.\d\d g, where gravity makes it 1: they look like m/s2"):
         api.import_recording(tmp_path / "log.csv", app_exports.ANY_NAMES, {"a": "g", "g": "rad/s", "speed": "km/h"})
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_the_turns_of_the_track_show_the_sign_where_no_maker_does(tmp_path, sign):
+def test_turns_of_the_track_show_an_unknown_sign(tmp_path, sign):
     (tmp_path / "r.csv").write_text(app_exports.racechrono(riding().every(2), sign))
     found = api.import_recording(tmp_path / "r.csv")
     assert up_at_rest(found) == pytest.approx(UP, abs=0.02)
@@ -86,8 +86,8 @@ def test_the_turns_of_the_track_show_the_sign_where_no_maker_does(tmp_path, sign
     assert not found.notices
 
 
-def test_a_mirrored_export_of_a_known_app_is_remarked_on(tmp_path):
-    """Its sign is known, so that something else is wrong: nothing is turned."""
+def test_mirrored_export_of_a_known_app_gives_a_remark(tmp_path):
+    """Its sign is known, so something else is wrong: no sign is changed."""
     ride = riding().every(2)
     ride.force_g = -ride.force_g
     found = api.import_recording(app_exports.into(tmp_path / "p.zip", app_exports.phyphox(ride)))
@@ -96,7 +96,7 @@ def test_a_mirrored_export_of_a_known_app_is_remarked_on(tmp_path):
     assert up_at_rest(found) == pytest.approx(-UP, abs=0.02)
 
 
-def test_without_a_track_an_uncertain_sign_is_reported_and_can_be_turned(tmp_path):
+def test_uncertain_sign_is_reported_and_can_be_turned(tmp_path):
     ride = riding().every(2)
     ride.force_g = -ride.force_g  # as an iPhone might
     folder = app_exports.into(tmp_path / "k", app_exports.sensor_kinetics(ride))
@@ -109,7 +109,7 @@ def test_without_a_track_an_uncertain_sign_is_reported_and_can_be_turned(tmp_pat
 
 
 def test_no_turns_show_no_sign(tmp_path):
-    """Straight on: the same warning as without a track."""
+    """A straight ride gives the same warning as no track."""
     ride = riding().every(2)
     ride.lat_deg, ride.lon_deg = 52.5 + 1e-5 * ride.t_s, np.full(len(ride.t_s), 13.4)
     (tmp_path / "r.csv").write_text(app_exports.racechrono(ride))
@@ -118,7 +118,7 @@ def test_no_turns_show_no_sign(tmp_path):
 
 @pytest.mark.parametrize("late_s", [0.0, 1.0, 1.5, 2.0])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_swerves_that_come_late_are_not_taken_for_the_opposite_ones(sign, late_s):
+def test_late_swerves_are_not_mistaken_for_opposite_ones(sign, late_s):
     """Four seconds from left to right and back: 2 s late, the track turns the other way."""
     t_s = np.arange(0.0, 60.0, 0.02)
     yaw_dps = 20.0 * np.sin(2 * np.pi * t_s / 4.0 + np.sin(t_s / 7.0))

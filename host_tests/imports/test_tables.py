@@ -1,4 +1,4 @@
-"""Tables of anybody: separators, decimal marks, letters, units, times; what is said of a file that nobody knows."""
+"""Tables from any source: separators, decimal marks, letters, units, times; messages about unknown files."""
 
 import shlex
 
@@ -28,7 +28,7 @@ DRESSES = {
 
 
 @pytest.mark.parametrize("name", DRESSES)
-def test_the_same_table_in_another_dress_is_the_same_ride(tmp_path, name):
+def test_table_in_another_format_is_the_same_ride(tmp_path, name):
     separator, comma, encoding, end = DRESSES[name]
     ride = riding().every(4)
     text = app_exports.any_table(ride, separator, comma).replace("\n", end)
@@ -62,7 +62,7 @@ def test_units_in_brackets_need_no_others(tmp_path):
     assert [taken.unit for taken in found.taken] == ["ms", "m/s^2, m/s², m/s2", "°/s, dps, deg/s", "km/h"]
 
 
-def test_a_minus_turns_all_axes_or_one(tmp_path):
+def test_minus_reverses_all_axes_or_one(tmp_path):
     ride = riding().every(4)
     (tmp_path / "log.csv").write_text(app_exports.any_table(ride))
     found = api.import_recording(tmp_path / "log.csv", NAMES, UNITS | {"a": "-m/s2", "gz": "-rad/s"})
@@ -121,20 +121,20 @@ def test_times_of_any_kind_without_a_unit(name):
         assert found[0] == pytest.approx(START_NS, abs=600)
 
 
-def test_slow_recorders_in_ms_are_not_taken_for_seconds():
+def test_slow_times_in_ms_are_not_read_as_seconds():
     """Ten and twenty-five samples a second, and as fast as 400."""
     for step, unit in ((100, 1e6), (40, 1e6), (2.5, 1e6), (0.1, 1e9), (0.0025, 1e9), (100_000, 1e3), (2500, 1e3)):
         found = units.times_ns(np.array([step * k for k in range(20)]))
         assert np.allclose(np.diff(found), step * unit), (step, unit)
 
 
-def test_a_cell_without_a_time():
+def test_cell_without_a_time_is_marked():
     found = units.times_ns(column(["0.0", "0.01", "", "x", "1e300", "inf", "0.06"]))
     assert (found == units.NO_TIME).tolist() == [False, False, True, True, True, True, False]
 
 
-def test_an_uncertain_table_is_met_with_the_line_to_type(tmp_path, monkeypatch):
-    """And the line, typed as it stands, works."""
+def test_uncertain_table_gives_a_command_line_that_works(tmp_path, monkeypatch):
+    """The proposed command line works unchanged."""
     monkeypatch.chdir(tmp_path)
     rest = app_exports.any_table(riding().every(4)).split("\n")[:120]
     (tmp_path / "my log.csv").write_text("\n".join(rest) + "\n")
@@ -158,7 +158,7 @@ def test_an_uncertain_table_is_met_with_the_line_to_type(tmp_path, monkeypatch):
         ("t,a_x (m/s^2),a_y,a_z,g_x (deg/s),g_y,g_z,Speed (mph)", "t=ms,a=m/s2,g=deg/s,speed=mph"),
     ],
 )
-def test_units_that_stand_in_the_names_are_found(names, units):
+def test_units_in_the_names_are_found(names, units):
     gravity = 9.81 if "m/s" in names.split("speed")[0] and "a_x" in names else 1.0
     rows = "".join(f"{20 * k},0,{gravity},0,0.1,0,0,3\n" for k in range(40))
     sheet = layout.sheet_in(RecordingFile("log.csv", b"", names + "\n" + rows))
@@ -166,7 +166,7 @@ def test_units_that_stand_in_the_names_are_found(names, units):
     assert ",".join(f"{key}={unit}" for key, unit in findings.find(sheet).units.items()) == units
 
 
-def test_what_a_table_lacks_is_said(tmp_path):
+def test_missing_columns_of_a_table_are_reported(tmp_path):
     rows = "".join(f"{0.02 * k:.2f},0,1,0,3\n" for k in range(40))
     (tmp_path / "log.csv").write_text("time,ax,ay,az,speed\n" + rows)
     given = "import", tmp_path / "log.csv", "--out", tmp_path / "R.csv"
@@ -202,7 +202,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("name", MISTAKES)
-def test_a_mistake_in_the_options(tmp_path, name):
+def test_mistake_in_the_options_is_refused(tmp_path, name):
     columns, given, words = MISTAKES[name]
     (tmp_path / "log.csv").write_text(app_exports.any_table(riding().every(8)))
     out = tmp_path / "R.csv"
@@ -217,7 +217,7 @@ def test_columns_are_whole_numbers_floats_or_text():
     assert floats.tolist() == ["0.5", " 1.5 ", "", "x"]
     assert np.allclose(csv_reader.numbers_of(floats), [0.5, 1.5, np.nan, np.nan], equal_nan=True)
     assert words.tolist() == ["start", "", 'a, "b"', "1_0"]
-    assert np.all(np.isnan(csv_reader.numbers_of(words)))  # 1_0 is no number
+    assert np.all(np.isnan(csv_reader.numbers_of(words)))  # 1_0 is not a number
     assert left_out == 0
     assert few.dtype.kind == "f" and np.isnan(few[1]) and csv_reader.filled(few).tolist() == [True, False, True, True]
 

@@ -1,4 +1,4 @@
-"""kickstand join: GPX and FIT are read, the ride is written line for line, what is wrong is refused in one line."""
+"""kickstand join: GPX and FIT are read, the lines of the ride are kept, wrong input is refused in one line."""
 
 import gzip
 
@@ -36,7 +36,7 @@ def placed(path) -> np.ndarray:
     return table[np.isfinite(table["lat_deg"])]
 
 
-def test_each_point_is_in_the_row_nearest_to_it(tmp_path, log, ride, track):
+def test_each_point_is_in_the_nearest_row(tmp_path, log, ride, track):
     out = tmp_path / "JOINED.csv"
     gpx = phone_tracks.write_gpx(tmp_path / "track.gpx", track, "garmin")
     said = command.works("join", log, gpx, "--out", out).out
@@ -58,16 +58,16 @@ def test_each_point_is_in_the_row_nearest_to_it(tmp_path, log, ride, track):
     assert np.allclose(there["speed_mps"], track.speed_mps[part], atol=1e-3)
 
 
-def test_the_nearest_row_is_the_one_before_or_the_one_after():
+def test_nearest_row_may_be_before_or_after():
     time_us, at_us = np.arange(0, 50_000, 5000), np.array([-1, 0, 2400, 2600, 12_400, 44_000, 45_000, 45_001])
     rows, points = joined._nearest(time_us, at_us)
-    assert rows.tolist() == [0, 1, 2, 9]  # of two points in a row the later one
+    assert rows.tolist() == [0, 1, 2, 9]  # the later of two points in a row
     assert points.tolist() == [2, 3, 4, 6]
     gap_us = np.array([0, 1_000_000, 1_005_000])
     assert joined._nearest(gap_us, np.array([100_000, 500_000, 900_000]))[1].tolist() == [0, 2]
 
 
-def test_the_ride_stays_as_it_is(tmp_path, log, track):
+def test_lines_of_the_ride_are_unchanged(tmp_path, log, track):
     """Line for line, with columns at the end."""
     gpx = phone_tracks.write_gpx(tmp_path / "track.gpx", track)
     packed = tmp_path / "JOINED.csv.gz"
@@ -80,7 +80,7 @@ def test_the_ride_stays_as_it_is(tmp_path, log, track):
     assert empty == np.count_nonzero(np.isnan(api.read_log(packed).lat_deg)) > 30_000
 
 
-def test_the_logs_own_speed_stays(tmp_path, ride, track):
+def test_own_speed_of_the_log_is_kept(tmp_path, ride, track):
     made = api.Log.from_readings(ride.readings, ride.rate_hz)
     made.speed_mps[::200] = np.round(ride.truth["speed_mps"][::200], 3)
     api.write_log(tmp_path / "RIDE.csv", made)
@@ -93,7 +93,7 @@ def test_the_logs_own_speed_stays(tmp_path, ride, track):
 
 
 def test_columns_without_values_are_replaced(tmp_path, log, track):
-    """As import writes them: a time in the first row, and a speed that the phone did not have."""
+    """As written by import: a time in the first row, and a speed column of a phone without speed."""
     head, *rows = log.read_text().splitlines()
     rows = [f"{rows[0]},,1.5", *[row + ",," for row in rows[1:]]]
     log.write_text("\n".join([head + ",speed_mps,utc_s", *rows]) + "\n")
@@ -118,10 +118,10 @@ def test_tracks_are_read_with_their_speed(tmp_path, track, kind):
         assert np.all(np.isnan(read.speed_mps))
         known = np.isfinite(read.speeds_mps())
         assert np.median(np.abs(read.speeds_mps() - track.speed_mps)[known]) < 1.0
-        assert 0.5 < np.mean(known) < 0.95  # not where it stands
+        assert 0.5 < np.mean(known) < 0.95  # not at standstill
 
 
-def test_what_is_no_track_of_this_ride_is_refused(tmp_path, log, track):
+def test_track_of_another_ride_is_refused(tmp_path, log, track):
     short = api.Track(*(values[:20] for values in track.columns().values()), name="short")
     other = phone_tracks.track(api.simulate_ride("hills", seed=2, seconds=200.0))
     for name, words, make in (
@@ -140,7 +140,7 @@ def test_what_is_no_track_of_this_ride_is_refused(tmp_path, log, track):
     command.refused(tmp_path, "join", log, half, "--out", tmp_path / "JOINED.csv", words="damaged")
 
 
-def test_a_ride_with_positions_and_outputs_that_destroy_are_refused(tmp_path, log, track):
+def test_ride_with_positions_or_unsafe_output_is_refused(tmp_path, log, track):
     gpx = phone_tracks.write_gpx(tmp_path / "track.gpx", track)
     command.refused(tmp_path, "join", log, gpx, "--out", log, words="is also an input")
     command.refused(tmp_path, "join", log, gpx, "--out", gpx, words="is also an input")

@@ -15,7 +15,7 @@ LATER_S, SLOW = 7.3, 80e-6
 
 
 def shifted(log, later_s, drift):
-    """As recorded by a device that was started so much later and whose clock loses."""
+    """The log as recorded by a device that was started later by later_s and whose clock loses."""
     kept = log.t_s >= later_s
     t_s = (log.t_s[kept] - later_s) * (1.0 - drift)
     return api.Log(t_s, log.accel_g[kept], log.gyro_dps[kept])
@@ -49,7 +49,7 @@ def test_the_clocks_are_found(found, ride):
 
 
 def test_the_difference_is_that_of_both_errors(found, ride):
-    """Against the truth: each one's error, and their difference."""
+    """Compared with the truth: the error of each, and their difference."""
     for kind, seen in (("live", found.live), ("smoothed", found.smoothed)):
         leans = [found.leans[f"{kind} {name}"] for name in "AB"]
         riding = ~np.isnan(leans[0] + leans[1])
@@ -63,7 +63,7 @@ def test_the_difference_is_that_of_both_errors(found, ride):
     assert found.smoothed.moving_deg < found.live.moving_deg
 
 
-def test_constant_part_slope_and_delay_are_parted():
+def test_constant_slope_and_delay_are_separated():
     """B leans 1.5 degrees more to the left, 3 % more, and 0.1 s later."""
     t_s = np.arange(0.0, 60.0, agreement.STEP_S)
     sigma = np.ones(len(t_s))
@@ -78,7 +78,7 @@ def test_constant_part_slope_and_delay_are_parted():
     assert agreement._difference((one[:500], sigma[:500]), (one[:500], sigma[:500])) is None
 
 
-def test_a_lean_that_is_late_is_said_to_be(ride):
+def test_late_lean_is_reported(ride):
     log, (first, _) = ride.logs[0], ride.calibrations
     late = api.CalibrationFile(
         vehicle_from_sensor=first.vehicle_from_sensor, aligned=True, six_done=True, gyro_delay_s=-0.04
@@ -97,19 +97,18 @@ def test_words_json_and_a_picture(files, found, monkeypatch):
     assert 0.0 < data["smoothed"]["moving_deg"] < 2.0
 
 
-def test_a_name_is_no_formula(found, tmp_path):
-    """Between two $ matplotlib sees one."""
+def test_dollar_signs_in_a_name_are_no_formula(found, tmp_path):
+    """matplotlib reads text between two $ as a formula."""
     agreement.draw(tmp_path / "C.png", replace(found, names=("A$_$.csv", "B$x$.csv")))
     assert (tmp_path / "C.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_remark_is_said_once(ride):
+def test_remark_appears_once(ride):
     log, calibration = ride.logs[0], ride.calibrations[0]
     stuck = np.where(np.abs(log.t_s - 80.0) < 3.0, np.argmax(log.t_s > 80.0), np.arange(len(log.t_s)))
     frozen = api.Log(log.t_s, log.accel_g[stuck], log.gyro_dps[stuck])
     for said in api.compare_rides(frozen, frozen, calibration, calibration).notices.values():
-        known = [(notice.code, notice.values) for notice in said]
-        assert known and len(known) == len(set(known))
+        assert said and len(said) == len(set(said))
 
 
 def test_another_ride_is_refused_in_one_line(files, ride):
@@ -119,7 +118,7 @@ def test_another_ride_is_refused_in_one_line(files, ride):
     command.refused(files, "compare", files / "A.csv", files / "O.csv", words="nowhere do they turn alike")
 
 
-def test_a_calibration_is_needed_and_has_to_be_this_mounts(files, ride, tmp_path):
+def test_calibration_of_this_mount_is_required(files, ride, tmp_path):
     api.write_log(tmp_path / "B.csv", ride.logs[1])
     command.refused(tmp_path, "compare", files / "A.csv", tmp_path / "B.csv", words="no calibration")
     command.refused(

@@ -1,4 +1,4 @@
-"""Where a track belongs in a ride: found within 0.2 s in every profile; a track that does not belong is refused."""
+"""The place of a track in a ride is found within 0.2 s in every profile. Another track is refused."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from kickstand_tools.signals import EARTH_M
 from support.recordings import phone_tracks
 
 PROFILES = ("street", "track", "sweeper", "city", "hills")
-SECONDS = {"sweeper": 450.0, "city": 300.0, "street": 300.0}  # of a ride that has few bends for its length
+SECONDS = {"sweeper": 450.0, "city": 300.0, "street": 300.0}  # for rides with few bends per length
 
 
 @pytest.fixture(scope="module")
@@ -19,14 +19,14 @@ def rides():
 
 
 def log_of(ride, part: slice = slice(None), slow_ppm: float = 0.0) -> api.Log:
-    """What a board with a clock that is slow by slow_ppm recorded."""
+    """The log of a board whose clock is slow by slow_ppm."""
     readings = ride.readings[part]
     t_s = np.arange(len(readings)) / ride.rate_hz * (1.0 - slow_ppm * 1e-6)
     return api.Log(t_s, readings[:, :3], readings[:, 4:], name="ride")
 
 
 def error_s(joined, late_s: float, at_s: float = 0.0) -> float:
-    """By how much the bike was elsewhere by the track than by the match, at a time of the ride."""
+    """Time error of the match at a time of the ride."""
     return float(joined.match.ride_s(np.array([phone_tracks.START_UTC_S + late_s + at_s]))[0]) - at_s
 
 
@@ -42,8 +42,8 @@ def test_a_phones_track_is_found_within_a_fifth_of_a_second(rides, profile):
     assert joined.match.common_s == pytest.approx(rides[profile].time[-1], abs=1.0)
 
 
-def test_any_offset_and_half_of_the_ride(rides):
-    """The phone was switched on late, or off early; the track goes on for hours before."""
+def test_track_over_half_of_the_ride_is_found_at_any_offset(rides):
+    """The phone was switched on late, or off early; the track begins hours earlier."""
     ride = rides["hills"]
     track = phone_tracks.track(ride, before_s=8 * 3600.0)
     assert abs(error_s(api.join_track(log_of(ride), track), 0.5)) < 0.2
@@ -68,7 +68,7 @@ def winding(seconds: float, slow_ppm: float = 0.0) -> tuple[api.Log, api.Track]:
     return api.Log(t_s * (1.0 - slow_ppm * 1e-6), force, rates), track
 
 
-def test_clocks_that_drift():
+def test_drift_of_the_clocks_is_found():
     """300 ppm are 0.5 s in half an hour: a match without drift would be off by half of it at both ends."""
     log, track = winding(1800.0, slow_ppm=300.0)
     found = api.join_track(log, track).match
@@ -77,7 +77,7 @@ def test_clocks_that_drift():
         assert found.ride_s(np.array([1.7e9 + at_s]))[0] == pytest.approx(at_s * (1.0 - 300e-6), abs=0.12)
 
 
-def test_a_watch_that_writes_a_point_now_and_then(rides):
+def test_track_with_sparse_points_is_found(rides):
     track = phone_tracks.track(rides["street"], error_m=3.0)
     some = np.flatnonzero(np.random.default_rng(1).random(len(track.utc_s)) < 0.6)
     thin = api.Track(*(values[some] for values in track.columns().values()), name="watch")
@@ -101,7 +101,7 @@ def test_the_same_roads_on_another_day_are_refused(rides, profile, differs):
         api.join_track(log_of(ride), phone_tracks.track(ride, pace=pace))
 
 
-def test_a_ride_that_is_too_short_or_does_not_turn_is_refused(rides):
+def test_short_or_straight_ride_is_refused(rides):
     ride = rides["street"]
     track = phone_tracks.track(ride)
     with pytest.raises(api.InputError, match="ride, track: the ride lasts 30 s"):
@@ -115,7 +115,7 @@ def test_a_ride_that_is_too_short_or_does_not_turn_is_refused(rides):
         api.join_track(log_of(ride), still)
 
 
-def test_bends_that_are_alike_are_not_taken_for_one_another():
+def test_similar_bends_are_refused_as_ambiguous():
     """A slalom fits a slalom at every bend."""
     t_s = np.arange(0.0, 120.0, 0.01)
     yaw_dps = 25.0 * np.sin(2.0 * np.pi * t_s / 12.0)
@@ -145,10 +145,10 @@ def test_frozen_readings_and_gaps_are_left_out(rides):
     joined = api.join_track(broken, phone_tracks.track(ride))
     assert [notice.code for notice in joined.notices] == ["frozen-readings"]
     assert abs(error_s(joined, 0.5)) < 0.2
-    assert joined.match.correlation > 0.97  # as if the frozen readings had turned on it would be 0.8
+    assert joined.match.correlation > 0.97  # with the frozen readings it would be 0.8
 
 
-def test_a_leaning_bikes_gyro_shows_how_the_course_turns():
+def test_course_turns_are_scaled_by_the_lean():
     """At 45 degrees of lean the rate about the bike's up is 0.7 of the yaw rate."""
     log, track = winding(300.0)
     steps = course(track.once_a_second())

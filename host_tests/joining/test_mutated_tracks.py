@@ -21,7 +21,7 @@ def some_track():
 
 
 def flipped(content, number):
-    """Some bytes or a part of a binary file changed."""
+    """The binary content with some bytes or a part changed."""
     chance = random.Random(number)
     change = (broken_logs.flip_bytes, broken_logs.cut_end, broken_logs.cut_a_piece, broken_logs.put_nul_bytes)[
         number % 4

@@ -91,8 +91,10 @@ def test_bends_to_either_side_and_deep_ones_are_believed():
         windows(judge, 3.0, lean=radians(lean_deg))
         assert not judge.one_sided
     judge = doubted()
-    windows(judge, 10.0, lean=radians(35.0))
+    windows(judge, 8.0, lean=radians(35.0))
     assert not judge.one_sided
+    windows(judge, 4.0, lean=radians(35.0))
+    assert judge.one_sided
     judge = doubted(2)
     windows(judge, 8.0, lean=radians(35.0))
     assert not judge.one_sided

@@ -1,4 +1,4 @@
-"""The largest values that a log may have: a little more is refused with its unit, read quickly or cell by cell."""
+"""The largest values of a log: slightly larger ones are refused with the unit, by both readers."""
 
 import contextlib
 import io
@@ -11,7 +11,8 @@ from kickstand_tools.logs.reader import read_blocks, read_log
 from support import command
 
 HEADER = command.HEADER + ",speed_mps,temp_c,lat_deg,lon_deg,utc_s"
-# The widest ranges of the chips are 16 g and 2000 deg/s, of which more is another unit; their data sheets end at 85 C.
+# The widest ranges of the chips are 16 g and 2000 deg/s: larger values are in another unit. Their data sheets end at 85
+# C.
 LIMITS = {
     "t_s": (1e10, "seconds"),
     "ax_g": (20.0, "g"),
@@ -30,7 +31,7 @@ LIMITS = {
 
 @pytest.mark.parametrize("quoted", [False, True])  # columns at once, or cell by cell
 @pytest.mark.parametrize("name", LIMITS)
-def test_past_any_reading(name, quoted):
+def test_values_out_of_range_are_refused(name, quoted):
     limit, unit = LIMITS[name]
     for sign in (1.0, -1.0) if name != "t_s" else (1.0,):
         for factor, good in (1.0, True), (1.001, False):
@@ -41,7 +42,7 @@ def test_past_any_reading(name, quoted):
                 rows.append(",".join(cells.values()))
             rows[0] = rows[0].replace("0", '"0"', quoted)
             log = io.StringIO("\n".join([HEADER, *rows]) + "\n")
-            if name == "t_s":  # from one second to a far one: milliseconds, which another check refuses
+            if name == "t_s":  # a large step in seconds means milliseconds, which another check refuses
                 words = "milliseconds" if good else "line 6: t_s is '.*', past any reading: its unit is seconds"
                 with pytest.raises(InputError, match=words):
                     read_log(log)
@@ -68,8 +69,8 @@ def test_a_firmware_without_a_temperature_gets_25():
     ("size_g", "step_s", "words"),
     [(9.81, 0.01, "look like m/s2"), (1.0, 10.0, "is t_s in milliseconds"), (4.5, 0.01, ""), (1.0, 2.0, "")],
 )
-def test_units_that_are_easily_mistaken(size_g, step_s, words):
-    """Forces by their usual size, not by an axis."""
+def test_common_wrong_units_are_refused(size_g, step_s, words):
+    """Forces are judged by their usual size, not by single axes."""
     force = np.tile([size_g * 0.6, 0.0, size_g * 0.8], (9, 1))
     force[:4] = [0.0, 1.0, 0.0]
     log = Log(np.arange(9) * step_s, force, np.zeros((9, 3)))

@@ -1,4 +1,4 @@
-"""Logs that cannot be read are refused in one line; those that differ only in their dress are read."""
+"""Unreadable logs are refused in one line. Logs that differ only in format are read."""
 
 import gzip
 
@@ -63,8 +63,8 @@ def test_a_bad_log_is_refused(tmp_path, name):
     assert name.replace("\n", " ") in line
 
 
-def test_calibration_names_the_bad_one_of_its_captures(tmp_path):
-    """Not only when it is the first to be read."""
+def test_calibration_names_its_bad_capture(tmp_path):
+    """Also if it is not the first capture."""
     poses = [command.still(tmp_path / f"pose{k}.csv", axis) for k, axis in enumerate(command.AXES.values())]
     poses[2].write_bytes(BAD["nan.csv"][0])
     out = tmp_path / "CAL.json"
@@ -73,7 +73,7 @@ def test_calibration_names_the_bad_one_of_its_captures(tmp_path):
 
 
 @pytest.mark.parametrize(("name", "words"), [(".", "holds no recording"), ("none.csv", "there is no such file")])
-def test_a_directory_and_a_log_that_is_not_there(tmp_path, name, words):
+def test_directory_or_missing_log_is_refused(tmp_path, name, words):
     cal, out = command.write_cal(tmp_path / "CAL.json"), tmp_path / "LEAN.csv"
     command.refused(tmp_path, "replay", tmp_path / name, "--calibration", cal, "--out", out, words=words)
 
@@ -95,7 +95,7 @@ SAME = {
 
 
 @pytest.mark.parametrize("name", SAME)
-def test_the_same_log_in_another_dress_gives_the_same_result(tmp_path, name):
+def test_log_in_another_format_gives_the_same_result(tmp_path, name):
     cal = command.write_cal(tmp_path / "CAL.json")
     (tmp_path / "plain.csv").write_bytes(PLAIN)
     (tmp_path / name).write_bytes(SAME[name])

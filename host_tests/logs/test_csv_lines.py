@@ -1,4 +1,4 @@
-"""Columns of numbers as text: to the letter what Python's own formatting gives."""
+"""Columns of numbers as text: exactly as Python's own formatting."""
 
 import numpy as np
 import pytest
@@ -25,12 +25,12 @@ def test_numbers_are_written_as_python_writes_them(digits):
 
 @pytest.mark.parametrize("values", [[np.nan, 1.25, -np.nan], [np.nan], [np.nan, np.inf]])
 @pytest.mark.parametrize("nan", ["nan", "", "unknown"])
-def test_what_is_no_number_has_a_text_of_its_own(values, nan):
+def test_nan_and_infinity_have_their_texts(values, nan):
     lines = joined_cells([number_cells(np.array(values), 1, nan)]).decode().split("\n")[:-1]
     assert lines == [nan if np.isnan(value) else f"{value:.1f}" for value in values]
 
 
-def test_lines_are_of_texts_and_numbers():
+def test_lines_contain_texts_and_numbers():
     texts, values = ["0.00", "1700000000.125", "2"], np.array([-1.0, 22.125, 3.375])
     assert joined_cells([text_cells(texts), number_cells(values, 2)]) == b"0.00,-1.00\n1700000000.125,22.12\n2,3.38\n"
     assert joined_cells([text_cells([]), number_cells(values[:0], 2)]) == b""
@@ -59,7 +59,7 @@ def test_numbers_are_read_as_python_reads_them(digits):
     assert np.all(np.isnan(found[:, 1:]))
 
 
-def test_the_last_line_needs_no_end():
+def test_last_line_needs_no_line_end():
     found = numbers_in(b"1.25,,-3\n,2,4", 3)
     assert found is not None
     assert np.array_equal(found, [[1.25, np.nan, -3.0], [np.nan, 2.0, 4.0]], equal_nan=True)
@@ -71,7 +71,7 @@ def test_the_last_line_needs_no_end():
     + ["-,1\n", ".,1\n", "1-2,1\n", "--2,1\n", "1.2.3,1\n", "1e3,1\n", "1+2\n", " 1,1\n", "nan,1\n"]
     + ["1\r,2\n", '"1",2\n', "1.5,2\n\u0661.5,2\n"],
 )
-def test_what_is_no_table_of_plain_numbers_is_left_to_another_reader(text):
+def test_other_tables_are_left_to_another_reader(text):
     assert numbers_in(text.encode(), 2) is None
 
 

@@ -1,13 +1,13 @@
-"""A recorder that lost its power: what is broken at the end of its log is left out; in the middle it is refused."""
+"""A recorder that lost its power: a broken end of its log is left out; a broken middle is refused."""
 
 import gzip
 
 import numpy as np
 import pytest
 from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import sentence
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.refusals import sentence
 from support import command
 from support.recordings import analysis_rides
 
@@ -16,7 +16,7 @@ WHOLE = ("\n".join([command.HEADER, *ROWS]) + "\n").encode()
 LINE = len(ROWS) + 1
 CUT = f"line {LINE}, the last one, was cut: it is left out"
 
-# content, samples that are read, what is said
+# content, number of samples read, message
 ENDS = {
     "fewer cells": (WHOLE[:-12], 399, CUT),
     "fewer cells, but a line": (WHOLE[:-12] + b"\n", 399, CUT),
@@ -49,7 +49,7 @@ def test_a_cut_line_behind_nul_bytes(tmp_path):
 
 
 def test_a_last_speed_may_be_empty(tmp_path):
-    """Its row is whole, however many digits the speed before had, and with no line feed behind it."""
+    """Its row is whole, for any digits of the previous speed, and without a line feed after it."""
     path = tmp_path / "log.csv"
     rows = [row + ("," if k % 2 else ",5.25") for k, row in enumerate(ROWS)]
     path.write_text("\n".join([f"{command.HEADER},speed_mps", *rows]))
@@ -58,7 +58,7 @@ def test_a_last_speed_may_be_empty(tmp_path):
 
 
 @pytest.mark.parametrize("kept", [0.3, 0.6, 0.99])
-def test_a_cut_gzip_file_gives_what_is_in_it(tmp_path, kept):
+def test_cut_gzip_file_is_read_up_to_the_cut(tmp_path, kept):
     path = tmp_path / "log.csv.gz"
     chance = np.random.default_rng(3)
     rows = [f"{k / 100:.2f}," + ",".join(f"{x:.5f}" for x in chance.normal(1.0, 0.1, 6)) for k in range(3000)]
@@ -72,7 +72,7 @@ def test_a_cut_gzip_file_gives_what_is_in_it(tmp_path, kept):
 
 
 @pytest.mark.parametrize("broken", [b"3.00,0,0", b"3.00,0,0,1,0,0,", b"3.00,\0\0\0", b"3.00,0,-,1,0,0,0"])
-def test_in_the_middle_it_is_refused_with_its_line(tmp_path, broken):
+def test_broken_line_in_the_middle_is_refused_by_number(tmp_path, broken):
     lines = WHOLE.split(b"\n")
     lines[301] = broken
     path = tmp_path / "log.csv"
@@ -81,8 +81,8 @@ def test_in_the_middle_it_is_refused_with_its_line(tmp_path, broken):
         read_log(path)
 
 
-def test_every_command_says_it(tmp_path):
-    """report and export read as replay does, see test_frozen.py."""
+def test_every_command_reports_a_cut_end(tmp_path):
+    """report and export read like replay, see test_frozen.py."""
     ride = analysis_rides.short(tmp_path)
     ride.write_bytes(ride.read_bytes()[:-20])
     for arguments in (("replay", ride), ("cut", ride, "--from", "5")):
@@ -92,7 +92,7 @@ def test_every_command_says_it(tmp_path):
 
 
 @pytest.mark.parametrize("block_bytes", [300, 50_000, 1 << 22])
-def test_times_are_spread_alike_however_the_log_is_read(tmp_path, monkeypatch, block_bytes):
+def test_times_are_spread_equally_for_any_block_size(tmp_path, monkeypatch, block_bytes):
     true = np.arange(12_000) / 104
     path = tmp_path / "log.csv"
     rows = [f"{t:.2f},0.{k % 9}1,-0.02,1.01,0.5,-0.5,0.1{k % 7}" for k, t in enumerate(true)]

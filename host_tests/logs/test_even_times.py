@@ -1,4 +1,4 @@
-"""Times that were rounded, or stamped on several samples at once, against the even times that they came from."""
+"""Rounded times, and times shared by several samples, compared with the original even times."""
 
 import doctest
 import sys
@@ -28,20 +28,20 @@ def test_rounded_times_are_even_again(rate_hz, tick_s, how):
     true = 0.123 + np.arange(5000) / rate_hz
     recorded = ROUND[how](true / tick_s) * tick_s
     step_error, time_error = errors(true, recorded)
-    assert step_error < 0.03  # as recorded up to 1 and more: steps of 0 and of twice the right length
+    assert step_error < 0.03  # as recorded over 1: steps of 0 and of twice the right length
     assert time_error < 0.07 * tick_s
     found = even_times(recorded)
     assert np.max(np.abs(found - recorded)) <= 0.6 * tick_s + 1e-9
 
 
-def test_a_time_for_several_samples_at_once():
+def test_samples_with_a_common_time_are_spread():
     true = np.arange(5000) / 104
     step_error, time_error = errors(true, np.repeat(true[9::10], 10))
     assert step_error < 0.01
     assert time_error < 0.001
 
 
-def test_times_that_are_fine_or_even_come_back_as_they_are():
+def test_fine_or_even_times_are_unchanged():
     chance = np.random.default_rng(1)
     for times in (
         np.arange(1000) / 100.0,
@@ -62,7 +62,7 @@ def test_gaps_stay_gaps():
     assert np.max(np.abs(np.delete(steps, 1499) * 104 - 1.0)) < 0.1
 
 
-def test_a_line_that_is_there_twice_moves_no_other_by_more_than_rounding():
+def test_repeated_line_moves_other_times_within_rounding():
     times = np.arange(1000) / 100.0
     twice = np.insert(times, 500, times[500])
     found = even_times(twice)
@@ -75,11 +75,11 @@ def test_a_line_that_is_there_twice_moves_no_other_by_more_than_rounding():
     assert fine[500] < found[501] < fine[501]
 
 
-def test_what_is_no_time_is_refused():
+def test_invalid_time_is_refused():
     """Times that go back or are all the same: test_cli_logs.py."""
     with pytest.raises(InputError, match=r"time stands still at 0\.99 s"):
         even_times([*np.arange(100) / 100.0, *[0.99] * 600, *(1.0 + np.arange(100) / 100.0)])
 
 
-def test_its_example():
+def test_example_in_the_docstring_works():
     assert doctest.testmod(sys.modules[even_times.__module__]).failed == 0

@@ -1,4 +1,4 @@
-"""Readings that froze are a gap, not a standstill; a quiet sensor at rest is no frozen one."""
+"""Frozen readings are a gap, not a standstill. A quiet sensor at rest is not frozen."""
 
 import numpy as np
 import pytest
@@ -6,10 +6,10 @@ from kickstand_tools.analysis import report
 from kickstand_tools.api import Log, open_ride, overview, replay
 from kickstand_tools.calibration import drive
 from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.common.messages import sentence
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.frozen import without_frozen
 from kickstand_tools.logs.reader import read_blocks
-from kickstand_tools.refusals import sentence
 from support import command
 from support.recordings import analysis_rides
 
@@ -26,7 +26,7 @@ def frozen(log: Log) -> np.ndarray:
 
 
 def riding(seconds, seed=0, digits=5):
-    """Vibration and bends, not at rest."""
+    """Readings with vibration and bends."""
     chance = np.random.default_rng(seed)
     n = round(seconds * HZ)
     values = REST + chance.normal(scale=[0.1, 0.1, 0.1, 4.0, 4.0, 4.0], size=(n, 6))
@@ -34,7 +34,7 @@ def riding(seconds, seed=0, digits=5):
 
 
 def resting(seconds, seed=0, noise=1.0, digits=5):
-    """noise: times that of a phone's sensor, 1 mg and 0.03 deg/s."""
+    """noise: factor on that of a phone's sensor, 1 mg and 0.03 deg/s."""
     chance = np.random.default_rng(seed)
     return np.round(REST + noise * chance.normal(scale=[0.001] * 3 + [0.03] * 3, size=(round(seconds * HZ), 6)), digits)
 
@@ -45,17 +45,17 @@ def test_a_freeze_is_marked_to_the_sample(monkeypatch, blocks_of):
     readings = riding(8)
     readings[300:500] = readings[300]
     found = np.flatnonzero(frozen(log_of(readings)))
-    first = 301 if blocks_of == 60_000 else found[0]  # at the end of a block the start may be taken for a reading
+    first = 301 if blocks_of == 60_000 else found[0]  # at the end of a block the start may count as a reading
     assert found.tolist() == list(range(first, 500))
     assert first < 360
     notices = []
     list(read_blocks(log_of(readings), notices=notices))
     (notice,) = notices
     assert sentence(notice).startswith("the readings froze from 3.")
-    assert sentence(notice).endswith("to 5.0 s: they are left out, and the lean begins anew after each")
+    assert sentence(notice).endswith("to 5.0 s: they are left out, and the lean filter restarts after each")
 
 
-def test_at_each_end_and_twice():
+def test_freezes_at_each_end_and_twice_are_marked():
     readings = riding(10)
     readings[:200], readings[400:500], readings[900:] = readings[0], readings[400], readings[900]
     found = np.flatnonzero(frozen(log_of(readings)))
@@ -77,12 +77,12 @@ def test_a_vehicle_at_rest_is_not_frozen(digits, noise):
         assert np.all(same)
 
 
-def test_what_never_changes_is_not_judged():
-    """There is nothing to compare it with. A pose of it is refused where it is used, see test_still_pose."""
+def test_constant_log_is_not_marked_as_frozen():
+    """There is nothing to compare it with. A pose of such readings is refused, see test_still_pose."""
     assert not np.any(frozen(log_of(np.tile(REST, (500, 1)))))
 
 
-def test_a_log_without_what_froze():
+def test_log_without_frozen_readings_has_gaps():
     readings = riding(8)
     whole = log_of(readings)
     assert without_frozen(whole) is whole
@@ -92,7 +92,7 @@ def test_a_log_without_what_froze():
     assert np.max(np.diff(left.t_s)) == pytest.approx(2.0)
 
 
-def test_the_commands_say_it(tmp_path):
+def test_commands_report_frozen_readings(tmp_path):
     ride = analysis_rides.short(tmp_path, speed_hz=1)
     header, *rows = ride.read_text().splitlines()
     for k in range(1300, 1500):  # in the first turn
@@ -113,7 +113,7 @@ def test_the_commands_say_it(tmp_path):
 
 
 @pytest.mark.parametrize("engine", ["cpython", "micropython"])
-def test_every_engine_is_given_the_gap(engine):
+def test_every_engine_gets_frozen_readings_as_a_gap(engine):
     from kickstand_tools.common import unix_port
 
     if engine == "micropython" and not unix_port.available():
@@ -126,7 +126,7 @@ def test_every_engine_is_given_the_gap(engine):
     assert np.array_equal(found.lean_deg[400:], gap.lean_deg[201:])
 
 
-def test_a_freeze_is_no_stop_for_calibrate_drive():
+def test_calibrate_drive_does_not_use_a_freeze_as_a_stop():
     readings = riding(60)
     readings[2000:4000] = readings[2000]
     log = log_of(readings)
@@ -146,7 +146,7 @@ def test_no_real_log_is_frozen_and_a_freeze_in_one_is_found(shared_data):
 
 
 @pytest.mark.parametrize("digits", [5, 1])
-def test_a_phone_that_freezes_in_a_ride_is_not(digits):
+def test_quiet_phone_in_a_ride_is_not_frozen(digits):
     readings = riding(30, 4, digits)
     readings[1000:2000] = readings[1000]
     assert np.count_nonzero(frozen(log_of(readings))) == 999

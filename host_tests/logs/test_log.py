@@ -1,4 +1,4 @@
-"""A log in memory and its blocks: times, orders of columns, and what does not fit."""
+"""A log in memory and its blocks: times, orders of columns, and arrays that do not fit."""
 
 import io
 import time
@@ -61,7 +61,7 @@ def test_the_chips_order_and_the_names_of_the_columns():
         ({"t_s": [0.0, 4e-7]}, "has to increase"),  # the same microsecond
     ],
 )
-def test_what_does_not_fit_is_refused(changed, words):
+def test_arrays_that_do_not_fit_are_refused(changed, words):
     with pytest.raises(InputError, match="the log: .*" + words):
         Log(**({"t_s": [0.0, 1.0], "accel_g": [FORCE] * 2, "gyro_dps": [RATE] * 2} | changed))
 
@@ -85,7 +85,7 @@ def text_of(n: int, header: str = command.HEADER, row: str = "{t:.2f},0.1,0.2,0.
     return "\n".join([header, *[row.format(t=k / 100) for k in range(n)]]) + "\n"
 
 
-def test_the_time_may_stand_in_any_column():
+def test_time_may_be_in_any_column():
     text = text_of(3, "note,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps,t_s", '"a, b",0.1,0.2,0.9,1,2,3, {t:.3f} ')
     (block,) = read_blocks(io.StringIO(text))
     assert block.time_text == ["0.000", "0.010", "0.020"]
@@ -100,7 +100,7 @@ def test_optional_columns_may_be_empty_anywhere():
     assert log.temperature_c == pytest.approx([np.nan, np.nan, 20.5, 21.0], nan_ok=True)
 
 
-def test_how_many_samples_are_needed():
+def test_minimum_number_of_samples_is_required():
     assert len(read_log(log_of(300), 300).t_s) == 300
     with pytest.raises(InputError, match="the log is too short: 299 samples, at least 300 are needed"):
         read_log(log_of(299), 300)
@@ -115,7 +115,7 @@ def test_an_open_file_is_read_once_and_kept():
     assert read_twice("log.csv") == "log.csv"
 
 
-def test_names():
+def test_sources_have_the_expected_names():
     assert log_stem("rides/monday.csv.gz") == "monday"
     for name in ("monday.csv", "monday", "monday.zip", "monday.VBO", "monday.txt.gz", "monday.parquet"):
         assert log_stem(name) == "monday", name
@@ -124,7 +124,7 @@ def test_names():
     assert total_bytes(io.StringIO("abc")) == total_bytes("there is none") == 0
 
 
-def test_a_folder_may_be_the_one_that_one_is_in(tmp_path, monkeypatch):
+def test_stem_of_the_current_folder_is_its_name(tmp_path, monkeypatch):
     (tmp_path / "EXPORT" / "in").mkdir(parents=True)
     monkeypatch.chdir(tmp_path / "EXPORT" / "in")
     assert log_stem(".") == "in" and log_stem("..") == "EXPORT"
@@ -133,8 +133,8 @@ def test_a_folder_may_be_the_one_that_one_is_in(tmp_path, monkeypatch):
     assert calibration_path(Path("RIDE.csv")) == Path("RIDE.cal.json")
 
 
-def test_a_long_line_is_known_as_no_log_at_once(tmp_path):
-    """1 MB without the end of a line: read byte by byte, its time grows with the square of its length."""
+def test_long_line_is_refused_quickly(tmp_path):
+    """1 MB without a line end: read byte by byte, the time would grow with the square of the length."""
     (tmp_path / "long.csv").write_text("[" + "0.12345," * 125_000)
     begin_s = time.process_time()
     assert not is_log(tmp_path / "long.csv")
@@ -142,8 +142,8 @@ def test_a_long_line_is_known_as_no_log_at_once(tmp_path):
 
 
 @pytest.mark.parametrize(("blank", "rows"), [("\n", 2), ("\n" * 2_000_000, 2), ("\n", 0), ("\n" * 2_000_000, 0)])
-def test_blank_lines_below_the_header_are_no_end(tmp_path, blank, rows):
-    """Also over more than a block."""
+def test_blank_lines_below_the_header_are_skipped(tmp_path, blank, rows):
+    """Also if they fill more than a block."""
     header, *given = text_of(2).splitlines(keepends=True)
     (tmp_path / "log.csv").write_text(header + blank + "".join(given[:rows]))
     assert is_log(tmp_path / "log.csv") == (rows > 0)

@@ -1,4 +1,4 @@
-"""A log read block by block is the log read at once, and a mistake far down is found with its line."""
+"""A log read block by block equals the log read at once, and a mistake far down is found with its line."""
 
 import gzip
 import tracemalloc
@@ -44,7 +44,7 @@ def test_blocks_add_up_to_the_log(tmp_path, monkeypatch, name, block_bytes):
 
 
 def test_the_readers_of_numbers_agree(tmp_path):
-    """A number with an exponent, or a text column, leaves a block to the reader of cells: the numbers are the same."""
+    """A block with an exponent or a text column is read by the reader of cells: the numbers are the same."""
     quick = write(tmp_path / "quick.csv", [HEADER, *[row.replace("1e0", "1") for row in rows(800)]])
     plain = write(tmp_path / "plain.csv", [HEADER, *rows(800)])
     noted = write(tmp_path / "noted.csv", [HEADER + ",note", *[row + ',"a, ""b"""' for row in rows(800)]])
@@ -76,7 +76,7 @@ MISTAKES = {
 
 @pytest.mark.parametrize("row", MISTAKES)
 @pytest.mark.parametrize("block_bytes", [1, 700, 1 << 22])  # of 1: a row each
-def test_a_mistake_far_down_is_named(tmp_path, monkeypatch, row, block_bytes):
+def test_mistake_far_down_is_reported_with_its_line(tmp_path, monkeypatch, row, block_bytes):
     monkeypatch.setattr(reader, "BLOCK_BYTES", block_bytes)
     path = tmp_path / "ride.csv"
     path.write_bytes("\n".join([HEADER, *rows(1000), row, *rows(300, 2000)]).encode("latin-1") + b"\n")
@@ -86,7 +86,7 @@ def test_a_mistake_far_down_is_named(tmp_path, monkeypatch, row, block_bytes):
 
 
 def test_memory_does_not_grow_with_the_log(tmp_path, monkeypatch):
-    """But for the cells of its last hour, by which it is judged: here of its last half minute."""
+    """Except for the cells of its last hour (here half a minute), which are used to check it."""
     monkeypatch.setattr(reader, "BLOCK_BYTES", 1 << 16)
     monkeypatch.setattr(cells, "KEPT", 300)
     peaks = []

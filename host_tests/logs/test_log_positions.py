@@ -1,4 +1,4 @@
-"""Positions and Universal Time in a log: read, cut, repaired and written like the other columns."""
+"""Positions and Universal Time in a log are read, cut, repaired and written like the other columns."""
 
 import io
 from collections.abc import Iterable
@@ -43,7 +43,7 @@ def expected(rows: Iterable[int] = PLACED) -> list:
 
 
 @pytest.mark.parametrize("block_bytes", [700, 1 << 22])
-def test_they_are_read_in_any_block_and_cut_like_all_else(monkeypatch, block_bytes):
+def test_positions_are_read_in_any_block_and_cut(monkeypatch, block_bytes):
     monkeypatch.setattr(reader, "BLOCK_BYTES", block_bytes)
     monkeypatch.setattr(reader, "BLOCK_SAMPLES", 55)
     log = read_log(io.StringIO(text()))
@@ -53,14 +53,14 @@ def test_they_are_read_in_any_block_and_cut_like_all_else(monkeypatch, block_byt
     assert placed(read_log(Stretch(io.StringIO(text()), 1.0, 2.0))) == expected(range(103, 200, 20))
 
 
-def test_times_that_are_spread_keep_them_in_their_rows():
+def test_spread_times_keep_positions_in_their_rows():
     """Times in tenths of a second: ten rows share one."""
     log = read_log(io.StringIO(text(t="{:.1f}")))
     assert np.flatnonzero(np.isfinite(log.lat_deg)).tolist() == list(PLACED)
     assert log.lon_deg[23] == pytest.approx(place(23)[1], abs=1e-8)
 
 
-def test_those_of_frozen_readings_go_with_them():
+def test_positions_of_frozen_readings_are_removed():
     whole = read_log(io.StringIO(text()))
     whole.accel_g += np.random.default_rng(1).normal(0.0, 1e-3, whole.accel_g.shape)
     whole.accel_g[100:200] = whole.accel_g[100]
@@ -72,7 +72,7 @@ def test_those_of_frozen_readings_go_with_them():
     assert np.count_nonzero(np.isfinite(block.measured.lat_deg)) == len(placed(kept))
 
 
-def test_a_cut_and_a_written_log_have_them_and_one_without_has_no_columns(tmp_path):
+def test_written_log_has_position_columns_only_if_needed(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(text())
     cut_log(path, tmp_path / "cut.csv.gz", 1.0, 2.0)

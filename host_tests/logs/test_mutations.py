@@ -1,4 +1,4 @@
-"""1,000 logs broken in many ways: each ends in a result or in one line, and a file is whole or not there."""
+"""1,000 logs broken in many ways: each gives a result or one line, and a written file is complete or absent."""
 
 import io
 import json
@@ -40,7 +40,7 @@ def _export(form: str):
     return lambda log, out: export(open_ride(log, CALIBRATION), form, out)
 
 
-# What is done with a log: (log, the file to write). A new command that reads logs belongs in here.
+# Uses of a log: (log, the file to write). Add a new command that reads logs here.
 USES = {
     "replay": lambda log, out: replay_to_csv(log, CALIBRATION, "cpython", out),
     "report and plot": _report,
@@ -73,7 +73,7 @@ def bases(tmp_path_factory) -> list[bytes]:
     return [("\n".join(lines) + "\n").encode(), ("\n".join(plain) + "\n").encode(), pose.read_bytes()]
 
 
-def test_each_ends_in_a_result_or_in_one_line(bases, tmp_path):
+def test_mutated_log_gives_a_result_or_one_line(bases, tmp_path):
     results, lines = 0, set()
     use_of = list(USES)
     for number in range(COUNT):
@@ -102,5 +102,5 @@ def test_each_ends_in_a_result_or_in_one_line(bases, tmp_path):
                     out.unlink()
         assert [path.name for path in tmp_path.iterdir()] == [name], f"number {number}: {ways}"
         log.unlink()
-    assert 0.2 * COUNT < results < 1.8 * COUNT  # both happen, and often
+    assert 0.2 * COUNT < results < 1.8 * COUNT  # both happen often
     assert len(lines) > 20

@@ -1,4 +1,4 @@
-"""A stretch of a log: its samples and times, cut out by `kickstand cut` or taken by --from and --to."""
+"""A stretch of a log: its samples and times, cut out by `kickstand cut` or selected by --from and --to."""
 
 import gzip
 import io
@@ -37,7 +37,7 @@ def log(tmp_path):
     ],
 )
 @pytest.mark.parametrize("block_bytes", [500, 1 << 22])
-def test_which_samples(log, monkeypatch, from_s, to_s, first, last, block_bytes):
+def test_stretch_selects_the_right_samples(log, monkeypatch, from_s, to_s, first, last, block_bytes):
     monkeypatch.setattr(reader, "BLOCK_BYTES", block_bytes)
     for source in log, read_log(log):
         found = read_log(Stretch(source, from_s, to_s))
@@ -49,7 +49,7 @@ def test_which_samples(log, monkeypatch, from_s, to_s, first, last, block_bytes)
     assert blocks[0].time_text[0] == ROWS[first].partition(",")[0]
 
 
-def test_what_is_no_stretch(log):
+def test_invalid_stretch_is_refused(log):
     for from_s, to_s, words in (
         (3.0, 2.0, "the stretch ends before it begins"),
         (2.0, 2.0, "the stretch ends before it begins"),
@@ -68,7 +68,7 @@ def test_an_open_file_can_be_read_twice():
         assert len(read_log(kept).t_s) == 101
 
 
-def test_cut_writes_the_lines_as_they_are(log, tmp_path):
+def test_cut_copies_the_lines_unchanged(log, tmp_path):
     out = tmp_path / "cut.csv"
     said = command.works("cut", log, "--from", "2", "--to", "3", "--out", out)
     assert said.out == f"written: {out}, 101 samples, 1.0 s\n"
@@ -78,14 +78,14 @@ def test_cut_writes_the_lines_as_they_are(log, tmp_path):
     assert gzip.decompress(packed.read_bytes()).decode().splitlines() == [HEADER, *ROWS[:100]]
 
 
-def test_what_cut_refuses(log, tmp_path):
+def test_cut_refuses_unsafe_outputs_and_bad_stretches(log, tmp_path):
     out = tmp_path / "cut.csv"
     command.refused(tmp_path, "cut", log, "--out", out, words="Give --from, --to or both")
     command.refused(tmp_path, "cut", log, "--from", "1", "--out", log, words="is also an input")
     command.refused(tmp_path, "cut", log, "--from", "early", "--out", out, words="'early' is no time: give seconds")
 
 
-def test_replay_and_report_take_a_stretch(tmp_path):
+def test_replay_and_report_accept_a_stretch(tmp_path):
     ride = analysis_rides.short(tmp_path, speed_hz=1)
     out = tmp_path / "LEAN.csv"
     command.works("replay", ride, "--from", "18", "--to", "26", "--out", out)
@@ -98,8 +98,8 @@ def test_replay_and_report_take_a_stretch(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["replay", "smooth", "export"])
-def test_the_lean_of_a_stretch_is_that_of_the_whole_ride_there(tmp_path, name):
-    """What was before shows where upright is, and what comes after too; begun anew it would be off, or not known."""
+def test_lean_of_a_stretch_equals_that_of_the_whole_ride(tmp_path, name):
+    """Earlier and later readings show where upright is. Without them the lean would be off or unknown."""
     ride = analysis_rides.short(tmp_path, rate_hz=50)
     whole, part = tmp_path / "whole.csv", tmp_path / "part.csv"
     form = ("--to", "csv") if name == "export" else ()
@@ -114,7 +114,7 @@ def test_the_lean_of_a_stretch_is_that_of_the_whole_ride_there(tmp_path, name):
     assert part.read_text().splitlines()[1:] == expected
 
 
-def test_a_stretch_is_warned_of_another_mounts_calibration_as_the_ride_is(tmp_path):
+def test_stretch_warns_of_another_mounts_calibration(tmp_path):
     ride = analysis_rides.short(tmp_path, speed_hz=1)
     turned = [[-1, 0, 0], [0, 1, 0], [0, 0, -1]]
     backward = analysis_rides.calibration(tmp_path / "backward.json", vehicle_from_sensor=turned)
@@ -123,8 +123,8 @@ def test_a_stretch_is_warned_of_another_mounts_calibration_as_the_ride_is(tmp_pa
         assert "forward" in said.err, given
 
 
-def test_a_stretch_exported_keeps_its_time_of_day(tmp_path):
-    """A log without a clock ends when it was written; a stretch of it ends earlier by what is left out."""
+def test_exported_stretch_keeps_its_time_of_day(tmp_path):
+    """A log without a clock ends when it was written. A stretch of it ends earlier by the part left out."""
     ride = analysis_rides.short(tmp_path)  # 34 s
     os.utime(ride, (1_700_000_100, 1_700_000_100))
     out = tmp_path / "out.csv"

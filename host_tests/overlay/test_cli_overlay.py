@@ -1,4 +1,4 @@
-"""kickstand overlay: frames read back, transparency, times, sides; what is no video of the ride is refused."""
+"""kickstand overlay: frames read back, transparency, times, sides; other videos are refused."""
 
 import os
 import subprocess
@@ -49,7 +49,7 @@ def filled(pictures: np.ndarray, gauge: Gauge) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("form", "fps"), [(".mov", 60), (".webm", 30)])
-def test_a_transparent_clip(tmp_path, ride, lean, left_s, form, fps):
+def test_transparent_clip_shows_the_lean(tmp_path, ride, lean, left_s, form, fps):
     out = tmp_path / f"clip{form}"
     begin = round(left_s, 2)
     arguments = "--from", begin, "--to", begin + 8.0, "--fps", fps, "--height", 240
@@ -67,8 +67,8 @@ def test_a_transparent_clip(tmp_path, ride, lean, left_s, form, fps):
     assert np.abs(shares * np.abs(wanted).max() - wanted).max() < 3.5
 
 
-def test_over_a_video(tmp_path, ride, left_s):
-    """The film stays as it is around the gauge, which shows the time of the ride that the offset says."""
+def test_gauge_over_a_video_shows_the_lean_at_its_time(tmp_path, ride, left_s):
+    """The video around the gauge is unchanged, and the gauge shows the time of the ride given by the offset."""
     film, out = gopro.film(tmp_path / "film.mp4", 4.0), tmp_path / "out.mp4"
     offset = round(left_s - 2.0, 2)
     said = command.works("overlay", ride, "--video", film, "--offset", offset, "--fps", 30, "--out", out).out
@@ -86,12 +86,12 @@ def test_over_a_video(tmp_path, ride, left_s):
 
 
 def ffmpeg(*arguments: object) -> str:
-    """What the program says."""
+    """The program's output."""
     command = [imageio_ffmpeg.get_ffmpeg_exe(), *(str(argument) for argument in arguments)]
     return subprocess.run(command, capture_output=True, text=True).stderr
 
 
-def test_a_part_of_a_video_that_began_before_the_ride(tmp_path, ride):
+def test_video_that_began_before_the_ride_is_cut(tmp_path, ride):
     film = gopro.film(tmp_path / "film.mp4", 6.0)
     given = "overlay", ride, "--video", film, "--offset", -3
     out = "--out", tmp_path / "out.mp4"
@@ -108,7 +108,7 @@ def test_a_gopros_gyro_finds_the_offset(tmp_path):
     api.write_log(log, api.Log.from_readings(made.readings, made.rate_hz))
     kickstand, upright = (api.Log.from_readings(pose, made.rate_hz) for pose in (made.kickstand, made.upright))
     api.write_calibration(tmp_path / "RIDE.cal.json", api.fit_two_positions(kickstand, upright).calibration)
-    begin = 9005  # between two of the cells of 0.05 s that are compared
+    begin = 9005  # between two of the compared cells of 0.05 s
     turned = made.readings[begin : begin + 30 * 200, 4:] @ np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     noise = np.random.default_rng(2).normal(0.0, 0.5, turned.shape)
     film = gopro.with_telemetry(gopro.film(tmp_path / "GX01.mp4", 30.0), turned + noise + [1.0, -2.0, 0.5], 200.0)
@@ -123,12 +123,12 @@ def test_a_gopros_gyro_finds_the_offset(tmp_path):
 
 
 def walk(count: int) -> np.ndarray:
-    """Rates of something else that moves."""
+    """Rates of another motion."""
     steps = np.random.default_rng(5).normal(size=(count, 3))
     return 40.0 * np.apply_along_axis(lambda v: np.convolve(v, np.ones(80) / 80.0, "same"), 0, steps)
 
 
-def test_what_is_no_video_of_the_ride_is_refused(tmp_path, ride):
+def test_file_that_is_not_a_video_of_the_ride_is_refused(tmp_path, ride):
     film = gopro.film(tmp_path / "film.mp4", 3.0)
     (tmp_path / "text.mp4").write_text("no film\n" * 100)
     (tmp_path / "half.mp4").write_bytes(film.read_bytes()[: film.stat().st_size // 2])
@@ -156,8 +156,8 @@ def test_what_is_no_video_of_the_ride_is_refused(tmp_path, ride):
     command.refused(tmp_path, "overlay", ride, "--video", film, "--offset", 1, "--out", film, words="is also an input")
 
 
-def test_when_it_is_stopped_nothing_is_left(tmp_path, ride):
-    """Neither a file nor ffmpeg, which would go on writing it."""
+def test_stopped_overlay_leaves_nothing(tmp_path, ride):
+    """Neither a file nor a running ffmpeg."""
     film = gopro.film(tmp_path / "film.mp4", 5.0)
     (tmp_path / "clip.mov").write_text("an older clip")
     before = command.snapshot(tmp_path)
@@ -179,8 +179,8 @@ def test_when_it_is_stopped_nothing_is_left(tmp_path, ride):
     assert not [line for line in os.popen("ps -o ppid=,comm=").read().splitlines() if f"{os.getpid()} ffmpeg" in line]
 
 
-def test_a_disk_that_is_full_is_reported(tmp_path, ride, monkeypatch):
-    """What ffmpeg says when it stops stands in the line."""
+def test_full_disk_is_reported_by_overlay(tmp_path, ride, monkeypatch):
+    """The line contains ffmpeg's last words."""
     from kickstand_tools.overlay import overlay
 
     monkeypatch.setitem(overlay._TRANSPARENT, ".mov", ("-c:v", "no-such-codec"))
@@ -188,7 +188,7 @@ def test_a_disk_that_is_full_is_reported(tmp_path, ride, monkeypatch):
     command.refused(tmp_path, *given, words="ffmpeg has stopped: ")
 
 
-def test_a_gopros_readings_are_read_in_deg_s_on_the_videos_time(tmp_path):
+def test_gopro_readings_are_in_deg_s_on_the_videos_time(tmp_path):
     rate = walk(3 * 150)
     film = open_video(gopro.with_telemetry(gopro.film(tmp_path / "GX.mp4", 3.0), rate, 150.0))
     assert (film.width, film.height, film.fps, film.seconds) == (320, 240, 10.0, pytest.approx(3.0))
@@ -199,8 +199,8 @@ def test_a_gopros_readings_are_read_in_deg_s_on_the_videos_time(tmp_path):
     assert telemetry(open_video(gopro.film(tmp_path / "plain.mp4", 1.0))) is None
 
 
-def test_live_shows_what_the_display_showed(tmp_path, ride):
-    """At the first lean the two differ: the display did not know what came after."""
+def test_live_option_shows_the_displayed_lean(tmp_path, ride):
+    """At the first lean the two differ: the display did not have the later readings."""
     for more in ((), ("--live",)):
         part = "--from", 6, "--to", 9, "--height", 240
         command.works("overlay", ride, *part, *more, "--out", tmp_path / f"clip{len(more)}.webm")

@@ -1,4 +1,4 @@
-"""The gauge by its pixels: the side of the lean, the maxima, what is not known, and what is clear; what it is given."""
+"""The pixels of the gauge: the side of the lean, the maxima, unknown values, transparency; and its input values."""
 
 import math
 
@@ -21,19 +21,19 @@ def gauge() -> Gauge:
 
 
 def amber(gauge: Gauge, **values: float) -> np.ndarray:
-    """(height, width) True where the picture is in the colour that says how much."""
+    """(height, width) True where the picture has the colour of the lean."""
     picture = np.asarray(gauge.picture(**(KNOWN | values)), dtype=int)
     return np.abs(picture[..., :3] - ACCENT[:3]).max(axis=2) < 12
 
 
 def on_dial(gauge: Gauge, found: np.ndarray) -> tuple[int, int]:
-    """How much of it is left and right of the middle of the dial, above its ends."""
+    """Number of pixels left and right of the middle of the dial, above its ends."""
     middle, end = round(0.6 * gauge.height), round(0.62 * gauge.height)
     return int(found[:end, :middle].sum()), int(found[:end, middle : round(1.15 * gauge.height)].sum())
 
 
 @pytest.mark.parametrize("lean", [3.0, 20.0, 45.0, 60.0, 80.0])
-def test_a_lean_fills_its_own_side_as_far_as_it_goes(gauge, lean):
+def test_lean_fills_its_side_of_the_dial(gauge, lean):
     left, right = on_dial(gauge, amber(gauge, lean_deg=lean))
     other = on_dial(gauge, amber(gauge, lean_deg=-lean))
     assert left < 20 < right
@@ -43,7 +43,7 @@ def test_a_lean_fills_its_own_side_as_far_as_it_goes(gauge, lean):
 
 
 def test_the_bike_leans_to_that_side(gauge):
-    """By the white between its feet and the dial: the rider's head is on the side of the lean."""
+    """Judged by the white pixels between its feet and the dial: the rider's head is on the side of the lean."""
     rows, middle = slice(round(0.25 * gauge.height), round(0.5 * gauge.height)), round(0.6 * gauge.height)
     for lean in (-35.0, 35.0):
         picture, still = (np.asarray(gauge.picture(**(KNOWN | {"lean_deg": d})), dtype=int) for d in (lean, math.nan))
@@ -54,7 +54,7 @@ def test_the_bike_leans_to_that_side(gauge):
         assert np.sign(columns.mean() - middle) == np.sign(lean)
 
 
-def test_the_word_of_the_side_is_lit(gauge):
+def test_name_of_the_side_is_lit(gauge):
     below = slice(round(0.75 * gauge.height), None)
     for lean, side in ((-25.0, 0), (25.0, 1)):
         found = amber(gauge, lean_deg=lean)[below, : round(1.2 * gauge.height)]
@@ -63,7 +63,7 @@ def test_the_word_of_the_side_is_lit(gauge):
         assert halves[1 - side].sum() == 0
 
 
-def test_what_is_not_known_is_not_drawn(gauge):
+def test_unknown_values_are_not_drawn(gauge):
     unknown = gauge.picture(NAN, NAN, NAN, NAN, 0.0, 0.0)
     assert not amber(gauge, lean_deg=NAN, forward_g=NAN, left_g=NAN, speed_mps=NAN).any()
     zero = gauge.picture(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -71,7 +71,7 @@ def test_what_is_not_known_is_not_drawn(gauge):
     assert np.array_equal(np.asarray(unknown), np.asarray(gauge.picture(NAN, NAN, 0.5, NAN, 0.0, 0.0)))
 
 
-def test_forces_move_the_spot_the_way_the_bike_is_pushed(gauge):
+def test_spot_moves_in_the_direction_of_the_acceleration(gauge):
     """Up when speeding up, down when braking, to the left in a left turn."""
     side = round(1.2 * gauge.height)
 
@@ -100,18 +100,18 @@ def test_maxima_have_their_marks(gauge):
 
 
 @pytest.mark.parametrize("height, pixels", [(240, 108), (480, 216), (720, 216), (1080, 324), (2160, 648)])
-def test_its_size_goes_by_the_videos_and_its_corners_are_clear(height, pixels):
+def test_gauge_scales_with_the_video_and_has_clear_corners(height, pixels):
     gauge = Gauge(height, has_speed=height != 480, mph=True)
     picture = np.asarray(gauge.picture(30.0, -0.2, 0.5, 20.0, 12.0, 31.0))
     assert picture.shape == (gauge.height, gauge.width, 4)
     assert gauge.height == pixels
     assert gauge.width % 2 == gauge.height % 2 == 0
     assert picture[0, 0, 3] == picture[-1, -1, 3] == 0
-    assert 50 < picture[gauge.height // 2, 2, 3] < 200  # the panel lets the film through
+    assert 50 < picture[gauge.height // 2, 2, 3] < 200  # the panel is transparent
     assert picture[..., 3].max() == 255
 
 
-def test_between_moments_values_are_interpolated_but_not_across_gaps():
+def test_values_are_interpolated_but_not_across_gaps():
     t_s = np.array([0.0, 0.1, 0.2, 1.0, 1.1])
     none = np.full(5, NAN)
     speed = np.array([10.0, NAN, NAN, 12.0, NAN])
@@ -121,4 +121,4 @@ def test_between_moments_values_are_interpolated_but_not_across_gaps():
     assert np.allclose(at.lean_deg, [NAN, 5.0, NAN, NAN, 25.0, NAN], equal_nan=True)
     assert at.speed_mps[1] == pytest.approx(10.1)
     assert np.isnan(at.speed_mps[[0, 5]]).all()
-    assert at.right_deg.tolist() == [0.0, 0.0, 10.0, 10.0, 20.0, 30.0]  # the largest until then
+    assert at.right_deg.tolist() == [0.0, 0.0, 10.0, 10.0, 20.0, 30.0]  # the largest so far

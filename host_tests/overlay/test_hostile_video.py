@@ -1,4 +1,4 @@
-"""What poses as a video or as a camera's readings: no error of ours, and no file but the one that was named."""
+"""Fake videos and camera readings cause no internal error and open no other file."""
 
 import random
 import struct
@@ -28,5 +28,5 @@ def test_mutated_readings_of_a_camera_are_numbers_or_nothing():
             assert values.ndim == 2 and values.shape[1] == 3
 
 
-def test_a_name_is_no_protocol_and_the_network_is_closed():
+def test_file_name_is_no_protocol_and_opens_no_network():
     assert video.input_of(Path("12:30.mp4")) == ["-protocol_whitelist", "file,pipe", "-i", "file:12:30.mp4"]

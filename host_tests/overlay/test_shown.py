@@ -1,10 +1,9 @@
-"""What the gauge shows of a ride."""
+"""The values of a ride that the gauge shows."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from kickstand.errors import Notice
 from kickstand_tools import api
 from kickstand_tools.overlay.shown import shown
 from support.recordings import analysis_rides
@@ -15,7 +14,7 @@ def ride(tmp_path_factory):
     return analysis_rides.short(tmp_path_factory.mktemp("ride"), rate_hz=100, speed_hz=1)
 
 
-def test_it_is_what_the_display_showed(ride):
+def test_shown_values_are_those_of_the_display(ride):
     seen, lean = shown(api.open_ride(ride)), api.vehicle_channels(ride)
     sure = lean.trusted
     assert np.array_equal(seen.t_s, lean.t_s)
@@ -27,10 +26,10 @@ def test_it_is_what_the_display_showed(ride):
     braking = seen.at(np.array([seen.t_s[-1] - 6.0]))
     assert braking.forward_g[0] < -0.2
     turning = np.abs(seen.lean_deg) > 25.0
-    assert np.all(np.sign(seen.left_g[turning]) == -np.sign(seen.lean_deg[turning]))  # leaning right it is pushed right
+    assert np.all(np.sign(seen.left_g[turning]) == -np.sign(seen.lean_deg[turning]))  # right lean: pushed right
 
 
-def test_a_potholes_lean_is_no_maximum_and_a_lean_that_is_not_trusted_neither(ride, monkeypatch):
+def test_brief_or_untrusted_lean_is_no_maximum(ride, monkeypatch):
     opened = api.open_ride(ride)
     blocks = list(opened.blocks())
 
@@ -50,11 +49,11 @@ def test_a_potholes_lean_is_no_maximum_and_a_lean_that_is_not_trusted_neither(ri
     assert np.isnan(seen.at(np.array([3.2])).lean_deg[0])
 
 
-def test_a_calibration_that_the_ride_contradicts_is_reported(ride):
-    """As by every command that takes one."""
+def test_contradicted_calibration_is_reported_by_overlay(ride):
+    """As in every command with a calibration."""
     calibration = api.read_calibration(ride.with_name("RIDE.cal.json"))
     backward = replace(calibration, vehicle_from_sensor=np.diag([-1.0, 1.0, -1.0]))
     for given, codes in ((calibration, []), (backward, ["forward-exchanged"])):
-        notices: list[Notice] = []
+        notices: list[api.Message] = []
         shown(api.open_ride(ride, given), notices=notices)
         assert [notice.code for notice in notices] == codes

@@ -1,4 +1,4 @@
-"""kickstand replay: the firmware's own lean over a log, the same by every engine."""
+"""kickstand replay: the firmware's own lean over a log, the same on every engine."""
 
 import csv
 import json
@@ -14,7 +14,7 @@ from support.recordings import analysis_rides
 
 
 def replayed(log, cal, engine="cpython"):
-    """The table that `replay` writes, and what it says."""
+    """The table that `replay` writes, and its printed output."""
     out = cal.with_name("LEAN.csv")
     said = command.works("replay", log, "--calibration", cal, "--out", out, "--engine", engine)
     return analysis_rides.table(out), said.err
@@ -56,7 +56,7 @@ def test_forces_and_rates_are_the_calibrated_and_turned_readings(tmp_path):
 
 
 def with_speed(log, speed):
-    """The log once more, with this in the last column of each row."""
+    """The log with this speed in the last column of each row."""
     header, *rows = log.read_text().split("\n")[:-1]
     text = [header + ",speed_mps", *[f"{row},{mps}" for row, mps in zip(rows, speed, strict=True)]]
     (log.with_name("speed.csv")).write_text("\n".join(text) + "\n")
@@ -64,7 +64,7 @@ def with_speed(log, speed):
 
 
 @pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
-def test_the_engines_agree(tmp_path):
+def test_all_engines_give_the_same_lean(tmp_path):
     """With a speed once a second, a 0 too, that has a say, and a lean that is not always shown."""
     plain, cal = ride(tmp_path / "log.csv", seconds=60), command.write_cal(tmp_path / "CAL.json", trim_deg=1.0)
     log = with_speed(plain, [("0" if k % 1000 else "14.0") if k % 100 == 0 else "" for k in range(6000)])
@@ -107,7 +107,7 @@ def test_an_unaligned_calibration_works_with_a_warning(tmp_path):
     assert len(lean) == 100
 
 
-def test_no_lean_of_a_car_is_one_that_the_display_showed(tmp_path):
+def test_car_has_no_displayed_lean(tmp_path):
     log, cal = ride(tmp_path / "log.csv", 5.0), command.write_cal(tmp_path / "CAL.json", vehicle="car")
     lean, said = replayed(log, cal)
     assert said.count("\n") == 1 and "a car's, whose display shows no lean" in said
@@ -116,7 +116,7 @@ def test_no_lean_of_a_car_is_one_that_the_display_showed(tmp_path):
 
 
 def test_the_trim_that_riding_found_is_used(tmp_path):
-    """Standing still, the lean is what the accelerometer says less what upright was off; without one it is 0."""
+    """At standstill the lean is the accelerometer's minus the error of the upright pose; without a trim it is 0."""
     log = command.still(tmp_path / "log.csv", (0.0, 0.0, 1.0), seconds=8.0)
     leans = []
     for changed in ({}, {"trim_deg": 2.0}):
@@ -126,7 +126,7 @@ def test_the_trim_that_riding_found_is_used(tmp_path):
     assert abs(leans[1] - leans[0]) == pytest.approx(2.0, abs=0.3)
 
 
-def test_times_are_those_of_the_log_to_the_letter(tmp_path):
+def test_times_of_the_log_are_kept_exactly(tmp_path):
     """A log that starts at a Unix time keeps it, and its microseconds are not lost on the way."""
     cal = command.write_cal(tmp_path / "CAL.json")
     tables = []
@@ -140,7 +140,7 @@ def test_times_are_those_of_the_log_to_the_letter(tmp_path):
     assert [row[1:] for row in tables[0]] == [row[1:] for row in tables[1]]
 
 
-def test_a_real_recording_leans_as_gravity_says(tmp_path, shared_data):
+def test_lean_of_a_real_recording_matches_gravity(tmp_path, shared_data):
     """Held upright, leaned to one side and held, then to the other: gravity gives the true lean."""
     given = analysis_rides.table(shared_data / "hand-leaning.csv.gz")
 
@@ -163,8 +163,8 @@ def test_a_real_recording_leans_as_gravity_says(tmp_path, shared_data):
         assert abs(shown[-1] - true_lean) < 2.0
 
 
-def test_the_calibration_beside_the_log_is_taken(tmp_path):
-    """As report, plot and export take it; and what replay has written is not taken for a log."""
+def test_calibration_beside_the_log_is_used(tmp_path):
+    """Like in report, plot and export. Replay's output is not read as a log."""
     log = analysis_rides.short(tmp_path)
     beside = log.with_name(log.name.split(".")[0] + ".cal.json")
     beside.unlink(missing_ok=True)
@@ -190,7 +190,7 @@ def test_the_calibration_beside_the_log_is_taken(tmp_path):
     command.refused(tmp_path, "report", lean, words="give the log that it was made from\n")
 
 
-def test_no_command_writes_over_the_calibration_beside_the_log(tmp_path):
+def test_calibration_beside_the_log_is_never_overwritten(tmp_path):
     log = analysis_rides.short(tmp_path)
     beside = log.with_name("RIDE.cal.json")
     command.refused(tmp_path, "replay", log, "--out", beside, words="is also an input")

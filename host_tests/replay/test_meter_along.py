@@ -1,5 +1,5 @@
-"""The fast loop of replay, report and plot gives what the firmware's meter gives sample by sample, and LEAN.csv has
-it to the letter."""
+"""The fast loop of replay, report and plot gives the same as the firmware's meter for each sample, and LEAN.csv
+contains exactly that."""
 
 import multiprocessing
 from dataclasses import replace
@@ -20,7 +20,7 @@ BY_NUMPY = ("lean_formula_deg", "static_lean_deg")  # its arc functions may diff
 
 @pytest.fixture(scope="module")
 def known():
-    """A ride with a speed now and then, a short and a long gap, and readings that freeze."""
+    """A ride with a speed in some samples, a short and a long gap, and frozen readings."""
     made = smoothed_rides.simulated("street", 3, 40.0)
     log, n = made.log, len(made.log.t_s)
     t_s, accel_g, gyro_dps = log.t_s.copy(), log.accel_g.copy(), log.gyro_dps.copy()
@@ -43,7 +43,7 @@ def by_steps(log, calibration):
     return np.concatenate(rows)
 
 
-def test_it_is_the_meter_sample_by_sample(known):
+def test_fast_loop_equals_the_meter_for_each_sample(known):
     log, calibration = known
     (block,) = read_blocks(log)
     measured, along = block.measured, MeterAlong(calibration)
@@ -60,7 +60,7 @@ def test_it_is_the_meter_sample_by_sample(known):
             assert np.array_equal(mine, meters), name
 
 
-def test_the_file_has_the_values_as_python_writes_them(known, tmp_path):
+def test_lean_file_has_values_as_python_writes_them(known, tmp_path):
     log, calibration = known
     write_log(tmp_path / "log.csv", log)
     count, _ = replay.replay_to_csv(tmp_path / "log.csv", calibration, "cpython", tmp_path / "LEAN.csv")
@@ -74,8 +74,8 @@ def test_the_file_has_the_values_as_python_writes_them(known, tmp_path):
     assert count == len(lines)
 
 
-def test_two_processes_write_the_same(known, tmp_path, monkeypatch):
-    """As for a long log, with more blocks than are read ahead; and a second process that ends is an error."""
+def test_two_processes_write_the_same_file(known, tmp_path, monkeypatch):
+    """As for a long log, with more blocks than are read ahead. If the second process ends, an error is raised."""
     log, calibration = known
     write_log(tmp_path / "log.csv", log)
     monkeypatch.setattr(reader, "BLOCK_BYTES", 50_000)

@@ -1,4 +1,4 @@
-"""What is done to arrays of samples everywhere."""
+"""Functions on arrays of samples."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ from kickstand_tools.signals.leaning import leaning_of
 CHANCE = np.random.default_rng(1)
 
 
-def test_readings_are_calibrated_and_turned_as_the_firmware_does_it():
+def test_readings_are_calibrated_like_in_the_firmware():
     matrix = rotation_matrix(np.array([0.3, -1.2, 2.0]))
     offset, slope, bias = np.array([[0.01, -0.02, 0.03], [1.02, 0.99, 1.01], [1.0, -2.0, 3.0]])
     calibration = CalibrationFile(offset, slope, bias, matrix)
@@ -58,7 +58,7 @@ def test_means_and_spreads_of_windows(n, shape):
         assert np.allclose(around[n // 2 : 20 - (n - 1 - n // 2)], window(values, n), atol=1e-6)
 
 
-def test_beyond_the_ends_the_last_value_goes_on():
+def test_moving_mean_repeats_the_end_values():
     assert moving_mean(np.array([3.0, 0.0, 0.0, 6.0]), 3).tolist() == [2.0, 1.0, 2.0, 4.0]
     assert len(moving_mean(np.zeros(0), 5)) == len(moving_spread(np.zeros(0), 5)) == 0
 
@@ -97,7 +97,7 @@ def test_cells_hold_the_means_of_their_samples(block):
     assert seconds.latest[1, 0] == pytest.approx(1.14), "the first of a second's"
 
 
-def test_only_so_many_cells_are_kept_and_too_long_a_time_is_no_log():
+def test_number_of_cells_is_limited():
     cells = Cells(1.0, most=3)
     assert cells.evenly(100) is None
     for at in (0.0, 1.0, 2.0, 5.0):
@@ -115,7 +115,7 @@ def test_runs_and_stretches():
 
 
 @pytest.mark.parametrize("late_s", [0.0, 0.33, 0.8])
-def test_the_lag_of_one_signal_against_another(late_s):
+def test_lag_between_two_signals_is_found(late_s):
     time = np.arange(0.0, 60.0, 0.1)
     direction = np.array([0.6, 0.0, -0.8])
     lags = np.arange(-0.5, 1.6, 0.1)
@@ -131,7 +131,7 @@ def test_the_lag_of_one_signal_against_another(late_s):
     assert best_lag(lags, lambda by: None) is None
 
 
-def test_a_correlation_with_all_of_the_cause_is_less_than_along_one_direction():
+def test_correlation_with_the_whole_cause_is_smaller():
     effect = CHANCE.normal(size=1000)
     cause = np.column_stack((effect, CHANCE.normal(size=1000)))
     assert correlation(effect, cause).value > 0.99
@@ -140,7 +140,7 @@ def test_a_correlation_with_all_of_the_cause_is_less_than_along_one_direction():
     assert correlation(np.ones(5), np.ones((5, 1))).value == 0.0
 
 
-def test_all_shifts_at_once():
+def test_correlations_at_all_shifts_are_right():
     first, second = CHANCE.normal(size=300), np.zeros(100)
     second[:] = first[120:220]
     good, other = CHANCE.random(300) > 0.1, CHANCE.random(100) > 0.2
@@ -157,7 +157,7 @@ def test_all_shifts_at_once():
     assert peaks(np.array([1.0, 5.0, 4.0, 0.0, 3.0, -1.0]), 1, 9) == [1, 4]
 
 
-def test_a_peak_lies_between_its_neighbours():
+def test_peak_is_interpolated_between_its_neighbours():
     assert peak_offset(np.array([-0.49, -0.09, -1.69])) == pytest.approx(-0.3)
     assert peak_offset(np.array([1.0, 0.0, 1.0])) == 0.0
 
@@ -178,7 +178,7 @@ def test_rotation_vectors_and_matrices_are_each_others_inverse():
     ("shaking", "speed", "expected"),
     [(0.5, None, True), (3.0, None, False), (3.0, 0.1, True), (12.0, 0.1, False), (0.5, 5.0, False)],
 )
-def test_a_standstill_is_where_nothing_changes(shaking, speed, expected):
+def test_standstill_is_where_nothing_changes(shaking, speed, expected):
     rate = CHANCE.normal(size=(100, 3)) * shaking
     force = np.tile([0.0, 1.0, 0.0], (100, 1))
     known = None if speed is None else np.full(100, speed)
@@ -187,8 +187,8 @@ def test_a_standstill_is_where_nothing_changes(shaking, speed, expected):
     assert not motionless(0.0 * rate, force + CHANCE.normal(size=(100, 3)), 9, 1.8, 0.01).any()
 
 
-def test_a_bike_leans_as_it_turns():
-    """Forward, speed, handedness and unit of the rates, from bends at 15 m/s; turned into other axes."""
+def test_leaning_shows_forward_speed_handedness_and_unit():
+    """From bends at 15 m/s, also in rotated axes."""
     time = np.arange(0.0, 120.0, 0.2)
     lean, roll_rate = 0.4 * np.sin(1.1 * time), 0.44 * np.cos(1.1 * time)
     yaw = -STANDARD_GRAVITY * np.tan(lean) / 15.0

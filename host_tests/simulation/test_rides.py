@@ -33,7 +33,7 @@ HILLY = [
 ]
 
 
-def test_forces_and_rates_are_those_of_the_kinematics_that_judge_long_rides():
+def test_scripted_motion_matches_the_simulated_kinematics():
     """test_simulation_kinematics.py shows that those are the derivatives of attitude and place."""
     ride = Ride(HILLY, vibration_g=0.0)
     rate_hz = 1000.0
@@ -47,7 +47,7 @@ def test_forces_and_rates_are_those_of_the_kinematics_that_judge_long_rides():
     assert np.abs(np.degrees(body_rates(same)) - motion[:, 3:])[1:-1].max() < 0.01
 
 
-def test_in_balance_no_force_to_the_side_and_the_yaw_rate_of_the_lean():
+def test_balance_has_no_side_force_and_the_right_yaw_rate():
     ride = Ride(HILLY, vibration_g=0.0)
     seen = set()
     for t in np.arange(10.0, ride.seconds - 8.0, 0.05):
@@ -61,7 +61,7 @@ def test_in_balance_no_force_to_the_side_and_the_yaw_rate_of_the_lean():
     assert seen == {True, False}
 
 
-def test_kickstand_and_upright_poses():
+def test_kickstand_and_upright_poses_have_their_leans():
     assert Ride([kickstand(5, lean_deg=15)]).motion(1.0)[0] == pytest.approx(np.sin(np.radians(15)))  # on the right
     ride = Ride([kickstand(5), upright(5)])
     assert ride.truth(0.0)[3] == "kickstand"
@@ -75,7 +75,7 @@ def test_kickstand_and_upright_poses():
     assert ride.truth(9.0)[1:] == (0.0, 0.0, "upright")
 
 
-def test_vibration_has_the_size_asked_for_and_stops_with_the_engine():
+def test_vibration_has_its_size_and_stops_with_the_engine():
     def rms(vibration_g):
         ride = Ride([upright(4), accelerate(15, 4), straight(20)], vibration_g=vibration_g)
         clean = Ride([upright(4), accelerate(15, 4), straight(20)], vibration_g=0.0)
@@ -89,7 +89,7 @@ def test_vibration_has_the_size_asked_for_and_stops_with_the_engine():
     assert 0.2 < rms(0.05)[3] < 2.0
 
 
-def test_by_hand_the_bike_keeps_the_same_balance():
+def test_bike_steered_by_hand_stays_in_balance():
     bike = HandBike(vibration_g=0.0)
     assert bike.truth(1.0)[3] == "kickstand"
     bike.command("left")
@@ -109,7 +109,7 @@ def test_by_hand_the_bike_keeps_the_same_balance():
     assert bike.truth(30.0) == (pytest.approx(KICKSTAND_DEG), 0.0, 0.0, "kickstand")
 
 
-def test_by_hand_rates_and_forces_follow_from_the_motion():
+def test_rates_by_hand_follow_from_the_motion():
     bike = HandBike(vibration_g=0.0)
     bike.command("upright")
     seen, dt = [], 0.005
@@ -121,7 +121,7 @@ def test_by_hand_rates_and_forces_follow_from_the_motion():
     seen = np.array(seen)
     roll_rate, acceleration = (np.gradient(seen[:, i], dt) for i in (6, 7))
     assert np.ptp(seen[:, 6]) > 20
-    # but for the instants in which the rider changes his mind
+    # except at the moments of a new command
     assert np.quantile(np.abs(roll_rate - seen[:, 5]), 0.99) < 0.5
     assert np.quantile(np.abs(acceleration / STANDARD_GRAVITY - seen[:, 2]), 0.99) < 0.005
     assert np.ptp(seen[:, 2]) > 0.25

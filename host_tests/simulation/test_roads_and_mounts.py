@@ -1,4 +1,4 @@
-"""Roads of ISO 8608, and mounts and loggers as they are."""
+"""Roads of ISO 8608, and imperfect mounts and loggers."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def in_vehicle(made):
     return (made.readings[:, :3] @ turned)[riding], (made.readings[:, 4:7] @ turned)[riding]
 
 
-def test_each_class_is_twice_as_rough_as_the_one_before(rides):
+def test_each_road_class_is_twice_as_rough(rides):
     """Four times its power; the quietest has the engine beside it. Ridden is alike, but for rider and camber."""
     assert np.array_equal(rides("A").truth["speed_mps"], rides("D").truth["speed_mps"])
     off = rides("C").truth["lean_deg"] - rides().truth["lean_deg"]
@@ -38,8 +38,8 @@ def test_each_class_is_twice_as_rough_as_the_one_before(rides):
     assert np.all((bands[1:] / bands[:-1] > 1.7) & (bands[1:] / bands[:-1] < 2.2))
 
 
-def test_a_holder_sings_where_it_resonates():
-    """At its own frequency, by 1 over twice its damping; far below it follows."""
+def test_holder_resonates_at_its_frequency():
+    """At its own frequency the gain is 1 over twice the damping; far below it is 1."""
     rate_hz, time = 1000.0, np.arange(20_000) / 1000.0
     holder = Holder(np.full(3, 10.0), np.full(3, 0.05), np.zeros(3))
     for hz, least, most in ((1.0, 0.99, 1.03), (10.0, 9.5, 10.5), (50.0, 0.0, 0.12)):
@@ -50,7 +50,7 @@ def test_a_holder_sings_where_it_resonates():
             assert np.all(np.abs(found[5000:15000]).max(axis=0) < most)
 
 
-def test_what_a_holder_sags_by_its_gyro_measures():
+def test_gyro_measures_the_sagging_of_a_holder():
     holder = Holder(np.full(3, 20.0), np.full(3, 0.5), np.radians([1.0, 0.0, 1.0]))
     pushed = np.zeros((8000, 3))
     pushed[:, 1] = 1.0
@@ -62,13 +62,13 @@ def test_what_a_holder_sags_by_its_gyro_measures():
 
 
 @pytest.mark.parametrize("mount", MOUNTS)
-def test_a_bad_mount_reads_otherwise_and_leaves_the_ride_as_it_was(rides, mount):
+def test_bad_mount_changes_readings_but_not_the_ride(rides, mount):
     firm, bad = rides("D"), rides("D", mount)
     assert np.array_equal(firm.truth["lean_deg"], bad.truth["lean_deg"])
     assert not np.allclose(firm.readings, bad.readings, atol=0.01)
 
 
-def test_what_aliases_is_the_engine_below_its_speed(rides):
+def test_aliased_engine_vibration_appears_at_low_frequencies(rides):
     """The road shakes below 25 Hz: more there is of frequencies over 100 Hz."""
     plain, aliased = (bands_of(*in_vehicle(rides("A", mount)), 200.0)[QUANTITIES[1]] for mount in (None, "aliasing"))
     assert aliased[4] > 1.05 * plain[4]
@@ -84,7 +84,7 @@ def test_bands_are_those_of_a_sine():
     assert found[QUANTITIES[4]] == pytest.approx([0.0, 3.0 / np.sqrt(2.0), 0.0, 0.0, 0.0], abs=0.05)
 
 
-def test_simulated_roads_reach_what_a_real_motorcycle_meets():
+def test_simulated_roads_are_as_rough_as_real_ones():
     """Through town (tools/docs/simulation.md): vertical 0.078 g from 1 to 3 Hz and 0.151 g from 3 to 10,
     between C and D."""
     calm, rough = (of_simulated("street", 0, 100.0, road, None)[QUANTITIES[0]] for road in "CD")
@@ -92,8 +92,8 @@ def test_simulated_roads_reach_what_a_real_motorcycle_meets():
     assert calm[3] < 0.151 and rough[3] > 0.078
 
 
-def test_a_dive_that_is_set_is_that_of_the_ride():
-    """The same ride otherwise. The springs turn the sensor; the road under the wheels stays."""
+def test_given_dive_is_used():
+    """The rest of the ride is the same. The springs turn the sensor, but the road is unchanged."""
     soft, stiff = (ride("track", 3, 60.0, dive=dive) for dive in ((6.0, 3.0), (0.0, 0.0)))
     assert np.array_equal(soft.truth["slope_deg"], stiff.truth["slope_deg"])
     push = np.gradient(soft.truth["speed_mps"]) * soft.rate_hz / STANDARD_GRAVITY

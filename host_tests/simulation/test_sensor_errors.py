@@ -25,7 +25,7 @@ def test_mountings_are_rotations():
         assert np.linalg.det(matrix) == pytest.approx(1.0)
 
 
-def test_the_sensor_reads_what_its_errors_say():
+def test_readings_contain_the_stated_errors():
     ride = Ride(RIDE, vibration_g=0.0)
     sensor = Sensor(seed=5)
     t = np.arange(0.0, ride.seconds, 0.01)
@@ -43,7 +43,7 @@ def test_the_sensor_reads_what_its_errors_say():
     assert np.abs([np.corrcoef(e[1:], e[:-1])[0, 1] for e in force_error.T]).max() < 0.06  # white
 
 
-def test_seeds_give_different_parts_and_the_same_again():
+def test_seed_determines_the_simulated_sensor():
     parts = [Sensor(seed=s) for s in range(50)]
     offsets = np.array([p.accel_offset_g for p in parts])
     largest = np.abs(offsets).max(axis=0) / MAX_OFFSET_G
@@ -54,7 +54,7 @@ def test_seeds_give_different_parts_and_the_same_again():
     assert first.world(ride.motion)(7.5) == again.world(ride.motion)(7.5) != other.world(ride.motion)(7.5)
 
 
-def test_at_rest_it_reads_one_g_upward_with_its_errors():
+def test_sensor_at_rest_reads_one_g_with_its_errors():
     sensor = Sensor(seed=9, noise=0.0)
     reading = resting(sensor, (0.0, -2.0, 0.0))(1.0)
     assert reading[:3] == pytest.approx(np.array([0.0, -1.0, 0.0]) * sensor.accel_scale + sensor.accel_offset_g)

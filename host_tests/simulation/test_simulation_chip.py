@@ -29,7 +29,7 @@ def size_and_phase(values: np.ndarray, hz: float) -> tuple[float, float]:
     return float(abs(z)), float(np.angle(z) + np.pi / 2.0)
 
 
-def test_the_filter_is_4_9_ms_late():
+def test_filter_has_4_9_ms_of_delay():
     readings = read(PERFECT, wave(5.0, 1.0), STILL)
     _, phase = size_and_phase(readings[:, 0], 5.0)
     assert -phase / (2.0 * np.pi * 5.0) == pytest.approx(0.0049, abs=0.0003)
@@ -64,14 +64,14 @@ def test_the_range_ends_before_the_filter():
     assert mean == pytest.approx((8.0 + 3.0) / 2.0, abs=0.05)
 
 
-def test_noise_is_the_sheets():
+def test_noise_matches_the_data_sheet():
     still = read(PERFECT, STILL, STILL)
     # behind a 44 Hz low-pass of this shape (equivalent bandwidth about 50 Hz)
     assert still[:, :3].std() == pytest.approx(400e-6 * np.sqrt(50.0), rel=0.1)
     assert still[:, 4:].std() == pytest.approx(0.005 * np.sqrt(50.0), rel=0.15)
 
 
-def test_parts_stay_within_the_sheet_and_differ():
+def test_random_sensors_stay_within_the_data_sheet():
     parts = [Chip.random(np.random.default_rng(seed)) for seed in range(100)]
     matrices = np.array([p.accel_matrix for p in parts] + [p.gyro_matrix for p in parts])
     off = matrices - np.eye(3)
@@ -95,7 +95,7 @@ def test_errors_and_temperature_reach_the_reading():
     assert mean[4:] == pytest.approx([1.0, 12.0, 0.1], abs=0.01)  # 0.1 deg/s per g on z
 
 
-def test_bias_wanders():
+def test_bias_drifts_at_random():
     n = 100 * RATE_HZ
     gyro = replace(PERFECT, gyro_walk=0.1).read(
         np.random.default_rng(3), np.zeros((n, 3)), np.zeros((n, 3)), np.full(n, 25.0)

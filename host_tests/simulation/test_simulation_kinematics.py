@@ -77,14 +77,14 @@ def held_turn(lean_deg: float, bike: Bike, speed: float = 18.0, **more: float) -
 
 
 @pytest.mark.parametrize("lean_deg", [-45.0, -20.0, 10.0, 38.0])
-def test_a_steady_turn_balances_gravity_and_the_centripetal_force(lean_deg):
+def test_steady_turn_balances_gravity_and_centripetal_force(lean_deg):
     narrow = Bike(tyre_radius=0.0, wheel_inertia=0.0)
     rolled, k = held_turn(lean_deg, narrow)
     assert np.degrees(rolled.lean[k]) == pytest.approx(lean_deg, abs=0.01)
     assert np.degrees(np.arctan(-18.0 * rolled.yaw_rate[k] / STANDARD_GRAVITY)) == pytest.approx(lean_deg, abs=0.01)
 
 
-def test_wide_tyres_and_spinning_wheels_lean_further_than_the_formula():
+def test_wide_tyres_and_spinning_wheels_add_lean():
     bike = Bike()
     rolled, k = held_turn(40.0, bike)
     centripetal = -18.0 * rolled.yaw_rate[k] / STANDARD_GRAVITY
@@ -105,7 +105,7 @@ def test_the_moments_about_the_contact_point_balance():
     assert np.arctan2(right, up) == pytest.approx(b)
 
 
-def test_hanging_off_to_the_inside_spares_lean():
+def test_hanging_off_to_the_inside_reduces_the_lean():
     hung, k = held_turn(30.0, Bike(), hang_m=0.04)
     plain, _ = held_turn(30.0, Bike())
     assert 3.0 < np.degrees(plain.lean[k] - hung.lean[k]) < 5.0

@@ -1,4 +1,4 @@
-"""Whole simulated rides: the same again from the same seed, within their stated ranges, written as logs."""
+"""Whole simulated rides: reproducible from the seed, within their stated ranges, written as logs."""
 
 import tracemalloc
 
@@ -27,7 +27,7 @@ def vehicle_readings(made):
     return force, rates
 
 
-def test_a_seed_gives_the_same_ride_again_and_another_seed_another():
+def test_seed_determines_the_ride():
     first, again, other = ride("street", 1, 60.0), ride("street", 1, 60.0), ride("street", 2, 60.0)
     assert np.array_equal(first.readings, again.readings)
     assert np.array_equal(first.truth["lean_deg"], again.truth["lean_deg"])
@@ -37,7 +37,7 @@ def test_a_seed_gives_the_same_ride_again_and_another_seed_another():
 
 
 @pytest.mark.parametrize("name", list(PROFILES))
-def test_nothing_is_past_a_motorcycle(rides, name):
+def test_simulated_values_are_possible_for_a_motorcycle(rides, name):
     made = rides[name]
     truth = made.truth
     assert all(np.all(np.isfinite(values)) for values in [made.readings, *truth.values()])
@@ -72,7 +72,7 @@ def test_profiles_reach_their_stated_ranges(rides, name, lean, speed, yaw):
     assert yaw[0] < np.abs(truth["yaw_rate_dps"]).max() < yaw[1]
 
 
-def test_each_profile_has_what_it_is_named_for(rides):
+def test_each_profile_has_its_special_condition(rides):
     turn = rides["sweeper"].phase == "turn"
     assert turn.sum() > 60 * 200
     assert np.abs(rides["sweeper"].truth["lean_deg"][turn]).min() < 60.0
@@ -96,7 +96,7 @@ def test_each_profile_has_what_it_is_named_for(rides):
 
 
 @pytest.mark.parametrize("name", ["held", "corners", "weight"])
-def test_a_rider_who_moves_about_does_not_tilt_a_bike_on_its_stand(rides, name):
+def test_moving_rider_does_not_tilt_a_bike_on_its_stand(rides, name):
     made = rides[name]
     lean = made.truth["lean_deg"]
     assert np.ptp(lean[made.phase == "kickstand"]) < 0.02
@@ -128,7 +128,7 @@ def test_simulate_writes_logs_that_calibrate_and_replay(tmp_path):
     assert len(truth) == len((tmp_path / "r" / "RIDE.csv").read_text().splitlines()) == 60 * 200 + 1
 
 
-def test_the_speed_is_written_once_a_second_where_asked(tmp_path):
+def test_speed_is_written_once_per_second_if_requested(tmp_path):
     made = simulate("street", 1, tmp_path, seconds=60.0, speed=True)
     log = read_log(tmp_path / "RIDE.csv")
     given = [k for k, v in enumerate(log.speed_mps) if v == v]
@@ -139,12 +139,12 @@ def test_the_speed_is_written_once_a_second_where_asked(tmp_path):
 
 
 @pytest.mark.parametrize(("profile", "seed"), [("hills", 3), ("fall", 1)])
-def test_a_ride_is_as_long_as_asked(profile, seed):
-    """Also one that would go on to the end of its bend, and one that a fall ends."""
+def test_ride_has_the_requested_length(profile, seed):
+    """Also one that would continue to the end of its bend, and one that ends with a fall."""
     assert len(ride(profile, seed, 120.0, exact=True).readings) == 120 * 200
 
 
-def test_the_calibration_of_the_ride_before_goes_with_it(tmp_path):
+def test_calibration_of_the_previous_ride_is_removed(tmp_path):
     """`report` looks there for the calibration of RIDE.csv, but it is of a sensor that was mounted otherwise."""
     works("simulate", "--profile", "street", "--seconds", 30, "--out", tmp_path)
     (tmp_path / "RIDE.cal.json").write_text("{}")
@@ -152,7 +152,7 @@ def test_the_calibration_of_the_ride_before_goes_with_it(tmp_path):
     refused(tmp_path, "report", tmp_path / "RIDE.csv", words="no calibration RIDE.cal.json beside it")
 
 
-def test_a_ride_takes_at_most_so_many_columns():
+def test_memory_of_a_ride_is_limited():
     """An hour has 3.6 million rows at the chip's 1 kHz. What it gives back keeps none of them alive."""
     seconds = 400.0
     column = seconds * RATE_HZ * 8  # bytes of one number a row

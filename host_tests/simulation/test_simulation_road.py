@@ -31,18 +31,18 @@ def test_the_profile_has_the_standards_density():
         assert np.mean(displacement * (waves[near] / 0.1) ** 2) == pytest.approx(road.CLASS_B, rel=0.25)
 
 
-def test_an_ordinary_road_at_90_shakes_with_peaks_of_0_3_to_0_5_g():
+def test_ordinary_road_at_90_has_peaks_of_0_3_to_0_5_g():
     heave = over(25.0, road.CLASS_B).heave / STANDARD_GRAVITY
     assert 0.3 < np.percentile(np.abs(heave), 99.9) < 0.6
 
 
-def test_it_shakes_with_the_square_root_of_roughness_and_more_at_speed():
+def test_shaking_grows_with_roughness_and_speed():
     fine, rough = over(15.0, road.CLASS_A), over(15.0, road.CLASS_C)
     assert np.std(rough.heave) / np.std(fine.heave) == pytest.approx(4.0, rel=0.01)
     assert np.std(over(25.0, road.CLASS_B).heave) > 1.5 * np.std(over(6.0, road.CLASS_B).heave)
 
 
-def test_bumps_are_as_high_as_asked():
+def test_bumps_have_the_requested_height():
     slope = np.zeros(2000)
     road.add_bumps(slope, [10.0], height_m=0.04, length_m=0.8)
     height = np.cumsum(slope) * 0.02
@@ -60,14 +60,14 @@ def test_the_front_wheel_meets_a_bump_first():
     assert 0.05 < (lifted - nose_up) / RATE < 0.25  # 1.43 m of wheelbase at 10 m/s
 
 
-def test_the_lowest_gear_that_keeps_the_engine_under_where_it_is_shifted_up():
+def test_lowest_gear_under_the_shift_speed_is_used():
     """370, 260, 205, 170, 150 and 135 /min per m/s; the clutch slips at first, and the last gear has no limit."""
     rpm = {0.0: 1250.0, 3.0: 1250.0, 10.0: 3700.0, 15.0: 3900.0, 24.0: 4920.0, 29.0: 4930.0, 33.0: 4950.0, 40.0: 5400.0}
     for mps, wanted in rpm.items():
         assert crank_rpm(np.full(2000, mps), 5000.0, RATE)[1000] == pytest.approx(wanted), mps
 
 
-def test_it_shakes_at_half_once_and_twice_the_crankshafts_speed():
+def test_engine_shakes_at_its_three_orders():
     """A four-stroke engine fires every other turn; 3900 /min are 65 Hz."""
     n = 20000
     force, rates = vibration(np.random.default_rng(2), np.full(n, 15.0), np.ones(n), 0.1, 5000.0, RATE)
@@ -80,7 +80,7 @@ def test_it_shakes_at_half_once_and_twice_the_crankshafts_speed():
     assert np.std(rates) / np.std(force) == pytest.approx(np.radians(15.0) / STANDARD_GRAVITY, rel=0.2)
 
 
-def test_it_shakes_with_the_square_of_its_speed_up_to_half_a_g():
+def test_engine_vibration_grows_with_the_square_of_its_speed():
     def size(mps: float, rms_g: float) -> float:
         force, _ = vibration(np.random.default_rng(2), np.full(4000, mps), np.ones(4000), rms_g, 5000.0, RATE)
         return float(np.sqrt(np.mean(force**2)) / STANDARD_GRAVITY)

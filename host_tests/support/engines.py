@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 from kickstand.errors import Refusal
+from kickstand_tools.calibration import drive_refusals, pose_refusals
 from kickstand_tools.common import unix_port
-from kickstand_tools.refusals import sentence
 
 from support import firmware_calls
 from support.mpy import run_mpy
@@ -31,4 +31,8 @@ def run(engine, calls):
 
 def words(answer):
     """What a terminal says of an answer that is a refusal."""
-    return sentence(Refusal(answer["refused"], *answer["values"]))
+    refusal = Refusal(answer["refused"], *answer["values"])
+    for of in (pose_refusals, drive_refusals):
+        if refusal.code in of.CODES:
+            return of.of_firmware(refusal).line()
+    raise AssertionError(f"no class for {refusal.code}")

@@ -8,8 +8,10 @@ import pytest
 from kickstand import console, errors
 from kickstand.errors import AlignmentError, Notice, Refusal, SettingsError
 from kickstand.ui import messages
-from kickstand_tools import refusals
+from kickstand_tools.calibration import drive_refusals, pose_refusals
 from kickstand_tools.common import firmware_path
+
+POSES = {"CaptureError", "SickSensor", "CalibrationError", "GyroError"}  # raised by what the tools run as well
 
 CLASSES = {name for name in vars(errors) if name[0].isupper()}
 # Codes that a name or a call gives, not a text beside the class
@@ -33,11 +35,10 @@ VALUES |= {"axis-ill": ("Accel", "xyz", "stuck"), "clips": ("Accel",)}
 VALUES |= {"speed-late": (2.5,), "aligned": (9.9,)}
 
 
-def codes(with_tools=False):
-    """Every code given to one of the classes in errors.py, by the class. with_tools: by the host's tools too."""
+def codes():
+    """Every code given to one of the classes in errors.py, by the class."""
     found = {}
-    tools = Path(refusals.__file__).parent
-    for path in [*firmware_path.PACKAGE.rglob("*.py"), *(tools.rglob("*.py") if with_tools else ())]:
+    for path in firmware_path.PACKAGE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in CLASSES:
                 code = node.args[0] if node.args else None
@@ -71,38 +72,35 @@ def test_they_fit_into_sixteen_characters(code):
         assert len(line) <= 16, line
 
 
-def test_each_code_has_a_sentence_for_a_terminal():
-    """Notices are the display's alone."""
+def test_a_refusal_of_the_board_has_a_console_sentence():
+    known = worded(console._SENTENCES)
+    assert known <= set(codes()) | INDIRECT
     for code, kind in codes().items():
-        if kind != "Notice":
+        if code in known and kind != "Notice":
             values = VALUES.get(code, ("NAME", 2.0, 3.0, 4.0, 5.0, 6.0) if kind == "SettingsError" else (1.0, 2.0, 3.0))
-            assert "{" not in refusals.sentence(Refusal(code, *values))
+            assert "{" not in console.sentence(Refusal(code, *values))
+        assert code in known or kind not in ("SettingsError", "LiveError", "StoreError")
 
 
-@pytest.mark.parametrize("how", refusals._MOVED)
+def test_each_refusal_of_a_calibration_has_one_class():
+    here = {code for code, kind in codes().items() if kind in POSES | {"AlignmentError"}} | {"mount-moved"}
+    assert set(pose_refusals.CODES) | set(drive_refusals.CODES) == here
+    assert not set(pose_refusals.CODES) & set(drive_refusals.CODES)
+
+
+@pytest.mark.parametrize("how", drive_refusals._MOVED)
 def test_a_mount_that_moved(how):
-    assert refusals.sentence(AlignmentError("mount-moved", how, 12.0)).startswith("the mount has moved: ")
+    found = drive_refusals.of_firmware(AlignmentError("mount-moved", how, 12.0))
+    assert found.line().startswith("the mount has moved: ")
     assert messages.lines(AlignmentError("mount-moved", how, 12.0)) == ("Mount has moved", "Align again")
     assert f'"{how}"' in "".join(path.read_text() for path in (firmware_path.PACKAGE / "drive_alignment").glob("*.py"))
-
-
-def test_each_code_of_the_tools_has_a_sentence_in_one_table():
-    tables = refusals._AXES, refusals._MOUNT, refusals._OTHERS
-    assert len(refusals._WORDS) == sum(len(table) for table in tables)
-    assert set(codes(with_tools=True)) - set(codes()) - worded(console._SENTENCES) <= set(refusals._WORDS)
-
-
-def test_no_sentence_is_left_over():
-    known = set(codes(with_tools=True)) | INDIRECT
-    assert set(refusals._WORDS) <= known
-    assert worded(console._SENTENCES) <= known
 
 
 def test_the_limits_of_user_code_are_said_as_they_are():
     source = (firmware_path.PACKAGE / "user_code.py").read_text(encoding="utf-8")
     limits = dict(re.findall(r"^_([A-Z_]+) = const\((\d+)", source, re.MULTILINE))
     words = "over {TOO_SLOW_MS} ms, or {MOST_SLOW} times over {SLOW_MS} ms in a row".format(**limits)
-    assert words in refusals.sentence(Refusal("user-slow", "page", 60))
+    assert words in console.sentence(Refusal("user-slow", "page", 60))
 
 
 def test_a_notice_is_worded_like_a_refusal():

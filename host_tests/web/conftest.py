@@ -1,4 +1,4 @@
-"""The site on a server of its own, and the page Rides. Where the site cannot be put together, its tests are skipped."""
+"""The site on a server, and the page Rides. If the site cannot be built, its tests are skipped."""
 
 import threading
 
@@ -21,7 +21,7 @@ def files() -> dict[str, bytes]:
 
 @pytest.fixture(scope="session")
 def address(files):
-    """Of a server of the site."""
+    """The address of a server of the site."""
     with serve.server(files, 0) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         yield f"http://{serve.HOST}:{server.server_address[1]}/"
@@ -30,7 +30,7 @@ def address(files):
 
 @pytest.fixture(scope="session")
 def ride(tmp_path_factory):
-    """Half a minute, with a speed."""
+    """A ride of half a minute, with a speed."""
     return analysis_rides.short(tmp_path_factory.mktemp("ride"), rate_hz=50, speed_hz=5)
 
 
@@ -41,7 +41,7 @@ def calibration(ride):
 
 @pytest.fixture(scope="session")
 def page(chromium, address):
-    """One for all tests: Python is loaded once. Its content security policy stops nothing that is needed."""
+    """One page for all tests: Python is loaded once. Its content security policy blocks nothing that is needed."""
     rider = Rider(chromium, address + "rides.html", policy=True, **LAPTOP)
     yield Rides(rider)
     away = [url for url in rider.asked if not url.startswith((address, "blob:" + address, "data:"))]

@@ -12,7 +12,7 @@ pytest.importorskip("bumble", reason="no bumble")
 from support.web.bluetooth_bridge import FAKE, Bridge
 
 BEGIN_S = 26.0
-# The last part lasts for all of the test, however late a busy machine is
+# The last part lasts for the whole test, even on a busy machine
 RIDE = [["kickstand", 8.0], ["upright", 8.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 900.0]]
 PLAN = {"ride": RIDE, "presses": device_plans.PRESSES, "config": {"LIVE": True}, "until": 900}
 
@@ -68,7 +68,7 @@ def lean_reads(rider, pattern):
     )
 
 
-def test_the_lean_fills_the_screen_and_comes_back(on_the_bar, tmp_path):
+def test_lean_fills_the_screen_and_returns(on_the_bar, tmp_path):
     """In a left turn of 30 degrees: shown large, lost, "--", back, stopped, saved."""
     rider, bridge = on_the_bar
     page = rider.page
@@ -103,7 +103,7 @@ def test_the_lean_fills_the_screen_and_comes_back(on_the_bar, tmp_path):
     assert rider.errors == [] and rider.strangers() == []
 
 
-def test_a_browser_without_serial_and_bluetooth_says_what_can(chromium, address):
+def test_browser_without_serial_and_bluetooth_gives_advice(chromium, address):
     rider = Rider(chromium, address + "live.html", **PHONE)
     rider.page.evaluate("['serial', 'bluetooth'].forEach((one) => (document.documentElement.dataset[one] = 'no'))")
     assert rider.page.is_visible("#unable") and not rider.page.is_visible(".live")
@@ -116,7 +116,7 @@ def test_a_browser_without_serial_and_bluetooth_says_what_can(chromium, address)
 
 @pytest.fixture(scope="module")
 def packets(tmp_path_factory):
-    """What a phone hears in a minute of bends, and then a stop; and the display's record."""
+    """The packets of a minute of bends and then a stop, and the display's record."""
     turns = [["turn", lean, 5.0] for lean in (-30.0, 35.0, -20.0, 40.0)] * 2
     ride = [*RIDE[:3], *turns, ["straight", 4.0], ["brake", 0.0, 3.0], ["upright", 12.0]]
     acts = [[18.0, "connect"], [18.1, "write", "rate", [40, 0]]]
@@ -125,9 +125,9 @@ def packets(tmp_path_factory):
     return record.phones[0]["packets"], record
 
 
-def test_report_and_smooth_take_what_is_saved(chromium, address, packets, tmp_path):
-    """The smoothed lean is that of the display, within a degree and a half. Time goes on over 16 bits, and packets that
-    come late are known."""
+def test_saved_bluetooth_log_can_be_reported_and_smoothed(chromium, address, packets, tmp_path):
+    """The smoothed lean equals the display's within a degree and a half. Time continues over 16 bits, and late packets
+    are recognised."""
     heard, record = packets
     rider = Rider(chromium, address + "live.html")
     assert rider.page.evaluate(LATE) == [[0, 0], [40, 5], [540, 0], [580, 2420], [3540, 0]]

@@ -1,4 +1,4 @@
-"""An emulated Pico at the pages Install and Live, one after the other."""
+"""An emulated Pico with the pages Install and Live."""
 
 import pytest
 from kickstand_tools.simulated_board.lcd import shown_lean
@@ -14,9 +14,9 @@ LEAN_DEG = 20.0
 
 @pytest.mark.nightly  # `flash` onto the same board, and the page with an imagined one, are tried each time
 @pytest.mark.chip
-def test_a_board_is_brought_up_to_date_and_watched(chromium, address, tmp_path):
-    """Its calibration stays. Its lean on the page is the one on its own display, and the log is the one that `kickstand
-    record` writes."""
+def test_board_is_updated_and_watched(chromium, address, tmp_path):
+    """Its calibration is kept. The lean on the page equals that on its display, and the log equals that of `kickstand
+    record`."""
     line = SerialLine(chromium, address + "install.html")
     rider = line.rider
     old = {path: b"old" if path == "/kickstand/lean/meter.mpy" else data for path, data in firmware().items()}
@@ -40,7 +40,7 @@ def test_a_board_is_brought_up_to_date_and_watched(chromium, address, tmp_path):
         rider.page.click("#stop")
         rider.page.wait_for_selector("#files li", timeout=120_000)
     assert rider.text("#live-said") == "Stopped."
-    rider.page.wait_for_function("document.querySelector('#lean').textContent === '--'")  # it is old news soon
+    rider.page.wait_for_function("document.querySelector('#lean').textContent === '--'")  # it is soon outdated
     blocks = streamed(bytes(line.said))
     assert len(blocks) > 1
     assert list(saved(rider, tmp_path).values()) == recorded(blocks)
@@ -50,12 +50,12 @@ def test_a_board_is_brought_up_to_date_and_watched(chromium, address, tmp_path):
 
 @pytest.mark.nightly
 @pytest.mark.chip
-def test_from_a_broken_off_installation_to_the_lean(chromium, address):
-    """All that a rider does: install, unplug, press on the stand and upright. The display shows the lean. Most files
-    are there already, because the emulated board takes a minute for all of them."""
+def test_interrupted_installation_is_completed_up_to_the_lean(chromium, address):
+    """All steps of a rider: install, unplug, press on the stand and upright. The display shows the lean. Most files are
+    already on the board, because copying all of them takes a minute."""
     line = SerialLine(chromium, address + "install.html")
     poses = Ride([kickstand(5.5), upright(5.5), upright(1e6, lean_deg=LEAN_DEG)])
-    part = Sensor(seed=1, share=0.1)  # its accelerometer is not calibrated here: that shall cost no degrees
+    part = Sensor(seed=1, share=0.1)  # its accelerometer is not calibrated here: small errors cost no degrees
     feels, started_s = part.world(poses.motion), 0.0
     missing = ("/main.py", "/kickstand/calibration/")
     there = {path: data for path, data in firmware().items() if not path.startswith(missing)}
@@ -85,7 +85,7 @@ def test_from_a_broken_off_installation_to_the_lean(chromium, address):
 @pytest.mark.nightly
 @pytest.mark.chip
 def test_a_board_is_checked_on_the_page(chromium, address):
-    """What the command prints, line by line; the button is asked for."""
+    """The lines of the command, including the request to press the button."""
     line = SerialLine(chromium, address + "install.html")
     with pico(part(4, share=0.3), modules()) as device:
         device.run(0.5)

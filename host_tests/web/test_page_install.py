@@ -1,4 +1,4 @@
-"""The page puts the firmware and its config.py onto a board, with the code of `kickstand flash`."""
+"""The page installs the firmware and its config.py on a board, with the code of `kickstand flash`."""
 
 import re
 import types
@@ -26,7 +26,7 @@ def line(chromium, address):
 
 @pytest.fixture
 def board(tmp_path):
-    """A board that has all of the firmware but for what computes the lean, and what starts it: copying takes time."""
+    """A board with all of the firmware except the lean's modules and main.py, because copying takes time."""
     for path, data in FIRMWARE.items():
         if not path.startswith("/kickstand/lean/") and path.count("/") > 1:
             (tmp_path / path[1:]).parent.mkdir(parents=True, exist_ok=True)
@@ -45,7 +45,7 @@ def choose(line, name, value):
 
 
 def test_a_new_board_gets_the_firmware_and_its_settings(line, board):
-    """What is wrong is said beside the field, by the firmware's own rules, and nothing is copied until it is right."""
+    """A fault is shown beside the field, by the firmware's own rules, and nothing is copied until it is corrected."""
     line.plug_in(RawPrompt(board))
     assert line.look().startswith("Imagined Pico with RP2040, MicroPython 1.26.1 is there.")
     page = line.rider.page
@@ -74,7 +74,7 @@ def test_a_new_board_gets_the_firmware_and_its_settings(line, board):
     assert on_it == {path: data for path, data in FIRMWARE.items() if path != "/config.py"}
 
 
-def test_what_a_rider_has_set_is_shown_and_stays(line, board):
+def test_riders_settings_are_shown_and_kept(line, board):
     board.path("config.py").write_text("SIDE = 'right'  # mine\nDLPF = 0x4\n")
     line.plug_in(RawPrompt(board))
     line.look()
@@ -86,8 +86,8 @@ def test_what_a_rider_has_set_is_shown_and_stays(line, board):
     assert board.path("config.py").read_text() == "SIDE = 'right'  # mine\nDLPF = 0x4\nRECORD = True\n"
 
 
-def test_each_board_has_usual_pins_of_its_own(line, board):
-    """After a Pico, by which the fields above were filled."""
+def test_each_board_has_its_own_default_pins(line, board):
+    """After a Pico, which filled the fields above."""
     other(board, _machine="Generic ESP32 module with ESP32")
     board.modules["sys"].platform = "esp32"
     line.plug_in(RawPrompt(board))
@@ -97,7 +97,7 @@ def test_each_board_has_usual_pins_of_its_own(line, board):
     assert "no pin of the chip" in line.rider.text("#fault-BUTTON_PIN")
 
 
-def test_a_config_that_is_more_than_settings_is_left_to_the_rider(line, board):
+def test_config_with_more_than_settings_stays_with_the_rider(line, board):
     own = b"import sys\nRECORD = sys.platform == 'rp2'\n"
     board.path("config.py").write_bytes(own)
     line.plug_in(RawPrompt(board))
@@ -108,8 +108,8 @@ def test_a_config_that_is_more_than_settings_is_left_to_the_rider(line, board):
     assert board.path("config.py").read_bytes() == own
 
 
-def test_a_cable_that_is_pulled_leaves_a_board_that_starts_nothing(line, board):
-    """And that can be installed anew."""
+def test_pulled_cable_leaves_a_board_that_starts_nothing(line, board):
+    """The board can be flashed again."""
     line.plug_in(RawPrompt(board))
     line.look()
     line.cut_after = 12_000
@@ -128,8 +128,8 @@ def test_a_check_of_a_board_without_the_firmware_is_refused(line, board):
     assert line.rider.page.is_visible("#check") and line.rider.axe() == []
 
 
-def test_the_status_is_what_the_command_prints(line, board, monkeypatch):
-    """And it can be copied into an issue."""
+def test_status_equals_the_output_of_the_command(line, board, monkeypatch):
+    """The text can be copied into an issue."""
     line.plug_in(RawPrompt(board))
     assert line.status().startswith("Kickstand is not on the board at this port: the page Install puts it there")
     report = "Kickstand 9.9.9\nSensor   MPU6050 at 0x68\n\nDisplay  none found"
@@ -157,7 +157,7 @@ def other(board, **differs):
         ({}, "stm32", "runs on a Raspberry Pi Pico"),
     ],
 )
-def test_a_board_that_does_not_fit_is_left_alone(line, board, differs, platform, words):
+def test_unsuitable_board_is_not_changed(line, board, differs, platform, words):
     other(board, **differs)
     board.modules["sys"].platform = platform
     line.plug_in(RawPrompt(board))
@@ -166,8 +166,8 @@ def test_a_board_that_does_not_fit_is_left_alone(line, board, differs, platform,
     assert board.written == [] and board.resets == 1
 
 
-def test_what_is_no_image_for_an_esp32_is_not_written(line, board, tmp_path):
-    """Nor one for another chip: no chip answers here at all."""
+def test_file_that_is_no_esp32_image_is_not_written(line, board, tmp_path):
+    """Nor an image for another chip; no chip answers here at all."""
     page = line.rider.page
     page.click("text=ESP32: a file that ends in .bin")
     for name, content, words in (
@@ -205,7 +205,7 @@ def test_the_form_has_every_setting(line):
     assert sorted(names) == sorted(re.findall(r"(?m)^# ([A-Z_0-9]+) = ", text))
 
 
-def test_a_setting_of_0_is_not_shown_as_the_usual_one(line):
+def test_setting_of_0_is_not_shown_as_the_default(line):
     shown = """async () => {
       const place = document.createElement("div");
       const fields = new (await import("./install/fields.mjs")).Fields(place, () => {});
@@ -215,8 +215,8 @@ def test_a_setting_of_0_is_not_shown_as_the_usual_one(line):
     assert line.rider.page.evaluate(shown) == ["0", "0"]
 
 
-def test_a_browser_without_serial_ports_says_so(chromium, address):
-    """First of all, and offers nothing that needs one."""
+def test_browser_without_serial_ports_is_told_so(chromium, address):
+    """At the top, and it offers nothing that needs one."""
     rider = Rider(chromium, address, script="delete Navigator.prototype.serial")
     for name in ("install.html", "live.html"):
         rider.page.goto(address + name)
@@ -243,7 +243,7 @@ def test_a_browser_without_serial_ports_says_so(chromium, address):
     rider.context.close()
 
 
-def test_a_browser_with_serial_ports_hears_nothing_of_others(line):
+def test_browser_with_serial_ports_gets_no_other_advice(line):
     assert line.rider.page.is_hidden("#unable")
     assert line.rider.page.is_visible("#look")
 
@@ -265,7 +265,7 @@ def test_the_wiring_is_that_of_the_boards_own_pins(line):
 
 
 def test_each_board_has_its_own_page_for_micropython(line):
-    """A link that leaves the page only when it is clicked, into a tab of its own."""
+    """A link that opens a new tab when it is clicked."""
     links = line.rider.page.locator("a[href^='https:']")
     assert links.evaluate_all("links => links.map((one) => [one.target, one.rel])") == 10 * [["_blank", "noopener"]]
     names = links.evaluate_all("links => links.map((one) => one.href)")

@@ -47,8 +47,8 @@ def board(tmp_path):
     return FakeBoard(tmp_path / "flash")
 
 
-def test_a_cable_that_is_pulled_leaves_the_log(line, rider, board, tmp_path):
-    """And no lean on the gauge. What swayed too much for its lean to be known was "--" all along."""
+def test_pulled_cable_leaves_the_log(line, rider, board, tmp_path):
+    """The gauge then shows no lean. While the bike swayed too much for a certain lean it showed "--"."""
     blocks, _ = half_seconds(3)
     line.plug_in(RawPrompt(board, blocks))
     rider.page.click("#start")
@@ -60,8 +60,8 @@ def test_a_cable_that_is_pulled_leaves_the_log(line, rider, board, tmp_path):
     assert list(saved(rider, tmp_path).values()) == recorded(blocks)
 
 
-def test_a_car_shows_g_in_place_of_a_lean(line, rider, board, tmp_path, monkeypatch):
-    """And so does its log, by the calibration. A motorcycle after it has its gauge again."""
+def test_car_shows_g_instead_of_a_lean(line, rider, board, tmp_path, monkeypatch):
+    """So does its log, by the calibration. The next motorcycle gets its gauge again."""
     monkeypatch.setattr(ride_writer, "turns", braking_in_a_left_bend)
     line.plug_in(RawPrompt(board, half_seconds(3)[0], vehicle="car"))
     rider.page.click("#start")
@@ -92,8 +92,8 @@ def test_a_lean_ends_soon_after_the_last_block(rider):
     assert rider.page.evaluate(PLAYED) == [20, 20, None]
 
 
-def test_tools_that_cannot_be_loaded_can_be_asked_for_again(chromium, address, board):
-    """And a browser without a store for other pages says how its files get there."""
+def test_failed_loading_of_tools_can_be_repeated(chromium, address, board):
+    """A browser without a store for other pages explains how to transfer the files."""
     line = SerialLine(chromium, address + "live.html", service_workers="block")
     rider = line.rider
     line.plug_in(RawPrompt(board, half_seconds(3)[0]))
@@ -133,7 +133,7 @@ def test_after_a_new_alignment_another_log_begins(line, rider, board, tmp_path):
     assert board.resets == 2
 
 
-def test_the_rides_of_a_board_are_what_the_command_pulls(line, rider, board, tmp_path, monkeypatch):
+def test_pulled_rides_equal_those_of_the_command(line, rider, board, tmp_path, monkeypatch):
     damaged = ride_writer.blocks(2, ride=4)[0]
     damaged[1] = damaged[1][:500] + b"?" + damaged[1][501:]
     for number, blocks in {3: ride_writer.blocks(2, ride=3, speed=True)[0], 4: damaged}.items():
@@ -178,7 +178,7 @@ def has_firmware(board, monkeypatch):
     board.modules["kickstand.rides"] = types.SimpleNamespace(ride_paths=ride_paths)
 
 
-def test_a_port_that_takes_no_signals_is_closed_again(line):
+def test_port_without_signals_is_closed_again(line):
     script = """async () => {
       const said = [];
       const port = {
@@ -194,8 +194,8 @@ def test_a_port_that_takes_no_signals_is_closed_again(line):
     assert said.startswith("The port cannot be opened: Failed to open serial port. Does another program have it?")
 
 
-def test_a_port_whose_stream_refuses_to_end_is_closed_all_the_same(line):
-    """Else it could not be opened again."""
+def test_port_with_a_stuck_stream_is_closed(line):
+    """Otherwise it could not be opened again."""
     script = """async () => {
       const { SerialLine } = await import("./cable/cable.mjs");
       const said = [];
@@ -211,8 +211,8 @@ def test_a_port_whose_stream_refuses_to_end_is_closed_all_the_same(line):
     assert line.rider.page.evaluate(script) == ["closed"]
 
 
-def test_after_a_disturbed_byte_the_line_goes_on(line):
-    """As Web Serial does it: the stream fails, and the port has another until the cable is pulled."""
+def test_line_continues_after_a_disturbed_byte(line):
+    """Like Web Serial: the stream fails, and the port gets another one until the cable is pulled."""
     script = """async () => {
       const { SerialLine } = await import("./cable/cable.mjs");
       const streams = [1, 2].map((byte) => {
@@ -233,7 +233,7 @@ def test_after_a_disturbed_byte_the_line_goes_on(line):
     assert line.rider.page.evaluate(script) == [[1, 2], True]
 
 
-def test_a_board_without_the_firmware_is_told_of_the_page_install(line, rider, board):
+def test_board_without_firmware_is_sent_to_page_install(line, rider, board):
     line.plug_in(RawPrompt(board))
     rider.page.click("#pull")
     rider.page.wait_for_selector("#pull:enabled:visible")
@@ -241,8 +241,8 @@ def test_a_board_without_the_firmware_is_told_of_the_page_install(line, rider, b
     assert board.resets == 1
 
 
-def test_without_a_board_a_simulated_one_is_watched(chromium, address):
-    """Also in a browser that cannot connect to a board, as a phone's: a lean to either side, said to be simulated."""
+def test_simulated_board_is_watched_without_a_real_one(chromium, address):
+    """Also in a browser that cannot connect to a board, such as a phone's: a lean to each side, marked as simulated."""
     rider = Rider(chromium, address + "live.html", **PHONE)
     rider.page.evaluate("document.documentElement.dataset.serial = 'no'")
     rider.page.click("#simulated")

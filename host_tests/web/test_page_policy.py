@@ -1,5 +1,5 @@
-"""The pages under their own content security policy, which the other tests switch off but for those of the page Rides:
-nothing they need is stopped."""
+"""The pages under their own content security policy, which the other tests switch off, except those of the page Rides:
+nothing they need is blocked."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""Rides given to the page: what it shows is what the commands say, and no file leaves it."""
+"""Rides given to the page: it shows the same as the commands, and no file leaves it."""
 
 import json
 import re
@@ -68,7 +68,7 @@ def test_the_lean_of_each_sample_is_that_of_the_command(page, ride, calibration,
     assert page.page.is_visible("#report")
 
 
-def test_what_the_site_does_not_give_is_not_saved(page, ride, calibration):
+def test_missing_file_of_the_site_is_not_saved(page, ride, calibration):
     page.show(ride, calibration)
     page.page.evaluate(MISSING, ["plotly.min.js", 404])
     page.page.click("#save-page")
@@ -77,7 +77,7 @@ def test_what_the_site_does_not_give_is_not_saved(page, ride, calibration):
     assert b"Plotly.newPlot" in page.saved("#save-page")
 
 
-def test_charts_that_a_browser_cannot_draw_are_not_waited_for(page, ride, calibration):
+def test_page_does_not_wait_for_impossible_charts(page, ride, calibration):
     before = list(page.rider.errors)
     page.page.evaluate(MISSING, ["plotly.min.js", 200])
     page.give(ride, calibration)
@@ -88,8 +88,8 @@ def test_charts_that_a_browser_cannot_draw_are_not_waited_for(page, ride, calibr
     page.rider.errors[:] = before  # without those of the frame that had no library
 
 
-def test_too_little_of_a_ride_is_said_at_its_top(page, calibration, tmp_path):
-    """In the words of the command; a bike that stands with its engine running does not ride."""
+def test_too_short_ride_is_reported_at_the_top(page, calibration, tmp_path):
+    """In the words of the command. A standing bike with a running engine is not riding."""
     random = np.random.default_rng(1)
     readings = random.normal(0.0, [0.03] * 3 + [1.0] * 3, (1200, 6)) + [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
     rows = [",".join(f"{value:.4f}" for value in (k / 100.0, *row)) for k, row in enumerate(readings.tolist())]
@@ -103,7 +103,7 @@ def test_too_little_of_a_ride_is_said_at_its_top(page, calibration, tmp_path):
     assert page.page.is_hidden("#terms")
 
 
-def test_the_charts_follow_the_dark(page, ride, calibration):
+def test_charts_follow_the_dark_theme(page, ride, calibration):
     page.show(ride, calibration)
     chart = page.page.frame_locator("#plot").locator("#chart")
     for scheme, filtered, paper in (("dark", True, "rgb(26, 29, 36)"), ("light", False, "rgb(255, 255, 255)")):
@@ -114,8 +114,8 @@ def test_the_charts_follow_the_dark(page, ride, calibration):
         assert (shown[0] != "none", shown[1]) == (filtered, paper)
 
 
-def test_what_is_pointed_at_is_said_in_one_line(page, ride, calibration):
-    """And of the many buttons of the charts' library two are left."""
+def test_values_at_the_pointer_are_in_one_line(page, ride, calibration):
+    """Only two of the chart library's many buttons remain."""
     page.show(ride, calibration)
     inside = page.page.frame_locator("#plot")
     inside.locator("#chart .main-svg").first.wait_for()
@@ -145,8 +145,8 @@ def test_once_used_it_works_without_a_network(chromium, address, ride, calibrati
     rider.context.close()
 
 
-def test_what_takes_too_long_can_be_stopped(page, ride, calibration):
-    """And other files taken in its place."""
+def test_long_work_can_be_stopped(page, ride, calibration):
+    """Then other files are used instead."""
     page.give()
     page.page.set_input_files("#files", [ride, calibration])
     page.page.click("#stop")
@@ -160,7 +160,7 @@ def test_what_takes_too_long_can_be_stopped(page, ride, calibration):
     assert not set(before) & set(page.page.workers)
 
 
-def test_what_was_stopped_leaves_no_report_whose_buttons_do_nothing(page, ride, calibration):
+def test_stopped_work_leaves_no_dead_buttons(page, ride, calibration):
     page.show(ride, calibration)
     page.page.evaluate("['#save-lean', '#stop'].forEach((button) => document.querySelector(button).click())")
     assert page.said() == "Stopped."
@@ -177,7 +177,7 @@ def test_axe_finds_nothing(page, ride, calibration, kind):
 
 
 @pytest.mark.nightly
-def test_thirty_megabytes_leave_the_page_awake(chromium, address, calibration, tmp_path):
+def test_page_responds_while_reading_thirty_megabytes(chromium, address, calibration, tmp_path):
     """Over half an hour at 200 samples a second: the page answers meanwhile, and its memory hardly grows."""
     short = app_exports.riding()
     readings = np.column_stack((short.force_g, short.rates_dps))

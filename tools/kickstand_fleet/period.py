@@ -11,14 +11,18 @@ from typing import Any
 import numpy as np
 from kickstand.drive_alignment.quality import AGREE_DEG
 from kickstand.drive_alignment.speed_check import fit_problem
-from kickstand.errors import AlignmentError
 from kickstand_tools.analysis.brake_tests import brake_tests
 from kickstand_tools.analysis.stops.brake_test import Stop
 from kickstand_tools.calibration.drive import DriveFit, fit_logs, usable
+from kickstand_tools.calibration.drive_refusals import Uncertain, of_firmware
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.common.errors import InputError, cause
+from kickstand_tools.checks.bends import LeftHanded
+from kickstand_tools.checks.sensor import AccelClipped, AxisDead, GyroSaturated
+from kickstand_tools.common.errors import InputError, RefusedInput, cause
+from kickstand_tools.logs.frozen import FrozenReadings
 from kickstand_tools.logs.log import Log
-from kickstand_tools.refusals import RefusedInput, sentence
+from kickstand_tools.logs.reader import CutLine
+from kickstand_tools.logs.source import CutGzip, NulEnd
 
 from . import evidence, files, signals
 from .forward import Forward, find_forward
@@ -26,11 +30,12 @@ from .manifest import Period
 from .moved import Move, find_moves
 
 UNREADABLE, CHANGED, NO_MEMORY, FAULT = "unreadable", "changed", "no-memory", "fault"
-NO_SPEED, MOVED, LEFT_HANDED = "no-speed", "mount-moved", "left-handed"
+NO_SPEED, MOVED = "no-speed", "mount-moved"
 # AFTERWARDS: the vehicle is aligned, but brake tests or signals of this log are missing. DISK_FULL: no space for
 # signals
 AFTERWARDS, DISK_FULL = "not-finished", "disk-full"
-_LEFT_OUT = ("cut-line", "cut-gzip", "nul-end", "frozen-readings")  # notices about parts of a log that are not used
+# Notices about parts of a log that are not used, or of a sensor that is ill
+_LEFT_OUT = (CutLine, CutGzip, NulEnd, FrozenReadings, AxisDead, GyroSaturated, AccelClipped)
 _SUSPECTS = (MOVED, "parts-differ", "uncertain")  # refusals of the firmware after which moves are searched
 _PLOTTED = 160  # intervals in a picture
 _AGAINST = -0.5  # evidence.handedness() below this, the gyro or the axes are mirrored
@@ -100,10 +105,10 @@ def _result(period: Period, signals_to: str | None) -> PeriodResult:
     aligned = not reason
     row = _alignment(period, "aligned" if aligned else "refused", reason, message, logs, len(errors), drive)
     errors += [
-        _error(period, log.name, notice.code, sentence(notice))
+        _error(period, log.name, notice.code, notice.line())
         for log in logs
         for notice in log.notices
-        if notice.code in _LEFT_OUT
+        if isinstance(notice, _LEFT_OUT)
     ]
     moved = [_vehicle_columns(period) | _moved_row(move, logs) for move in drive.moves]
     result = PeriodResult(row, moved, [], errors, _picture(drive))
@@ -141,16 +146,17 @@ def _refusal(drive: _Drive, logs: list[Log]) -> tuple[str, str]:
     fit, found = drive.fit, drive.found
     if drive.moves:
         return MOVED, _moved_words(drive.moves, logs)
-    problem = None
+    reason = None
     if _mirrored(drive.intervals):
-        problem = AlignmentError(LEFT_HANDED)
+        reason = LeftHanded()
     elif fit.reason == MOVED:
-        problem = fit_problem(fit.lag_s or 0.0, 1.0)  # if the speed is late, braking looks like a stop on another slope
+        late = fit_problem(fit.lag_s or 0.0, 1.0)  # if it is late, braking looks like a stop on another slope
+        reason = of_firmware(late) if late else None
     elif found and found.sure:
         return "", ""
     elif found and not fit.reason:
-        problem = AlignmentError("uncertain", found.sigma_deg, fit.used)
-    refusal = RefusedInput(problem) if problem else fit.refusal
+        reason = Uncertain(found.sigma_deg, fit.used)
+    refusal = RefusedInput(reason) if reason else fit.refusal
     return (refusal.code, str(refusal)) if refusal else ("", "")
 
 

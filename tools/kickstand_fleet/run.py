@@ -148,7 +148,7 @@ def _keep(directory: str, journal: Journal | StoreJournal, key: str, kept: Perio
         raise unshown
     full = next((row for row in missing if row["reason"] == DISK_FULL), None)
     if full:
-        raise InputError(f"{full['message']}; what is finished is kept, the same command goes on")
+        raise InputError(f"{full['message']}; finished work is kept: run the same command again to resume")
 
 
 def _marks(periods: list[Period]) -> dict[str, str]:

@@ -9,10 +9,10 @@
     stops = api.find_stops(api.vehicle_channels("RIDE.csv.gz", two.calibration))
 
 A log is a path, an open file of text or bytes, a Log made of arrays, or a Stretch of one of these. Tables have
-to_pandas(). What takes long takes `progress`, a function that is called with (done, total).
+to_pandas(). Long functions accept `progress`, a function that is called with (done, total).
 
-InputError says in one line what is wrong with what was given. Its subclass RefusedInput has the code and the values of
-a refusal of the firmware's (kickstand.errors). sentence() puts a notice or a refusal into words.
+InputError says in one line what is wrong with the input. Its subclass RefusedInput has the
+reason as a Message. A notice is a Message, too: a code, named fields, and sentence() puts it into words.
 """
 
 from .analysis.brake_tests import brake_tests as brake_tests
@@ -36,7 +36,8 @@ from .calibration.poses import (
     fit_two_positions as fit_two_positions,
 )
 from .calibration.procedure import fit_procedure as fit_procedure
-from .common.errors import InputError as InputError
+from .common.errors import InputError as InputError, RefusedInput as RefusedInput
+from .common.messages import Message as Message, sentence as sentence
 from .estimation.alignment import RideFit as RideFit, fit_ride as fit_ride
 from .estimation.smooth import SmoothedRide as SmoothedRide, smooth as smooth
 from .imports.importing import (
@@ -52,12 +53,11 @@ from .logs.csv_lines import cut_log as cut_log, write_log as write_log
 from .logs.log import Log as Log, Stretch as Stretch
 from .logs.reader import read_log as read_log
 from .overlay.overlay import Overlaid as Overlaid, overlay as overlay
-from .refusals import RefusedInput as RefusedInput, sentence as sentence
 from .replay.replay import LeanTable as LeanTable, replay as replay
 from .simulation import ride as _simulation
 from .web.site import site_files as site_files, write_site as write_site
 
 SimulatedRide, simulate_ride = _simulation.SimulatedRide, _simulation.ride
 
-# All of the above: without it pydoc leaves out what is imported
+# All names above: without it pydoc leaves out imported names
 __all__ = [name for name in dir() if not name.startswith("_")]  # pyright: ignore[reportUnsupportedDunderAll]

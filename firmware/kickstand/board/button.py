@@ -11,19 +11,19 @@ from ..units import const
 SHORT = 1
 LONG = 2
 
-_DEBOUNCE_MS = const(20)  # a change of the contact counts once it has lasted for this time
+_DEBOUNCE_MS = const(20)  # a change of the contact must last this long
 _LONG_MS = const(800)  # a press that lasts longer is a long one
 
 
 class Button:
-    """pin: a machine.Pin with pull-up, low while pressed. Call poll() about every 20 ms or more often."""
+    """A debounced push button. pin: a machine.Pin with pull-up, low while pressed. Call poll() at least every 20 ms."""
 
     def __init__(self, pin):
         self._pin = pin
         self._pressed = self._raw = self.held()
         self._changed_ms = None
         self._pressed_ms = 0
-        self._long_sent = True  # the press was reported as long; True also for one that began before this object
+        self._long_sent = True  # the long press was reported; also True for a press that began before this object
 
     def held(self):
         """True if the button is pressed now, not debounced."""

@@ -6,7 +6,8 @@
         display.tick(time.ticks_ms())  # one step of the work
         time.sleep_ms(10)
 
-A driver (hd44780.Lcd, oled.Oled) has these; host_tests/simulated_board/test_board_display.py tests each driver:
+A driver (hd44780.Lcd, oled.Oled) has the following members. host_tests/simulated_board/test_board_display.py tests each
+driver.
 
 begin(i2c, address, hz, fresh)  takes a display that has just answered. fresh: it may just have got its power.
 show(line1, line2, picture)     notes what to show. 16 characters a line, a str of codes below 256 or bytes.
@@ -16,7 +17,7 @@ busy                            True while something is left to be sent
 draws                           True if it shows pictures. A picture is (draw, values...): draw(canvas, values...) is
                                 called with a blank framebuf.FrameBuffer of 128x64 pixels. Others show the two lines.
 
-A display that lost its power or whose transfer failed is set up again, and dark or crossed out until it is right.
+After a loss of power or a failed transfer the display is set up again. It is dark or crossed out until it is correct.
 """
 
 from time import sleep_ms, ticks_diff, ticks_ms
@@ -30,21 +31,22 @@ _OLED_ADDRESSES = const((0x3C, 0x3D))
 ADDRESSES = (0x27, 0x3F) + _OLED_ADDRESSES  # the backpack's PCF8574 and PCF8574A with all jumpers open
 _FAMILY = tuple(range(0x20, 0x27)) + tuple(range(0x38, 0x3C)) + (0x3E,)  # a backpack's other addresses
 LCD_HZ, OLED_HZ = 100_000, 400_000  # the fastest clocks that a PCF8574 and the OLEDs allow
-STOPPED = "Kickstand", "stopped"  # what a display shows when the firmware has ended
+STOPPED = "Kickstand", "stopped"  # shown after the firmware has ended
 KINDS = ("auto", "lcd", "ssd1306", "sh1106", "ssd1306-32")
-_PROBE_MS = const(200)  # time between two searches for a display, while there is none
-MOST_WAIT_MS = 60_000  # the longest, while a driver cannot be loaded: each is twice as long as the last
-_REOPEN_PROBES = const(5)  # while there is no display the bus is freed once in so many probes
-_POWER_UP_MS = const(40)  # a display that is found sooner after power-on may have got its power with the board
+_PROBE_MS = const(200)  # time between two searches for a missing display
+MOST_WAIT_MS = 60_000  # longest such time: it doubles while a driver cannot be loaded
+_REOPEN_PROBES = const(5)  # without a display the bus is freed once per this many probes
+_POWER_UP_MS = const(40)  # a display found sooner after power-on may have got its power with the board
 _FLUSH_STEPS = const(60)
 _STEP_MS = const(5)
 
 
 class Display:
-    """A display that may be absent, or come and go.
+    """A display that may be absent, or be plugged in and out at any time.
 
-    reopen(hz): called to free the bus, returns it as a machine.I2C.  bus_hz: its clock; None: as the display allows.
-    kind: of KINDS.  addresses: to look for it at.  contrast, inverted: of an OLED.  wiring: of an LCD's backpack.
+    reopen(hz): frees the bus and returns it as a machine.I2C.  bus_hz: its clock; None: the fastest that the display
+    allows. kind: one of KINDS.  addresses: where to look for the display.  contrast, inverted: see Oled.  wiring: see
+    Lcd.
 
     address: where it was found, or None while no display answers.  draws: see above.
     """
@@ -56,7 +58,7 @@ class Display:
         self._addresses = addresses
         self._look = contrast, inverted
         self._wiring = wiring
-        self._oled = False  # the driver is that of an OLED
+        self._oled = False  # the driver is an Oled
         self._i2c = self._driver = None
         self._wanted = "", "", None
         self._status = bytearray(1)
@@ -68,13 +70,13 @@ class Display:
         self._fresh = ticks_ms() < _POWER_UP_MS
 
     def show(self, line1, line2, picture=None):
-        """Set what to show, to be sent by tick()."""
-        self._wanted = line1, line2, picture  # for the driver of what is plugged in next
+        """Set the lines and the picture. tick() sends them."""
+        self._wanted = line1, line2, picture  # also for the driver of the next display
         if self._driver:
             self._driver.show(line1, line2, picture)
 
     def tick(self, now_ms):
-        """Do the next step of the work. Call it about every 10 ms. now_ms: ticks_ms().
+        """Do the next step of the display's work. Call it about every 10 ms. now_ms: ticks_ms().
 
         Raises SettingsError for pins that cannot be used, and nothing else."""
         try:
@@ -89,7 +91,7 @@ class Display:
             self._fresh = True
 
     def flush(self):
-        """Send everything now, in about 0.1 s: for what is shown before the loop runs or after it has failed."""
+        """Send everything now, in about 0.1 s. For texts shown before the loop runs or after it has failed."""
         self._probed_ms = None
         for _ in range(_FLUSH_STEPS):
             self.tick(ticks_ms())
@@ -98,9 +100,9 @@ class Display:
             sleep_ms(_STEP_MS)
 
     def end(self, line1, line2):
-        """Show two lines for good, because the firmware ends. Raises nothing, and Ctrl-C does not interrupt it.
+        """Show two lines until power-off, because the firmware ends. Raises nothing; Ctrl-C does not interrupt it.
 
-        The display is set up again: what ends the firmware may have interrupted a transfer."""
+        The display is set up again, because a transfer may have been interrupted."""
         interrupt = getattr(micropython, "kbd_intr", None)  # computers have none
         if interrupt:
             interrupt(-1)
@@ -110,7 +112,7 @@ class Display:
                 self._fresh = True
                 self.show(line1, line2)
                 self.flush()
-        except Exception:  # of pins, drivers, memory: there is nobody left to report it to
+        except Exception:  # pins, drivers, memory: nobody is left to report it to
             pass
         finally:
             if interrupt:
@@ -118,9 +120,7 @@ class Display:
 
     def _probe(self):
         """Look for the display at each address."""
-        if (
-            self._probes % _REOPEN_PROBES == 0
-        ):  # a stuck bus has to be freed, but to do so each time would take too long
+        if self._probes % _REOPEN_PROBES == 0:  # a stuck bus must be freed, but not each time: that takes too long
             self._i2c = self._reopen(self._bus_hz or LCD_HZ)
         self._probes += 1
         for address in self._addresses:
@@ -129,7 +129,7 @@ class Display:
         other = _FAMILY[self._probes % len(_FAMILY)]
         if self._addresses is ADDRESSES and self._kind in ("auto", "lcd") and self._answers(other):
             return
-        # Not found: if it answers later it was just powered, and may be another one
+        # Not found: a display that answers later has just got its power, and may be another one
         self._fresh = True
         self._wait_ms = _PROBE_MS
 
@@ -139,7 +139,7 @@ class Display:
         except OSError:
             return False
         self._probes = 0
-        if attempt(self._begin, address):  # its driver is missing, or has no memory
+        if attempt(self._begin, address):  # its driver is missing, or memory is short
             self._wait_ms = min(2 * self._wait_ms, MOST_WAIT_MS)
         else:
             self.address, self._wait_ms = address, _PROBE_MS

@@ -1,22 +1,22 @@
 """Driver for an HD44780 character display, 16x2 or larger, behind a PCF8574 port expander (the usual I2C backpack).
-display.py finds it, and says what its methods do.
+display.py finds it and describes its methods.
 
-Sources: data sheets Hitachi HD44780U (ADE-207-272) and NXP PCF8574. The display is driven in 4-bit mode. The part of a
-line that has changed is sent in two transfers, dashes and then the text, each of 6 ms for a whole line at 100 kHz.
+Sources: data sheets Hitachi HD44780U (ADE-207-272) and NXP PCF8574. The display is driven in 4-bit mode. The changed
+part of a line is sent in two transfers, first dashes, then the text. Each takes 6 ms for a whole line at 100 kHz.
 
-Backpacks differ in which pin of the PCF8574 goes where: see WIRINGS. R/W, which stays low, is between RS and E.
+Backpacks connect the pins of the PCF8574 differently: see WIRINGS. R/W, which stays low, is between RS and E.
 """
 
 from time import ticks_diff, ticks_ms
 
 from micropython import const
 
-# By LCD_WIRING - 1: the bits of RS and E, the bit that lights the backlight, and True if D4 to D7 are P0 to P3
+# By LCD_WIRING - 1: the bits of RS, E and the backlight, and True if D4 to D7 are P0 to P3
 WIRINGS = (
     (0x01, 0x04, 0x08, False),  # the usual one: P0 RS, P2 E, P3 light
     (0x40, 0x10, 0x00, True),  # MJKDZ, GY-IICLCD: P6 RS, P4 E, P7 light, on while low
     (0x10, 0x40, 0x80, True),  # P4 RS, P6 E, P7 light
-    (0x01, 0x04, 0x00, False),  # as the usual one, but the light is on while P3 is low
+    (0x01, 0x04, 0x00, False),  # like the usual one, but the light is on while P3 is low
 )
 _LINE_ADDRESSES = (0x80, 0xC0)  # instruction "set DDRAM address" for the beginning of each line (table 6)
 _CGRAM_ADDRESS = const(0x40)  # instruction "set CGRAM address" (table 6)
@@ -24,28 +24,28 @@ _CGRAM_ADDRESS = const(0x40)  # instruction "set CGRAM address" (table 6)
 _COLUMNS = const(16)
 _DASHES = b"-" * _COLUMNS
 _NO_TEXT = "\n"
-_NEVER = b"\xfe" * _COLUMNS  # a character code that no text uses: marks a line as not yet written
-# Time between initialisations: noise can put the nibbles out of step, and nothing else repairs that
+_NEVER = b"\xfe" * _COLUMNS  # a code that no text uses: marks a line as not yet written
+# Time between initialisations. Only they bring the nibbles back into step after electrical noise.
 _REINIT_MS = const(10_000)
-_PROBE_MS = const(200)  # time between two checks whether the display is still connected
+_PROBE_MS = const(200)  # time between two checks that the display is connected
 _STEP_MS = const(5)  # time between two steps: the longest wait that the initialisation requires is 4.1 ms
-_POWER_UP = const(-8)  # the first step after power-up, for 40 ms of which the display takes no instruction
+_POWER_UP = const(-8)  # first step after power-up: the display takes no instruction for 40 ms
 
-# Initialisation by instruction (data sheet, figure 24), one step a tick, _STEP_MS apart, so that the loop never waits.
-# First single nibbles, which bring the display into 4-bit mode from whatever state it was in. Then whole bytes:
-# function set (4 bit, 2 lines); display on, no cursor; entry mode left to right; return home, which undoes a shift. The
-# first three take 37 us each, less than a transfer.
+# Initialisation by instruction (data sheet, figure 24), one step per tick, _STEP_MS apart: the loop never waits. First
+# single nibbles, which bring the display into 4-bit mode from any state. Then whole bytes: function set (4 bit, 2
+# lines); display on, no cursor; entry mode left to right; return home, which undoes a shift. The first three need 37 us
+# each, less than a transfer takes.
 _NIBBLES = (0x30, 0x30, 0x30, 0x20)
 _COMMANDS = b"\x28\x0c\x06\x02"
 _GLYPH_PARTS = const(4)  # the 64 bytes of character patterns are sent 16 at a time
-# The display memory of a line is longer than 16 characters. What is behind them is visible on a larger display, 20x4 or
-# 20x2: it is blanked, one line a step.
+# The memory of a line is longer than 16 characters. A larger display, 20x4 or 20x2, shows the rest: it is blanked, one
+# line per step.
 _BEHIND = const(24)
 _STEPS = len(_NIBBLES) + 1 + _GLYPH_PARTS + 2
 
 
 def _bar_glyphs():
-    """64 bytes, the patterns of characters 0 to 7: 1 to 4 of 5 columns filled from the left, then 1 to 4 from the
+    """The patterns of characters 0 to 7, 64 bytes: 1 to 4 of 5 columns filled from the left, then 1 to 4 from the
     right."""
     rows = bytearray()
     for columns in range(1, 5):
@@ -56,7 +56,7 @@ def _bar_glyphs():
 
 
 class Lcd:
-    """The driver; display.py says what its methods do, and finds it."""
+    """The driver. display.py describes its methods."""
 
     draws = False
 
@@ -65,8 +65,8 @@ class Lcd:
         self._rs, self._e, self._light, self._low = WIRINGS[wiring - 1]
         self._wanted = [bytearray(b" " * _COLUMNS), bytearray(b" " * _COLUMNS)]
         self._shown = [bytearray(_COLUMNS), bytearray(_COLUMNS)]
-        self._texts = [_NO_TEXT, _NO_TEXT]  # the text that each line showed last, if it was a str
-        self._changed = True  # a line may have to be sent
+        self._texts = [_NO_TEXT, _NO_TEXT]  # the last text of each line, if it was a str
+        self._changed = True  # a line may need sending
         self._packed = bytearray(4 * (_BEHIND + 1))
         self._port = bytearray(1)
         self._glyphs = _bar_glyphs()
@@ -74,7 +74,7 @@ class Lcd:
     def begin(self, i2c, address, hz, fresh):
         self._i2c = i2c
         self._address = address
-        # of the initialisation; negative: waiting for the display's own power-up
+        # step of the initialisation; negative: waiting for the display's own power-up
         self._step = _POWER_UP if fresh else 0
         self._acted_ms = ticks_ms()  # when something was last sent
         self._seen_ms = 0  # when the display last answered
@@ -85,13 +85,13 @@ class Lcd:
         return self._changed or self._step < _STEPS
 
     def show(self, line1, line2, picture=None):
-        """Note what tick() sends: two lines, str or bytes, padded or cut to 16 characters. Codes 0 to 7 show the
-        patterns of _bar_glyphs(), the others those of the display's ROM. picture: not used."""
+        """Set the two lines that tick() sends: str or bytes, padded or cut to 16 characters. Codes 0 to 7 show the
+        patterns of _bar_glyphs(), other codes those of the display's ROM. picture: not used."""
         self._put(0, line1)
         self._put(1, line2)
 
     def tick(self, now_ms):
-        """At most one line, or one step of the initialisation."""
+        """Send at most one line, or do one step of the initialisation."""
         if ticks_diff(now_ms, self._acted_ms) < _STEP_MS:
             return
         if self._step < _STEPS:
@@ -102,7 +102,7 @@ class Lcd:
                 self._initialise(self._step)
             self._step += 1
             self._init_ms = self._seen_ms = now_ms
-        elif self._changed and self._refresh():  # first: what is shown may be too old to stay
+        elif self._changed and self._refresh():  # first, because the shown text may be too old
             self._seen_ms = self._acted_ms = now_ms
         elif ticks_diff(now_ms, self._seen_ms) >= _PROBE_MS:
             self._seen_ms = self._acted_ms = now_ms
@@ -114,7 +114,7 @@ class Lcd:
     def _put(self, number, text):
         line = self._wanted[number]
         if isinstance(text, str):
-            if text == self._texts[number]:  # mostly so; converting it would take 0.2 ms
+            if text == self._texts[number]:  # the usual case; a conversion takes 0.2 ms
                 return
             self._texts[number] = text
             for i in range(_COLUMNS):
@@ -137,7 +137,7 @@ class Lcd:
         else:
             quarter = (step - len(_NIBBLES) - 1) * _COLUMNS
             self._send(_CGRAM_ADDRESS + quarter, memoryview(self._glyphs)[quarter : quarter + _COLUMNS])
-            for shown in self._shown:  # both lines have to be written again
+            for shown in self._shown:  # write both lines again
                 shown[:] = _NEVER
             self._changed = True
 
@@ -150,7 +150,7 @@ class Lcd:
         return not self._port[0] & self._e
 
     def _refresh(self):
-        """Send the changed part of one line; False if no line has changed."""
+        """Send the changed part of one line. Return False if no line has changed."""
         for i in (0, 1):
             wanted, shown = self._wanted[i], self._shown[i]
             if shown != wanted:
@@ -163,7 +163,7 @@ class Lcd:
                 while shown[last] == wanted[last]:
                     last -= 1
                 at = _LINE_ADDRESSES[i] + first
-                if last > first:  # a transfer that breaks off must not leave half a number or the wrong side
+                if last > first:  # an interrupted transfer must not leave half a number or the wrong side
                     self._send(at, memoryview(_DASHES)[first : last + 1])
                 self._send(at, memoryview(wanted)[first : last + 1])
                 shown[:] = wanted

@@ -1,4 +1,4 @@
-"""Opens I2C buses, and frees one that a device holds (NXP UM10204, section 3.1.16, bus clear)."""
+"""Opens I2C buses, and frees a bus that a device blocks (NXP UM10204, section 3.1.16, bus clear)."""
 
 from time import sleep_us
 
@@ -7,7 +7,7 @@ from machine import Pin
 from . import port
 
 _HALF_PERIOD_US = 5  # half a period of SCL while a bus is freed: 100 kHz
-# Time-out in bit times. On rp2 it is for a whole transfer, which has 136 bytes at most, on an ESP32 for a bit.
+# Time-out in bit times. On rp2 it is for a whole transfer of at most 136 bytes, on an ESP32 for one bit.
 # The default of 50 ms would stop the loop for too long.
 _TIMEOUT_BITS = 2000
 
@@ -18,10 +18,10 @@ def _set(pin, value):
 
 
 def free(sda_pin, scl_pin):
-    """Make a device that holds SDA low let go of it; True if SDA is high afterwards. Pins: GPIO numbers.
+    """Make a device release SDA. Return True if SDA is high afterwards. Pins: GPIO numbers.
 
-    A microcontroller that was reset in the middle of a read leaves the device waiting for clocks, with SDA low for
-    ever. Up to nine clocks let it finish its byte; a STOP condition ends the transfer. MicroPython does not do this.
+    If the microcontroller resets in the middle of a read, the device waits for clocks and holds SDA low forever. Up to
+    nine clocks let it finish its byte; a STOP condition ends the transfer. MicroPython does not do this.
     """
     scl = Pin(scl_pin, Pin.OPEN_DRAIN, value=1)
     sda = Pin(sda_pin, Pin.OPEN_DRAIN, value=1)
@@ -39,7 +39,7 @@ def free(sda_pin, scl_pin):
 
 
 def open_i2c(controller, sda_pin, scl_pin, frequency):
-    """Free the bus and return it, see port.open_i2c(). controller: its number.  Pins: GPIO numbers.  frequency: in Hz.
+    """Free the bus and open it: see port.open_i2c(). controller: its number.  Pins: GPIO numbers.  frequency: in Hz.
 
     Raises OSError if SDA stays low, ValueError for pins that the controller cannot use."""
     if not free(sda_pin, scl_pin):

@@ -1,8 +1,8 @@
-"""Driver for an OLED of 128x64 pixels with an SSD1306 or SH1106, or of 128x32 with an SSD1306. display.py finds it, and
-says what its methods do.
+"""Driver for an OLED of 128x64 pixels with an SSD1306 or SH1106, or of 128x32 with an SSD1306. display.py finds it and
+describes its methods.
 
-Sources: data sheets Solomon Systech SSD1306 rev 1.1 and Sino Wealth SH1106 V2.3. Both are addressed page by page, which
-is 8 rows, because an SH1106 knows no other way. It has 132 columns, of which the panel shows the middle ones.
+Sources: data sheets Solomon Systech SSD1306 rev 1.1 and Sino Wealth SH1106 V2.3. Both are addressed by pages of 8 rows,
+the only way that an SH1106 has. It has 132 columns; the panel shows the middle ones.
 """
 
 from time import ticks_add, ticks_diff, ticks_ms
@@ -12,34 +12,34 @@ import framebuf
 from ..units import const
 
 WIDTH, HEIGHT = 128, 64
-# The picture is sent in parts of _PART columns of a page, each only if it has changed. A part takes 0.9 ms at 400 kHz,
-# 3.5 ms at 100 kHz; _PARTS of them are sent in one pass of the loop, _PARTS_SLOW on a bus slower than _SLOW_HZ.
+# The picture is sent in parts of _PART columns of a page, and only changed parts are sent. A part takes 0.9 ms at 400
+# kHz, 3.5 ms at 100 kHz. One pass of the loop sends _PARTS of them, or _PARTS_SLOW on a bus slower than _SLOW_HZ.
 _PART = 32
 _PARTS, _PARTS_SLOW, _SLOW_HZ = 3, 2, 200_000
-_PROBE_MS = const(200)  # time between two checks whether it has kept its power
-_REFRESH_MS = const(10_000)  # send everything again so often: nothing else repairs what noise has changed
+_PROBE_MS = const(200)  # time between two checks that it has kept its power
+_REFRESH_MS = const(10_000)  # time until everything is sent again: this repairs the effects of electrical noise
 _POWER_UP_MS = 40
 _OFF = 0x40  # bit of the status
-_SH1106_STATUS = (0x08, 0x00, 0x0C)  # low half of the status; of an SSD1306 it is 3 or 6, or that of a clone
+_SH1106_STATUS = (0x08, 0x00, 0x0C)  # low half of the status; an SSD1306 has 3 or 6, or a clone's value
 _SH1106_OFFSET = 2  # its first visible column
-# Rows by which the picture is shifted, each for _SHIFT_REFRESHES: the same pixels must not glow for ever. The rows that
-# leave at the top come back at the bottom, so pictures leave the first two blank.
+# Rows by which the picture is shifted, each for _SHIFT_REFRESHES, to spare the pixels. Rows shifted out at the top
+# return at the bottom, so pictures leave the first two blank.
 _SHIFTS = (0, 1, 2, 1)
 _SHIFT_REFRESHES = const(6)
-# A panel of 32 rows has none to spare: its picture moves down, over the two blank rows below the letters.
+# A panel of 32 rows has no spare rows: its picture moves down, over the two blank rows below the letters.
 _SHIFTS_32 = (0, 63, 62, 63)
 # Control byte of a stream of commands, then: clock, rows - 1, no offset, columns and rows from the side opposite to the
 # cable, COM pins alternate (64 rows) or in sequence (32), pre-charge, VCOMH, show the RAM
 _SET_UP = b"\x00\xd5\x80\xa8\x3f\xd3\x00\xa1\xc8\xda\x12\xd9\xf1\xdb\x40\xa4"
 _SET_UP_32 = b"\x00\xd5\x80\xa8\x1f\xd3\x00\xa1\xc8\xda\x02\xd9\xf1\xdb\x40\xa4"
-# An SH1106's DC-DC converter; an SSD1306's charge pump, page addressing, no scrolling. Each ignores the other's. The
-# status of a clone may be that of either, and without its own the panel would stay dark.
+# The SH1106's DC-DC converter; the SSD1306's charge pump, page addressing, no scrolling. Each ignores the other's
+# commands. A clone's status may be that of either chip, so all are sent: without its own the panel would stay dark.
 _SUPPLY = b"\xad\x8b\x8d\x14\x20\x02\x2e"
 _SPREAD = bytes((i & 1) * 3 | (i & 2) * 6 | (i & 4) * 12 | (i & 8) * 24 for i in range(16))  # each bit twice
 
 
 class Canvas(framebuf.FrameBuffer):
-    """What pictures are drawn on: a FrameBuffer of 128x64 pixels, and letters of twice the height."""
+    """The canvas of pictures: a FrameBuffer of 128x64 pixels that can write letters of twice the height."""
 
     def __init__(self, pixels):
         super().__init__(pixels, WIDTH, HEIGHT, framebuf.MONO_VLSB)
@@ -58,8 +58,10 @@ class Canvas(framebuf.FrameBuffer):
 
 
 class Oled:
-    """kind: "ssd1306", "sh1106", "auto", or "ssd1306-32": a panel of 32 rows, which shows the two lines alone.
-    contrast: 0 to 255.  inverted: dark on bright.
+    """The driver. display.py describes its methods.
+
+    kind: "ssd1306", "sh1106", "auto", or "ssd1306-32": a panel of 32 rows, which shows only the two lines. contrast: 0
+    to 255.  inverted: dark on bright.
 
     canvas: the Canvas on which pictures are drawn.
     """
@@ -71,13 +73,14 @@ class Oled:
         self._pixels = bytearray(WIDTH * HEIGHT // 8)
         self._sent = bytearray(WIDTH * HEIGHT // 8)
         self.canvas = Canvas(self._pixels)
-        # part by part, the pixels to show and those that were sent: a digit's parts, one below the other, in a row
+        # the pixels to show and those sent, part by part; parts of the same columns follow each other, so a digit is
+        # sent at once
         self._pages = HEIGHT // 8 if self.draws else HEIGHT // 16
         starts = [page * WIDTH + x for x in range(0, WIDTH, _PART) for page in range(self._pages)]
         self._new, self._old = [
             [memoryview(pixels)[at : at + _PART] for at in starts] for pixels in (self._pixels, self._sent)
         ]
-        # a transfer: three commands, each behind a control byte, and then data
+        # a transfer: three commands, each after a control byte, then data
         self._packet = bytearray(b"\x80\xb0\x80\x00\x80\x10\x40") + bytearray(_PART)
         self._status = bytearray(1)
         self._wanted = self._drawn = "", ""
@@ -91,13 +94,13 @@ class Oled:
         self._restart()
 
     def _restart(self):
-        # asked each time: it may be another one that was plugged in
+        # check each time: another display may be plugged in
         self._sh1106 = self._kind == "sh1106" or (self._kind == "auto" and self._state() & 0x0F in _SH1106_STATUS)
         self._set_up = self._lit = False
         self._send_all()
 
     def _send_all(self):
-        self._unsent = len(self._new)  # so many parts have to be sent, changed or not
+        self._unsent = len(self._new)  # number of parts to send, changed or not
         self._changed = True
 
     @property
@@ -105,7 +108,7 @@ class Oled:
         return not self._lit or self._changed or self._drawn is not self._wanted
 
     def show(self, line1, line2, picture=None):
-        """Without a picture: the lines, in letters of twice their height. Codes as of an HD44780, see hd44780.py."""
+        """Set the picture, or without one the two lines, in letters of double height. Codes: those of hd44780.py."""
         wanted = (self.draws and picture) or tuple(
             [line if isinstance(line, str) else bytes(line) for line in (line1, line2)]
         )
@@ -113,11 +116,11 @@ class Oled:
             self._wanted = wanted
 
     def tick(self, now_ms):
-        """Draw, or send some parts that have changed, or ask whether it is still on. A picture that is being sent does
-        not change."""
+        """Draw, or send some changed parts, or check the display's power. A picture does not change while it is being
+        sent."""
         if ticks_diff(now_ms, self._due_ms) < 0:
             return
-        if not self._set_up:  # dark, until its RAM has been written
+        if not self._set_up:  # dark until its RAM is written
             self._command(b"\x00\xae")
             self._configure()
             self._draw(self._wanted)
@@ -155,7 +158,7 @@ class Oled:
         self._command((_SET_UP if self.draws else _SET_UP_32) + _SUPPLY + self._look + bytes((0x40 | shift,)))
 
     def _send(self):
-        """Send the first parts that have changed, or have to be sent anyway."""
+        """Send the first parts that have changed or must be sent anyway."""
         packet, left = self._packet, self._most
         for k in range(len(self._new)):
             new, old = self._new[k], self._old[k]
@@ -185,7 +188,7 @@ class Oled:
 
 
 def character(canvas, code, x, y):
-    """One of 8x8 pixels. code: of an HD44780's ROM, or one of the patterns of hd44780.py."""
+    """Draw a character of 8x8 pixels at x, y. code: of an HD44780's ROM, or one of the patterns of hd44780.py."""
     if code < 8:
         columns = (code & 3) + 1
         canvas.fill_rect(x if code < 4 else x + 8 - 2 * columns, y, 2 * columns, 8, 1)

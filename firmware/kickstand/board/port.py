@@ -1,7 +1,7 @@
-"""What differs from board to board: default pins, I2C, interrupts, the SD card's driver, how a watchdog is disarmed,
-and how the heap grows.
+"""The differences between boards: default pins, I2C, interrupts, the SD card's driver, how to disarm the watchdog, and
+how the heap grows.
 
-No other module asks which board it runs on.
+No other module depends on the kind of board.
 """
 
 import gc
@@ -9,107 +9,109 @@ import sys
 
 import machine
 
-# Collect garbage often while the other modules are loaded. Else their garbage would push what stays to the far end of
-# the heap, and every later collection would have to walk all of it. App resets the threshold before its loop begins.
+# Collect garbage often while the other modules are loaded. Otherwise lasting objects would be placed behind the
+# garbage, far along the heap, and every later collection would scan all of it. App resets the threshold before its loop
+# begins.
 gc.threshold(80_000)
 
 IS_ESP32 = sys.platform == "esp32"
-# The board and then its chip, as "Raspberry Pi Pico with RP2040" or "ESP32C3 module with ESP32-C3"
+# The board and its chip, such as "Raspberry Pi Pico with RP2040" or "ESP32C3 module with ESP32-C3"
 MACHINE = getattr(sys.implementation, "_machine", "")
 
 if IS_ESP32:
-    _KNOWN = MACHINE.startswith("Generic ESP32 module")  # ESP32-DevKitC and its like, of the classic chip
+    _KNOWN = MACHINE.startswith("Generic ESP32 module")  # ESP32-DevKitC and similar, with the classic chip
     SENSOR_PINS, LCD_PINS, BUTTON_PIN = (21, 22), (18, 19), 4  # (SDA, SCL)
     GPS_UART, GPS_PINS, WHEEL_PIN = 2, (17, 16), 27  # (TX, RX)
     if "SPIRAM" in MACHINE:  # MicroPython's image for PSRAM, which takes 16 and 17, has no Pin for these
         GPS_PINS = None, None
-    PIN_IRQ = {}  # further arguments of Pin.irq(): this port has soft interrupts only, which SoftI2C keeps waiting
+    PIN_IRQ = {}  # more arguments of Pin.irq(): this port has only soft interrupts, which wait during SoftI2C transfers
     I2C_NUMBERED = False  # see open_i2c()
     SD_SPI = (2, 3)  # the slots of machine.SDCard that are SPI
-    # Pins that the chip itself needs: those of its own USB (driving one cuts the board off from the computer until BOOT
-    # is held), those of a classic chip's flash (6 to 11; driving one crashes the board at each start) and its console's
-    _CHIP = MACHINE.split(" with ESP32")[-1].lstrip("-")[:2]  # "S2", "C3", ...; of a classic one "", "UN", "D2" or "PI"
+    # Pins that the chip itself needs: its own USB (driving one cuts the board off from the computer until BOOT is
+    # held), a classic chip's flash (6 to 11; driving one crashes the board at each start) and its console
+    _CHIP = MACHINE.split(" with ESP32")[-1].lstrip("-")[:2]  # "S2", "C3", ...; classic: "", "UN", "D2" or "PI"
     _CLASSIC = not (_CHIP[:1] in ("S", "C", "H", "P") and _CHIP[1:].isdigit())
     TAKEN_PINS = {"S2": (19, 20), "S3": (19, 20), "C3": (18, 19), "C6": (12, 13), "H2": (26, 27)}.get(
         _CHIP, (1, 3, 6, 7, 8, 9, 10, 11) if _CLASSIC else ()
     )
-    INPUT_PINS = (34, 35, 36, 37, 38, 39) if _CLASSIC else ()  # they have no output and no pull-up
-else:  # Raspberry Pi Pico and Pico 2, and boards of other makers that have its pins and its name
+    INPUT_PINS = (34, 35, 36, 37, 38, 39) if _CLASSIC else ()  # no output and no pull-up
+else:  # Raspberry Pi Pico and Pico 2, and other makers' boards with the same pins and name
     _KNOWN = sys.platform != "rp2" or "Pico" in MACHINE
     SENSOR_PINS, LCD_PINS, BUTTON_PIN = (4, 5), (6, 7), 15
     GPS_UART, GPS_PINS, WHEEL_PIN = 1, (8, 9), 14
-    PIN_IRQ = {"hard": True}  # a soft interrupt is lost while the display is written to
+    PIN_IRQ = {"hard": True}  # a soft interrupt is lost during a transfer to the display
     I2C_NUMBERED = True  # two buses need two numbers
     SD_SPI = (0, 1)  # the numbers of machine.SPI
     TAKEN_PINS = INPUT_PINS = ()
-if not _KNOWN:  # these pins may be missing, or connected to something else on the board
+if not _KNOWN:  # these pins may be missing or used otherwise on the board
     SENSOR_PINS = LCD_PINS = GPS_PINS = None, None
     BUTTON_PIN = WHEEL_PIN = None
     GPS_UART = 1
 
 
-_SOFT_I2C_HZ = 250_000  # half a period of 2 us: at 400 kHz SoftI2C's would be 1 us, and the MPU6050 needs 1.3
-_TURN_BYTES = 2800  # bytes of heap that one pass of the app's loop uses
+_SOFT_I2C_HZ = 250_000  # half a period of 2 us: at 400 kHz SoftI2C has 1 us, but the MPU6050 needs 1.3
+_TURN_BYTES = 2800  # bytes of heap used by one pass of the app's loop
 _FEWEST_TURNS = 3
 
 _WATCHDOG_MS = 8000  # rp2 allows 8388 at most
-_WEEK_MS = 604_800_000  # a time-out of a week: an ESP32 counts it in 32 bits, four to a millisecond, so 12 days at most
+_WEEK_MS = 604_800_000  # an ESP32 counts a time-out in 32 bits, four counts per ms: 12 days at most
 
 _watchdog = None
 
 
 def open_i2c(controller, sda, scl, frequency, timeout_us):
-    """A machine.I2C or SoftI2C. controller: its number, which an ESP32 does not need.  Pins: machine.Pin.
+    """Open a machine.I2C or SoftI2C. controller: its number, which an ESP32 does not need.  Pins: machine.Pin.
 
     Raises ValueError for pins that the controller cannot use. An ESP32's machine.I2C is not used. Up to MicroPython
-    1.28 it waits up to 0.1 s for each byte of a transfer that stalls, whatever the time-out: longer than the watchdog.
-    Later ones count the time-out in ticks of 10 ms, so that with 5 ms every transfer fails. And a C3 has only one."""
+    1.28 it ignores the time-out and waits up to 0.1 s for each byte of a stalled transfer: longer than the watchdog
+    allows. Later versions count the time-out in ticks of 10 ms: with 5 ms every transfer fails. And a C3 has only
+    one."""
     if IS_ESP32:
         return machine.SoftI2C(scl, sda, freq=min(frequency, _SOFT_I2C_HZ), timeout=timeout_us)
     return machine.I2C(controller, sda=sda, scl=scl, freq=frequency, timeout=timeout_us)
 
 
 def turns_to_collect(most):
-    """The number of passes of the app's loop between two garbage collections: `most`, or fewer where the heap is small.
+    """The number of passes of the app's loop between two garbage collections: `most`, or fewer if the heap is small.
 
-    An ESP32's heap starts with 64 KB and grows only when a collection has not helped. It would be collected again and
-    again in the middle of a pass."""
+    An ESP32's heap starts with 64 KB and grows only after a collection that frees too little. With `most`, collections
+    would often run in the middle of a pass."""
     if not IS_ESP32:
         return most
     import esp32  # type: ignore[import-not-found]
 
-    # mem_free() counts what the heap could grow by, the largest block of ESP-IDF's heap, as free
+    # mem_free() also counts the possible growth as free: the largest block of ESP-IDF's heap
     grow = max(region[2] for region in esp32.idf_heap_info(esp32.HEAP_DATA))
     return max(_FEWEST_TURNS, min(most, (gc.mem_free() - grow) // (2 * _TURN_BYTES)))
 
 
 def start_watchdog():
-    """Start and return a machine.WDT: the board resets itself when its feed() is not called for 8 s."""
+    """Start and return a machine.WDT. The board resets if its feed() is not called for 8 s."""
     global _watchdog
     _watchdog = machine.WDT(timeout=_WATCHDOG_MS)
     return _watchdog
 
 
 def rest_watchdog():
-    """Keep the watchdog, if it was started, from resetting the board.
+    """Stop a started watchdog from resetting the board.
 
-    After Ctrl-C nothing feeds it any more, and a board that resets in the middle of a copy cannot be deployed to.
-    machine.WDT has no way to stop it."""
+    After Ctrl-C nothing feeds it any more, and a reset in the middle of a copy would break an installation. machine.WDT
+    cannot be stopped."""
     if _watchdog is None:
         return
     if IS_ESP32:
-        machine.WDT(timeout=_WEEK_MS)  # an ESP32 accepts a new time-out, and keeps it through a soft reset
+        machine.WDT(timeout=_WEEK_MS)  # an ESP32 accepts a new time-out and keeps it through a soft reset
         return
     # Data sheets RP2040 section 4.7.6 and RP2350 section 12.9.7: ENABLE is bit 30 of the watchdog's CTRL, at its base
-    # address. Sections 2.1.2 and 2.1.3: a write to an address plus 0x3000 clears the bits that are 1.
+    # address. Sections 2.1.2 and 2.1.3: a write to address + 0x3000 clears the bits that are 1.
     base = 0x400D8000 if "RP2350" in getattr(sys.implementation, "_machine", "") else 0x40058000
     machine.mem32[base + 0x3000] = 1 << 30
 
 
 def open_sd_card(number, sck, mosi, miso, cs):
-    """The card as a block device for os.mount(). number: one of SD_SPI.  Pins: machine.Pin.
+    """Open the card as a block device for os.mount(). number: one of SD_SPI.  Pins: machine.Pin.
 
-    Raises ImportError if the driver is missing, OSError for no card, ValueError for wrong pins."""
+    Raises ImportError if the driver is missing, OSError without a card, ValueError for wrong pins."""
     if IS_ESP32:
         from machine import SDCard
 

@@ -1,4 +1,4 @@
-"""The SD card on SPI whose pins config.py names."""
+"""Mounts the SD card on the SPI pins set in config.py."""
 
 import os
 
@@ -11,10 +11,10 @@ MOUNT = "/sd"
 
 
 def mount(settings):
-    """Mount the card, unless it is mounted; return its directory. settings: a Settings. Raises CardError.
+    """Mount the card unless it is mounted; return its directory. settings: a Settings. Raises CardError.
 
-    For a card that does not get ready this takes 5 s or more."""
-    # A mounted card is listed without a size. A folder in the flash, to which a card's files were copied, has one.
+    With a card that does not become ready this takes 5 s or more."""
+    # A mounted card is listed without a size. A folder in flash with the same name has one.
     if any(entry[0] == MOUNT[1:] and len(entry) == 3 for entry in os.ilistdir("/")):
         return MOUNT
     pins = settings.SD_SCK, settings.SD_MOSI, settings.SD_MISO, settings.SD_CS
@@ -23,6 +23,6 @@ def mount(settings):
         os.mount(card, MOUNT)
     except ImportError:
         raise CardError("no-driver")
-    except Exception as error:  # whatever the driver raises: else the board would restart again and again
+    except Exception as error:  # any error of the driver: otherwise the board would restart again and again
         raise CardError("no-card", str(error))
     return MOUNT

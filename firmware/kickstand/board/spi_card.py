@@ -1,7 +1,7 @@
-"""micropython-lib's driver of an SD card on SPI, with its faults in writing corrected.
+"""micropython-lib's driver for SD cards on SPI, with corrected writing.
 
-The original returns silently when the card rejects the data, waits without limit while the card is busy, and takes heap
-for each byte that it waits.
+The original returns silently when the card rejects the data, waits without limit while the card is busy, and allocates
+heap for each byte while it waits.
 """
 
 from errno import EIO, ETIMEDOUT
@@ -17,7 +17,7 @@ _ACCEPTED = 0x05  # data response, section 7.3.3.1
 
 
 class CheckedCard(SDCard):
-    """spi: a machine.SPI.  cs: a machine.Pin. Raises OSError."""
+    """An SD card whose writes are checked. spi: a machine.SPI.  cs: a machine.Pin. Raises OSError."""
 
     def __init__(self, spi, cs):
         self._byte = bytearray(1)
@@ -25,14 +25,14 @@ class CheckedCard(SDCard):
         super().__init__(spi, cs, baudrate=_CLOCK_HZ)
 
     def writeblocks(self, block_num, buf):
-        """Write sectors for the file system. Raises OSError, also for data that the card rejects."""
+        """Write sectors for the file system. Raises OSError, also if the card rejects the data."""
         self._fault = 0
         super().writeblocks(block_num, buf)
         if self._fault:
             raise OSError(self._fault)
 
     def write(self, token, buf):
-        """Write one sector; the driver calls it for each. After a fault the rest is left out."""
+        """Write one sector; the driver calls this for each. After a fault the other sectors are skipped."""
         if self._fault:
             return
         self._send(token)
@@ -45,7 +45,7 @@ class CheckedCard(SDCard):
         self._release()
 
     def write_token(self, token):
-        """End the writing of several sectors; the driver calls it."""
+        """End a write of several sectors; the driver calls this."""
         self._send(token)
         self._receive()
         self._wait()

@@ -10,22 +10,23 @@ _TRIM_MS = const(60_000)  # least time between two saves of the roll-misalignmen
 
 
 class ActiveCalibration:
-    """meter: the LeanMeter that works with it. changed: called as changed(replaced) after each change.
-    replaced: True for another alignment, so that maxima and the results of driving are discarded; False for a small
+    """The Calibration in use, and its store. meter: the LeanMeter that uses it. changed(replaced): called after each
+    change.
+    replaced: True for another alignment, after which maxima and the results of driving are discarded; False for a small
     correction.
 
-    The trim, short for the roll-misalignment correction, is in degrees, and riding finds it (see Calibration).
+    The trim (the roll-misalignment correction, in degrees) is found while riding: see Calibration.
     """
 
     def __init__(self, meter, changed):
         self._meter = meter
         self._changed = changed
-        self._store = None  # a stored calibration belongs to one chip, and which one is known once it runs
+        self._store = None  # a stored calibration belongs to one chip, which is known once it runs
         self._trim_due_ms = ticks_add(ticks_ms(), _TRIM_MS)
 
     @property
     def value(self):
-        """The Calibration. Until the first chip has started it is that with which the meter was made."""
+        """The Calibration in use. Until the first chip has started it is the one that the meter was created with."""
         return self._meter.calibration
 
     @property
@@ -34,7 +35,7 @@ class ActiveCalibration:
         return self.value.aligned
 
     def chip_started(self, chip):
-        """Load the stored calibration of `chip` (an Mpu6050 that runs), unless it is in use: return True if loaded."""
+        """Load the stored calibration of `chip` (an Mpu6050 that runs), unless it is in use. Return True if loaded."""
         if self._store and self._store.who_am_i == chip.who_am_i:
             return False
         self._chip = chip
@@ -43,7 +44,7 @@ class ActiveCalibration:
         return True
 
     def save(self, calibration, posed=False):
-        """Save a calibration that the rider's poses made to flash, then use it. posed: see LeanMeter.use(). Raises
+        """Save a calibration from the rider's poses to flash, then use it. posed: see LeanMeter.use(). Raises
         StoreError."""
         self._store.save(calibration)
         self._use(calibration, True, posed)
@@ -54,12 +55,13 @@ class ActiveCalibration:
         self._use(calibration, False)
 
     def restart(self):
-        """Save the trim found so far, then restart the meter with the values in flash, as a replay of a ride will."""
+        """Save the trim found so far, then restart the meter with the values in flash, as a replay of the ride does."""
         self._save_trim()
         self._meter.use(self.value)
 
     def keep_trim(self, now_ms):
-        """Save the trim that riding has found, if the bike stands and _TRIM_MS are over. Call it about every 100 ms."""
+        """Save the trim found while riding if the bike is at rest and _TRIM_MS have passed. Call it about every 100
+        ms."""
         if ticks_diff(now_ms, self._trim_due_ms) >= 0:
             saved = self.value.aligned and self._save_trim()
             self._trim_due_ms = ticks_add(now_ms, _TRIM_MS if saved else 0)

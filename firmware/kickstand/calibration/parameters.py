@@ -3,24 +3,24 @@ vehicle's."""
 
 from ..rotation import is_identity, matrix, product, rotate, vector
 
-# Limits of plausible parameters. The data sheet allows 50 to 80 mg and 3 %; boards that are sold exceed that.
+# Limits of plausible parameters. The data sheet allows 50 to 80 mg and 3 %; real boards exceed that.
 MAX_OFFSET_G = 0.5
 MIN_SLOPE, MAX_SLOPE = 0.8, 1.2
-MAX_MATRIX_ERROR = 0.15  # largest difference of an entry of accel_matrix or gyro_matrix from the identity's
+MAX_MATRIX_ERROR = 0.15  # largest difference of an entry of accel_matrix or gyro_matrix from the identity
 MAX_GYRO_SIGMA = 0.05
 _UNKNOWN = (0.0,) * 9
 
 
 class Calibration:
-    """The parameters of one mounted sensor. By default they change nothing: offset 0, slope 1, bias 0, the identity.
+    """The parameters of one mounted sensor. The defaults change nothing: offset 0, slope 1, bias 0, identity matrices.
 
     accel_offset (3, g) and accel_slope (3): calibrated = slope * reading + offset, Nicolae's equations 18-20.
-    gyro_bias (3, deg/s): what the gyro reads at rest. accel_matrix, gyro_matrix (9, row-major): what remains, force =
-    accel_matrix * calibrated, and rate = gyro_matrix * (reading - bias). gyro_sigma (9): standard error of each entry
-    of gyro_matrix, 0 where that was not measured. vehicle_from_sensor (9, row-major, rows left, up, forward): the
-    alignment, a rotation matrix. trim_deg: the roll-misalignment correction, which riding has found: degrees by which
-    the lean would read too far to the right. six_done: offset and slope were measured. aligned:
-    vehicle_from_sensor was measured. by_drive: it was measured or refined by driving.
+    gyro_bias (3, deg/s): the gyro's reading at rest. accel_matrix, gyro_matrix (9, row-major): the remaining errors,
+    force = accel_matrix * calibrated, and rate = gyro_matrix * (reading - bias). gyro_sigma (9): standard error of each
+    entry of gyro_matrix, 0 if not measured. vehicle_from_sensor (9, row-major, rows left, up, forward): the alignment,
+    a rotation matrix. trim_deg: the roll-misalignment correction found while riding: degrees by which the lean would
+    read too far to the right. six_done: offset and slope were measured. aligned:
+    vehicle_from_sensor was measured. by_drive: the alignment was measured or refined by driving.
     """
 
     def __init__(self):
@@ -37,7 +37,7 @@ class Calibration:
         self.set_scale(1.0, 1.0)
 
     def with_alignment(self, vehicle_from_sensor, gyro_bias, trim_deg=0.0, by_drive=False):
-        """A new Calibration with offset, slope and matrices of this one, aligned by vehicle_from_sensor (9). gyro_bias:
+        """A new Calibration with this one's offset, slope and matrices, aligned by vehicle_from_sensor (9). gyro_bias:
         3, deg/s."""
         new = Calibration()
         new.set_accel(self.accel_offset, self.accel_slope)
@@ -51,7 +51,7 @@ class Calibration:
         return new
 
     def set_scale(self, accel_lsb_per_g, gyro_lsb_per_dps):
-        """Set the counts per unit of the readings to come. By default they are 1: readings in g and deg/s."""
+        """Set the counts per unit of the next readings. By default 1: readings are in g and deg/s."""
         self._accel_lsb = accel_lsb_per_g
         self.set_accel(self.accel_offset, self.accel_slope)
         self._gyro_scale = 1.0 / gyro_lsb_per_dps
@@ -62,7 +62,7 @@ class Calibration:
         self._scale = vector(*[value / self._accel_lsb for value in slope])
 
     def parameters(self):
-        """The 19 numbers that were measured: offset (3), slope (3), gyro bias (3), matrix (9), trim."""
+        """The 19 measured numbers: offset (3), slope (3), gyro bias (3), matrix (9), trim."""
         measured = list(self.accel_offset) + list(self.accel_slope) + list(self.gyro_bias)
         return measured + list(self.vehicle_from_sensor) + [self.trim_deg]
 
@@ -88,26 +88,27 @@ class Calibration:
         self.gyro_sigma = matrix(values[18:27])
 
     def correct(self, accel):
-        """Return a mean accelerometer reading (3, g) calibrated, as a new array."""
+        """Calibrate a mean accelerometer reading (3, g); return a new array."""
         out = vector()
         rotate(out, self.accel_matrix, [self.accel_slope[i] * accel[i] + self.accel_offset[i] for i in range(3)])
         return out
 
     def correct_rate(self, gyro):
-        """Return a mean gyro reading (3, deg/s) calibrated, as a new array."""
+        """Calibrate a mean gyro reading (3, deg/s); return a new array."""
         out = vector()
         rotate(out, self.gyro_matrix, [gyro[i] - self.gyro_bias[i] for i in range(3)])
         return out
 
     def scales(self):
-        """(3) g per count of each accelerometer axis, slope included; and deg/s per count of the gyro."""
+        """g per count of each accelerometer axis (3), including slope, and deg/s per count of the gyro."""
         return self._scale, self._gyro_scale
 
     def in_vehicle(self):
-        """The whole calibration and the alignment, for counts of accelerometer and gyro.
+        """The whole calibration and alignment as matrices and offsets for raw counts.
 
-        Four lists: matrix (9) and offset (3) of force = matrix * counts + offset, in g; of the rate likewise, in deg/s.
-        These are Nicolae's equations (18)-(20), the matrices, and (15), multiplied out: 18 products a reading."""
+        Four lists: matrix (9) and offset (3) of force = matrix * counts + offset, in g; the same for the rate, in
+        deg/s. They are the product of Nicolae's equations (18)-(20), accel_matrix and gyro_matrix, and (15): 18
+        products per reading."""
         of_force, of_rate = matrix(), matrix()
         product(of_force, self.vehicle_from_sensor, self.accel_matrix)
         product(of_rate, self.vehicle_from_sensor, self.gyro_matrix)
@@ -134,9 +135,9 @@ class Calibration:
 
 def six_position_calibration(offset, slope, gyro_bias, matrices=None):
     """A new Calibration with the six-position result: offset (3, g), slope (3), gyro_bias (3, deg/s). matrices: the 27
-    numbers of Calibration.matrices(), where the gyro was measured too.
+    numbers of Calibration.matrices(), if the gyro was measured too.
 
-    It is not aligned, because the sensor was off the vehicle for the six poses.
+    It is not aligned, because the sensor was not on the vehicle for the six poses.
     """
     new = Calibration()
     new.set_accel(offset, slope)

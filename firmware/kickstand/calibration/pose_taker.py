@@ -1,4 +1,4 @@
-"""One pose taken while the loop runs: wait until the sensor is still, then average."""
+"""Takes one pose while the loop runs: waits until the sensor is still, then averages."""
 
 from ..errors import CaptureError
 from ..units import const
@@ -7,7 +7,7 @@ from .still_pose import StillPose
 _SETTLE_MS = const(500)
 _GIVE_UP_MS = const(10_000)  # longest time to wait for stillness
 
-# What step() returns
+# The states that step() returns
 SETTLING = 0  # waiting for stillness
 SETTLED = 1  # for one sample: it has been still for _SETTLE_MS, and averaging begins
 AVERAGING = 2
@@ -16,11 +16,11 @@ _ENDED = 4
 
 
 class PoseTaker:
-    """Takes one pose from samples that come one by one.
+    """Takes one pose from successive samples.
 
-    chip: an Mpu6050, for its scale and range. rate_hz: samples a second. seconds: how long to average.
-    settled: the mean reading (3, g) of the half second before averaging, once SETTLED. pose: the StillPose, finished
-    once DONE.
+    chip: an Mpu6050, for its scale and range. rate_hz: samples per second. seconds: duration of the average.
+    settled: from SETTLED on, the mean reading (3, g) of the half second before averaging. pose: the StillPose, finished
+    at DONE.
     """
 
     def __init__(self, chip, rate_hz, seconds):
@@ -31,7 +31,7 @@ class PoseTaker:
         self.restart()
 
     def restart(self):
-        """Begin again by waiting for stillness."""
+        """Begin again: wait for stillness."""
         self._state = SETTLING
         self._waited = 0
         self.settled = None
@@ -48,16 +48,16 @@ class PoseTaker:
 
     @property
     def averaging(self):
-        """True from SETTLED until DONE or a refusal."""
+        """True from SETTLED until DONE or an error."""
         return self._state == AVERAGING
 
     @property
     def restless(self):
-        """True after waiting for stillness for longer than a sensor at rest needs."""
+        """True if waiting for stillness has taken longer than a sensor at rest needs."""
         return self._state == SETTLING and self._waited > 2 * self._settle_count
 
     def progress(self):
-        """The number of samples averaged so far, and the number of all that are to be."""
+        """The number of samples averaged so far, and the number needed."""
         return (self.pose.count, self._take_count) if self._state == AVERAGING else (0, self._take_count)
 
     def _new(self, expected):

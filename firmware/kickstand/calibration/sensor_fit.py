@@ -1,9 +1,10 @@
-"""The whole sensor from still poses and the turns between them: one least-squares problem of 18 unknowns.
+"""Calibrates accelerometer and gyro from still poses and the turns between them: least squares with 18 unknowns.
 
 Accelerometer: force = (I + N) (slope * reading + offset), N symmetric with a diagonal of 0, 9 unknowns. Gyro: rate =
-(I + X) (reading - bias), 9 unknowns. Each pose asks that the force be 1 g long, each turn that the force of the pose
-before, turned, be the force of the pose after; the prior is the data sheet. Five Gauss-Newton steps, in 32-bit floats
-and little memory: the normal equations' lower triangle (171 numbers), factorised in its place (A.-L. Cholesky).
+(I + X) (reading - bias), 9 unknowns. For each pose the force must have a length of 1 g. For each turn the turned force
+of the pose before must equal the force of the pose after. The prior is the data sheet. Five Gauss-Newton steps, in
+32-bit floats and little memory: the lower triangle of the normal equations (171 numbers) is factorised in place (A.-L.
+Cholesky).
 """
 
 from array import array
@@ -15,26 +16,26 @@ from ..units import AXES, const
 from .turn import rotated
 
 _UNKNOWNS = const(18)
-_GYRO = 9  # the first unknown of the gyro; before it offset (3), slope (3), N (3: yz, xz, xy)
+_GYRO = 9  # index of the gyro's first unknown, after offset (3), slope (3), N (3: yz, xz, xy)
 _STEPS = const(5)
-_SIGMA_FORCE = const(0.0015)  # g: of a pose's force; 1 sigma, as all that follow
+_SIGMA_FORCE = const(0.0015)  # g: of a pose's force; 1 sigma, as in the next lines
 _SIGMA_TURN = const(0.0015)  # rad: of a turn, by the poses at its ends
-# deg/s per sqrt(s): random walk of the gyro's bias during a turn. Between the poses at both ends, which measure it, the
-# angle's variance becomes walk^2 seconds^3 / 12.
+# deg/s per sqrt(s): random walk of the gyro's bias during a turn. The poses at both ends measure the bias, so the
+# angle's variance is walk^2 seconds^3 / 12.
 _BIAS_WALK_DPS = const(0.008)
-# The priors: offset (g), slope, N, and of X its diagonal (scale) and the rest (cross-axis). The data sheet allows 0.03
-# and 0.02; the accelerometer's axes may also sit turned against the gyro's.
+# The priors: offset (g), slope, N, the diagonal of X (scale) and the rest of X (cross-axis). The data sheet allows 0.03
+# and 0.02; the accelerometer's axes may also be rotated against the gyro's.
 SIGMA_OFFSET, SIGMA_SLOPE, SIGMA_SKEW = 0.1, 0.1, 0.012
 SIGMA_SCALE, SIGMA_CROSS = 0.03, 0.02
-# What is refused
+# Limits of acceptance
 _MAX_SCALE_ERROR = const(0.10)  # of the gyro: no working chip is as far off
-_MAX_CROSS_ERROR = const(0.06)  # of its axes: twice the data sheet's, or one is late
+_MAX_CROSS_ERROR = const(0.06)  # of its axes: twice the data sheet's value, or one axis is late
 _MAX_MISFIT = const(0.012)  # rad: of a turn after the fit
-_GROSS_MISFIT = const(0.25)  # rad: of a turn before it; the sheet's errors add up to 0.2 in half a turn
-# what an axis reads of a rate of 1, to find one that alone is wrong
+_GROSS_MISFIT = const(0.25)  # rad: of a turn before the fit; the data sheet's errors add up to 0.2 in half a turn
+# readings of an axis at a rate of 1, to find a single wrong axis
 _READS = const((-1.0, 0.25, 0.5, 0.75, 1.3, 2.0, 4.0))
 _DEAD_RAD = const(0.2)  # an axis that saw less than this in all turns is dead
-# largest standard error of a scale: else no turn about this axis has shown it, and it may be anything
+# largest standard error of a scale: beyond it no turn about this axis has measured the scale
 _PROOF_SIGMA = const(0.025)
 
 
@@ -43,11 +44,11 @@ def _triangle(i):
 
 
 class SensorFit:
-    """A fit under way. poses: mean readings (3, g) in the order in which they were taken. turns: one fewer, each
-    Turn.packed() and its duration in seconds, or None where it cannot be used. offset (g), slope: the first guess.
+    """One fit. poses: mean readings (3, g) in the order in which they were taken. turns: one fewer, each Turn.packed()
+    and its duration in seconds, or None if it cannot be used. offset (g), slope: the first guess.
 
-    run() does it. Then: offset (3, g), slope (3), accel_matrix (9), gyro_matrix (9), gyro_sigma (9: the standard error
-    of each entry of gyro_matrix), unproved (names of axes that no turn has measured).
+    run() computes: offset (3, g), slope (3), accel_matrix (9), gyro_matrix (9), gyro_sigma (9: the standard error of
+    each entry of gyro_matrix), unproved (names of axes that no turn has measured).
     """
 
     def __init__(self, poses, turns, offset, slope):
@@ -60,8 +61,8 @@ class SensorFit:
         self._g = [0.0] * _UNKNOWNS
 
     def run(self):
-        """A generator of short steps, because on a board the fit takes longer than the chip's FIFO lasts. Raises
-        GyroError where the turns are not those of a gyro."""
+        """Fit, as a generator of short steps: on a board the whole fit takes longer than the chip's FIFO lasts. Raises
+        GyroError if a working gyro cannot have measured these turns."""
         self._check_gross()
         for _ in range(_STEPS):
             yield from self._accumulate()
@@ -75,7 +76,7 @@ class SensorFit:
         self._check()
 
     def finish(self):
-        """run() at once."""
+        """Do all steps of run()."""
         for _ in self.run():
             pass
 
@@ -94,8 +95,8 @@ class SensorFit:
         return 1.0, xy, xz, xy, 1.0, yz, xz, yz, 1.0
 
     def _misfit(self, k, x):
-        """(3, rad): the force before turn k, turned, less that after it, in the axes of the pose before. x: 9, row by
-        row of X; and the turned force."""
+        """The misfit of turn k (3, rad): the turned force of the pose before, minus the force of the pose after, in the
+        axes of the pose before. Also the turned force. x: the 9 entries of X, row by row."""
         turn = self._turns[k][0]
         turned = [0.0] * 3
         for a in range(3):
@@ -155,7 +156,7 @@ class SensorFit:
         return out
 
     def _add(self, row, n, residual, weight):
-        """Add the measurement residual = row . change, whose row has n entries, to the normal equations."""
+        """Add the measurement residual = row . change to the normal equations. The row has n entries."""
         h, g = self._h, self._g
         at = 0
         for i in range(n):
@@ -166,7 +167,7 @@ class SensorFit:
                 at += 1
 
     def _factorise(self):
-        """h = L L^T, L in its place."""
+        """Factorise h = L L^T in place."""
         h = self._h
         for i in range(_UNKNOWNS):
             of_i = _triangle(i)
@@ -178,7 +179,7 @@ class SensorFit:
                 h[of_i + j] = total / h[of_j + j] if j < i else max(total, 1e-9) ** 0.5
 
     def _solve(self):
-        """The change for g, by L L^T change = g."""
+        """Solve L L^T change = g."""
         h, out = self._h, self._g[:]
         for i in range(_UNKNOWNS):
             for k in range(i):
@@ -191,8 +192,8 @@ class SensorFit:
         return out
 
     def _finish(self):
-        """Set the results. The gyro's unknowns are the last, so that the last rows of L alone give their covariance:
-        its diagonal has the squared lengths of the columns of that block's inverse."""
+        """Set the results. The gyro's unknowns are the last ones, so the last rows of L give their covariance: its
+        diagonal has the squared lengths of the columns of that block's inverse."""
         h, p = self._h, self._p
         self.offset, self.slope = p[0:3], p[3:6]
         self.accel_matrix = matrix(self._accel())
@@ -210,13 +211,13 @@ class SensorFit:
         self.unproved = [AXES[i] for i in range(3) if self.gyro_sigma[4 * i] > _PROOF_SIGMA]
 
     def _check_gross(self):
-        """Raise GyroError if a turn by the gyro is not at all that by gravity."""
+        """Raise GyroError if a turn by the gyro is far from the turn by gravity."""
         worst = self._cost([0.0] * 9)[1]
         if worst > _GROSS_MISFIT**2:
             raise self._ill(worst)
 
     def _ill(self, worst):
-        """The GyroError for turns that do not fit. It names the axis that alone explains them, if there is one."""
+        """The GyroError for turns that do not fit. It names an axis if that axis alone explains them."""
         x = [0.0] * 9
         best, found = self._cost(x)[0] / 4, None
         for axis in range(3):
@@ -236,7 +237,7 @@ class SensorFit:
         return GyroError("gyro-scale", AXES[axis], 100.0 * (reads - 1.0))
 
     def _turned(self, axis):
-        """The largest turn about an axis (rad) in all turns, by the gyro."""
+        """The largest rotation about an axis (rad) in all turns, by the gyro."""
         most = 0.0
         for turn in self._turns:
             if turn is not None:
@@ -245,7 +246,7 @@ class SensorFit:
         return most
 
     def _cost(self, x):
-        """Sum and largest of the turns' squared misfits."""
+        """The sum and the maximum of the turns' squared misfits."""
         total = most = 0.0
         for k in range(len(self._turns)):
             if self._turns[k] is not None:
@@ -256,7 +257,7 @@ class SensorFit:
         return total, most
 
     def _check(self):
-        """Raise GyroError if the gyro's errors are those of no working chip, or a turn does not fit."""
+        """Raise GyroError if the gyro's errors exceed those of a working chip, or a turn does not fit."""
         p = self._p
         worst = self._cost(p[_GYRO:])[1]
         if not worst < _MAX_MISFIT**2:

@@ -1,9 +1,10 @@
 """Accelerometer offset and slope from six still poses, one on each side (A. Nicolae, section 4).
 
-The closed form, equations 16-17, assumes that each axis points exactly up or down: a pose that is 10 degrees off costs
-0.6 degrees of lean. fit() uses the same six mean readings, but asks only that each calibrated reading be 1 g long: that
-holds in any pose. It starts from the closed form, takes a few Gauss-Newton steps, and stays near 0.1 degrees.
-Six poses determine six numbers exactly, so that their residual proves nothing. A seventh, free pose does.
+The closed form, equations 16-17, assumes that each axis points exactly up or down: a pose that is 10 degrees off causes
+an error of 0.6 degrees of lean. fit() uses the same six mean readings, but only assumes that each calibrated reading is
+1 g long, which holds in any pose. It starts from the closed form and takes a few Gauss-Newton steps. Its error is near
+0.1 degrees.
+Six poses determine six numbers exactly, so their residual proves nothing. A seventh, free pose is a real check.
 """
 
 from math import acos, degrees
@@ -12,15 +13,15 @@ from ..errors import CalibrationError
 from ..units import AXES, const
 from .parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE
 
-SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")  # which axis points up, in the order of the six poses
+SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")  # the axis that points up, in the order of the six poses
 _MAX_TILT_DEG = const(20.0)  # largest angle between a side's axis and the vertical
-FREE_TILT_DEG = 20.0  # a free pose nearer to one of the sides than this adds little information
+FREE_TILT_DEG = 20.0  # a free pose nearer to a side adds little information
 # Largest error of a free pose: six numbers cannot describe the 2 % of cross-axis sensitivity
 _FREE_MAX_G = const(0.028)
 
 
 def side_of(accel):
-    """Index into SIDES of the side that is up in a mean reading (3, g)."""
+    """The index into SIDES of the side that is up, from a mean reading (3, g)."""
     axis = 0
     for i in (1, 2):
         if abs(accel[i]) > abs(accel[axis]):
@@ -50,8 +51,8 @@ def closed_form(poses):
 
 
 def fit(poses):
-    """Offset (3, g) and slope (3) that make all six calibrated readings 1 g long. poses: as for closed_form(). Raises
-    CalibrationError."""
+    """Offset (3, g) and slope (3) with which all six calibrated readings are 1 g long. poses: as for closed_form().
+    Raises CalibrationError."""
     offset, slope = closed_form(poses)
     rows = [[0.0] * 7 for _ in range(6)]
     for _ in range(8):  # 3 to 5 steps are enough
@@ -75,8 +76,8 @@ def fit(poses):
 
 
 def check_plausible(offset, slope, poses):
-    """Raise CalibrationError unless offset and slope are plausible, and the axis of every side was within _MAX_TILT_DEG
-    of the vertical."""
+    """Raise CalibrationError unless offset and slope are plausible and each side's axis was within _MAX_TILT_DEG of the
+    vertical."""
     for i in range(3):
         if not (abs(offset[i]) < MAX_OFFSET_G and MIN_SLOPE < slope[i] < MAX_SLOPE):
             raise CalibrationError("odd-axis", AXES[i], offset[i], slope[i])
@@ -87,7 +88,7 @@ def check_plausible(offset, slope, poses):
 
 
 def check_free_pose(offset, slope, accel):
-    """Return by how many g the calibrated reading of a seventh, slanted pose differs from 1 g. accel: its mean reading
+    """Return the difference (g) of the calibrated reading of a seventh, slanted pose from 1 g. accel: its mean reading
     (3, g). Raises CalibrationError beyond _FREE_MAX_G."""
     force = [slope[i] * accel[i] + offset[i] for i in range(3)]
     error = sum(f * f for f in force) ** 0.5 - 1.0
@@ -98,7 +99,7 @@ def check_free_pose(offset, slope, accel):
 
 def _solve(rows):
     """Solve six linear equations in place (Gauss-Jordan elimination with partial pivoting). rows: six lists of six
-    coefficients and the right-hand side, in whose place the solution comes. False for singular equations."""
+    coefficients and the right-hand side, which the solution replaces. Return False for singular equations."""
     for k in range(6):
         pivot = k
         for r in range(k + 1, 6):

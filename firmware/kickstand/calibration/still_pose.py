@@ -1,7 +1,7 @@
 """The mean reading of one still pose, with a check that it was still.
 
-A sensor that is ill is no still one: each axis must change by a count now and then, as noise makes a working one do,
-and a gyro axis must not be too noisy.
+A faulty sensor must not pass as a still one. Each axis must change by a count now and then, because a working axis has
+noise, and a gyro axis must not be too noisy.
 
 Sums are kept as integers until the end: 32-bit floats would lose the digits that averaging gains.
 """
@@ -9,15 +9,16 @@ Sums are kept as integers until the end: 32-bit floats would lose the digits tha
 from ..errors import CaptureError, SickSensor
 from ..units import AXES, const
 
-# Largest difference of a sample from the first one: more is a knock. Ten times the chip's noise with its widest filter.
+# Largest difference of a sample from the first one: more is a knock. It is ten times the chip's noise with its widest
+# filter.
 _PEAK_G = const(0.08)
 _PEAK_DPS = const(5.0)
-# Largest noise of a gyro axis, by the differences of samples that follow each other: a hand's sway has none. Fifteen
-# times the chip's with its usual filter.
+# Largest noise of a gyro axis, from the differences between successive samples, which a hand's slow sway does not
+# change. It is fifteen times the chip's noise with its usual filter.
 _NOISE_DPS = const(0.6)
-_SPREAD_G = const(0.02)  # largest standard deviation: being still matters more than the exact angle of a pose
-_DRIFT_G = const(0.007)  # largest difference between the means of both halves: 0.4 degrees of slow tilt
-_MAX_REST_RATE_DPS = const(45.0)  # the data sheet allows 20 deg/s of gyro offset, and as much again over temperature
+_SPREAD_G = const(0.02)  # largest standard deviation: stillness matters more than the exact angle
+_DRIFT_G = const(0.007)  # largest difference between the means of the two halves: 0.4 degrees of slow tilt
+_MAX_REST_RATE_DPS = const(45.0)  # the data sheet allows 20 deg/s of gyro offset, plus 20 over temperature
 _MIN_SAMPLES = const(20)
 
 _AXES = (0, 1, 2, 4, 5, 6)  # accelerometer and gyro in the chip's order; 3 is the temperature
@@ -26,9 +27,9 @@ _AXES = (0, 1, 2, 4, 5, 6)  # accelerometer and gyro in the chip's order; 3 is t
 class StillPose:
     """Averages the samples of one pose.
 
-    accel_lsb_per_g, gyro_lsb_per_dps: counts per unit. accel_limit: |counts| from which on an axis is saturated.
-    expected: number of samples to come; the check for drift compares their halves.
-    count: samples taken. A pose that a CaptureError has spoilt is not to be used any more.
+    accel_lsb_per_g, gyro_lsb_per_dps: counts per unit. accel_limit: |counts| from which an axis is saturated. expected:
+    number of samples to come; the check for drift compares their two halves.
+    count: samples taken. Do not use a pose after a CaptureError.
     After finish(): accel (3, g, sensor's axes, uncalibrated), gyro (3, deg/s).
     """
 
@@ -41,10 +42,10 @@ class StillPose:
         gyro_peak = int(_PEAK_DPS * gyro_lsb_per_dps)
         self._peaks = (accel_peak, accel_peak, accel_peak, 0, gyro_peak, gyro_peak, gyro_peak)
         self._first = [0] * 7
-        self._sums = [0] * 7  # sums of the deviations from the first sample, so that they stay small integers
+        self._sums = [0] * 7  # sums of the deviations from the first sample: small integers
         self._early = [0] * 7  # the sums at half time
         self._squares = [0] * 7
-        self._last = [0] * 7  # the deviations of the sample before, and the sums of the squares of their changes
+        self._last = [0] * 7  # the last sample's deviations, and the sums of their squared changes
         self._changes = [0] * 7
         self.count = 0
         self.accel = None

@@ -1,9 +1,9 @@
-"""The calibration in flash: two files that are written in turn, so that after a power cut one of them is whole.
+"""Stores the calibration in flash. Two files are written alternately: after a power cut one of them is still valid.
 
-Each holds a record: magic, version, length, sequence number, the chip's WHO_AM_I and range, flags, 19 floats, in a
-record of version 2 another 27 for the matrices, and the CRC32 of everything before it. A calibration without matrices
-is written as version 1, which all releases read. load() takes the newest valid record; save() writes over the other one
-and reads it back. Nothing is ever written because a read failed: while the supply sags a good file can read as empty.
+Each holds a record: magic, version, length, sequence number, the chip's WHO_AM_I and range, flags, 19 floats (in
+version 2 another 27 for the matrices), and the CRC32 of everything before it. A calibration without matrices is written
+as version 1, which all releases read. load() takes the newest valid record; save() overwrites the other one and reads
+it back. A failed read never causes a write: in a voltage sag a good file can read as empty.
 """
 
 import struct
@@ -28,15 +28,15 @@ WHOLE_BODY_LENGTH = BODY_LENGTH + struct.calcsize(_WHOLE)
 _HEAD_LENGTH = struct.calcsize(_HEAD)
 _LENGTHS = {_VERSION: _HEAD_LENGTH + BODY_LENGTH + 4, _WHOLE_VERSION: _HEAD_LENGTH + WHOLE_BODY_LENGTH + 4}
 MAX_BIAS_DPS = 60.0  # deg/s of the gyro
-MAX_TRIM_DEG = 3.6  # the limit in lean/upright_trim.py plus a margin for rounding to 32 bits
+MAX_TRIM_DEG = 3.6  # the limit in lean/upright_trim.py plus a margin for 32-bit rounding
 
 
 class Store:
     """Calibration records of one chip.
 
-    who_am_i, accel_range_g: those of the chip in use; records of another chip are not valid. Those of another range are
-    valid, because offset and slope hardly depend on it.  directory: that of the files, "" for the current one.
-    message: after load(), in a few words, which record is in use or why none is.
+    who_am_i, accel_range_g: of the chip in use. Records of another chip are invalid. Records of another range are
+    valid, because offset and slope hardly depend on it.  directory: where the files are, "" for the current one.
+    message: after load(), a few words about the record in use, or why there is none.
     """
 
     def __init__(self, who_am_i, accel_range_g, directory=""):
@@ -44,8 +44,8 @@ class Store:
         self._chip = (who_am_i, accel_range_g)
         self._directory = directory
         self.message = ""
-        self._sequence = 0  # number of the record in use, 0 for none
-        self._problems = []  # what is wrong with the other records, in words
+        self._sequence = 0  # sequence number of the record in use, 0 for none
+        self._problems = []  # faults of the other records, in words
 
     def load(self):
         """The newest valid Calibration, or a new one if there is none. Raises nothing and writes nothing."""
@@ -58,14 +58,14 @@ class Store:
         return calibration
 
     def unchanged(self):
-        """True if both files still read as they did in load() or save(). If not, one was misread, as in a voltage sag,
-        and the older record may have been loaded: then the newer one must not be overwritten."""
+        """True if both files read the same as in load() or save(). If not, one was misread, for example in a voltage
+        sag, and the older record may be the loaded one: then the newer one must not be overwritten."""
         sequence, _, problems = self._newest()
         return sequence == self._sequence and problems == self._problems
 
     def save(self, calibration):
-        """Write calibration over the older record and read it back. Raises StoreError; the record in use stays whole in
-        any case."""
+        """Write calibration over the older record and read it back. Raises StoreError. The record in use is never
+        damaged."""
         sequence, _, _ = self._newest()
         record = self._pack(calibration, sequence + 1)
         path = self._path(FILES[(sequence + 1) % 2])
@@ -107,7 +107,7 @@ class Store:
         return record + struct.pack("<I", crc32(record))
 
     def _unpack(self, record):
-        """(sequence, calibration, None) of a record's bytes, or (0, None, what is wrong in words)."""
+        """(sequence, calibration, None) of a record's bytes, or (0, None, the fault in words)."""
         if len(record) not in _LENGTHS.values():
             whole = len(record) >= 6 and record[4] == _WHOLE_VERSION
             length = _LENGTHS[_WHOLE_VERSION if whole else _VERSION]
@@ -126,8 +126,8 @@ class Store:
 
 
 def pack(who_am_i, accel_range_g, calibration):
-    """A Calibration and the chip it belongs to, as BODY_LENGTH bytes, or WHOLE_BODY_LENGTH with matrices.
-    accel_range_g: a whole number of g."""
+    """Pack a Calibration and its chip into BODY_LENGTH bytes, or WHOLE_BODY_LENGTH with matrices. accel_range_g: a
+    whole number of g."""
     how = (_BY_DRIVE if calibration.by_drive else _BY_POSES) if calibration.aligned else _NOT_ALIGNED
     body = struct.pack(_BODY, who_am_i, accel_range_g, calibration.six_done, how, *calibration.parameters())
     return body + struct.pack(_WHOLE, *calibration.matrices()) if calibration.whole else body
@@ -146,7 +146,7 @@ def unpack(data):
 
 
 def plausible(calibration):
-    """True if every parameter of the Calibration is one that a real sensor can have."""
+    """True if a real sensor can have every parameter of the Calibration."""
     for i in range(3):
         if not abs(calibration.accel_offset[i]) < MAX_OFFSET_G:  # "not <" also refuses not-a-number
             return False

@@ -1,10 +1,10 @@
-"""From the chip's counts to the vehicle's force and rate in one step: calibration and alignment multiplied out.
+"""Converts the chip's counts to the vehicle's force and rate in one step: calibration and alignment combined.
 
     force = R A (slope * counts / lsb + offset)        Nicolae's equations (18)-(20), then (15)
     rate  = R G (counts / lsb - bias)                  R: vehicle_from_sensor; A, G: accel_matrix, gyro_matrix
 
-That takes eighteen products a sample instead of twenty-seven. On the board a product of floats takes 12 us and 32 bytes
-of heap, so there they are products of integers in machine code, which are right to 0.03 degrees of lean.
+That takes eighteen products per sample instead of twenty-seven. On the board a product of floats takes 12 us and 32
+bytes of heap. There, machine code multiplies integers instead, with an error of at most 0.03 degrees of lean.
 """
 
 from array import array
@@ -13,15 +13,15 @@ from math import radians
 from ..errors import NO_MACHINE_CODE, checked
 from ..units import const
 
-# The integer that stands for the largest scale: times the sum of eight samples it still fits 32 bits
+# The integer for the largest scale: its product with the sum of eight samples still fits in 32 bits
 _ONE = const(2048)
 
 
 def products_python(matrices, sums, n, out):
-    """out[0:3] = A (sums[0:3], n) and out[3:6] = B (sums[4:7], n), where n multiplies the offsets.
+    """Compute out[0:3] = A (sums[0:3], n) and out[3:6] = B (sums[4:7], n), where n multiplies the offsets.
 
-    matrices: array('i', 24), the 3x4 matrices A and B by rows.  sums: array('i', 7).  out: array('i', 6). On the board
-    products() is the machine code of transform_viper.py, elsewhere this.
+    matrices: array('i', 24), the 3x4 matrices A and B by rows.  sums: array('i', 7).  out: array('i', 6). On the board,
+    products() is the machine code of transform_viper.py; elsewhere it is this function.
     """
     for i in range(6):
         first = 0 if i < 3 else 4
@@ -40,7 +40,7 @@ else:
 
 
 class Transform:
-    """calibration: a Calibration whose set_scale() was called; later changes to it are not seen."""
+    """Applies a Calibration to sums of counts. Call its set_scale() first. Later changes to it have no effect."""
 
     def __init__(self, calibration):
         force, force_offset, rate, rate_offset = calibration.in_vehicle()
@@ -54,10 +54,10 @@ class Transform:
         self._force_unit, self._rate_unit = force_unit, radians(rate_unit)
 
     def apply_sum(self, sums, n, force, rate):
-        """Put the mean force and rate of n samples, at most 8, into force and rate.
+        """Compute the mean force and rate of n samples (at most 8) into force and rate.
 
-        sums: array('i', 7), of the samples' counts, in the chip's order.  force: 3, left, up, forward in g.  rate: 3,
-        about the same axes in rad/s."""
+        sums: array('i', 7), sums of the samples' counts in the chip's order.  force: 3, left, up, forward, in g.  rate:
+        3, about the same axes, in rad/s."""
         p = self._products
         products(self._integers, sums, n, p)
         unit = self._force_unit / n

@@ -1,7 +1,7 @@
-"""How a sensor turned between two still poses, by its gyro: the attitude, and how the gyro's errors change it.
+"""Measures by the gyro how a sensor turned between two still poses, and how the gyro's errors change the result.
 
-Gravity in the pose before and in the pose after shows the same turn, so the two measure the gyro. Of a whole turn this
-keeps R (3x3), which takes vectors from the sensor's axes now to its axes at the start, and S (3x12): a true rate of
+Gravity in the poses before and after shows the same turn, so the poses calibrate the gyro. For a whole turn this keeps
+R (3x3), which rotates vectors from the sensor's axes now to its axes at the start, and S (3x12): a true rate of
 (I + X) rate + c turns the sensor by exp([S x]) R, where x has row i of X, then c_i, in 4 i to 4 i + 3. D. Tedaldi, A.
 Pretto, E. Menegatti, "A robust and easy to implement method for IMU calibration", ICRA 2014, keeps all samples instead.
 """
@@ -11,9 +11,9 @@ from math import cos, radians, sin
 
 from ..units import const
 
-_STEP_RAD = const(0.02)  # a step ends when the sensor has turned by so much about one axis. Larger: less exact
-_STEP_US = const(60_000)  # or has taken so long
-# Counts, 0.95 of the gyro's range: the chip's low-pass hides that single conversions were at its end
+_STEP_RAD = const(0.02)  # a step ends after a turn by this about one axis. Larger: less exact
+_STEP_US = const(60_000)  # or after this time
+# Counts, 0.95 of the gyro's range: the chip's low-pass hides single conversions that reached its end
 _QUICK = const(31_000)
 
 
@@ -21,9 +21,9 @@ class Turn:
     """Integrates the gyro from start() to end(). Fixed memory.
 
     lsb_per_dps: counts per deg/s. period_us: nominal time between two samples. quick: |counts| of a rate that is too
-    quick.
+    fast.
     quick: the rate came near the end of the gyro's range since start(). lost: readings were missing since then.
-    seconds: duration of the turn, once end() was called.
+    seconds: duration of the turn, after end().
     """
 
     def __init__(self, lsb_per_dps, period_us, quick=_QUICK):
@@ -31,7 +31,7 @@ class Turn:
         self._lsb = lsb_per_dps
         self._period_us = period_us
         self._quick = quick
-        self._step_counts = int(_STEP_RAD / self._rad / period_us)  # a sum of counts: the angle of a step
+        self._step_counts = int(_STEP_RAD / self._rad / period_us)  # the angle of a step as a sum of counts
         self.running = False
 
     def start(self, bias):
@@ -46,8 +46,9 @@ class Turn:
         self.running = True
 
     def add(self, sums, n, dt_us, hold=False):
-        """Take n samples: their sums (7, counts, the chip's order), and microseconds since the samples before. hold:
-        they belong to a still pose, after which the turn ends; or they count after all, if that pose is spoilt."""
+        """Take n samples: their sums (7, counts, the chip's order), and the microseconds since the previous samples.
+        hold: they belong to a still pose that ends the turn; if that pose fails, they are added to the turn after
+        all."""
         if not self.running:
             return
         if hold and not self._held and self._n:
@@ -76,7 +77,7 @@ class Turn:
         self.running = False
 
     def attitude(self, bias, share):
-        """R as a list of 9, with another bias: of start()'s and this one (3, deg/s), the mean where share is 0.5."""
+        """R as a list of 9, for a bias between that of start() (share 0) and this one (3, deg/s; share 1)."""
         turned, out = [0.0] * 3, self.r[:]
         for i in range(3):
             error = radians(share * (self._bias[i] / self._lsb - bias[i]))
@@ -90,7 +91,7 @@ class Turn:
 
     def packed(self, bias):
         """The turn as array('f', 36): R (9), then S (27) without the columns of the bias. bias: 3, deg/s, of the pose
-        at its end; the mean of both ends holds for the turn."""
+        at its end. For the turn, the mean of the biases at both ends is used."""
         out = array("f", self.attitude(bias, 0.5))
         for i in range(36):
             if i % 4 != 3:
@@ -98,7 +99,7 @@ class Turn:
         return out
 
     def angle(self):
-        """Size of the turn by the gyro, rad."""
+        """The size of the turn by the gyro, in rad."""
         total = 0.0
         for a in range(0, 36, 12):
             turned = self.s[a] + self.s[a + 5] + self.s[a + 10]
@@ -106,7 +107,7 @@ class Turn:
         return total**0.5
 
     def _step(self):
-        """Turn R and S on by the sums of counts. A row of R times [w] is row x w, and half a step first makes it
+        """Advance R and S by the sums of counts. A row of R times [w] is row x w. The half step makes it
         second-order."""
         share, own, bias, n = self._rad * self._us / self._n, self._sums, self._bias, self._n
         x, y, z = [share * (own[i] - n * bias[i]) for i in range(3)]
@@ -115,7 +116,7 @@ class Turn:
         own[0] = own[1] = own[2] = 0
         self._n = self._us = 0
         steps = (x, y, z, seconds)
-        small = 1.0 - (x * x + y * y + z * z) / 6  # so that the angle is right to the fifth order
+        small = 1.0 - (x * x + y * y + z * z) / 6  # makes the angle correct to the fifth order
         x, y, z = small * x, small * y, small * z
         r, s = self.r, self.s
         for a in range(3):
@@ -132,7 +133,7 @@ class Turn:
 
 
 def rotated(turned, vector):
-    """The vector (3) rotated by the rotation vector `turned` (3, rad), as a new list. O. Rodrigues' formula."""
+    """Rotate a vector (3) by the rotation vector `turned` (3, rad); return a new list. O. Rodrigues' formula."""
     x, y, z = turned
     p, q, t = vector
     square = x * x + y * y + z * z

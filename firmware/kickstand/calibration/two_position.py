@@ -1,8 +1,8 @@
-"""Alignment from two still poses, on the kickstand and upright (A. Nicolae, section 2).
+"""Aligns the sensor by two still poses, on the kickstand and upright (A. Nicolae, section 2).
 
 Differences from the paper: (4) is the cross product of the upright and the tilted reading, which as printed is zero.
-(5) takes y from the upright reading and divides by its own length. Where the kickstand leans the bike to the right, x
-and z come out pointing right and backward, and both signs are changed.
+(5) takes y from the upright reading and divides it by its own length. If the kickstand is on the right, x and z point
+right and backward, and both signs are changed.
 """
 
 from math import atan2, degrees
@@ -11,18 +11,20 @@ from ..errors import AlignmentError, GyroError
 from ..rotation import cross, dot, frame, matrix, norm, normalize, rotate, vector
 from ..units import const
 
-# Least tilt between the poses. At 5 degrees, one degree of pitch between them makes a yaw error of 11 degrees; at 8, 7.
+# Least tilt between the poses. At 5 degrees, one degree of pitch between them causes a yaw error of 11 degrees; at 8,
+# of 7.
 _MIN_TILT_DEG = const(5.0)
 WARN_TILT_DEG = 8.0
 _MAX_TILT_DEG = const(60.0)
 _SAME_POSE_DEG = const(1.0)
-# Largest difference of a reading at rest from 1 g. The data sheet allows 80 mg of offset and 3 % of scale, plus drift;
-# after the six positions there remain 35 mg of drift over temperature.
+# Largest difference of a reading at rest from 1 g. The data sheet allows 80 mg of offset and 3 % of scale, plus drift.
+# After the six positions only 35 mg of drift over temperature remain.
 _UNCALIBRATED_TOLERANCE_G = const(0.15)
 _CALIBRATED_TOLERANCE_G = const(0.05)
-# By how much the turn between the poses, by the gyro, may differ from the tilt: a constant (rad); the share of the tilt
-# by which uncalibrated sensors and the gyro's scale change it; the share of another turn, as while the bike is pushed
-# about, that cross-axis errors add; drift (rad/s) and random walk (rad/s per sqrt(s), 3 sigma) of the gyro's bias
+# Largest difference between the turn by the gyro and the tilt between the poses. It is the sum of: a constant (rad); a
+# share of the tilt, for uncalibrated sensors and the gyro's scale; a share of the whole turn, for cross-axis errors,
+# for example while the bike is pushed about; drift (rad/s) and random walk (rad/s per sqrt(s), 3 sigma) of the gyro's
+# bias
 GYRO_RAD, GYRO_TILT_SHARE, GYRO_TURN_SHARE = 0.02, 0.15, 0.04
 GYRO_DRIFT, GYRO_WALK = 0.0005, 0.0002
 
@@ -36,11 +38,11 @@ def check_one_g(force, tolerance_g, pose):
 
 
 def two_position(out, kickstand, upright, side="left", tolerance_g=_UNCALIBRATED_TOLERANCE_G):
-    """Fill out (9, rows left, up, forward) with the rotation from sensor to vehicle axes; return the tilt between the
-    poses in degrees. Equations 3-8.
+    """Compute the rotation from sensor to vehicle axes into out (9, rows left, up, forward); return the tilt between
+    the poses in degrees. Equations 3-8.
 
-    kickstand, upright: mean specific force of each pose (3, g, sensor's axes). side: "left" or "right", to which the
-    kickstand leans the bike. Raises AlignmentError.
+    kickstand, upright: mean specific force of each pose (3, g, sensor's axes). side: "left" or "right", the side to
+    which the kickstand leans the bike. Raises AlignmentError.
     """
     check_one_g(kickstand, tolerance_g, "kickstand")
     check_one_g(upright, tolerance_g, "upright")
@@ -65,8 +67,9 @@ def two_position(out, kickstand, upright, side="left", tolerance_g=_UNCALIBRATED
 def align(calibration, kickstand, upright, side):
     """A new Calibration, aligned by two finished poses (StillPose each), and the tilt between them in degrees.
 
-    calibration: that with offset and slope. side: "left" or "right", to which the kickstand leans the bike. The gyro's
-    bias is that of the kickstand pose: a stand holds the bike stiller than a rider does. Raises AlignmentError.
+    calibration: the one with offset and slope. side: "left" or "right", the side to which the kickstand leans the bike.
+    The gyro's bias is taken from the kickstand pose: a stand holds the bike stiller than a rider does. Raises
+    AlignmentError.
     """
     vehicle_from_sensor = matrix()
     poses = calibration.correct(kickstand.accel), calibration.correct(upright.accel)
@@ -76,11 +79,11 @@ def align(calibration, kickstand, upright, side):
 
 
 def check_turn(calibration, kickstand, upright, turn):
-    """Raise GyroError unless the gyro says that between the two poses (StillPose each) the bike turned by the tilt
-    between them. turn: the Turn, which has ended; calibration: as for align().
+    """Raise GyroError unless the gyro's turn between the two poses (StillPose each) agrees with the tilt between them.
+    turn: the Turn, ended; calibration: as for align().
 
-    The longer it took, the less the gyro can say: after a minute a tilt of 12 degrees is hardly checked any more. Where
-    readings were lost nothing is checked.
+    The check is weaker after a longer time: after a minute a tilt of 12 degrees is hardly checked. If readings were
+    lost nothing is checked.
     """
     if turn.lost:
         return
@@ -91,7 +94,7 @@ def check_turn(calibration, kickstand, upright, turn):
     cross(axis, u, v)
     tilt = atan2(norm(axis), dot(u, v))
     misfit = 9.9
-    for share in (0.0, 0.5):  # a stand holds the bike stiller; but the bias may have drifted, evenly
+    for share in (0.0, 0.5):  # the upright pose is less still than the stand; but the bias may have drifted evenly
         r = turn.attitude(upright.gyro, share)
         rotate(back, r, v)
         misfit = min(misfit, norm([u[i] - back[i] for i in range(3)]))

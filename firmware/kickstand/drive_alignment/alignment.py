@@ -1,18 +1,18 @@
-"""Sensor to vehicle from driving: the vertical from standing and driving straight, forward from braking (ViriCiti).
+"""Aligns the sensor by driving: the vertical from standing and driving straight, forward from braking (ViriCiti).
 
-This is the published method without its weaknesses. Forward comes from a regression of force on change of speed, whose
-intercept takes up forces that are not braking; driving in bends is left out; the lag of the speed is estimated; and the
-result has a standard error.
+This is the published method without its weaknesses. Forward comes from a regression of force on change of speed; its
+intercept absorbs forces that are not braking. Bends are excluded, the lag of the speed is estimated, and the result has
+a standard error.
 
     drive = DriveAlignment("car")                  # or ("motorcycle", up), up from two poses
-    drive.update(force, rate, dt_us)               # some 100 times a second, sensor's axes
-    drive.measure_speed(speed_mps, age_us)         # each new value of the speed source, 1 to 10 a second
+    drive.update(force, rate, dt_us)               # about 100 times per second, sensor's axes
+    drive.measure_speed(speed_mps, age_us)         # each new value of the speed source, 1 to 10 per second
     if drive.ready: drive.matrix(out)
 
 To show the progress, use `state`, `counted` of `needed` and, when REFUSED, `problem`. A problem is a fault of the speed
-or of the mount, which more driving cannot resolve; missing() says what more driving will bring; `reason` is the problem
-or, without one, what is missing. verdict.compare() says whether an earlier alignment still fits. Memory is fixed, and
-each call does a short step of the work.
+or of the mount that more driving cannot resolve. missing() describes the driving that is still needed. `reason` is the
+problem or, without one, the result of missing(). verdict.compare() checks whether an earlier alignment still fits.
+Memory is fixed, and each call does a short step of the work.
 """
 
 from ..errors import AlignmentError
@@ -27,26 +27,26 @@ from .vertical import COUNTS_S, MAX_CHANGE_DEG, MOVED_MPS, SETTLE_S, StandingVer
 CAR, MOTORCYCLE = "car", "motorcycle"
 
 # state
-WAITING_FOR_SPEED = 0  # no speed has come yet, or none for STALE_US
-WAITING_FOR_STOP = 1  # a car only: the vertical and the gyro's bias come from standing
+WAITING_FOR_SPEED = 0  # no speed yet, or none for STALE_US
+WAITING_FOR_STOP = 1  # only a car: the vertical and the gyro's bias come from standing
 WAITING_FOR_BRAKING = 2  # in a straight line
-BRAKING = 3  # a braking event goes on
-TURNING = 4  # a braking event goes on in a bend: it will not count
-READY = 5  # matrix() gives the alignment; it gets better with more events
+BRAKING = 3  # during a braking event
+TURNING = 4  # during a braking event in a bend: it will not count
+READY = 5  # matrix() gives the alignment; more events improve it
 REFUSED = 6  # matrix() raises `problem`
 
 STALE_US = 5_000_000
-STEP_US = 12_000  # an update does one step of work, and one more for each whole STEP_US since the update before
+STEP_US = 12_000  # an update does one step of work, plus one for each whole STEP_US since the last update
 
 
 class DriveAlignment:
-    """vehicle: CAR or MOTORCYCLE. up: the vertical in the sensor's axes (unit vector) from two poses, for a motorcycle;
-    without it the vertical comes from riding straight. bias: the gyro's (3 values, deg/s), subtracted until a stop
-    shows a newer one; zeros for rates that are corrected already. Without a bias no braking event counts before the
-    first stop.
+    """One drive. vehicle: CAR or MOTORCYCLE. up: the vertical in the sensor's axes (unit vector) from two poses, for a
+    motorcycle; without it the vertical comes from riding straight. bias: the gyro's (3 values, deg/s), subtracted until
+    a stop gives a newer one; zeros for rates that are already corrected. Without a bias no braking event counts before
+    the first stop.
 
-    standing: the StandingVertical, which has the gyro's bias too; vertical: the Vertical; events: the DrivingEvents;
-    quality: the DrivingQuality; needed: number of events that must have counted.
+    standing: the StandingVertical, which also has the gyro's bias; vertical: the Vertical; events: the DrivingEvents;
+    quality: the DrivingQuality; needed: number of counted events required.
     """
 
     def __init__(self, vehicle, up=None, bias=None):
@@ -59,8 +59,8 @@ class DriveAlignment:
         self.quality = DrivingQuality(self.events, self.vertical)
         self._speed_check = SpeedCheck()
         self._bias_given = bias is not None
-        self._judged = (0, 0)  # events and stops that quality has taken into account
-        self._sums = [0.0] * 6  # integrals of force and rate over the bin that is filling up
+        self._judged = (0, 0)  # events and stops included in quality
+        self._sums = [0.0] * 6  # integrals of force and rate over the current bin
         self._sums_us = 0
         self._speed_mps = -1.0  # none yet
         self._top_mps = 0.0
@@ -70,17 +70,17 @@ class DriveAlignment:
 
     @property
     def counted(self):
-        """Number of events that have counted, at most `needed`."""
+        """The number of counted events, at most `needed`."""
         return self.events.counted
 
     @property
     def turned(self):
-        """Number of braking events that did not count because the vehicle was in a bend."""
+        """The number of braking events that did not count because of a bend."""
         return self.events.turning_count
 
     @property
     def quality_deg(self):
-        """Standard error of forward's direction, 180 until there is one."""
+        """The standard error of forward's direction in degrees, 180 until there is one."""
         return self.quality.quality_deg
 
     @property
@@ -114,12 +114,12 @@ class DriveAlignment:
 
     @property
     def reason(self):
-        """Why matrix() gives no alignment: the problem or, without one, what is missing. An AlignmentError."""
+        """Why matrix() gives no alignment: the problem or, without one, the result of missing(). An AlignmentError."""
         return self.problem or self.missing(self.counted, self.needed, self.turned)
 
     def missing(self, counted, needed, turned):
-        """What a drive without a problem still waits for: an AlignmentError. counted, needed, turned: numbers of events
-        that counted, that are needed, and of braking events that did not count because of a bend."""
+        """The driving still needed by a drive without a problem, as an AlignmentError. counted, needed, turned: the
+        numbers of counted events, of required events, and of braking events that did not count because of a bend."""
         if self._speed_mps < 0.0:
             return AlignmentError("no-speed")
         if self._top_mps < MOVED_MPS:
@@ -135,7 +135,7 @@ class DriveAlignment:
 
     def update(self, force, rate, dt_us):
         """Take a sample and do a step of the work. force (3, g), rate (3, deg/s): calibrated, sensor's axes; dt_us:
-        microseconds since the sample before (an integer)."""
+        microseconds since the previous sample (an integer)."""
         if dt_us > GAP_US:
             self.interrupt()
             return
@@ -154,7 +154,7 @@ class DriveAlignment:
             self._do_step()
 
     def interrupt(self):
-        """Samples are missing: drop the braking event under way and the history. Events that have counted stay."""
+        """Drop the current braking event and the history, because samples are missing. Counted events are kept."""
         self._sums = [0.0] * 6
         self._sums_us = 0
         self._history.clear()
@@ -162,7 +162,7 @@ class DriveAlignment:
         self.events.interrupt()
 
     def finish(self):
-        """Do all pending work at once, because no more samples will come."""
+        """Do all pending work at once, because there are no more samples."""
         while self._means is not None or self._work is not None:
             self._do_step()
 
@@ -172,14 +172,15 @@ class DriveAlignment:
         if not speed_mps >= 0.0:
             speed_mps = 0.0
         self._speed_mps = speed_mps
-        if self._silent_us > STALE_US:  # the history's time may have wrapped round since the last speed
+        if self._silent_us > STALE_US:  # the history's time may have wrapped since the last speed
             self.events.interrupt()
         self._silent_us = 0
         self._top_mps = max(self._top_mps, speed_mps)
         self.events.measure_speed(speed_mps, self._history.now + self._sums_us - age_us)
 
     def matrix(self, out):
-        """Fill out (9, rows left, up, forward) with vehicle-from-sensor. Raises AlignmentError while not ready."""
+        """Write the rotation from sensor to vehicle into out (9, rows left, up, forward). Raises AlignmentError while
+        not ready."""
         if not self.ready:
             raise self.reason
         up = vector()
@@ -187,7 +188,7 @@ class DriveAlignment:
         frame(out, up, self.quality.fit.forward)
 
     def _do_step(self):
-        """One short step of work, if there is any."""
+        """Do one short step of work, if there is any."""
         if self._means is not None:
             force, rate, seconds = self._means
             self._means = None
@@ -219,7 +220,7 @@ class DriveAlignment:
             sums[i] = 0.0
 
     def _follow(self):
-        """Process the last interval between two speeds; a generator of short steps."""
+        """Process the last interval between two speeds, as a generator of short steps."""
         yield from self.events.follow(self._bias_given or self.standing.stops)
         judged = (self.events.straight_count, self.standing.stops)
         if judged != self._judged:

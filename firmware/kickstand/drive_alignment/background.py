@@ -1,7 +1,8 @@
-"""Alignment by driving in the background: feeds a DriveAlignment, and saves its alignment.
+"""Aligns by driving in the background: feeds a DriveAlignment and saves its alignment.
 
-With a speed source it always runs. Where there is no alignment yet, or where the menu asked for a new one, the drive's
-is used as soon as it is ready; an earlier alignment is checked and refined. Flash is written at standstill only.
+It always runs if there is a speed source. Without an alignment, or after a request in the menu, the drive's alignment
+is used as soon as it is ready. Otherwise the drive checks and refines the earlier alignment. Flash is written only at
+standstill.
 """
 
 from time import ticks_add, ticks_diff
@@ -14,26 +15,27 @@ from .quality import MIN_EVENTS_TO_CHECK_SPEED
 from .verdict import MOVED, REFINED, REVERSED, SAME, compare, turn_round
 
 _FEED_TURNS = const(2)  # passes of the loop whose counts are summed as integers, because floats take time
-_GAP_MS = const(300)  # a longer time between two readings means that some are missing
+_GAP_MS = const(300)  # after a longer time between two readings some are missing
 _LOOK_MS = const(1000)
-_FRESH_MS = const(3000)  # an older speed does not show that the vehicle stands
-_AWAY_MPS = const(2.0)  # at a higher speed the vehicle has driven off
+_FRESH_MS = const(3000)  # an older speed does not prove a standstill
+_AWAY_MPS = const(2.0)  # a faster vehicle has driven off
 
-_KNOWN_BIAS = (0.0, 0.0, 0.0)  # the gyro's bias was measured with the alignment, and is subtracted already
+_KNOWN_BIAS = (0.0, 0.0, 0.0)  # the gyro's bias was measured with the alignment and is already subtracted
 STAND_SIDE, MOUNT_MOVED = "other-side", "mount-moved"
-_QUESTIONS = (STAND_SIDE, MOUNT_MOVED)  # codes of messages: no lean is shown until they are answered
+_QUESTIONS = (STAND_SIDE, MOUNT_MOVED)  # codes of messages that hide the lean until they are answered
 
 
 class BackgroundAlignment:
-    """leans: True for a motorcycle, False for a car.  speed: a Speed.  meter: a LeanMeter.  calibration: the
-    ActiveCalibration.
+    """Runs the alignment by driving. leans: True for a motorcycle, False for a car.  speed: a Speed.  meter: a
+    LeanMeter.  calibration: the ActiveCalibration.
 
-    The loop calls poll() and feed() each turn, begin() with another calibration; the menu ask(); a press answer().
+    The loop calls poll() and feed() in each turn, and begin() after a change of calibration. The menu calls ask(), a
+    press answer().
 
-    speed: the Speed.  drive: the current DriveAlignment, read only.  state: the state (see alignment.py) to show.
-    shown: True if the progress has a page of its own (ui/drive_page.py).  result: the Notice or AlignmentError that the
-    last drive ended with, or None.  message: an AlignmentError, StoreError or Notice to be shown before everything
-    else, until answer() or until the vehicle drives off; or None.
+    speed: the Speed.  drive: the current DriveAlignment, read-only.  state: the state to show (see alignment.py).
+    shown: True if the progress has its own page (ui/drive_page.py).  result: the Notice or AlignmentError at the end of
+    the last drive, or None.  message: None, or an AlignmentError, StoreError or Notice to show before everything else,
+    until answer() or until the vehicle drives off.
     """
 
     def __init__(self, leans, speed, meter, calibration):
@@ -49,16 +51,16 @@ class BackgroundAlignment:
         self.begin()
 
     def begin(self, asked=False):
-        """Start a new drive, because another calibration is in use, from flash or from a wizard. The drive checks its
-        alignment or, if `asked`, replaces it."""
+        """Start a new drive after a change of calibration, from flash or from a wizard. The drive checks its alignment
+        or, if `asked`, replaces it."""
         self._asked = asked
-        self._answered = []  # codes of messages that are not shown again
+        self._answered = []  # codes of messages not to show again
         self.message = None
         self._restart()
 
     def _restart(self):
         old = self._meter.calibration
-        self._calibration = old  # applied to all samples of this drive, even if another one is saved meanwhile
+        self._calibration = old  # applies to all samples of this drive, even if another one is saved meanwhile
         trusted = self._leans and old.aligned and not self._asked
         up = old.vehicle_from_sensor[3:6] if trusted else None
         self.drive = DriveAlignment(MOTORCYCLE if self._leans else CAR, up, _KNOWN_BIAS if old.aligned else None)
@@ -67,8 +69,8 @@ class BackgroundAlignment:
         self._clear_sums()
 
     def ask(self):
-        """Start a drive that replaces the alignment, because the rider asks for a new one (the sensor was mounted
-        anew). The drive so far is lost."""
+        """Start a drive that replaces the alignment, on the rider's request (the sensor was remounted). The drive so
+        far is lost."""
         self.shown = True
         self.begin(True)
 
@@ -78,8 +80,8 @@ class BackgroundAlignment:
             self._total[i] = 0
 
     def poll(self, now_ms):
-        """Read the speed source, and once a second act on the drive's result. Call it once in each pass of the loop.
-        Returns a new speed (m/s) for a recording, or None."""
+        """Read the speed source, and once per second handle the drive's result. Call it once per pass of the loop.
+        Return a new speed (m/s) for a recording, or None."""
         speed = self.speed.poll(now_ms)
         if speed is not None:
             self._speed_mps = speed
@@ -90,22 +92,22 @@ class BackgroundAlignment:
             self._look_ms = ticks_add(now_ms, _LOOK_MS)
             self.fresh_speed(now_ms)
             if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > _LOOK_MS:
-                self._begin_again()  # now: after 6 days without a reading ticks_diff() is negative
+                self._begin_again()  # at once: after 6 days without a reading ticks_diff() is negative
             self._look(now_ms)
         return speed
 
     def fresh_speed(self, now_ms):
-        """The speed measured last (m/s), or None if that was long ago."""
+        """The last speed (m/s), or None if it is old."""
         if self._speed_ms is not None and ticks_diff(now_ms, self._speed_ms) >= _FRESH_MS:
-            self._speed_ms = None  # kept, it would be fresh again after 6 days: then ticks_diff() is negative
+            self._speed_ms = None  # after 6 days it would seem fresh again: ticks_diff() is then negative
         return self._speed_mps if self._speed_ms is not None else None
 
     def _share(self, speed):
-        """Pass a speed (m/s) on to the lean filter if it is reliable. Returns that speed, rounded as a recording keeps
-        it, or None if it was not passed on.
+        """Pass a speed (m/s) to the lean filter if it is reliable. Return the speed, rounded as in a recording, or None
+        if it was not passed.
 
-        A speed that no braking event has confirmed is not passed on, because a wheel may have two magnets. Nor is zero,
-        which a broken wire gives too: the filter detects a standstill by itself.
+        A speed that no braking event has confirmed is not passed, because a wheel may have two magnets. Zero is not
+        passed either, because a broken wire also gives it: the filter detects a standstill on its own.
         """
         if not self._leans:
             return speed
@@ -118,8 +120,8 @@ class BackgroundAlignment:
         return speed
 
     def feed(self, sums, n, dt_us, now_ms):
-        """Take the n samples of a pass of the loop. sums: 7, their sums in counts, in the chip's order. dt_us: the time
-        that they cover. Call it once in each pass that has samples."""
+        """Take the n samples of a pass of the loop. sums (7): their sums in counts, in the chip's order. dt_us: the
+        time that they cover. Call it once per pass with samples."""
         if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > _GAP_MS:
             self._begin_again()
         self._fed_ms = now_ms
@@ -142,8 +144,7 @@ class BackgroundAlignment:
         self.drive.interrupt()
 
     def _look(self, now_ms):
-        """Act on the drive's result, but only while speed and sensor say that the vehicle stands. Called once a
-        second."""
+        """Handle the drive's result, but only while speed and sensor show a standstill. Called once per second."""
         if self._away():
             self.message = None
             return
@@ -170,14 +171,14 @@ class BackgroundAlignment:
                 self._meter.distrust(None)
 
     def _away(self):
-        """True while the vehicle drives. A faulty speed source may say zero for ever: then the lean filter's own
-        estimate of the speed decides too."""
+        """True while the vehicle drives. A faulty speed source may report zero forever, so the lean filter's own
+        estimate of the speed counts too."""
         faulty = self.drive.problem is not None or (self.message is not None and self.message.code not in _QUESTIONS)
         return self._speed_mps > _AWAY_MPS or (faulty and self._meter.speed_mps > _AWAY_MPS)
 
     def _refuse(self, problem, aligned):
-        """Report a problem and begin a new drive, which may not have it any more. Until an event has counted in that,
-        the page shows the problem as the result."""
+        """Report a problem and begin a new drive, in which it may be gone. The page shows the problem as the result
+        until an event has counted in the new drive."""
         if aligned:
             self._say(problem)
         self._restart()
@@ -190,7 +191,7 @@ class BackgroundAlignment:
                 self._meter.distrust(message.code)
 
     def answer(self, agreed):
-        """Clear the message, which the rider has read. agreed: do what it offers, for STAND_SIDE reverse forward."""
+        """Clear the message after the rider has read it. agreed: do what it offers: for STAND_SIDE, reverse forward."""
         code, self.message = self.message.code, None
         self._answered.append(code)
         if code in _QUESTIONS:
@@ -204,7 +205,7 @@ class BackgroundAlignment:
                 self._meter.reset_maxima()
 
     def _adopt(self, anew):
-        """Save the drive's alignment. anew: the sensor sits differently now, so trim and maxima are reset."""
+        """Save the drive's alignment. anew: the sensor is mounted differently now, so trim and maxima are reset."""
         found = matrix()
         self.drive.matrix(found)
         if not self._save(found, 0.0 if anew else self._meter.trim_deg):
@@ -218,8 +219,7 @@ class BackgroundAlignment:
     def _save(self, vehicle_from_sensor, trim_deg):
         """Save this alignment; return True, or False with the reason in `message`."""
         old, used = self._meter.calibration, self._calibration
-        # the drive was fed rates less the bias of `used`, so the bias that it found at a stop is the remainder: add
-        # both
+        # the drive's rates were reduced by the bias of `used`, so its own bias is the remainder: add both
         bias = [used.gyro_bias[i] + self.drive.standing.bias[i] for i in range(3)]
         try:
             self._active.refine(old.with_alignment(vehicle_from_sensor, bias, trim_deg, True))
@@ -230,6 +230,6 @@ class BackgroundAlignment:
 
     @property
     def state(self):
-        """The drive's state, but never TURNING at walking pace, where a bend cannot be recognised: BRAKING instead."""
+        """The drive's state, but BRAKING instead of TURNING at walking pace, where a bend cannot be recognised."""
         state = self.drive.state
         return BRAKING if state == TURNING and self._speed_mps < _AWAY_MPS else state

@@ -1,4 +1,4 @@
-"""Braking and acceleration events, and which of them were in a straight line.
+"""Finds braking and acceleration events, and those of them that were in a straight line.
 
 Each change of speed is compared with the force and yaw rate of the same interval, for each lag that the speed may have.
 """
@@ -13,11 +13,11 @@ from .regression import LAG_STEP_US, LAGS, Fit, ForwardRegression
 # An event begins above BEGIN_MPS2, ends below END_MPS2, and changes the speed by at least _CHANGE_MPS.
 BEGIN_MPS2, END_MPS2 = 0.8, 0.4
 _CHANGE_MPS = const(1.5)
-_MAX_ACCELERATION_EVENTS = const(2)  # more than these do not count, because braking shows forward better
-MIN_INTERVAL_US = 400_000  # a GPS at 10 Hz adds nothing to one at 2 Hz, and its differences are noisier
+_MAX_ACCELERATION_EVENTS = const(2)  # more do not count, because braking shows forward better
+MIN_INTERVAL_US = 400_000  # a GPS at 10 Hz gives no more information than at 2 Hz, and noisier differences
 MAX_INTERVAL_US = 2_200_000  # one value of a GPS at 1 Hz may be missing
-_MAX_WAITING = const(4)  # intervals that wait while an earlier one is processed
-# A larger yaw rate is a bend. At 10 m/s this one makes 0.036 g sideways, a fifth of the force of braking; the
+_MAX_WAITING = const(4)  # intervals that can wait while an earlier one is processed
+# A larger yaw rate is a bend. At 10 m/s this one causes 0.036 g sideways, a fifth of the force of braking; the
 # regression removes most of it.
 _STRAIGHT_DPS = const(2.0)
 _MIN_SPEED_MPS = const(1.0)  # at lower speeds steering angles are large, and a stop ends with a jerk
@@ -27,8 +27,8 @@ _MAX_FORCE_G = const(3.0)  # an interval with a larger mean force has a knock
 class EventFinder:
     """Finds braking and acceleration events from the speed alone.
 
-    going_on: an event is under way; change: the change of speed in it, or in the one that ended last (m/s, < 0:
-    braking). Whether an event was straight depends on the lag of the speed, so that is kept for each lag.
+    going_on: True during an event; change: the change of speed in it, or in the last one (m/s, < 0: braking). The
+    straight part is kept for each lag, because it depends on the lag of the speed.
     """
 
     def __init__(self, lags):
@@ -36,14 +36,14 @@ class EventFinder:
         self.interrupt()
 
     def interrupt(self):
-        """Speeds are missing: drop the event under way."""
+        """Drop the current event, because speeds are missing."""
         self.going_on = False
         self.change = 0.0
         for lag in range(len(self._straight_change)):
             self._straight_change[lag] = 0.0
 
     def update(self, change_mps, seconds, straight):
-        """Take one change of speed. straight: for each lag, True if the vehicle drove straight meanwhile. Returns True
+        """Take one change of speed. straight: for each lag, True if the vehicle drove straight during it. Return True
         if an event has just ended."""
         acceleration = change_mps / seconds
         if self.going_on and (acceleration if self.change > 0.0 else -acceleration) < END_MPS2:
@@ -61,12 +61,12 @@ class EventFinder:
         return False
 
     def was_straight(self, lag):
-        """True if the straight part of the event that ended last is large enough for an event."""
+        """True if the straight part of the last event is large enough for an event."""
         return abs(self._straight_change[lag]) >= _CHANGE_MPS
 
 
 class LastEvent:
-    """Forward from the latest event alone, given the vertical: good to some 10 degrees, but known at once."""
+    """Estimates forward from the latest event and the vertical: within about 10 degrees, but immediately."""
 
     def __init__(self):
         self._force = [0.0] * 3
@@ -79,7 +79,7 @@ class LastEvent:
             self._force[i] = 0.0
 
     def add(self, seconds, change_g, force):
-        """Add a straight interval of the event; arguments as for ForwardRegression.add()."""
+        """Add a straight interval of the event. Arguments: see ForwardRegression.add()."""
         a = change_g / seconds
         self._weight += a * change_g
         self._change += change_g
@@ -87,14 +87,14 @@ class LastEvent:
             self._force[i] += a * force[i]
 
     def forward(self, out, level):
-        """Fill out (3, g per g) with forward. level (3, g): the vertical. Returns forward's weight (g^2 s)."""
+        """Write forward into out (3, g per g). level (3, g): the vertical. Return forward's weight (g^2 s)."""
         for i in range(3):
             out[i] = (self._force[i] - self._change * level[i]) / max(self._weight, 1e-6)
         return self._weight
 
 
 class DrivingEvents:
-    """history: the ForceHistory of the same drive.
+    """The events of a drive. history: the ForceHistory of the same drive.
 
     braking_count, acceleration_count: numbers of straight events so far; turning_count: number of braking events that
     were not straight; lag_s: lag of the speed; lag: index of the nearest of the regression's lags; regression: the
@@ -110,7 +110,7 @@ class DrivingEvents:
         self._history = history
         self._finder = EventFinder(LAGS)
         self._fit = Fit()
-        # for each lag: the history's integrals at the end of the last interval, whether they were known, and whether
+        # for each lag: the history's integrals at the end of the last interval, True if they were known, and True if
         # that interval was straight
         self._ends = [[0] * COLUMNS for _ in range(LAGS)]
         self._known = [False] * LAGS
@@ -121,12 +121,12 @@ class DrivingEvents:
 
     @property
     def straight_count(self):
-        """Number of all straight events."""
+        """The number of all straight events."""
         return self.braking_count + self.acceleration_count
 
     @property
     def counted(self):
-        """Number of events that count towards an alignment: all straight braking, and the first few accelerations."""
+        """The number of events that count for an alignment: all straight braking, and the first few accelerations."""
         return self.braking_count + min(self.acceleration_count, _MAX_ACCELERATION_EVENTS)
 
     @property
@@ -140,7 +140,7 @@ class DrivingEvents:
         return self._straight[self.lag]
 
     def interrupt(self):
-        """Samples are missing: drop the event under way and the waiting intervals. Events that have counted stay."""
+        """Drop the current event and the waiting intervals, because samples are missing. Counted events are kept."""
         self._waiting.clear()
         self._before = (0.0, self._history.now - MIN_INTERVAL_US)
         self._forget_interval()
@@ -151,19 +151,19 @@ class DrivingEvents:
         self._finder.interrupt()
 
     def measure_speed(self, speed_mps, time_us):
-        """Take a new speed, and its time on the history's clock."""
+        """Take a new speed and its time on the history's clock."""
         before = self._waiting[-1] if self._waiting else self._before
         if len(self._waiting) < _MAX_WAITING and difference(time_us, before[1]) >= MIN_INTERVAL_US:
             self._waiting.append((speed_mps, time_us))
 
     @property
     def due(self):
-        """True if an interval waits whose end is in the history by now."""
+        """True if the history has reached the end of a waiting interval."""
         return bool(self._waiting) and difference(self._history.now, self._waiting[0][1]) >= 0
 
     def follow(self, use):
-        """Process the interval that is due; a generator of short steps. use: the gyro's bias is known, so that straight
-        driving and bends can be distinguished."""
+        """Process the next interval, as a generator of short steps. use: the gyro's bias is known, so straight driving
+        and bends can be distinguished."""
         before, before_us = self._before
         speed, time_us = self._before = self._waiting.pop(0)
         length_us = difference(time_us, before_us)
@@ -204,7 +204,7 @@ class DrivingEvents:
                 self.last.add(seconds, change_g, best_force)
 
     def _end_event(self):
-        """Find the lag that fits best after the event that has ended, and count the event if it was straight."""
+        """Find the best lag after an event has ended, and count the event if it was straight."""
         fit = self._fit
         explained = [0.0] * LAGS
         for lag in range(LAGS):

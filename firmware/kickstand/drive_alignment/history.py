@@ -1,25 +1,25 @@
-"""Force and yaw rate of the last seconds, so that a speed that arrives late is compared with what was measured then.
+"""Keeps force and yaw rate of the last seconds, to compare a late speed with the readings of its own time.
 
-It keeps running integrals, as integers that wrap round. The difference of two is exact however long the drive lasts,
-while float32 sums lose digits as they grow; and integers need no heap.
+It stores running integrals as integers that wrap. The difference of two is exact however long the drive lasts, while
+float32 sums lose digits as they grow. Integers also need no heap.
 """
 
 from array import array
 
 BIN_US = 100_000
-SIZE = 64  # bins: enough for a late speed, the interval before it, and the time to work on both
+SIZE = 64  # bins: enough for a late speed, the interval before it, and the time to process both
 MASK = 0x1FFFFFFF
 _HALF = 0x10000000
 COLUMNS = 4  # integrals of force (3, in 1e-6 g s) and of the yaw rate (in 1e-5 degrees)
 
 
 def difference(a, b):
-    """a - b of two values that wrap round."""
+    """a - b for values that wrap."""
     return ((a - b + _HALF) & MASK) - _HALF
 
 
 class ForceHistory:
-    """A ring of the integrals of force and yaw rate at the end of each bin. now: time in us, wraps round at MASK."""
+    """A ring of the integrals of force and yaw rate at the end of each bin. now: time in us, wraps at MASK."""
 
     def __init__(self):
         self._times = array("i", [0] * SIZE)
@@ -30,7 +30,7 @@ class ForceHistory:
         self.now = 0
 
     def clear(self):
-        """Drop all entries, because samples are missing: no difference may be taken across the gap."""
+        """Drop all entries, because samples are missing: no difference may span the gap."""
         self._count = 1
 
     def add(self, force_us, yaw, dt_us):
@@ -53,7 +53,7 @@ class ForceHistory:
         behind = difference(self.now, time_us)
         if behind < 0 or behind >= difference(self.now, self._times[(self._newest - self._count + 1) % SIZE]):
             return False
-        # a first guess for the bin: bins may be longer than BIN_US, but hardly twice as long
+        # a first guess of the bin: bins may be longer than BIN_US, but hardly twice as long
         i = self._newest
         step = behind // (2 * BIN_US)
         if step < self._count:

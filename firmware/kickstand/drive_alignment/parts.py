@@ -1,9 +1,10 @@
-"""Do two parts of a drive agree about forward and about the vertical? If not, the mount may have moved between them.
+"""Compares forward and the vertical between two parts of a drive. If they differ, the mount may have moved between
+them.
 
-Nobody knows when it moved, so the drive is split in two after each of its blocks in turn. How far two parts may differ
-by chance follows from the scatter of forward between the blocks within each part: the variance of a part's forward
-falls with the part's weight, but not below what the road's camber and the wind do to a single long stretch of road. Few
-blocks give a poor sample variance: a prior of PRIOR_FREEDOM degrees of freedom is blended in.
+The time of the move is unknown, so the drive is split in two after each of its blocks in turn. The difference expected
+by chance follows from the scatter of forward between the blocks within each part. The variance of a part's forward
+falls with the part's weight, but not below the effect of camber and wind on one long stretch of road. A few blocks give
+a poor sample variance, so a prior of PRIOR_FREEDOM degrees of freedom is blended in.
 """
 
 from array import array
@@ -27,15 +28,16 @@ def angle_between(a, b):
 
 
 def blend_prior(variance, weight, freedom):
-    """Variance (deg^2) of forward: the sample variance, with `freedom` degrees of freedom, averaged with the prior's.
-    weight (g^2 s): that of the events from which forward was found."""
+    """The variance (deg^2) of forward: the sample variance, with `freedom` degrees of freedom, averaged with the
+    prior's. weight (g^2 s): of the events that forward was computed from."""
     return (freedom * variance + PRIOR_FREEDOM * PRIOR_DEG * PRIOR_DEG / weight) / (freedom + PRIOR_FREEDOM)
 
 
 class DriveParts:
-    """clear(), add() each block in the order of time, run compare() to its end. Then, for the split with the most
-    significant difference of forward: forward_deg, that difference; sigmas, the same in standard deviations. And over
-    all splits: roll_deg, pitch_deg, the largest differences of the vertical.
+    """Call clear(), add() each block in chronological order, and run compare() to its end.
+
+    It then has, for the split with the most significant difference of forward: forward_deg, the difference; sigmas, the
+    same in standard deviations. Over all splits: roll_deg, pitch_deg, the largest differences of the vertical.
     """
 
     def __init__(self):
@@ -43,13 +45,13 @@ class DriveParts:
         self.clear()
 
     def clear(self):
-        """Drop all blocks. To be called before the first add()."""
+        """Drop all blocks. Call it before the first add()."""
         self.count = 0
         self.forward_deg = self.sigmas = self.roll_deg = self.pitch_deg = 0.0
 
     def add(self, across, along, roll_g, pitch_g, weight, seconds):
-        """Add one block of events. across, along: components of its forward to the left of and along the whole drive's
-        forward; roll_g, pitch_g: the same components of its vertical; weight (g^2 s), seconds: see Fit."""
+        """Add one block of events. across, along: the components of its forward to the left of and along the whole
+        drive's forward; roll_g, pitch_g: the same components of its vertical; weight (g^2 s), seconds: see Fit."""
         block = self._blocks[self.count]
         self.count += 1
         block[0], block[1] = weight * across, weight * along
@@ -57,7 +59,7 @@ class DriveParts:
         block[4], block[5] = weight, seconds
 
     def compare(self):
-        """Compare the two parts of each split; a generator of short steps."""
+        """Compare the two parts of each split, as a generator of short steps."""
         one, two = [0.0] * 7, [0.0] * 7
         for split in range(1, self.count):
             self._sum(one, 0, split)
@@ -86,7 +88,7 @@ class DriveParts:
             yield
 
     def _sum(self, sums, first, last):
-        """Fill sums (7) with the sums of add()'s values over blocks first to last - 1, and of the squared weights."""
+        """Write into sums (7) the sums of add()'s values over blocks first to last - 1, and of the squared weights."""
         for i in range(7):
             sums[i] = 0.0
         for k in range(first, last):
@@ -96,7 +98,7 @@ class DriveParts:
             sums[6] += block[4] * block[4]
 
     def _scatter(self, angle, first, last):
-        """Sum of weight times squared deviation (deg^2) of forward from angle, over blocks first to last - 1."""
+        """The sum of weight times squared deviation (deg^2) of forward from angle, over blocks first to last - 1."""
         total = 0.0
         for k in range(first, last):
             block = self._blocks[k]

@@ -1,8 +1,8 @@
-"""The standard error of forward, whether it is good enough, and faults of the speed or of the mount.
+"""Judges a drive: the standard error of forward, its limits, and faults of the speed or of the mount.
 
-A block is the sums of a few braking and acceleration events (a regression block, see regression.py). The halves of a
-drive are the first and the second half of its blocks. The parts of a drive are the blocks before, and the blocks after,
-one boundary between two blocks; parts.py tries every boundary.
+A block has the sums of a few braking and acceleration events (a regression block, see regression.py). The halves of a
+drive are the first and the second half of its blocks. The parts of a drive are the blocks before and after one boundary
+between two blocks; parts.py tries every boundary.
 """
 
 from math import atan2, degrees, sqrt
@@ -22,19 +22,19 @@ READY_DEG, STAY_READY_DEG = 1.5, 2.5  # standard error of forward; one drive in 
 AGREE_DEG, STAY_AGREE_DEG = 4.0, 6.0  # largest difference of forward between halves, and between parts
 AGREE_SIGMAS, STAY_AGREE_SIGMAS = 3.0, 4.0  # or, between parts, its largest number of standard deviations
 # A larger difference between two parts means that the mount moved
-_MOVED_DEG = const(30.0)  # forward; a motorway's long banked curve, taken for straight, made 15
+_MOVED_DEG = const(30.0)  # forward; a long banked motorway curve, treated as straight, gave 15
 PITCH_DEG = 7.0  # 6 % uphill, then downhill, is within this
-ROLL_DEG = 7.0  # that banked curve made 6. Not used on a motorcycle, which leans
-# An event whose forward differs by over _EVENT_OFF_DEG from the overall one means that the mount moved. Only events of
-# at least _MIN_EVENT_WEIGHT are judged, whose force is at least _MIN_EVENT_FORWARD times the one that the change of
-# speed requires: on recorded drives none of these ever differed by more than 40 degrees.
+ROLL_DEG = 7.0  # that banked curve gave 6. Not used on a motorcycle, which leans
+# The mount moved if an event's forward differs by over _EVENT_OFF_DEG from the overall one. Only events of at least
+# _MIN_EVENT_WEIGHT are judged, with a force of at least _MIN_EVENT_FORWARD times the one that the change of speed
+# requires. On recorded drives none of these differed by more than 40 degrees.
 _EVENT_OFF_DEG = const(80.0)
 _MIN_EVENT_WEIGHT = const(0.012)  # g^2 s
 _MIN_EVENT_FORWARD = const(0.5)  # g per g
 
 
 class DrivingQuality:
-    """events: the DrivingEvents of the drive; vertical: its Vertical.
+    """The quality of a drive. events: its DrivingEvents; vertical: its Vertical.
 
     fit: the Fit of all straight driving so far; quality_deg: standard error of its forward, 180 until there is one;
     halves_deg: angle between the forwards of the two halves of the drive; parts: the DriveParts; agree: halves and
@@ -53,7 +53,7 @@ class DrivingQuality:
         self._scratch_fit = Fit()
 
     def judge(self):
-        """Update all attributes after another event or stop. A generator of short steps."""
+        """Update all attributes after another event or stop, as a generator of short steps."""
         regression, lag, part = self._events.regression, self._events.lag, self._scratch_fit
         up = vector()
         if not (yield from regression.fitting(self.fit, lag)):
@@ -85,8 +85,8 @@ class DrivingQuality:
             yield
         if blocks < 2 or weights <= 0.0:
             return
-        # The jackknife: the variance of forward from its changes as each block in turn is left out. It is empirical;
-        # the formal error of the regression is optimistic early in a drive.
+        # The jackknife: the variance of forward from its changes when each block in turn is left out. The formal error
+        # of the regression is too small early in a drive.
         freedom = blocks - 1
         variance = degrees(degrees(squares)) * freedom / blocks  # rad^2 to deg^2
         self.quality_deg = sqrt(blend_prior(variance, self.fit.weight, freedom))
@@ -121,7 +121,7 @@ class DrivingQuality:
         self.good = self._precise and self.agree
 
     def _find_mount_problem(self, level_change_deg):
-        """An AlignmentError if the mount has moved, else None."""
+        """Return an AlignmentError if the mount has moved, else None."""
         parts = self.parts
         if level_change_deg > MAX_CHANGE_DEG:
             return AlignmentError("mount-moved", "vertical", level_change_deg)
@@ -135,7 +135,8 @@ class DrivingQuality:
         return None
 
     def _is_last_event_off(self):
-        """True if forward by the latest event that can be judged is over _EVENT_OFF_DEG from the overall one."""
+        """True if forward from the latest event that can be judged differs by over _EVENT_OFF_DEG from the overall
+        one."""
         forward, last = vector(), self._events.last
         if last.forward(forward, self.fit.level) > _MIN_EVENT_WEIGHT and norm(forward) > _MIN_EVENT_FORWARD:
             self._event_off = angle_deg(forward, self.fit.forward) > _EVENT_OFF_DEG

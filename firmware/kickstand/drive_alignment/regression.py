@@ -1,15 +1,15 @@
-"""Forward from driving straight: the force regressed on dv/dt, for several lags of the speed at once.
+"""Computes forward from driving straight by a regression of the force on dv/dt, for several lags of the speed at once.
 
     f = level + forward a + left c        a = dv/dt / g, c = v (yaw rate) / g
 
 in the sensor's own axes, each interval weighted by its length. The intercept, level, is the vertical of straight
-driving; as it is fitted too, no error of the vertical gets into forward. c takes up the lateral force of slight bends.
-On a motorcycle, which leans into them, its coefficient is about zero. |forward| is 1 if the speed is in m/s, 1/3.6 if
-it is in km/h. The right lag is the one at which the regression explains most.
+driving. It is fitted too, so an error of the vertical does not affect forward. c absorbs the lateral force of slight
+bends. On a motorcycle, which leans into them, its coefficient is about zero. |forward| is 1 if the speed is in m/s,
+1/3.6 if it is in km/h. The right lag is the one with which the regression explains most.
 
-The sums of each few events (braking or acceleration) are kept in a regression block of their own, so that parts of the
-drive can be compared. When all blocks are in use, they are joined in pairs. So memory is fixed, and at least half of
-the blocks are in use from then on.
+A regression block has the sums of a few events (braking or acceleration), so parts of the drive can be compared. When
+all blocks are in use, they are joined in pairs. Memory is therefore fixed, and from then on at least half of the blocks
+are in use.
 """
 
 from array import array
@@ -22,13 +22,13 @@ LAGS = 11
 # The sums of one regression block: time in s, and integrals of a, c, a a, a c, c c, f (3), a f (3), c f (3) over it
 _TERMS = const(15)
 SECONDS, A, C, AA, AC, CC, F, AF, CF = 0, 1, 2, 3, 4, 5, 6, 9, 12
-_RIDGE = const(1e-6)  # g^2: keeps the coefficient of c at zero where the drive had no curve at all
+_RIDGE = const(1e-6)  # g^2: keeps the coefficient of c at zero if the drive had no curve
 
 
 class Fit:
     """A result of the regression. forward (3, g per g), level (3, g); weight (g^2 s): variation of the speed's change,
-    which is the information about forward; seconds: duration of the straight driving in it; explained (g^2 s): the part
-    of the force's variation that forward explains; found: False if there was nothing to fit.
+    the information about forward; seconds: duration of its straight driving; explained (g^2 s): the part of the force's
+    variation that forward explains; found: False if there was nothing to fit.
     """
 
     def __init__(self):
@@ -36,11 +36,11 @@ class Fit:
         self.level = [0.0] * 3
         self.weight = self.seconds = self.explained = 0.0
         self.found = False
-        self.total = [0.0] * _TERMS  # each Fit has its own, so that one can be made while another is half done
+        self.total = [0.0] * _TERMS  # each Fit has its own, because two can be computed at the same time
 
 
 class ForwardRegression:
-    """blocks: number of regression blocks in use; the last one is still being filled."""
+    """The regression of a drive. blocks: number of regression blocks in use; the last one is still being filled."""
 
     def __init__(self):
         self._sums = [array("f", [0.0] * (BLOCKS * _TERMS)) for _ in range(LAGS)]
@@ -67,7 +67,7 @@ class ForwardRegression:
             sums[k + CF + i] += curve_g * f
 
     def end_event(self):
-        """Begin the next block if this one is full, because an event has ended. A generator of short steps."""
+        """After an event, begin the next block if this one is full. A generator of short steps."""
         self._events_in_last += 1
         if self._events_in_last < self._events_per_block:
             return
@@ -86,18 +86,18 @@ class ForwardRegression:
 
     @property
     def filled(self):
-        """Number of blocks with at least one event that has ended."""
+        """The number of blocks with at least one complete event."""
         return self.blocks if self._events_in_last else self.blocks - 1
 
     def fit(self, out, lag, first=0, last=BLOCKS):
-        """Fit blocks first to last - 1 into out (a Fit), at once. False if there is nothing to fit."""
+        """Fit blocks first to last - 1 into out (a Fit), at once. Return False if there is nothing to fit."""
         for _ in self.fitting(out, lag, first, last):
             pass
         return out.found
 
     def fitting(self, out, lag, first=0, last=BLOCKS, without=-1):
-        """Like fit(), but a generator of short steps, which returns True or False. without: index of a block that is
-        left out."""
+        """Like fit(), but a generator of short steps, which returns True or False. without: index of a block to leave
+        out."""
         sums, total = self._sums[lag], out.total
         out.found = False
         for k in range(_TERMS):
@@ -116,7 +116,7 @@ class ForwardRegression:
         n = total[SECONDS]
         if n <= 0.0:
             return False
-        # the normal equations, with the means of a and c subtracted
+        # the normal equations, with the means of a and c removed
         a, c = total[A] / n, total[C] / n
         aa = total[AA] - n * a * a
         cc = total[CC] - n * c * c + _RIDGE * n

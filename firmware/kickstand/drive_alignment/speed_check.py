@@ -1,4 +1,4 @@
-"""Is the speed of the source the vehicle's speed in m/s, and in time?"""
+"""Checks that the source's speed is the vehicle's speed in m/s and arrives in time."""
 
 from math import sqrt
 
@@ -6,12 +6,12 @@ from ..errors import AlignmentError
 from ..units import const
 
 _NEGATIVE_MPS = const(-0.5)  # noise around zero does not count as negative
-# A second is lively if its mean force differs from that of the second before by this much. At standstill no second is
-# lively, while driving most are.
+# A second is lively if its mean force differs by this much from the previous second. At standstill no second is lively;
+# while driving most are.
 _LIVELY_G = const(0.03)
-_TURNING_DPS = const(5.0)  # seconds in a bend are left out: they are lively at a constant speed too
-# The speed is stuck if it has not changed during at least _STUCK_S lively seconds (as many as four braking events have
-# at their beginnings and ends), and these are at least _STUCK_SHARE of all seconds since its last change.
+_TURNING_DPS = const(5.0)  # seconds in a bend are ignored: they are lively even at constant speed
+# The speed is stuck if it has not changed during at least _STUCK_S lively seconds (the number in the beginnings and
+# ends of four braking events), and these are at least _STUCK_SHARE of all seconds since its last change.
 _STUCK_S = const(8)
 _STUCK_SHARE = const(0.15)
 # Limits of the change of force per change of speed, which should be 1. The pitch of a braking vehicle and a coarsely
@@ -21,13 +21,13 @@ MAX_LAG_S = 1.9
 
 
 def speed_unit_problem(force_ratio):
-    """The AlignmentError for a speed whose changes do not fit the force. force_ratio: change of force per change of
+    """The AlignmentError for changes of speed that do not fit the force. force_ratio: change of force per change of
     speed."""
     return AlignmentError("speed-unit", min(1.0 / max(force_ratio, 0.01), 99.9))
 
 
 def fit_problem(lag_s, force_ratio):
-    """The fault of the speed that the fit of force on changes of speed shows: an AlignmentError, or None."""
+    """The fault of the speed shown by the fit of force on changes of speed: an AlignmentError, or None."""
     if lag_s >= MAX_LAG_S:
         return AlignmentError("speed-late", lag_s)
     if not MIN_FORCE_RATIO < force_ratio < MAX_FORCE_RATIO:
@@ -36,7 +36,7 @@ def fit_problem(lag_s, force_ratio):
 
 
 class SpeedCheck:
-    """Finds a negative or stuck speed, without knowing forward. problem: an AlignmentError, or None."""
+    """Finds a negative or stuck speed without knowing forward. problem: an AlignmentError, or None."""
 
     def __init__(self):
         self.problem = None
@@ -48,7 +48,7 @@ class SpeedCheck:
         self._sums_us = 0
 
     def _start_count(self):
-        """Count the lively seconds from here on, because the speed has changed."""
+        """Restart the count of lively seconds, because the speed has changed."""
         self._seconds = self._lively_seconds = 0
 
     def measure(self, speed_mps):
@@ -60,7 +60,7 @@ class SpeedCheck:
             self._start_count()
 
     def update(self, force, yaw_dps, dt_us):
-        """Take mean force (3, g) and yaw rate (deg/s) over the last dt_us."""
+        """Take the mean force (3, g) and yaw rate (deg/s) over the last dt_us."""
         sums = self._force_us
         for i in range(3):
             sums[i] += force[i] * dt_us
@@ -74,7 +74,7 @@ class SpeedCheck:
                 sums[i] = 0.0
 
     def update_second(self, force, yaw_dps=0.0):
-        """Take mean force (3, g) and mean absolute yaw rate (deg/s) over the last second."""
+        """Take the mean force (3, g) and the mean absolute yaw rate (deg/s) over the last second."""
         before, self._force_before = self._force_before, list(force)
         turning = max(yaw_dps, self._yaw_dps_before) > _TURNING_DPS
         self._yaw_dps_before = yaw_dps

@@ -1,8 +1,8 @@
-"""Does an earlier alignment, from two poses or from another drive, fit this drive?
+"""Checks whether an earlier alignment, from two poses or another drive, fits this drive.
 
-A kickstand on the other side than the setting says exchanges forward and backward. The poses cannot show that, the
-first braking events do. A change of pitch between the poses makes a yaw error of some degrees, which enough braking
-events correct. Any other difference is a mount that has moved.
+If the kickstand is not on the side in the settings, forward and backward are exchanged. The poses cannot show that, but
+the first braking events do. A change of pitch between the poses causes a yaw error of a few degrees, which enough
+braking events correct. Any other difference means that the mount has moved.
 """
 
 from math import atan2, degrees
@@ -13,20 +13,20 @@ from .regression import Fit
 
 UNKNOWN = 0  # not enough events yet
 SAME = 1
-REFINED = 2  # a yaw error of some degrees: use the DriveAlignment's matrix()
+REFINED = 2  # a yaw error of a few degrees: use the DriveAlignment's matrix()
 REVERSED = 3  # forward is backward: turn_round()
 MOVED = 4  # the mount has moved: align again
 
-_MIN_EVENTS_TO_REVERSE = const(2)  # least number of straight events, which have to agree
+_MIN_EVENTS_TO_REVERSE = const(2)  # least number of straight events, which must agree
 _SAME_DEG = const(1.0)
-# Largest yaw error: 2 degrees of pitch at the smallest allowed tilt between two poses make 22
+# Largest yaw error: 2 degrees of pitch cause 22 at the smallest allowed tilt between two poses
 _REFINED_DEG = const(30.0)
 _REVERSED_DEG = const(135.0)
-_UPRIGHT_DEG = const(8.0)  # largest difference of up, by an inexact upright pose and the road's camber
+_UPRIGHT_DEG = const(8.0)  # largest difference of up, from an inexact upright pose and the road's camber
 
 
 def compare(drive, matrix):
-    """UNKNOWN, SAME, REFINED, REVERSED or MOVED. drive: a DriveAlignment; matrix: 9, rows left, up, forward."""
+    """Return UNKNOWN, SAME, REFINED, REVERSED or MOVED. drive: a DriveAlignment; matrix: 9, rows left, up, forward."""
     events, quality = drive.events, drive.quality
     if quality.speed_problem is not None or events.straight_count < _MIN_EVENTS_TO_REVERSE:
         return UNKNOWN
@@ -45,13 +45,13 @@ def compare(drive, matrix):
 
 
 def yaw_deg(fit, matrix):
-    """The yaw error of the matrix: the angle from its forward to that of a Fit, about the matrix's up; > 0 to the
+    """The yaw error of the matrix: the angle from its forward to a Fit's forward about the matrix's up; > 0 to the
     left."""
     return degrees(atan2(dot(matrix[0:3], fit.forward), dot(matrix[6:9], fit.forward)))
 
 
 def _all_backward(events, matrix):
-    """True if forward is backward in each block of the drive. events: its DrivingEvents."""
+    """True if each block of the drive shows forward as backward. events: its DrivingEvents."""
     regression, part = events.regression, Fit()
     for block in range(regression.filled):
         if regression.fit(part, events.lag, block, block + 1) and abs(yaw_deg(part, matrix)) < 90.0:
@@ -60,6 +60,6 @@ def _all_backward(events, matrix):
 
 
 def turn_round(matrix):
-    """Reverse forward and left, in place: the result that the poses would have given with the other side set."""
+    """Reverse forward and left in place: the result of the same poses with the other side set."""
     for i in (0, 1, 2, 6, 7, 8):
         matrix[i] = -matrix[i]

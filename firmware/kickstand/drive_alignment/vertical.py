@@ -1,11 +1,11 @@
-"""The vertical in the sensor's axes: from standing, and from the best source that a drive has so far.
+"""Finds the vertical in the sensor's axes: from standing, and from the best source of a drive so far.
 
-Standing shows it as the mean direction of gravity over many stops, because no city is all uphill (ViriCiti). Each stop
-counts once, however long it was. At a stop the gyro reads its bias alone, which is measured too.
+From standing, it is the mean direction of gravity over many stops, because no city is all uphill (ViriCiti). Each stop
+counts once, however long it was. At a stop the gyro reads only its bias, which is measured too.
 
-A motorcycle's stops are not level sideways. It has the vertical from the upright pose, or else from riding straight,
-where balance keeps the lateral force at zero. A car has it from its stops and from driving straight, in equal shares:
-the road's camber and slope tilt both alike.
+A motorcycle's stops are not level sideways. Its vertical comes from the upright pose, or else from riding straight,
+when balance keeps the lateral force at zero. A car's vertical comes in equal shares from its stops and from driving
+straight: the road's camber and slope tilt both in the same way.
 """
 
 from ..errors import AlignmentError
@@ -13,26 +13,26 @@ from ..rotation import angle_deg, norm, normalize, vector
 from ..units import const
 
 _STANDING_MPS = const(0.5)  # a lower speed is standing: a GPS at rest shows up to this
-MOVED_MPS = 2.0  # a vehicle that was faster than this has driven: its next stop is another one
+MOVED_MPS = 2.0  # after a higher speed the next stop is a new one
 SETTLE_S = 1.0  # a vehicle rocks back after braking
-COUNTS_S = 2.0  # after settling, a stop has to last this long to count
-# Largest difference at a stop of a mean over 0.1 s from a mean with the time constant _AVERAGE_S. A diesel at idle,
-# wind and passengers make less.
+COUNTS_S = 2.0  # after settling, a stop must last this long to count
+# Largest difference at a stop between a mean over 0.1 s and a mean with the time constant _AVERAGE_S. An idling diesel,
+# wind and passengers cause less.
 _STILL_G = const(0.06)
 _STILL_DPS = const(3.0)
 _AVERAGE_S = const(0.5)
 _SAME_STOP_DEG = const(1.5)  # doors and passengers tilt a standing vehicle by less
-# a sensor still for so long at another angle was rotated: a late speed of zero would be over by then
+# a sensor that is still for this long at another angle was rotated: a late speed of zero would have ended by then
 _TURNED_S = const(6.0)
-# A rate that differs by more from the bias at the last stop is a bend, and a speed of zero in it is wrong. Warming up
+# A rate that differs by more from the bias at the last stop is a bend, where a speed of zero is wrong. Warming up
 # changes the bias by less.
 TURNING_DPS = 10.0
-_MEAN_S = const(60.0)  # time constant of the mean force, which serves as the vertical until there is a better one
-MAX_CHANGE_DEG = 8.0  # largest difference of two verticals by slopes of the road (14 %): beyond, the mount has moved
+_MEAN_S = const(60.0)  # time constant of the mean force, the vertical until there is a better one
+MAX_CHANGE_DEG = 8.0  # largest difference of two verticals due to the road's slope (14 %); above, the mount moved
 
 
 class StandingVertical:
-    """update() with each mean over about 0.1 s.
+    """Measures the vertical at stops. Call update() with each mean over about 0.1 s.
 
     stops: their number; up: the vertical in the sensor's axes (unit vector), None before the first one; bias: the
     gyro's (3, deg/s) at the last stop; standing: True during a stop; moved: True if the verticals of two stops differ
@@ -45,11 +45,11 @@ class StandingVertical:
         self.bias = list(bias)
         self.standing = False
         self.moved = False
-        self._sum = [0.0] * 3  # sum of the directions of the stops before this one
+        self._sum = [0.0] * 3  # sum of the directions of the earlier stops
         self._begin_stop()
 
     def _begin_stop(self):
-        """Begin the means of another stop, because the vehicle has driven."""
+        """Begin the means of a new stop, because the vehicle has driven."""
         self._stop_force = [0.0] * 3  # means of this stop
         self._stop_bias = [0.0] * 3
         self._averaged_s = 0.0
@@ -74,7 +74,7 @@ class StandingVertical:
         if self._counted:
             apart_deg = angle_deg(self._force, self._stop_force)
             if apart_deg > _SAME_STOP_DEG:
-                # Either the vehicle drives again while a late speed still says zero, or the sensor was rotated.
+                # Either the vehicle drives again while a late speed is still zero, or the sensor was rotated.
                 self.moved = self.moved or (apart_deg > MAX_CHANGE_DEG and self._still_s > _TURNED_S)
                 return
         self.standing = True
@@ -144,10 +144,10 @@ class Vertical:
         return (self.is_car and self._standing.up) or self._from_pose or self._mean
 
     def known(self, out, fit=None):
-        """Fill out (unit vector) with the vertical. Returns False if it is not known yet (a car's before its first
+        """Write the vertical into out (a unit vector). Return False if it is not known yet (a car's before its first
         stop).
 
-        fit: the Fit of all straight driving, None if there is none yet.
+        fit: the Fit of all straight driving, or None.
         """
         if self.is_car:
             best = self._standing.up
@@ -163,8 +163,8 @@ class Vertical:
         return True
 
     def problem(self, level):
-        """An AlignmentError if straight driving's vertical is far from that of the stops or of the upright pose, else
-        None. level (3): the vertical of straight driving, from the Fit of all of it."""
+        """Return an AlignmentError if the vertical of straight driving is far from that of the stops or the upright
+        pose, else None. level (3): the vertical of straight driving, from the Fit of all of it."""
         before = self._standing.up if self.is_car else self._from_pose
         change_deg = 0.0 if before is None else angle_deg(before, level)
         if change_deg > MAX_CHANGE_DEG:

@@ -1,7 +1,9 @@
-"""Judges axes that may be ill, by what add_up() has noted: imported once one does not look well.
+"""Finds faulty axes from the notes of add_up(). It is imported only when an axis looks suspicious.
 
-An axis is ill if its counts have only two values or keep their lowest bit (it is dead, or its low byte is stuck), if
-they jump through 256 counts while their high byte stays (which is stuck), or if they equal those of another axis.
+An axis is faulty in three cases:
+* Its counts have at most two values, or their lowest bits do not change: it is dead, or its low byte is stuck.
+* Its counts wrap around within 256 while the high byte stays the same: the high byte is stuck.
+* Its counts equal those of another axis.
 """
 
 from micropython import const
@@ -9,7 +11,7 @@ from micropython import const
 from ..errors import Notice
 from ..units import AXES
 
-# Places in the notes, see fifo_frames.py, which keeps them to itself: a name that others import takes heap.
+# Places in the notes. They repeat those of fifo_frames.py, because importing names would take heap.
 _ENDS = const(5)
 _CLIPPED = const(6)
 _GYRO_CLIPPED = const(7)
@@ -19,9 +21,10 @@ _SEEN = const(19)
 _HIGH_BYTE = const(0x10000)
 _WRAPPED = const(0x20000)
 
-# Looks in which an axis must be quiet to be ill, by dlpf 1 to 6, for the gyro in rows from 250 deg/s up. With the noise
-# of the quietest chip (accelerometer 100 ug/sqrt(Hz), at 16 g; gyro 0.004 deg/s/sqrt(Hz)) a working axis at rest is
-# that quiet once in 1e12 looks. 0: its noise is so much less than a count that nobody can tell.
+# The number of looks for which an axis must be quiet to be faulty, for dlpf 1 to 6. The gyro has a row for each range,
+# from 250 deg/s up. With the noise of the quietest chip (accelerometer 100 ug/sqrt(Hz), at 16 g; gyro 0.004
+# deg/s/sqrt(Hz)) a working axis at rest is quiet for so long once in 1e12 looks. 0: the noise is too far below one
+# count to decide.
 _ACCEL_LOOKS = (1, 1, 1, 4, 15, 80)
 _GYRO_LOOKS = (
     (1, 1, 1, 3, 5, 11),
@@ -30,30 +33,35 @@ _GYRO_LOOKS = (
     (1, 2, 14, 0, 0, 0),
 )
 _COLUMNS = (0, 1, 2, 4, 5, 6)  # of the axes
-_WRAP_LOOKS = const(2)  # looks in which a stuck high byte must show
-_WELL_LOOKS = const(2)  # successive looks without a fault that end one
-_CLIP_LOOKS = const(2)  # successive looks with half of the samples at the end of the range that are a fault,
-_RAIL_LOOKS = const(5)  # and with all of them: not the vibration, but the axis
-_SETUP_LOOKS = const(25)  # looks from one set-up of a chip with an ill axis to the next
+_WRAP_LOOKS = const(2)  # looks with a wrap until the high byte counts as stuck
+_WELL_LOOKS = const(2)  # successive looks without a fault until it is cleared
+_CLIP_LOOKS = const(2)  # successive looks with half of the samples at the end of the range until it is a fault
+_RAIL_LOOKS = const(5)  # the same with all samples: the axis is the cause, not vibration
+_SETUP_LOOKS = const(25)  # looks between two set-ups of a chip with a faulty axis
 _QUIET_LOOKS = const(150)  # looks until the same notice is shown again
 
 
 class AxisJudge:
-    """gyro_range: 0 (250 deg/s) to 3 (2000). dlpf: see Mpu6050."""
+    """Decides from the notes of an AxisWatch which axes are faulty.
+
+    gyro_range: 0 (250 deg/s) to 3 (2000). dlpf: see Mpu6050.
+    """
 
     def __init__(self, gyro_range, dlpf):
         self._limits = _ACCEL_LOOKS[dlpf - 1], _GYRO_LOOKS[gyro_range][dlpf - 1]
-        # For each column: successive looks in which it was quiet; looks in which it wrapped since its high byte changed
+        # For each column: successive quiet looks; looks with a wrap since the high byte changed
         self._quiet, self._wrapped = bytearray(7), bytearray(7)
-        self._clips = self._well = self._ill = 0  # successive looks: clipped; without a fault; with an ill axis
+        self._clips = self._well = self._ill = 0  # successive looks: clipped; without a fault; with a faulty axis
         self._noticed = {}  # number of the look at which a code was last shown
 
     def look(self, watch, samples):
-        """AxisWatch.look() for so many samples: set the fault, notice and clipped of watch, an AxisWatch."""
+        """Judge so many samples for AxisWatch.look(). Set fault, notice and clipped of watch, an AxisWatch.
+
+        Return True if the chip should be set up."""
         notes = watch.notes
         lost, gyro = notes[_CLIPPED], notes[_GYRO_CLIPPED]
         watch.clipped += lost
-        enough = 2 * lost < samples  # good ones to judge by
+        enough = 2 * lost < samples  # good samples to judge
         shaken = 10 * notes[_SHAKEN] >= samples
         if shaken or not enough:
             self._clips += 1
@@ -80,7 +88,7 @@ class AxisJudge:
         return self._ill % _SETUP_LOOKS == 1
 
     def _ill_axes(self, notes):
-        """A Notice for axes that are ill, or None."""
+        """A Notice for the faulty axes, or None."""
         quiet, wrapped = self._quiet, self._wrapped
         dead = equal = 0
         for i in _COLUMNS:
@@ -89,12 +97,12 @@ class AxisJudge:
                 equal |= 1 << i | 1 << (i - 1 if i & 3 else i + 2)
             seen = notes[_SEEN + i]
             values = seen & 0xFFFF
-            more = values & (values - 1)  # without its lowest 1: 0 if there was one value
+            more = values & (values - 1)  # without its lowest 1: 0 if there was only one value
             if not (more & (more - 1) and values & 0x5555 and values & 0xAAAA):
                 if quiet[i] < 255:
                     quiet[i] += 1
                 if quiet[i] < limit or not limit:
-                    continue  # the values of several looks are put together
+                    continue  # collect the values of several looks
                 dead |= 1 << i
             else:
                 quiet[i] = 0
@@ -108,14 +116,14 @@ class AxisJudge:
         return _ill(dead) if dead else _ill(equal, "equal") if equal else None
 
     def _show(self, watch, notice):
-        """Let a notice be shown for a moment, unless the same one was shown a minute ago."""
+        """Show a notice for a moment, unless the same one was shown in the last minute."""
         if watch.looks - self._noticed.get(notice.code, -_QUIET_LOOKS) >= _QUIET_LOOKS:
             self._noticed[notice.code] = watch.looks
             watch.notice = notice
 
 
 def _ill(axes, how=None):
-    """The Notice for these axes, a bit for each column: of the gyro, or if none of its is ill of the accelerometer."""
+    """The Notice for these axes, one bit per column. It names the gyro's axes; without any, the accelerometer's."""
     gyro = axes >> 4
     names = "".join([AXES[i] for i in range(3) if (gyro or axes) >> i & 1])
     return Notice("axis-ill", "Gyro" if gyro else "Accel", names, how or ("dead" if gyro else "stuck"))

@@ -1,8 +1,8 @@
-"""Decodes frames of the chip's FIFO, sums them up, and watches the counts of each axis.
+"""Decodes frames of the chip's FIFO, adds them up, and watches the counts of each axis.
 
 A frame is one sample: 14 bytes, seven big-endian int16 in the order ax ay az temperature gx gy gz (register map
-RM-MPU-6000A rev 4.2, pp. 29 to 31). On the board decode() and add_up() are the machine code of fifo_frames_viper.py;
-elsewhere they are decode_python() and add_up_python(), which give the same results.
+RM-MPU-6000A rev 4.2, pp. 29 to 31). On the board, decode() and add_up() are the machine code of fifo_frames_viper.py.
+Elsewhere they are decode_python() and add_up_python(), which give the same results.
 """
 
 import gc
@@ -13,29 +13,30 @@ from micropython import const
 from ..errors import NO_MACHINE_CODE, Notice, checked, tried
 
 FRAME = const(14)  # bytes
-SATURATED = const(32700)  # |counts|: from here on a reading is at the end of its range
+SATURATED = const(32700)  # |counts| from which a reading is at the end of its range
 LOOK_MS = const(400)
 
-# Places in the array('i', 33) that add_up() keeps its notes in; in the machine code they are numbers. The hash of the
-# last frame; how many times in a row it was repeated; how many repetitions make a frame dead; the number of frames at
-# the end of the range in this call; the same in a row until now.
+# Places in array('i', 33), the notes of add_up(). The machine code uses the numbers. The hash of the last frame; how
+# often it was repeated in a row; the repetitions that make a frame dead; the number of frames at the end of the range
+# in this call; the number of such frames in a row until now.
 _HASH = const(0)
 _REPEATS = const(1)
 _LIMIT = const(2)
 LOST = const(3)
 _ROW = const(4)
-# Since the last look: a bit for each column that was at its end; the number of frames in which one was, and in which
-# one of the gyro's was; bits for axes that differed: y from x (bits 1 and 5), z from y (2 and 6), z from x (0 and 4).
-# The number of samples until the next look.
+# Since the last look: one bit per column that was at the end of its range; the number of frames with such a column; the
+# number of frames with such a column of the gyro; bits for axes that differed: y from x (bits 1 and 5), z from y (2 and
+# 6), z from x (0 and 4). Then the number of samples until the next look.
 _ENDS = const(5)
 _CLIPPED = const(6)
 _GYRO_CLIPPED = const(7)
 _DIFFER = const(8)
 DUE = const(9)
-# |counts| of the accelerometer that hard vibration reaches, and the number of frames with so much since the last look.
+# |counts| of the accelerometer that hard vibration reaches, and the number of frames that reached it since the last
+# look.
 _HARD = const(10)
 _SHAKEN = const(11)
-# From each of these on seven places, in the frame's order: the counts of the last frame; a bit for each value that
+# Each of these begins seven places, in the frame's order: the counts of the last frame; one bit for each value that
 # their lowest four bits had since the last look; the largest |counts| since power-on.
 _LAST = const(12)
 _SEEN = const(19)
@@ -44,26 +45,27 @@ _HIGH_BYTE = const(0x10000)  # in _SEEN: the high byte has changed
 _WRAPPED = const(0x20000)  # in _SEEN: the counts jumped by _JUMP or more, but the high byte stayed
 _JUMP = const(192)
 
-# Half of 8 g and of 16 g. The low-pass hides most of a vibration: where so much is left, it was cut off before, and the
-# mean of what was cut off unevenly is wrong. A range below 8 g has no such limit, because bends reach half of it.
+# Half of the range of 8 g or 16 g. The low-pass hides most of a vibration. If this much is left after it, the vibration
+# was clipped before it, and the mean of unevenly clipped readings is wrong. A range below 8 g has no such limit,
+# because bends reach half of it.
 _HARD_COUNTS = const(16384)
 _COLUMNS = (0, 1, 2, 4, 5, 6)  # of the axes
 _ALL_DIFFER = const(0x77)
 
 
 def decode_python(frames, at, counts):
-    """Put the frame that begins at byte `at` of frames into counts, array('h', 7)."""
+    """Decode the frame that begins at byte `at` of frames into counts, array('h', 7)."""
     for i in range(7):
         counts[i] = _int16(frames, at + 2 * i)
 
 
 def add_up_python(frames, n, sums, watch):
-    """Add n frames into sums, array('i', 7). Return how many are in the sums.
+    """Add n frames into sums, array('i', 7). Return the number of frames added.
 
-    A frame with an axis at the end of its range is left out: it is counted in watch[LOST], and the good frames after it
-    move up in `frames`, so that the good ones are the first ones there. It stops at the first dead frame: the result
+    A frame with an axis at the end of its range is skipped and counted in watch[LOST]. The good frames after it move up
+    in `frames`: the good frames are then the first ones there. The function stops at the first dead frame: the result
     and watch[LOST] then add up to less than n. A frame is dead if the six bytes of its force are all 0x00 or all 0xFF,
-    or if it is like so many frames before it. watch: AxisWatch.notes.
+    or if it repeats too many frames before it. watch: AxisWatch.notes.
     """
     for i in range(7):
         sums[i] = 0
@@ -125,21 +127,22 @@ def add_up_python(frames, n, sums, watch):
 
 
 def _int16(frames, at):
-    """The big-endian int16 at byte `at`. struct.unpack_from() would put a tuple on the heap for each frame."""
+    """The big-endian int16 at byte `at`. struct.unpack_from() would allocate a tuple for each frame."""
     value = frames[at] << 8 | frames[at + 1]
     return value - 65536 if value > 32767 else value
 
 
 class AxisWatch:
-    """Looks at each axis. A working one is never quiet: its noise changes the counts (product specification
-    PS-MPU-6000A rev 3.4, sections 6.1 and 6.2). What is not well is judged by axis_judge.py, imported only then.
+    """Watches each axis for faults. The noise of a working axis always changes its counts (product specification
+    PS-MPU-6000A rev 3.4, sections 6.1 and 6.2). A suspicious axis is judged by axis_judge.py, which is imported only
+    then.
 
-    rate_hz: samples a second. accel_range, gyro_range: 0 (2 g, 250 deg/s) to 3 (16 g, 2000 deg/s). dlpf: see Mpu6050.
-    repeats: repetitions of a frame that make it dead.
+    rate_hz: samples per second. accel_range, gyro_range: 0 (2 g, 250 deg/s) to 3 (16 g, 2000 deg/s). dlpf: see Mpu6050.
+    repeats: repetitions that make a frame dead.
 
-    notes: what add_up() notes. fault: None, or a Notice: an axis is ill, or half of the samples are at the end of the
-    range. notice: None, or a Notice that is to be shown for a moment; who shows it sets it to None. clipped: samples
-    that were left out since power-on, because an axis was at its end. looks: number of looks.
+    notes: the notes of add_up(). fault: None, or a Notice: an axis is faulty, or half of the samples are at the end of
+    the range. notice: None, or a Notice to show for a moment; whoever shows it sets it to None. clipped: samples
+    skipped since power-on because an axis was at the end of its range. looks: number of looks.
     """
 
     def __init__(self, rate_hz, accel_range, gyro_range, dlpf, repeats):
@@ -152,7 +155,7 @@ class AxisWatch:
         self.clipped = self.looks = 0
 
     def restart(self):
-        """Forget the samples since the last look, because the chip was set up."""
+        """Drop the samples since the last look, because the chip was set up."""
         notes = self.notes
         for i in range(_ROW, DUE):
             notes[i] = 0
@@ -162,19 +165,19 @@ class AxisWatch:
         notes[DUE] = self._look
 
     def clips(self):
-        """A Notice if the last samples, those of 0.1 s or more, were all at the end of the range; else None."""
+        """A Notice if all samples of the last 0.1 s or more were at the end of the range, else None."""
         notes = self.notes
         if notes[_ROW] < notes[_LIMIT]:
             return None
         return Notice("clips", "Gyro" if notes[_ENDS] > 7 else "Accel")
 
     def shaken(self):
-        """Since power-on: the largest |counts| of the accelerometer's axes (3), and the share of lost samples."""
+        """The largest |counts| of the accelerometer's axes (3) and the share of lost samples, both since power-on."""
         return self.notes[_PEAK : _PEAK + 3], self.clipped / max(1, self.looks * self._look)
 
     def look(self):
-        """Judge the samples since the last look. To be called when notes[DUE] is 0 or less. Returns True if the chip
-        should be set up, which may cure an axis: when it fell ill, and now and then."""
+        """Judge the samples since the last look. Call it when notes[DUE] is 0 or less. Return True if the chip should
+        be set up, which may repair an axis: once when a fault begins, then from time to time."""
         samples = self._look - self.notes[DUE]
         self.notes[DUE] = self._look
         self.looks += 1
@@ -183,18 +186,18 @@ class AxisWatch:
                 self.fault = None
                 return False
             self.fault = tried(self._load)
-            if self.fault:  # no memory, or the firmware is incomplete
+            if self.fault:  # out of memory, or the firmware is incomplete
                 return False
         return self._judge.look(self, samples)
 
     def _well(self):
-        """True if all axes are certainly well; then the next look begins."""
+        """Return True if all axes certainly work, and begin the next look."""
         notes = self.notes
         if notes[_DIFFER] & _ALL_DIFFER != _ALL_DIFFER or notes[_CLIPPED] or notes[_SHAKEN]:
             return False
         for i in _COLUMNS:
             seen = notes[_SEEN + i]
-            more = seen & (seen - 1) & 0xFFFF  # without its lowest 1: 0 if there was one value
+            more = seen & (seen - 1) & 0xFFFF  # without its lowest 1: 0 if there was only one value
             if not (more & (more - 1) and seen & 0x5555 and seen & 0xAAAA and (seen & _HIGH_BYTE or seen < _WRAPPED)):
                 return False
         for i in _COLUMNS:
@@ -203,7 +206,7 @@ class AxisWatch:
         return True
 
     def _load(self):
-        gc.collect()  # or lasting objects would lie behind garbage
+        gc.collect()  # or lasting objects would be placed behind garbage
         from .axis_judge import AxisJudge
 
         self._judge = AxisJudge(*self._settings)
@@ -216,7 +219,7 @@ except NO_MACHINE_CODE:
 else:
     _FRAME = b"\x7f\x00\x80\xff\xff\xff\x80\x00\x80\xff\x01\x00\xab\xcd"
     decode = checked(decode, decode_python, _FRAME, 0, array("h", range(7)))
-    # Eight frames: numbers 2 and 4 are at the ends of the range, the last one repeats the one before
+    # Eight frames: numbers 2 and 4 are at the ends of the range, the last one repeats the previous one
     _TRIAL = bytearray(_FRAME * 8)
     for _k in range(7):
         _TRIAL[14 * _k + 1] = _TRIAL[14 * _k + 9] = 250 - 40 * _k

@@ -1,4 +1,4 @@
-"""fifo_frames.py's decode_python() and add_up_python() as machine code: 7 and NN us instead of 140 and NNNN us.
+"""fifo_frames.py's decode_python() and add_up_python() as machine code. decode() takes 7 us instead of 140.
 
 Both pairs must give the same results: host_tests/imu/test_batches.py compares them.
 """
@@ -53,7 +53,7 @@ def add_up(frames: ptr8, n: int, sums: ptr32, watch: ptr32) -> int:  # noqa: F82
                 ends |= 1 << i
             if value >= watch[10] and i < 3:
                 shaken = 1
-            value = watch[12 + i]  # as last, which a computer of 64 bits reads without its sign
+            value = watch[12 + i]  # read again as last: 64-bit computers read it unsigned
             seen = 1 << (value & 15)
             if value >> 8 != last >> 8:
                 seen |= 0x10000

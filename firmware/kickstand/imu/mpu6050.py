@@ -1,6 +1,6 @@
-"""Driver for the InvenSense MPU6050 and the chips sold under its name: registers in, counts out.
+"""Driver for the InvenSense MPU6050 and the chips sold under its name. It returns raw counts.
 
-Sources: register map RM-MPU-6000A rev 4.2, whose pages are named below; product specification PS-MPU-6000A rev 3.4.
+Sources: register map RM-MPU-6000A rev 4.2 (the page numbers below); product specification PS-MPU-6000A rev 3.4.
 
     from time import sleep_ms
     from machine import I2C, Pin
@@ -24,8 +24,8 @@ from micropython import const
 
 from .fifo_frames import FRAME, SATURATED, AxisWatch, add_up, decode
 
-# setup() writes the registers from here on one after the other: SMPLRT_DIV (p. 11), CONFIG with DLPF_CFG (p. 13),
-# GYRO_CONFIG (p. 14), ACCEL_CONFIG (p. 15) and, where the chip has it, ACCEL_CONFIG2: the accelerometer's own low-pass
+# setup() writes the registers from here on one by one: SMPLRT_DIV (p. 11), CONFIG with DLPF_CFG (p. 13),
+# GYRO_CONFIG (p. 14), ACCEL_CONFIG (p. 15) and, if the chip has it, ACCEL_CONFIG2, the accelerometer's own low-pass
 _SMPLRT_DIV = const(0x19)
 _FIFO_EN = const(0x23)  # p. 16
 _ACCEL_XOUT_H = const(0x3B)  # p. 29: the fourteen bytes from here belong to one sampling instant
@@ -36,9 +36,9 @@ _FIFO_R_W = const(0x74)  # p. 44
 _WHO_AM_I = const(0x75)  # p. 45
 
 _RESET = const(0x80)  # bit of PWR_MGMT_1
-_STANDBY = const(0x3F)  # bits of PWR_MGMT_2 (p. 42), which follows PWR_MGMT_1: an axis each that does not measure
-_CLOCK_PLL_GYRO_X = const(0x01)  # in PWR_MGMT_1: 1 % accurate; the oscillator used after a reset is off by up to 5 %
-_FIFO_ALL = const(0xF8)  # in FIFO_EN: temperature, gyro and accelerometer, the same fourteen bytes as one burst
+_STANDBY = const(0x3F)  # bits of PWR_MGMT_2 (p. 42), which follows PWR_MGMT_1: each turns an axis off
+_CLOCK_PLL_GYRO_X = const(0x01)  # in PWR_MGMT_1: 1 % accurate; after a reset the oscillator is used, off by up to 5 %
+_FIFO_ALL = const(0xF8)  # in FIFO_EN: temperature, gyro, accelerometer: the fourteen bytes of a burst
 _FIFO_ENABLE = const(0x40)  # bit of USER_CTRL
 _FIFO_RESET = const(0x04)  # bit of USER_CTRL
 
@@ -47,9 +47,9 @@ GYRO_LSB_PER_DPS = {250: 131.0, 500: 65.5, 1000: 32.8, 2000: 16.4}  # counts per
 MIN_DLPF = {50: 4, 100: 3, 125: 3, 200: 2}  # by rate_hz: the widest low-pass (98, 44 or 21 Hz) under half of it (p. 13)
 GYRO_DELAY_S = {1: 0.0019, 2: 0.0028, 3: 0.0048, 4: 0.0083, 5: 0.0134, 6: 0.0186}  # delay by dlpf (p. 13)
 
-# The chips known to work, by WHO_AM_I: a name of at most 12 characters; temperature counts per degree C; degrees C at 0
-# counts; True if it has ACCEL_CONFIG2 (0x1D); bytes in its FIFO, or fewer; the bits of FIFO_EN that must read back.
-# A new one also goes into VARIANTS in tools/kickstand_tools/simulated_board/mpu6050.py and the parts in the README. A
+# The chips known to work, by WHO_AM_I: name (at most 12 characters); temperature counts per degree C; degrees C at 0
+# counts; True if it has ACCEL_CONFIG2 (0x1D); size of its FIFO in bytes, or less; bits of FIFO_EN that must read back.
+# Add a new one also to VARIANTS in tools/kickstand_tools/simulated_board/mpu6050.py and to the parts in the README. A
 # chip with other registers (LSM6DS3, BMI160) needs a driver with the same methods, opened by open_sensor().
 CHIPS = {
     0x68: ("MPU6050", 340.0, 36.53, False, 1024, 0xF8),
@@ -60,7 +60,7 @@ CHIPS = {
     0x74: ("MPU6515", 333.87, 21.0, True, 512, 0xF8),
     0x78: ("MPU6500 0x78", 333.87, 21.0, True, 512, 0xF8),
     0x98: ("ICM20689", 326.8, 25.0, True, 512, 0xF8),
-    0x19: ("MPU6886", 326.8, 25.0, True, 512, 0x18),  # it always adds the temperature, without a bit for it
+    0x19: ("MPU6886", 326.8, 25.0, True, 512, 0x18),  # always adds the temperature and has no bit for it
 }
 _NAME = const(0)
 _LSB_PER_C = const(1)
@@ -69,33 +69,33 @@ _HAS_ACCEL_CONFIG2 = const(3)
 _FIFO_EN_BITS = const(5)
 
 _MAX_FRAMES = const(8)  # most frames in one transfer, to catch up: 3 ms at 400 kHz
-# Most while fewer than _MAX_FRAMES wait, so that one slow pass of the loop does not slow the next one
+# The limit while fewer than _MAX_FRAMES wait: one slow pass of the loop must not slow the next one
 _FEW_FRAMES = const(3)
-# Readings repeated for longer are a fault: noise changes those of a working chip in every sample
+# Readings that repeat for longer are a fault: in a working chip, noise changes every sample
 _FROZEN_MS = const(100)
 
 
 class UnknownChip(Exception):
-    """A chip answers, but it is not in CHIPS. args[0]: its WHO_AM_I."""
+    """A chip answers that is not in CHIPS. args[0]: its WHO_AM_I."""
 
 
 class NotKept(OSError):
-    """A chip answers, but registers that were written do not read back. args[0]: which, in words."""
+    """A chip answers, but registers do not read back as written. args[0]: which registers, in words."""
 
 
 class Mpu6050:
     """One chip on one bus.
 
-    i2c: a machine.I2C.  address: 0x68, or 0x69 with AD0 high: where it is looked for first.  accel_range_g: 2, 4, 8 or
-    16.  gyro_range_dps: 250, 500, 1000 or 2000 deg/s.  dlpf: DLPF_CFG, the low-pass, from 1 (184 Hz) to 6 (5 Hz).
-    rate_hz: samples a second, 1000 divided by 1 to 256.  accept: one more WHO_AM_I, to be treated as an MPU6500.
+    i2c: a machine.I2C.  address: where to look first, 0x68, or 0x69 with AD0 high.  accel_range_g: 2, 4, 8 or 16.
+    gyro_range_dps: 250, 500, 1000 or 2000 deg/s.  dlpf: DLPF_CFG, the low-pass, from 1 (184 Hz) to 6 (5 Hz). rate_hz:
+    samples per second, 1000 divided by 1 to 256.  accept: an additional WHO_AM_I, treated as an MPU6500.
 
-    address: where it answers. Until a set-up has succeeded, each one also tries the other of the two addresses.
-    who_am_i: what the chip answered, 0 before setup().  counts: array('h', 7) of the last read() or take(), ax ay az
-    temperature gx gy gz.  sums: array('i', 7) of the last add_up(), in the same order.  accel_lsb_per_g and
-    gyro_lsb_per_dps: counts per g and per deg/s.  period_ms: time from one sample to the next.  gyro_delay_s: delay of
-    the gyro by the low-pass.  overflows: number of times that the FIFO had to be emptied, losing samples.  frames_left:
-    samples that the last fetch() left in it.  axes: an AxisWatch, which judges each axis.
+    address: where the chip answers. Until a set-up succeeds, each set-up also tries the other address. who_am_i: the
+    chip's answer, 0 before setup().  counts: array('h', 7) of the last read() or take(), ax ay az temperature gx gy gz.
+    sums: array('i', 7) of the last add_up(), in the same order.  accel_lsb_per_g and gyro_lsb_per_dps: counts per g and
+    per deg/s.  period_ms: time from one sample to the next.  gyro_delay_s: delay of the gyro by the low-pass.
+    overflows: number of times that the FIFO was emptied and samples were lost.  frames_left: samples that the last
+    fetch() left in the FIFO.  axes: an AxisWatch, which judges each axis.
     """
 
     SATURATED = SATURATED
@@ -112,18 +112,18 @@ class Mpu6050:
         self.period_ms = 1000 // rate_hz
         accel_bits = (2, 4, 8, 16).index(accel_range_g) << 3
         gyro_bits = (250, 500, 1000, 2000).index(gyro_range_dps) << 3
-        self._configuration = bytes((self.period_ms - 1, dlpf, gyro_bits, accel_bits, dlpf))  # SMPLRT_DIV and on
+        self._configuration = bytes((self.period_ms - 1, dlpf, gyro_bits, accel_bits, dlpf))  # from SMPLRT_DIV on
         self._one, self._two, self._three = bytearray(1), bytearray(2), bytearray(3)
         self._readback = bytearray(_FIFO_EN - _SMPLRT_DIV + 1)
         self._frames = bytearray(FRAME * _MAX_FRAMES)
-        # The first n frames, for each n: made once, because each slice takes heap.
+        # The first n frames, for each n. Made once, because each slice takes heap.
         self._some_frames = [memoryview(self._frames)[: FRAME * n] for n in range(_MAX_FRAMES + 1)]
         self.frames_left = self.overflows = 0
-        self._most = 0  # bytes that have waited in the FIFO
-        self._odd = False  # the last fetch() found a frame that was not complete
-        self._settled = False  # a chip was started at this address, and no other one is looked for
-        self._started = False  # setup() has run to its end: the FIFO is filling
-        self._full = 0  # with so many bytes in it the FIFO may have overflowed
+        self._most = 0  # largest number of bytes found in the FIFO
+        self._odd = False  # the last fetch() found an incomplete frame
+        self._settled = False  # a chip was started at this address: do not try the other one
+        self._started = False  # setup() is complete: the FIFO is filling
+        self._full = 0  # from this number of bytes on the FIFO may have overflowed
         self.counts, self.sums = array("h", [0] * 7), array("i", [0] * 7)
         self.axes = AxisWatch(rate_hz, accel_bits >> 3, gyro_bits >> 3, dlpf, rate_hz * _FROZEN_MS // 1000)
 
@@ -133,7 +133,7 @@ class Mpu6050:
         return self._chip()[_NAME] if self.who_am_i in CHIPS else "WHO 0x%02X" % self.who_am_i
 
     def connect(self, i2c):
-        """Use this machine.I2C from now on, because the bus was opened again."""
+        """Use this machine.I2C from now on."""
         self._i2c = i2c
 
     def identify(self):
@@ -143,7 +143,7 @@ class Mpu6050:
         except (UnknownChip, OSError) as error:
             if self._settled:
                 raise
-            self.address ^= 1  # AD0 may be tied the other way, and a clock may have the usual address
+            self.address ^= 1  # AD0 may be wired the other way, or a clock may have the usual address
             try:
                 return self._identify()
             except (UnknownChip, OSError) as other:
@@ -152,12 +152,12 @@ class Mpu6050:
 
     def _identify(self):
         self.who_am_i = self.read_register(_WHO_AM_I)
-        # Twice, because a misread number would choose the calibration of another chip.
+        # Read twice, because a misread number would choose the calibration of another chip.
         if self.read_register(_WHO_AM_I) != self.who_am_i:
             raise OSError("MPU6050 WHO_AM_I reads differently each time")
         if self.who_am_i not in CHIPS and self.who_am_i != self._accept:
             raise UnknownChip(self.who_am_i)
-        _, _, _, _, fifo_bytes, _ = self._chip()  # unpacked: a type checker then knows that it is a number
+        _, _, _, _, fifo_bytes, _ = self._chip()  # unpacked for the type checker
         self._full = fifo_bytes - FRAME
         return self.who_am_i
 
@@ -169,31 +169,31 @@ class Mpu6050:
         self.start()
 
     def configure(self):
-        """Do what setup() does except start(), as a generator: it yields the milliseconds to wait before it is
-        continued, so that the caller can do something else meanwhile. Raises the same."""
+        """Do the steps of setup() except start(), as a generator. It yields the milliseconds to wait before the next
+        step: the caller can do other work meanwhile. Raises the same."""
         self._started = False
         self.identify()
         self.write_register(_PWR_MGMT_1, _RESET)
         yield 100
         self.write_register(_PWR_MGMT_1, _CLOCK_PLL_GYRO_X)
-        yield 60  # a write that comes too early after a reset is lost without an error
+        yield 60  # a write too early after a reset is lost without an error
         for i in range(5 if self._chip()[_HAS_ACCEL_CONFIG2] else 4):
             self.write_register(_SMPLRT_DIV + i, self._configuration[i])
         if not self.configured():
             raise NotKept("MPU6050 configuration does not read back")
-        yield 20  # until the low-pass has settled
+        yield 20  # for the low-pass to settle
 
     def start(self):
-        """Start the FIFO of a chip that is configured. Raises OSError as restart_fifo() does."""
+        """Start the FIFO of a configured chip. Raises OSError as restart_fifo() does."""
         self.restart_fifo()
         self._started = self._settled = True
         self.axes.restart()
 
     def configured(self):
-        """True if the chip is awake with the configuration that setup() wrote. Raises OSError from the bus."""
+        """True if the chip is awake and has the configuration that setup() wrote. Raises OSError from the bus."""
         self._read_into(_SMPLRT_DIV, self._readback)  # SMPLRT_DIV to FIFO_EN
         self._read_into(_USER_CTRL, self._three)  # USER_CTRL, PWR_MGMT_1 and PWR_MGMT_2
-        # An unknown chip that is accepted is sent ACCEL_CONFIG2 as well, but it need not have that register.
+        # An accepted unknown chip is also sent ACCEL_CONFIG2, but it may not have that register.
         for i in range(5 if self.who_am_i in CHIPS and self._chip()[_HAS_ACCEL_CONFIG2] else 4):
             if self._readback[i] != self._configuration[i]:
                 return False
@@ -207,11 +207,11 @@ class Mpu6050:
         self.take(0)
 
     def fetch(self):
-        """Read waiting samples from the FIFO and return their number: _MAX_FRAMES if as many wait, else at most
-        _FEW_FRAMES. Sets frames_left. Raises OSError from the bus, or as restart_fifo() does.
+        """Read samples from the FIFO and return their number: _MAX_FRAMES if so many wait, else at most _FEW_FRAMES.
+        Sets frames_left. Raises OSError from the bus, or as restart_fifo() does.
 
-        After an overflow the frames no longer begin at multiples of 14 bytes. Then the FIFO is emptied, overflows is
-        incremented, and 0 is returned. 0 is also returned while the chip is writing a frame: see below.
+        After an overflow the frames no longer begin at multiples of 14 bytes. This method then empties the FIFO,
+        increments overflows and returns 0. It also returns 0 while the chip is writing a frame: see below.
         """
         self._i2c.readfrom_mem_into(self.address, _FIFO_COUNT_H, self._two)
         waiting = self._two[0] << 8 | self._two[1]
@@ -225,7 +225,7 @@ class Mpu6050:
             return 0
         self._odd = odd
         n = waiting // FRAME
-        if odd:  # the chip may be writing a frame; if the next count is odd as well, an overflow has cut one
+        if odd:  # the chip may be writing a frame; if the next count is also odd, an overflow has cut one
             self.frames_left = n + 1
             return 0
         taken = _MAX_FRAMES if n >= _MAX_FRAMES else _FEW_FRAMES if n > _FEW_FRAMES else n
@@ -235,7 +235,7 @@ class Mpu6050:
         return taken
 
     def least_free_samples(self):
-        """Smallest free space in the FIFO that a fetch() has found so far, in samples."""
+        """The smallest free space in the FIFO found by a fetch() so far, in samples."""
         return max(0, self._full + FRAME - self._most) // FRAME
 
     def take(self, k):
@@ -243,16 +243,16 @@ class Mpu6050:
         decode(self._frames, k * FRAME, self.counts)
 
     def add_up(self, n):
-        """Sum the first n samples of the last fetch() into sums; return the number of those. Takes no heap.
+        """Add the first n samples of the last fetch() into sums; return the number added. Takes no heap.
 
-        Samples at the end of the range are left out, and take() then finds only the others; axes.notes[LOST] is their
-        number. It stops at a sample that only a dead chip sends: a force of all zeros or all ones, or the same reading
-        as for _FROZEN_MS before it."""
+        Samples at the end of the range are skipped and counted in axes.notes[LOST]; take() then finds only the others.
+        The method stops at a sample that only a dead chip sends: a force of all zeros or all ones, or a reading that
+        did not change for _FROZEN_MS."""
         return add_up(self._frames, n, self.sums, self.axes.notes)
 
     def restart_fifo(self):
-        """Empty the FIFO and start it again, after an overflow or a transfer that broke off. Raises OSError from the
-        bus, or NotKept."""
+        """Empty the FIFO and start it again, after an overflow or an incomplete transfer. Raises OSError from the bus,
+        or NotKept."""
         self.write_register(_FIFO_EN, 0)
         self.write_register(_USER_CTRL, _FIFO_RESET)  # works only while the FIFO is disabled (p. 38)
         self.write_register(_USER_CTRL, _FIFO_ENABLE)
@@ -262,7 +262,7 @@ class Mpu6050:
             raise NotKept("MPU6050 FIFO does not read back")
 
     def _fifo_runs(self, fifo_en, user_ctrl):
-        """True if these values of the two registers mean that all three sensors go into the FIFO."""
+        """True if these values of the two registers mean that the FIFO takes all three sensors."""
         bits = self._chip()[_FIFO_EN_BITS]
         return fifo_en & bits == bits and user_ctrl & _FIFO_ENABLE != 0
 
@@ -279,8 +279,8 @@ class Mpu6050:
         self._read_into(_FIFO_COUNT_H, self._two)
         return self._two[0] << 8 | self._two[1]
 
-    # A transfer to registers that fails is tried once more: else a bad contact for a moment would cost a whole set-up.
-    # A read of the FIFO is not, because the chip has dropped what it sent.
+    # A failed register transfer is tried once more: otherwise a moment of bad contact would cost a whole set-up. A read
+    # of the FIFO is not repeated, because the chip has already dropped the bytes.
 
     def read_register(self, register):
         """The content of a register. Raises OSError from the bus."""

@@ -1,18 +1,18 @@
-"""Names the chips that may be found on the sensor's bus. Imported after a fault, and by kickstand.status().
+"""Identifies the chips on the sensor's bus. Imported after a fault, and by kickstand.status().
 
-Sources: the chips' data sheets and the register maps of their makers' drivers; registers are only read, because a write
-could set a clock or spoil another chip's calibration.
+Sources: the chips' data sheets and the register maps of their makers' drivers. Registers are only read: a write could
+set a clock or damage another chip's calibration.
 """
 
 from .mpu6050 import CHIPS
 
 _WHO_AM_I = 0x75
 _PWR_MGMT_1 = 0x6B
-_AS_AN_MPU = (0x40, 0x41, 0x01)  # PWR_MGMT_1 of the MPU6050's relatives after power-on, and as they are set up
+_AS_AN_MPU = (0x40, 0x41, 0x01)  # PWR_MGMT_1 of chips like the MPU6050, after power-on and when set up
 OTHER, MOTION, SUPPORTED = 0, 1, 2  # kinds of devices: MOTION is a sensor that this firmware does not know
-_TIME_BYTES = 10  # of a clock: the seven of its time, which may begin at register 0 or 3
+_TIME_BYTES = 10  # a clock's registers: its time takes seven, from register 0 or 3
 
-# addresses in hexadecimal, register, its content, name. Those with a register name themselves
+# addresses in hexadecimal, register, its content, name: chips that identify themselves
 _MOTION = """
 68 69 75 47 ICM-42688
 68 69 75 db ICM-42688-V
@@ -65,7 +65,7 @@ _OTHERS = """
 def name_of(i2c, address):
     """(name, kind) of the device that answers at this address; ("", OTHER) for an unknown one. i2c: a machine.I2C."""
     at_mpu = address & 0xFE == 0x68
-    # their register 0 holds any number
+    # register 0 of these chips can hold any number
     skipped = 0x00 if at_mpu and _reads(i2c, address, _PWR_MGMT_1) in _AS_AN_MPU else -1
     mark = " %02x " % address
     for line in _MOTION.split("\n"):
@@ -87,17 +87,18 @@ def name_of(i2c, address):
 
 
 def who_am_i(i2c, address):
-    """What the MPU6050's register WHO_AM_I reads, -1 if it does not answer."""
+    """The value of the MPU6050's register WHO_AM_I, -1 without an answer."""
     return _reads(i2c, address, _WHO_AM_I)
 
 
 def is_clock(i2c, address):
-    """True if it is a clock by its first registers: a DS1307, DS3231 or PCF8523, which have the sensor's address."""
+    """True if its first registers are those of a clock: a DS1307, DS3231 or PCF8523, which have the sensor's
+    address."""
     try:
         time = i2c.readfrom_mem(address, 0, _TIME_BYTES)
     except OSError:
         return False
-    # seconds, minutes, hours, then day of the week, date, month; in a PCF8523 from register 3 on, date first
+    # seconds, minutes, hours, then day of the week, date, month; a PCF8523 begins at register 3 and has the date first
     return _is_time(time, 0, 4, 3) or _is_time(time, 3, 6, 7)
 
 
@@ -112,7 +113,7 @@ def _is_time(time, at, date_at, day_at):
 
 
 def _reads(i2c, address, register):
-    """What a register reads, -1 if it does not answer."""
+    """The value of a register, -1 without an answer."""
     try:
         return i2c.readfrom_mem(address, register, 1)[0]
     except OSError:

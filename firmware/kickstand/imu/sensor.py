@@ -1,5 +1,5 @@
-"""Keeps the chip working: finds it, sets it up, watches it, and sets it up again after a fault. SampleClock gives the
-samples' times."""
+"""Keeps the chip working: finds it, sets it up, watches it, and sets it up again after a fault. SampleClock computes
+the times of the samples."""
 
 from time import ticks_add, ticks_diff, ticks_ms
 
@@ -9,26 +9,26 @@ from .fifo_frames import DUE, LOST
 from .mpu6050 import UnknownChip
 
 _RETRY_MS = const(50)  # time between two attempts to set the chip up
-_FAILURES = const(3)  # so many failed transfers in a row are a fault; a NACK or two are tolerated
-_SILENT_MS = const(100)  # this long without a sample is a fault
-_STALE_MS = const(500)  # and this long if all samples were lost in overflows, because the board had no time to read
-_SETTLED_MS = const(1000)  # a fault sooner after a set-up than this has outlasted the set-up
-_FRUITLESS = const(3)  # after so many of those in a row the FIFO is tried out
-# Of set-ups in a row that fail: the first one that is explained, and each so many later, about once a second
+_FAILURES = const(3)  # failed transfers in a row that are a fault; one or two NACKs are tolerated
+_SILENT_MS = const(100)  # time without a sample that is a fault
+_STALE_MS = const(500)  # the same if overflows lost all samples, because the board had no time to read
+_SETTLED_MS = const(1000)  # the set-up did not help if a fault returns sooner than this
+_FRUITLESS = const(3)  # after this many such faults in a row the FIFO is tested
+# Of failed set-ups in a row, the first one to explain, and the number from one explanation to the next, about a second
 EXPLAINED, EXPLAINED_EVERY = 3, 20
 _CORRECTION_SHIFT = const(4)  # SampleClock.emptied() corrects by 1/16 of the difference between the two clocks
 
 
 class Sensor:
-    """Samples of one chip that may fail at any time. A transfer that fails, by NACK or time-out, ends in _missed().
+    """Samples of one chip, which may fail at any time. Every failed transfer (NACK or time-out) ends in _missed().
 
-    chip: an Mpu6050.  reopen: called to free the bus, returns it as a machine.I2C.  explain(chip, error): returns a
-    Notice, why the chip could not be set up, and the addresses that answer; for error None whether its FIFO works, a
-    Notice or None. None: no such function.
-    found: the addresses on the bus when it was last explained, a list.
-    fault: None, or a Notice: what is wrong.  restarts: number of times that the chip was set up, that no sample could
-    be read for _STALE_MS, or that an axis was ill. After each, samples do not follow on from those before.  clipped:
-    samples that fetch() has left out, because an axis was at the end of its range; the caller sets it to 0.
+    chip: an Mpu6050.  reopen(): frees the bus and returns it as a machine.I2C.  explain(chip, error): returns a Notice,
+    why the chip could not be set up, and the addresses that answer. With error None it tests the FIFO, and the first
+    value is a Notice for a broken one or None. explain may be None.
+    found: list of the addresses on the bus at the last explanation.
+    fault: the Notice of a fault, or None.  restarts: number of times that the chip was set up, that no sample could be
+    read for _STALE_MS, or that an axis was faulty. After each there is a gap in the samples.  clipped: samples that
+    fetch() skipped because an axis was at the end of its range; the caller sets it to 0.
     """
 
     def __init__(self, chip, reopen, explain=None):
@@ -37,12 +37,12 @@ class Sensor:
         self.explain = explain
         self.found = []
         self._refused = 0  # set-ups that failed in a row
-        self._fruitless = 0  # set-ups in a row that a fault followed within _SETTLED_MS
+        self._fruitless = 0  # set-ups in a row with a fault within _SETTLED_MS after them
         self._started_ms = 0
         self._failures = 0  # transfers that failed in a row
-        self._overflows = 0  # the chip's overflows that have been dealt with
-        self._due_ms = ticks_ms()  # when the next step of setting the chip up is due
-        self._steps = None  # these steps, a generator
+        self._overflows = 0  # the chip's overflows handled so far
+        self._due_ms = ticks_ms()  # time of the next step of the set-up
+        self._steps = None  # the steps of the set-up, a generator
         self._ready = False  # the chip is set up, but its FIFO does not fill yet
         self._sample_ms = 0  # when the last sample was read, or the FIFO was emptied after an overflow
         # _emptied_ms: when the FIFO last overflowed; _read_ms: when the last sample before that overflow was read
@@ -52,15 +52,16 @@ class Sensor:
         self._running = False
 
     def set_up(self):
-        """Free the bus and set the chip up, in 0.2 s. Raises UnknownChip, OSError, or SettingsError for wrong pins."""
+        """Free the bus and set the chip up. Takes 0.2 s. Raises UnknownChip, OSError, or SettingsError for wrong
+        pins."""
         self.chip.connect(self.reopen())
         self.chip.setup()
 
     def fetch(self, now_ms):
-        """Read the samples that have come in; return their number, at most MAX_FRAMES. now_ms: ticks_ms().
+        """Read the waiting samples; return their number, at most MAX_FRAMES. now_ms: ticks_ms().
 
-        Their sum is in chip.sums; chip.take(k) gives each of them. While an axis is ill there are none. A chip that
-        does not run is set up first, which takes 0.2 s of calls. Raises SettingsError for pins that cannot be used, and
+        Their sum is in chip.sums; chip.take(k) gives each of them. The number is 0 while an axis is faulty. A chip that
+        does not run is set up first, by calls over 0.2 s. Raises SettingsError for pins that cannot be used, and
         nothing else."""
         if not self._running:
             self.prepare(now_ms)
@@ -69,7 +70,7 @@ class Sensor:
             return 0
         try:
             if self._failures:
-                self.chip.restart_fifo()  # the transfer that failed may have left half a frame in the FIFO
+                self.chip.restart_fifo()  # the failed transfer may have left half a frame in the FIFO
             waiting = self.chip.fetch()
         except OSError:
             self._missed(now_ms)
@@ -87,9 +88,9 @@ class Sensor:
         return self._judge(good, waiting, now_ms)
 
     def _judge(self, good, waiting, now_ms):
-        """Return the number of samples that can be used: good, or 0 while an axis is ill. Set the fault.
+        """Set the fault. Return the number of usable samples: good, or 0 while an axis is faulty.
 
-        good: those of the waiting ones that are in the sums."""
+        good: number of the waiting samples that are in the sums."""
         axes = self.chip.axes
         if good:
             self.fault = None
@@ -115,8 +116,8 @@ class Sensor:
         return good
 
     def _no_sample(self, now_ms):
-        """Report a fault if the FIFO has held no sample for too long. After an overflow it was just emptied, so that
-        this takes longer."""
+        """Report a fault if the FIFO has held no sample for too long. After an overflow the limit is longer, because
+        the FIFO was just emptied."""
         if self._overflows != self.chip.overflows:
             self._overflows = self.chip.overflows
             if self._sample_ms != self._emptied_ms:  # there were samples since the last overflow
@@ -130,7 +131,7 @@ class Sensor:
             self._fail_again("sensor-silent", now_ms)
 
     def _fail_again(self, code, now_ms):
-        """Fail, and name the FIFO if set-ups do not help because that is broken."""
+        """Fail. If set-ups do not help, report a broken FIFO where the test finds one."""
         self._fruitless = self._fruitless + 1 if ticks_diff(now_ms, self._started_ms) < _SETTLED_MS else 1
         fault = self._fifo_fault() if self._fruitless % _FRUITLESS == 0 else self._named_fifo()
         self._fail(code, now_ms)
@@ -138,28 +139,28 @@ class Sensor:
             self.fault = fault
 
     def _named_fifo(self):
-        """The fault, if it is the FIFO's, which stays until a sample comes; else None."""
+        """The fault, if it is the FIFO's, else None. That fault stays until a sample arrives."""
         return self.fault if self.fault is not None and self.fault.code == "sensor-fifo" else None
 
     def _fifo_fault(self):
-        """None, or a Notice: the chip measures, but its FIFO does not work. To find out takes up to 0.3 s, once."""
+        """None, or a Notice: the chip measures, but its FIFO does not work. The test takes up to 0.3 s, once."""
         return self._named_fifo() or (self.explain(self.chip, None)[0] if self.explain else None)
 
     def check(self, now_ms):
-        """Make sure that the chip is still configured: a supply dip during a transfer leaves a sample that is half
-        garbage. Call it before readings are shown; it takes 0.6 ms. Raises nothing. now_ms: ticks_ms().
+        """Check that the chip is still configured. A supply dip during a transfer can corrupt half a sample: call this
+        before readings are shown. It takes 0.6 ms. Raises nothing. now_ms: ticks_ms().
 
-        After a transfer that failed nothing is judged: restarting the FIFO may have failed half way."""
+        It checks nothing after a failed transfer: a restart of the FIFO may be incomplete."""
         if not self._running or self._failures:
             return
         try:
-            if not self.chip.configured():  # a supply dip: the chip has reset itself
+            if not self.chip.configured():  # a supply dip has reset the chip
                 self._fail("sensor-reset", now_ms)
         except OSError:
             self._missed(now_ms)
 
     def _missed(self, now_ms):
-        """Count a failed transfer: _FAILURES of them in a row are a fault."""
+        """Count a failed transfer. _FAILURES in a row are a fault."""
         self._failures += 1
         if self._failures >= _FAILURES:
             self._fail("sensor-lost", now_ms)
@@ -170,7 +171,7 @@ class Sensor:
         self._due_ms = now_ms
 
     def prepare(self, now_ms):
-        """Do the next step of setting the chip up, if it is due. The last one, to start the FIFO, is left to fetch().
+        """Do the next step of the set-up if its time has come. The last step, starting the FIFO, is left to fetch().
         Raises SettingsError for pins that cannot be used, and nothing else. now_ms: ticks_ms()."""
         if self._ready or ticks_diff(now_ms, self._due_ms) < 0:
             return
@@ -188,7 +189,7 @@ class Sensor:
         self._due_ms = ticks_add(now_ms, wait_ms)
 
     def _not_set_up(self, error):
-        """Set the fault once attempts to set the chip up have failed; the next attempt begins with the bus."""
+        """Record a failed set-up; after a few in a row, set the fault. The next attempt begins with freeing the bus."""
         self._ready = False
         self._steps = None
         self._refused += 1
@@ -199,7 +200,7 @@ class Sensor:
             self.fault, self.found = self.explain(self.chip, error)
 
     def _start(self, now_ms):
-        """Start the FIFO of the chip, which is set up."""
+        """Start the FIFO of a chip that is set up."""
         try:
             self.chip.start()
         except OSError as error:
@@ -214,9 +215,9 @@ class Sensor:
 
 
 class SampleClock:
-    """The times of the samples: the chip samples at a steady rate, whatever the program does, but its clock may be off
-    by 1 %, which is corrected by the board's. Times are integers of microseconds: a 32-bit float could no longer hold
-    them after 17 seconds.
+    """Computes the times of the samples. The chip samples at a steady rate, whatever the program does. Its clock may be
+    off by 1 %, which is corrected with the board's clock. Times are integers in microseconds: a 32-bit float could no
+    longer hold them after 17 seconds.
 
     period_us: nominal time from one sample to the next.  lost: samples lost in overflows or skipped, since power-on."""
 
@@ -228,20 +229,20 @@ class SampleClock:
         self._sample_us = None  # when the last sample was taken, in ticks_us(); None: no sample yet
 
     def restart(self):
-        """Drop the time of the last sample: the next ones do not follow on from it."""
+        """Drop the time of the last sample, because of a gap in the samples."""
         self._sample_us = None
         self._pending_us = self._skipped_us = 0
 
     def skip(self, n):
-        """Count n samples that are left out: the next step() spans them."""
+        """Count n skipped samples: the next step() spans them."""
         self.lost += n
         if self._sample_us is not None:
             self._skipped_us += n * self._period_us
 
     def step(self, n, now_us):
-        """Count n new samples; return the microseconds from the last sample before them to the last of them.
+        """Count n new samples; return the microseconds from the last earlier sample to the last new one.
 
-        After a restart() there is none before them: the time then begins at the first of them. now_us: ticks_us().
+        After a restart() the time begins at the first new sample. now_us: ticks_us().
         """
         if self._sample_us is None:
             n -= 1
@@ -252,9 +253,9 @@ class SampleClock:
         return dt_us
 
     def emptied(self, now_us):
-        """Correct the clock: at now_us, ticks_us(), the chip's FIFO was empty and all its samples were counted.
+        """Correct the clock. At now_us (ticks_us()) the chip's FIFO was empty and all its samples were counted.
 
-        So the last sample was then half a period old on average."""
+        The last sample was then half a period old on average."""
         if self._sample_us is None:
             return
         late_us = ticks_diff(now_us, self._sample_us) - self._skipped_us - self._period_us // 2

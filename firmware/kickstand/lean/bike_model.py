@@ -1,4 +1,4 @@
-"""A motorcycle's states, its equations of motion and of what a sensor on it measures, and their partial derivatives.
+"""The states of a motorcycle, its equations of motion, the equations for a sensor on it, and their partial derivatives.
 
 Axes: left (x), up (y), forward (z). Units: rad, rad/s, m/s, m and s; forces in g, which is 9.80665 m/s^2.
 
@@ -25,18 +25,17 @@ Equations, with ' for the derivative by time
     roads are level          0 = q + psi sin t  on average                             (6)
     lean of the bike itself  t - psi cos t (tan q + 1/2 psi sin t)                     (7)
 
-t and q are those of the sensor's axes, which psi has turned: they share in the bike's own pitch, q + psi sin t. On a
-slope of 10 % a yaw error of 5 degrees makes half a degree of lean. (7) is to second order of psi; on the level, where
-q is -psi sin t, it is that of tan(lean of the bike) = tan t / cos psi.
+t and q refer to the sensor's axes, which psi has turned: they contain a part of the bike's own pitch, q + psi sin t. On
+a slope of 10 % a yaw error of 5 degrees causes half a degree of lean. (7) is to second order of psi. On the level,
+where q is -psi sin t, it is that of tan(lean of the bike) = tan t / cos psi.
 
-d is the part of the pitch rate q' that is the springs' and not the road's: the wheels do not rise with it. Braking
-explains most of it; dive.py has (8).
+d is the part of the pitch rate q' from the springs and not from the road: the wheels do not rise with it. Braking
+causes most of it; dive.py has (8).
 
 h is the height of the sensor above the roll axis. (4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a
 steady turn (4) and (5) cannot separate lean from speed, because their derivatives by lean and by speed are in the same
 proportion. There the ratio of two rates gives the lean: pitch does not change, by (6), so that by (2) w_x / w_y is
-tan t. Just after the bike has entered a turn its speed is still known from before, and (4) with this speed gives the
-lean.
+tan t. At the beginning of a turn the earlier speed is still valid, and (4) with this speed gives the lean.
 """
 
 from math import cos, radians, sin, sqrt, tan
@@ -112,7 +111,7 @@ def predict(x, force, rate, seconds, sums):
 
 
 def possible_pitch(pitch):
-    """pitch within +-MAX_PITCH: at a right angle predict() would divide by zero, as with a board that lies flat."""
+    """Limit pitch to +-MAX_PITCH: at a right angle, as with a board lying flat, predict() would divide by zero."""
     return max(MIN_PITCH, min(MAX_PITCH, pitch))
 
 
@@ -121,8 +120,8 @@ def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
     (v w_y / g = -cos q sin t) if the measured rate about up is close to them, else the measured ones. speed: 0 for the
     measured ones in any case.
 
-    Noise of a measured rate would be squared in such products, and speed and lean would be estimated too small (the
-    problem of errors in variables).
+    The noise of a measured rate would be squared in such products, and the estimates of speed and lean would be too
+    small (the problem of errors in variables).
     """
     if speed > _BALANCE_MIN_SPEED:
         balanced = -STANDARD_GRAVITY * cos_pitch * sin_lean / speed
@@ -194,5 +193,6 @@ class Linearisation:
         self.pitching = per_rate * self.pitch_rate  # in g
 
     def lean_by_pitch(self, x):
-        """(7): the part of the state's lean, rad, that is the bike's own pitch, which the yaw error shows as lean."""
+        """(7): the part of the state's lean (rad) that is the bike's own pitch, seen as lean because of the yaw
+        error."""
         return x[YAW_ERROR] * self.cos_lean * (tan(x[PITCH]) + 0.5 * x[YAW_ERROR] * self.sin_lean)

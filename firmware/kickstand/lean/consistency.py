@@ -1,15 +1,14 @@
-"""Whether the readings fit the model: the lean filter judges itself by its own innovations.
+"""Checks that the readings fit the model: the lean filter judges itself by its own innovations.
 
-A filter's covariance knows nothing of a sensor that has failed in part. Its innovations do. The square of one over
-the variance that the filter expects of it, the normalised innovation squared, is 1 on average where all fits (Y.
-Bar-Shalom and others, Estimation with Applications to Tracking and Navigation, section 5.4). Here the mean is of its
-root, with its sign: vibration and bumps, which a sound sensor has too, cancel in it. An axis that is dead, mirrored or
-of half its scale, a bias that has stepped and a mount that has slipped do not. Of the force to the left and of the
-force up there is a short mean, which sees much within a second or two, and a long one, which sees little after some
-seconds.
+A filter's covariance does not show a partly failed sensor, but its innovations do. The square of an innovation over its
+expected variance, the normalised innovation squared, is 1 on average if everything fits (Y. Bar-Shalom and others,
+Estimation with Applications to Tracking and Navigation, section 5.4). Here the mean is of its root, with its sign.
+Vibration and bumps, which a good sensor has too, cancel in this mean. A dead or mirrored axis, half of the scale, a
+step of the bias and a slipped mount do not cancel. The forces to the left and up each have a short mean, which shows
+large errors within a second or two, and a long one, which shows small errors after some seconds.
 
-Two more means are of what no road and no rider does for long: a force to the side, because a bike is in balance, and a
-steep pitch.
+Two more means are of quantities that never last long on a real ride: a force to the side, because a bike is in balance,
+and a steep pitch.
 
 Each mean is judged by its own spread, as in Student's t: on a road that is rougher than the filter expects the
 innovations are large, of either sign, and so are their means.
@@ -17,8 +16,8 @@ innovations are large, of either sign, and so are their means.
 After a doubt one thing more is asked. A gyro that is wrong about up makes a straight a bend that does not end, with all
 forces as they should be. So a lean that has stayed on one side for long is not shown then.
 
-What does not fit is doubted, and the lean hidden until all has fitted for a while. What does not fit again and again is
-a fault of the sensor.
+After a misfit the lean is doubted, and hidden until everything has fitted for a while. Repeated misfits are a fault of
+the sensor.
 """
 
 from math import sqrt
@@ -41,8 +40,8 @@ _STEEP = const(0.21)  # rad: pitch
 # The limits of left and up grow with the spread, the root of this mean square: half the square of the change between
 # windows. Larger: more is hidden on the roughest roads.
 _SPREAD = const(0.4)  # standard deviations, squared
-# rad: mean lean after a doubt, and a larger one that the force up confirms. Larger, the first, and smaller, the second:
-# less is hidden in long bends, and on straights that are taken for bends.
+# rad: mean lean after a doubt, and a larger one that the force up confirms for a while. Larger, the first, and
+# smaller, the second: less is hidden in long bends, and on straights that are taken for bends.
 _ONE_SIDE = const(0.13)
 _SURE_LEAN = const(0.3)
 # ratio: of the mean square of the lean, above which it has been steady. Larger: as _ONE_SIDE.
@@ -64,8 +63,8 @@ last_odd = None  # the last code of `odd`, for the status report
 
 
 class Consistency:
-    """Read only: doubt: the lean is not to be shown. doubts: how often it did not fit, less those that are forgotten.
-    odd: None, or the code of what did not fit again and again: "odd-left", "odd-up" (forces) or "odd-pitch".
+    """Read-only attributes. doubt: the lean must not be shown. doubts: number of misfits minus the forgotten ones. odd:
+    None, or the code of repeated misfits: "odd-left", "odd-up" (forces) or "odd-pitch".
 
     measured: the six positions have measured the sensor."""
 
@@ -85,7 +84,8 @@ class Consistency:
         self._left_before = self._up_before = self._left_square = self._up_square = 0.0
 
     def gap(self, in_rest=True):
-        """Doubt until it has fitted for a while, because the filter has just begun. in_rest: rest counts as fitting."""
+        """Doubt until everything has fitted for a while, because the filter has just begun. in_rest: rest counts as
+        fitting."""
         self.doubt = True
         self._in_rest = in_rest
         self._fits_s = 0.0
@@ -93,17 +93,17 @@ class Consistency:
 
     @property
     def one_sided(self):
-        """True where it did not fit lately, and the lean has been on one side: steadily, or after a second doubt for
+        """True where it did not fit lately, and the lean has been on one side: steadily, or after a second doubt, for
         long."""
         lean = abs(self._lean)
         if not self.doubts or lean <= _ONE_SIDE:
             return False
-        steady = lean < _SURE_LEAN and lean * lean > _STEADY * self._lean_square
-        return steady or (self.doubts > 1 and self._mean_s >= _LONG_S)
+        steady, long = lean * lean > _STEADY * self._lean_square, self._mean_s >= _LONG_S
+        return (steady and (long or lean < _SURE_LEAN)) or (long and self.doubts > 1)
 
     def add(self, left, up, sideways, pitch, lean, yaw_rate, seconds):
         """Take a window of `seconds` while riding. left, up: the normalised innovations of these forces. sideways:
-        force to the side over force up. pitch and lean in rad, yaw_rate in rad/s. Returns True if just now it does not
+        force to the side over force up. pitch and lean in rad, yaw_rate in rad/s. Return True if a misfit not
         fit any more."""
         gain, long_gain = min(1.0, seconds / _SHORT_S), min(1.0, seconds / _LONG_S)
         left, up = max(-_MOST, min(_MOST, left)), max(-_MOST, min(_MOST, up))
@@ -147,7 +147,7 @@ class Consistency:
             self._fit(seconds if self.doubts else _GAP_S)
 
     def fail(self, code):
-        """Doubt, because it does not fit. code: see odd."""
+        """Doubt because of a misfit. code: see odd."""
         global last_odd
         self.gap()
         self._since_s = 0.0

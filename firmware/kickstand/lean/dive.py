@@ -1,13 +1,13 @@
-"""Suspension dive: how far braking and acceleration pitch the bike on its springs, found while riding.
+"""Suspension dive: estimates while riding how far braking and acceleration pitch the bike on its springs.
 
 Under braking a telescopic fork dives, under acceleration the rear sits down: on a superbike by 2.8 and 1.3 degrees per
-g. The wheels do not rise meanwhile, so that this pitch rate times the speed is no acceleration. The springs' pitch is
-close to a share of the forward acceleration a, and its rate is
+g. The wheels do not rise with it, so this pitch rate times the speed is not an acceleration. The springs' pitch is
+nearly proportional to the forward acceleration a, and its rate is
 
     dive' = share a'                                                                  (8)
 
-Where the road's slope changes and the bike does not brake, the pitch rate has nothing to do with a'. So regression of
-the pitch rate on a' finds the share: sum(a' pitch rate) / sum(a'^2), each sum with a prior.
+If the road's slope changes without braking, the pitch rate is independent of a'. A regression of the pitch rate on a'
+therefore gives the share: sum(a' pitch rate) / sum(a'^2), each sum with a prior.
 """
 
 from ..units import STANDARD_GRAVITY, const
@@ -23,7 +23,7 @@ _MAX_JERK = const(3.0)  # g/s. Larger: bumps and lost readings count as braking.
 
 
 class Dive:
-    """What braking does to the pitch. share (read only): rad per g; nose down in braking > 0. Fixed memory."""
+    """The effect of braking on the pitch. share (read-only): rad per g; nose down in braking > 0. Fixed memory."""
 
     def __init__(self):
         self.share = PRIOR_SHARE
@@ -32,14 +32,14 @@ class Dive:
         self.restart()
 
     def restart(self):
-        """Forget the last window, because readings were missing. The share stays: it is the bike's."""
+        """Drop the last window, because readings were missing. Keep the share, which belongs to the bike."""
         self._push = None
         self._pitch_rate = 0.0
 
     def update(self, push, pitch_rate, speed, seconds):
         """Take one window: push, the mean of the forward acceleration in g, pitch_rate in rad/s, speed in m/s.
 
-        Returns speed x dive' / g, in g: the acceleration that (4) and (5) would see where there is none.
+        Returns speed x dive' / g, in g: the acceleration that (4) and (5) would wrongly contain.
         """
         last_push, last_rate = self._push, self._pitch_rate
         self._push, self._pitch_rate = push, pitch_rate

@@ -1,4 +1,4 @@
-"""Lean angle from one reading of forces and yaw rate in the vehicle frame (A. Nicolae, section 5, signs corrected).
+"""Computes lean from one reading of forces and yaw rate in the vehicle frame (A. Nicolae, section 5, signs corrected).
 
 With lean t > 0 to the right, s the centripetal acceleration in g (> 0 in a left turn) and forces in g:
     A_up cos t + A_left sin t = 1        (22)
@@ -32,7 +32,7 @@ def formula_lean_deg(force, yaw_rate):
     """Nicolae's lean (25)-(26) in degrees, > 0 to the right; 0 in free fall (under 0.1 g). force: left, up, forward
     in g. yaw_rate: in any unit, only its sign counts.
 
-    Right on average and noisy near upright, where 1 % of vibration makes an error of 8 degrees.
+    It is right on average, but noisy near upright, where 1 % of vibration causes an error of 8 degrees.
     """
     left, up = force[0], force[1]
     square = left * left + up * up

@@ -1,8 +1,8 @@
-"""The covariance of a Kalman filter, in steps short enough for the time of one sample.
+"""The covariance of a Kalman filter, updated in steps short enough for the time of one sample.
 
-Matrices are lists of lists of floats, not arrays: on a board reading an array's element takes heap, reading a list's
-does not. The methods that take long are generators, which yield where the work may be interrupted. Rows of Jacobians
-are given as ((state, value), ...), because most of their values are zero.
+Matrices are lists of lists of floats, not arrays: on a board, reading an element of an array takes heap. The long
+methods are generators, which yield where the work may be interrupted. Rows of Jacobians are written as ((state, value),
+...), because most of their values are zero.
 """
 
 from math import sqrt
@@ -17,7 +17,7 @@ _GATE = const(25.0)  # 5 sigma, squared. An innovation beyond it is not dropped,
 
 
 class Covariance:
-    """P, the covariance of n states, and the correction of these states that measurements lead to.
+    """P, the covariance of n states, and the correction of these states by measurements.
 
     variances: n initial variances, uncorrelated.
     """
@@ -38,14 +38,14 @@ class Covariance:
         self.rows[i][i] = variance
 
     def add_noise(self, i, variance):
-        """Add process noise to the variance of state i. For states that no other one changes."""
+        """Add process noise to the variance of state i. For states that do not depend on others."""
         self.rows[i][i] += variance
 
     def propagate_row(self, i, derivatives, seconds, noise):
-        """P = F P F^T for one row of F, plus process noise. A generator.
+        """Compute P = F P F^T for one row of F, plus process noise. A generator.
 
         derivatives: of state i's rate of change, ((j, d rate_i / d state_j), ...) with j other than i. seconds: length
-        of the step. noise: variance that is added to state i's.
+        of the step. noise: added to state i's variance.
         """
         rows = self.rows
         row = rows[i]
@@ -65,11 +65,12 @@ class Covariance:
         yield
 
     def update(self, derivatives, innovation, variance):
-        """One scalar measurement: K = P H^T / (H P H^T + R), correction += K innovation, P -= K H P. A generator.
+        """Apply one scalar measurement: K = P H^T / (H P H^T + R), correction += K innovation, P -= K H P. A generator.
 
         derivatives: H, ((state, d measurement / d state), ...).  innovation: measured minus expected, for the states
         before this window's corrections.  variance: R, in the measurement's unit squared. Beyond _GATE the
-        innovation's variance is raised until it lies on it. misfit is then the innovation in standard deviations.
+        innovation's variance is raised until the innovation equals it. misfit is then the innovation in standard
+        deviations.
         """
         rows, column, correction = self.rows, self._column, self.correction
         n = self.n

@@ -6,8 +6,8 @@ linearise   five times a second: the model's partial derivatives at the means of
 update      with them the covariance is propagated over the window and corrected by each of its measurements
 inject      the corrections that were found go into the state
 
-Linearise to inject take longer than a sample lasts. They are a generator, which is spread over the samples of the next
-window: each of them runs it as far as its next yield. Forces are in g, speeds in m/s, angles in rad.
+The steps from linearise to inject take longer than one sample. They are a generator, spread over the samples of the
+next window: each sample runs it to its next yield. Forces are in g, speeds in m/s, angles in rad.
 """
 
 from math import atan2, degrees, pi, sin, sqrt
@@ -45,9 +45,9 @@ _MAX_SPEED = const(250.0)
 class LeanFilter:
     """Estimates lean from force and rate in the vehicle's axes. Fixed memory.
 
-    delay_s: by how much the gyro's low-pass is late; lean is extrapolated to now. trim: rad, see UprightTrim.
+    delay_s: delay of the gyro's low-pass; lean is extrapolated to now. trim: rad, see UprightTrim.
     posed: see LeanMeter.use(). gyro_variances: of the priors of its scale and cross-axis errors, the last five
-    states, where the six positions have measured them.
+    states, if the six positions have measured them.
     """
 
     def __init__(self, delay_s=DELAY_S, trim=0.0, posed=False, gyro_variances=None):
@@ -71,8 +71,7 @@ class LeanFilter:
         self.restart()
 
     def restart(self):
-        """Forget the ride: lean, pitch and speed, because readings were missing. The sensor's errors and the bike's
-        dive are kept."""
+        """Reset lean, pitch and speed after missing readings. Keep the sensor's errors and the bike's dive."""
         x = [0.0] * STATES
         self.dive.restart()
         self._kept = []  # (state, variance) of the sensor's errors
@@ -98,7 +97,7 @@ class LeanFilter:
         self._roll_rate = self._last_roll_rate = 0.0
 
     def inflate_covariance(self, seconds):
-        """Add the process noise of so many seconds of lost readings to the variances of lean, pitch and speed."""
+        """Add the process noise of this many seconds of lost readings to the variances of lean, pitch and speed."""
         p = self._p
         if p is None:
             return
@@ -110,7 +109,7 @@ class LeanFilter:
         p.add_noise(SPEED, (measurements.SIGMA_LOST_FORCE * STANDARD_GRAVITY * seconds) ** 2)
 
     def _remember(self, seconds):
-        """Keep the sensor's errors of some time ago, while all fits."""
+        """Store the sensor's errors of some time ago, while everything fits."""
         self._good_s += seconds
         if self.consistency.doubt:
             self._good_s = 0.0
@@ -119,8 +118,9 @@ class LeanFilter:
             self._good, self._next_good = self._next_good, self._x[BIAS_LEFT:STATES]
 
     def _doubt(self):
-        """Restart, because the readings do not fit: with the sensor's errors as they were before, as the fault may be
-        over, and with nothing known, as a bias may have stepped, in turns. Again and again: with nothing known."""
+        """Restart because the readings do not fit. Alternate between the sensor's earlier errors, because the fault may
+        be over, and no prior knowledge, because a bias may have stepped. After many misfits, restart without prior
+        knowledge."""
         good = self.consistency.doubts in (1, 3)
         speed, variance, rest = self._x[SPEED], self._p.rows[SPEED][SPEED], self._rest
         self._forget()
@@ -155,13 +155,13 @@ class LeanFilter:
         return degrees(self._x[PITCH])
 
     def measure_speed(self, speed_mps):
-        """Keep a measured speed for the next window. Optional."""
+        """Take a measured speed for the next window. Optional."""
         self._speed = speed_mps
         self._moving_s = measurements.MOVING_S if speed_mps > measurements.MOVING_SPEED else 0.0
 
     @property
     def variance(self):
-        """Variance of the lean's error, rad^2; that of no knowledge (pi^2) before the first window has ended."""
+        """Variance of the lean's error, rad^2; pi^2 (unknown) before the end of the first window."""
         if self._p is None:
             return pi * pi
         return measurements.SIGMA_SHARE**2 * (self._p.rows[LEAN][LEAN] + self.trim.variance)
@@ -173,13 +173,13 @@ class LeanFilter:
 
     @property
     def rolling(self):
-        """True where the estimated speed is certain enough to say that the bike does not stand."""
+        """True if the estimated speed is certain enough to exclude a standstill."""
         if self._p is None or self._x[SPEED] <= measurements.ROLLING_SPEED:
             return False
         return self._x[SPEED] > measurements.ROLLING_SIGMAS * sqrt(self._p.rows[SPEED][SPEED])
 
     def update(self, force, rate, dt_us):
-        """One sample: force (3, g), rate (3, rad/s), dt_us since the one before. Returns lean in degrees."""
+        """Take one sample: force (3, g), rate (3, rad/s), dt_us since the previous one. Return lean in degrees."""
         x, sums = self._x, self._sums
         self._roll_rate = predict(x, force, rate, dt_us * 1e-6, sums)
         self._count += 1
@@ -196,8 +196,8 @@ class LeanFilter:
         return degrees(x[LEAN] + self._delay_s * self._roll_rate - self._upright)
 
     def _end_window(self):
-        """Start the work on the window that ends, unless it is the first one, the bike comes to rest or the filter has
-        to restart. The work on the window before it is finished."""
+        """Start the work on the window that ends, unless it is the first one, the bike comes to rest or the filter must
+        restart. The work on the previous window is finished."""
         n = self._count
         means = [total / n for total in self._sums]
         seconds = self._window_us * 1e-6
@@ -234,8 +234,8 @@ class LeanFilter:
         self._work = self._process(means, seconds, roll_acceleration)
 
     def _impossible(self, means, seconds):
-        """True where the lean has been one that no bike has, and that the force does not show. Of a bike that has
-        fallen and of a sensor in the hand it does."""
+        """True if the lean has been impossible for a bike, and the force does not confirm it. The force does confirm
+        the lean of a fallen bike or of a sensor in the hand."""
         lean = self._x[LEAN]
         apart = abs(lean - atan2(means[5], means[6]))
         if abs(lean) > measurements.IMPOSSIBLE_LEAN and pi / 4 < apart < 7 * pi / 4:
@@ -276,8 +276,8 @@ class LeanFilter:
             self._stand(means)
 
     def _stand(self, means):
-        """The bike comes to rest: set lean and pitch by the force, which is vertical now, and the speed to 0. A bias
-        stays unless it is far off, as after the sensor was moved about in a hand."""
+        """At the beginning of rest, set lean and pitch by the force, which is now vertical, and the speed to 0. Keep a
+        bias unless it is far off, for example after the sensor was moved about by hand."""
         fx, fy, fz = means[5:8]
         x, p = self._x, self._p
         rates = [abs(means[2 + i] + x[BIAS_LEFT + i]) for i in range(3)]
@@ -297,7 +297,7 @@ class LeanFilter:
                 p.set_variance(BIAS_LEFT + i, measurements.SIGMA_START[BIAS_LEFT] ** 2)
 
     def _process(self, means, seconds, roll_acceleration):
-        """Linearise, update and inject for one window; a generator of short steps."""
+        """Linearise, update and inject for one window, as a generator of short steps."""
         p = self._p
         model = Linearisation(self._x, means[2:5], means[7], p.rows[LEAN][LEAN])
         yield
@@ -319,8 +319,8 @@ class LeanFilter:
         self._inject(model)
 
     def _update_ride(self, model, means, seconds, roll_acceleration):
-        """A generator: update with the window's forces, the level road, and the measured speed; without a new one with
-        straight_or_prior_speed(). Update the trim where speed and lean are certain enough."""
+        """Update with the window's forces, the level road, and the measured speed, or without a new speed with
+        straight_or_prior_speed(). Update the trim if speed and lean are certain enough. A generator."""
         p, x = self._p, self._x
         dive = self.dive.update(means[7] - model.sin_pitch, model.pitch_rate, model.speed, seconds)
         left, up = measurements.forces(model, means, roll_acceleration, self._force_error, dive)
@@ -355,7 +355,8 @@ class LeanFilter:
             self.trim.update(sideways, x[LEAN], model.yaw_rate, seconds)
 
     def _inject(self, model):
-        """Add the corrections to the state, and adapt the sums of innovations, which were taken against the old one."""
+        """Add the corrections to the state, and adapt the sums of innovations, which were computed with the old
+        state."""
         p, x, sums = self._p, self._x, self._sums
         for j, h in model.left_row:
             sums[0] -= self._count * h * p.correction[j]

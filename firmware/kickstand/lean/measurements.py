@@ -1,7 +1,8 @@
-"""What the lean filter measures in a window, how uncertain that is, and every parameter of the filter.
+"""The measurements of the lean filter in a window, their noise, and every parameter of the filter.
 
-A measurement is what Covariance.update() takes: ((state, d measurement / d state), ...), the innovation (measured minus
-expected) and the variance of its noise. model: a Linearisation. x: the state. means: see bike_model.predict().
+A measurement has the arguments of Covariance.update(): ((state, d measurement / d state), ...), the innovation
+(measured minus expected) and the variance of its noise. model: a Linearisation. x: the state. means: see
+bike_model.predict().
 
 SIGMA_... are standard deviations (1 sigma). A disturbance that lasts tau seconds, measured once in each window of T
 seconds, gets the variance sigma^2 2 tau / T, because measurements that share an error must not count as independent.
@@ -138,7 +139,7 @@ SIGMA_TRIM_LEAN = radians(1.4)  # rad
 
 
 def gyro_variances(sigma, r):
-    """The priors' variances of the last five states where the six positions have measured the gyro, else None.
+    """The priors' variances of the last five states if the six positions have measured the gyro, else None.
 
     sigma (9): standard errors of the entries of its matrix in the sensor's axes, taken as independent, or zeros. r (9):
     vehicle_from_sensor."""
@@ -146,7 +147,7 @@ def gyro_variances(sigma, r):
         return None
 
     def variance(i, j):
-        """Of the reading of axis i of a rate about axis j, of the vehicle."""
+        """The variance for the reading of the vehicle's axis i from a rate about its axis j."""
         total = _SIGMA_GYRO_DRIFT**2
         for a in range(3):
             for b in range(3):
@@ -159,7 +160,7 @@ def gyro_variances(sigma, r):
 
 def forces(model, means, roll_acceleration, force_error, dive=0.0):
     """Two measurements: the force to the left, (4), and up, (5). roll_acceleration: rad/s^2. force_error:
-    relative error of the accelerometer's magnitude, as found at rest. dive: see Dive.update(), in g."""
+    relative error of the accelerometer's magnitude, found at rest. dive: see Dive.update(), in g."""
     rolling = roll_acceleration / STANDARD_GRAVITY  # g in a metre of height, as is square below
     uncertain = _SIGMA_ROLL_HEIGHT_M * rolling
     left = means[0]
@@ -191,15 +192,15 @@ def level_road(model, x, seconds):
 
 
 def straight_or_prior_speed(lean, speed, yaw_rate, seconds):
-    """The measurement of a lean of 0 where the bike rides straight, of PRIOR_SPEED elsewhere."""
+    """The measurement of a lean of 0 while the bike rides straight, else of PRIOR_SPEED."""
     if abs(lean) < STRAIGHT_MAX_LEAN and abs(yaw_rate) < STRAIGHT_MAX_RATE and speed > STRAIGHT_MIN_SPEED:
         return ((LEAN, 1.0),), -lean, SIGMA_STRAIGHT**2 * 2 * _STRAIGHT_S / seconds
     return ((SPEED, 1.0),), PRIOR_SPEED - speed, _SIGMA_PRIOR_SPEED**2 * 2 * _PRIOR_SPEED_S / seconds
 
 
 def measured_speed(measured, speed, acceleration, seconds):
-    """The measurement of speed by a receiver or a wheel sensor. acceleration: m/s^2; by the delay it adds noise.
-    seconds: since the measured speed before: ten a second count as much as one."""
+    """The measurement of speed by a receiver or a wheel sensor. acceleration: m/s^2; with the delay it adds noise.
+    seconds: since the previous measured speed. Ten speeds per second count as much as one."""
     late = _MEASURED_SPEED_LATE_S * acceleration
     scale = _SIGMA_SPEED_SCALE * measured
     variance = (_SIGMA_MEASURED_SPEED**2 + late * late) * max(1.0, 2 * _MEASURED_SPEED_S / seconds)
@@ -207,8 +208,8 @@ def measured_speed(measured, speed, acceleration, seconds):
 
 
 def at_rest(model, means, speed, axis):
-    """The four measurements of a bike that stands (zero-velocity update): its speed is 0; the gyro's reading about
-    `axis` (0 to 2) is bias; the left and the forward force are gravity's."""
+    """The four measurements of a bike at rest (zero-velocity update): its speed is 0; the gyro's reading about `axis`
+    (0 to 2) is bias; the left and forward forces are from gravity."""
     return (
         (((SPEED, 1.0),), -speed, SIGMA_REST_SPEED**2),
         (((BIAS_LEFT + axis, 1.0),), means[2 + axis], SIGMA_REST_RATE**2),

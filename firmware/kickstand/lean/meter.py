@@ -1,4 +1,4 @@
-"""From a reading of the chip to lean and g: what happens to every sample, on the board and in a replay."""
+"""Computes lean and g from each reading of the chip, on the board and in a replay."""
 
 from math import degrees, radians
 
@@ -24,9 +24,9 @@ class LeanMeter:
     """Lean and acceleration of the vehicle. leans: False for a car, whose lean stays 0. delay_s: delay of the gyro's
     low-pass.
 
-    After update() or update_sum(): force (left, up, forward in g), rate (about them in rad/s), lean_deg (the
+    After update() or update_sum(): force (left, up, forward, in g), rate (about these axes, in rad/s), lean_deg (the
     filter's, > 0 right), smooth_force (g, for display; of an aligned motorcycle left and up are NaN), fallen, and the
-    maxima since reset_maxima(). suppressed_reason: why the lean is not shown, as given to distrust(), or None.
+    maxima since reset_maxima(). suppressed_reason: why the lean is not shown, from distrust(), or None.
     """
 
     def __init__(self, calibration, leans=True, delay_s=DELAY_S):
@@ -42,9 +42,9 @@ class LeanMeter:
         self.use(calibration)
 
     def use(self, calibration, posed=False):
-        """Take a calibration, its scale set, and restart the filter. suppressed_reason is cleared unless it is the same
-        calibration as before. posed: the bike has stood for its poses, and the one on the kickstand has just measured
-        the gyro's bias."""
+        """Take a calibration, its scale set, and restart the filter. suppressed_reason is cleared if the calibration
+        has changed. posed: the bike was still for its poses, and the kickstand pose has just measured the gyro's
+        bias."""
         if calibration is not self.calibration:
             self.suppressed_reason = None
         self.calibration = calibration
@@ -56,7 +56,7 @@ class LeanMeter:
         self.restart()
 
     def restart(self):
-        """Restart filter and smoothing, because readings were missing. The maxima and the sensor's errors stay."""
+        """Restart filter and smoothing after missing readings. Keep the maxima and the sensor's errors."""
         self.filter.restart()
         self._fresh = True
         self._flat_us = 0
@@ -85,7 +85,7 @@ class LeanMeter:
 
     @property
     def odd(self):
-        """Code of what does not fit again and again, or None: see Consistency."""
+        """The code of repeated misfits, or None: see Consistency."""
         return self.filter.consistency.odd
 
     @property
@@ -95,7 +95,7 @@ class LeanMeter:
 
     @property
     def trusted(self):
-        """True while lean_deg is certain enough to be shown."""
+        """True while lean_deg is certain enough to show."""
         if not self._leans:
             return True
         if self.suppressed_reason:
@@ -107,7 +107,7 @@ class LeanMeter:
         return 0.0 <= lean.variance <= (MAX_VARIANCE if doubts < MILD else DOUBTED_VARIANCE)
 
     def keep_trim(self):
-        """If the bike stands and the trim is certain enough and has changed, copy it to the calibration and return
+        """If the bike is at rest and the trim is certain and has changed, copy it to the calibration and return
         True."""
         angle = self.trim_deg
         certain = self.at_rest and self.filter.trim.variance <= TRIM_MAX_VARIANCE
@@ -118,13 +118,13 @@ class LeanMeter:
 
     @property
     def lean_formula_deg(self):
-        """Nicolae's lean of the last reading alone."""
+        """Nicolae's lean from only the last reading."""
         from .formula import formula_lean_deg  # one page shows it
 
         return formula_lean_deg(self.force, self.rate[1])
 
     def measure_speed(self, speed_mps):
-        """Take a measured speed: it improves the lean, and is optional. Below 0: there is none, ignored."""
+        """Take a measured speed, which improves the lean. Optional. A negative value means no speed and is ignored."""
         if speed_mps >= 0.0:
             self.filter.measure_speed(speed_mps)
 
@@ -135,14 +135,15 @@ class LeanMeter:
 
     def update_sum(self, sums, n, dt_us):
         """Take the mean of n samples. sums: array('i', 7), their sum in counts, in the chip's order; dt_us: integer
-        microseconds since the samples before (0 for the first). These are the samples of one pass of the main loop,
-        because floats cost too much to do it for each sample."""
+        microseconds since the previous samples (0 for the first). These are the samples of one pass of the main loop:
+        float computations for each sample would take too long."""
         self._reading, self._n = sums, n
         self._transform.apply_sum(sums, n, self.force, self.rate)
         self._follow(dt_us)
 
     def _follow(self, dt_us):
-        """Update filter, smoothed force, fallen and maxima with the new force and rate, dt_us after those before."""
+        """Update filter, smoothed force, fallen and maxima with the new force and rate. dt_us: since the previous
+        ones."""
         if dt_us > LOST_US:
             if dt_us > GAP_US:
                 self.restart()
@@ -174,7 +175,7 @@ class LeanMeter:
             self._hold_again()
 
     def _hold_again(self):
-        """Begin again to time how long the lean exceeds a maximum, because it is within its maxima or not trusted."""
+        """Restart the timing of a lean above its maximum, because it is within its maxima or not trusted."""
         # _over_us: time for which the lean has exceeded a maximum; starts again from 0 after each HELD_US.
         # _least: smallest lean in that time. _least_before: the same in the HELD_US before, 0 if the lean was within
         # its maxima then.

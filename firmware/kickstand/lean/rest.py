@@ -1,5 +1,5 @@
-"""Standstill detector for zero-velocity updates, on means over a fifth of a second, in which an idling engine averages
-out."""
+"""Standstill detector for zero-velocity updates. It uses means over a fifth of a second, in which an idling engine
+averages out."""
 
 from ..units import const
 
@@ -17,10 +17,10 @@ _AVERAGE_S = const(0.5)  # s: time constant of the recent average. Larger: rest 
 
 
 class RestDetector:
-    """update() takes the means of each window. resting (read only): True after _REST_S of stillness, or _REST_ROLLING_S
-    where the bike seems to move.
+    """Detects rest. update() takes the means of each window. resting (read-only): True after _REST_S of stillness, or
+    _REST_ROLLING_S if the bike seems to move.
 
-    first: no rest has been detected since power-on, so the bias may be far off.
+    first: no rest since power-on, so the bias may be far off.
     """
 
     def __init__(self, first=True):
@@ -32,8 +32,8 @@ class RestDetector:
 
     def update(self, rates, force, bias, seconds, rolling=False, moving=False):
         """Take the means over a window of `seconds`: rates (rad/s) less the estimated bias, that bias (rad/s), and
-        force (g). rolling: other evidence says that the bike moves. moving: a measured
-        speed does: it stands in no case."""
+        force (g). rolling: other evidence shows that the bike moves. moving: a measured
+        speed shows it: the bike is certainly not at rest."""
         readings = [rates[i] + bias[i] for i in range(3)] + force
         if self._average is None:
             self._average = readings

@@ -1,8 +1,9 @@
-"""The roll-misalignment correction, in short the trim: the upright pose of the alignment was not quite upright.
+"""Estimates the roll-misalignment correction (the trim), because the upright pose of the alignment was not quite
+upright.
 
-On a bike in balance there is no specific force to the side. What is measured on straights, on average, is the roll
-misalignment plus the accelerometer's drift. Both are taken off the lean. In turns wide tyres and a rider who hangs off
-add to it; what turns to the left and to the right have in common is again the trim.
+A bike in balance has no specific force to the side. The mean measured on straights is the roll misalignment plus the
+accelerometer's drift. Both are subtracted from the lean. In turns wide tyres and a rider who hangs off add to it; the
+common part of left and right turns is again the trim.
 """
 
 from math import radians, sin
@@ -28,10 +29,10 @@ NOISE = radians(0.01)  # rad per square root of a second: process noise. Larger:
 
 
 class UprightTrim:
-    """A Kalman filter of two states. angle: the trim in rad, to take off the lean, within MAX_TRIM. variance: its
-    uncertainty, rad^2. Both are read only.
+    """A Kalman filter of two states. angle: the trim in rad, to subtract from the lean, within MAX_TRIM. variance: its
+    uncertainty, rad^2. Both are read-only.
 
-    angle at the start: what was found on earlier rides, 0 if nothing was.
+    angle at the start: the trim found on earlier rides, or 0.
     """
 
     def __init__(self, angle):
@@ -44,7 +45,7 @@ class UprightTrim:
 
     def update(self, sideways, lean, yaw_rate, seconds):
         """Take one measurement while riding. sideways: force to the left over force up. lean (rad) and yaw_rate (rad/s)
-        make its noise larger in bends. seconds: since the update before."""
+        increase its noise in bends. seconds: since the previous update."""
         sine = sin(lean - self.angle)
         innovation = sideways - self.angle - sine * self._lean_share
         if not -_MAX_SIDEWAYS < innovation < _MAX_SIDEWAYS:

@@ -1,4 +1,4 @@
-"""The keys of phones that have given the PIN, kept in flash: such a phone is not asked again."""
+"""Stores the keys of paired phones in flash. A paired phone need not enter the PIN again."""
 
 import json
 from binascii import hexlify, unhexlify
@@ -7,29 +7,29 @@ PATH = "live_bonds.json"
 
 
 class Bonds:
-    """pin: with another one than before, all phones are asked again."""
+    """The stored keys. pin: if it has changed, all phones must pair again."""
 
     def __init__(self, pin):
         self._pin = pin
-        self._keys = {}  # {(type, key): value}, as MicroPython's bluetooth hands them over
+        self._keys = {}  # {(type, key): value}, from MicroPython's bluetooth
         self._changed = False
         try:
             with open(PATH) as file:
                 kept = json.load(file)
             if kept["pin"] == pin:
                 self._keys = {(kind, unhexlify(key)): unhexlify(value) for kind, key, value in kept["keys"]}
-        except (OSError, ValueError, KeyError, TypeError):  # none yet, or a file that is damaged: they pair again
+        except (OSError, ValueError, KeyError, TypeError):  # no file yet, or a damaged one: the phones pair again
             pass
 
     def get(self, kind, index, key):
-        """The value for this key, or, without a key, the one at this index of its kind; None if there is none."""
+        """The value for this key, or without a key the value at this index of its kind; None if it does not exist."""
         if key is not None:
             return self._keys.get((kind, bytes(key)))
         found = [value for place, value in self._keys.items() if place[0] == kind]
         return found[index] if index < len(found) else None
 
     def put(self, kind, key, value):
-        """Keep a value, or forget the one before if it is None. True: done."""
+        """Store a value; None deletes the stored one. Return True if it worked."""
         place = kind, bytes(key)
         if value is None and place not in self._keys:
             return False
@@ -41,7 +41,7 @@ class Bonds:
         return True
 
     def save(self):
-        """Write what has changed. A flash that cannot be written costs no more than giving the PIN again."""
+        """Write the changes. If flash cannot be written, the phones only have to enter the PIN again."""
         if not self._changed:
             return
         self._changed = False

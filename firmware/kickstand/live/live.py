@@ -1,4 +1,4 @@
-"""Sends what the meter knows to a phone, from the loop, at the pace that the phone asks for."""
+"""Sends the meter's results from the loop to a phone, at the rate that the phone requests."""
 
 from array import array
 from math import degrees, sqrt
@@ -10,21 +10,22 @@ from . import packets
 from .packets import LEAN, MOTION, OWN, SPEED
 
 _LOOK_MS = const(1000)
-# A phone that has asked for nothing for so long makes room for the next; typing a PIN takes half of it
+# A phone that requests nothing for this long is disconnected, to make room for the next. Typing a PIN takes half of it
 _IDLE_S = const(60)
-_SAMPLES = 8  # as many as Transform takes at most
+_SAMPLES = 8  # the most that Transform takes
 
 
 def attach(radio, app):
-    """Let an App send to phones. radio: a Radio."""
+    """Connect an App with a Radio, so that it sends to phones."""
     app.live = app.screen.pages.live = Live(radio, app, app.settings.leans)
 
 
 class Live:
-    """radio: a Radio. app: the App whose meter, drive, rides, screen, sensor and clock are read. leans: False for a
-    car.
+    """Sends to one phone. radio: a Radio. app: the App whose meter, drive, rides, screen, sensor and clock are read.
+    leans: False for a car.
 
-    asked: what the phone has asked for, "RaceChrono" or "browser", or None. per_second: packets in the last second.
+    asked: the packets that the phone has requested: "RaceChrono" or "browser", or None. per_second: packets in the last
+    second.
     """
 
     def __init__(self, radio, app, leans):
@@ -43,7 +44,7 @@ class Live:
         self._begin()
 
     def _begin(self):
-        """Another phone is there, or none."""
+        """Handle a new phone, or the loss of the phone."""
         self.radio.changed = False
         self.asked = None
         self.per_second = self._sent = self._idle_s = 0
@@ -52,7 +53,7 @@ class Live:
         self._ask()
 
     def _ask(self):
-        """The phone has asked for other packets. Start anew, for no mean may span a time without them."""
+        """Restart the means, because the phone has requested other packets: no mean may span a time without them."""
         self._due_ms = ticks_ms()
         for i in range(4):
             self._dues[i] = self._due_ms
@@ -65,19 +66,20 @@ class Live:
             self._sums[i] = 0
 
     def feed(self, sums, n):
-        """While period_ms is not 0, once each turn of the loop that has samples. sums (7): of n samples' counts."""
+        """Add the sums (7) of n samples' counts. Call it once per turn of the loop with samples while period_ms is not
+        0."""
         total = self._sums
         for i in range(7):
             total[i] += sums[i]
         self._n += n
 
     def poll(self, now_ms):
-        """Once each turn of the loop. Waits for nothing."""
+        """Send the packets whose time has come. Call it once per turn of the loop. It never waits."""
         radio = self.radio
         if radio.changed:
             self._begin()
             self._look_ms = now_ms
-        inbox = radio.inbox  # the interrupt may put another list in its place meanwhile
+        inbox = radio.inbox  # the interrupt may replace the list meanwhile
         while inbox:
             self._hear(*inbox.pop(0))
         if self.period_ms and ticks_diff(now_ms, self._due_ms) >= 0:
@@ -93,7 +95,7 @@ class Live:
         self._ask()
 
     def _look(self, now_ms):
-        """Once a second: everything that is not of this moment."""
+        """Send the slow packets: call it once per second."""
         self._look_ms = ticks_add(now_ms, _LOOK_MS)
         self.per_second, self._sent = self._sent, 0
         radio, app = self.radio, self._app
@@ -113,7 +115,7 @@ class Live:
         self._sent += self.radio.send(handle, self._views[size])
 
     def _lean(self):
-        """The lean in degrees, or None where the display shows none either."""
+        """The lean in degrees, or None if the display shows none either."""
         app = self._app
         shown = self._leans and app.sensor.fault is None and app.screen.pages.trusted
         return app.meter.lean_deg if shown else None
@@ -125,7 +127,7 @@ class Live:
         return state + packets.RECORDING * self._app.recording + packets.NO_READINGS * bool(self._app.sensor.fault)
 
     def _send(self, now_ms):
-        """What is due of the samples since the last time: none where none have come."""
+        """Send the packets whose time has come, from the samples since the last call. Send none without samples."""
         period_ms = self.period_ms
         self._due_ms = ticks_add(self._due_ms, period_ms)
         if ticks_diff(now_ms, self._due_ms) >= 0:  # late, or the first
@@ -140,12 +142,12 @@ class Live:
         for packet in range(4):
             interval = intervals[packet]
             late_ms = ticks_diff(now_ms, dues[packet])
-            if interval and 2 * late_ms >= -period_ms:  # the nearest of the times at which something is sent
+            if interval and 2 * late_ms >= -period_ms:  # the nearest of the times for sending
                 dues[packet] = ticks_add(now_ms, interval - (late_ms if late_ms < period_ms else 0))
                 self._send_one(packet, lean, now_ms)
 
     def _mean(self):
-        """Force and rate of the samples since the last time: their mean is the low-pass that this rate needs."""
+        """Compute the mean force and rate since the last call. The mean is the low-pass that this rate needs."""
         calibration = self._app.meter.calibration
         if calibration is not self._calibration:
             self._calibration, self._transform = calibration, Transform(calibration)
@@ -161,7 +163,7 @@ class Live:
         radio, buffer, sigma, speed = self.radio, self._buffer, self._sigma, self._speed
         aligned = self._app.meter.calibration.aligned
         if packet == OWN:
-            force = self._force if aligned else None  # it is along the sensor's axes
+            force = self._force if aligned else None  # without an alignment it is in the sensor's axes
             state = self._state(lean)
             self._put(radio.now, packets.now(buffer, now_ms, lean, sigma, force, self._rate, speed, state))
         elif packet == LEAN and lean is not None:
@@ -172,11 +174,11 @@ class Live:
             self._put(radio.chrono, packets.speed(buffer, speed))
 
     def lines(self):
-        """Its page: who gets the lean, and how many packets a second."""
+        """The lines of its page: who receives the lean, and the packets per second."""
         who = self.asked or ("a phone" if self.radio.phone is not None else "no phone")
         return "BLE %12s" % who, "%4d packets/s" % self.per_second
 
     def stop(self, now_ms=0):
-        """End it, until power-on: also an entry of the menu."""
+        """Switch Live off until the next power-on. Also an entry of the menu."""
         self.radio.stop()
         self._app.live = self._app.screen.pages.live = None

@@ -1,7 +1,6 @@
-"""What goes to a phone, as bytes, and what a phone may ask for. The same tables are in firmware/docs/live.md.
+"""Encodes the packets for a phone, and decodes its requests. The same tables are in firmware/docs/live.md.
 
-Whatever is not known is never sent as a number that could pass for one: RaceChrono gets no packet then, our own page
-UNKNOWN.
+An unknown value is never sent as a plausible number: RaceChrono then gets no packet, and our own page gets UNKNOWN.
 """
 
 from math import floor
@@ -10,15 +9,15 @@ from struct import pack_into, unpack_from
 from ..units import const
 
 VERSION = 1  # of our own packets
-LEAN, MOTION, SPEED, OWN = range(4)  # places in a list of intervals; RaceChrono's packet ids are one higher
-_FASTEST_MS = const(40)  # 25 packets of each kind a second, whatever the phone asks for
+LEAN, MOTION, SPEED, OWN = range(4)  # indices in a list of intervals; RaceChrono's packet ids are one higher
+_FASTEST_MS = const(40)  # at most 25 packets of each kind per second
 UNKNOWN, UNKNOWN_SPEED, UNKNOWN_SIGMA = -0x8000, 0xFFFF, 0xFF
 
 ALIGNED, TRUSTED, AT_REST, FALLEN, RECORDING, CAR, NO_READINGS = (1 << bit for bit in range(7))  # bits of the state
 
 
 def whole(value, scale, low=-0x7FFF, high=0x7FFF):
-    """value in units of 1 / scale, rounded to a whole number that its field can hold."""
+    """The value in units of 1 / scale, rounded and limited to the range of its field."""
     return max(low, min(high, floor(scale * value + 0.5)))
 
 
@@ -27,13 +26,14 @@ def _sigma(sigma_deg):
 
 
 def lean(buffer, lean_deg, sigma_deg):
-    """RaceChrono's packet 1; return its length, as those below do."""
+    """Write RaceChrono's packet 1; return its length. The other functions return the same."""
     pack_into("<IhB", buffer, 0, LEAN + 1, whole(lean_deg, 10), _sigma(sigma_deg))
     return 7
 
 
 def motion(buffer, force, rate_dps, trusted):
-    """RaceChrono's packet 2. force: left, up, forward in g. rate_dps: about them. trusted: the lean is."""
+    """Write RaceChrono's packet 2. force: left, up, forward, in g. rate_dps: about these axes, in deg/s. trusted: the
+    lean can be trusted."""
     pack_into("<I", buffer, 0, MOTION + 1)
     forces = whole(force[2], 1000), whole(force[0], 1000), whole(force[1], 1000)
     pack_into("<5hB", buffer, 4, *forces, whole(rate_dps[1], 10), whole(rate_dps[2], 10), trusted)
@@ -41,13 +41,13 @@ def motion(buffer, force, rate_dps, trusted):
 
 
 def speed(buffer, speed_mps):
-    """RaceChrono's packet 3."""
+    """Write RaceChrono's packet 3."""
     pack_into("<IH", buffer, 0, SPEED + 1, whole(speed_mps, 100, 0, 0xFFFE))
     return 6
 
 
 def now(buffer, ms, lean_deg, sigma_deg, force, rate_dps, speed_mps, state):
-    """Our own, of this moment; lean_deg, force and speed_mps may be None. ms: the board's time."""
+    """Write our own packet with the current values. lean_deg, force and speed_mps may be None. ms: the board's time."""
     known = lean_deg is not None
     tilt = (whole(lean_deg, 100), _sigma(sigma_deg)) if known else (UNKNOWN, UNKNOWN_SIGMA)
     pack_into("<HhB", buffer, 0, ms & 0xFFFF, *tilt)
@@ -59,7 +59,7 @@ def now(buffer, ms, lean_deg, sigma_deg, force, rate_dps, speed_mps, state):
 
 
 def ride(buffer, state, meter, lost):
-    """Our own, of the ride so far. meter: a LeanMeter. lost: how many samples."""
+    """Write our own packet with the values of the ride so far. meter: a LeanMeter. lost: number of lost samples."""
     leans = whole(meter.max_left_deg, 10), whole(meter.max_right_deg, 10)
     peaks = whole(meter.max_accel_g, 1000), whole(meter.max_brake_g, 1000)
     pack_into("<BB4HhH", buffer, 0, VERSION, state, *leans, *peaks, whole(meter.trim_deg, 100), min(lost, 0xFFFF))
@@ -71,8 +71,8 @@ def _interval(data, start, form):
 
 
 def take_filter(data, intervals):
-    """Do what RaceChrono has written to its filter. intervals: ms for each packet id, 0 for not at all. Returns False
-    for what is no command of its."""
+    """Execute a command that RaceChrono has written to its filter. intervals: ms per packet id, 0 for no packets.
+    Return False if it is not one of RaceChrono's commands."""
     command = bytes(data[:1]), len(data)
     if command == (b"\x00", 1):
         intervals[LEAN] = intervals[MOTION] = intervals[SPEED] = 0
@@ -88,7 +88,8 @@ def take_filter(data, intervals):
 
 
 def take_rate(data, intervals):
-    """Do what our own page has written: the ms between two packets, 0 for none. Returns False for anything else."""
+    """Execute a command of our own page: the ms between two packets, 0 for no packets. Return False for anything
+    else."""
     if len(data) != 2:
         return False
     intervals[OWN] = _interval(data, 0, "<H") if data[0] or data[1] else 0

@@ -1,5 +1,5 @@
-"""The radio: a Bluetooth LE peripheral for one phone at a time. What happens is noted in the interrupt; the loop acts
-on it."""
+"""The radio: a Bluetooth LE peripheral for one phone at a time. The interrupt records the events; the loop handles
+them."""
 
 from binascii import unhexlify
 
@@ -9,19 +9,19 @@ from . import packets
 
 SERVICE = "7b6f0000-3c1e-4d5a-9a55-6b69636b7374"  # our own; its characteristics have 1 to 4 in place of the 0
 _ADVERTISE_US = const(150_000)
-MOST_WRITES = 16  # that wait for the loop; a phone that writes more in a turn is not heard
+MOST_WRITES = 16  # that wait for the loop; more writes in one turn are ignored
 
 _CONNECTED, _DISCONNECTED, _WRITTEN, _GET_SECRET, _SET_SECRET, _PASSKEY = 1, 2, 3, 29, 30, 31
 _READ, _WRITE, _NOTIFY = 0x02, 0x08, 0x10
-_READ_PAIRED, _WRITE_PAIRED = 0x0600, 0x3000  # only over an encrypted line, to a phone that gave the PIN
-_DISPLAY_ONLY = 0  # this side shows the PIN, as a sticker or config.py does, and the phone asks for it
+_READ_PAIRED, _WRITE_PAIRED = 0x0600, 0x3000  # only over an encrypted link, to a phone that entered the PIN
+_DISPLAY_ONLY = 0  # the PIN is on this side (on a sticker or in config.py); the phone asks for it
 
 
 class Radio:
-    """phone: the handle of the phone that is connected, or None. changed: another phone, or none, since the loop looked
-    last. inbox: what it has written, [(filter or rate, bytes)]. filter, rate, chrono, now, ride: handles.
+    """phone: the handle of the connected phone, or None. changed: the phone has changed since the loop last looked.
+    inbox: the phone's writes, [(filter or rate, bytes)]. filter, rate, chrono, now, ride: handles.
 
-    pin: six digits that a phone has to give, or None. Raises LiveError."""
+    pin: six digits that a phone must enter, or None. Raises LiveError."""
 
     def __init__(self, pin=None):
         try:
@@ -73,10 +73,10 @@ class Radio:
                 self.inbox.append((data[1], self._ble.gatts_read(data[1])))
         elif event == _CONNECTED or event == _DISCONNECTED:
             self.phone = data[0] if event == _CONNECTED else None
-            self.changed = True  # before anything that may find no memory
+            self.changed = True  # before anything that may run out of memory
             self.inbox = []
         elif event == _PASSKEY:
-            getattr(self._ble, "gap_passkey")(data[0], data[1], self._pin)  # noqa: B009 the stubs of rp2 know it not
+            getattr(self._ble, "gap_passkey")(data[0], data[1], self._pin)  # noqa: B009 missing in the stubs of rp2
         elif self._bonds and event == _GET_SECRET:
             return self._bonds.get(*data)
         elif self._bonds and event == _SET_SECRET:
@@ -84,28 +84,28 @@ class Radio:
         return None
 
     def advertise(self):
-        """Let the next phone find the board. True if that works now."""
+        """Advertise the board to the next phone. Return True if that works now."""
         return self._attempt(self._ble.gap_advertise, _ADVERTISE_US, self._found, resp_data=self._named)
 
     def send(self, handle, data):
-        """Queue a notification. False: the radio has no room for it, or the phone has just gone."""
+        """Queue a notification. Return False if the radio has no room for it, or the phone has just disconnected."""
         return self._attempt(self._ble.gatts_notify, self.phone, handle, data)
 
     def keep(self, handle, data):
-        """For a phone that reads."""
+        """Set the value that a phone can read."""
         self._attempt(self._ble.gatts_write, handle, data)
 
     def drop(self):
-        """Let go of the phone, for the next one."""
+        """Disconnect the phone, to make room for the next one."""
         self._attempt(self._ble.gap_disconnect, self.phone)
 
     def save_bonds(self):
-        """Write what a pairing has changed to flash; in the loop, for that takes long."""
+        """Write the keys changed by a pairing to flash. Called in the loop, because it takes long."""
         if self._bonds:
             self._bonds.save()
 
     def stop(self):
-        """Switch it off, until power-on."""
+        """Switch the radio off until the next power-on."""
         self._attempt(self._ble.active, False)
 
     @staticmethod
@@ -114,5 +114,6 @@ class Radio:
             function(*arguments, **named)
             return True
         except (OSError, MemoryError, TypeError):
-            # MemoryError: the port keeps what the phone does not take. TypeError: the phone has just gone, handle None
+            # MemoryError: the port stores packets that the phone does not take. TypeError: the phone has just
+            # disconnected, handle None
             return False

@@ -1,23 +1,23 @@
-"""The format of a recorded ride: ride blocks of a few thousand bytes, each readable without the others.
+"""The format of a recorded ride: blocks of a few thousand bytes, each readable without the others.
 
 A block is: a head (magic, format version, length, ride, sequence, time in us since power-on, temperature at its end in
 hundredths of a degree Celsius, counts per g, ten times the counts per deg/s, samples per second, firmware version,
-number of positions, how late the gyro's low-pass is in tenths of a millisecond, 0 in rides of version 0.3.0 and
-before); the calibration as store.pack() writes it, with matrices in blocks of format 2; the entries; zeros; the
-positions, the last one first; a tail (number of entries, CRC32 of everything before it).
+number of positions, delay of the gyro's low-pass in tenths of a millisecond, 0 in rides up to version 0.3.0); the
+calibration as store.pack() writes it, with matrices in blocks of format 2; the entries; zeros; the positions, the last
+one first; a tail (number of entries, CRC32 of everything before it).
 
-An entry is one pass of the main loop, App.turn(), called "a turn" here: the number of samples in it (n), the
-microseconds since the turn before, and the sums of the samples' six counts (ax ay az gx gy gz). So the mean from which
-the lean was computed is kept exactly. Or an entry is a speed: n = 0, then centimetres per second.
+An entry is one pass of the main loop, App.turn(), called "a turn" here: the number of its samples (n), the microseconds
+since the previous turn, and the sums of the samples' six counts (ax ay az gx gy gz). This keeps the exact mean that the
+lean was computed from. An entry can also be a speed: n = 0, then centimetres per second.
 
-A position is the number of the entry (a turn) that it belongs to, and the four numbers of Gps.place(). Readers of
-version 0.4.0 and before, which know no positions, take their bytes for the zeros and read the rest.
+A position is the number of its entry (a turn) and the four numbers of Gps.place(). Readers up to version 0.4.0 do not
+support positions: they treat these bytes as the zeros and read the rest.
 
-Each number is kept as its difference from a prediction: n sample periods for the time, the values of the turn before
-for the others. The difference is in an adaptive Rice code (R. F. Rice, JPL publication 79-22), most significant bit
-first. The difference becomes a size >= 0 by zigzag coding: 0, -1, 1, -2, ... become 0, 1, 2, 3, ... k is log2 of the
-mean of the last sizes. The code is size >> k as that many ones, a zero, and the low k bits of the size. Where that
-would take LIMIT ones or more, it is LIMIT ones and then the size in RAW_BITS bits.
+Each number is stored as its difference from a prediction: n sample periods for the time, the values of the previous
+turn for the others. The difference is written in an adaptive Rice code (R. F. Rice, JPL publication 79-22), most
+significant bit first. Zigzag coding makes the difference a size >= 0: 0, -1, 1, -2, ... become 0, 1, 2, 3, ... k is
+log2 of the mean of the last sizes. The code is (size >> k) ones, a zero, and the low k bits of the size. If that would
+take LIMIT ones or more, the code is LIMIT ones and then the size in RAW_BITS bits.
 """
 
 import struct
@@ -42,26 +42,26 @@ FIELDS = 9  # values of an entry: n, dt_us, sums of ax ay az gx gy gz, speed
 _SPEED = 8  # the index of the speed among them
 LIMIT = 12
 RAW_BITS = 31
-MEAN_SHIFT = 4  # a mean is that of about the last 16 sizes, and is kept times 16
+MEAN_SHIFT = 4  # a mean covers about the last 16 sizes, and is stored times 16
 START_MEAN = 128 << MEAN_SHIFT
-MAX_SIZE = 1 << 20  # a larger size counts as this in the mean, so that it fits 32 bits
+MAX_SIZE = 1 << 20  # a larger size counts as this in the mean, which must fit in 32 bits
 MAX_DT_US = 1 << 29  # the longest time between two turns that an entry can hold
 _HEAD_LENGTH = struct.calcsize(HEAD)
 _TAIL_LENGTH = struct.calcsize(TAIL)
 _PLACE_LENGTH = struct.calcsize(PLACE)
 _WORST = (FIELDS + 1) * (LIMIT + RAW_BITS) // 8 + 2  # the most bytes that a turn and a speed can take
-# Indices in the coder's state, array('i', 22). From 0 on, FIELDS values: the entry before. From _MEANS on, FIELDS
-# values: the mean size of each field. Then: bits that do not yet make a byte, the number of these, the index of the
-# next byte in the buffer, and the sample period in us.
+# Indices in the coder's state, array('i', 22). From 0 on, FIELDS values: the previous entry. From _MEANS on, FIELDS
+# values: the mean size of each field. Then: bits that do not yet fill a byte, their number, the index of the next byte
+# in the buffer, and the sample period in us.
 _MEANS, _PENDING, _BITS, _AT, _PERIOD = 9, 18, 19, 20, 21
 
 
 def block_length(index):
-    """Bytes in ride block number `index` of a file: as many as littlefs keeps in its own block of that number.
+    """The number of bytes in ride block `index` of a file: as many as littlefs keeps in its own block of that number.
 
-    Each of those but the first begins with 4-byte pointers to earlier blocks: one, and another for each time that its
-    number can be halved (littlefs, SPEC.md, CTZ skip-lists). A block of a ride that ends where one of littlefs does
-    never has to be copied when the file grows."""
+    Each block of littlefs except the first begins with 4-byte pointers to earlier blocks: one, plus one for each time
+    that its number can be halved (littlefs, SPEC.md, CTZ skip-lists). A ride block that ends where a block of littlefs
+    ends is never copied when the file grows."""
     if index == 0:
         return BLOCK
     length = BLOCK - 4
@@ -72,9 +72,10 @@ def block_length(index):
 
 
 def encode_python(entry, state, out):
-    """Append an entry, array('i', FIELDS), to the buffer out. state: the coder's, array('i', 22), is updated.
+    """Append an entry, array('i', FIELDS), to the buffer out. Updates state, the coder's array('i', 22).
 
-    On the board encode() is the machine code of block_viper.py, elsewhere this; the bytes are the same."""
+    On the board, encode() is the machine code of block_viper.py; elsewhere it is this function. The bytes are the
+    same."""
     n, before = entry[0], state[0]
     for i in range(_SPEED) if n else (0, _SPEED):
         value, guess = entry[i], state[i]
@@ -96,7 +97,7 @@ def encode_python(entry, state, out):
             _append(state, out, (1 << LIMIT) - 1, LIMIT)
             _append(state, out, size, RAW_BITS)
         state[_MEANS + i] = mean + min(size, MAX_SIZE) - (mean >> MEAN_SHIFT)
-        if i or n:  # a speed, n = 0, does not replace the n of the turn before
+        if i or n:  # a speed (n = 0) does not replace the n of the previous turn
             state[i] = value
 
 
@@ -118,13 +119,13 @@ except NO_MACHINE_CODE:
     encode = encode_python
 else:
     _ENTRY = array("i", (2, 9999, -30000, 30000, -1, 0, 255, -256, 0))
-    # the entry before, means from small to large, and three bits that wait
+    # the previous entry, means from small to large, and three pending bits
     _STATE = array("i", (3, 1, -1, 29000, 70, -7, 254, 77, 0) + tuple(range(16, 160, 16)) + (5, 3, 0, 5000))
     encode = checked(encode, encode_python, _ENTRY, _STATE, bytearray(40))
 
 
 class RideBlock:
-    """A ride block being filled: begin(), add() until full(), close(). Then buffer[:length] is the block.
+    """A ride block to fill: call begin(), add() until full(), close(). Then buffer[:length] is the block.
 
     period_us: nominal time from one sample to the next.  count: entries so far.
     """
@@ -134,21 +135,21 @@ class RideBlock:
         self._state = array("i", [0] * (_PERIOD + 1))
         self._state[_PERIOD] = period_us
         self._entry = array("i", [0] * FIELDS)
-        self._temperature = 0  # temperature in the last turn, in counts
+        self._temperature = 0  # temperature of the last turn, in counts
         self._reserved = 0  # bytes kept free for the next position; 0 before the first one
 
     def begin(self, length, ride, sequence, time_us, chip, sample_hz, body):
-        """Begin an empty block. length: in bytes, with head and tail.  ride, sequence: the number of the ride, and of
-        the block in it.  time_us: time since power-on of the last sample before it.  chip: an Mpu6050.  sample_hz: its
-        samples a second.  body: the calibration, from store.pack()."""
+        """Begin an empty block. length: in bytes, with head and tail.  ride, sequence: the numbers of the ride and of
+        the block in it.  time_us: time of the last sample before it, since power-on.  chip: an Mpu6050.  sample_hz: its
+        samples per second.  body: the calibration, from store.pack()."""
         state = self._state
         for i in range(FIELDS):
             state[i] = 0
             state[_MEANS + i] = START_MEAN
-        state[0] = 1  # the prediction divides by the n of the turn before
+        state[0] = 1  # the prediction divides by the n of the previous turn
         state[_PENDING] = state[_BITS] = 0
         state[_AT] = _HEAD_LENGTH + len(body)
-        # the zeros, temperature and number of positions, are written by close()
+        # close() writes the two zeros: temperature and number of positions
         numbers = MAGIC, _WHOLE_VERSION if len(body) > BODY_LENGTH else _VERSION, length, ride, sequence, time_us, 0
         rates = chip.accel_lsb_per_g, int(10 * chip.gyro_lsb_per_dps + 0.5), sample_hz
         version, delay = __version__.encode()[:10], int(10_000 * chip.gyro_delay_s + 0.5)
@@ -160,7 +161,7 @@ class RideBlock:
         self._end = length - _TAIL_LENGTH  # where the positions begin
 
     def add(self, sums, n, dt_us):
-        """Append a turn: the sums of n samples' seven counts, and the microseconds since the turn before."""
+        """Append a turn: the sums of n samples' seven counts, and the microseconds since the previous turn."""
         entry = self._entry
         entry[0] = n
         entry[1] = dt_us
@@ -175,29 +176,29 @@ class RideBlock:
         self.count += 1
 
     def add_speed(self, cm_per_s):
-        """Append a speed in cm/s, which belongs to the turn that is appended next."""
+        """Append a speed in cm/s. It belongs to the next turn."""
         self._entry[0] = 0
         self._entry[_SPEED] = cm_per_s
         encode(self._entry, self._state, self.buffer)
         self.count += 1
 
     def add_place(self, place):
-        """Append a position, as Gps.place() has it, which belongs to the turn that is appended next."""
+        """Append a position, the result of Gps.place(). It belongs to the next turn."""
         end = self._end - _PLACE_LENGTH
         if not self._reserved:
             self._reserved = _PLACE_LENGTH
             if self._state[_AT] + _WORST > end:
-                return  # the first position is dropped, because no room was kept for it
+                return  # drop the first position, because no room was kept for it
         struct.pack_into(PLACE, self.buffer, end, self.count, place[0], place[1], place[2], place[3])
         self._end = end
         self._places += 1
 
     def full(self):
-        """True if the longest possible turn and speed, and a position, might not fit any more."""
+        """True if the longest possible turn and speed, and a position, might no longer fit."""
         return self._state[_AT] + _WORST + self._reserved > self._end
 
     def close(self):
-        """Write the temperature, the last bits and the tail. Then the block is complete."""
+        """Complete the block: write the temperature, the last bits and the tail."""
         state, buffer = self._state, self.buffer
         struct.pack_into("<h", buffer, _TEMPERATURE_AT, int(100 * self._chip.temperature_c(self._temperature)))
         at = state[_AT]

@@ -1,7 +1,7 @@
 """Writes rides to the board's flash or an SD card, and removes the oldest to make room.
 
-A ride is written in parts, files of about a minute in flash and of a quarter of an hour on a card. RESERVE bytes of the
-flash always stay free, for the calibration and for new firmware.
+A ride is written in parts: files of about a minute in flash, of a quarter of an hour on a card. RESERVE bytes of the
+flash always stay free for the calibration and new firmware.
 """
 
 import os
@@ -14,25 +14,25 @@ from .block import BLOCK, block_length
 _DIRECTORY = 0x4000  # in the mode of os.stat()
 _ENOSPC = const(28)  # MicroPython's errno does not have it
 PART_BLOCKS = 16  # ride blocks in a part in flash
-_CARD_PART_BLOCKS = const(256)  # ride blocks in a part on a card: a day's ride is 85 files, not 1300
+_CARD_PART_BLOCKS = const(256)  # ride blocks in a part on a card: 85 files for a day's ride, not 1300
 FIRMWARE = 103 * BLOCK  # compiled: each of its files takes whole blocks, each folder two
-RESERVE = 61 * BLOCK  # what an update of compiled firmware needs at most, with some to spare
+RESERVE = 61 * BLOCK  # most that an update of compiled firmware needs, plus a margin
 
 
 def free_bytes(path):
-    """Free bytes of the file system that path is on. Raises OSError."""
+    """The free bytes of path's file system. Raises OSError."""
     space = os.statvfs(path)
     return space[1] * space[3]
 
 
 def all_bytes(path):
-    """Size in bytes of the file system that path is on. Raises OSError."""
+    """The size in bytes of path's file system. Raises OSError."""
     space = os.statvfs(path)
     return space[1] * space[2]
 
 
 def make(path):
-    """Make a directory, unless it exists. Raises OSError, with EEXIST if a file has its name."""
+    """Make a directory unless it exists. Raises OSError, with EEXIST if a file has its name."""
     try:
         os.mkdir(path)
     except OSError as error:
@@ -49,7 +49,7 @@ def _exists(path):
 
 
 def _remove_emptied(path):
-    """Remove a directory if it is empty: the board's owner may have put something into it."""
+    """Remove a directory if it is empty. The board's owner may have put files into it."""
     try:
         os.rmdir(path)
     except OSError:
@@ -57,18 +57,18 @@ def _remove_emptied(path):
 
 
 class RideRing:
-    """The files of the ride that is being recorded, for a Recorder. settings: a Settings.
+    """Writes the files of the current ride for a Recorder. settings: a Settings.
 
     Use: begin(); for each block next_length(), ready() until it is True, write() until the block is whole,
     end_block(); at last end(). stops_interrupts: True if interrupts are off during a write, as they are for flash.
-    needed: bytes that have to be free before a part is begun.  refused: None, or the CardError that begin() raises.
+    needed: bytes that must be free before a part begins.  refused: None, or the CardError that begin() raises.
     """
 
     def __init__(self, settings):
         self._settings = settings
         self.stops_interrupts = settings.SD_SPI is None
         self._part_blocks = PART_BLOCKS if settings.SD_SPI is None else _CARD_PART_BLOCKS
-        self.needed = RESERVE + (self._part_blocks + 2) * BLOCK  # two blocks, because the directories grow as well
+        self.needed = RESERVE + (self._part_blocks + 2) * BLOCK  # two more, because directories grow too
         self._file = None
         self.refused = None
 
@@ -82,15 +82,15 @@ class RideRing:
         self._part = 0
         self._block = 0  # number of the ride block in its part
         self._free = free_bytes(self._directory)
-        # roughly the bytes of the earlier rides: adding up hundreds of files would take too long
+        # an estimate of the earlier rides' bytes: adding up hundreds of files would take too long
         self._others = max(0, all_bytes(self._directory) - self._free - FIRMWARE)
-        self._wrapped = False  # the first parts of this ride itself have been removed
-        self._oldest = None  # the ride whose parts are removed next; None: still to be found
+        self._wrapped = False  # parts at the beginning of this ride were removed
+        self._oldest = None  # the ride whose parts are removed next; None: not found yet
         self._passed = -1  # rides up to this one have no parts left
         return self._ride
 
     def _use(self, ride):
-        """Make the directory of this ride, for the parts to come; of a later one if somebody's file has its name."""
+        """Make the directory for the parts of this ride. If a user's file has its name, use a later ride number."""
         while True:
             self._ride = ride
             self._path = ride_paths.ride_path(self._directory, ride)
@@ -104,17 +104,18 @@ class RideRing:
             ride += 1
 
     def next_length(self):
-        """Length in bytes that the ride's next block has to have. The block before it may not be written yet."""
+        """The required length of the ride's next block in bytes. The previous block may not be written yet."""
         length = block_length(self._block)
         self._block = (self._block + 1) % self._part_blocks
         return length
 
     def room(self):
-        """Bytes that can still be recorded before the beginning of this ride itself is removed."""
+        """The bytes that can be recorded until the beginning of this ride itself is removed."""
         return 0 if self._wrapped else max(0, self._free + self._others - self.needed)
 
     def ready(self):
-        """True if a block can be written now; else take one step of making room and return False. Raises OSError."""
+        """Return True if a block can be written now. Else do one step of making room and return False. Raises
+        OSError."""
         if self._file:
             return True
         if self._free < self.needed:
@@ -122,14 +123,14 @@ class RideRing:
         else:
             path = ride_paths.part_path(self._directory, self._ride, self._part)
             self._part += 1
-            if _exists(path):  # it may be a ride, whatever the listing says
+            if _exists(path):  # it may be a ride, even if the listing does not show it
                 return False
             self._file = open(path, "wb")
             self._left = self._part_blocks
         return False
 
     def _make_room(self):
-        """Take one step: find the oldest ride, remove its first part, or remove its empty directory. Raises OSError."""
+        """Do one step: find the oldest ride, remove its first part, or remove its empty directory. Raises OSError."""
         ride = self._oldest
         if ride is None:
             self._oldest = self._find_oldest()
@@ -152,7 +153,7 @@ class RideRing:
             self._oldest, self._passed = None, ride
 
     def _find_oldest(self):
-        """The number of the oldest ride that may have parts; None if this step has not found it. Raises OSError."""
+        """The number of the oldest ride that may have parts, or None if this step has not found it. Raises OSError."""
         passed, size = self._passed, ride_paths.RIDES_IN_GROUP
         groups = ride_paths.groups(self._directory)
         group = min((group for group in groups if size * (group + 1) - 1 > passed), default=None)
@@ -170,7 +171,7 @@ class RideRing:
             raise OSError(_ENOSPC)
 
     def end_block(self):
-        """End a block and flush the file: from here on a power cut does not lose the block. Raises OSError."""
+        """End a block and flush the file. From now on a power cut does not lose the block. Raises OSError."""
         self._free -= BLOCK
         self._left -= 1
         if self._left:
@@ -179,14 +180,13 @@ class RideRing:
             self.end()
 
     def end(self):
-        """Close the file of the part that is being written. Raises OSError."""
+        """Close the file of the current part. Raises OSError."""
         if self._file:
             file, self._file = self._file, None
             file.close()
 
     def abandon(self):
-        """Close the ride's open file after an error, and ignore an OSError in doing so. Blocks that were ended before
-        are kept."""
+        """Close the ride's open file after an error; ignore an OSError. Completed blocks are kept."""
         try:
             self.end()
         except OSError:

@@ -1,9 +1,9 @@
-"""Records a ride: puts the samples of each pass of the loop into a ride block, and writes full blocks to flash step by
+"""Records a ride: adds the samples of each pass of the loop to a ride block, and writes full blocks to flash step by
 step.
 
-A block takes four seconds or more to fill. Meanwhile the one before is written. In one pass of the loop a page is
-written, a file is flushed, or an old file is removed, so that no pass waits for more than one erase of the flash
-(45 ms). The chip's FIFO keeps the samples that come during that time.
+A block takes four seconds or more to fill. Meanwhile the previous one is written. One pass of the loop writes a page,
+flushes a file, or removes an old file: no pass waits for more than one erase of the flash
+(45 ms). The chip's FIFO keeps the samples during that time.
 """
 
 from time import ticks_diff, ticks_ms
@@ -14,17 +14,17 @@ from ..units import GAP_US, const
 from .block import MAX_DT_US, RideBlock
 
 _PAGE = const(256)  # bytes in a page of the flash, the unit of writing
-_STALL_MS = const(10)  # a write that took longer included an erase of the flash: a page alone takes 1 ms
+_STALL_MS = const(10)  # a longer write included an erase of the flash: a page alone takes 1 ms
 
 
 class Recorder:
-    """keeper: a RideRing (flash or SD card) or a RideStream (USB), which writes the blocks.  sample_hz: the chip's
-    samples a second.
+    """Records rides. keeper: the writer of the blocks, a RideRing (flash or SD card) or a RideStream (USB).  sample_hz:
+    the chip's samples per second.
 
     active: True while a ride is being recorded.
-    problem: None, or a CardError or Notice: why the recording ended by itself; take_problem() clears it.
-    stalled: True if interrupts were off for longer than _STALL_MS, so that GPS bytes or wheel pulses may be lost. The
-    caller informs the speed source (after_stall()) and sets it to False.
+    problem: None, or a CardError or Notice: why the recording stopped; take_problem() clears it.
+    stalled: True if interrupts were off for longer than _STALL_MS: GPS bytes or wheel pulses may be lost. The caller
+    then calls the speed source's after_stall() and sets it to False.
     """
 
     def __init__(self, keeper, sample_hz):
@@ -33,13 +33,13 @@ class Recorder:
         self.problem = None
         self.stalled = False
         self._sample_hz = sample_hz
-        self._block = self._spare = None  # RideBlocks, 8 KB of heap: made by the first start()
+        self._block = self._spare = None  # RideBlocks, 8 KB of heap: created by the first start()
 
     def start(self, chip, calibration):
-        """Begin a ride, and end the one before. chip: an Mpu6050 that runs.  calibration: the Calibration in use.
+        """End the current ride and begin a new one. chip: a running Mpu6050.  calibration: the Calibration in use.
 
-        A replay begins with a new filter. So the caller has to restart the meter's as well, or the replay's lean will
-        differ. Raises nothing: see active and problem."""
+        A replay begins with a new filter. The caller must therefore restart the meter's filter too, or the replay's
+        lean will differ. Raises nothing: see active and problem."""
         self.stop()
         begun_ms = ticks_ms()
         try:
@@ -63,14 +63,14 @@ class Recorder:
         self._sequence = 0
         self._bytes = 0
         self._interrupted = False
-        self._speed = self._place = None  # the last speed since the turn before, in cm/s, and the last position
-        self._waiting = None  # the block that is being written; _at: number of its bytes that are written
+        self._speed = self._place = None  # the last speed (cm/s) and position since the previous turn
+        self._waiting = None  # the block being written; _at: number of bytes already written
         self._at = 0
         self.active = True
         self._begin_block()
 
     def stop(self):
-        """Write all entries that were added, in at most 0.1 s, and end the ride, if there is one."""
+        """End the ride, if there is one. Writes all added entries, in at most 0.1 s."""
         if not self.active:
             return
         if self._block.count:
@@ -95,12 +95,12 @@ class Recorder:
         self._interrupted = True
 
     def add(self, sums, n, dt_us):
-        """Add a turn of the loop. sums: sums of the seven counts of n samples.  dt_us: microseconds since the turn
-        before.
+        """Add a turn of the loop. sums: sums of the seven counts of n samples.  dt_us: microseconds since the previous
+        turn.
 
         Only while active."""
         now_ms = ticks_ms()
-        if self._interrupted:  # a gap makes the replay start its filter again, as the board did
+        if self._interrupted:  # at a gap the replay restarts its filter, as the board did
             self._interrupted = False
             if self._time_us != self._start_us:
                 dt_us = max(GAP_US + 1, min(MAX_DT_US, ticks_diff(now_ms, self._before_ms) * 1000))
@@ -119,15 +119,15 @@ class Recorder:
                 self._begin_block()
 
     def add_fix(self, speed_mps, place):
-        """Keep a speed and a position (see Gps.place(); None if there is no new one) for the turn that is added next.
-        They replace those kept since the turn before."""
+        """Keep a speed and a position (see Gps.place(); None without a new one) for the next turn. They replace those
+        kept since the previous turn."""
         if speed_mps is not None:
             self._speed = int(100 * speed_mps + 0.5)
         if place is not None:
             self._place = place
 
     def tick(self):
-        """Take one step of the writing. Call it once in each turn of the loop while active."""
+        """Do one step of the writing. Call it once per turn of the loop while active."""
         waiting = self._waiting
         if not waiting:
             return
@@ -136,12 +136,12 @@ class Recorder:
         self._note_stall(begun_ms)
 
     def _note_stall(self, begun_ms):
-        """Set stalled if the write that began at begun_ms took so long that it erased flash."""
+        """Set stalled if the write since begun_ms was long enough to include an erase of the flash."""
         if ticks_diff(ticks_ms(), begun_ms) > _STALL_MS and self.keeper.stops_interrupts:
             self.stalled = True
 
     def _write(self, waiting):
-        """Take one step of writing this block."""
+        """Do one step of writing this block."""
         try:
             if not self.keeper.ready():
                 return
@@ -157,11 +157,11 @@ class Recorder:
             self._fail(error)
 
     def seconds(self):
-        """Duration of this recording so far, in seconds."""
+        """The duration of this recording so far, in seconds."""
         return (self._time_us - self._start_us) // 1_000_000
 
     def room_s(self):
-        """Seconds for which there is still room; None if there is no limit."""
+        """The seconds that can still be recorded, or None without a limit."""
         room = self.keeper.room()
         if room is None:
             return None
@@ -177,14 +177,14 @@ class Recorder:
 
     def _end_block(self):
         """Close the full block, to be written by tick()."""
-        while self._waiting and self.active:  # the block before is not yet written: flash was slower than the ride
+        while self._waiting and self.active:  # the previous block is not written yet: flash was slower than the ride
             self.tick()
         self._block.close()
         self._block, self._spare = self._spare, self._block
         self._waiting, self._at = self._spare, 0
 
     def _fail(self, error):
-        """End the ride after an error, which becomes `problem`. Blocks that are not yet written are lost."""
+        """End the ride after an error, which becomes `problem`. Unwritten blocks are lost."""
         self.active = False
         self.keeper.abandon()
         self._end(Notice(self.keeper.fault_code(error), str(error)))

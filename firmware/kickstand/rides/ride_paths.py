@@ -1,7 +1,7 @@
 """The files of rides: part 2 of ride 345 is the file 003/45/00002.rid in the directory of the rides.
 
-To find a name, FAT reads a directory from its beginning. So each directory is kept small: 100 rides make a group, and
-each ride has its own directory. The names have the form 8.3, which takes one directory entry each.
+FAT searches a directory from its beginning, so each directory is kept small: 100 rides form a group, and each ride has
+its own directory. Names in the form 8.3 take one directory entry each.
 """
 
 import os
@@ -16,10 +16,10 @@ _DIRECTORY, _FILE = 0x4000, 0x8000  # types of os.ilistdir()'s entries
 
 
 def directory(settings):
-    """The directory of the rides: in flash, or on the SD card if config.py names one. Raises CardError."""
+    """The directory of the rides: in flash, or on the SD card if one is set in config.py. Raises CardError."""
     if settings.SD_SPI is None:
         return "rides"
-    from ..board import sd_card  # only here, because most boards do not need it
+    from ..board import sd_card  # imported here, because most boards do not need it
 
     return sd_card.mount(settings) + "/rides"
 
@@ -52,15 +52,14 @@ def rides(directory, group):
 
 
 def first_part(ride_directory):
-    """(part, bytes) of the first part in a ride's directory, or None. Raises OSError."""
+    """The first part in a ride's directory as (part, bytes), or None. Raises OSError."""
     return min(_numbers(ride_directory, _PART_DIGITS, _ENDING), default=None)
 
 
 def newest_ride(directory, below=RIDES_IN_ALL):
-    """The number of the newest ride that has a part, of those with a number below this; 0 if there is none. Raises
-    OSError.
+    """The number of the newest ride with a part and a number below this one; 0 without such a ride. Raises OSError.
 
-    A directory without parts does not count: the board's owner may have made it."""
+    A directory without parts does not count: the board's owner may have created it."""
     while True:
         group = max((n for n in groups(directory) if RIDES_IN_GROUP * n < below), default=None)
         if group is None:
@@ -75,9 +74,10 @@ def newest_ride(directory, below=RIDES_IN_ALL):
 
 
 def next_ride(directory):
-    """The number for a new ride: that after the newest. Raises OSError.
+    """The number for a new ride: the newest plus one. Raises OSError.
 
-    A directory may have the last number of all, which no ring reaches. The new ride then comes below it."""
+    A directory may have the largest possible number, which no ring reaches. Then the new ride gets a number below
+    it."""
     below = RIDES_IN_ALL
     while True:
         newest = newest_ride(directory, below)
@@ -87,7 +87,8 @@ def next_ride(directory):
 
 
 def parts(directory):
-    """(ride, part, bytes) of every part, in any order. Takes 5 ms a ride in flash, 20 ms on a card. Raises OSError."""
+    """(ride, part, bytes) of every part, in any order. Takes 5 ms per ride in flash, 20 ms on a card. Raises
+    OSError."""
     for group in groups(directory):
         for ride in rides(directory, group):
             for part, size in _numbers(ride_path(directory, ride), _PART_DIGITS, _ENDING):
@@ -95,8 +96,8 @@ def parts(directory):
 
 
 def _numbers(path, digits, ending=""):
-    """(number, bytes) of each file in path whose name consists of so many digits and the ending; without an ending, of
-    each such directory. Other files are the board owner's and are left alone."""
+    """(number, bytes) of each file in path with a name of this many digits and this ending; without an ending, of each
+    such directory. Other files belong to the board's owner and are ignored."""
     kind = _FILE if ending else _DIRECTORY
     for entry in os.ilistdir(path):
         name = entry[0]

@@ -1,6 +1,6 @@
-"""Writes a ride to the console instead of flash, for `kickstand record`: lines of base64, a '.' after each block.
+"""Writes a ride to the console instead of flash, for `kickstand record`: lines of base64, and a '.' after each block.
 
-A host that sleeps reads nothing, and each print waits half a second for it. The second slow print ends the ride.
+A sleeping computer reads nothing, and each print waits half a second for it. The second slow print ends the ride.
 """
 
 from binascii import b2a_base64
@@ -11,21 +11,21 @@ from ..console import say
 from ..units import const
 
 _LENGTH = const(512)  # bytes in a ride block: half a second
-_SLOW_APART_MS = const(60_000)  # a slow print after a longer time counts as the first one again
+_SLOW_APART_MS = const(60_000)  # a slow print after a longer time counts as the first again
 
 
 class RideStream:
-    """Takes the place of a RideRing: the same methods, for the console."""
+    """Has the same methods as a RideRing, but writes to the console."""
 
     stops_interrupts = False
 
     def begin(self):
-        """Begin a ride; its number is always 0."""
+        """Begin a ride. Its number is always 0."""
         self._slow_ms = None
         return 0
 
     def next_length(self):
-        """Length in bytes that the next block has to have."""
+        """The required length of the next block in bytes."""
         return _LENGTH
 
     def room(self):
@@ -51,10 +51,10 @@ class RideStream:
             raise OSError(ETIMEDOUT)
 
     def end(self):
-        """The ride is over. Nothing to close: there is no file."""
+        """End the ride. There is no file to close."""
 
     def abandon(self):
-        """The ride ends after an error. Nothing to close, where a RideRing closes its file."""
+        """End the ride after an error. There is no file to close."""
 
     def fault_code(self, error):
         return "out-of-memory" if isinstance(error, MemoryError) else "usb-fault"

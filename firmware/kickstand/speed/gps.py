@@ -1,11 +1,12 @@
-"""Speed and position from a GPS receiver: its sentences RMC and VTG (NMEA 0183) on a UART.
+"""Reads speed and position from a GPS receiver: its sentences RMC and VTG (NMEA 0183) on a UART.
 
 >>> gps = Gps(machine.UART(1, 9600, tx=machine.Pin(8), rx=machine.Pin(9), timeout=0))
 >>> speed_mps = gps.poll(now_ms)        # None: no new speed. now_ms: time.ticks_ms()
 >>> place = gps.place(now_ms)           # None: poll(now_ms) has found no new position
 
 A sentence is a line: $, two letters for the satellite system (GP, GL, GN, BD, ...: all are accepted), three letters for
-its kind, fields separated by commas, *, and a checksum of two hexadecimal digits: the exclusive or of all between $
+its kind, fields separated by commas, *, and a checksum of two hexadecimal digits: the exclusive or of all bytes between
+$
 and *.
 """
 
@@ -16,30 +17,31 @@ from ..errors import Notice
 from ..units import const
 
 _MAX_SENTENCE = const(100)  # bytes: the standard says 82, but receivers with many decimals exceed it
-_MAX_CHUNK = const(64)  # bytes read in one pass of the loop: at 10 ms a pass, twice what 10 fixes a second need
-_SILENT_MS = const(3000)  # after so long without a byte, a whole sentence or a fix, fault() reports which
-_LATE_MS = const(2000)  # a fix that waited in the receiver for longer is dropped
-_LOOK_MS = const(1500)  # after so long without a speed's sentence other kinds are looked at
-_CARRY_MS = const(60_000)  # a time that is longer ago is kept as so long ago: after 6 days ticks_diff() is negative
+_MAX_CHUNK = const(64)  # bytes read per pass of the loop: at 10 ms per pass, twice the need of 10 fixes per second
+_SILENT_MS = const(3000)  # fault() reports a byte, sentence or fix that is missing for this long
+_LATE_MS = const(2000)  # a fix is dropped if it waited in the receiver for longer
+_LOOK_MS = const(1500)  # after this long without a speed sentence other kinds are examined
+_CARRY_MS = const(60_000)  # older times are moved up to this age: after 6 days ticks_diff() is negative
 _TIME_JUMP_MS = const(5000)  # a larger difference is not a delay: the receiver has corrected its clock
-# The delay of a fix is counted from a fix that was not late, the reference. When at least so many fixes over more than
-# _TIME_JUMP_MS all came late, the one with the smallest delay becomes the reference: the receiver set its clock back.
+# The delay of a fix is relative to the reference, a fix that was not late. If at least this many fixes over more than
+# _TIME_JUMP_MS were all late, the receiver has set its clock back: the fix with the smallest delay becomes the
+# reference.
 _MIN_FIXES_FOR_NEW_REFERENCE = const(4)
 _KNOT_MPS = const(1852.0 / 3600.0)  # one knot in m/s
 _KMH_MPS = const(1.0 / 3.6)  # one km/h in m/s
 _DAY_MS = 86_401_000  # a day with a leap second
-_YEARS = (25, 79)  # since 2000: before the first a receiver has lost count of the weeks, or not heard the date yet
-_POSITIONS = (b"GGA", b"GLL", b"GNS")  # of the kinds without a speed these are named first
-_UBX = b"\xb5b"  # begins a message of u-blox's binary protocol: class, number and length of two bytes follow
+_YEARS = (25, 79)  # since 2000: an earlier date is a week rollover, or not received yet
+_POSITIONS = (b"GGA", b"GLL", b"GNS")  # of the kinds without a speed these are reported first
+_UBX = b"\xb5b"  # begins a u-blox binary message; class, number and a two-byte length follow
 _UBX_CLASSES = b"\x01\x02\x05\x06\x0a\x0b\x0d\x10\x13\x21\x27\x28"
 _DIGITS = 5  # decimals of a minute of arc: 2 cm
 
 
 class Gps:
-    """uart: a machine.UART with a time-out of 0. After poll() has returned a speed: age_ms, the delay of its sentence
-    relative to the earliest-arriving one."""
+    """A GPS receiver. uart: a machine.UART with a time-out of 0. age_ms: after poll() has returned a speed, the delay
+    of its sentence relative to the earliest-arriving one."""
 
-    problem = None  # always None here, a Wheel uses it: see fault()
+    problem = None  # always None; only a Wheel uses it: see fault()
 
     def __init__(self, uart):
         self._uart = uart
@@ -48,16 +50,16 @@ class Gps:
         self._heard_ms = None
         self._sentence_ms = self._fix_ms = self._carried_ms = 0
         self._rmc_ms = None
-        self._other = b""  # a kind of sentence or message that it sends and that has no speed
+        self._other = b""  # a received kind of sentence or message without a speed
         self._time = b""  # time of day in the last RMC
-        # A fix is remembered as (ticks_ms() when it came, its time of day in ms).
+        # A fix is stored as (ticks_ms() at its arrival, its time of day in ms).
         self._reference = None  # the fix that delays are counted from
         self._earliest = None  # the fix with the smallest delay since the reference was set, and that delay
         self._earliest_delay_ms = 0
-        self._fixes = 0  # fixes with a delay since the reference was set, and when that was
+        self._fixes = 0  # fixes with a delay since the reference was set, and the time of that
         self._since_ms = 0
         self.age_ms = 0
-        self._fix = None  # the fields of the RMC that the last speed came from, None if it came from a VTG
+        self._fix = None  # fields of the RMC with the last speed, None if it was from a VTG
         self._day_ms = 0  # its time of day
         self._place = array("i", (0, 0, 0, 0))
 
@@ -89,7 +91,7 @@ class Gps:
             end = chunk.find(b"\n")
         self._line += chunk
         beyond = len(self._line) - _MAX_SENTENCE
-        if beyond > 0:  # the end of a line was lost: keep what may be the beginning of the next one
+        if beyond > 0:  # the end of a line was lost: keep a possible beginning of the next one
             self._line = self._line[max(beyond, self._line.rfind(b"$")) :]
         return speed
 
@@ -100,7 +102,7 @@ class Gps:
         self._other = b""
 
     def _carry(self, now_ms):
-        """Carry the times on that are longer ago than _CARRY_MS."""
+        """Move times older than _CARRY_MS up to that age."""
         self._carried_ms = now_ms
         oldest_ms = ticks_add(now_ms, -_CARRY_MS)
         for name in ("_heard_ms", "_sentence_ms", "_fix_ms", "_rmc_ms"):
@@ -109,10 +111,10 @@ class Gps:
                 setattr(self, name, oldest_ms)
 
     def place(self, now_ms):
-        """The position of the fix whose speed poll(now_ms) has returned; None if there is none.
+        """The position of the fix whose speed poll(now_ms) has returned, or None.
 
-        An array that the next position overwrites: date, (year since 2000) << 9 | month << 5 | day, or 0 if the
-        receiver does not know it yet; time of day in ms; latitude (north > 0) and longitude (east > 0) in 0.00001
+        It is an array that the next position overwrites: date, (year since 2000) << 9 | month << 5 | day, or 0 if the
+        receiver does not have it yet; time of day in ms; latitude (north > 0) and longitude (east > 0) in 0.00001
         minutes. All are integers: 32-bit floats do not resolve a metre."""
         fields = self._fix
         if fields is None or now_ms != self._fix_ms:
@@ -143,8 +145,8 @@ class Gps:
         return None
 
     def _sentence(self, line, now_ms):
-        """The speed in one line, m/s; None if there is none that can be trusted."""
-        start = line.rfind(b"$")  # there may be noise in front of it
+        """The speed in one line, in m/s, or None without a trustworthy one."""
+        start = line.rfind(b"$")  # noise may precede it
         kind = line[start + 3 : start + 6]
         if start < 0 or kind not in (b"RMC", b"VTG"):
             if start >= 0 and ticks_diff(now_ms, self._sentence_ms) > _LOOK_MS:
@@ -156,7 +158,7 @@ class Gps:
                 return None
             fields = line[start:star].split(b",")
             speed = self._rmc(fields, now_ms) if kind == b"RMC" else self._vtg(fields, now_ms)
-        except (ValueError, IndexError, OverflowError):  # OverflowError: a number such as 1e999
+        except (ValueError, IndexError, OverflowError):  # OverflowError: a number like 1e999
             return None
         self._sentence_ms = now_ms
         self._other = b""
@@ -165,13 +167,13 @@ class Gps:
         return speed
 
     def _look_at(self, line):
-        """Remember the kind of a whole sentence without a speed."""
+        """Store the kind of a whole sentence without a speed."""
         star = line.rfind(b"*")
         try:
             if star < 6 or _checksum(line, 1, star) != int(line[star + 1 : star + 3], 16):
                 return
             name = line[1 : line.find(b",")]
-            kind = name if name[:1] == b"P" else name[2:]  # P: a maker's own, such as PUBX
+            kind = name if name[:1] == b"P" else name[2:]  # P: a manufacturer's own, like PUBX
             kind.decode()
         except ValueError:
             return
@@ -192,7 +194,8 @@ class Gps:
         return speed
 
     def _vtg(self, fields, now_ms):
-        """The speed in the fields of $--VTG,course,T,course,M,knots,N,km/h,K[,mode], unless the receiver sends RMC."""
+        """The speed in the fields of $--VTG,course,T,course,M,knots,N,km/h,K[,mode], or None if the receiver sends
+        RMC."""
         if self._rmc_ms is not None and ticks_diff(now_ms, self._rmc_ms) < _SILENT_MS:
             return None
         if len(fields) > 9 and fields[9] in (b"E", b"N"):
@@ -204,11 +207,11 @@ class Gps:
         return float(fields[7]) * _KMH_MPS if fields[8] == b"K" and fields[7] else None
 
     def _set_age(self, time, now_ms):
-        """Set age_ms and _day_ms by a fix with this time of day, hhmmss.ss, and the reference if this shows a new one;
-        return age_ms.
+        """Set age_ms and _day_ms from a fix's time of day, hhmmss.ss, and the reference if the clock has changed.
+        Return age_ms.
 
-        Clocks do go back: a NEO-6M's by 3 s when it learns of the leap seconds. Raises ValueError if the field is no
-        time of day."""
+        Receivers do set their clocks back: a NEO-6M by 3 s when it receives the leap seconds. Raises ValueError if the
+        field is not a time of day."""
         day_ms = (int(time[0:2]) * 60 + int(time[2:4])) * 60_000 + int(float(time[4:]) * 1000.0 + 0.5)
         if not 0 <= day_ms <= _DAY_MS:
             raise ValueError
@@ -230,8 +233,8 @@ class Gps:
 
 
 def _minutes(field, degrees, negative):
-    """An angle as NMEA writes it, (d)ddmm.mmmm, in 0.00001 minutes; None if it is none, or over `degrees` degrees.
-    Further decimals are cut off."""
+    """Convert an angle in NMEA's form, (d)ddmm.mmmm, to 0.00001 minutes. More decimals are cut off. Return None if it
+    is not an angle, or exceeds `degrees` degrees."""
     whole = part = 0
     digits = -1  # number of decimals so far, -1 before the point
     for byte in field:
@@ -254,7 +257,7 @@ def _minutes(field, degrees, negative):
 
 
 def _date(field):
-    """The date ddmmyy in the form of place(), 0 if there is no such day, or it cannot be today's."""
+    """The date ddmmyy in the form of place(), or 0 if the date does not exist or cannot be today's."""
     try:
         date = int(field)
     except ValueError:
@@ -267,7 +270,7 @@ def _date(field):
 
 
 def _has_ubx(data):
-    """True if a message of u-blox's binary protocol begins in these bytes."""
+    """Return True if a message of u-blox's binary protocol begins in these bytes."""
     at = data.find(_UBX)
     return 0 <= at <= len(data) - 6 and data[at + 2] in _UBX_CLASSES and data[at + 5] < 4
 

@@ -1,4 +1,4 @@
-"""Opens the speed source that config.py names, and refuses speeds that no vehicle can have.
+"""Opens the speed source set in config.py, and rejects speeds that no vehicle can have.
 
 A source is a Gps or a Wheel. Both have poll(now_ms), place(now_ms), after_stall(now_ms), fault(now_ms), problem and
 age_ms.
@@ -14,30 +14,30 @@ from ..units import const
 
 _MAX_MPS = const(100.0)
 _MAX_CHANGE_MPS2 = const(15.0)  # no tyre has more grip
-_NOISE_MPS = const(2.0)  # a speed may jump beyond that by so much
-_GIVE_UP_MS = const(3000)  # after refusing speeds for so long, the last accepted one is taken as wrong
-_RX_BUFFER = const(512)  # bytes, half a second at 9600 baud: the loop may write flash or set up the sensor meanwhile
+_NOISE_MPS = const(2.0)  # a speed may jump beyond that by this much
+_GIVE_UP_MS = const(3000)  # after rejecting speeds for this long, the last accepted one is considered wrong
+_RX_BUFFER = const(512)  # bytes, half a second at 9600 baud, for writing flash or setting up the sensor
 
 
 class Speed:
-    """Plausible speeds. source: a Gps or a Wheel, whose place() belongs to the speed that poll() has found, even if it
-    has refused that. After poll() has returned a speed: age_us, how old it is."""
+    """Reads plausible speeds. source: a Gps or a Wheel. Its place() belongs to the last speed read, even if poll() has
+    rejected it. age_us: after poll() has returned a speed, its age."""
 
     def __init__(self, source):
         self.source = source
-        self._last = None  # the last accepted speed in m/s, and when that was
+        self._last = None  # the last accepted speed in m/s, and its time
         self._last_ms = 0
         self.age_us = 0
 
     def poll(self, now_ms):
-        """Return a new speed in m/s and set age_us, or return None: none has come, or it is refused.
+        """Return a new speed in m/s and set age_us. Return None without a new speed, or if it is rejected.
 
-        A speed outside 0 to _MAX_MPS is refused. So is one that no vehicle could have reached from the last accepted
-        speed, but only for _GIVE_UP_MS. Call it in each turn of the loop. now_ms: ticks_ms()."""
+        A speed outside 0 to _MAX_MPS is rejected. A speed that no vehicle could have reached from the last accepted
+        speed is also rejected, but only for _GIVE_UP_MS. Call this in each turn of the loop. now_ms: ticks_ms()."""
         speed = self.source.poll(now_ms)
         if self._last is not None:
             waited_ms = ticks_diff(now_ms, self._last_ms)
-            if waited_ms >= _GIVE_UP_MS:  # without a new speed too: after 6 days ticks_diff() is negative
+            if waited_ms >= _GIVE_UP_MS:  # also without a new speed: after 6 days ticks_diff() is negative
                 self._last = None
         if speed is None or not 0.0 <= speed <= _MAX_MPS:
             return None
@@ -57,7 +57,8 @@ class Speed:
 
 
 def open_speed(settings):
-    """The Speed of these settings, whose SPEED is not None. Raises SettingsError for pins that cannot be used."""
+    """Open the Speed of these settings. Their SPEED must not be None. Raises SettingsError for pins that cannot be
+    used."""
     if settings.SPEED == "gps":
         from .gps import Gps
 
@@ -69,7 +70,7 @@ def open_speed(settings):
 
 def _open_uart(settings):
     pins = settings.GPS_TX, settings.GPS_RX
-    try:  # nothing is sent, but a UART takes two pins: on rp2 its default is a pin of the sensor
+    try:  # nothing is sent, but a UART takes two pins: rp2's default is a pin of the sensor
         tx, rx = Pin(pins[0]), Pin(pins[1])
         return UART(settings.GPS_UART, settings.GPS_BAUD, tx=tx, rx=rx, rxbuf=_RX_BUFFER, timeout=0)
     except ValueError as error:

@@ -1,8 +1,8 @@
-"""Speed from pulses: a reed contact or Hall switch to ground at a wheel, or a vehicle's speed signal.
+"""Measures speed from pulses: a reed contact or Hall switch to ground at a wheel, or a vehicle's speed signal.
 
-The interrupt only counts pulses and keeps the time of the last one, in integers: a hard interrupt must take no heap. In
-a storm of pulses, as from an ignition cable, it would leave no time for anything else: it turns itself off, and poll()
-turns it on again later.
+The interrupt only counts pulses and stores the time of the last one, in integers: a hard interrupt must take no heap. A
+storm of pulses, for example from an ignition cable, would leave no time for anything else. The interrupt then turns
+itself off, and poll() turns it on again later.
 
 >>> wheel = Wheel(machine.Pin(14, machine.Pin.IN, machine.Pin.PULL_UP), 0.5, {"hard": True})
 >>> speed_mps = wheel.poll(time.ticks_ms())     # None: no new speed
@@ -15,30 +15,30 @@ from machine import Pin
 from ..errors import Notice
 from ..units import const
 
-_MAX_MPS = const(100.0)  # pulses that would mean a higher speed are disturbances
-# a contact that was open for less than this, or than a quarter of the shortest period, is bouncing
+_MAX_MPS = const(100.0)  # pulses that imply a higher speed are disturbances
+# a contact is bouncing if it was open for less than this, or less than a quarter of the shortest period
 _BOUNCE_US = const(3000)
 _STOPPED_MPS = const(0.5)  # a wheel slower than this counts as standing
-MIN_STOP_MS, MAX_STOP_MS = 500, 1800  # limits of the time without a pulse that means standing
-_REPORT_MS = const(100)  # least time between two speeds that poll() returns
+MIN_STOP_MS, MAX_STOP_MS = 500, 1800  # limits of the time without a pulse that counts as standing
+_REPORT_MS = const(100)  # least time between two speeds from poll()
 _STANDING_MS = const(200)  # the same between two speeds of zero
-# So many edges in less than STORM_US are a storm: over 8,000 a second. The interrupt takes 33 us on a Pico, so that at
-# 30,000 a second nothing else would run: for 2 ms before this ends it, less than the time-out of a transfer. 50 pulses
-# a metre at 70 m/s are allowed.
+# This many edges in less than STORM_US are a storm: over 8,000 per second. The interrupt takes 33 us on a Pico, so at
+# 30,000 per second nothing else would run. Such a storm ends after 2 ms, less than the time-out of a transfer. 50
+# pulses per metre at 70 m/s are allowed.
 STORM_EDGES, STORM_US = 64, 8_000
-_STORM_PAUSE_MS = const(5000)  # the interrupt is off for so long after a storm, and again if the storm lasts
+_STORM_PAUSE_MS = const(5000)  # the interrupt is off for this long after a storm, and again if the storm lasts
 _SOFT_PERIOD_US = const(3333)  # at shorter periods soft interrupts, such as an ESP32's, lose over 2 % of the pulses
-# Counts and times wrap at 30 bits. The interrupt subtracts times with this mask and not by ticks_diff(), which would
-# give a negative time after nine minutes of standing.
+# Counts and times wrap at 30 bits. The interrupt subtracts times with this mask, because ticks_diff() would be negative
+# after nine minutes of standing.
 _TICKS = _COUNT = 0x3FFFFFFF
 
 
 class Wheel:
-    """pin: a machine.Pin with pull-up.  pulses_per_metre: pulses per metre of road.  irq: dict of further arguments of
-    Pin.irq().
+    """A speed sensor with pulses. pin: a machine.Pin with pull-up.  pulses_per_metre: pulses per metre of road.  irq:
+    dict of more arguments of Pin.irq().
 
-    After poll() has returned a speed: age_ms, its age.  problem: None, or a Notice to be shown once; the caller that
-    shows it sets it to None.
+    age_ms: after poll() has returned a speed, its age.  problem: None, or a Notice to show once; the caller that shows
+    it sets it to None.
     """
 
     def __init__(self, pin, pulses_per_metre, irq):
@@ -47,7 +47,7 @@ class Wheel:
         self._open_us = min(_BOUNCE_US, shortest_us // 4)
         self._metre_us = 1e6 / pulses_per_metre  # the speed in m/s is this divided by the period in us
         self._stop_ms = min(MAX_STOP_MS, max(MIN_STOP_MS, int(1000.0 / (pulses_per_metre * _STOPPED_MPS))))
-        self.count = 0  # pulses, counted by the interrupt; _pulse_us: when the last one came
+        self.count = 0  # pulses counted by the interrupt; _pulse_us: time of the last one
         self._pulse_us = ticks_us()
         self._opened_us = ticks_us()  # when the contact last opened
         # _seen: the count at the last report; _seen_us: the time of its last pulse, None if no period begins there
@@ -58,20 +58,20 @@ class Wheel:
         self.age_ms = 0
         self._pin = pin
         self._irq = irq
-        self._noisy = False  # there was a storm, and no speed since then
+        self._noisy = False  # there was a storm and no speed since
         self._soft = not irq.get("hard")
-        self._too_quick = None  # True while pulses come too quickly for a soft interrupt; None: never yet
+        self._too_quick = None  # True while pulses are too fast for a soft interrupt; None: not yet
         self.problem = None
         self._listen()
 
     def _listen(self):
         """Turn the interrupt on."""
-        self._off = False  # True after the interrupt has turned itself off; _off_ms: when poll() found that
+        self._off = False  # True after the interrupt has turned itself off; _off_ms: when poll() noticed it
         self._off_ms = None
-        self._edges = STORM_EDGES  # edges to come before the time since _edges_us is compared with STORM_US
+        self._edges = STORM_EDGES  # edges until the time since _edges_us is compared with STORM_US
         self._edges_us = ticks_us()
-        # For soft interrupts: _level: the pin's level at the last one. _same: True if that was the first of two that
-        # found the level unchanged. _usual_us: the usual time from pulse to pulse, 0 if it is not known
+        # For soft interrupts. _level: the pin's level at the last one. _same: True if that was the first of two that
+        # found the level unchanged. _usual_us: the usual time from pulse to pulse, 0 if unknown
         self._level = None
         self._same = False
         self._usual_us = 0
@@ -84,7 +84,7 @@ class Wheel:
             self._edges = STORM_EDGES
             if (now - self._edges_us) & _TICKS < STORM_US:
                 self._off = True
-                pin.irq(None)  # here, because the loop may get no time at all; it takes no heap
+                pin.irq(None)  # here, because the loop may get no time at all; takes no heap
             self._edges_us = now
         if pin.value():
             self._opened_us = now
@@ -93,9 +93,9 @@ class Wheel:
             self.count = (self.count + 1) & _COUNT
 
     def _soft_edge(self, pin):
-        """The handler of soft interrupts, which wait during transfers to sensor or display. If a contact closes and
-        opens meanwhile, two of them find the level unchanged. That is counted as a pulse too, unless it comes so early
-        that the contact is bouncing."""
+        """Handle a soft interrupt, which waits during transfers to sensor or display. If a contact closes and opens
+        meanwhile, two interrupts find the level unchanged. They count as a pulse too, unless they come so early that
+        the contact is bouncing."""
         level = pin.value()
         if level != self._level or self._edges == 1:
             self._level, self._same = level, False
@@ -120,13 +120,13 @@ class Wheel:
         if waited_ms < _REPORT_MS:
             return None
         count, pulse_us = self.count, self._pulse_us
-        while count != self.count:  # a pulse came between the two reads
+        while count != self.count:  # a pulse arrived between the two reads
             count, pulse_us = self.count, self._pulse_us
         pulses = (count - self._seen) & _COUNT
         if pulses:
             return self._pulses(pulses, count, pulse_us, now_ms)
         if self._moved_ms is None or ticks_diff(now_ms, self._moved_ms) < self._stop_ms or waited_ms < _STANDING_MS:
-            if waited_ms > MAX_STOP_MS:  # it never moved; carried on, because after 6 days ticks_diff() is negative
+            if waited_ms > MAX_STOP_MS:  # it never moved; kept young, because after 6 days ticks_diff() is negative
                 self._report_ms = ticks_add(now_ms, -MAX_STOP_MS)
             return None
         self._report_ms = now_ms
@@ -134,11 +134,11 @@ class Wheel:
         self._noisy = False
         self._usual_us = 0
         self._seen_us = None  # the next period begins with the next pulse
-        self.age_ms = self._stop_ms // 2  # the wheel may have stopped, or moved again, at any time since the last pulse
+        self.age_ms = self._stop_ms // 2  # the wheel may have stopped at any time since the last pulse
         return 0.0
 
     def _wait(self, now_ms):
-        """Turn the interrupt on again when _STORM_PAUSE_MS are over. The pulses counted in the storm make no speed."""
+        """Turn the interrupt on again after _STORM_PAUSE_MS. The pulses counted in the storm give no speed."""
         if self._off_ms is None:
             self._off_ms = now_ms
             if not self._noisy:
@@ -150,7 +150,7 @@ class Wheel:
             self._listen()
 
     def _pulses(self, pulses, count, pulse_us, now_ms):
-        """The speed in m/s from so many new pulses, the last of which came at pulse_us."""
+        """The speed in m/s from this many new pulses. pulse_us: the time of the last one."""
         before_us = self._seen_us
         self._seen, self._seen_us = count, pulse_us
         self._report_ms = self._moved_ms = now_ms
@@ -172,14 +172,14 @@ class Wheel:
         """None: a wheel has no position."""
 
     def after_stall(self, now_ms):
-        """Begin the next period with the next pulse, because interrupts were off: pulses may be lost or late."""
+        """Begin the next period with the next pulse, because pulses may be lost or late after interrupts were off."""
         if self._seen_us is not None or self._seen != self.count:
             self._moved_ms = now_ms
         self._seen = self.count
         self._seen_us = None
 
     def fault(self, now_ms):
-        """None, or a Notice if no pulse has ever come: a wire may be loose."""
+        """None, or a Notice if no pulse has ever arrived: a wire may be loose."""
         if self._noisy:
             return Notice("wheel-storm")
         if self._too_quick:

@@ -8,15 +8,15 @@ from . import messages, pages
 from .wizard import ASKING, RESULT, Wizard
 
 _RESULT_MS = const(4000)
-# How long the gyro's bias that the pose on the kickstand has measured stays valid; then it may have drifted
+# How long the gyro's bias from the kickstand pose stays valid; then it may have drifted
 _FRESH_MS = const(90_000)
 _ASK = (("On the stand,", "press button"), ("Now upright:", "hold it, press"))
 _TAKING = ("Stand: hold", "Upright: hold")
 
 
 class AlignWizard(Wizard):
-    """chip, rate_hz, calibration: as for Wizard. side: "left" or "right", to which the kickstand leans the bike.
-    pressed: the rider has already pressed the button for the pose on the kickstand.
+    """chip, rate_hz, calibration: see Wizard. side: "left" or "right", the side to which the kickstand leans the bike.
+    pressed: the rider has already pressed the button for the kickstand pose.
     """
 
     name = "align"
@@ -48,8 +48,8 @@ class AlignWizard(Wizard):
         self._show(ASKING, messages.lines(problem), problem)  # the next press takes the pose again
 
     def _pose_done(self, pose, now_ms):
-        """Keep the first pose; with the second one compute and save the alignment. Raises AlignmentError for poses that
-        do not fit together, GyroError where the gyro does not fit them, StoreError."""
+        """Keep the first pose. After the second one compute and save the alignment. Raises AlignmentError if the poses
+        do not fit together, GyroError if the gyro does not fit them, StoreError."""
         if not self.upright:
             self._kickstand, self._kickstand_ms = pose, now_ms
             self._turn.start(pose.gyro)

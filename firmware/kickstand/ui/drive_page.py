@@ -1,4 +1,4 @@
-"""The page of alignment by driving: its state, its progress, its result."""
+"""The page for alignment by driving: its state, progress and result."""
 
 from ..drive_alignment import alignment
 from . import messages
@@ -13,7 +13,7 @@ _WAITS = {
 
 
 def lines(background, now_ms):
-    """Two lines of 16 characters. background: a BackgroundAlignment, of which this reads drive, state, result and the
+    """Return two lines of 16 characters. background: a BackgroundAlignment. This reads its drive, state, result and the
     fault of its speed."""
     drive = background.drive
     if drive.problem is not None:

@@ -1,6 +1,6 @@
-"""The pages as pictures of 128x64 pixels, for a display that draws: what is read at a glance is large.
+"""The pages as pictures of 128x64 pixels, for a display that draws. The values to read at a glance are large.
 
-page_ring.py takes the picture of a page from here, if it has one: a tuple, see board/display.py. Rows 0 and 1 stay
+page_ring.py takes the picture of a page from here, if there is one: a tuple, see board/display.py. Rows 0 and 1 stay
 blank, because an OLED shifts its picture.
 """
 
@@ -12,7 +12,7 @@ from . import pages
 
 DIGIT_WIDTH, DIGIT_HEIGHT = 24, 40
 _PITCH = 28  # from digit to digit
-_ARC_RADIUS, _ARC_DEG, _ARC_WIDTH = 100, 60, 7  # a degree is a column wide
+_ARC_RADIUS, _ARC_DEG, _ARC_WIDTH = 100, 60, 7  # one degree is one column wide
 _G_PIXELS = 60  # length of the bar for 1 g
 _SMALL_Y = 56  # of the last line, in letters of 8x8
 
@@ -44,7 +44,7 @@ _ARC = bytes(2 + _ARC_RADIUS - int((_ARC_RADIUS**2 - x * x) ** 0.5 + 0.5) for x 
 
 
 def _scale():
-    """The arc without a lean: drawing it anew for each page would take 6 ms."""
+    """The arc without a lean, drawn once: drawing it for each page would take 6 ms."""
     scale = framebuf.FrameBuffer(bytearray(128 * 4), 128, 32, framebuf.MONO_VLSB)
     for x in range(_ARC_DEG + 1):
         for column in (64 + x, 64 - x):
@@ -56,7 +56,7 @@ _SCALE = _scale()
 
 
 def _number(canvas, value, x, y, digits=0):
-    """A number, with at least so many digits; return where it ends."""
+    """Draw a number with at least this many digits; return the column where it ends."""
     for character in "%0*d" % (digits, value):
         canvas.blit(_GLYPHS[ord(character) - 48], x, y)
         x += _PITCH
@@ -64,14 +64,14 @@ def _number(canvas, value, x, y, digits=0):
 
 
 def _triangle(canvas, x, y, direction):
-    """24 columns wide, its point at x. direction: -1 points to the left, 1 to the right."""
+    """Draw an arrow 24 columns wide with its point at x. direction: -1 to the left, 1 to the right."""
     for i in range(24):
         half = i * 14 // 23
         canvas.vline(x - direction * i, y - half, 2 * half + 1, 1)
 
 
 def lean(meter, recording):
-    """The lean with its side, and an arc that ends at 60 degrees."""
+    """Draw the lean with its side, and an arc that ends at 60 degrees."""
     deg = meter.lean_deg
     return _lean, int(abs(deg) + 0.5), pages.side_name(deg), int(deg + (0.5 if deg > 0 else -0.5)), recording
 
@@ -95,7 +95,7 @@ def _lean(canvas, number, side, deg, recording):
 
 
 def unsure(line1, line2):
-    """In place of a lean: dashes, and the reason as dark letters in a bright band."""
+    """Draw dashes instead of a lean, and the reason as dark letters in a bright band."""
     return _unsure, line2
 
 
@@ -103,12 +103,12 @@ def _unsure(canvas, reason):
     for x in (38, 66):
         canvas.fill_rect(x, 18, DIGIT_WIDTH, 8, 1)
     canvas.tall(" " * ((17 - len(reason)) // 2) + reason, 5, True)
-    for y in (39, 56):  # so that the letters do not touch the edge of the band
+    for y in (39, 56):  # keep the letters off the edge of the band
         canvas.hline(0, y, 128, 1)
 
 
 def maxima(meter, recording):
-    """The largest lean to each side."""
+    """Draw the largest lean to each side."""
     return _maxima, int(meter.max_left_deg + 0.5), int(meter.max_right_deg + 0.5)
 
 
@@ -120,7 +120,7 @@ def _maxima(canvas, left, right):
 
 
 def acceleration(meter, recording):
-    """Braking or acceleration in numbers and as a bar, and the peaks of both."""
+    """Draw braking or acceleration as a number and a bar, and the peaks of both."""
     peaks = pages.acceleration(meter)[1]
     forward, most, least = meter.smooth_force[2], meter.max_accel_g, meter.max_brake_g
     return _acceleration, round(100 * forward), round(_G_PIXELS * most), round(_G_PIXELS * least), peaks
@@ -141,5 +141,5 @@ def _acceleration(canvas, hundredths, most, least, peaks):
     canvas.text(peaks, 0, _SMALL_Y, 1)
 
 
-# A page, and what makes its picture of a LeanMeter and whether a ride is being recorded
+# For each page, the function that returns its picture from a LeanMeter and the state of recording
 PICTURES = {pages.lean: lean, pages.maxima: maxima, pages.acceleration: acceleration}

@@ -1,4 +1,4 @@
-"""The menu behind a long press: a short press shows the next entry, a long one chooses it."""
+"""The menu, opened by a long press. A short press shows the next entry, a long one chooses it."""
 
 from time import ticks_add, ticks_diff
 
@@ -10,7 +10,8 @@ _TIMEOUT_MS = const(20_000)
 
 
 class Menu:
-    """entries: (name of at most 15 characters, what to call with now_ms when it is chosen) each."""
+    """entries: one (name, function) per entry. name: at most 15 characters. function: called with now_ms if it is
+    chosen."""
 
     name = "menu"
 

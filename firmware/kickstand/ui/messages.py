@@ -1,4 +1,4 @@
-"""The words of the display for every refusal and fault: two lines of 16 characters, by code (see errors.py)."""
+"""The display's words for every refusal and fault: two lines of 16 characters, by code (see errors.py)."""
 
 DEGREE = "\xdf"  # in the display's character ROM
 
@@ -106,7 +106,7 @@ mount-moved|Mount has moved|Align again
 side-fixed|Side corrected|Set SIDE too
 aligned|Aligned by drive|error about {0:.1f}\xdf
 """
-# In place of the lean, by LeanMeter.suppressed_reason while the alignment is in question, and by LeanMeter.odd
+# Shown instead of the lean: by LeanMeter.suppressed_reason while the alignment is in doubt, and by LeanMeter.odd
 NO_LEAN = {
     "other-side": "side was wrong?",
     "mount-moved": "mount has moved",
@@ -114,9 +114,9 @@ NO_LEAN = {
     "odd-up": "sensor odd: up",
     "odd-pitch": "sensor odd: tilt",
 }
-_OTHER_SETTING = "config.py: wrong|{0}"  # {0}: the setting's name; the console says what is wrong with it
+_OTHER_SETTING = "config.py: wrong|{0}"  # {0}: the setting's name; the console shows its fault
 
 
 def lines(refusal):
-    """Two lines for a Refusal or a Notice, neither padded nor cut. An unknown code is that of a setting."""
+    """The two lines for a Refusal or a Notice, neither padded nor cut. An unknown code belongs to a setting."""
     return tuple(refusal.words(_LINES, _OTHER_SETTING).split("|"))

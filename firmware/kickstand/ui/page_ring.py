@@ -1,4 +1,4 @@
-"""The pages, which a short press turns. A page is a function in pages.py. To add one called load, add
+"""The ring of pages: a short press shows the next one. A page is a function in pages.py. To add one called load, add
 pages.load to MOTORCYCLE or CAR, and a row to the table of pages in firmware/docs/displays.md."""
 
 from ..board.button import SHORT
@@ -11,13 +11,13 @@ CAR = (pages.acceleration, pages.cornering, pages.raw)
 
 
 class PageRing:
-    """The page that is shown, as a view (see screen.py). leans: False for a car. meter, calibration, drive, rides: the
-    LeanMeter, the ActiveCalibration, the BackgroundAlignment or None, and the Recording, all to be read only. align:
-    called for a short press while there is no alignment: it means that the bike is on its kickstand.
+    """The current page, as a view (see screen.py). leans: False for a car. meter, calibration, drive, rides: the
+    LeanMeter, the ActiveCalibration, the BackgroundAlignment or None, and the Recording, all read-only. align(): called
+    for a short press without an alignment. That press means that the bike is on its kickstand.
 
     name: of the page that is shown: the name of its function in pages.py, "drive", "live" or "own". late: True if the
-    next page must not show a lean, because it comes too late. live: a Live, which has a page then, or None. draws: True
-    if the display shows pictures. own: the owner's pages, functions that return two lines each.
+    next page must not show a lean because it would be too old. live: a Live, which then has a page, or None. draws:
+    True if the display shows pictures. own: the owner's pages, functions that return two lines each.
     """
 
     def __init__(self, leans, meter, calibration, drive, rides, align):
@@ -36,16 +36,17 @@ class PageRing:
         self.own = []
 
     def show_own(self, now_ms):
-        """To the first of the owner's pages: before there is an alignment the menu is the way there."""
+        """Go to the first of the owner's pages. The menu calls this, the only way to these pages without an
+        alignment."""
         self._own_at = 0
 
     def first(self):
         """Go back to the first page."""
         self._at = 0
-        self._own_at = None  # index of the owner's page that is shown
+        self._own_at = None  # index of the owner's page on display
 
     def drive(self):
-        """Go to the page of alignment by driving."""
+        """Go to the page for alignment by driving."""
         self._at = len(self._pages) if self._calibration.aligned else 0
 
     def press(self, event, now_ms):
@@ -63,7 +64,7 @@ class PageRing:
 
     @property
     def _driving(self):
-        """True while alignment by driving has a page: the first page until there is an alignment, then the last."""
+        """True while alignment by driving has a page: without an alignment the first page, then the last."""
         return self._drive is not None and self._drive.shown
 
     def _drive_lines(self, now_ms):
@@ -88,7 +89,7 @@ class PageRing:
             return pages.not_aligned(self._meter, now_ms // 1000, "drive and brake")
         more = len(self._pages) + self._driving
         count = more + (self.live is not None) + self._rides.recorder.active
-        if self._at >= count:  # the last page has gone; checked here, so that the other pages keep their places
+        if self._at >= count:  # the last page was removed; checked here, where the other pages keep their places
             self._at = 0
             if self.own:
                 self._own_at = 0
@@ -105,7 +106,7 @@ class PageRing:
 
     @property
     def trusted(self):
-        """True if there is a lean that may be shown."""
+        """True if there is a lean to show."""
         meter = self._meter
         shown = meter.trusted and not meter.fallen and abs(meter.lean_deg) <= FALLEN_DEG
         return shown and self._calibration.aligned and not self.late
@@ -128,7 +129,7 @@ class PageRing:
 
     @property
     def _pictures(self):
-        """The module glance, only for a display that draws. Where it cannot be loaded, lines are shown."""
+        """The module glance, only for a display that draws. If it cannot be loaded, lines are shown."""
         if self.draws and not self._glance_tried:
             self._glance_tried = True
             attempt(self._load)

@@ -1,6 +1,6 @@
-"""What each page says in two lines of 16 characters. A page is a function: meter in, two lines out.
+"""The pages as two lines of 16 characters. A page is a function of the meter that returns two lines.
 
-page_ring.py lists the pages that a short press turns.
+page_ring.py lists the pages in the order of short presses.
 """
 
 from ..rotation import vector
@@ -19,18 +19,18 @@ _bar = bytearray(16)
 
 
 def unsure(reason):
-    """The two lines in place of a lean that is not trusted. reason: its code, or None."""
+    """The two lines instead of a lean that is not trusted. reason: its code, or None."""
     return "Lean  --", messages.NO_LEAN.get(reason, "not sure yet")
 
 
 def lean_bar(lean_deg):
-    """16 character codes: a bar from the middle to the side of the lean. Of the display's own glyphs 0 to 3 have 1 to 4
+    """A bar from the middle to the side of the lean, as 16 character codes. The display's own glyphs 0 to 3 have 1 to 4
     dot columns filled from the left, 4 to 7 from the right."""
     columns = min(5 * _HALF_BAR, int(abs(lean_deg) / _DEG_PER_COLUMN + 0.5))
     right = columns if lean_deg > 0 else 0
     left = columns if lean_deg < 0 else 0
     for cell in range(_HALF_BAR):
-        # the innermost dot column of each side is always on: it marks the middle
+        # the innermost dot column of each side is always on, to mark the middle
         _bar[_HALF_BAR + cell] = _cell(max(1, right) - 5 * cell, 0)
         _bar[_HALF_BAR - 1 - cell] = _cell(max(1, left) - 5 * cell, 4)
     return _bar
@@ -60,13 +60,13 @@ def lean(meter):
 
 
 def recorded(line):
-    """The line with the mark for a recording in its last column."""
-    # by hand: MicroPython's %-15s counts the bytes of a degree sign, which are two
+    """The line with the recording mark in its last column."""
+    # padded by hand: MicroPython's %-15s counts a degree sign as two bytes
     return line + " " * (15 - len(line)) + RECORDING
 
 
 def recording(recorder):
-    """Duration of the recording, and the time that is left before its beginning is erased."""
+    """The duration of the recording, and the time until its beginning is erased."""
     seconds, room_s = recorder.seconds(), recorder.room_s()
     if room_s is None:
         room = "to USB"
@@ -84,7 +84,7 @@ def maxima(meter):
 
 
 def acceleration(meter):
-    """Forward or braking g, and the peaks of both."""
+    """Acceleration or braking in g, and the peaks of both."""
     forward = meter.smooth_force[2]
     word = "Brake" if forward < -0.005 else "Accel"
     return "%s   %5.2f g" % (word, abs(forward)), "pk +%.2f / -%.2f" % (meter.max_accel_g, meter.max_brake_g)
@@ -112,9 +112,9 @@ def raw(meter):
 
 
 def not_aligned(meter, seconds, todo="On stand: press"):
-    """Before alignment: tilt and g in the sensor's own axes, which are not the bike's (Nicolae's figure 3). todo: what
-    to do next; shown in turn with "Not aligned"."""
-    from ..lean.formula import static_lean_deg  # not needed once there is an alignment
+    """Before alignment: tilt and g in the sensor's own axes, which are not the bike's (Nicolae's figure 3). todo: the
+    next step, shown in turn with "Not aligned"."""
+    from ..lean.formula import static_lean_deg  # not needed after an alignment
 
     tilt = static_lean_deg(meter.smooth_force)
     hint = "Not aligned" if seconds % 4 < 2 else todo
@@ -122,9 +122,9 @@ def not_aligned(meter, seconds, todo="On stand: press"):
 
 
 def sensor_info(sensor, lost, meter, seconds):
-    """The chip's name and temperature; below that alternately what is calibrated, the numbers of FIFO overflows and of
-    set-ups of the chip, the number of samples that overflows have lost (lost), and the chip's address. While the sensor
-    has a fault: that, and the addresses that answer on its bus, in turn."""
+    """The chip's name and temperature. The second line shows in turn: the calibrated parts, the numbers of FIFO
+    overflows and of set-ups of the chip, the number of samples lost in overflows (lost), and the chip's address. During
+    a fault of the sensor: the fault, and the addresses that answer on its bus, in turn."""
     if sensor.fault is not None:
         if seconds // 2 % 2 == 0:
             return messages.lines(sensor.fault)

@@ -1,4 +1,4 @@
-"""A stack of views: the one in front is shown on the display and takes presses of the button.
+"""A stack of views. The display shows the front view, which also gets the presses of the button.
 
 A view has lines(now_ms), which returns two lines of 16 characters, or None while it has nothing to show, and
 press(event, now_ms), which returns True if it used the press. Its name tells programs which view it is.
@@ -17,8 +17,8 @@ _NOTICE_MS = const(2000)
 
 
 class NoticeView:
-    """Shows two lines for two seconds. A press ends this early and is passed on to the view below. code: the Notice's,
-    or None."""
+    """Shows two lines for two seconds. A press ends it early and is passed to the view below. code: the Notice's, or
+    None."""
 
     name = "notice"
 
@@ -43,7 +43,7 @@ class NoticeView:
 
 
 class View:
-    """Made of two functions, lines and press."""
+    """A view made of two functions, lines and press."""
 
     def __init__(self, name, lines, press):
         self.name = name
@@ -52,11 +52,11 @@ class View:
 
 
 class Screen:
-    """settings: a Settings. sensor, clock, meter: the Sensor, its SampleClock and the LeanMeter, which it shows.
-    calibration, drive, rides: the ActiveCalibration, the BackgroundAlignment or None, and the Recording, which the menu
-    starts as well.
+    """The views of the device. settings: a Settings. sensor, clock, meter: the Sensor, its SampleClock and the
+    LeanMeter to show. calibration, drive, rides: the ActiveCalibration, the BackgroundAlignment or None, and the
+    Recording, which the menu can also start.
 
-    wizard: the AlignWizard or SixWizard under way, which takes every sample, or None. menu: the open Menu, or None.
+    wizard: the current AlignWizard or SixWizard, which takes every sample, or None. menu: the open Menu, or None.
     pages: the PageRing. front: the view that the display shows.
     """
 
@@ -70,7 +70,7 @@ class Screen:
         self.wizard = None
         self.menu = None
         self._notice = NoticeView()
-        # why there are no readings
+        # the reason for missing readings
         self._fault = View(
             "fault", lambda now_ms: sensor.fault and messages.lines(sensor.fault), lambda event, now_ms: False
         )
@@ -85,13 +85,13 @@ class Screen:
         self.front = self.pages
 
     def lines(self, now_ms):
-        """What the display should show now: two lines and, where it draws, a picture. Call it about every 100 ms."""
+        """The content for the display: two lines and, if it draws, a picture. Call it about every 100 ms."""
         self.front, lines = self._update_front(now_ms)
         return lines
 
     def press(self, event, now_ms):
-        """React to a press. event: SHORT or LONG. A long press that the view in front does not use opens the menu. The
-        modules for it may be missing, or memory too small: the rider gets a notice, and the ride goes on."""
+        """React to a press. event: SHORT or LONG. A long press that the front view does not use opens the menu. If
+        modules for it are missing or memory is short, the rider gets a notice and the ride continues."""
         problem = attempt(self._press, event, now_ms)
         if problem:
             self.notify(problem, now_ms)
@@ -102,17 +102,17 @@ class Screen:
 
     def _press(self, event, now_ms):
         view = self._update_front(now_ms)[0]
-        if view is self._notice:  # the press dismisses the notice, and goes to the view below it,
+        if view is self._notice:  # the press dismisses the notice and is passed to the view below it,
             self._notice.press(event, now_ms)
             view = self._update_front(now_ms)[0]
-            if view is self._question:  # except to a question, which has not been seen yet
+            if view is self._question:  # except to a question, which the rider has not seen yet
                 return
         if not view.press(event, now_ms) and event == LONG:
             self._open_menu(now_ms)
         self._drop_ended()
 
     def _info_lines(self, now_ms):
-        """The chip's name, its temperature and what is calibrated, until a short press."""
+        """Show the chip's name, its temperature and the calibrated parts, until a short press."""
         if not self._info_open:
             return None
         return pages.sensor_info(self._sensor, self._clock.lost, self._meter, now_ms // 1000)
@@ -129,7 +129,7 @@ class Screen:
         return True
 
     def interrupt(self, now_ms):
-        """Cancel a calibration under way, because the sensor has failed, unless the wizard continues in spite of it."""
+        """Cancel the current calibration because the sensor has failed, unless the wizard can continue."""
         if self.wizard and not self.wizard.bears(self._sensor.fault, now_ms):
             self.wizard = None
             self._notice.show(("Calibration", "stopped: fault"), now_ms, "stopped")
@@ -154,12 +154,12 @@ class Screen:
             self.menu = None
 
     def _open_menu(self, now_ms):
-        from .menu import Menu  # with the first long press
+        from .menu import Menu  # imported at the first long press
 
         self.menu = Menu(self._entries(), now_ms)
 
     def _entries(self):
-        """The entries of the menu: (name, what to call with now_ms)."""
+        """The entries of the menu: (name, function to call with now_ms)."""
         align = (("Align the bike", self._align),)
         drive = (("Align by drive", self._align_by_drive),) if self._drive else ()
         rest = (("Six positions", self._six), ("Reset maxima", self._reset), ("Sensor info", self._show_info))
@@ -171,7 +171,7 @@ class Screen:
         return drive + rest + last
 
     def _ready(self, now_ms):
-        """True if there are readings; if not, show a notice that says why."""
+        """Return True if there are readings. If not, show a notice with the reason."""
         fault = self._sensor.fault
         if fault is not None:
             self.notify(fault, now_ms)
@@ -182,11 +182,12 @@ class Screen:
             self._begin_align(False)
 
     def _align_now(self):
-        """Start the AlignWizard as if the button had been pressed for the pose on the kickstand."""
+        """Start the AlignWizard as if the button had been pressed for the kickstand pose."""
         self._begin_align(True)
 
-    # The wizards are imported when they are needed, because with their own imports they take 12 KB of heap. This is
-    # done after a collection: else lasting objects would lie at the far end of the heap and make each later one longer.
+    # The wizards are imported when needed, because with their own imports they take 12 KB of heap. The import follows a
+    # collection: otherwise lasting objects would be placed at the far end of the heap and make each later collection
+    # longer.
 
     def _begin_align(self, pressed):
         gc.collect()

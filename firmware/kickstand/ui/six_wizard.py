@@ -1,6 +1,6 @@
 """Guides the rider through the six positions, each side up once in any order, and a slanted pose that verifies them.
 
-Between the poses the sensor is turned, and that calibrates the gyro: see calibration/sensor_fit.py.
+The turns of the sensor between the poses calibrate the gyro: see calibration/sensor_fit.py.
 """
 
 from ..calibration import six_position
@@ -13,7 +13,7 @@ from .wizard import COMPUTING, NOTICE, RESULT, TAKING, Wizard
 _NOTICE_MS = const(1500)
 _RESULT_MS = const(6000)
 _ROUGH_TILT_DEG = const(30.0)  # largest tilt of a side in uncalibrated readings; the fit has a stricter limit
-_MAX_POSES = const(12)  # six sides, a slanted pose, and those that repeat a turn that could not be used
+_MAX_POSES = const(12)  # six sides, a slanted pose, and repetitions after unusable turns
 
 
 class SixWizard(Wizard):
@@ -25,15 +25,15 @@ class SixWizard(Wizard):
         self._sides = [-1] * 6  # the number of each side's pose, -1 until it is taken
         self._poses, self._turns = [], []  # for SensorFit
         self._bias = [0.0] * 3
-        self._fitted = None  # offset and slope, once all six poses are taken
+        self._fitted = None  # offset and slope, after all six poses
         self._unproved = None  # the axis that needs another turn
         self._work = self._fit = None
-        self._told = False  # that the turn under way cannot be used
+        self._told = False  # the rider knows that the current turn cannot be used
         self._turn.running = False
         self._next_pose()
 
     def _next_pose(self):
-        """Ask for the next pose and wait until the sensor lies still."""
+        """Ask for the next pose and wait until the sensor is still."""
         if self._unproved:
             self._begin_pose("Slant it again,", "another way")
         elif self._fitted:
@@ -51,7 +51,7 @@ class SixWizard(Wizard):
         self._notice(now_ms, *messages.lines(problem))
 
     def _settled(self, accel, now_ms):
-        """Check, after half a second of stillness, that this is a pose that is still missing; else tell the rider."""
+        """Check after half a second of stillness that this pose is still missing. If not, tell the rider."""
         if self._fitted:
             offset, slope = self._fitted
             tilt = six_position.tilt_deg([slope[i] * accel[i] + offset[i] for i in range(3)])
@@ -66,7 +66,7 @@ class SixWizard(Wizard):
             self._side_done(now_ms, "Side %s is done")
 
     def _again(self):
-        """True if a side may be taken again, to turn from there: the turn since the last pose cannot be used."""
+        """True if a side may be repeated as the start of a turn, because the last turn cannot be used."""
         return self._spoilt_turn and len(self._poses) + self._sides.count(-1) + 1 < _MAX_POSES
 
     @property
@@ -75,7 +75,7 @@ class SixWizard(Wizard):
         return self._turn.running and (self._turn.quick or self._turn.lost)
 
     def bears(self, fault, now_ms):
-        """A turn that is too quick for the gyro's range is no defect."""
+        """Return True for readings at the end of the range: a turn too fast for the gyro is not a defect."""
         if fault is None or fault.code != "gyro-clips" or not self._turn.running:
             return False
         self._turn.quick = True
@@ -87,12 +87,12 @@ class SixWizard(Wizard):
             if next(self._work, True):  # a yield gives None, the end gives True
                 self._computed(now_ms)
         elif self._spoilt_turn and not self._told and self.state in (TAKING, NOTICE):
-            self._told = True  # readings at the end of the range do not come, so lost ones count too
+            self._told = True  # readings at the end of the range are dropped, so lost ones count too
             self._notice(now_ms, "Turned too fast:", "turn it slower")
 
     def _pose_done(self, pose, now_ms):
-        """Keep the pose, and the turn to it; after the sixth side fit the accelerometer, after a slanted one the whole
-        sensor. Raises CalibrationError."""
+        """Keep the pose and the turn before it. After the sixth side fit the accelerometer, after the slanted pose the
+        whole sensor. Raises CalibrationError."""
         turn, spoilt = self._turn, self._spoilt_turn
         if self._poses:
             turn.end()
@@ -126,7 +126,7 @@ class SixWizard(Wizard):
         self._show(COMPUTING, ("Computing...", ""))
 
     def _computed(self, now_ms):
-        """Save the result, or ask for another pose where an axis of the gyro was not turned enough. Raises GyroError,
+        """Save the result, or ask for another pose if the sensor did not turn enough about an axis. Raises GyroError,
         StoreError."""
         fit = self._fit
         self._work = self._fit = None

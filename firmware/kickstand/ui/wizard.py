@@ -1,5 +1,5 @@
-"""The base of both wizards: a view that takes poses, one after the other, in one of a few named states. Between two
-poses it integrates the gyro, whose rates must explain how the sensor has turned."""
+"""The base of both wizards: a view that takes one pose after another, with a few named states. Between two poses it
+integrates the gyro's rates, which must match the turn of the sensor."""
 
 from time import ticks_add, ticks_diff
 
@@ -17,14 +17,14 @@ NOTICE = 2  # shows a notice for a moment, then asks for the next pose
 _REFUSED = const(3)  # shows the reason until a press, then starts again
 RESULT = 4  # shows the result for some seconds, then ends
 _ENDED = const(5)
-COMPUTING = 6  # step by step, with each pass of the main loop
+COMPUTING = 6  # one step in each pass of the main loop
 
 
 class Wizard:
     """A view (see screen.py) that also takes each sample, until it has ended.
 
-    chip, rate_hz: as for PoseTaker. calibration: the ActiveCalibration. A subclass says which poses it asks for,
-    what it does with each, and how long each takes if it is not POSE_SECONDS.
+    chip, rate_hz: see PoseTaker. calibration: the ActiveCalibration. A subclass defines which poses it asks for,
+    how it uses each, and how long each takes if not POSE_SECONDS.
 
     state: see above. problem: the Refusal that is shown, or None.
     """
@@ -39,7 +39,7 @@ class Wizard:
 
     @property
     def ended(self):
-        """True once the wizard is over."""
+        """True after the end of the wizard."""
         return self.state == _ENDED
 
     def sample(self, counts, now_ms):
@@ -62,7 +62,7 @@ class Wizard:
             self._refuse(problem)
 
     def follow(self, sums, n, dt_us, now_ms):
-        """Take the sums of the n samples that sample() has just taken, and the microseconds since those before."""
+        """Take the sums of the n samples that sample() has just taken, and the microseconds since the previous ones."""
         self._turn.add(sums, n, dt_us, self.state == TAKING and self._taker.averaging)
         try:
             self._followed(now_ms)
@@ -70,18 +70,18 @@ class Wizard:
             self._refuse(problem)
 
     def bears(self, fault, now_ms):
-        """True if the wizard continues in spite of this fault of the sensor, a Notice; none does here."""
+        """True if the wizard continues despite this fault of the sensor, a Notice. The default is False."""
         return fault is None
 
     def _refuse(self, problem):
-        """Show why, until a press. What is wrong with the gyro is printed, too: it calls for another sensor."""
+        """Show the reason until a press. A fault of the gyro is also printed, because another sensor is needed."""
         if isinstance(problem, GyroError):
             report(problem)
         self._turn.running = False
         self._show(_REFUSED, messages.lines(problem), problem)
 
     def _followed(self, now_ms):
-        """Called with each pass of the main loop. May raise a Refusal, which is shown."""
+        """Called in each pass of the main loop. May raise a Refusal, which is shown."""
 
     def _start(self):
         """Ask for the first pose."""
@@ -93,10 +93,10 @@ class Wizard:
         """Called when the sensor has been still for half a second. accel: the mean reading (3, g)."""
 
     def _progress(self, done, total):
-        """Show that `done` of `total` samples of the pose are taken."""
+        """Show the progress: `done` of `total` samples of the pose."""
 
     def _spoilt(self, problem, now_ms):
-        """Called when the pose was refused. problem: a CaptureError."""
+        """Called when the pose was rejected. problem: a CaptureError."""
 
     def _pose_done(self, pose, now_ms):
         """Called with each complete StillPose. May raise a Refusal, which is shown."""
@@ -119,13 +119,13 @@ class Wizard:
         return True
 
     def _show(self, state, lines, problem=None):
-        """Go into a state and show two lines."""
+        """Enter a state and show two lines."""
         self.problem = problem
         self.state = state
         self._lines = lines
 
     def _show_for(self, ms, state, now_ms, *lines):
-        """Go into NOTICE or RESULT for so long, and show two lines."""
+        """Enter NOTICE or RESULT for the given time, and show two lines."""
         self._until_ms = ticks_add(now_ms, ms)
         self._show(state, lines)
 

@@ -1,4 +1,4 @@
-"""Rides without any noise, of which every figure is known."""
+"""Rides without noise, for which every figure is known."""
 
 from dataclasses import fields
 
@@ -6,7 +6,7 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.analysis.channels import Channels
 
-RATE_HZ = 50.0  # that in which stops are looked for
+RATE_HZ = 50.0  # the rate at which stops are searched
 REST_S = 5.0
 
 
@@ -14,7 +14,7 @@ class Road:
     """A ride made of stretches of constant acceleration, m/s2, on the level and upright unless channels are changed."""
 
     def __init__(self, *legs: tuple[float, float], rate_hz: float = RATE_HZ):
-        """legs: seconds and m/s2. Without acceleration at no speed the vehicle stands."""
+        """legs: seconds and m/s2. At speed 0 without acceleration the vehicle stands."""
         self.t_s = np.arange(0.0, sum(seconds for seconds, _ in legs) - 1e-9, 1.0 / rate_hz)
         ends = np.cumsum([seconds for seconds, _ in legs])
         steps = np.array([mps2 for _, mps2 in legs] + [0.0])
@@ -41,5 +41,5 @@ class Road:
 
 
 def braking(mps: float, mps2: float, before_s: float = 4.0) -> Road:
-    """Standing, up to this speed at 4 m/s2, straight on, and a stop with this deceleration."""
+    """Stand, speed up to this speed at 4 m/s2, ride straight ahead, and stop with this deceleration."""
     return Road((REST_S, 0.0), (mps / 4.0, 4.0), (before_s, 0.0), (mps / mps2, -mps2), (REST_S, 0.0))

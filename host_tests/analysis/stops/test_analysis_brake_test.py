@@ -23,7 +23,7 @@ def course(path: Path) -> Channels:
 
 
 def brakes(plan: Plan) -> Conditions:
-    """Stop after stop, from 29 to 126 km/h with 2 to 9 m/s2, on slopes of up to 3 %."""
+    """Repeated stops from 29 to 126 km/h with 2 to 9 m/s2, on slopes of up to 3 %."""
     plan.begin()
     while plan.going_on:
         speed = plan.uniform(8.0, 35.0)
@@ -36,7 +36,7 @@ def brakes(plan: Plan) -> Conditions:
 
 @pytest.fixture(scope="module")
 def ride(tmp_path_factory) -> tuple[Channels, np.ndarray, np.ndarray]:
-    """Read by an MPU6050 stuck on at random, calibrated by its poses: the course, true times and speeds."""
+    """A ride read by a randomly mounted MPU6050, calibrated by its poses: the course, true times and speeds."""
     directory = tmp_path_factory.mktemp("brakes")
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(profiles.PROFILES, "brakes", brakes)
@@ -50,7 +50,7 @@ def ride(tmp_path_factory) -> tuple[Channels, np.ndarray, np.ndarray]:
 
 
 def with_speed(ride, hz: int, late_s: float, noise_mps: float) -> Channels:
-    """The course with the true speed in it now and then."""
+    """The course with the true speed in some samples."""
     whole, time, speed = ride
     result = whole.part(slice(None))
     result.speed_mps = np.full(len(result.t_s), np.nan)
@@ -90,7 +90,7 @@ LIMITS = {
 
 
 @pytest.mark.parametrize("name", LIMITS)
-def test_with_a_speed(ride, name):
+def test_stops_with_a_speed_match_the_truth(ride, name):
     source, mfdd_limit, speed_limit = LIMITS[name]
     found = find_stops(with_speed(ride, *source))
     assert len(found) == len(true_stops(ride[1], ride[2])) >= 9
@@ -107,8 +107,8 @@ def test_with_a_speed(ride, name):
     assert abs(np.mean(errors)) < 0.5 * mfdd_limit
 
 
-def test_without_a_speed(ride):
-    """Every stop is found, nothing else is; 3 % at worst, 1 % rms."""
+def test_stops_without_a_speed_match_the_truth(ride):
+    """Exactly the true stops are found; errors are at most 3 %, 1 % rms."""
     whole = ride[0]
     found = find_stops(whole)
     assert len(found) == len(true_stops(ride[1], ride[2]))
@@ -120,8 +120,8 @@ def test_without_a_speed(ride):
     assert np.sqrt(np.mean(np.square(errors))) < 1.2
 
 
-def test_the_definition():
-    """Constant deceleration gives just that; before 0.8 v0 and after 0.1 v0 nothing counts."""
+def test_mfdd_follows_its_definition():
+    """Constant deceleration gives the same value. Before 0.8 v0 and after 0.1 v0 nothing counts."""
     v = np.linspace(20.0, 0.0, 2001)
     assert mfdd_mps2(v, (20.0**2 - v * v) / (2 * 5.0)) == pytest.approx(5.0, rel=1e-9)
     # 3 m/s2 down to 0.8 v0, then 8 and 5, then 3 again
@@ -134,8 +134,8 @@ def test_the_definition():
     assert mfdd_mps2(np.array([9.0, 0.0]), np.zeros(2)) == float("inf")  # from one sample to the next
 
 
-def test_slowing_down_is_no_stop(ride):
-    """Cut out of the ride before it stands."""
+def test_slowing_down_is_not_a_stop(ride):
+    """The part of the ride before the standstill."""
     whole, time, speed = ride
     first = true_stops(time, speed)[0]
     part = with_speed(ride, *PERFECT_1HZ).part(whole.t_s < first - 0.5)
@@ -143,6 +143,6 @@ def test_slowing_down_is_no_stop(ride):
     assert find_stops(whole.part(whole.t_s < first - 0.5)) == []
 
 
-def test_the_shortest_of_rides(ride):
+def test_shortest_ride_has_no_stops(ride):
     for n in 1, 2, 5, 40:
         assert find_stops(ride[0].part(slice(0, n))) == []

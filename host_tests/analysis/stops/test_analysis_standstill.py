@@ -1,4 +1,4 @@
-"""Without a speed in the log, a standstill has to be proven and a stop plausible: on a fast, smooth track."""
+"""Without a speed in the log, a standstill must be proven and a stop plausible: on a fast, smooth track."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from kickstand_tools.simulation.files import simulate
 
 @pytest.fixture(scope="module", params=[1, pytest.param(2, marks=pytest.mark.nightly)])
 def track(tmp_path_factory, request) -> Channels:
-    """Without a speed, as an MPU6050 reads it: smooth, fast, with held turns and one stop, the last of it."""
+    """A ride without a speed, read by an MPU6050: smooth, fast, with held turns and one stop at the end."""
     directory = tmp_path_factory.mktemp("track")
     made = simulate("track", request.param, directory, seconds=200.0)
     pair = directory / "KICKSTAND.csv", directory / "UPRIGHT.csv"
@@ -30,7 +30,7 @@ def without_speed(whole: Channels) -> Channels:
     return result
 
 
-def test_a_fast_smooth_track_is_no_standstill(track):
+def test_fast_smooth_track_is_not_a_standstill(track):
     """Not even with a sensor that had no six positions: its weight at rest is known from the ride."""
     still = standing(without_speed(track))
     assert np.max(track.speed_mps[still]) < 0.5
@@ -41,8 +41,8 @@ def test_a_fast_smooth_track_is_no_standstill(track):
     assert stop.initial_speed_mps == pytest.approx(true.initial_speed_mps, rel=0.03)
 
 
-def test_what_was_integrated_to_a_standstill_that_was_none_is_not_shown(track, monkeypatch):
-    """Rests made up on the fast straights after hard braking."""
+def test_stop_at_a_false_standstill_is_not_shown(track, monkeypatch):
+    """False rests are inserted on fast straights after hard braking."""
     braked = (track.shown_g < -0.4) & (track.speed_mps > 20.0)
     ends = np.flatnonzero(braked[:-1] & ~braked[1:])
     made_up = np.zeros(len(braked), dtype=bool)
@@ -59,7 +59,7 @@ def test_what_was_integrated_to_a_standstill_that_was_none_is_not_shown(track, m
 @pytest.mark.parametrize(
     ("mps", "side_m", "heading_deg"), [(80.0, 0.0, 0.0), (20.0, -20.0, 0.0), (20.0, 20.0, 0.0), (20.0, 0.0, -40.0)]
 )
-def test_a_bend_or_a_speed_beyond_the_vehicles_is_no_stop(mps, side_m, heading_deg):
-    """Where only integrated readings show it: 288 km/h, 20 m beside the line, a heading that changes by 40 degrees."""
+def test_implausible_bend_or_speed_is_not_a_stop(mps, side_m, heading_deg):
+    """If only integrated readings show it: 288 km/h, 20 m beside the line, a heading that changes by 40 degrees."""
     assert brake_test.plausible(60.0, 10.0, 20.0)
     assert not brake_test.plausible(mps, side_m, heading_deg)

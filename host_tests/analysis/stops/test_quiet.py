@@ -1,4 +1,4 @@
-"""A standstill seen by how little the vehicle shakes: each condition on its own, a little to either side of its limit.
+"""Standstill by small shaking: each condition alone, slightly on both sides of its limit.
 
 Ten seconds of riding, four of what may be a standstill, ten of riding; no speed in the log.
 """
@@ -15,7 +15,8 @@ ROAD_HZ, ENGINE_HZ = RATE_HZ / 11.0, 3.0 * RATE_HZ / 7.0
 
 
 def maybe(**changed: float) -> Channels:
-    """NAME=share: how much of its riding the channel shakes in the middle, 5 % if not said. Other words: below."""
+    """NAME=share: shaking of a channel in the middle as a share of that while riding, 5 % by default. Other keywords:
+    below."""
     road = Road((24.0, 0.0))
     road.rests[:] = False
     ride = road.channels()
@@ -41,7 +42,7 @@ def maybe(**changed: float) -> Channels:
 
 
 def share(ride: Channels) -> float:
-    """How much of the middle is a standstill; of the rest nothing may be."""
+    """The share of the middle that is a standstill. The rest must not be."""
     still = standing(ride)
     t = ride.t_s
     assert not still[(t < 5.0) | (t > END_S + 0.5)].any()
@@ -69,14 +70,14 @@ def share(ride: Channels) -> float:
         ({"heavier": 0.055, "rested": 1.1}, {"heavier": 0.045, "rested": 1.1}),
     ],
 )
-def test_each_condition(stands, does_not):
+def test_each_condition_of_a_standstill_has_its_limit(stands, does_not):
     assert share(maybe(**stands)) == 1.0
     assert share(maybe(**does_not)) < 0.2
 
 
 @pytest.mark.parametrize("ridden_s", [(0.0, 24.0), (8.0, 15.0)])
-def test_it_begins_and_ends_within_half_a_second(ridden_s):
-    """Also where it is the greater part of the ride."""
+def test_standstill_is_found_within_half_a_second(ridden_s):
+    """Also if it is the larger part of the ride."""
     ride = maybe()
     ride = ride.part((ride.t_s >= ridden_s[0]) & (ride.t_s < ridden_s[1]))
     times = ride.t_s[standing(ride)]
@@ -85,7 +86,7 @@ def test_it_begins_and_ends_within_half_a_second(ridden_s):
 
 
 @pytest.mark.parametrize(("seconds", "stands"), [(0.7, False), (2.0, True)])
-def test_a_second_of_quiet_is_needed(seconds, stands):
+def test_standstill_needs_a_second_of_quiet(seconds, stands):
     quiet, ridden = maybe(), maybe(pitch_rate_dps=1.0, yaw_rate_dps=1.0, up_g=1.0)
     there = (quiet.t_s >= BEGIN_S) & (quiet.t_s < BEGIN_S + seconds)
     for name in SHAKEN:
@@ -93,8 +94,9 @@ def test_a_second_of_quiet_is_needed(seconds, stands):
     assert standing(ridden).any() == stands
 
 
-def test_a_rest_of_the_filter_goes_back_to_where_the_force_became_that_of_the_rest():
-    """On a road without any shaking: braked to 12 s, a fork that comes up for 0.3 s, and a rest seen from 13.5 s on."""
+def test_rest_of_the_filter_is_extended_back():
+    """On a road without shaking: braking until 12 s, a fork that rebounds for 0.3 s, and a rest found from 13.5 s
+    on."""
     road = Road((8.0, 0.0), (4.0, -4.0), (4.0, 0.0))
     ride = road.channels(resting=(road.t_s >= 13.5).astype(float))
     ride.forward_g += 0.03
@@ -108,7 +110,7 @@ def test_a_rest_of_the_filter_goes_back_to_where_the_force_became_that_of_the_re
     assert ride.t_s[standing(ride)][0] == pytest.approx(12.9, abs=0.07)
 
 
-def test_a_rest_from_the_beginning_on():
+def test_rest_from_the_beginning_is_found():
     road = Road((4.0, 0.0), (4.0, 3.0))
     ride = road.channels(resting=((road.t_s >= 2.0) & (road.t_s < 4.0)).astype(float))
     still = standing(ride)

@@ -1,4 +1,5 @@
-"""The speed of a log, fitted to the measured force: against the same estimate made in another way, and its delay."""
+"""The speed of a log, fitted to the measured force: compared with the same estimate computed differently, and its
+delay."""
 
 import numpy as np
 import pytest
@@ -10,14 +11,14 @@ BEGIN_S, STOP_S = 14.0, 18.0  # of the braking
 
 
 def part_of(road: Road, every: int, scale=1.0, off_mps=0.0, late_s=0.0):
-    """The ride up to 2.5 s of rest, with a speed at every so many samples: that of so much earlier, and wrong."""
+    """The ride up to 2.5 s of rest, with a speed every `every` samples: late by late_s, and wrong."""
     ride = road.channels()
     ride.speed_mps[::every] = scale * np.interp(ride.t_s[::every] - late_s, road.t_s, road.mps) + off_mps
     return ride.part(ride.t_s < STOP_S + 2.5)
 
 
 def conditioned(part, speed, acceleration, delay_s):
-    """The estimate as the mean of a normal distribution, given what was measured.
+    """The estimate as the mean of a normal distribution, conditioned on the measurements.
 
     Before any speed is known: the scale is off by 1 %, the log's delay by 0.05 s, and the slope of the force by
     0.05 m/s2 at the end of the part, from where it walks by 0.1 m/s2 per root second backwards, straight on between
@@ -59,7 +60,7 @@ def conditioned(part, speed, acceleration, delay_s):
     ],
 )
 @pytest.mark.parametrize("delay_s", [0.0, 0.4])
-def test_the_fit_is_the_mean_of_what_can_be(wrong, delay_s):
+def test_fit_is_the_conditional_mean(wrong, delay_s):
     part = part_of(braking(20.0, 5.0), **wrong)
     acceleration = STANDARD_GRAVITY * part.forward_g
     integrated = np.concatenate(([0.0], np.cumsum((acceleration[1:] + acceleration[:-1]) / 2.0 / RATE_HZ)))
@@ -72,7 +73,7 @@ def test_the_fit_is_the_mean_of_what_can_be(wrong, delay_s):
     assert np.max(np.abs(fitted[shown] - integrated[shown])) > 0.01 or wrong == {"every": 50}
 
 
-def test_one_speed_is_not_enough_nor_are_those_before_the_braking():
+def test_fit_needs_several_speeds_during_braking():
     part = part_of(braking(20.0, 5.0), 50)
     acceleration = STANDARD_GRAVITY * part.forward_g
     begin = int(np.searchsorted(part.t_s, BEGIN_S))
@@ -90,7 +91,7 @@ def test_one_speed_is_not_enough_nor_are_those_before_the_braking():
 
 
 def waves(seconds=60.0, late_s=0.0, size_mps2=1.5, every_s=1.0, period_s=5.0):
-    """Faster and slower, with a speed as late as this."""
+    """Alternately faster and slower, with a speed delayed by late_s."""
     road = Road((seconds, 0.0))
     t, omega = road.t_s, 2.0 * np.pi / period_s
     ride = road.channels(forward_g=size_mps2 * np.cos(omega * t) / STANDARD_GRAVITY)
@@ -101,12 +102,12 @@ def waves(seconds=60.0, late_s=0.0, size_mps2=1.5, every_s=1.0, period_s=5.0):
 
 @pytest.mark.parametrize("late_s", [-0.4, 0.0, 0.1, 0.42, 1.0, 1.43])
 @pytest.mark.parametrize("every_s", [0.2, 1.0])
-def test_how_late_a_speed_is(late_s, every_s):
+def test_delay_of_the_speed_is_found(late_s, every_s):
     assert speed_delay_s(waves(300.0, late_s, every_s=every_s)) == pytest.approx(late_s, abs=0.005)
 
 
 @pytest.mark.parametrize("late_s", [-0.7, 1.7])
-def test_a_speed_that_is_later_than_any_receivers_shows_no_delay(late_s):
+def test_impossible_delay_of_the_speed_is_ignored(late_s):
     assert speed_delay_s(waves(late_s=late_s)) == 0.0
 
 
@@ -118,7 +119,7 @@ def test_a_speed_that_is_later_than_any_receivers_shows_no_delay(late_s):
         ({"size_mps2": 0.80}, {"size_mps2": 0.70}),  # that change by 0.5 m/s rms: 0.66 of the acceleration's size
     ],
 )
-def test_what_it_takes_to_show_a_delay(shows, does_not):
+def test_delay_needs_enough_changing_speeds(shows, does_not):
     assert speed_delay_s(waves(late_s=0.4, **shows)) == pytest.approx(0.4, abs=0.02)
     assert speed_delay_s(waves(late_s=0.4, **does_not)) == 0.0
 

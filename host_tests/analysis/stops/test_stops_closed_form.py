@@ -1,6 +1,6 @@
-"""Stops without any noise, against their closed form: what counts as a stop, and each figure of it.
+"""Stops without noise, compared with their closed form: the definition of a stop, and each of its figures.
 
-Nothing shakes, so a standstill is where the lean filter says that the vehicle rests, or where the log's speed is 0.
+Nothing shakes, so a standstill is where the lean filter finds rest, or where the log's speed is 0.
 """
 
 import numpy as np
@@ -22,7 +22,7 @@ from roads import RATE_HZ, REST_S, Road, braking
         (30.0, 31.5, False),  # 30 m/s2
     ],
 )
-def test_what_counts_as_a_stop(mps, mps2, counts):
+def test_limits_of_a_stop(mps, mps2, counts):
     found = find_stops(braking(mps, mps2).channels())
     assert len(found) == counts
     if counts:
@@ -31,8 +31,8 @@ def test_what_counts_as_a_stop(mps, mps2, counts):
 
 
 @pytest.mark.parametrize("speed", ["log", "integrated"])
-def test_every_figure_of_a_stop(speed):
-    """20 m/s at 5 m/s2: 4 s and 40 m, straight on."""
+def test_every_figure_of_a_stop_is_right(speed):
+    """20 m/s at 5 m/s2: 4 s and 40 m, straight ahead."""
     road = braking(20.0, 5.0)
     ride = road.channels()
     if speed == "log":
@@ -51,8 +51,8 @@ def test_every_figure_of_a_stop(speed):
     assert stop.side_m == stop.heading_deg == 0.0
 
 
-def test_the_end_is_hidden_by_the_forks_rebound():
-    """From a fiftieth of the speed on the vehicle is taken to stop evenly: here the sensor is thrown back and forth.
+def test_rebound_of_the_fork_does_not_change_the_end():
+    """Below a fiftieth of the speed an even stop is assumed, because there the sensor is thrown back and forth.
 
     60 m/s at 5 m/s2: 12 s and 360 m.
     """
@@ -90,8 +90,8 @@ def test_jerk_is_the_steepest_change_of_the_force():
         (0.27, 1.4, 4.08),
     ],
 )
-def test_where_braking_begins(engine_mps2, mps2, earlier_s):
-    """After 4 s of braking with the engine alone."""
+def test_start_of_braking_is_found(engine_mps2, mps2, earlier_s):
+    """After 4 s of braking only with the engine."""
     mps = 18.0
     seconds = (mps - 4.0 * engine_mps2) / mps2
     road = Road((REST_S, 0.0), (6.0, 3.0), (3.0, 0.0), (4.0, -engine_mps2), (seconds, -mps2), (REST_S, 0.0))
@@ -100,8 +100,8 @@ def test_where_braking_begins(engine_mps2, mps2, earlier_s):
 
 
 @pytest.mark.parametrize(("pause_s", "counts"), [(0.26, True), (0.56, False)])
-def test_a_pause_just_before_the_standstill(pause_s, counts):
-    """Short, the stop goes on; longer, it ends there, and what follows is too slow to count."""
+def test_brief_pause_before_the_standstill_is_bridged(pause_s, counts):
+    """After a short pause the stop continues. A longer one ends it, and the rest is too slow to count."""
     road = Road(*((REST_S, 0.0), (5.0, 4.0), (3.0, 0.0), (3.9, -5.0), (pause_s, 0.0), (0.1, -5.0), (REST_S, 0.0)))
     found = find_stops(road.channels())
     assert len(found) == counts
@@ -110,13 +110,13 @@ def test_a_pause_just_before_the_standstill(pause_s, counts):
 
 
 def test_no_stop_is_longer_than_a_minute():
-    """67.6 m/s at 1.04 m/s2 take 65 s, of which the last 60 are looked at."""
+    """67.6 m/s at 1.04 m/s2 take 65 s, of which the last 60 are used."""
     (stop,) = find_stops(braking(67.6, 1.04).channels())
     assert stop.initial_speed_mps == pytest.approx(1.04 * 60.0, rel=0.005)
 
 
 @pytest.mark.parametrize(("missing_s", "initial_mps"), [(0.46, 20.0), (0.56, 12.2)])
-def test_readings_that_are_missing(missing_s, initial_mps):
+def test_missing_readings_are_bridged_for_half_a_second(missing_s, initial_mps):
     """Up to half a second is bridged. After a longer gap the stop begins: 14 + 1 s and the gap after the start."""
     road = braking(20.0, 5.0)
     there = (road.t_s < 15.001) | (road.t_s > 15.0 + missing_s - 1e-6)
@@ -124,7 +124,7 @@ def test_readings_that_are_missing(missing_s, initial_mps):
     assert stop.initial_speed_mps == pytest.approx(initial_mps, rel=0.01)
 
 
-def test_after_a_gap_only_what_is_whole_is_integrated():
+def test_only_readings_after_the_last_gap_are_integrated():
     """Two gaps: the last one counts."""
     road = braking(20.0, 2.0)
     there = ~((road.t_s > 14.5) & (road.t_s < 15.4)) & ~((road.t_s > 17.0) & (road.t_s < 17.9))
@@ -133,7 +133,7 @@ def test_after_a_gap_only_what_is_whole_is_integrated():
 
 
 class TestStandstill:
-    """What the rest after the stop shows: the slope, and what the gyro reads at rest."""
+    """The rest after the stop shows the slope and the gyro's reading at rest."""
 
     def disturbed(self, begin_s: float, end_s: float, off_g: float = 0.1) -> float:
         """Deceleration found where the force is off from begin_s to end_s after the standstill at 18 s."""
@@ -143,16 +143,16 @@ class TestStandstill:
         (stop,) = find_stops(ride)
         return stop.mfdd_mps2
 
-    def test_its_first_half_second_and_what_comes_after_two_and_a_half_count_for_nothing(self):
+    def test_slope_is_from_0_5_to_2_5_seconds_after_the_stop(self):
         right = self.disturbed(9.0, 9.0)
         assert right == pytest.approx(5.0, rel=0.002)
         assert self.disturbed(2.56, 4.0) == pytest.approx(right, rel=1e-4)
-        # in between it is taken for the slope: 0.1 g for 1 of 2 s, 0.49 m/s2
+        # in between it counts as slope: 0.1 g for 1 of 2 s, 0.49 m/s2
         assert self.disturbed(0.5, 1.5) == pytest.approx(right + 0.49, rel=0.02)
         assert self.disturbed(1.5, 2.5) == pytest.approx(right + 0.49, rel=0.02)
 
-    def test_the_forks_rebound_is_none_of_the_slope(self):
-        """Zero in the mean, so that it changes no speed, but only in the first half second."""
+    def test_rebound_of_the_fork_is_not_part_of_the_slope(self):
+        """Its mean is zero, so it changes no speed, and it is only in the first half second."""
         road = braking(20.0, 5.0)
         ride = road.channels()
         after = road.t_s - 18.0
@@ -160,7 +160,7 @@ class TestStandstill:
         (stop,) = find_stops(ride)
         assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.004)
 
-    def test_what_the_gyro_reads_at_rest_is_its_bias(self):
+    def test_reading_of_the_gyro_at_rest_is_its_bias(self):
         road = braking(20.0, 5.0)
         ride = road.channels(pitch_rate_dps=np.full(len(road.t_s), 1.5), yaw_rate_dps=np.full(len(road.t_s), -2.5))
         (stop,) = find_stops(ride)
@@ -170,7 +170,7 @@ class TestStandstill:
 
 
 @pytest.mark.parametrize("up", [-0.33, 0.33])
-def test_on_a_steep_road(up):
+def test_steep_road_does_not_change_the_figures(up):
     """The sine of 19 degrees, as in the steepest streets: the force at standstill shows it."""
     road = braking(20.0, 5.0)
     (stop,) = find_stops(road.channels(forward_g=road.mps2 / STANDARD_GRAVITY + up))
@@ -178,7 +178,7 @@ def test_on_a_steep_road(up):
 
 
 @pytest.mark.parametrize(("samples", "counts"), [(10, 0), (11, 1)])
-def test_a_standstill_of_a_fifth_of_a_second_shows_no_slope(samples, counts):
+def test_brief_standstill_shows_no_slope(samples, counts):
     """A longer one shows that of a road that falls by 10 %."""
     road = braking(20.0, 5.0)
     still = (road.t_s >= 18.0 - 1e-6) & (road.t_s < 18.0 + samples / RATE_HZ - 1e-6)
@@ -186,7 +186,7 @@ def test_a_standstill_of_a_fifth_of_a_second_shows_no_slope(samples, counts):
     assert [stop.mfdd_mps2 for stop in found] == pytest.approx([5.0 - 2.5 / 11] * counts, rel=0.002)  # its first brakes
 
 
-def test_a_dive_is_no_braking():
+def test_dive_is_not_braking():
     """The nose is 4 degrees down while the bike brakes: the sensor feels its weight along the bike, which is no
     deceleration. Going down at 10 deg/s where braking begins, a sensor 0.65 m above the hubs is 0.11 m/s faster than
     the bike."""
@@ -202,7 +202,7 @@ def test_a_dive_is_no_braking():
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_a_bend_is_no_dive(side):
+def test_bend_is_not_a_dive(side):
     """Braking in a bend at 30 degrees of lean: turned about the vertical by 8 deg/s for 2 s, the gyro reads a rate of
     pitch, but the nose stays level."""
     road = braking(20.0, 5.0)
@@ -218,7 +218,7 @@ def test_a_bend_is_no_dive(side):
     assert np.sign(stop.side_m) == -side
 
 
-def test_how_far_off_the_straight_line():
+def test_deviation_from_the_straight_line_is_right():
     """0.5 deg/s to the left over the 4 s: the integral of (20 - 5 t) sin(0.5 deg/s t), with t from braking's begin."""
     road = braking(20.0, 5.0)
     ride = road.channels(yaw_rate_dps=np.where((road.t_s >= 14.0) & (road.t_s < 18.0), 0.5, 0.0))
@@ -232,8 +232,8 @@ def test_how_far_off_the_straight_line():
     assert len(find_stops(ride)) == 1
 
 
-def test_each_stop_begins_after_the_standstill_before():
-    """Its initial speed and start are its own, in whatever order of hardness."""
+def test_each_stop_begins_after_the_previous_standstill():
+    """Its initial speed and start are its own, for any order of hard and soft stops."""
     legs = []
     for mps, mps2 in (20.0, 6.0), (12.0, 3.0), (25.0, 8.0):
         legs += [(3.0, 0.0), (mps / 4.0, 4.0), (3.0, 0.0), (mps / mps2, -mps2), (3.0, 0.0)]
@@ -243,7 +243,7 @@ def test_each_stop_begins_after_the_standstill_before():
 
 
 @pytest.mark.parametrize(("off_g", "counts"), [(0.11, True), (0.15, False)])
-def test_a_speed_that_does_not_close(off_g, counts):
+def test_stop_with_an_open_speed_is_rejected(off_g, counts):
     """0.15 g too much for 8.8 s of riding on would be 13 m/s at the standstill before: over 3 + 0.7 m/s a s."""
     road = braking(20.0, 5.0, before_s=4.0)
     ride = road.channels()
@@ -252,11 +252,11 @@ def test_a_speed_that_does_not_close(off_g, counts):
     assert closes(40.0, seconds=40.0) and not closes(40.0, seconds=20.0)  # after long, a speed shows nothing
 
 
-def test_a_vehicle_that_rolls_out_has_not_braked():
+def test_rolling_out_is_not_braking():
     assert find_stops(braking(10.0, 0.4).channels()) == []
 
 
-def test_a_speed_in_the_log_has_the_last_word():
+def test_speed_in_the_log_corrects_the_integral():
     """The accelerometer's slope is 3 % too large: the log's speed corrects it."""
     road = braking(20.0, 5.0)
     ride = road.channels(forward_g=1.03 * road.mps2 / STANDARD_GRAVITY)
@@ -269,8 +269,8 @@ def test_a_speed_in_the_log_has_the_last_word():
 
 
 @pytest.mark.parametrize(("mps2", "counts"), [(1.45, False), (1.55, True)])
-def test_a_stop_that_the_speed_alone_shows(mps2, counts):
-    """Surely one, from 1.5 m/s2, and from over 10 km/h."""
+def test_hard_stop_is_shown_by_the_speed_alone(mps2, counts):
+    """It is surely a stop from 1.5 m/s2 and over 10 km/h."""
     road = braking(20.0, mps2)
     ride = road.channels()
     ride.speed_mps[::50] = road.mps[::50]
@@ -284,7 +284,7 @@ def test_a_stop_that_the_speed_alone_shows(mps2, counts):
 @pytest.mark.parametrize(
     ("hard", "easy", "counts"), [((4.0, -4.0), (8.0, -0.5), True), ((4.0, -9.0), (16.0, -0.25), False)]
 )
-def test_a_stop_that_the_speed_alone_shows_takes_fifteen_seconds_at_most(hard, easy, counts):
+def test_stop_by_speed_alone_takes_at_most_15_seconds(hard, easy, counts):
     """From 20 m/s within 12 s it is one; from 40 m/s within 20 s the last 15 s do not show it."""
     top_mps = -hard[0] * hard[1] - easy[0] * easy[1]
     road = Road((REST_S, 0.0), (top_mps / 4.0, 4.0), (3.0, 0.0), hard, easy, (REST_S, 0.0))
@@ -294,8 +294,8 @@ def test_a_stop_that_the_speed_alone_shows_takes_fifteen_seconds_at_most(hard, e
 
 
 @pytest.mark.parametrize(("age_s", "stands"), [(2.9, True), (3.1, False)])
-def test_an_old_speed_shows_nothing(age_s, stands):
-    """The log's only speed is 0 m/s: three seconds later the vehicle may ride again."""
+def test_old_speed_shows_no_standstill(age_s, stands):
+    """The log's only speed is 0 m/s. Three seconds later the vehicle may be riding again."""
     road = Road((10.0, 0.0), (20.0, 0.5))
     road.rests[:] = False
     ride = road.channels()
@@ -305,14 +305,14 @@ def test_an_old_speed_shows_nothing(age_s, stands):
     assert still[round((1.0 + age_s) * RATE_HZ)] == stands
 
 
-def test_a_log_that_begins_on_the_move():
-    """No standstill before shows that the speed there was 0."""
+def test_log_may_begin_on_the_move():
+    """There is no previous standstill with speed 0."""
     ride = braking(20.0, 5.0).channels()
     (stop,) = find_stops(ride.part(ride.t_s >= 11.0))
     assert stop.initial_speed_mps == pytest.approx(20.0, rel=0.003)
 
 
-def test_stops_are_looked_for_in_fifty_samples_a_second():
+def test_stops_are_searched_at_50_samples_per_second():
     """Of a log with 200, each the mean of four: of a time of 13.88, 13.885, 13.89 and 13.895 s."""
     road = Road((REST_S, 0.0), (5.0, 4.0), (4.0, 0.0), (4.0, -5.0), (REST_S, 0.0), rate_hz=200.0)
     (stop,) = find_stops(road.channels())
@@ -333,7 +333,7 @@ def test_the_straight_line_is_the_direction_just_before_braking():
 @pytest.mark.parametrize(
     ("hard", "easy", "earlier_s"), [((2.0, -6.0), (1.4, -2.0), 0.71), ((10.0 / 9.0, -9.0), (2.4, -2.0), 4.08)]
 )
-def test_how_hard_the_braking_was_is_that_of_its_last_two_seconds(hard, easy, earlier_s):
+def test_full_deceleration_is_from_the_last_two_seconds(hard, easy, earlier_s):
     """A quarter of them at 6 m/s2 is enough before it is eased to 2: 15 % are 0.9, more than the engine's 0.8. What is
     over before them does not count: 15 % are 0.3, and it began with the engine's."""
     legs = (REST_S, 0.0), (6.0, 3.0), (3.0, 0.0), (4.0, -0.8), hard, easy, (REST_S, 0.0)
@@ -341,8 +341,8 @@ def test_how_hard_the_braking_was_is_that_of_its_last_two_seconds(hard, easy, ea
     assert REST_S + 6.0 + 3.0 + 4.0 - stop.start_s == pytest.approx(earlier_s, abs=0.025)
 
 
-def test_the_vehicle_may_roll_out():
-    """The last metre a second at 0.4 m/s2: the brakes are off, and the stop is that before it."""
+def test_rolling_out_after_braking_is_left_out():
+    """The last metre per second at 0.4 m/s2: the brakes are released, and the stop is the part before."""
     legs = (REST_S, 0.0), (5.0, 4.0), (3.0, 0.0), (3.9, -5.0), (1.25, -0.4), (REST_S, 0.0)
     (stop,) = find_stops(Road(*legs).channels())
     assert stop.initial_speed_mps == pytest.approx(20.0, rel=1e-3)

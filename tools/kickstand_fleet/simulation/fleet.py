@@ -153,7 +153,7 @@ def _turn(chance: np.random.Generator, degrees: float) -> Array:
 
 
 def _write(path: Path, log: Log, broken: str) -> None:
-    """broken: what is wrong with the file, a key of TROUBLES, or ""."""
+    """Write a log. broken: the file's trouble, a key of TROUBLES, or ""."""
     content = log_bytes(log)
     if path.suffix == ".gz":
         content = gzip.compress(content, 1, mtime=0)

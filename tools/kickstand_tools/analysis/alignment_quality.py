@@ -91,7 +91,7 @@ def quality(ride: Channels, standing: Bools) -> Quality:
     still = means(standing.astype(float)) == 1.0
     static = np.degrees(np.arctan2(left, up))
     ahead = moving & (np.abs(yaw_rate) < STRAIGHT_DPS)
-    usual = float(np.median(static[ahead])) if np.any(ahead) else 0.0  # upright, however far off "up" is
+    usual = float(np.median(static[ahead])) if np.any(ahead) else 0.0  # when upright, for any error of "up"
     straight = ahead & (np.abs(static - usual) < STRAIGHT_DEG)
     straight_s = float(np.count_nonzero(straight)) * n * step_s
     roll = pitch = yaw = None

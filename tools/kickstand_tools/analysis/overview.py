@@ -4,8 +4,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from kickstand.errors import Notice
 
+from ..checks.mount import ForwardExchanged
+from ..common.messages import Message
+from ..logs.frozen import FrozenReadings
 from ..logs.log import Stretch
 from ..logs.source import Progress
 from ..signals import Array, Bools, smoothed
@@ -39,12 +41,12 @@ class Overview:
     stops: list[Stop]
     quality: Quality
     riding_s: float
-    notices: list[Notice]
+    notices: list[Message]
 
     @property
-    def exchanged(self) -> Notice | None:
+    def exchanged(self) -> ForwardExchanged | None:
         """The notice that forward and backward are exchanged, or None."""
-        return next((notice for notice in self.notices if notice.code == "forward-exchanged"), None)
+        return next((notice for notice in self.notices if isinstance(notice, ForwardExchanged)), None)
 
     @property
     def has_speed(self) -> bool:
@@ -65,7 +67,7 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
     (2.5, [])
     """
     total = Summary()
-    notices: list[Notice] = []
+    notices: list[Message] = []
 
     def blocks() -> Iterator[Channels]:
         for block in ride.blocks(progress, notices):
@@ -75,16 +77,15 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
     course = joined(downsampled(blocks(), RATE_S))
     if total.speed_mps.time_s is None:  # always 0, as with a broken wheel contact: it does not mean that the bike stood
         course = replace(course, speed_mps=np.broadcast_to(np.nan, len(course.t_s)))
-    frozen_s = sum(float(notice.values[1]) for notice in notices if notice.code == "frozen-readings")
+    frozen_s = sum((notice.seconds for notice in notices if isinstance(notice, FrozenReadings)), 0.0)
     # The notice is about the whole log, even if the ride is a stretch of it.
     total.frozen_s = min(frozen_s, total.missing_s) if isinstance(ride.log, Stretch) else frozen_s
     still = standing(course)
     found = quality(course, still)
     moved_s = min(total.riding_s, _riding_s(course, still, whole=not isinstance(ride.log, Stretch)))
+    notices = [replace(n, roll_deg=found.roll_deg) if isinstance(n, ForwardExchanged) else n for n in notices]
     seen = Overview(ride, total, course, [], found, moved_s, notices)
-    if seen.exchanged:
-        seen.exchanged.values = (*seen.exchanged.values[:2], found.roll_deg)
-    else:
+    if not seen.exchanged:
         seen.stops = stops_of(course, still)
     return seen
 

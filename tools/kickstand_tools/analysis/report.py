@@ -4,9 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..checks.mount import SWAPPED_DEG
+from ..common.messages import Remedy, WrongAxes, WrongMount, as_data as remarks_as_data
 from ..common.times import clock
-from ..refusals import CONTRADICTING, SWAPPED_DEG, as_data as remarks_as_data, sentence
-from ..remedies import COMMANDS, Remedies
+from ..estimation.smooth import PoseOff
 from .alignment_quality import LeanCost, Quality, lean_cost
 from .overview import Overview
 from .stops.brake_test import Stop, stops_by_speed
@@ -25,6 +26,19 @@ STOPS_TERMS = (
     "MFDD: mean deceleration while the speed falls from 80 to 10 % of what it was (UN R13). peak: the largest. "
     "jerk: how fast the deceleration changes, at most. pulls: how far the bike ends beside its straight line."
 )
+
+
+_BY_RIDE = "remove the calibration and let the ride show how the sensor sits"
+_LESS_ROLL = Remedy(
+    "calibrate ride takes it out, or calibrate two, held upright", f"{_BY_RIDE}, or align the bike again, held upright"
+)
+_LESS_PITCH = Remedy(
+    "calibrate ride takes it out, or calibrate two, on level ground",
+    f"{_BY_RIDE}, or align the bike again, on level ground",
+)
+_LESS_YAW = Remedy("calibrate ride takes it out", _BY_RIDE)
+_LESS_YAW_BY_SPEED = Remedy("calibrate ride or drive takes it out", _BY_RIDE)
+_SIX_POSITIONS = Remedy("kickstand calibrate six takes that out", "the six positions of the sensor take that out")
 
 
 @dataclass
@@ -75,7 +89,7 @@ def as_data(seen: Overview) -> dict[str, Any]:
             name: round(value, 2) if known and value is not None else None for name, value in costs.items()
         }
     data["remarks"] = remarks_as_data(seen.notices)
-    data["remark"] = sentence(seen.exchanged) if seen.exchanged else ""
+    data["remark"] = seen.exchanged.line() if seen.exchanged else ""
     data["stops"] = [
         {name: value if isinstance(value, str) else round(value, 3) for name, value in vars(stop).items()}
         | {"duration_s": round(stop.duration_s, 3)}
@@ -109,9 +123,9 @@ def page(seen: Overview) -> "Group":
     return Group(*parts)
 
 
-def words(seen: Overview, remedies: Remedies = COMMANDS) -> Words:
-    """The ride in words. remedies: the wording of instructions."""
-    alignment = _alignment(seen, remedies)
+def words(seen: Overview, on_page: bool = False) -> Words:
+    """The ride in words. on_page: what to do is said for a page, which has no commands."""
+    alignment = _alignment(seen, on_page)
     return Words(
         Path(seen.ride.name).name, _too_little(seen), _ride(seen), alignment, _stops(seen.stops), _remark(seen)
     )
@@ -165,7 +179,7 @@ def _ride(seen: Overview) -> list[tuple[str, str, str]]:
     return rows
 
 
-def _alignment(seen: Overview, remedies: Remedies) -> str:
+def _alignment(seen: Overview, on_page: bool) -> str:
     quality = seen.quality
     if not judged(seen):
         return "Alignment: not judged, see the warning."
@@ -175,14 +189,14 @@ def _alignment(seen: Overview, remedies: Remedies) -> str:
         far = abs(quality.roll_deg or 0.0) > SWAPPED_DEG and not seen.ride.car
         # swapped poses exchange forward and backward too
         swapped = far and (seen.exchanged or not seen.has_speed)
-        costs = "" if seen.ride.car or seen.exchanged else _costs(lean_cost(quality), seen.has_speed, remedies)
+        costs = "" if seen.ride.car or seen.exchanged else _costs(lean_cost(quality), seen.has_speed, on_page)
         said = f"Alignment: it seems off by {', '.join(known)}"
         if _good(seen):
             said = f"Alignment: good. It seems off by {', '.join(known)}, which costs less than {COSTS_DEG}° of lean."
         else:
             said += ": were the poses swapped?" if swapped else ": was it held upright?" if far else "."
         said += costs
-    return said + _gravity(quality.gravity_g, remedies)
+    return said + _gravity(quality.gravity_g, on_page)
 
 
 def _good(seen: Overview) -> bool:
@@ -192,32 +206,35 @@ def _good(seen: Overview) -> bool:
         return False
     together = cost.roll_deg + cost.yaw_deg + (cost.pitch_deg or 0.0)
     upright = abs(seen.quality.roll_deg or 0.0) <= SWAPPED_DEG
-    return together < COSTS_DEG and upright and all(notice.code != "pose-off" for notice in seen.notices)
+    return together < COSTS_DEG and upright and not any(isinstance(notice, PoseOff) for notice in seen.notices)
 
 
-def _gravity(found_g: float | None, remedies: Remedies) -> str:
+def _gravity(found_g: float | None, on_page: bool) -> str:
     if found_g is None:
         return ""
     if abs(found_g - 1.0) <= GRAVITY_G:
         return f" At rest the force is {found_g:.3f} g, as good as 1."
-    return f" At rest the force is {found_g:.3f} g and not 1: {remedies['six_positions']}."
+    return f" At rest the force is {found_g:.3f} g and not 1: {_SIX_POSITIONS.words(on_page)}."
 
 
 def judged(seen: Overview) -> bool:
     """True if the ride shows how well the sensor is aligned. False if it contradicts the calibration altogether."""
-    return not any(notice.code in CONTRADICTING for notice in seen.notices)
+    return not any(
+        isinstance(notice, WrongAxes) or (isinstance(notice, WrongMount) and not notice.judged)
+        for notice in seen.notices
+    )
 
 
-def _costs(cost: LeanCost, speed: bool, remedies: Remedies) -> str:
+def _costs(cost: LeanCost, speed: bool, on_page: bool) -> str:
     """A sentence for each angle that causes a lean error, and the remedy; "" if none does. speed: True if the log has
     one."""
     costs = {
-        "Roll": (cost.roll_deg, remedies["less_roll"]),
-        "Pitch": (cost.pitch_deg, remedies["less_pitch"]),
-        "Yaw": (cost.yaw_deg, remedies["less_yaw_by_speed" if speed else "less_yaw"]),
+        "Roll": (cost.roll_deg, _LESS_ROLL),
+        "Pitch": (cost.pitch_deg, _LESS_PITCH),
+        "Yaw": (cost.yaw_deg, _LESS_YAW_BY_SPEED if speed else _LESS_YAW),
     }
     said = [
-        f" {name} usually costs about {value:.1f}° of lean; {remedy}."
+        f" {name} usually costs about {value:.1f}° of lean; {remedy.words(on_page)}."
         for name, (value, remedy) in costs.items()
         if value is not None and value >= COSTS_DEG
     ]

@@ -5,19 +5,46 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from kickstand.errors import Notice
 
-from ..calibration.file import CalibrationFile, calibration_path, read_calibration
+from ..calibration.file import ALIGN, CalibrationFile, calibration_path, read_calibration
 from ..common.errors import InputError
+from ..common.messages import Message, Remedy
 from ..estimation.smooth import smooth_blocks
 from ..logs.log import Block, Stretch
 from ..logs.reader import Source, check_first_line, read_blocks, split_stretch
 from ..logs.source import File, Progress, log_stem, name_of
-from ..replay.meter_along import MeterAlong
-from ..signals import Array
+from ..replay.meter_along import MeterAlong, Misfit
+from ..signals import Array, Bools
 from .channels import Channels, channels, joined
 
 _MAX_SIGMA_DEG = 3.0  # a smoothed lean less certain than this counts as not sure
+
+
+@dataclass(frozen=True)
+class SmoothSlow(Message):
+    """There are too few samples per second to smooth the lean."""
+
+    code = "smooth-slow"
+    text = (
+        "the smoothed lean needs 10 samples per second: where the log has fewer, the lean is the one that the display "
+        "showed"
+    )
+
+
+@dataclass(frozen=True)
+class AbsurdReadings(Message):
+    """Implausible readings. rate_dps, force_g: the largest in the second before at_s."""
+
+    at_s: float
+    rate_dps: float
+    force_g: float
+
+    code = "absurd-readings"
+    text = (
+        "implausible readings at {at_s:.1f} s, up to {rate_dps:.0f} deg/s and {force_g:.1f} g, where the lean is not "
+        "known"
+    )
+    todo = Remedy("check the sensor, and the units in the log")
 
 
 @dataclass
@@ -43,17 +70,19 @@ class Ride:
         """True for a car, which has no lean; False for a motorcycle."""
         return self.calibration.vehicle == "car"
 
-    def blocks(self, progress: Progress | None = None, notices: list[Notice] | None = None) -> Iterator[Channels]:
+    def blocks(self, progress: Progress | None = None, notices: list[Message] | None = None) -> Iterator[Channels]:
         """Yield the channels of the ride, block by block, without frozen readings, which become gaps. progress,
         notices: see read_blocks(); they are for the whole log, even if the ride is a stretch of it. Raises
         InputError."""
         along, absurd, slow, some = MeterAlong(self.calibration), False, False, False
         log, stretch = split_stretch(self.log)
+        misfit = Misfit()
         for whole, found in self._read(log, progress, notices):
             block = whole.measured
             if not len(block.time_us):
                 continue
-            lean, variance = _lean_along(along, block, shown=found is None)
+            lean, variance, odd = _lean_along(along, block, shown=found is None)
+            misfit.add(block.t_s, odd)
             if notices is not None and not absurd and np.any(variance < 0.0):
                 absurd = True
                 notices.append(_absurd(block, int(np.argmax(variance < 0.0))))
@@ -73,11 +102,13 @@ class Ride:
             yield seen
         if not some:
             raise InputError(f"{self.name}: all readings are frozen, so that nothing is known: check the sensor")
+        if notices is not None and not self.car:
+            notices += misfit.remarks(notices)
         if notices is not None and slow:
-            notices.append(Notice("smooth-slow"))
+            notices.append(SmoothSlow())
 
     def _read(
-        self, log: Source, progress: Progress | None, notices: list[Notice] | None
+        self, log: Source, progress: Progress | None, notices: list[Message] | None
     ) -> Iterator[tuple[Block, Array | None]]:
         """The blocks of the log, each with its smoothed values (see smooth_blocks()); None instead of these if the ride
         is not smoothed or the log has under 10 samples per second."""
@@ -124,7 +155,7 @@ def open_ride(log: Source, calibration: CalibrationFile | File | None = None, sm
     parameters = source if isinstance(source, CalibrationFile) else read_calibration(source)
     if not parameters.aligned:
         name = "the calibration" if isinstance(source, CalibrationFile) else name_of(source)
-        raise InputError(f"{name} is not aligned, so lean and braking are unknown", "align")
+        raise InputError(f"{name} is not aligned, so lean and braking are unknown", ALIGN)
     return Ride(log, parameters, smoothed and parameters.vehicle != "car")
 
 
@@ -145,28 +176,30 @@ def vehicle_channels(
     return joined(open_ride(log, calibration).blocks(progress))
 
 
-def _absurd(block: Block, at: int) -> Notice:
+def _absurd(block: Block, at: int) -> Message:
     """The notice that the lean filter diverged at this row, with the readings of the previous second."""
     before = slice(int(np.searchsorted(block.time_us, block.time_us[at] - 1_000_000)), at + 1)
     most = np.max(np.abs(block.readings[before]), axis=0)
-    return Notice("absurd-readings", block.time_us[at] / 1e6, float(np.max(most[4:])), float(np.max(most[:3])))
+    return AbsurdReadings(block.time_us[at] / 1e6, float(np.max(most[4:])), float(np.max(most[:3])))
 
 
-def _lean_along(along: MeterAlong, block: Block, shown: bool) -> tuple[dict[str, Array], Array]:
-    """The arguments of channels(), computed by the firmware's meter, and the variance of its lean (rad2), < 0 if it
-    diverged.
+def _lean_along(along: MeterAlong, block: Block, shown: bool) -> tuple[dict[str, Array], Array, Bools]:
+    """The arguments of channels(), computed by the firmware's meter, the variance of its lean (rad2), < 0 if it
+    diverged; and where
+    it named the sensor, because its readings do not fit.
 
     shown: compute the lean that was shown; otherwise it and sure are 0, which saves a tenth of the time.
     """
-    names = ("lean_deg", "shown_g", "variance", "resting", "rolling", "sure")
+    names = ("lean_deg", "shown_g", "variance", "resting", "rolling", "odd", "sure")
     columns: list[list[float]] = [[] for _ in names]
-    lean_deg, forward, variance, resting, rolling, sure = (column.append for column in columns)
+    lean_deg, forward, variance, resting, rolling, odd, sure = (column.append for column in columns)
     for meter in along.after_each(block, *along.in_vehicle(block)):
         lean = meter.filter
         forward(meter.smooth_force[2])
         variance(lean.variance)
         resting(lean.at_rest)
         rolling(lean.rolling)
+        odd(meter.odd is not None)
         if shown:
             lean_deg(meter.lean_deg)
             sure(meter.trusted)
@@ -175,4 +208,4 @@ def _lean_along(along: MeterAlong, block: Block, shown: bool) -> tuple[dict[str,
     variances = found.pop("variance")
     found["doubtful"] = np.zeros(n)  # known afterwards only
     found["lean_sigma_deg"] = np.degrees(np.sqrt(np.where(variances >= 0.0, variances, np.nan)))
-    return found, variances
+    return found, variances, found.pop("odd") > 0.0

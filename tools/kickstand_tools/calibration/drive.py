@@ -8,16 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from kickstand.drive_alignment import verdict
 from kickstand.drive_alignment.alignment import CAR, MOTORCYCLE, DriveAlignment
-from kickstand.errors import AlignmentError, Notice
+from kickstand.errors import AlignmentError
 
-from ..common.errors import InputError
+from ..common.errors import InputError, RefusedInput
+from ..common.messages import Message
 from ..logs.frozen import without_frozen
 from ..logs.reader import Log, Source, read_log
 from ..logs.source import Progress
-from ..refusals import RefusedInput
 from ..signals import Array
 from .drive_events import DriveEvent, DriveWatch
 from .drive_feed import Steps, feed, standing
+from .drive_refusals import of_firmware
 from .file import CalibrationFile
 from .poses import refuse_same_file
 from .published import PublishedAlignment
@@ -61,7 +62,7 @@ class DriveFit:
     halves_deg: float | None
     poses: PoseCheck | None
     events: list[DriveEvent]
-    notices: list[tuple[str, Notice]]
+    notices: list[tuple[str, Message]]
     bias_dps: Array
     refusal: RefusedInput | None = None
 
@@ -77,7 +78,7 @@ class DriveFit:
 
     @property
     def reason(self) -> str:
-        """The code of the refusal (see kickstand.errors), "" for none."""
+        """The code of the refusal, "" for none."""
         return self.refusal.code if self.refusal else ""
 
 
@@ -96,7 +97,7 @@ def fit_drive(
     the two poses of a motorcycle. vehicle: "motorcycle" or "car"; None: a motorcycle if calibration has two poses,
     otherwise a car. method: "improved", or "published" for ViriCiti's published method. progress: called with the
     samples done and their total (each is read twice). on_event: called with each DriveEvent as it happens, even if the
-    drive is refused in the end. Raises InputError; RefusedInput, a subclass with code and values, if the drive does not
+    drive is refused in the end. Raises InputError; RefusedInput, a subclass with a Message, if the drive does not
     determine the sensor's mounting.
 
     >>> from kickstand_tools.api import Log, simulate_ride
@@ -153,7 +154,7 @@ def fit_logs(
         )
     except AlignmentError as error:
         assumed = " (taken for a car: else --vehicle motorcycle)" if vehicle is None and kind == CAR else ""
-        refusal = RefusedInput(error, ", ".join(log.name for log in logs), assumed)
+        refusal = RefusedInput(of_firmware(error), ", ".join(log.name for log in logs), assumed)
     improved = alignment if isinstance(alignment, DriveAlignment) else None
     pose_check = None
     if improved and up is not None and not refusal:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from kickstand.drive_alignment.alignment import DriveAlignment
 from kickstand.errors import Refusal
 
+from ..common.messages import Message
+from .drive_refusals import of_firmware
 from .published import PublishedAlignment
 
 # DriveEvent.what
@@ -31,7 +33,7 @@ class DriveEvent:
     counted: int
     needed: int
     quality_deg: float
-    refusal: Refusal | None = None
+    refusal: Message | None = None
 
 
 class DriveWatch:
@@ -81,7 +83,8 @@ class DriveWatch:
 
     def _add(self, t_s: float, what: str, refusal: Refusal | None = None) -> None:
         alignment = self._alignment
-        event = DriveEvent(self._log, t_s, what, alignment.counted, alignment.needed, alignment.quality_deg, refusal)
+        reason = of_firmware(refusal) if refusal else None
+        event = DriveEvent(self._log, t_s, what, alignment.counted, alignment.needed, alignment.quality_deg, reason)
         self.events.append(event)
         if self._on_event:
             self._on_event(event)

@@ -22,6 +22,7 @@ from kickstand.rotation import is_rotation
 from kickstand.units import AXES
 
 from ..common.errors import InputError, cause
+from ..common.messages import Remedy
 from ..common.output import whole_file
 from ..logs.source import File, log_stem, name_of, open_input
 from ..signals import Array, rotated
@@ -32,6 +33,11 @@ MAX_DELAY_S = 0.05  # largest delay of a chip's low-pass: the slowest has 33 ms
 _NEUTRAL = {"accel_matrix": np.eye(3), "gyro_matrix": np.eye(3), "gyro_sigma": np.zeros((3, 3))}
 _MATRICES = tuple(_NEUTRAL)  # in the order of the firmware's Calibration.matrices()
 ROTATION_TOLERANCE = 2e-3  # a matrix copied with three or four decimals is still good to 0.1 degrees
+
+
+_BY_RIDE = "remove the calibration and let the ride show how the sensor sits"
+ALIGN = Remedy("kickstand calibrate two, or calibrate ride, first", _BY_RIDE)
+GIVE_CALIBRATION = Remedy("give a file made by kickstand calibrate", "give the .cal.json of the ride")
 
 
 @dataclass(eq=False)
@@ -159,16 +165,16 @@ def read_calibration(source: File) -> CalibrationFile:
         else:
             content = source.read(MOST_BYTES + 1)
         if len(content) > MOST_BYTES:
-            raise InputError(f"{name} is too large for a calibration, which has under 1 MB", "give_calibration")
+            raise InputError(f"{name} is too large for a calibration, which has under 1 MB", GIVE_CALIBRATION)
         data = json.loads(content if isinstance(content, str) else content.decode("utf-8-sig"))
     except OSError as error:
         raise InputError(f"{name} cannot be read: {cause(error)}") from error
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{name} is not JSON", "give_calibration") from error
+        raise InputError(f"{name} is not JSON", GIVE_CALIBRATION) from error
     if not isinstance(data, dict):
-        raise InputError(f"{name} is no calibration", "give_calibration")
+        raise InputError(f"{name} is no calibration", GIVE_CALIBRATION)
     if "version" not in data:
-        raise InputError(f"{name} is no calibration: version is missing", "give_calibration")
+        raise InputError(f"{name} is no calibration: version is missing", GIVE_CALIBRATION)
     if data["version"] != VERSION or isinstance(data["version"], bool):
         raise InputError(f"{name}: version {_shown(data['version'])}, this program reads {VERSION}: calibrate again")
     offset, slope, bias = (
@@ -229,7 +235,7 @@ def calibration_path(log: Path) -> Path:
 
 def _list(name: str, data: dict[str, Any], entry: str) -> list[Any]:
     if entry not in data:
-        raise InputError(f"{name}: {entry} is missing", "give_calibration")
+        raise InputError(f"{name}: {entry} is missing", GIVE_CALIBRATION)
     if not isinstance(data[entry], list) or len(data[entry]) != 3:
         what = "3 rows of 3 numbers" if entry in ("vehicle_from_sensor", *_MATRICES) else "3 numbers"
         raise InputError(f"{name}: {entry} has to be {what}: calibrate again")

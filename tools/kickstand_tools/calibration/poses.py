@@ -12,12 +12,12 @@ from kickstand.calibration.still_pose import StillPose
 from kickstand.errors import AlignmentError, CalibrationError, CaptureError
 from kickstand.units import AXES
 
-from ..common.errors import InputError
+from ..common.errors import InputError, RefusedInput
 from ..logs.log import ROOM_TEMP_C
 from ..logs.reader import Source, read_log
-from ..refusals import RefusedInput
 from ..signals import Array
 from .file import CalibrationFile
+from .pose_refusals import FreePoseOff, SideTilted, of_firmware
 
 _MICRO = 1_000_000  # StillPose sums integers: millionths of g and deg/s
 _SATURATED = 1_990_000  # a still pose is measured with a range of at least 2 g: an axis at 2 g may be at its limit
@@ -70,7 +70,7 @@ def take_pose(name: str, readings: Array, advice: str) -> Pose:
         where = f"{name}: pose refused"
         still.finish()
     except CaptureError as error:
-        raise RefusedInput(error, where, f": {advice}") from error
+        raise RefusedInput(of_firmware(error), where, f": {advice}") from error
     return Pose(name, still)
 
 
@@ -110,7 +110,7 @@ def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
     poses: six logs, or seven with a slanted one that checks the result (see read_log for what a log may be). Nicolae's
     paper, section 4, equations (16)-(20), solved so that each calibrated reading is 1 g long whether or not the axis
     points exactly up. The gyro's bias is the median of the poses. Raises InputError; RefusedInput, a subclass with
-    code and values, if the firmware refuses a pose or the result.
+    a Message, if the firmware refuses a pose or the result.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("parked", seed=1, seconds=20.0)
@@ -180,9 +180,10 @@ def _tilt_deg(pose: Pose) -> float:
 
 def _with_file(error: CalibrationError, sides: list[Pose], free: Pose | None) -> RefusedInput:
     """The refusal with its file, if it is about one."""
-    if error.code == "side-tilted":
-        return RefusedInput(error, sides[SIDES.index(error.values[0])].name, ": capture this side again")
-    return RefusedInput(error, free.name if free and error.code == "free-pose-off" else "")
+    reason = of_firmware(error)
+    if isinstance(reason, SideTilted):
+        return RefusedInput(reason, sides[SIDES.index(reason.side)].name, ": capture this side again")
+    return RefusedInput(reason, free.name if free and isinstance(reason, FreePoseOff) else "")
 
 
 def beyond_sheet(offset: Sequence[float], slope: Sequence[float]) -> list[str]:
@@ -212,7 +213,7 @@ def fit_two_positions(
     kickstand, upright: logs (see read_log). calibration: that of fit_six_positions(), with offset and slope; None: the
     readings are treated as calibrated. side: "left" or "right", the side of the kickstand. The gyro's bias is that of
     the pose on the kickstand. Nicolae's paper, section 2, equations (3)-(8). Raises InputError; RefusedInput, a
-    subclass with code and values, if the firmware refuses the poses.
+    subclass with a Message, if the firmware refuses the poses.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("parked", seed=1, seconds=20.0)
@@ -227,7 +228,7 @@ def fit_two_positions(
     try:
         aligned, tilt_deg = two_position.align(before.to_firmware(), first.still, second.still, side)
     except AlignmentError as error:
-        raise RefusedInput(error, f"{first.name} and {second.name}") from error
+        raise RefusedInput(of_firmware(error), f"{first.name} and {second.name}") from error
     result = replace(
         before,
         gyro_bias_dps=first.gyro_dps,

@@ -10,11 +10,11 @@ from kickstand.calibration.six_position import SIDES
 from kickstand.calibration.turn import Turn
 from kickstand.errors import CalibrationError, GyroError
 
-from ..common.errors import InputError
+from ..common.errors import InputError, RefusedInput
 from ..logs.log import Log
 from ..logs.reader import Source, read_log
-from ..refusals import RefusedInput
 from .file import CalibrationFile
+from .pose_refusals import SideTilted, UnprovedGyro, of_firmware
 from .poses import Pose, SixPositions, beyond_sheet, take_pose, wrong_number
 
 _WINDOW_S = 0.5  # stillness is searched in windows of this length
@@ -60,10 +60,11 @@ def fit_procedure(source: Source) -> SixPositions:
         fit = SensorFit(means, turns, offset, slope)
         fit.finish()
         if fit.unproved:
-            raise GyroError("unproved-gyro", fit.unproved[0])
+            raise RefusedInput(UnprovedGyro(fit.unproved[0]), log.name)
     except (CalibrationError, GyroError) as error:
-        side = error.code == "side-tilted"
-        raise RefusedInput(error, poses[sides[SIDES.index(error.values[0])]].name if side else log.name) from error
+        reason = of_firmware(error)
+        side = isinstance(reason, SideTilted)
+        raise RefusedInput(reason, poses[sides[SIDES.index(reason.side)]].name if side else log.name) from error
     bias = np.median([pose.gyro_dps for pose in poses], axis=0)
     matrices = fit.accel_matrix, fit.gyro_matrix, np.array(fit.gyro_sigma)
     calibration = replace(

@@ -6,9 +6,11 @@ left only 57 times. Where all rates have the opposite sign, or all axes are left
 the rate about left has the opposite one. Logs of a car, which does not lean, and of a parked vehicle are never judged.
 """
 
-import numpy as np
-from kickstand.errors import Notice
+from dataclasses import dataclass
 
+import numpy as np
+
+from ..common.messages import AT_REST, Message, Remedy, WrongAxes
 from ..signals import Array
 from ..signals.leaning import LIKENESS, WINDOW_S, leaning_of, leans, speed_in_radians, unrest
 from .cells import CELL_S, LogCells
@@ -26,7 +28,30 @@ CALMEST, LEAST, CALM_G = 0.2, 3, 0.02
 AGREE, FEW, KNOWN_DPS = 0.8, 5, 3.0
 
 
-def bends(cells: LogCells) -> Notice | None:
+@dataclass(frozen=True)
+class RatesInRadians(WrongAxes):
+    """The rates are those of deg/s only if the bike is very slow. speed_mps: the speed that they give."""
+
+    speed_mps: float
+
+    code = "rates-in-radians"
+    text = "in bends the rates are those of {speed_mps:.0f} m/s"
+    todo = Remedy("are they in rad/s? deg/s are needed")
+
+
+@dataclass(frozen=True)
+class LeftHanded(WrongAxes):
+    """The rates have the opposite sign, or the axes are left-handed."""
+
+    code = "left-handed"
+    text = "the rates turn the force the wrong way, so the lean is wrong"
+    todo = Remedy(
+        "are the axes left-handed (reverse one in both sensors) or the gyro of the opposite sign (reverse all its "
+        f"rates)? {AT_REST.capitalize()}"
+    )
+
+
+def bends(cells: LogCells) -> Message | None:
     """A notice if the rates seem to be in rad/s or of the opposite sign; None if not, or if the log does not show
     it."""
     force, rate, _ = cells.means(round(WINDOW_S / CELL_S))
@@ -47,9 +72,9 @@ def bends(cells: LogCells) -> Notice | None:
     found = leaning_of(rate, force, changes > moves)
     speed = speed_in_radians(found)
     if speed is not None:
-        return Notice("rates-in-radians", speed)
+        return RatesInRadians(speed)
     against = found.share < AGAINST and found.sigmas > SURE and found.likeness > LIKENESS
-    return Notice("left-handed") if against and leans(found) else None
+    return LeftHanded() if against and leans(found) else None
 
 
 def calm_bias(calm: Array) -> Array | None:

@@ -12,12 +12,14 @@ exchange" below); the one that explains the forces best is reported if it is cle
 """
 
 import itertools
+from dataclasses import dataclass
 
 import numpy as np
-from kickstand.errors import Notice
+from kickstand.units import AXES
 
+from ..common.messages import Message, WrongAxes
 from ..signals import Array, Bools, Ints, stretches
-from .bends import KNOWN_DPS, calm_bias, calm_rates
+from .bends import KNOWN_DPS, LeftHanded, calm_bias, calm_rates
 from .cells import CELL_S, LogCells
 from .turning import Turning
 
@@ -49,7 +51,47 @@ def _exchanges() -> Array:
 EXCHANGES = _exchanges()  # rate = exchange @ reading of the gyro
 
 
-def handedness(cells: LogCells) -> Notice | None:
+@dataclass(frozen=True)
+class RatesMisfit(WrongAxes):
+    """The gyro's axes are not the accelerometer's. The rows (3 numbers each) of a signed permutation: times the rates
+    of the log it gives the rates about x, y and z."""
+
+    about_x: tuple[int, ...]
+    about_y: tuple[int, ...]
+    about_z: tuple[int, ...]
+
+    code = "rates-misfit"
+
+    def sentence(self) -> str:
+        """See Message.
+
+        A reversed axis of the accelerometer is the same as the two others reversed in the gyro, because accelerations
+        of the opposite sign are as good as the right ones; likewise with two that are exchanged.
+        """
+        exchange = self.about_x, self.about_y, self.about_z
+        kept = [axis for k, axis in enumerate(AXES) if exchange[k][k] == 1]
+        off = [axis for k, axis in enumerate(AXES) if exchange[k][k] != 1]
+        moved = [axis for k, axis in enumerate(AXES) if exchange[k][k] == 0]
+        signs = [sum(row) for row in exchange]
+        what, or_else = "are in another order or of another sign", ""
+        if len(kept) == 2:
+            what = f"are reversed about {off[0]}"
+        elif not moved:
+            what, or_else = f"are reversed about {off[0]} and {off[1]}", f"along {kept[0]} are reversed"
+        elif len(moved) == 2 and signs == [1, 1, 1]:
+            what = f"about {moved[0]} and {moved[1]} are exchanged"
+        elif len(moved) == 2 and signs == [-1, -1, -1]:
+            or_else = f"along {moved[0]} and {moved[1]} are exchanged"
+        from_axis = [AXES[[abs(x) for x in row].index(1)] for row in exchange]
+        right = ", ".join(("-" if sign < 0 else "") + f"g{axis}" for sign, axis in zip(signs, from_axis))
+        return (
+            "the rates do not belong to the accelerations, so the lean is wrong: "
+            + (f"either the accelerations {or_else}, or " if or_else else "")
+            + f"the rates {what}, and instead of gx, gy, gz right would be {right}"
+        )
+
+
+def handedness(cells: LogCells) -> Message | None:
     """A notice that says what is wrong with the axes; None if nothing is, or if the log does not show it."""
     turning = liveliest(cells)
     found = None if turning is None else better_exchange(turning)
@@ -57,7 +99,7 @@ def handedness(cells: LogCells) -> Notice | None:
         return None
     exchange = EXCHANGES[found]
     reversed_all = np.array_equal(exchange, -np.eye(3))
-    return Notice("left-handed") if reversed_all else Notice("rates-misfit", *exchange.astype(int).tolist())
+    return LeftHanded() if reversed_all else RatesMisfit(*map(tuple, exchange.astype(int).tolist()))
 
 
 def better_exchange(turning: Turning) -> int | None:

@@ -1,12 +1,14 @@
 """All remarks about a log, from one table of cells."""
 
+from dataclasses import dataclass
+
 import numpy as np
-from kickstand.errors import Notice
 
 from ..calibration.file import CalibrationFile
+from ..common.errors import RefusedInput
+from ..common.messages import AT_REST, Message, Remedy, WrongAxes
 from ..logs.cells import MOST_DPS, MOST_G
 from ..logs.log import Block, Log
-from ..refusals import RefusedInput
 from . import mount
 from .bends import bends
 from .cells import CellTable, LogCells
@@ -16,6 +18,15 @@ from .units import speed_unit
 
 _LIMITS = np.array(3 * [MOST_G] + [np.inf] + 3 * [MOST_DPS])  # of readings; a log made in Python may have larger ones
 _AGAIN_S = 20.0  # while a log is read, the unit of its speed is checked again after each such time of the log
+
+
+@dataclass(frozen=True)
+class Mirrored(WrongAxes):
+    """The track shows that left and right are exchanged."""
+
+    code = "mirrored"
+    text = "the sensor turns against the track, so left and right are exchanged"
+    todo = Remedy(f"were all accelerations turned? {AT_REST.capitalize()}")
 
 
 class Checks:
@@ -37,16 +48,16 @@ class Checks:
             self._judged_s = float(part.t_s[-1])
             self._judge_speed(self._table.cells())
 
-    def remarks(self, axes: bool = True, calibration: CalibrationFile | None = None) -> list[Notice]:
+    def remarks(self, axes: bool = True, calibration: CalibrationFile | None = None) -> list[Message]:
         """The remarks: at most one about the log's axes (only if `axes`), and one if the log contradicts the
         calibration. Raises RefusedInput if the speed is not in m/s."""
         cells = self._table.cells()
         if cells is None:
             return []
         self._judge_speed(cells)
-        found: list[Notice | None] = []
+        found: list[Message | None] = []
         if axes:
-            mirrored = Notice("mirrored") if course_agrees(cells) is False else None
+            mirrored = Mirrored() if course_agrees(cells) is False else None
             found.append(handedness(cells) or bends(cells) or mirrored)
         if calibration is not None:
             found.append(mount.contradiction(cells, calibration))
@@ -58,7 +69,7 @@ class Checks:
             raise RefusedInput(wrong, self._name)
 
 
-def remarks(log: Log, calibration: CalibrationFile | None = None, axes: bool = True) -> list[Notice]:
+def remarks(log: Log, calibration: CalibrationFile | None = None, axes: bool = True) -> list[Message]:
     """Checks.remarks() for a log in memory. Raises RefusedInput.
 
     >>> import numpy as np

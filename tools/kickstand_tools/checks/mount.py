@@ -11,11 +11,13 @@ do two poses that were swapped. The force alone does not show it, because brakin
 On simulated rides and recordings with a right calibration up is found within 8 degrees and forward within 5.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
-from kickstand.errors import Notice
 from kickstand.units import AXES, STANDARD_GRAVITY
 
 from ..calibration.file import CalibrationFile
+from ..common.messages import AT_REST, OPPOSITE_SIGN, Message, Remedy, WrongMount
 from ..signals import Array, Lag, best_lag, correlation, rotated, rotation_vector
 from .cells import CELL_S, LogCells
 
@@ -37,7 +39,115 @@ UPSIDE_DOWN = 0.87  # cosine of the angle to straight down: within 30 degrees
 ANOTHER_MOUNT_DEG = 10.0  # two alignments that differ by more are of two mounts
 
 
-def contradiction(cells: LogCells, calibration: CalibrationFile) -> Notice | None:
+SWAPPED_DEG = 4.0  # an upright pose is hardly ever so far off; a pose on the kickstand taken for it is
+UPSIDE_DOWN_DEG = 150.0  # an up that is further off may come from accelerations of the opposite sign
+# For a motorcycle, and for a car
+AGAIN = Remedy(
+    "is it another mount's? Calibrate again: calibrate two, or calibrate ride",
+    "is it another mount's? Remove the calibration and let the ride show how the sensor sits, or align the bike again",
+)
+AGAIN_CAR = Remedy(
+    "is it another mount's? Calibrate again: calibrate drive",
+    "is it another mount's? Give the calibration of this mount",
+)
+
+
+@dataclass(frozen=True)
+class UpOff(WrongMount):
+    """The calibration's up is not the ride's."""
+
+    angle_deg: float
+    car: bool
+
+    code = "up-off"
+    text = "the calibration's up is {angle_deg:.0f} degrees off, so nothing computed with it is right"
+
+    def remedy(self) -> Remedy:
+        """See Message."""
+        again = AGAIN_CAR if self.car else AGAIN
+        return again.followed(f". Or {OPPOSITE_SIGN}") if self.angle_deg > UPSIDE_DOWN_DEG else again
+
+
+@dataclass(frozen=True)
+class ForwardOff(WrongMount):
+    """The calibration's forward is not the ride's. angle_deg: from the calibration's to the ride's, > 0 to the left.
+    by: "speed" or "bends"."""
+
+    angle_deg: float
+    by: str
+    car: bool
+
+    code = "forward-off"
+
+    def sentence(self) -> str:
+        """See Message."""
+        side = "left" if self.angle_deg > 0.0 else "right"
+        wrong = "braking and cornering are" if self.car else "lean, braking and cornering are"
+        return (
+            f"by the {self.by} of this ride forward is {abs(self.angle_deg):.0f} degrees to the {side} of the "
+            f"calibration's, so {wrong} wrong"
+        )
+
+    def remedy(self) -> Remedy:
+        """See Message."""
+        return AGAIN_CAR if self.car else AGAIN
+
+
+@dataclass(frozen=True)
+class ForwardExchanged(WrongMount):
+    """Forward and backward are exchanged. side: of the kickstand in the calibration by two poses, "" if unknown.
+    roll_deg: error of up, None if unknown; it shows whether the two poses were swapped."""
+
+    car: bool
+    side: str
+    roll_deg: float | None
+
+    code = "forward-exchanged"
+    text = "forward and backward are exchanged"
+    judged = True
+
+    def remedy(self) -> Remedy:
+        """See Message."""
+        if self.car:
+            found = Remedy("calibrate drive again?", "was it aligned while driving backwards?")
+        elif self.roll_deg is not None and abs(self.roll_deg) > SWAPPED_DEG:
+            found = Remedy("were the poses swapped?")
+        else:
+            other = {"left": "--side right", "right": "--side left"}.get(self.side, "with the other --side")
+            found = Remedy(
+                f"calibrate two {other}?",
+                "does the kickstand lean the bike to the other side than SIDE in config.py says?",
+            )
+            found = found if self.roll_deg is not None else found.followed(" Or were the poses swapped?")
+        return found.followed(f" Or, if no board wrote this log, {OPPOSITE_SIGN}")
+
+
+@dataclass(frozen=True)
+class UpsideDown(WrongMount):
+    """Accelerations of the opposite sign look like a sensor that is mounted upside down. axis: the one that points
+    down."""
+
+    axis: str
+
+    code = "upside-down"
+    text = "the sensor's {axis} points down"
+    todo = Remedy(
+        "if it is not mounted upside down, all accelerations are of the opposite sign, and left and right get "
+        f"exchanged: reverse them ({AT_REST})"
+    )
+
+
+@dataclass(frozen=True)
+class AnotherMount(WrongMount):
+    """The calibration that a new one builds on is of another mount: only its offset and slope are used."""
+
+    angle_deg: float
+
+    code = "another-mount"
+    text = "the calibration given is of a mount {angle_deg:.0f} degrees from this one: its offset and slope are used"
+
+
+def contradiction(cells: LogCells, calibration: CalibrationFile) -> Message | None:
     """A notice that says what in a log contradicts a calibration; None if nothing does or it is not aligned."""
     if not calibration.aligned:
         return None
@@ -50,28 +160,28 @@ def contradiction(cells: LogCells, calibration: CalibrationFile) -> Notice | Non
         found, by = ride.forward_by_bends(), "bends"
     exchanged = found is not None and abs(found) > BACKWARD_DEG
     if up is not None and up > (LEANED_DEG if exchanged else UP_DEG):
-        return Notice("up-off", up, car)
+        return UpOff(up, car)
     if exchanged:
-        return Notice("forward-exchanged", car, calibration.kickstand_side, None)  # None: the error of up is not known
-    return None if found is None or abs(found) < FORWARD_DEG else Notice("forward-off", found, by, car)
+        return ForwardExchanged(car, calibration.kickstand_side, None)  # None: the error of up is not known
+    return None if found is None or abs(found) < FORWARD_DEG else ForwardOff(found, by, car)
 
 
-def of_calibration(found: CalibrationFile, before: CalibrationFile | None = None) -> list[Notice]:
+def of_calibration(found: CalibrationFile, before: CalibrationFile | None = None) -> list[Message]:
     """Notices about a new alignment `found`, and about the calibration `before` that it was to build on.
 
     upside-down: accelerations of the opposite sign look like a sensor upside down, and no log shows which it is. (A
     phone's x may point down: it lies on its side.) another-mount: of `before` only offset and slope are used.
     """
-    notices = []
+    notices: list[Message] = []
     up = found.vehicle_from_sensor[1]
     axis = int(np.argmax(np.abs(up)))
     if up[axis] < -UPSIDE_DOWN and AXES[axis] != "x":
-        notices.append(Notice("upside-down", AXES[axis]))
+        notices.append(UpsideDown(AXES[axis]))
     if before is not None and before.aligned:
         turn = rotation_vector(found.vehicle_from_sensor @ before.vehicle_from_sensor.T)
         turned_deg = float(np.degrees(np.linalg.norm(turn)))
         if turned_deg > ANOTHER_MOUNT_DEG:
-            notices.append(Notice("another-mount", turned_deg))
+            notices.append(AnotherMount(turned_deg))
     return notices
 
 

@@ -1,14 +1,17 @@
-"""Was the sensor ill? A dead axis, and a gyro at the end of its range.
+"""Was the sensor ill? A dead axis, a sensor at the end of its range.
 
 Noise changes every reading of a working axis within a second. An axis that stays the same to the last digit while the
 others of its sensor change was not measured. A rate of over SATURATED_DPS does not stay the same either: the gyro is at
-the end of its range, and how fast the bike rolled there is unknown. Lean must not be found from either of them.
+the end of its range, and how fast the bike rolled there is unknown. Lean must not be found from either of them. Of an
+accelerometer that vibration clips the force is nearly right between the blows: these readings are used, and remarked.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
-from kickstand.errors import Notice
 from kickstand.units import AXES
 
+from ..common.messages import Message, Remedy
 from ..signals import Array, Bools, Ints, cell_numbers
 
 DEAD_S = 1.0  # an axis is judged in each stretch of this length
@@ -17,12 +20,67 @@ LEAST_SAMPLES = 10  # of such a stretch
 OTHER_G, OTHER_DPS, OTHER_STEPS = 0.01, 0.3, 20.0
 # Least share of samples at which they turn round: those of noise are two thirds, those of a made log have no noise
 NOISY = 0.15
+# A sensor of which no axis has ever moved is judged in a part of the log of this length
+DEAD_ALL_S = 20.0
 DEAD_FROM_S = 2.0  # less is left in: rounding may hide the noise for a second
 SATURATED_DPS, SATURATED_S, SATURATED_SAMPLES = 100.0, 0.1, 5
+# An accelerometer is clipped where its largest reading, of over CLIPPED_G, is repeated to the last digit
+CLIPPED_G, CLIPPED_SAMPLES, CLIPPED_STEPS = 1.1, 10, 200.0
 NAMES = tuple(f"{sensor} {axis}" for sensor in ("accelerometer", "gyro") for axis in AXES)
 
+_SENSORS = slice(0, 3), slice(3, 6)
 _MOTION = [0, 1, 2, 4, 5, 6]  # of the chip's order: without the temperature
 _LEAST = np.repeat([OTHER_G, OTHER_DPS], 3)
+
+
+@dataclass(frozen=True)
+class AxisDead(Message):
+    """An axis stays the same while others change. name: "gyro x"."""
+
+    name: str
+    seconds: float
+    begin_s: float
+
+    code = "axis-dead"
+    text = (
+        "{name} is dead: from {begin_s:.1f} s on it does not change for {seconds:.0f} s while others do; these "
+        "readings are left out, and the lean is not known there"
+    )
+    todo = Remedy("check the sensor and its solder joints, or replace it")
+
+
+@dataclass(frozen=True)
+class GyroSaturated(Message):
+    """The gyro was at the end of its range. begin_s: of the first time."""
+
+    axis: str
+    times: int
+    seconds: float
+    begin_s: float
+
+    code = "gyro-saturated"
+    text = (
+        "gyro {axis} is at the end of its range {times} times, {seconds:.1f} s in all, first at {begin_s:.1f} s: these "
+        "readings are left out"
+    )
+    todo = Remedy("fix the sensor firmly, or set a larger GYRO_RANGE_DPS")
+
+
+@dataclass(frozen=True)
+class AccelClipped(Message):
+    """Vibration clipped the accelerometer. end_g: the end of its range. begin_s: of the first such sample."""
+
+    axis: str
+    end_g: float
+    samples: int
+    begin_s: float
+
+    code = "accel-clipped"
+    text = (
+        "accelerometer {axis} is at the end of its range ({end_g:.1f} g) in {samples} samples, first at {begin_s:.1f} "
+        "s: its mean is wrong there"
+    )
+    todo = Remedy("mount the sensor more softly, or set a larger ACCEL_RANGE_G")
 
 
 class SensorHealth:
@@ -34,6 +92,8 @@ class SensorHealth:
         self._run_s = np.zeros(6)  # for how long an axis has been dead now
         self._begin_s = np.full(6, np.nan)
         self._saturated: list[list[float]] = [[], [], []]  # begin of the first time, number of times, seconds
+        self._ends: list[tuple[float, int, float]] = [(0.0, 0, 0.0)] * 6  # of each axis and sign: g, samples, first
+        self._alive = np.zeros(2, dtype=bool)  # noise was seen: of accelerometer and gyro
 
     def mark(self, time_us: Ints, readings: Array) -> Bools:
         """(n) True where readings (n, 7), as in a Block, are sick. A part must not be longer than memory allows."""
@@ -50,38 +110,52 @@ class SensorHealth:
         slope = np.diff(values, axis=0, append=values[-1:])
         turns = np.add.reduceat(slope * np.roll(slope, 1, axis=0) < 0.0, begins, dtype=float)
         noisy = turns >= NOISY * (ends - begins)[:, None]
+        if time_s[-1] - time_s[0] > DEAD_ALL_S:
+            constant = np.array([np.all(change[:, sensor] == 0.0) for sensor in _SENSORS])
+        else:
+            constant = np.zeros(2, dtype=bool)
         before = 0  # begin of the stretch before: a first second of a dead axis is sick too
         for begin, end, spreads, noise in zip(begins.tolist(), ends.tolist(), spread, noisy):
             if end - begin >= LEAST_SAMPLES:
-                dead = self._dead(spreads, noise)
+                dead = self._dead(spreads, noise, constant)
                 self._count(dead, float(time_s[begin]), float(time_s[end - 1] - time_s[begin]))
                 if np.any(dead & (self._run_s >= DEAD_FROM_S)):
                     sick[before:end] = True
             before = begin
         for axis in range(3):
             self._mark_saturated(axis, time_s, values[:, 3 + axis], sick)
+            self._find_clipped(axis, time_s, values[:, axis])
         return sick
 
-    def notices(self) -> list[Notice]:
+    def notices(self) -> list[Message]:
         """The notices about the log so far."""
-        found = [
-            Notice("axis-dead", name, float(seconds), float(begin))
+        found: list[Message] = [
+            AxisDead(name, float(seconds), float(begin))
             for name, seconds, begin in zip(NAMES, self._dead_s, self._begin_s)
             if seconds >= DEAD_FROM_S
         ]
-        return found + [
-            Notice("gyro-saturated", name, int(at[1]), at[2], at[0]) for name, at in zip(AXES, self._saturated) if at
-        ]
+        found += [GyroSaturated(name, int(at[1]), at[2], at[0]) for name, at in zip(AXES, self._saturated) if at]
+        for axis, name in enumerate(AXES):
+            ends = [end for end in self._ends[axis :: len(AXES)] if self._is_clipped(axis, end)]
+            if ends:
+                samples = sum(count for _, count, _ in ends)
+                found.append(AccelClipped(name, ends[0][0], samples, min(first for *_, first in ends)))
+        return found
 
-    def _dead(self, spread: Array, noisy: Bools) -> Bools:
+    def _dead(self, spread: Array, noisy: Bools, constant: Bools) -> Bools:
         """(6) True for the dead axes of a stretch in which the readings change by `spread` (6). noisy (6): True for
-        axes with noise."""
+        axes with noise. constant (2): True for a sensor that does not change in a long part of the log."""
         step = np.where(np.isfinite(self._step), self._step, 0.0)
         moves = noisy & (spread >= np.maximum(_LEAST, OTHER_STEPS * step))
         still = spread <= 0.0
-        for sensor in (slice(0, 3), slice(3, 6)):
-            # all three at once are not judged: in made logs a gyro has no noise, and is still on each straight
-            still[sensor] &= np.any(moves[sensor])
+        others = [bool(np.any(moves[sensor])) for sensor in reversed(_SENSORS)]
+        for k, sensor in enumerate(_SENSORS):
+            if np.all(still[sensor]):
+                # In made logs a gyro has no noise, and is still on each straight
+                still[sensor] &= others[k] and (self._alive[k] or constant[k])
+            else:
+                still[sensor] &= np.any(moves[sensor])
+                self._alive[k] |= np.any(moves[sensor])
         return still
 
     def _count(self, dead: Bools, begin_s: float, seconds: float) -> None:
@@ -102,3 +176,19 @@ class SensorHealth:
             sick[begin:end] = True
             at = self._saturated[axis] or [float(time_s[begin]), 0.0, 0.0]
             self._saturated[axis] = [at[0], at[1] + 1.0, at[2] + seconds]
+
+    def _find_clipped(self, axis: int, time_s: Array, force: Array) -> None:
+        """Count how often the axis' largest and smallest reading so far occur."""
+        for at, values in ((axis, force), (axis + len(AXES), -force)):
+            end, count, first = self._ends[at]
+            most = float(np.max(values))
+            if most > end:
+                count = 0
+            if most >= max(end, CLIPPED_G):
+                there = values == most
+                first = first if count else float(time_s[np.argmax(there)])
+                self._ends[at] = (most, count + int(np.count_nonzero(there)), first)
+
+    def _is_clipped(self, axis: int, end: tuple[float, int, float]) -> bool:
+        """A log with few digits repeats its largest reading too."""
+        return end[1] >= CLIPPED_SAMPLES and end[0] > CLIPPED_STEPS * self._step[axis]

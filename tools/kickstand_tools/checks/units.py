@@ -7,12 +7,14 @@ direction along the vehicle is the one in which force and change of speed correl
 a rider who moves about add to the force alone: they can make the speed seem to change too little, never too much.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from kickstand.drive_alignment.speed_check import speed_unit_problem
-from kickstand.errors import Refusal
 from kickstand.units import STANDARD_GRAVITY
 
 from ..common.errors import InputError
+from ..common.messages import Message, Remedy
 from ..signals import Array, Ints, best_lag
 from .cells import LogCells
 
@@ -26,6 +28,34 @@ ENOUGH = 10  # seconds of such forces: two or three braking events
 SIGMAS = 5.0  # standard deviations by which the correlation of force and change of speed has to exceed chance
 LAGS_S = np.arange(0.0, 2.1, 0.25)  # by which a satellite receiver's speed may be late
 SHORTEST_S, LONGEST_S = 0.5, 2.2  # between two speeds
+
+
+@dataclass(frozen=True)
+class SpeedUnit(Message):
+    """The speed is not in m/s. factor: its changes over those that the force explains."""
+
+    factor: float
+
+    code = "speed-unit"
+    text = "the speed changes {factor:.1f} times as much as the force says"
+
+    def remedy(self) -> Remedy:
+        """See Message."""
+        if 3.0 < self.factor < 4.4:
+            return Remedy("it is in km/h, m/s are needed")
+        if 1.8 < self.factor < 2.5:
+            return Remedy("it is in mph or knots, m/s are needed")
+        return Remedy("is it in m/s, and the right vehicle's?")
+
+
+@dataclass(frozen=True)
+class SpeedStuck(Message):
+    """The speed does not change, but the vehicle's does."""
+
+    speed_mps: float
+
+    code = "speed-stuck"
+    text = "the speed is stuck at {speed_mps:.1f} m/s while the vehicle speeds up and brakes"
 
 
 def check_units(name: str, time_us: Ints, accel_g: Array) -> None:
@@ -43,8 +73,8 @@ def check_units(name: str, time_us: Ints, accel_g: Array) -> None:
         raise InputError(f"{name}: seconds between samples: is t_s in milliseconds?")
 
 
-def speed_unit(cells: LogCells) -> Refusal | None:
-    """A Refusal if the speed changes too much at most of the strong forces; None if not, or if the log does not show
+def speed_unit(cells: LogCells) -> SpeedUnit | None:
+    """The refusal if the speed changes too much at most of the strong forces; None if not, or if the log does not show
     it."""
     time_s, mps = cells.speeds.T
     seconds = np.diff(time_s)
@@ -66,4 +96,5 @@ def speed_unit(cells: LogCells) -> Refusal | None:
     strong = np.abs(push) > PUSH_G
     if np.count_nonzero(strong) < ENOUGH or np.median(change[strong] / push[strong]) <= MOST_RATIO:
         return None
-    return speed_unit_problem(float(change @ push / (change @ change)))  # the same regression as on the board
+    # the same regression as on the board
+    return SpeedUnit(*speed_unit_problem(float(change @ push / (change @ change))).values)

@@ -1,1 +1,2 @@
-"""The command `kickstand`: each command parses its words, calls a function of these tools, and prints."""
+"""The command `kickstand`: each command parses its arguments, calls a function of these tools, and prints the
+result."""

@@ -1,6 +1,6 @@
 """Commands that other packages add to `kickstand`, by entry points of the group "kickstand.commands".
 
-The name of an entry point is the command's name, its object a click.Command. In the other package's pyproject.toml:
+The name of an entry point is the command's name; its object is a click.Command. In the other package's pyproject.toml:
 
     [project.entry-points."kickstand.commands"]
     laps = "my_package.laps:laps_command"
@@ -39,7 +39,7 @@ def command(entry_point: EntryPoint) -> click.Command:
 
 
 def help_line(entry_point: EntryPoint) -> str:
-    """The line for a command in the list of commands. It says so if the command cannot be loaded."""
+    """The line for a command in the list of commands. It reports a command that cannot be loaded."""
     try:
         return command(entry_point).get_short_help_str(limit=80)
     except InputError as error:
@@ -47,7 +47,7 @@ def help_line(entry_point: EntryPoint) -> str:
 
 
 def owner(error: Exception) -> str:
-    """Whose fault an unexpected error is: the package whose command was running, or kickstand."""
+    """The package responsible for an unexpected error: the one whose command was running, or kickstand."""
     packages = {entry_point.module.partition(".")[0]: _package(entry_point) for entry_point in entry_points().values()}
     for frame, _ in traceback.walk_tb(error.__traceback__):
         package = packages.get(frame.f_globals.get("__name__", "").partition(".")[0], DISTRIBUTION)

@@ -56,7 +56,7 @@ def flash_command(port: str | None, config: bool, yes: bool) -> None:
 
 
 def _agree(lines: list[str]) -> None:
-    """Ask whether these files may get other names. Raises InputError if not."""
+    """Ask whether these files may be renamed. Raises InputError if not."""
     if not sys.stdin.isatty():
         raise InputError(f"{'; '.join(lines)}: run kickstand flash --yes for that")
     for line in lines:
@@ -127,13 +127,13 @@ def record_command(port: str | None, out: Path) -> None:
 
 
 def _live_text(reading: LiveReading) -> str:
-    """The lean as a bar to the left or right, in a car the forces, and how long the recording is."""
+    """The lean as a bar to the left or right (in a car the forces), and the duration of the recording."""
     how_long = f"{reading.rate_hz:3.0f} readings/s  {reading.seconds // 60:.0f}:{reading.seconds % 60:04.1f}"
     lean, forward_g, left_g = reading.moments[-1][1:] if reading.moments else (None, None, None)
     if left_g is not None:  # a car, and aligned
         side = "left " if left_g > 0.0 else "right"
         return f"forward {forward_g:+.2f} g  {side} {abs(left_g):.2f} g  {how_long}"
-    if lean is None:  # as on the display, a lean that is not certain enough is not shown
+    if lean is None:  # as on the display, an uncertain lean is not shown
         return f"{'lean --' if reading.aligned else 'not aligned'}  {how_long}"
     bar = "#" * min(20, round(abs(lean) / 3))
     picture = f"{bar if lean < 0 else '':>20}|{bar if lean > 0 else '':<20}"

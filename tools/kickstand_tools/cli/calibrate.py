@@ -17,11 +17,11 @@ from ..calibration.poses import GOOD_FREE_POSE_G, SixPositions, TwoPositions, fi
 from ..calibration.procedure import fit_procedure
 from ..checks.log import remarks
 from ..checks.mount import of_calibration
+from ..common.messages import OPPOSITE_SIGN
 from ..common.output import check_output
 from ..common.progress import Bar
 from ..estimation.alignment import RideFit, fit_ride
 from ..logs.reader import read_log
-from ..refusals import OPPOSITE_SIGN, sentence
 from .common import OUT, PATH, RIGHT_HANDED, VEHICLES, echo, file_argument, known_to, print_lines, warn
 
 
@@ -187,7 +187,7 @@ def _drive_lines(found: DriveFit, several: bool) -> Iterable[str]:
 
 
 def _event_lines(event: events.DriveEvent, several: bool) -> Iterable[str]:
-    """Of several logs, the name of each is said before its events."""
+    """Print the events; of several logs, print each name before its events."""
     if event.what in (events.LOG_BEGINS, events.LOG_WITHOUT_EVENTS):
         if several:
             yield f"{event.log}:" if event.what == events.LOG_BEGINS else "           no braking in it"
@@ -197,8 +197,8 @@ def _event_lines(event: events.DriveEvent, several: bool) -> Iterable[str]:
         + (f" of {event.needed} needed" if event.counted <= event.needed else ""),
         events.TURNING: "in a turn: not counted",
         events.READY: f"ready: forward known to {event.quality_deg:.1f} degrees",
-        events.NOT_READY: "no longer ready" + (f": {sentence(event.refusal)}" if event.refusal else ""),
-        events.PROBLEM: sentence(event.refusal) if event.refusal else "",
+        events.NOT_READY: "no longer ready" + (f": {event.refusal.line()}" if event.refusal else ""),
+        events.PROBLEM: event.refusal.line() if event.refusal else "",
     }
     yield f"{event.t_s:7.1f} s  {words[event.what]}"
 

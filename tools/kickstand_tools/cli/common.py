@@ -1,4 +1,4 @@
-"""What commands share: arguments and options, the times given to them, notices in words on standard error."""
+"""Shared by commands: arguments and options, their times, notices in words on standard error."""
 
 from collections.abc import Callable, Iterable
 from inspect import cleandoc
@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from kickstand.errors import Notice
 
 from ..common.errors import printable
-from ..refusals import sentence
+from ..common.messages import Message, distinct
 
 if TYPE_CHECKING:
     from ..estimation.alignment import RideFit
@@ -56,7 +55,7 @@ def file_argument(name: str, metavar: str, **more: Any) -> Command:
 
 
 def out_option(words: str) -> Command:
-    """The option --out, which has to be given."""
+    """The required option --out."""
     return click.option("--out", required=True, type=PATH, help=words)
 
 
@@ -119,14 +118,14 @@ def known_to(found: "RideFit") -> str:
     return f"known to: roll {found.roll_deg:.1f}, pitch {found.pitch_deg:.1f}, yaw {found.yaw_deg:.1f} degrees"
 
 
-def warn(log: Path | str, notices: Iterable[Notice]) -> None:
-    """A warning for each notice, once. log: what they are about."""
-    for words in dict.fromkeys(map(sentence, notices)):
-        warning(f"{log}: {words}")
+def warn(log: Path | str, notices: Iterable[Message]) -> None:
+    """Print a warning for each notice, once. log: the name of its log."""
+    for notice in distinct(notices):
+        warning(f"{log}: {notice.line()}")
 
 
 def echo(text: object = "", err: bool = False) -> None:
-    """Print text. Control characters, as in the name of a file in somebody's zip, would be commands to the terminal."""
+    """Print text. Control characters, such as in a file name from a zip, would control the terminal."""
     click.echo(printable(str(text)), err=err)
 
 

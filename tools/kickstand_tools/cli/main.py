@@ -1,4 +1,4 @@
-"""The `kickstand` command. What it refuses: one line on standard error, status 2, nothing written."""
+"""The `kickstand` command. A refusal is one line on standard error with status 2; nothing is written."""
 
 import contextlib
 import importlib
@@ -13,8 +13,8 @@ import click
 from ..common.errors import DISTRIBUTION, InputError, cause, printable
 from . import added
 
-# name: (the module of its function name_command, a line of help). Modules are imported when a command runs: most take
-# numpy, which takes its time
+# name: (the module of its function name_command, a line of help). Modules are imported when a command runs, because
+# most import numpy, which is slow
 COMMANDS = {
     "calibrate": (".calibrate", "Compute a calibration from recorded poses or drives."),
     "check": (".board", "Measure a board and all that is wired to it, in two minutes."),
@@ -40,7 +40,7 @@ COMMANDS = {
 
 
 class CommandGroup(click.Group):
-    """The commands of COMMANDS, and those that other packages add: see added.py."""
+    """The commands of COMMANDS, and those of other packages: see added.py."""
 
     def list_commands(self, ctx: click.Context | None) -> list[str]:
         return sorted(COMMANDS.keys() | added.entry_points().keys())
@@ -73,7 +73,8 @@ def kickstand(context: click.Context) -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """The console script: runs a command and leaves with its exit status."""
-    # Before a command imports numpy. The matrices are small: more threads would take twice the processor for nothing
+    # Set this before a command imports numpy. The matrices are small: more threads would double the processor time for
+    # nothing
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         with _ended_by_signals():
@@ -100,7 +101,7 @@ def main(arguments: list[str] | None = None) -> None:
     except UnicodeError as error:
         _refuse(f"a name or a text is not in the letters that it should be in ({error}): rename the file")
     except Exception as error:
-        if sys.flags.dev_mode:  # python -X dev: for whoever looks for the fault
+        if sys.flags.dev_mode:  # python -X dev: for debugging
             raise
         _refuse(f"unexpected {type(error).__name__}: {error}: a fault in {added.owner(error)}, please report it")
 
@@ -115,7 +116,7 @@ class _Ended(BaseException):
 
 @contextlib.contextmanager
 def _ended_by_signals() -> Iterator[None]:
-    """A context in which kill and a closed terminal raise _Ended, so that no temporary file is left."""
+    """A context in which kill and a closed terminal raise _Ended: then no temporary file is left."""
 
     def end(number: int, _frame: object) -> None:
         raise _Ended(number)

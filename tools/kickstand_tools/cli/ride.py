@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-from kickstand.errors import Notice
 from rich.console import Console
 from rich.table import Table
 
@@ -18,6 +17,7 @@ from ..analysis.report import as_data, page
 from ..analysis.ride import Ride, calibration_beside, open_ride
 from ..calibration.file import CalibrationFile, calibration_path, read_calibration
 from ..common.errors import InputError
+from ..common.messages import Message, WrongAxes, distinct
 from ..common.output import check_output, whole_file
 from ..common.progress import Bar, spinner
 from ..estimation.alignment import fit_ride
@@ -30,7 +30,6 @@ from ..logs.csv_lines import cut_log
 from ..logs.log import Log, Stretch
 from ..logs.reader import Source, is_log
 from ..overlay.overlay import overlay
-from ..refusals import WRONG_AXES, sentence
 from ..replay.replay import replay_to_csv
 from . import common
 
@@ -80,7 +79,7 @@ def import_command(
         common.echo("If the sensor has been moved since, recalibrate: kickstand calibrate ride")
     elif found.shortfalls:
         common.warn(source, found.shortfalls)
-    elif not any(notice.code in WRONG_AXES for notice in found.notices):
+    elif not any(isinstance(notice, WrongAxes) for notice in found.notices):
         common.echo(f"next: kickstand calibrate ride {out} --out {beside}")
         common.echo(f"      kickstand report {out}")
         common.echo(f"      kickstand plot {out} --out plots")
@@ -240,7 +239,7 @@ def cut_command(log: Path, from_s: float | None, to_s: float | None, out: Path) 
     if from_s is None and to_s is None:
         raise click.UsageError("Give --from, --to or both: seconds from the beginning of the log.")
     check_output(out, [log])
-    notices: list[Notice] = []
+    notices: list[Message] = []
     with Bar("cutting") as bar:
         count, seconds = cut_log(log, out, from_s, to_s, bar.reach, notices)
     common.warn(log, notices)
@@ -290,8 +289,8 @@ def overlay_command(
 
 
 def _from_export(source: Path, calibration: Path | None) -> tuple[Imported, CalibrationFile] | None:
-    """An app's export or a table, imported, with its calibration: the one given or beside it, else it is aligned by its
-    bends; a line says so. None for anything else, such as a log."""
+    """Import an app's export or a table, with its calibration: the given one, or the one beside it; otherwise it is
+    aligned by its bends, which a line reports. None for anything else, such as a log."""
     found = None
     if not is_log(source):
         with spinner("importing"):
@@ -312,7 +311,7 @@ def _from_export(source: Path, calibration: Path | None) -> tuple[Imported, Cali
     return found, known
 
 
-def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> tuple[Ride, list[Notice]]:
+def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> tuple[Ride, list[Message]]:
     """A ride, and notices about its import. See _from_export()."""
     taken = _from_export(source, calibration)
     if taken is None:
@@ -323,7 +322,7 @@ def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float
 
 def _log_of(source: Path, calibration: Path | None, out: Path) -> tuple[Path | Log, CalibrationFile]:
     """A ride's log and its calibration; notices about its import are printed. See _from_export(). Raises InputError
-    without a calibration, and where writing out would fail or destroy an input."""
+    without a calibration, and if writing out would fail or destroy an input."""
     if is_log(source) or source.suffix.lower() == ".json":
         return source, read_calibration(_given_or_beside(source, calibration, out))
     check_output(out, [*_inputs(source), *([calibration] if calibration else [])])
@@ -335,28 +334,27 @@ def _log_of(source: Path, calibration: Path | None, out: Path) -> tuple[Path | L
 
 
 def _overview(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> Overview:
-    """The overview of a ride of _opened(), in front of its notices those of the import; all are printed."""
+    """The overview of a ride from _opened(). Its notices begin with those of the import; all are printed."""
     opened, imported = _opened(source, calibration, live, **stretch)
     with Bar("reading") as bar:
         seen = overview(opened, bar.reach)
-    known = {sentence(notice) for notice in seen.notices}  # the log that was imported is checked again
-    seen.notices[:0] = [notice for notice in imported if sentence(notice) not in known]
+    seen.notices = distinct([*imported, *seen.notices])  # the imported log is checked again
     common.warn(source, seen.notices)
     return seen
 
 
 def _inputs(source: Path) -> list[Path]:
-    """The files that writing must not destroy: the source, or what is in it."""
+    """The files that writing must not destroy: the source or its content."""
     return sorted(source.rglob("*")) if source.is_dir() else [source]
 
 
 def _stretch(log: Path | Log, from_s: float | None = None, to_s: float | None = None) -> Source:
-    """What the options of STRETCH leave of a log."""
+    """The part of a log selected by the options of STRETCH."""
     return log if from_s is None and to_s is None else Stretch(log, from_s, to_s)
 
 
 def _given_or_beside(ride: Path, calibration: Path | None, out: Path, *inputs: Path) -> Path:
-    """The calibration. Raises InputError without one, and where writing out would fail or destroy an input."""
+    """The calibration. Raises InputError without one, and if writing out would fail or destroy an input."""
     calibration = calibration or calibration_beside(ride)
     check_output(out, [ride, calibration, *inputs])
     return calibration
@@ -395,7 +393,7 @@ def _joined_lines(joined: Joined) -> Iterator[str]:
         "track's first point"
     )
     yield f"match: correlation {found.correlation:.2f} over {found.common_s / 60.0:.1f} minutes"
-    if abs(found.drift) * found.common_s > 3.0 * found.sigma_s:  # less is not known from a ride of this length
+    if abs(found.drift) * found.common_s > 3.0 * found.sigma_s:  # a smaller drift is uncertain
         yield f"the ride's clock is {abs(found.drift) * 1e6:.0f} ppm {'slow' if found.drift > 0.0 else 'fast'}"
     if joined.own_speed:
         yield "the log's own speed is kept"

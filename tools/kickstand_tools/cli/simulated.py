@@ -14,7 +14,7 @@ from ..simulation.physics.road import CLASSES
 from ..simulation.profiles import MAIN, PROFILES
 from .common import OUT_DIRECTORY, Command, echo
 
-LINES_S = 10.0  # between two lines of progress where there is no terminal for a bar
+LINES_S = 10.0  # between two lines of progress without a terminal for a bar
 PROFILE_NAMES = f"{', '.join(MAIN)}; hard ones: {', '.join(name for name in PROFILES if name not in MAIN)}."
 
 
@@ -23,7 +23,7 @@ def seconds_option(least: float, words: str) -> Command:
 
 
 def pose_options(pitch_change_deg: float | None, words: str) -> Command:
-    """What is not as it should be in the two poses."""
+    """The errors of the two poses."""
 
     def add(command: Command) -> Command:
         upright, pitch = click.FloatRange(-30.0, 30.0), click.FloatRange(-10.0, 10.0)

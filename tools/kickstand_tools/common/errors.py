@@ -2,29 +2,55 @@
 
 import sys
 
-from ..remedies import COMMANDS, Remedies
 from . import firmware_path
+from .messages import NOTHING_TO_DO, Message, Plain, Remedy
 
 DISTRIBUTION = "kickstand-lean"  # as in pyproject.toml; the package "kickstand" belongs to another project
 
 
 class InputError(Exception):
-    """Something that the user has given cannot be used. Its text is one line: what is wrong, and what to do.
+    """Input from the user that cannot be used. The text is one line: the fault, and what to do.
 
-    what: what is wrong, and what to do about it if the command line and the pages say that in the same words. If not,
-    remedy: the name in remedies.py of what to do, and values: what is put into its words for {0}, {1} ...
+    what: a Message, or what is wrong in words. remedy: what to do about it; leave it out if `what` says it in words
+    that suit a terminal and a page.
     """
 
-    def __init__(self, what: str, remedy: str = "", *values: str) -> None:
-        super().__init__(what, remedy, *values)
+    def __init__(self, what: Message | str, remedy: Remedy = NOTHING_TO_DO) -> None:
+        super().__init__(what, remedy)
+        self.message = Plain(what, remedy) if isinstance(what, str) else what
 
     def __str__(self) -> str:
-        return self.said(COMMANDS)
+        return self.line()
 
-    def said(self, remedies: Remedies) -> str:
-        """The line with these words for what to do."""
-        what, remedy, *values = self.args
-        return f"{what}: {remedies[remedy].format(*values)}" if remedy else what
+    def line(self, page: bool = False) -> str:
+        """What is wrong and what to do, in one line. page: in the words of a page, not of a terminal."""
+        return self.message.line(page)
+
+
+class RefusedInput(InputError):
+    """Data that a check refuses, or the firmware's own modules. message: the reason, with its code and its fields.
+
+    where: put before the line, usually the file. advice: put after it.
+    """
+
+    def __init__(self, message: Message, where: str = "", advice: str = "") -> None:
+        super().__init__(message)
+        self.args = message, where, advice  # what it is pickled with: another process may raise it
+        self.where, self.advice = where, advice
+
+    @property
+    def code(self) -> str:
+        """The code of the reason."""
+        return self.message.code
+
+    def at(self, where: str) -> "RefusedInput":
+        """The same refusal of data from `where`."""
+        return RefusedInput(self.message, where, self.advice)
+
+    def line(self, page: bool = False) -> str:
+        """See InputError."""
+        line = f"{self.message.line(page)}{self.advice}"
+        return f"{self.where}: {line}" if self.where else line
 
 
 def cause(error: BaseException) -> str:

@@ -115,7 +115,7 @@ def flush_to_disk(path: Path) -> None:
     nor the new (fsync(2)).
     """
     directory = path.is_dir()
-    if sys.platform == "emscripten" or (directory and os.name == "nt"):  # has no disk; opens no directories
+    if sys.platform == "emscripten" or (directory and os.name == "nt"):  # no disk; cannot open directories
         return
     number = os.open(path, os.O_RDONLY if directory else os.O_RDWR)
     try:

@@ -1,3 +1,3 @@
-"""`kickstand demo`: device.py runs the firmware on the simulated board in a process of its own; the other modules draw
-or print what its display shows, and score it. `kickstand emulate` uses screen, keyboard and hand_bike too.
+"""`kickstand demo`: device.py runs the firmware on the simulated board in a separate process. The other modules draw or
+print its display, and score it. `kickstand emulate` uses screen, keyboard and hand_bike too.
 """

@@ -16,14 +16,14 @@ from .score import Score, table
 from .screen import lcd_lines, lean_text, oled_lines, screen
 
 SCRIPT_SPEED, HAND_SPEED = 1.5, 1.0  # simulated seconds per second when drawn in a terminal
-FRAME_S = 0.25  # when printed: the shortest time between two frames of the same page
+FRAME_S = 0.25  # when printed: shortest time between two frames of the same page
 _KEYS = {"b": "short", "B": "long", " ": "long", "p": "pause", "q": "quit"}
 _HELP = "b button  B long press  p pause  q quit"
 _HAND_HELP = "b button  B long press  a/d lean  k kickstand  u upright  p pause  q quit"
 
 
 class DeviceStopped(Exception):
-    """The device ended before its time was up. Its text is what the device wrote to its console."""
+    """The device ended too early. The text is the device's console output."""
 
 
 def _watch(device: DeviceProcess, engine: str, by_hand: bool, score: Score) -> None:
@@ -47,7 +47,7 @@ def _watch(device: DeviceProcess, engine: str, by_hand: bool, score: Score) -> N
 
 
 def _print(device: DeviceProcess, score: Score, console: bool) -> None:
-    """Print each frame of the display when it changes. console: also what the board prints."""
+    """Print each frame of the display when it changes. console: also print the board's console output."""
     said, said_s = [""], 0.0
     while not device.ended:
         ticks = device.ticks(1.0)
@@ -69,9 +69,9 @@ def _print(device: DeviceProcess, score: Score, console: bool) -> None:
 def demo(hand: bool = False, cpython: bool = False, display: str = "lcd", user: Path | None = None) -> None:
     """Run the demo until it ends or the user quits, then print the score.
 
-    hand: the bike is steered with keys. cpython: on CPython, not on MicroPython. display: "lcd", "ssd1306" or "sh1106".
-    user: own code for the board; then its console is printed, too.
-    Raises InputError where there is no terminal to steer in, DeviceStopped if the device ended early.
+    hand: the user steers the bike with keys. cpython: run on CPython, not on MicroPython. display: "lcd", "ssd1306" or
+    "sh1106". user: the user's code for the board; then its console is printed, too.
+    Raises InputError without a terminal for steering, DeviceStopped if the device ended early.
     """
     watched = sys.stdin.isatty() and sys.stdout.isatty()
     if hand and not watched:

@@ -3,9 +3,9 @@
     device.py script|hand SPEED DISPLAY
 
 SPEED: simulated seconds per second, 0 for as fast as possible. DISPLAY: "lcd", "ssd1306" or "sh1106". Every 50
-simulated ms a line of JSON goes to standard output (see score.State); other lines are the firmware's console. Commands
-come from standard input, one a line: short, long (presses of the button), left, right, kickstand, upright (if the bike
-is steered by hand), pause, quit.
+simulated ms it prints a line of JSON (see score.State); other lines are the firmware's console. It reads commands from
+standard input, one per line: short, long (presses of the button), left, right, kickstand, upright (to steer the bike by
+hand), pause, quit.
 """
 
 import json
@@ -27,8 +27,8 @@ HAND_LIMIT_S = 3600.0
 BATTERY_V = 12.6 / 11  # at GPIO 26, behind the divider of firmware/examples/user_battery.py
 LONG_PRESS_S = 1.2
 
-# The rider presses the button once on the kickstand and once upright, and turns to two other pages after the ride; with
-# a user.py also to its first page, after the first turn
+# The rider presses the button once on the kickstand and once upright, and switches to two other pages after the ride.
+# With a user.py the rider also switches to its first page, after the first turn
 SCRIPT = (
     kickstand(8.0),
     upright(7.5),
@@ -87,7 +87,7 @@ class Commands:
 
 
 def seen(board, bike, of_s=None):
-    """What score.State has, but for an OLED's pixels."""
+    """The fields of score.State, except an OLED's pixels."""
     t_s = board.clock.now_us / 1e6
     lean_deg, speed_mps, _, phase = bike.truth(t_s)
     return {
@@ -118,7 +118,7 @@ class Demo:
         sensor = Sensor(seed=PART_SEED, share=PART_SHARE)
         self.board = Board(sensor.world(self.bike.motion), clock=Clock(speed), display=display)
         self.board.volts[26] = BATTERY_V
-        self._pixels, self._seen = "", -1  # of an OLED, and its count of changes then
+        self._pixels, self._seen = "", -1  # an OLED's pixels, and its count of changes at that time
         if not by_hand:
             self.board.press(KICKSTAND_PRESS_S)
             self.board.press(UPRIGHT_PRESS_S)
@@ -127,7 +127,7 @@ class Demo:
         self.board.every(TICK_S, self._tick)
 
     def run(self):
-        """Power on, and start again after every reset, until time is up or "quit" comes."""
+        """Power on, and restart after every reset, until time is up or "quit" arrives."""
         self.board.install()
         from kickstand.start import main  # after install(), which replaces `machine` and `time`
         from kickstand.ui.page_ring import MOTORCYCLE  # the owner's pages are behind these

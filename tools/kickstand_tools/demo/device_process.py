@@ -1,4 +1,4 @@
-"""The demo's device (device.py) in a process of its own, under MicroPython or CPython."""
+"""Runs the demo's device (device.py) in a separate process, on MicroPython or CPython."""
 
 import contextlib
 import json
@@ -48,7 +48,7 @@ class DeviceProcess:
             text=True,
             encoding="utf-8",
             errors="replace",
-            start_new_session=True,  # Ctrl-C is for this process alone
+            start_new_session=True,  # Ctrl-C is only for this process
         )
         threading.Thread(target=self._read, daemon=True).start()
 
@@ -71,7 +71,7 @@ class DeviceProcess:
         self._lines.put(None)
 
     def hang_up(self) -> None:
-        """Close the device's standard input, at which it quits."""
+        """Close the device's standard input: then it quits."""
         assert self._process.stdin
         with contextlib.suppress(OSError):
             self._process.stdin.close()
@@ -85,11 +85,11 @@ class DeviceProcess:
 
     @property
     def failed(self) -> bool:
-        """True if it ended before its time was up."""
+        """True if it ended too early."""
         return self.ended and self._outcome != "off"
 
     def ticks(self, wait_s: float) -> list[State]:
-        """The ticks that have arrived; waits up to wait_s for the first. Sets `ended` with the last of all."""
+        """The ticks that have arrived; waits up to wait_s for the first. Sets `ended` after the last one."""
         ticks = []
         with contextlib.suppress(queue.Empty):
             line = self._lines.get(timeout=wait_s)

@@ -1,4 +1,4 @@
-"""A simulated bike that is steered by hand, with keys or in the browser. Plain Python for CPython and MicroPython.
+"""A simulated bike steered by hand, with keys or in the browser. Plain Python for CPython and MicroPython.
 
 Its motion follows the same equations as simulation/scripted/script.py.
 """
@@ -43,7 +43,7 @@ class HandBike:
         self._sway = 0.0  # amplitude, rad
 
     def command(self, name):
-        """left, right: set off, then lean 5 degrees further; upright, kickstand: stop and stand so."""
+        """left, right: set off, then lean 5 degrees further; upright, kickstand: stop and stand in this pose."""
         if name in ("kickstand", "upright"):
             self.stand(name)
         elif name in ("left", "right") and self._pose != "kickstand":
@@ -58,12 +58,14 @@ class HandBike:
         self._lean_wish = 0.0
 
     def ride(self, speed_mps):
-        """Set off, or ride on, at this speed in m/s: more than script.RIDING_MPS, or the bike would not lean."""
+        """Set off, or change speed, to this speed in m/s. It must be over script.RIDING_MPS, or the bike would not
+        lean."""
         self._pose = "riding"
         self._cruise = speed_mps
 
     def lean_to(self, lean_deg):
-        """Lean so far, > 0 to the right, in degrees; 50 at most. While the bike stands or sets off it stays upright."""
+        """Lean to this angle, > 0 to the right, in degrees; 50 at most. The bike stays upright while it stands or sets
+        off."""
         self._lean_wish = max(-MAX_LEAN_DEG, min(MAX_LEAN_DEG, lean_deg))
 
     def _advance(self, t_s):
@@ -96,7 +98,7 @@ class HandBike:
         return lean, lean_rate, yaw_rate_in_balance(lean, STANDARD_GRAVITY, self._speed)
 
     def motion(self, t_s):
-        """Specific force (g) along, and rates (deg/s) about left, up, forward, vibration included."""
+        """Specific force (g) along, and rates (deg/s) about left, up, forward, including vibration."""
         lean, lean_rate, yaw_rate = self._attitude(t_s)
         clean = body_motion(lean, lean_rate, self._speed, self._acceleration, yaw_rate)
         engine = min(1.0, self._speed / 2.0)

@@ -1,4 +1,4 @@
-"""Single key presses from the terminal, without waiting for Enter: Linux, macOS and Windows."""
+"""Reads single key presses from the terminal, without waiting for Enter: Linux, macOS and Windows."""
 
 import contextlib
 import os
@@ -6,14 +6,14 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 
-# Key of a bike that is steered by hand, and the command of hand_bike.HandBike
+# Key for steering a bike, and the command of hand_bike.HandBike
 BIKE_KEYS = {"a": "left", "left": "left", "d": "right", "right": "right", "k": "kickstand", "u": "upright"}
 
 _LEFT, _RIGHT = ("\x1b[D", "\x1bOD", "\xe0K"), ("\x1b[C", "\x1bOC", "\xe0M")  # the last of each: on Windows
 
 
 def split(text: str) -> list[str]:
-    """What was typed, key by key: characters, and "left" and "right" for arrows. Other special keys are dropped."""
+    """Split typed text into keys: characters, and "left" and "right" for arrows. Other special keys are dropped."""
     keys = []
     while text:
         size = 3 if text[:2] in ("\x1b[", "\x1bO") else 2 if text[0] in "\xe0\0" else 1

@@ -1,4 +1,4 @@
-"""The lean on the LCD compared with the true one."""
+"""Compares the lean on the LCD with the true one."""
 
 from math import sqrt
 from typing import NamedTuple, NotRequired, TypedDict
@@ -12,9 +12,9 @@ _STANDING = ("kickstand", "upright", "moving", "wait")
 
 
 class State(TypedDict):
-    """One tick of the device. of_s: how long the run will take, None if steered by hand; lcd: both lines;
-    lean_deg: the true lean, > 0 to the right; phase: what the bike does; pressed: True while the button is. pixels:
-    of an OLED, 64 rows of 128, 8 pixels a byte, the leftmost in bit 7, as hex."""
+    """One tick of the device. of_s: duration of the run, None if steered by hand; lcd: both lines; lean_deg: the true
+    lean, > 0 to the right; phase: the bike's action; pressed: True while the button is pressed. pixels: of an OLED, 64
+    rows of 128, 8 pixels per byte, the leftmost in bit 7, as hex."""
 
     t_s: float
     of_s: float | None
@@ -27,7 +27,7 @@ class State(TypedDict):
 
 
 class Figures(NamedTuple):
-    """Shown against true lean in one part of the ride, degrees. Errors: shown less true."""
+    """Shown and true lean in one part of the ride, degrees. Errors: shown minus true."""
 
     samples: int
     true_mean: float
@@ -38,7 +38,7 @@ class Figures(NamedTuple):
 
 class Score:
     """Collects true and shown lean (degrees, > 0 to the right) of the ticks that show the lean page, by part of the
-    ride; figures() sums them up."""
+    ride. figures() summarises them."""
 
     def __init__(self) -> None:
         self._pairs: dict[str, list[tuple[float, float]]] = {}  # part of the ride: (true, shown) in degrees
@@ -71,7 +71,7 @@ class Score:
 
 
 def table(figures: dict[str, Figures]) -> Table | str:
-    """Score.figures() for a terminal: a row for each part of the ride, then the whole."""
+    """Score.figures() for a terminal: one row per part of the ride, then the whole."""
     if not figures:
         return "The lean was not shown yet."
     table = Table(

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..common.errors import InputError
+from ..common.messages import Remedy
 from . import check_guest
 from .check_limits import BAD, GOOD, JUDGES, LOOK, SKIPPED, Finding
-from .connection import Port, connected, describe, last_line, refuse_unfit_firmware, restart
+from .connection import UPDATE, Port, connected, describe, last_line, refuse_unfit_firmware, restart
 
 TRANSFERS = 10_000  # to the sensor
 TEXTS = 20  # on the display
@@ -22,6 +23,9 @@ _GENUINE = 0x68  # the WHO_AM_I whose self-test is known
 
 # Called with a program for the board; returns its output. Raises GuestFailed
 Ask = Callable[[str], str]
+
+
+_SAYS_WHY = Remedy("kickstand status says why", "the status of the board says why")
 
 
 class GuestFailed(Exception):
@@ -81,10 +85,8 @@ def measured(ask: Ask, say: Callable[[str], None], name: str = "the board") -> l
     except GuestFailed as failed:
         refuse_unfit_firmware(str(failed), name)
         if "SettingsError" in str(failed):
-            raise InputError(f"{name}: config.py cannot be used: kickstand status says why") from failed
-        raise InputError(
-            f"the board at {name} cannot be checked ({failed}): kickstand flash brings it up to date"
-        ) from None
+            raise InputError(f"{name}: config.py cannot be used", _SAYS_WHY) from failed
+        raise InputError(f"the board at {name} cannot be checked ({failed})", UPDATE) from None
     found: list[Finding] = []
     check = _Check(ask, say, found)
     check.step("board")

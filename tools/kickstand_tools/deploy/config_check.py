@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..common import firmware_path
 from ..common.errors import InputError
+from ..common.messages import Remedy
 from ..simulated_board.simulator import Board
 from . import bytecode
 from .config_text import cleaned
@@ -35,13 +36,14 @@ _MODULES = set(
     "array asyncio binascii builtins cmath collections errno gc hashlib heapq io json math os platform random re "
     "select socket ssl struct sys time zlib __future__".split()
 )
+CORRECT = Remedy("correct it and run this command again", "correct it, then install again")
 LONGEST_S = 60.0  # longest time for a config.py to run, on a busy computer
 
 
 @dataclass(frozen=True)
 class Judged:
-    """fault: the fault that would make a board refuse the file, with line and remedy, or None. unused: settings that
-    differ from their defaults but are behind a '#', each with its line."""
+    """fault: the fault that would make a board refuse the file, with its line, or None. unused: settings that differ
+    from their defaults but are behind a '#', each with its line."""
 
     fault: str | None
     unused: list[str]
@@ -72,7 +74,7 @@ def in_words(path: Path, fault: tuple[int | None, str] | None, unused: list[tupl
     said = None
     if fault:
         line, reason = fault
-        said = f"{path}{f', line {line}' if line else ''}: {reason}: correct it and run this command again"
+        said = f"{path}{f', line {line}' if line else ''}: {reason}"
     return Judged(said, [f"{path}, line {line}: {text}" for line, text in unused])
 
 

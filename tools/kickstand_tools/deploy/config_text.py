@@ -5,6 +5,7 @@ import codecs
 import re
 
 from ..common.errors import InputError
+from ..common.messages import Remedy
 
 
 def cleaned(data: bytes) -> bytes:
@@ -20,9 +21,9 @@ def cleaned(data: bytes) -> bytes:
         encoding = "utf-16" if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8"
         text = data.decode(encoding).replace("\ufeff", "")
     except UnicodeDecodeError as error:
-        raise InputError("config.py is not text in UTF-8: save it in that encoding") from error
+        raise InputError("config.py is not text in UTF-8", Remedy("save it in that encoding")) from error
     if "\0" in text:
-        raise InputError("config.py is not text in UTF-8: save it in that encoding")
+        raise InputError("config.py is not text in UTF-8", Remedy("save it in that encoding"))
     return text.encode()
 
 
@@ -102,7 +103,7 @@ def _assigned(text: str) -> dict[str, ast.Assign]:
             ast.literal_eval(node.value)
         except (ValueError, TypeError, RecursionError) as error:
             raise InputError(
-                f"config.py, line {node.lineno} computes {target.id}, it is no plain value: change this file by hand"
+                f"config.py, line {node.lineno} computes {target.id}, it is not a literal: change this file by hand"
             ) from error
         found[target.id] = node
     return found
@@ -112,6 +113,6 @@ def _check(name: str, value: str) -> None:
     try:
         ast.literal_eval(value)
     except (SyntaxError, ValueError, RecursionError) as error:
-        raise InputError(f"{name} = {value} is no value: texts stand in quotes") from error
+        raise InputError(f"{name} = {value} is not a value: put text in quotes") from error
     if "\n" in value or "\r" in value:
-        raise InputError(f"{name}: a value stands in one line")
+        raise InputError(f"{name}: a value must be on one line")

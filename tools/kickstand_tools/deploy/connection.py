@@ -7,6 +7,7 @@ import io
 import math
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any, cast
 
 import serial
@@ -15,6 +16,7 @@ from mpremote.transport_serial import SerialTransport
 from serial.tools import list_ports
 
 from ..common.errors import InputError, cause
+from ..common.messages import Message, Remedy
 
 # Called with the current action, the bytes done and the total bytes.
 Progress = Callable[[str, int, int], None]
@@ -39,6 +41,58 @@ VENDORS = {
     0x0403: "FTDI",
 }
 _DEBUG_PROBE = (0x2E8A, 0x000C)  # a device of the same vendor that is not a board
+
+
+UPDATE = Remedy("kickstand flash brings it up to date", "the page Install brings it up to date")
+
+
+@dataclass(frozen=True)
+class ConnectionLost(Message):
+    """The port of that name gave this error. A page has one port, and its browser gives no cause."""
+
+    name: str
+    cause: str
+
+    text = "{name}: connection lost ({cause})"
+    todo = Remedy("plug the board in again, then repeat")
+
+    def line(self, page: bool = False) -> str:
+        """See Message."""
+        return f"connection lost: {self.todo.words(page)}" if page else super().line()
+
+
+@dataclass(frozen=True)
+class NotInstalled(Message):
+    """There is no Kickstand on the board at the port of that name."""
+
+    name: str
+
+    text = "Kickstand is not on the board at {name}"
+    todo = Remedy("kickstand flash puts it there", "the page Install puts it there")
+
+
+@dataclass(frozen=True)
+class UnfitFirmware(Message):
+    """The firmware on the board at the port of that name lacks a module. An update that was broken off lacks modules
+    too."""
+
+    name: str
+    missing: str
+
+    text = "the firmware on the board at {name} is of another version or not whole ({missing})"
+    todo = UPDATE
+
+
+@dataclass(frozen=True)
+class NoAnswer(Message):
+    """A program that uses the firmware has failed on the board at the port of that name. what: its result."""
+
+    name: str
+    what: str
+    reason: str
+
+    text = "the board at {name} cannot give {what} ({reason})"
+    todo = UPDATE
 
 
 class ConnectedBoard(SerialTransport):
@@ -113,7 +167,7 @@ def connected(port: Port) -> Iterator[tuple[ConnectedBoard, str]]:
             raise InputError(f"the board at {name} is full: remove files of your own from it") from error
         if error.errno in (errno.EILSEQ, 84, 52):  # an error on the board, which mpremote raises here
             raise InputError(f"{name}: the board's file system is damaged: erase its flash: {_NUKE}") from error
-        raise InputError(f"{name}: connection lost ({cause(error)}): plug the board in again, then repeat") from error
+        raise InputError(ConnectionLost(name, cause(error))) from error
     finally:
         with contextlib.suppress(OSError):
             transport.close()  # its port may be gone or restarting
@@ -131,13 +185,11 @@ def find_port() -> str:
     """The port of the only board that is plugged in. Raises InputError for none, or more than one."""
     found = [p for p in list_ports.comports() if p.vid in VENDORS and (p.vid, p.pid) != _DEBUG_PROBE]
     if not found:
-        raise InputError(
-            "no board found: plug it in with a USB cable that carries data, put MicroPython on it if it is "
-            "new, or name its port with --port"
-        )
+        plug_in = "plug it in with a USB cable that carries data, put MicroPython on it if it is new, or name its port "
+        raise InputError("no board found", Remedy(plug_in + "with --port"))
     if len(found) > 1:
         names = ", ".join(f"{p.device} ({VENDORS[p.vid]})" for p in sorted(found, key=lambda p: p.device))
-        raise InputError(f"several boards found: {names}: name one with --port")
+        raise InputError(f"several boards found: {names}", Remedy("name one with --port"))
     return found[0].device
 
 
@@ -150,13 +202,15 @@ def why_closed(port: str) -> InputError:
     except OSError as error:
         text = str(error)
         if error.errno in (errno.EBUSY, errno.EAGAIN) or "PermissionError" in text:  # the latter on Windows
-            return InputError(f"{port} is in use: close the other program that has it open")
+            return InputError(f"{port} is in use", Remedy("close the other program that has it open"))
         if error.errno in (errno.EACCES, errno.EPERM):
             return InputError(f"no permission for {port}: on Linux join the group dialout and log in again")
         if error.errno == errno.ENOENT or "FileNotFoundError" in text:
-            return InputError(f"there is no port {port}: plug the board in, or leave --port out to have it found")
+            return InputError(
+                f"there is no port {port}", Remedy("plug the board in, or leave --port out to have it found")
+            )
         if port.startswith("socket:") and "refused" in text:
-            return InputError(f"nothing listens at {port}: is kickstand emulate running?")
+            return InputError(f"nothing listens at {port}", Remedy("is kickstand emulate running?"))
         return InputError(f"{port} cannot be opened: {text}: check the name and the cable")
     return InputError(f"{port} could not be opened at first, and now can: try again")
 
@@ -221,7 +275,7 @@ def printed(transport: SerialTransport, name: str, code: str, what: str) -> byte
         if "CardError" in reason or "SettingsError" in reason:
             raise InputError(f"{name}: {reason.partition(': ')[2]}")
         refuse_unfit_firmware(reason, name)
-        raise InputError(f"the board at {name} cannot give {what} ({reason}): bring it up to date with kickstand flash")
+        raise InputError(NoAnswer(name, what, reason))
     return output
 
 
@@ -243,23 +297,20 @@ def refuse_unfit_firmware(reason: str, name: str) -> None:
     After an interrupted update, modules are missing too.
     """
     if "no module named 'kickstand'" in reason:
-        raise InputError(f"Kickstand is not on the board at {name}: kickstand flash puts it there")
+        raise InputError(NotInstalled(name))
     missing = reason.partition("ImportError: ")[2]
     if "kickstand" in missing:
-        raise InputError(
-            f"the firmware on the board at {name} is of another version or not whole ({missing}): "
-            "kickstand flash brings it up to date"
-        )
+        raise InputError(UnfitFirmware(name, missing))
 
 
 def last_line(text: str) -> str:
     """The exception at the end of a traceback."""
-    return text.strip().rpartition("\n")[2].strip() or "an error without words"
+    return text.strip().rpartition("\n")[2].strip() or "an unknown error"
 
 
 def _enter(transport: SerialTransport, name: str) -> None:
     """Ctrl-C, then a soft reset into the raw prompt, which does not start main.py."""
-    for limit_s in (_STARTING_S, ANSWER_S):  # a board that resets when its port is opened is starting the first time
+    for limit_s in (_STARTING_S, ANSWER_S):  # a board may reset when its port is opened: it is starting
         try:
             with contextlib.redirect_stdout(io.StringIO()):  # mpremote prints input that it did not understand
                 transport.enter_raw_repl(timeout_overall=limit_s)

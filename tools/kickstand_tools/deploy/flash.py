@@ -80,7 +80,7 @@ def flash(
             config = source if replace_config or there.config is None else None
             judged = judged_here(source)
             if config and judged.fault:
-                raise InputError(judged.fault)
+                raise InputError(judged.fault, config_check.CORRECT)
             wanted, why_sources = _contents(transport, compiler)
             wanted[CONFIG] = cleaned(source.read_bytes())
             if not config and there.mended and there.config is not None:

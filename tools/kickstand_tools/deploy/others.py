@@ -12,8 +12,9 @@ from mpremote.transport_serial import SerialTransport
 
 from ..common import firmware_path
 from ..common.errors import InputError
+from ..common.messages import Remedy
 from .board_files import BoardFiles, survey
-from .config_check import Judged
+from .config_check import CORRECT, Judged
 from .config_text import cleaned
 from .firmware_files import CONFIG, MAIN, PACKAGE
 
@@ -37,6 +38,11 @@ _OWN_MAIN = {
     "8744d5fdcd8f23fe",
     "901754b7b5d06b9c",
 }
+
+
+_CORRECT_OR_REPLACE = Remedy(
+    f"{CORRECT.terminal}, or replace that file with kickstand flash --config", CORRECT.words(page=True)
+)
 
 
 @dataclass(frozen=True)
@@ -91,7 +97,7 @@ def find(there: Contents, judge: Callable[[Path], Judged], replace_config: bool)
             leave.append(CONFIG)
             own = None
         elif fault and not replace_config:
-            raise InputError(f"{fault}, or replace that file with kickstand flash --config")
+            raise InputError(fault, _CORRECT_OR_REPLACE)
         else:
             own, mended = config, config != own
     taken = set(there.files.files)
@@ -107,7 +113,7 @@ def _judged(content: bytes, judge: Callable[[Path], Judged]) -> tuple[bytes, str
     try:
         content = cleaned(content)
     except InputError as error:
-        return content, str(error).replace("config.py", _ON_THE_BOARD, 1)
+        return content, error.message.sentence().replace("config.py", _ON_THE_BOARD, 1)
     with tempfile.TemporaryDirectory() as directory:
         path = Path(directory) / "config.py"
         path.write_bytes(content)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
 from ..common.errors import InputError
+from ..common.messages import Remedy
 from .board_files import BoardFiles, fingerprint
 from .firmware_files import CONFIG, MAIN, MODULE_ENDINGS, PACKAGE, unfinished
 
@@ -97,11 +98,14 @@ def refuse_without_room(update: Update, board: BoardFiles) -> None:
     blocks = needed_blocks(update, board)
     if blocks <= board.free_blocks:
         return
-    remedy = "remove files of your own from it"
+    remedy = Remedy("remove files of your own from it")
     if board.has_rides and f"{PACKAGE}/rides" in board.folders:  # firmware up to 0.4 must be updated before that
-        remedy = "pull the rides with kickstand pull --delete, then flash again"
+        remedy = Remedy(
+            "pull the rides with kickstand pull --delete, then flash again",
+            "save the rides with the page Live, delete them on the board by its menu, then install again",
+        )
     needed_kb, free_kb = (count * board.block // 1000 for count in (blocks, board.free_blocks))
-    raise InputError(f"not enough room on the board: {needed_kb} kB needed, {free_kb} kB free: {remedy}")
+    raise InputError(f"not enough room on the board: {needed_kb} kB needed, {free_kb} kB free", remedy)
 
 
 def _is_module(path: str) -> bool:

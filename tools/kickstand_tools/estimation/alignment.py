@@ -11,19 +11,19 @@ distinguished from the misalignment either: they are the larger part of its stan
 from dataclasses import dataclass
 
 import numpy as np
-from kickstand.errors import Notice, Refusal
 
 from ..calibration.file import CalibrationFile
-from ..common.errors import InputError
+from ..checks.handedness import RatesMisfit
+from ..common.errors import InputError, RefusedInput
+from ..common.messages import AT_REST, Message, Remedy
 from ..logs.cells import MOST_DPS, MOST_G
 from ..logs.frozen import without_frozen
 from ..logs.log import Log
 from ..logs.reader import Source, read_log
 from ..logs.source import Progress
-from ..refusals import RefusedInput
 from ..signals import Array, Bools, rotation_vector, stretches
 from ..signals.leaning import averaged
-from .first_guess import MIN_RIDING_S, MOUNTED_DEG, MOUNTED_S, Axes, axes, standing
+from .first_guess import MIN_RIDING_S, MOUNTED_DEG, MOUNTED_S, Axes, RideContradicts, RideShort, axes, standing
 from .hypotheses import Hypotheses
 from .least_squares import Estimate
 from .unknowns import ACCEL, BESIDE, BIAS, BIAS_PER_C, DELAY, LEAN, MEAN, OFFSET, OFFSET_PER_C, ROTATION, SENSOR, Prior
@@ -58,6 +58,56 @@ PHONE_SIGMA_DEG = 20.0  # a holder may be tilted towards the rider's eyes
 PHONE_MAX_DEG = 45.0  # the mountings are at least 90 degrees apart
 
 
+@dataclass(frozen=True)
+class RideHalves(Message):
+    """Two halves of the ride give two alignments."""
+
+    differ_deg: float
+
+    code = "ride-halves"
+    text = "two halves of the ride disagree by {differ_deg:.0f} degrees"
+    todo = Remedy("did the mount move? Give a part in which it did not")
+
+
+@dataclass(frozen=True)
+class RideUncertain(Message):
+    """The alignment's standard errors are too large."""
+
+    roll_deg: float
+    pitch_deg: float
+    yaw_deg: float
+
+    code = "ride-uncertain"
+    text = (
+        "the alignment is known to {roll_deg:.1f} degrees in roll, {pitch_deg:.1f} in pitch and {yaw_deg:.1f} in yaw "
+        "only"
+    )
+    todo = Remedy("a longer ride is needed, with bends to both sides")
+
+
+@dataclass(frozen=True)
+class PhoneOtherwise(Message):
+    """The phone is not mounted as its user says."""
+
+    phone: str
+    off_deg: float
+
+    code = "phone-otherwise"
+    text = "by the ride the phone is turned by {off_deg:.0f} degrees against {phone}"
+    todo = Remedy("mounted another way? Then leave out --phone", "mounted another way?")
+
+
+@dataclass(frozen=True)
+class PhoneUpsideDown(Message):
+    """With accelerations of the opposite sign the phone would be mounted as its user says."""
+
+    phone: str
+
+    code = "phone-upside-down"
+    text = "for a phone mounted {phone} all accelerations have the opposite sign"
+    todo = Remedy(AT_REST)
+
+
 @dataclass
 class RideFit:
     """The alignment from a ride, with its quality. Angles in degrees.
@@ -84,7 +134,7 @@ class RideFit:
     lean_deg: float
     lag_s: float | None
     phone_deg: float | None
-    notices: list[Notice]
+    notices: list[Message]
 
 
 def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = None) -> RideFit:
@@ -94,7 +144,7 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
     (see PHONES). progress: called with (steps done, all steps). Up is where the bike is balanced on
     straights, forward is the axis about which it leans into its bends and along which it speeds up; leaning into bends
     separates left from right. Scale errors of the accelerometer are not observable from a ride. Raises InputError;
-    RefusedInput, a subclass with code and values, if the ride does not determine the sensor's mounting.
+    RefusedInput, a subclass with a Message, if the ride does not determine the sensor's mounting.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("city", seed=3, seconds=240.0)
@@ -105,9 +155,9 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
     if phone is not None and phone not in PHONES:
         raise InputError(f"no phone is mounted {phone}: there are {', '.join(PHONES)}")
     log = without_frozen(read_log(log))
-    misfit = next((notice for notice in log.notices if notice.code == "rates-misfit"), None)
+    misfit = next((notice for notice in log.notices if isinstance(notice, RatesMisfit)), None)
     if misfit:
-        raise RefusedInput(Refusal(misfit.code, *misfit.values), log.name)
+        raise RefusedInput(misfit, log.name)
     step_s = float(log.t_s[-1]) / (len(log.t_s) - 1)
     if step_s * SLOWEST_HZ > 1.0:
         raise InputError(f"{log.name}: a sample every {step_s:.2f} s: at least {SLOWEST_HZ:.0f} a second are needed")
@@ -118,8 +168,8 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
             progress(1, 2)
         expected = _mounting(phone, guess.matrix) if phone else None
         found = _checked(windows, guess, estimate_alignment(windows, guess, expected), expected, log.notices)
-    except Refusal as refusal:
-        raise RefusedInput(refusal, log.name) from refusal
+    except RefusedInput as refusal:
+        raise refusal.at(log.name) from refusal
     if progress:
         progress(2, 2)
     return found
@@ -130,7 +180,7 @@ def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) ->
 
     windows: along the sensor's axes. expected: vehicle from sensor (3, 3) as named by the user, None if unknown. The
     alignment is the result's matrix times that of the guess. The result's parameters are the same in each block.
-    Raises Refusal if no alignment fits.
+    Raises RefusedInput if no alignment fits.
     """
     sigma, mean = Prior.of_pose(six_done=False).sigma, MEAN.copy()
     sigma[ROTATION], sigma[ACCEL], sigma[BESIDE] = ROTATION_SIGMA, AXES_SIGMA, BESIDE_SIGMA_G
@@ -140,16 +190,16 @@ def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) ->
     try:
         found = Estimate(windows.turned(guess.matrix, guess.bias), Prior(mean, sigma, posed=False), CONSTANT)
     except np.linalg.LinAlgError as error:
-        raise Refusal("ride-contradicts") from error
+        raise RefusedInput(RideContradicts()) from error
     if not found.change < UNSETTLED:
-        raise Refusal("ride-contradicts")
+        raise RefusedInput(RideContradicts())
     return found
 
 
 def mounted_windows(log: Log) -> Windows:
     """The windows, along the sensor's axes, of the longest stretch of a log in which the mean force keeps its
     direction: before and after, a hand held the sensor. Readings beyond MOST_G and MOST_DPS are left out. Raises
-    Refusal."""
+    RefusedInput."""
     log = log.part(np.all(np.abs(log.accel_g) < MOST_G, axis=1) & np.all(np.abs(log.gyro_dps) < MOST_DPS, axis=1))
     windows = _windows(log)
     mean = averaged(windows.force, MOUNTED_S)
@@ -158,7 +208,7 @@ def mounted_windows(log: Log) -> Windows:
     near = mean @ usual > np.cos(np.radians(MOUNTED_DEG)) * np.linalg.norm(usual)
     mounted = stretches(near)
     if not len(mounted):
-        raise Refusal("ride-short", 0.0, MIN_RIDING_S)
+        raise RefusedInput(RideShort(0.0, MIN_RIDING_S))
     begin, end = mounted[np.argmax(np.diff(mounted, axis=1))]
     margin = round(MOUNTED_S / WINDOW_S)  # after this number of windows the mean contains only the ride
     first = windows.edges[begin + margin * (begin > 0)]
@@ -167,26 +217,26 @@ def mounted_windows(log: Log) -> Windows:
 
 
 def _windows(log: Log, part: Bools | slice = slice(None)) -> Windows:
-    """The windows of a part of the log, along the sensor's axes. Raises Refusal."""
+    """The windows of a part of the log, along the sensor's axes. Raises RefusedInput."""
     t_s, rate = log.t_s[part], np.radians(log.gyro_dps[part])
     if len(t_s) < 2:
-        raise Refusal("ride-short", 0.0, MIN_RIDING_S)
+        raise RefusedInput(RideShort(0.0, MIN_RIDING_S))
     return windows_of(t_s, log.accel_g[part], rate, log.speed_mps[part], np.zeros(len(t_s)))
 
 
-def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | None, notices: list[Notice]) -> RideFit:
-    """The estimate as a RideFit. Raises Refusal if its quality is too low."""
+def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | None, notices: list[Message]) -> RideFit:
+    """The estimate as a RideFit. Raises RefusedInput if its quality is too low."""
     halves = np.degrees(found.split())
     if np.max(np.abs(halves)) > MOVED_DEG:
-        raise Refusal("ride-halves", float(np.max(np.abs(halves))))
+        raise RefusedInput(RideHalves(float(np.max(np.abs(halves)))))
     prior, parameters, sigma = found.prior, np.mean(found.parameters, axis=0), found.parameter_sigma()
     odd = float(np.max(np.abs(parameters[SENSOR] / prior.sigma[SENSOR])))
     if odd > ABSURD_SIGMAS:
-        raise Refusal("ride-contradicts")
+        raise RefusedInput(RideContradicts())
     # if the halves differ by more than the standard error, there was a disturbance that the model lacks
     error = np.hypot(np.degrees(sigma[ROTATION]), 0.5 * halves) * max(1.0, odd / ODD_SIGMAS)
     if np.any(error > MAX_DEG):
-        raise Refusal("ride-uncertain", *(float(error[i]) for i in (2, 0, 1)))
+        raise RefusedInput(RideUncertain(*(float(error[i]) for i in (2, 0, 1))))
     pitch, yaw, roll = (float(angle) for angle in error)
     # then the calibrated force on a level, upright bike is 1 g up for any scale errors
     offset = parameters[OFFSET] + parameters[ACCEL].reshape(3, 3)[:, 1]
@@ -224,14 +274,14 @@ def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | N
 
 
 def _mounting(phone: str, found: Array) -> Array:
-    """The matrix (3, 3) of PHONES[phone] that is nearest to `found`. Raises Refusal if `found` differs by over
+    """The matrix (3, 3) of PHONES[phone] that is nearest to `found`. Raises RefusedInput if `found` differs by over
     PHONE_MAX_DEG from it."""
     off, nearest = min(((_off_deg(found, matrix), i) for i, matrix in enumerate(PHONES[phone])))
     if off > PHONE_MAX_DEG:
         mirrored = found * [[1.0], [-1.0], [-1.0]]  # the result if the accelerations have the opposite sign
         if min(_off_deg(mirrored, matrix) for matrix in PHONES[phone]) < PHONE_MAX_DEG:
-            raise Refusal("phone-upside-down", phone)
-        raise Refusal("phone-otherwise", phone, off)
+            raise RefusedInput(PhoneUpsideDown(phone))
+        raise RefusedInput(PhoneOtherwise(phone, off))
     return PHONES[phone][nearest]
 
 

@@ -5,9 +5,12 @@ import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
-from kickstand.errors import Refusal
 from kickstand.units import STANDARD_GRAVITY
 
+from ..checks.bends import LeftHanded, RatesInRadians
+from ..checks.units import SpeedStuck, SpeedUnit
+from ..common.errors import RefusedInput
+from ..common.messages import Message, Remedy
 from ..signals import Array, Bools, motionless
 from ..signals.leaning import WINDOW_S, Leaning, averaged, leaning_of, speed_in_radians, without_drift
 from .windows import Windows
@@ -17,7 +20,7 @@ STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # a standing bike's windows diff
 BIAS_RADPS = np.radians(4.0)  # limit of the gyro's bias since its calibration: a higher mean rate is a bend
 MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # while the sensor is mounted, its mean force over MOUNTED_S is this close to up
 BETWEEN_S = 20.0  # a shorter time between two movements in a hand counts as in the hand too
-SURELY_S = 4.0  # the sensor is surely in a hand where it seems so for all of this: the bike may still ride, or fall
+SURELY_S = 4.0  # surely in a hand if it seems so for this long: otherwise the bike may ride or fall
 SLOW_S = 4.0  # slower changes of lean are computed from the yaw rate, faster ones from the roll rate
 TURNS_S = 40.0  # the speed is computed from the bends within this time
 CALM_S = 1.0  # without a standstill, the gyro's bias is the mean over almost calm stretches of this length
@@ -25,11 +28,54 @@ MIN_RIDING_S = 30.0
 MIN_LEAN = np.radians(3.0)  # rms: a ride with less lean does not show forward
 MIN_LIKENESS = 0.5  # correlation between leaning and turning; bikes have over 0.75
 MAX_PUSHED = 0.5  # force to the side over the lean in bends; bikes have 0.1 to 0.2, because of their tyres' width
-CAR_G, CAR_LEAN = 0.045, np.radians(5.0)  # a car's rms of the force to the side is above, of its lean below
+CAR_G, CAR_LEAN = 0.045, np.radians(5.0)  # rms of a car: the force to the side is larger, the lean smaller
 STUCK_MPS = 0.5  # a log's speed that changes by less is stuck
 MAX_SPEED_FACTOR = 1.8  # limit of the ratio of the log's speed to that from the bends, and of its inverse
 # Prior of the speed from the bends: this speed, with the weight of bends of this yaw rate
 USUAL_MPS, USUAL_RADPS = 10.0, 0.14
+
+
+@dataclass(frozen=True)
+class RideShort(Message):
+    """There is too little riding."""
+
+    riding_s: float
+    least_s: float
+
+    code = "ride-short"
+    text = "only {riding_s:.0f} s of riding"
+    todo = Remedy("at least {least_s:.0f} s with bends are needed")
+
+
+@dataclass(frozen=True)
+class NoBends(Message):
+    """It leans too little to show forward. lean_deg: rms."""
+
+    lean_deg: float
+
+    code = "no-bends"
+    text = "it hardly leans ({lean_deg:.1f} degrees rms)"
+    todo = Remedy("a motorcycle's ride with bends to both sides is needed")
+
+
+@dataclass(frozen=True)
+class NotLeaning(Message):
+    """A car's ride."""
+
+    code = "not-leaning"
+    text = "in bends it is pushed aside and does not lean, as a car"
+    todo = Remedy(
+        "with a speed in the log take kickstand calibrate drive --vehicle car", "this page aligns motorcycles only"
+    )
+
+
+@dataclass(frozen=True)
+class RideContradicts(Message):
+    """No mounting explains the readings."""
+
+    code = "ride-contradicts"
+    text = "no one mounting explains these readings"
+    todo = Remedy("was the sensor moved, or are axes exchanged between accelerometer and gyro?")
 
 
 def standing(w: Windows) -> Bools:
@@ -94,14 +140,15 @@ def axes(w: Windows) -> Axes:
     """The vehicle's axes, within some degrees, and the gyro's bias. w: windows along the sensor's axes.
 
     In balance the specific force has the direction of the bike's own up, so its mean while riding is up. For forward
-    and the handedness see signals/leaning.py. Raises Refusal if the ride is not a motorcycle's, or has too little lean.
+    and the handedness see signals/leaning.py. Raises RefusedInput if the ride is not a motorcycle's,
+    or has too little lean.
     """
     bias = _bias(w)
     w = replace(w, rate=w.rate - bias)
     riding = ~w.gap & ~standing(w)
     seconds = float(np.sum(w.seconds[riding]))
     if seconds < MIN_RIDING_S:
-        raise Refusal("ride-short", seconds, MIN_RIDING_S)
+        raise RefusedInput(RideShort(seconds, MIN_RIDING_S))
     found = leaning_of(w.rate, w.force, riding)
     _refuse_no_motorcycle(found, without_drift(w.force @ found.matrix[0]), riding)
     _refuse_wrong_speed(w.known_speed[riding], found.rolled[riding], found.turned[riding])
@@ -119,34 +166,34 @@ def _bias(w: Windows) -> Array:
 
 
 def _refuse_no_motorcycle(found: Leaning, sideways: Array, riding: Bools) -> None:
-    """Raise Refusal unless the ride is a motorcycle's with enough leaning and right-handed rates. sideways (n): force
-    to the left, g, without its slow changes."""
+    """Raise RefusedInput unless the ride is a motorcycle's with enough leaning and right-handed rates. sideways (n):
+    force to the left, g, without its slow changes."""
     in_radians_mps = speed_in_radians(found)
     if in_radians_mps is not None:
-        raise Refusal("rates-in-radians", in_radians_mps)
+        raise RefusedInput(RatesInRadians(in_radians_mps))
     rolled, turned, sideways = found.rolled[riding], found.turned[riding], sideways[riding]
     lean, side = float(np.sqrt(np.mean(rolled**2))), float(np.sqrt(np.mean(sideways**2)))
     pushed = abs(float(sideways @ turned)) / max(abs(float(rolled @ turned)), 1e-30)
     if pushed > MAX_PUSHED and side > CAR_G and lean < CAR_LEAN:
-        raise Refusal("not-leaning")
+        raise RefusedInput(NotLeaning())
     if lean < MIN_LEAN:
-        raise Refusal("no-bends", float(np.degrees(lean)))
+        raise RefusedInput(NoBends(float(np.degrees(lean))))
     if pushed > MAX_PUSHED or found.likeness < MIN_LIKENESS:
-        raise Refusal("ride-contradicts")
+        raise RefusedInput(RideContradicts())
     # a leaned bike that turns also turns about its own left
     if found.share < 0.0:
-        raise Refusal("left-handed")
+        raise RefusedInput(LeftHanded())
 
 
 def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array) -> None:
-    """Raise Refusal if the log's speed is stuck or not in m/s: compare it with the speed at which yaw rate and lean in
-    bends balance. known: the log's speed, NaN if it has none."""
+    """Raise RefusedInput if the log's speed is stuck or not in m/s: compare it with the speed at which yaw rate and
+    lean in bends balance. known: the log's speed, NaN if it has none."""
     if not len(known) or np.isnan(known[0]):
         return
     if np.ptp(known) < STUCK_MPS:
-        raise Refusal("speed-stuck", float(known[0]))
+        raise RefusedInput(SpeedStuck(float(known[0])))
     expected = known * turned
     both = -float(expected @ rolled) * STANDARD_GRAVITY
     factor = float(expected @ expected) / both if both > 0.0 else 0.0
     if not 1.0 / MAX_SPEED_FACTOR < factor < MAX_SPEED_FACTOR:
-        raise Refusal("speed-unit", factor)
+        raise RefusedInput(SpeedUnit(factor))

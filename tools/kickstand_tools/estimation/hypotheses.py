@@ -23,7 +23,7 @@ PUSHED_S = 120.0
 # of the other parameters from block to block, as a share of their prior's standard deviation, because a sensor warms up
 DRIFT = np.full(PARAMETERS, 1e-4)
 DRIFT[OFFSET] = 0.15, 0.05, 0.05
-# g: additional for OFFSET, for a sensor that warms up after its six positions, by 0.03 g within minutes
+# g: additional for OFFSET, for a sensor that warms up after its six positions, by 0.03 g in minutes
 DRIFT_G = 0.0015
 # Minus twice the logarithm of the prior probability. A light lasting wind is common, but its readings look like those
 # of a yielding mount. To mistake that mount for wind costs more than the reverse, so the prior of wind is low.

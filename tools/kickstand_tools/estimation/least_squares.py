@@ -92,7 +92,7 @@ class Estimate:
         self.states = np.zeros((len(self._windows) + 1, STATES))
         self.states[:, LEAN], self.states[:, FORWARD] = _at_edges(lean), _at_edges(speed)
         self.parameters = np.tile(self.prior.mean, (len(self._windows) // self._length, 1))
-        self.parameters[:, ROTATION] = 0.0  # a second start: what the first one found has been applied to the windows
+        self.parameters[:, ROTATION] = 0.0  # second start: the windows are already rotated by the first result
         self.change = np.inf
         self._converge()
 

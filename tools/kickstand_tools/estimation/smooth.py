@@ -5,15 +5,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from kickstand.errors import Notice
 
-from ..calibration.file import CalibrationFile
+from ..calibration.file import ALIGN, CalibrationFile
 from ..common.errors import InputError
+from ..common.messages import Message, Remedy, WrongAxes, WrongMount
 from ..logs.csv_lines import write_lean
 from ..logs.log import Block, Table, within
 from ..logs.reader import Source, read_blocks, split_stretch
 from ..logs.source import Progress, name_of
-from ..refusals import WRONG_AXES, WRONG_MOUNT
 from ..signals import Array, Bools
 from .equations import corrected_rates
 from .hypotheses import ALL, ROLL
@@ -39,7 +38,53 @@ POSE_DEG = 1.8
 # An estimated error of the gyro over this many standard deviations of its prior means a faulty gyro: no sound one was
 # over 2.6 on good and bad mounts. Then the lean's standard deviation grows by that factor.
 ODD_SIGMAS = 4.0
-CAUSES = WRONG_AXES | WRONG_MOUNT  # reasons why accelerations do not fit a bike: then there is no remark about the pose
+CAUSES = WrongAxes, WrongMount  # reasons why accelerations do not fit a bike: then there is no remark about the pose
+
+
+@dataclass(frozen=True)
+class SensorOdd(Message):
+    """The gyro's errors are larger than any sound gyro's."""
+
+    sigmas: float
+
+    code = "sensor-odd"
+    text = (
+        "no sound gyro fits this ride: its scale or axis error would be {sigmas:.0f} standard deviations, so "
+        "the smoothed lean is not certain, and its standard deviation says so"
+    )
+    todo = Remedy("is an axis of the gyro faulty?")
+
+
+@dataclass(frozen=True)
+class NotTheBikes(Message):
+    """In so many percent of the riding the accelerations are not a bike's."""
+
+    percent: float
+
+    code = "not-the-bikes"
+    text = (
+        "in {percent:.0f} % of the riding the accelerations are not those of a bike on its wheels, so the smoothed "
+        "lean is less exact there"
+    )
+    todo = Remedy("is the sensor in a soft mount or in a pocket? Fix it firmly")
+
+
+@dataclass(frozen=True)
+class PoseOff(Message):
+    """The upright pose was not upright. angle_deg: where the bike is in balance, > 0 to the right of it."""
+
+    angle_deg: float
+
+    code = "pose-off"
+
+    def sentence(self) -> str:
+        """See Message."""
+        side = "right" if self.angle_deg > 0.0 else "left"
+        return (
+            f"on straights the bike is in balance {abs(self.angle_deg):.1f} degrees to the {side} of the "
+            "calibration's upright, and the smoothed lean counts from there. Causes are a pose that was not upright, "
+            "and a sensor without six positions; with luggage on one side the lean is wrong by that much"
+        )
 
 
 @dataclass(eq=False)
@@ -48,8 +93,7 @@ class SmoothedRide(Table):
 
     t_s: seconds since the log's first sample. lean_deg: > 0 to the right. lean_sigma_deg: its standard deviation.
     pitch_deg: of road and suspension, > 0 nose up. speed_mps: of the sensor, forward. doubtful: 1 where accelerations
-    differ so much from a bike's that the lean is less exact, otherwise 0. notices: remarks about the ride
-    (kickstand_tools.refusals.sentence puts a notice into words).
+    differ so much from a bike's that the lean is less exact, otherwise 0. notices: remarks about the ride.
     """
 
     t_s: Array
@@ -58,7 +102,7 @@ class SmoothedRide(Table):
     pitch_deg: Array
     speed_mps: Array
     doubtful: Array
-    notices: list[Notice] = field(default_factory=list)
+    notices: list[Message] = field(default_factory=list)
 
 
 def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None = None) -> SmoothedRide:
@@ -74,7 +118,7 @@ def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None 
     >>> float(abs(found.lean_deg - ride.truth["lean_deg"]).max()) < 10.0
     True
     """
-    notices: list[Notice] = []
+    notices: list[Message] = []
     blocks = list(_checked_blocks(log, calibration, progress, notices))
     time_s = np.concatenate([block.t_s for block, _ in blocks])
     return SmoothedRide(time_s, *np.concatenate([found for _, found in blocks]).T, notices=notices)
@@ -82,17 +126,17 @@ def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None 
 
 def smooth_to_csv(
     log: Source, calibration: CalibrationFile, out: Path, progress: Progress | None = None
-) -> tuple[int, list[Notice]]:
+) -> tuple[int, list[Message]]:
     """Write LEAN.csv: the log's own times, then COLUMNS. Returns the number of samples and the notices.
 
     Memory does not grow with the log. Raises InputError.
     """
-    notices: list[Notice] = []
+    notices: list[Message] = []
     return write_lean(out, COLUMNS, DIGITS, _checked_blocks(log, calibration, progress, notices)), notices
 
 
 def _checked_blocks(
-    log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
+    log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Message]
 ) -> Iterator[tuple[Block, Array]]:
     """smooth_blocks() of the stretch in `log`. Raises InputError, also for under SLOWEST_HZ samples per second."""
     whole, stretch = split_stretch(log)
@@ -106,7 +150,7 @@ def smooth_blocks(
     log: Source,
     calibration: CalibrationFile,
     progress: Progress | None = None,
-    notices: list[Notice] | None = None,
+    notices: list[Message] | None = None,
     lines: bool = True,
 ) -> Iterator[tuple[Block, Array | None]]:
     """Yield each segment of the log with its values (n, COLUMNS), None for too few samples per second. notices, lines:
@@ -114,7 +158,7 @@ def smooth_blocks(
     if calibration.vehicle == "car":
         raise InputError(f"{name_of(log)}: a car does not lean, and its calibration is a car's")
     if not calibration.aligned:
-        raise InputError("the calibration is not aligned, so the lean is unknown", "align")
+        raise InputError("the calibration is not aligned, so the lean is unknown", ALIGN)
     past: list[Block] = []
     waiting: list[Block] = []
     smoother = Smoother(calibration)
@@ -209,15 +253,15 @@ class Smoother:
         self._doubtful_s += float(np.sum(seconds[riding & doubtful]))
         self._leaned += riding_s * float(np.degrees(pose_rad))
 
-    def remarks(self, known: Iterable[Notice]) -> list[Notice]:
+    def remarks(self, known: Iterable[Message]) -> list[Message]:
         """The remarks about the whole ride. known: existing remarks about it."""
-        if not self._riding_s or any(notice.code in CAUSES for notice in known):
+        if not self._riding_s or any(isinstance(notice, CAUSES) for notice in known):
             return []
         if self._odd:
-            return [Notice("sensor-odd", self._odd)]
+            return [SensorOdd(self._odd)]
         share, pose_deg = self._doubtful_s / self._riding_s, self._leaned / self._riding_s
-        found = [Notice("not-the-bikes", 100.0 * share)] if share > DOUBTFUL else []
-        return [*found, Notice("pose-off", pose_deg)] if abs(pose_deg) > POSE_DEG else found
+        found: list[Message] = [NotTheBikes(100.0 * share)] if share > DOUBTFUL else []
+        return [*found, PoseOff(pose_deg)] if abs(pose_deg) > POSE_DEG else found
 
 
 def oddness(found: Estimate) -> float:

@@ -34,7 +34,7 @@ SENSOR = slice(GYRO.start, OFFSET.stop)
 MEAN, SIGMA = np.zeros(PARAMETERS), np.zeros(PARAMETERS)
 SIGMA[ROTATION], SIGMA[GYRO] = np.radians([1.5, 5.0, 2.0]), 0.012
 SIGMA[OFFSET], SIGMA[UP_SCALE] = (0.001, 0.003, 0.003), 0.004
-SIGMA[OFFSET_PER_C], SIGMA[BIAS_PER_C] = 0.0003, np.radians(0.06)  # an ordinary sensor's; the sheet allows thrice that
+SIGMA[OFFSET_PER_C], SIGMA[BIAS_PER_C] = 0.0003, np.radians(0.06)  # ordinary; the sheet allows three times that
 # ratio: change of the gyro's errors with temperature after the six positions measured them, as in the firmware
 GYRO_DRIFT = 0.002
 # Sigmas of OFFSET and UP_SCALE without the six positions

@@ -8,10 +8,10 @@ from typing import Any
 from zipfile import is_zipfile
 
 import numpy as np
-from kickstand.errors import Notice
 
 from ..checks.course import log_agrees
 from ..common.errors import InputError
+from ..common.messages import AT_REST, Message, Remedy
 from ..estimation.first_guess import MIN_RIDING_S
 from ..logs.csv_lines import write_log
 from ..logs.log import Log
@@ -34,10 +34,59 @@ LEAST_HZ = 19.5  # samples per second required for a lean: 20, minus the error o
 NAMES = [app.NAME for app in reversed(_APPS)]
 
 
+@dataclass(frozen=True)
+class ImportSlow(Message):
+    """It has too few samples per second."""
+
+    rate_hz: float
+
+    code = "import-slow"
+    text = "{rate_hz:.3g} samples per second: at least 20 are needed to find a lean"
+    todo = Remedy("record it faster")
+
+
+@dataclass(frozen=True)
+class ImportShort(Message):
+    """It is too short to be aligned by it."""
+
+    lasts_s: float
+    least_s: float
+
+    code = "import-short"
+    text = "it lasts {lasts_s:.0f} s: to find the alignment from it, at least {least_s:.0f} s of riding are needed"
+
+
+@dataclass(frozen=True)
+class ImportDamaged(Message):
+    """Damaged rows are left out."""
+
+    rows: int
+
+    code = "import-damaged"
+    text = (
+        "damaged rows that are left out: {rows}; a cell or a time is not a number, a time is out of order, a row has "
+        "too many cells, or a reading is out of any sensor's range"
+    )
+
+
+@dataclass(frozen=True)
+class ImportSign(Message):
+    """It is not certain whether up is +1 g or -1 g in the files of this app."""
+
+    app: str
+
+    code = "import-sign"
+    text = "which sign accelerations have in {app} is not certain, and no track with turns shows it"
+    todo = Remedy(
+        f"{AT_REST}, else the ride is mirrored and --units a=-g or a=-m/s2 puts it right",
+        f"{AT_REST}, else the ride is mirrored and left is shown as right",
+    )
+
+
 @dataclass(eq=False)
 class Imported:
     """app: name of the app. log: times count from the recording's own start. taken: the file, columns and unit of each
-    quantity. notices: remarks (kickstand_tools.refusals.sentence puts a notice into words). gaps_s: duration of each
+    quantity. notices: remarks. gaps_s: duration of each
     gap.
 
     vehicle_axes: True if x already points left, y up and z forward on the vehicle, provided that the logger was mounted
@@ -47,7 +96,7 @@ class Imported:
     app: str
     log: Log
     taken: list[Taken]
-    notices: list[Notice] = field(default_factory=list)
+    notices: list[Message] = field(default_factory=list)
     vehicle_axes: bool = False
 
     @property
@@ -56,11 +105,11 @@ class Imported:
         return 1.0 / float(np.median(np.diff(self.log.t_s)))
 
     @property
-    def shortfalls(self) -> list[Notice]:
+    def shortfalls(self) -> list[Message]:
         """The reasons why it gives no alignment: too few samples per second, too short."""
-        found = [Notice("import-slow", self.rate_hz)] if self.rate_hz < LEAST_HZ else []
+        found: list[Message] = [ImportSlow(self.rate_hz)] if self.rate_hz < LEAST_HZ else []
         lasts_s = float(self.log.t_s[-1])
-        return found + ([Notice("import-short", lasts_s, MIN_RIDING_S)] if lasts_s < MIN_RIDING_S else [])
+        return found + ([ImportShort(lasts_s, MIN_RIDING_S)] if lasts_s < MIN_RIDING_S else [])
 
     @property
     def gaps_s(self) -> Array:
@@ -117,7 +166,7 @@ def _imported(recording: AppRecording, name: str, start_s: float | None = None, 
     log, damaged = join(recording, name)
     _check_sign(recording, log)
     if damaged:
-        recording.notices.append(Notice("import-damaged", damaged))
+        recording.notices.append(ImportDamaged(damaged))
     log = read_log(_stretch(log, start_s, end_s))
     notices = [*recording.notices, *log.notices]
     return Imported(recording.app, log, recording.taken, notices, recording.vehicle_axes)
@@ -190,7 +239,7 @@ def _check_sign(recording: AppRecording, log: Log) -> None:
         return
     agrees = log_agrees(log.t_s, log.accel_g, log.gyro_dps, log.lat_deg, log.lon_deg)
     if agrees is None:
-        recording.notices.append(Notice("import-sign", recording.app))
+        recording.notices.append(ImportSign(recording.app))
     elif agrees:
         _note_sign(recording, "+1 g up, by the turns of the track")
     else:

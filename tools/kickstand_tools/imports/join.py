@@ -19,7 +19,7 @@ GAP_NS = LOST_US * 1000  # no interpolation between samples that are further apa
 FASTER = 1.5  # a gyro with over FASTER times the accelerometer's rate is averaged over each accelerometer sample
 MANY = 0.02  # a larger share of readings over MOST_G or MOST_DPS means another unit, not damaged cells
 SHUFFLED_NS = 500_000_000  # samples that come after later ones are sorted if the delay is shorter
-LATE_STEPS, MOST_LATE = 4.0, 0.02  # and if at most a share of MOST_LATE is later by over LATE_STEPS median steps
+LATE_STEPS, MOST_LATE = 4.0, 0.02  # and if at most this share is late by over LATE_STEPS median steps
 MOST_HZ = 10_000.0  # highest rate of an inertial sensor; the fastest have 8,000
 
 

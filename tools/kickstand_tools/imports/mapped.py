@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from kickstand.errors import Notice
 
 from ..common.errors import InputError
+from ..common.messages import Message, Remedy
 from ..signals import Array
 from . import findings
 from .files import RecordingFile
@@ -16,7 +16,7 @@ from .findings import ACCEL, GYRO, OPTIONAL, REQUIRED, Findings
 from .layout import FEWEST_CELLS, joined_sheet, sheet_in
 from .rate_fit import fit_rates, turns_too_far
 from .recording import AppRecording, RecordedSensor, Sheet, Taken, plain, rate_hz, track_of, unit_in
-from .speeds import unit_by_positions
+from .speeds import ImportSpeedUnit, unit_by_positions
 from .units import (
     ACCELERATIONS,
     ANGLES,
@@ -201,9 +201,11 @@ def unknown(files: list[RecordingFile], source: str, table: MappedTable | None =
     reasons = f" ({found.reasons})" if found.reasons else ""
     return InputError(
         f"{source}: not a file of an app that is known{several}{table.lacking}",
-        "name_columns",
-        f"its columns are {shown}. {ask}{reasons}, and type: kickstand import {shlex.quote(where)} --out RIDE.csv "
-        f"--columns {shlex.quote(','.join(given))} --units {units}",
+        Remedy(
+            f"its columns are {shown}. {ask}{reasons}, and type: kickstand import {shlex.quote(where)} --out RIDE.csv "
+            f"--columns {shlex.quote(','.join(given))} --units {units}",
+            "needed are a time, the acceleration along three axes and the rates of a gyro about them",
+        ),
     )
 
 
@@ -296,7 +298,7 @@ def _speed(
     places: Mapping[str, int],
     units: Mapping[str, str],
     degrees: tuple[float, float],
-) -> tuple[int | None, str, list[Notice]]:
+) -> tuple[int | None, str, list[Message]]:
     """(column of the speed, its unit, notices). A missing unit is found from the positions; otherwise the speed is left
     out."""
     place = places.get("speed")
@@ -306,7 +308,7 @@ def _speed(
     if known not in SPEEDS:
         known = unit_by_positions(sheet, time_ns, place, places.get("lat"), places.get("lon"), degrees)
     if not known:
-        return None, "m/s", [Notice("import-speed-unit", sheet.columns[place])]
+        return None, "m/s", [ImportSpeedUnit(sheet.columns[place])]
     return place, known, []
 
 
@@ -364,7 +366,8 @@ def _check_units(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, st
         ask = ",".join(f"{key}={next(iter(UNIT_KEYS[key]))}" for key in unknown)
         choice = "; ".join(f"{key} is one of {', '.join(UNIT_KEYS[key])}" for key in unknown)
         columns = ", ".join(column for of_one in unknown.values() for column in of_one)
-        raise InputError(f"{sheet.name}: the unit is not known of {columns}", "name_units", ask, choice)
+        name_them = Remedy(f"add --units {ask} ({choice})", "choose them")
+        raise InputError(f"{sheet.name}: the unit is not known of {columns}", name_them)
 
 
 def _unit(units: Mapping[str, str], keys: tuple[str, ...], column: str) -> str:

@@ -7,9 +7,9 @@ import re
 from dataclasses import dataclass, field
 
 import numpy as np
-from kickstand.errors import Notice
 
 from ..common.errors import InputError
+from ..common.messages import Message
 from ..logs.csv_reader import Cells, cells_of, columns_of_text, numbers_of, separator_of
 from ..signals import Array, Bools
 from .files import RecordingFile
@@ -235,7 +235,7 @@ class AppRecording:
     gyro: RecordedSensor
     track: ReceiverTrack | None = None
     temp_c: Array | None = None
-    notices: list[Notice] = field(default_factory=list)
+    notices: list[Message] = field(default_factory=list)
     utc_ns: int | None = None
     vehicle_axes: bool = False
     sign_known: bool = True

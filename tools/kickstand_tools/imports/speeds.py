@@ -1,12 +1,29 @@
 """Finds the unit of a speed without a stated unit, from the positions beside it."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from ..common.messages import Message, Remedy
 from ..signals import Array, distance_m
 from .recording import SECOND_NS, Sheet
 from .units import SPEEDS, Nanoseconds, factor
 
 _NEAR = 1.25  # largest factor between the speed and that from positions: units differ by 1.6 or more
+
+
+@dataclass(frozen=True)
+class ImportSpeedUnit(Message):
+    """The speed has no unit: it is left out."""
+
+    column: str
+
+    code = "import-speed-unit"
+    text = "{column} has no unit, and the positions do not show it, so the speed is left out"
+    todo = Remedy(
+        "add --units speed=km/h, mph or m/s",
+        "write it in brackets behind that name, as in Speed (km/h)",
+    )
 
 
 def unit_by_positions(

@@ -12,15 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from kickstand.errors import Notice
 
 from ..calibration.file import CalibrationFile
 from ..common.errors import InputError, extra
+from ..common.messages import Message, as_data, distinct
 from ..common.times import clock, tick_s
 from ..estimation.smooth import SmoothedRide, smooth
 from ..logs.reader import Source, read_twice
 from ..logs.source import Progress, name_of
-from ..refusals import as_data
 from ..replay.replay import replay
 from ..signals import Array, Bools
 from .clocks import Clocks, clocks
@@ -64,7 +63,7 @@ class Agreement:
     smoothed: Difference
     t_s: Array
     leans: dict[str, Array]
-    notices: dict[str, list[Notice]] = field(default_factory=dict)
+    notices: dict[str, list[Message]] = field(default_factory=dict)
     names: tuple[str, str] = ("", "")
 
     def as_data(self) -> dict[str, Any]:
@@ -94,7 +93,7 @@ def compare_rides(
     0.0
     """
     a, b = read_twice(a), read_twice(b)
-    notices: dict[str, list[Notice]] = {"a": [], "b": []}
+    notices: dict[str, list[Message]] = {"a": [], "b": []}
     motion_a, motion_b = (motion(one, progress, said) for one, said in zip((a, b), notices.values()))
     try:
         found = clocks(motion_a, motion_b, calibration_a, calibration_b)
@@ -103,8 +102,7 @@ def compare_rides(
     rides = [smooth(one, calibration) for one, calibration in ((a, calibration_a), (b, calibration_b))]
     shown = [replay(one, calibration) for one, calibration in ((a, calibration_a), (b, calibration_b))]
     for said, ride in zip(notices.values(), rides):
-        known = {(notice.code, notice.values) for notice in said}
-        said.extend(notice for notice in ride.notices if (notice.code, notice.values) not in known)
+        said[:] = distinct([*said, *ride.notices])
     t_s = np.arange(0.0, rides[0].t_s[-1], STEP_S)
     at = t_s, found.of_b(t_s)
     riding = np.ones(len(t_s), dtype=bool)

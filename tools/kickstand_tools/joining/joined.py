@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from kickstand.errors import Notice
 from kickstand.units import LOST_US
 
 from ..common.errors import InputError
+from ..common.messages import Message
 from ..common.output import write_packed
 from ..logs.csv_lines import write_log
 from ..logs.log import Block, Log
@@ -33,7 +33,7 @@ class Joined:
     track: Track
     match: Match
     own_speed: bool
-    notices: list[Notice]
+    notices: list[Message]
 
     @property
     def columns(self) -> dict[str, Array]:
@@ -62,7 +62,7 @@ def join_track(ride: Source, track: Path | str | Track, progress: Progress | Non
     """
     given = track if isinstance(track, Track) else read_track(track)
     ride = read_twice(ride)
-    notices: list[Notice] = []
+    notices: list[Message] = []
     moved = motion(ride, progress, notices)
     if moved.positions:
         raise InputError(f"{name_of(ride)} has positions already: join puts them to a ride that has none")

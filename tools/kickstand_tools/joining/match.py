@@ -6,7 +6,7 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
 from ..common.errors import InputError
-from ..refusals import OPPOSITE_SIGN
+from ..common.messages import OPPOSITE_SIGN
 from ..signals import Array, Bools, correlations, log_likelihood_ratio, moving_mean, peaks
 from .fit import AROUND_S, TrackFit, cost_of_one_shift, fitted
 from .motion import STEP_S, CellMotion

@@ -7,9 +7,9 @@ about it is the yaw rate times the cosine of the lean.
 from dataclasses import dataclass
 
 import numpy as np
-from kickstand.errors import Notice
 
 from ..common.errors import InputError
+from ..common.messages import Message
 from ..logs.reader import Source, read_blocks
 from ..logs.source import Progress, name_of
 from ..signals import Array, Bools, Cells
@@ -51,7 +51,7 @@ class CellMotion:
         return up / max(float(np.linalg.norm(up)), 1e-9)
 
 
-def motion(ride: Source, progress: Progress | None = None, notices: list[Notice] | None = None) -> CellMotion:
+def motion(ride: Source, progress: Progress | None = None, notices: list[Message] | None = None) -> CellMotion:
     """The Motion of a log (see read_log). progress, notices: see read_blocks(). Raises InputError."""
     table, speed, positions = Cells(STEP_S), False, False
     for block in read_blocks(ride, 2, progress, notices):

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..common.errors import InputError
+from ..common.messages import Remedy
 from ..signals import Array
 from .csv_reader import cells_of
 
@@ -24,6 +25,9 @@ _UNITS |= {"ax_g": "g", "ay_g": "g", "az_g": "g", "gx_dps": "deg/s", "gy_dps": "
 _UNITS |= {"lat_deg": "degrees", "lon_deg": "degrees", "utc_s": "seconds since 1970"}
 
 
+_AS_EXPORTED = "give it as the app has exported it"
+
+
 def check_text(log: str, content: bytes, lines_before: int) -> None:
     """Raise InputError if the bytes are not UTF-8. log: its name for messages."""
     try:
@@ -31,7 +35,8 @@ def check_text(log: str, content: bytes, lines_before: int) -> None:
     except UnicodeDecodeError as error:
         line = lines_before + content.count(b"\n", 0, error.start) + 1
         if content.startswith(b"PK\x03\x04"):
-            raise InputError(f"{log} is a zip", "import_zip") from None
+            import_it = Remedy("if an app has exported it, kickstand import makes a log of it", _AS_EXPORTED)
+            raise InputError(f"{log} is a zip", import_it) from None
         raise InputError(f"{log}, line {line}: not text: give a log as CSV or as .csv.gz") from error
 
 
@@ -53,7 +58,8 @@ def header(log: str, line: str) -> list[str]:
         raise InputError(f"{log}, line 1: values stand apart by ; or tab: save it with commas between them")
     if missing:
         raise InputError(
-            f"{log}, line 1: no column {', '.join(missing)}, and a log starts with {','.join(COLUMNS)}", "import_log"
+            f"{log}, line 1: no column {', '.join(missing)}, and a log starts with {','.join(COLUMNS)}",
+            Remedy("an app's export has to go through kickstand import first", _AS_EXPORTED),
         )
     for name in COLUMNS + OPTIONAL:
         if names.count(name) > 1:

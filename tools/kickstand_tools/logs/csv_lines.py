@@ -9,9 +9,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from kickstand.errors import Notice
 from numpy.typing import NDArray
 
+from ..common.messages import Message
 from ..common.output import write_packed
 from ..signals import Array
 from .cells import COLUMNS, OPTIONAL
@@ -131,7 +131,7 @@ def cut_log(
     from_s: float | None = None,
     to_s: float | None = None,
     progress: Progress | None = None,
-    notices: list[Notice] | None = None,
+    notices: list[Message] | None = None,
 ) -> tuple[int, float]:
     """Copy the lines of a log from from_s to to_s to out, gzipped if its name ends in .gz, whole or not at all.
 

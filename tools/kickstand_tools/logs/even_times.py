@@ -6,13 +6,13 @@ the mean of the recorded times around it, within the tick of the recorder's cloc
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from kickstand.errors import Notice
 from numpy.typing import ArrayLike
 
 from ..common.errors import InputError
+from ..common.messages import Message
 from ..signals import Array, Ints, window_means
 from .log import Block
 
@@ -31,6 +31,22 @@ ALLOWED = 0.6
 SHORTEST_S = 2e-6  # shortest step, because times become whole microseconds
 CONTEXT = 2000  # samples before and after a block that are used for its times
 REPORTED_S = 0.002  # a larger shift of the times is reported in a notice
+
+
+@dataclass(frozen=True)
+class TimesSpread(Message):
+    """The recorder rounded the times. repeated: times equal to the one before, of so many samples. shift_s: the
+    largest."""
+
+    repeated: int
+    samples: int
+    shift_s: float
+
+    code = "times-spread"
+    text = (
+        "the times are rounded ({repeated} of {samples} repeat the one before): they are spread evenly, by up to "
+        "{shift_s:.3f} s"
+    )
 
 
 def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
@@ -126,7 +142,7 @@ def _line(k: Array, values: Array) -> Callable[[Array], Array]:
     return lambda at: mean + slope * (at - middle)
 
 
-def even_blocks(blocks: Iterator[Block], name: str, remarks: list[Notice]) -> Iterator[Block]:
+def even_blocks(blocks: Iterator[Block], name: str, remarks: list[Message]) -> Iterator[Block]:
     """Yield the blocks with increasing times, see even_times(). name: the log's. remarks: a notice of the changes is
     appended.
 
@@ -185,11 +201,11 @@ class _Spread:
         times = even_times(np.concatenate((self._before_s, block.t_s)), self._name)
         return self._ready(block, times[len(self._before_s) :])
 
-    def notices(self) -> list[Notice]:
+    def notices(self) -> list[Message]:
         """The notices about the times."""
         if not self._repeated and self._shift_s < REPORTED_S:
             return []
-        return [Notice("times-spread", self._repeated, self._samples, self._shift_s)]
+        return [TimesSpread(self._repeated, self._samples, self._shift_s)]
 
     def _ready(self, block: Block, times: np.ndarray) -> Block:
         recorded = block.t_s

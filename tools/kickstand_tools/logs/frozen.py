@@ -5,9 +5,11 @@ digit for half a second, they were not measured. But in a log with few digits, r
 at rest. There the readings are kept if those before or after continue at the same values, and left out if they jump.
 """
 
-import numpy as np
-from kickstand.errors import Notice
+from dataclasses import dataclass
 
+import numpy as np
+
+from ..common.messages import Message
 from ..signals import Array, Bools, Ints
 from .log import Log
 
@@ -19,7 +21,26 @@ NEAR_G, NEAR_DPS = 0.02, 0.5  # largest difference of these means from the stret
 _MOTION = [0, 1, 2, 4, 5, 6]  # indices in the chip's order, without the temperature
 
 
-class FrozenReadings:
+@dataclass(frozen=True)
+class FrozenReadings(Message):
+    """The readings froze. seconds: of all stretches; begin_s, end_s: of the first."""
+
+    stretches: int
+    seconds: float
+    begin_s: float
+    end_s: float
+
+    code = "frozen-readings"
+
+    def sentence(self) -> str:
+        """See Message."""
+        line = f"the readings froze from {self.begin_s:.1f} to {self.end_s:.1f} s"
+        if self.stretches > 1:
+            line += f" and {self.stretches - 1} times more, {self.seconds:.1f} s in all"
+        return line + ": they are left out, and the lean filter restarts after each"
+
+
+class FrozenFinder:
     """Finds frozen readings. Call mark() with one block after another."""
 
     def __init__(self) -> None:
@@ -60,13 +81,13 @@ class FrozenReadings:
         self._last, self._last_s = values[-1:], float(time_s[-1])
         return frozen[-n:]
 
-    def notices(self) -> list[Notice]:
+    def notices(self) -> list[Message]:
         """The notices about the log so far."""
         if not self._stretches:
             return []
         first, last = self._stretches[0]
         seconds = sum(end - begin for begin, end in self._stretches)
-        return [Notice("frozen-readings", len(self._stretches), seconds, first, last)]
+        return [FrozenReadings(len(self._stretches), seconds, first, last)]
 
     def _doubtful(self, values: Array, time_s: Array, begin: int, end: int) -> bool:
         """True if the equal readings from begin to end are surely frozen, not a standstill with noise hidden by
@@ -89,5 +110,5 @@ class FrozenReadings:
 
 def without_frozen(log: Log) -> Log:
     """The log without frozen readings, which become gaps. The same log if it has none."""
-    kept = ~FrozenReadings().mark(log.time_us, log.readings)
+    kept = ~FrozenFinder().mark(log.time_us, log.readings)
     return log if np.all(kept) else log.part(kept)

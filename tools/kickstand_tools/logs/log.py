@@ -5,11 +5,11 @@ from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from kickstand.errors import Notice
 from kickstand.units import AXES
 from numpy.typing import ArrayLike, NDArray
 
 from ..common.errors import InputError, extra
+from ..common.messages import Message
 from ..signals import Array, Bools, Ints
 from .cells import TRACK
 from .csv_reader import cells_of
@@ -77,7 +77,7 @@ class Log(Table):
     rate, deg/s. speed_mps (n): m/s. temperature_c (n). lat_deg, lon_deg (n): the position, degrees north and east.
     utc_s (n): Universal Time, s since 1970. The fields from speed_mps to utc_s are optional, and NaN without a new
     value. start_s: the recorder's own time at the first sample, s. name: the log's name in messages. notices: remarks
-    about it (kickstand_tools.refusals.sentence puts a notice into words).
+    about it.
 
     t_s may start at any value: its first value is added to start_s and subtracted from t_s. Raises InputError for
     shapes that do not fit and for a time that does not increase.
@@ -96,7 +96,7 @@ class Log(Table):
     temperature_c: Array = field(default_factory=lambda: np.zeros(0))
     start_s: float = 0.0
     name: str = "the log"
-    notices: list[Notice] = field(default_factory=list)
+    notices: list[Message] = field(default_factory=list)
     lat_deg: Array = field(default_factory=lambda: np.zeros(0))
     lon_deg: Array = field(default_factory=lambda: np.zeros(0))
     utc_s: Array = field(default_factory=lambda: np.zeros(0))

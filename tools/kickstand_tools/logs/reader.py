@@ -2,24 +2,24 @@
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from kickstand.errors import Notice
 
 from ..calibration.file import CalibrationFile
 from ..checks.log import Checks
 from ..checks.sensor import SensorHealth
 from ..checks.units import check_units
 from ..common.errors import InputError
+from ..common.messages import Message
 from ..signals import Array
 from . import cells
 from .cells import COLUMNS, OPTIONAL, TRACK
 from .csv_reader import numbers_in
 from .even_times import even_blocks
-from .frozen import FrozenReadings
+from .frozen import FrozenFinder
 from .log import Block, Log, Stretch
 from .source import File, Progress, chunks, name_of, total_bytes
 
@@ -29,6 +29,16 @@ MOST_SAMPLES = 10_000_000  # most samples of a log read as a whole: 14 hours at 
 _READINGS = ("ax_g", "ay_g", "az_g", "temp_c", "gx_dps", "gy_dps", "gz_dps")  # in the order of Block.readings
 
 Source = File | Log | Stretch  # what can be read as a log
+
+
+@dataclass(frozen=True)
+class CutLine(Message):
+    """The last line has no end."""
+
+    line_number: int
+
+    code = "cut-line"
+    text = "line {line_number}, the last one, was cut: it is left out"
 
 
 def read_log(source: Source, minimum: int = 2, progress: Progress | None = None, axes: bool = True) -> Log:
@@ -48,7 +58,7 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None,
     >>> log.to_pandas().columns.tolist()
     ['t_s', 'ax_g', 'ay_g', 'az_g', 'gx_dps', 'gy_dps', 'gz_dps', 'speed_mps', 'lat_deg', 'lon_deg', 'utc_s', 'temp_c']
     """
-    notices: list[Notice] = []
+    notices: list[Message] = []
     blocks = list(read_blocks(source, minimum, progress, notices, axes))
     readings = np.concatenate([block.readings for block in blocks])
     return Log(
@@ -67,7 +77,7 @@ def read_blocks(
     source: Source,
     minimum: int = 2,
     progress: Progress | None = None,
-    notices: list[Notice] | None = None,
+    notices: list[Message] | None = None,
     axes: bool = True,
     lines: bool = True,
     calibration: CalibrationFile | None = None,
@@ -76,8 +86,8 @@ def read_blocks(
     about the log and about contradictions to `calibration` are appended. lines: also keep the rows as CSV, which takes
     the most memory. For the rest see read_log()."""
     name, count = name_of(source), 0
-    remarks: list[Notice] = []
-    checks, frozen, health = Checks(name), FrozenReadings(), SensorHealth()
+    remarks: list[Message] = []
+    checks, frozen, health = Checks(name), FrozenFinder(), SensorHealth()
     whole = source.source if isinstance(source, Stretch) else source
     total = len(whole.t_s) if isinstance(whole, Log) else total_bytes(whole)
     for block in _unchecked(source, remarks):
@@ -149,7 +159,7 @@ def _rereadable(source: File | Log) -> File | Log:
     return source if isinstance(source, (Path, str, Log)) else read_log(source)
 
 
-def _unchecked(source: Source, remarks: list[Notice]) -> Iterator[Block]:
+def _unchecked(source: Source, remarks: list[Message]) -> Iterator[Block]:
     """The blocks, before units and number of samples are checked. remarks: notices about the file are appended."""
     if isinstance(source, Log):
         return _blocks_of(source)
@@ -175,7 +185,7 @@ def _blocks_of(log: Log) -> Iterator[Block]:
         )
 
 
-def _parsed(source: File, name: str, remarks: list[Notice]) -> Iterator[Block]:
+def _parsed(source: File, name: str, remarks: list[Message]) -> Iterator[Block]:
     pieces = chunks(source, BLOCK_BYTES, remarks)
     first, packed = next(pieces, (b"", 0))
     names, rest = _header(name, first)
@@ -196,7 +206,7 @@ def _header(name: str, first: bytes) -> tuple[list[str], bytes]:
         raise
 
 
-def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], remarks: list[Notice]) -> Iterator[Block]:
+def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], remarks: list[Message]) -> Iterator[Block]:
     """The blocks with the times of the file, which may repeat."""
     places = {column: names.index(column) for column in COLUMNS + OPTIONAL if column in names}
     line, start_us, last_us = 1, None, None
@@ -204,7 +214,7 @@ def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], rema
         cut = b""
         if is_last:
             text, cut = _without_cut_line(text, names, places)
-            remarks += [Notice("cut-line", line + text.count(b"\n") + 1)] if cut else []
+            remarks += [CutLine(line + text.count(b"\n") + 1)] if cut else []
         table = _numbers(name, text, names, places, line, last_us)
         line += text.count(b"\n")
         if not len(table):

@@ -7,18 +7,37 @@ import stat
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, cast
 
-from kickstand.errors import Notice
-
 from ..common.errors import InputError, cause
+from ..common.messages import Message, Remedy
 
 # Most bytes of a line, and most NUL bytes at the end: a file system may leave these in a file that was not closed
 LONGEST_LINE = 16_000_000
 SUFFIXES = (".csv", ".txt", ".tsv", ".vbo", ".parquet")  # of logs and of the tables of other apps
 File = Path | str | IO[bytes] | IO[str]
 Progress = Callable[[int, int], None]  # called with (done, total) in one unit; total is 0 where it is not known
+
+
+@dataclass(frozen=True)
+class NulEnd(Message):
+    """The file ends in NUL bytes. count: how many."""
+
+    count: int
+
+    code = "nul-end"
+    text = "its end is {count} NUL bytes, as after a loss of power: they are left out"
+
+
+@dataclass(frozen=True)
+class CutGzip(Message):
+    """A gzip file has no end."""
+
+    code = "cut-gzip"
+    text = "the file was cut: the readings at its end are lost"
+    todo = Remedy("copy it again if you can")
 
 
 def open_input(path: Path | str) -> IO[bytes]:
@@ -51,7 +70,7 @@ def log_stem(name: str) -> str:
     return name[: len(name) - len(ending)]
 
 
-def chunks(source: File, size: int, remarks: list[Notice] | None = None) -> Iterator[tuple[bytes, int]]:
+def chunks(source: File, size: int, remarks: list[Message] | None = None) -> Iterator[tuple[bytes, int]]:
     """Yield the text, unpacked, in chunks of about `size` bytes of whole lines, each with the number of bytes read so
     far.
 
@@ -95,7 +114,7 @@ def total_bytes(source: object) -> int:
     return 0
 
 
-def _pieces(name: str, file: Any, packed: Any, size: int, remarks: list[Notice] | None) -> Iterator[tuple[bytes, int]]:
+def _pieces(name: str, file: Any, packed: Any, size: int, remarks: list[Message] | None) -> Iterator[tuple[bytes, int]]:
     """See chunks(). packed: the file below `file`, whose position is the number of bytes read; `file` if not packed."""
     pending, read = b"", 0
     for data in _data(file, size, remarks):
@@ -110,13 +129,13 @@ def _pieces(name: str, file: Any, packed: Any, size: int, remarks: list[Notice] 
                 pending = pending[cut:]
     kept = pending.rstrip(b"\0")
     if remarks is not None and len(kept) < len(pending):
-        remarks.append(Notice("nul-end", len(pending) - len(kept)))
+        remarks.append(NulEnd(len(pending) - len(kept)))
         pending = kept
     if pending:
         yield _with_line_feeds(pending), read if packed is file else packed.tell()
 
 
-def _data(file: Any, size: int, remarks: list[Notice] | None) -> Iterator[bytes]:
+def _data(file: Any, size: int, remarks: list[Message] | None) -> Iterator[bytes]:
     """Yield the content of the file. A cut gzip file ends at the cut, if anything could be unpacked."""
     packed, there = isinstance(file, gzip.GzipFile), False
     while True:
@@ -126,7 +145,7 @@ def _data(file: Any, size: int, remarks: list[Notice] | None) -> Iterator[bytes]
         except EOFError:
             if remarks is None or not there:
                 raise
-            remarks.append(Notice("cut-gzip"))
+            remarks.append(CutGzip())
             return
         if not data:
             return

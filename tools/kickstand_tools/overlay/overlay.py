@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from kickstand.errors import Notice
 
 from ..analysis.ride import open_ride
 from ..calibration.file import CalibrationFile
 from ..common.errors import InputError
+from ..common.messages import Message
 from ..common.output import whole_file
 from ..joining.motion import motion
 from ..logs.reader import Source, read_twice
@@ -45,7 +45,7 @@ class Overlaid:
     end_s: float
     offset_s: float | None
     correlation: float | None
-    notices: list[Notice]
+    notices: list[Message]
 
 
 def overlay(
@@ -81,7 +81,7 @@ def overlay(
     correlation = None
     if filmed and offset_s is None:
         offset_s, correlation = _found_offset(opened.log, filmed, progress)
-    notices: list[Notice] = []
+    notices: list[Message] = []
     seen = shown(opened, progress, notices)
     begin_s, end_s = _part(seen, filmed, offset_s, from_s, to_s, opened.name)
     rate = fps or (filmed.fps if filmed else _FPS)

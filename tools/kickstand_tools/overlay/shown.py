@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from kickstand.errors import Notice
 
 from ..analysis.ride import Ride
 from ..analysis.summary import HELD_S
+from ..common.messages import Message
 from ..logs.source import Progress
 from ..signals import Array, Ints, smoothed
 
@@ -58,7 +58,7 @@ class Shown:
         return Shown(t_s, lean, forward, left, speed, most_left, most_right)
 
 
-def shown(ride: Ride, progress: Progress | None = None, notices: list[Notice] | None = None) -> Shown:
+def shown(ride: Ride, progress: Progress | None = None, notices: list[Message] | None = None) -> Shown:
     """The values of a whole ride, with the lean chosen in open_ride(). progress, notices: see Ride.blocks(). Raises
     InputError."""
     columns: list[Array] = []

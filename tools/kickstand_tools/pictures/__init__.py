@@ -1,1 +1,1 @@
-"""Display and wiring as SVG, drawn from the settings and the character ROM: for the web page and the READMEs."""
+"""Draws display and wiring as SVG, from the settings and the character ROM, for the web page and the READMEs."""

@@ -1,5 +1,5 @@
-"""What a rider builds, drawn as SVG: a 5 V display behind its level shifter, the supply on the bike, the six positions,
-and where all of it sits on the bike."""
+"""Draws what a rider builds, as SVG: a 5 V display behind its level shifter, the supply on the bike, the six positions,
+and the places of all parts on the bike."""
 
 from math import cos, radians, sin
 
@@ -13,7 +13,7 @@ _WHITE, _PAD = "#ffffff", "#f2c94c"
 
 
 def drawings(display: str, shifted: str) -> dict[str, str]:
-    """{file name: SVG}: wiring of both boards, and what is built. display, shifted: SVGs of the display at a
+    """{file name: SVG}: wiring of both boards, and the other drawings. display, shifted: SVGs of the display at a
     board, and of the one behind the level shifter."""
     return {
         "wiring_pico.svg": wiring.draw(wiring.PICO, display),
@@ -58,7 +58,7 @@ def shifter(board: wiring.DrawnBoard, display: str) -> str:
 
 
 def supply() -> str:
-    """From 12 V that the ignition switches to the board."""
+    """The supply from switched 12 V to the board."""
     page = Drawing(900, 210)
     y, ground = 84, 146
     page.wire(RED, (150, y), (520, y))
@@ -103,8 +103,8 @@ _HALF = (44.0, 34.0, 6.0)  # of the board along its axes, pixels
 
 
 def six_positions(columns: int = 7) -> str:
-    """The six sides on which the sensor is laid, as the display calls them, and the slanted pose that proves them: so
-    many beside each other."""
+    """The six sides of the sensor, with the display's names, and the slanted pose that checks them. columns: number of
+    poses side by side."""
     poses = [*_POSITIONS.items(), ("", _SLANTED)]
     page = Drawing(140 * columns, 215 * -(-len(poses) // columns))
     for k, (name, axes) in enumerate(poses):
@@ -119,7 +119,7 @@ def six_positions(columns: int = 7) -> str:
 
 
 def _lay(page: Drawing, x: float, y: float, axes: tuple[Vector, Vector, Vector]) -> None:
-    """The sensor's board with the arrows that are printed on its face, lying on the table."""
+    """Draw the sensor's board on the table, with the arrows printed on its face."""
     lowest = sum(abs(axis[1]) * half for axis, half in zip(axes, _HALF))
 
     def at(*of_sensor: float) -> tuple[float, float]:
@@ -127,7 +127,7 @@ def _lay(page: Drawing, x: float, y: float, axes: tuple[Vector, Vector, Vector])
         return _seen(x, y, (place[0], place[1] - 50 + lowest, place[2]))
 
     for which in range(3):
-        side = 1.0 if sum(axes[which]) > 0 else -1.0  # the one that is seen, from the right, above and in front
+        side = 1.0 if sum(axes[which]) > 0 else -1.0  # the visible side, from the right, above and in front
         along, across = [k for k in range(3) if k != which]
         corners = []
         for one, other in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
@@ -155,13 +155,14 @@ def _lay(page: Drawing, x: float, y: float, axes: tuple[Vector, Vector, Vector])
 
 
 def _seen(x: float, y: float, place: Vector) -> tuple[float, float]:
-    """Where a place to the right, up and towards the viewer is drawn: from the right, above and in front."""
+    """The drawn position of a point given as right, up and towards the viewer, seen from the right, above and in
+    front."""
     right, up, near = place
     return x + 0.71 * (right - near), y - 0.78 * up + 0.36 * (right + near)
 
 
 def on_the_bike() -> str:
-    """A motorcycle from its left side, and where each part sits."""
+    """A motorcycle from its left side, with the place of each part."""
     page = Drawing(900, 470)
     dark, frame, paint = "#22252b", "#6b717c", "#c63c06"
     page.box(0, 404, 900, 66, "#dcd6c6", 0)
@@ -202,7 +203,7 @@ def on_the_bike() -> str:
 
 
 def _label(page: Drawing, part: tuple[float, float], words_at: tuple[float, float], title: str, *lines: str) -> None:
-    """Words with a line to what they name."""
+    """Draw words with a line to the part that they name."""
     x, y = words_at
     under = y + 18 * len(lines) + 10 if part[1] > y else y - 12
     page.wire("#1d1f24", part, (x + 40, under), width=1.5)
@@ -212,7 +213,7 @@ def _label(page: Drawing, part: tuple[float, float], words_at: tuple[float, floa
 
 
 def _pads(page: Drawing, x: float, inwards: int, names: list[str], heights: list[int]) -> None:
-    """Pins at an edge of a module; inwards: 1 if the module is to the right of it."""
+    """Draw pins at an edge of a module. inwards: 1 if the module is to the right of the edge."""
     for name, y in zip(names, heights):
         page.disc(x, y, 7, _PAD)
         page.text(x + 14 * inwards, y, name, 13, "start" if inwards > 0 else "end", _WHITE, True)

@@ -1,4 +1,4 @@
-"""A drawing of boxes, wires and labels as SVG, which can be drawn mirrored left to right."""
+"""A drawing of boxes, wires and labels as SVG, which can be mirrored left to right."""
 
 from markupsafe import Markup
 
@@ -48,7 +48,7 @@ class Drawing:
         colour: str = "#1d1f24",
         bold: bool = False,
     ) -> None:
-        """Words around the height y. anchor: which end of them is at x, "start", "middle" or "end"."""
+        """Words around the height y. anchor: the part of them that is at x, "start", "middle" or "end"."""
         style = {"font_size": size, "font_weight": "bold" if bold else None}
         style["text_anchor"] = _MIRRORED[anchor] if self._mirrored else anchor
         self._elements.append(element("text", words, x=self._x(x), y=y + 0.35 * size, **style, fill=colour))
@@ -59,5 +59,5 @@ class Drawing:
         self._elements.append(Markup(str(svg).strip().replace("<svg", place, 1)))
 
     def svg(self) -> str:
-        """All that was drawn."""
+        """The whole drawing."""
         return drawing((self._width, self._height), *self._elements, font_family=_FONT)

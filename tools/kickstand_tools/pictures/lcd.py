@@ -1,4 +1,4 @@
-"""A 16x2 character display drawn dot by dot as SVG, from what its controller holds in its memories."""
+"""Draws a 16x2 character display dot by dot as SVG, from its controller's memories."""
 
 from ..common.svg import drawing, element
 from .lcd_font import ROM
@@ -15,7 +15,8 @@ _SIZE = (_GLASS[0] + 2 * _FRAME, _GLASS[1] + 2 * _FRAME)
 
 
 def draw(codes: list[list[int]], cgram: bytes) -> str:
-    """The display as SVG. codes: two lists of 16 character codes; cgram: the 64 bytes of the eight own characters."""
+    """The display as SVG. codes: two lists of 16 character codes; cgram: the 64 bytes of the eight custom
+    characters."""
     lit = [
         _dot(column * _CELL[0] + x * _PITCH[0], line * _CELL[1] + y * _PITCH[1])
         for line in range(_LINES)

@@ -1,4 +1,4 @@
-"""An OLED of 128x64 pixels drawn pixel by pixel as SVG."""
+"""Draws an OLED of 128x64 pixels as SVG."""
 
 from itertools import groupby
 
@@ -11,7 +11,7 @@ _SIZE = (WIDTH + 2 * (_MARGIN + _FRAME), HEIGHT + 2 * (_MARGIN + _FRAME))
 
 
 def draw(pixels: bytes) -> str:
-    """The display as SVG. pixels: 64 rows of 128, 8 pixels a byte, the leftmost in bit 7."""
+    """The display as SVG. pixels: 64 rows of 128, 8 pixels per byte, the leftmost in bit 7."""
     runs = []
     for y in range(HEIGHT):
         x = 0

@@ -1,4 +1,4 @@
-"""How sensor, display and button are wired to a Pico and to an ESP32, drawn as SVG. The pins are those of port.py."""
+"""Draws the wiring of sensor, display and button to a Pico and to an ESP32 as SVG. The pins are those of port.py."""
 
 import runpy
 from typing import NamedTuple
@@ -9,7 +9,8 @@ from .drawing import AMBER, BLACK, BLUE, RED, Drawing
 
 
 class DrawnBoard(NamedTuple):
-    """A board seen from above. Its pins from the top down: near, the side that faces the modules, and far."""
+    """A board seen from above. near, far: its pins from the top down, on the side that faces the modules and on the
+    other."""
 
     title: str
     machine: str  # in simulated_board.fakes.chips.MACHINES
@@ -17,7 +18,7 @@ class DrawnBoard(NamedTuple):
     near: tuple[str, ...]
     far: tuple[str, ...]
     near_is_left: bool
-    numbered: bool  # counted from the top down the near side, then up the other
+    numbered: bool  # pins are counted from the top down the near side, then up the other
 
 
 PICO = DrawnBoard(
@@ -55,7 +56,7 @@ _GROUND_X, _SUPPLY_X, _OUTSIDE_X, _TOP_Y = 380, 866, 36, 36
 
 
 def connections(board: DrawnBoard) -> list[tuple[str, dict[str, str]]]:
-    """[(module, {its pin: the board's pin})], as draw() draws them."""
+    """[(module, {its pin: the board's pin})] of the drawing."""
     near, far = ({name: row + 1 for row, name in enumerate(side)} for side in (board.near, board.far))
 
     def pin(name: str) -> str:
@@ -73,7 +74,7 @@ def connections(board: DrawnBoard) -> list[tuple[str, dict[str, str]]]:
 
 
 def pin_names(board: DrawnBoard) -> dict[str, str]:
-    """The names of the board's pins for SDA and SCL of a display, and of the one that has USB's 5 V."""
+    """The names of the board's pins for SDA and SCL of a display, and of the pin with USB's 5 V."""
     return _default_pins(board)["display"] | {"5V": board.far[0] if board.far[0] == "VBUS" else board.far[-1]}
 
 
@@ -95,7 +96,7 @@ def draw(board: DrawnBoard, display: str) -> str:
         used_near.add(grounds[-1])
         page.wire(BLACK, (_RIGHT, _pin_y(grounds[-1])), (_MODULE_LEFT, _BUTTON_PINS_Y[0]))
         _draw_signals(page, board, pins["button"], _BUTTON_PINS_Y[1:], _CHANNELS)
-    else:  # one on the other side, led around the board
+    else:  # a ground on the other side, led around the board
         ground = board.far.index("GND")
         used_far.add(ground)
         _draw_signals(page, board, pins["button"], _BUTTON_PINS_Y[:1], _CHANNELS)
@@ -118,7 +119,8 @@ def draw(board: DrawnBoard, display: str) -> str:
 def _draw_signals(
     page: Drawing, board: DrawnBoard, pins: dict[str, str], places: tuple[int, ...], channels: tuple[int, ...]
 ) -> list[str]:
-    """A module's wires, in the order of the board's pins, so that they do not cross. That order, as the module's pins.
+    """Draw a module's wires in the order of the board's pins, to avoid crossings. Returns the module's pins in this
+    order.
 
     places: heights of the module's pins; channels: x of the wires' vertical parts.
     """
@@ -130,8 +132,8 @@ def _draw_signals(
 
 
 def _default_pins(board: DrawnBoard) -> dict[str, dict[str, str]]:
-    """{module: {pin of the module: name of the board's pin}}, from port.py as it is on this board. Not while another
-    simulated board is installed: this one takes its place."""
+    """{module: {pin of the module: name of the board's pin}}, from port.py for this board. Do not call it while another
+    simulated board is installed, because it replaces that."""
     with simulator.Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=board.machine):
         port = runpy.run_path(str(firmware_path.PACKAGE / "board" / "port.py"))
 
@@ -150,7 +152,7 @@ def _pin_y(row: int) -> int:
 
 
 def _draw_supply(page: Drawing, pin_y: int) -> None:
-    """3.3 V around the outside to the far edge of both modules."""
+    """Draw 3.3 V around the outside to the far edge of both modules."""
     around = ((_OUTSIDE_X, pin_y), (_OUTSIDE_X, _TOP_Y), (_SUPPLY_X, _TOP_Y), (_SUPPLY_X, _DISPLAY_SUPPLY_Y))
     page.wire(RED, (_LEFT, pin_y), *around, (_MODULE_RIGHT, _DISPLAY_SUPPLY_Y))
     page.wire(RED, (_SUPPLY_X, _SENSOR_SUPPLY_Y), (_MODULE_RIGHT, _SENSOR_SUPPLY_Y))
@@ -158,7 +160,7 @@ def _draw_supply(page: Drawing, pin_y: int) -> None:
 
 
 def _draw_ground(page: Drawing, pin_y: int) -> None:
-    """From one pin to the sensor above and the display below."""
+    """Draw ground from one pin to the sensor above and the display below."""
     for y in (_SENSOR_PINS_Y[2], _DISPLAY_PINS_Y[0]):
         page.wire(BLACK, (_RIGHT, pin_y), (_GROUND_X, pin_y), (_GROUND_X, y), (_MODULE_LEFT, y))
     page.disc(_GROUND_X, pin_y, 6, BLACK)

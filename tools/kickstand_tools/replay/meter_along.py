@@ -4,16 +4,19 @@ numpy computes values that do not depend on earlier samples for a whole block. A
 7.2 s with Replay.step(). A test compares both.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from kickstand.lean.meter import LeanMeter
 
 from ..calibration.file import CalibrationFile
+from ..common.messages import Message, Remedy, WrongAxes, WrongMount
 from ..logs.log import Block
-from ..signals import Array
-from .replay_engine import NOT_SHOWN, Replay
+from ..signals import Array, Bools
+from .replay_engine import NOT_SHOWN, ODD, Replay
 
+CAUSES = WrongAxes, WrongMount  # remarks that say why readings do not fit
 TOO_SMALL = 0.01  # g2, as in kickstand.lean: in free fall the force has no direction
 
 
@@ -41,7 +44,7 @@ class MeterAlong(Replay):
         leans, variances = [], []
         for meter in self.after_each(block, force, rate):
             leans.append(meter.lean_deg)
-            variances.append(meter.filter.variance if meter.trusted else -1.0)
+            variances.append(meter.filter.variance if meter.trusted else ODD if meter.odd else NOT_SHOWN)
         variance = np.array(variances)
         return np.column_stack(
             (
@@ -51,9 +54,45 @@ class MeterAlong(Replay):
                 static_lean_deg(force[0], force[1]),
                 np.degrees(rate[1]),
                 np.degrees(rate[2]),
-                np.where(variance >= 0.0, np.degrees(np.sqrt(np.maximum(variance, 0.0))), NOT_SHOWN),
+                np.where(variance >= 0.0, np.degrees(np.sqrt(np.maximum(variance, 0.0))), variance),
             )
         )
+
+
+@dataclass(frozen=True)
+class ReadingsMisfit(Message):
+    """The meter named the sensor. seconds: in all. first_s: of the first time."""
+
+    seconds: float
+    first_s: float
+
+    code = "readings-misfit"
+    text = (
+        "the readings do not fit together again and again, first at {first_s:.0f} s, {seconds:.0f} s in all; the board "
+        "shows no lean there"
+    )
+    todo = Remedy("is the sensor's mount loose, or the sensor ill?")
+
+
+@dataclass
+class Misfit:
+    """Where the meter named the sensor, because its readings do not fit again and again: first at first_s, for seconds
+    in all."""
+
+    first_s: float = 0.0
+    seconds: float = 0.0
+
+    def add(self, t_s: Array, odd: Bools) -> None:
+        """Take a part of the ride: time (n, s), and where it was named (n)."""
+        if np.any(odd):
+            self.first_s = self.first_s if self.seconds else float(t_s[np.argmax(odd)])
+            self.seconds += float(np.sum(np.diff(t_s, prepend=t_s[0])[odd])) or 1e-6
+
+    def remarks(self, known: Iterable[Message]) -> list[Message]:
+        """The notice of it, unless `known` has the reason."""
+        if not self.seconds or any(isinstance(notice, CAUSES) for notice in known):
+            return []
+        return [ReadingsMisfit(self.seconds, self.first_s)]
 
 
 def static_lean_deg(left: Array, up: Array) -> Array:

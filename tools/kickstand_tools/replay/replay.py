@@ -10,18 +10,18 @@ from pathlib import Path
 from typing import IO
 
 import numpy as np
-from kickstand.errors import Notice
 
 from ..calibration.file import CalibrationFile
 from ..common import plugins, unix_port
 from ..common.errors import InputError
+from ..common.messages import Message
 from ..logs.csv_lines import write_lean
 from ..logs.log import Block, Log, Stretch, Table, within
 from ..logs.reader import Source, read_blocks, read_twice, split_stretch
 from ..logs.source import Progress, total_bytes
 from ..signals import Array
 from . import replay_engine
-from .meter_along import MeterAlong
+from .meter_along import MeterAlong, Misfit
 
 _LONG_BYTES = 20 << 20  # a quarter of an hour at 200 Hz: for a smaller file a second process costs more than it saves
 
@@ -43,7 +43,7 @@ class LeanTable(Table):
     lean_formula_deg: Nicolae's (25)-(26) unchanged.
     left_g, up_g, forward_g: specific force. static_lean_deg: the lean of a vehicle at rest with this force.
     lean_sigma_deg: the lean's standard deviation, estimated by the firmware; NaN if the display shows no lean. notices:
-    remarks about the ride (kickstand_tools.refusals.sentence puts a notice into words).
+    remarks about the ride.
     """
 
     t_s: Array
@@ -56,7 +56,18 @@ class LeanTable(Table):
     yaw_rate_dps: Array
     roll_rate_dps: Array
     lean_sigma_deg: Array
-    notices: list[Notice]
+    notices: list[Message]
+
+
+@dataclass(frozen=True)
+class CarReplayed(Message):
+    """A car's log is replayed, and a car does not lean."""
+
+    code = "car-replayed"
+    text = (
+        "the calibration is a car's, whose display shows no lean: lean_deg is that of a motorcycle which would feel "
+        "the same, and lean_sigma_deg is nan"
+    )
 
 
 def replay(
@@ -75,7 +86,7 @@ def replay(
     >>> float(abs(lean.lean_deg - ride.truth["lean_deg"]).max()) < 10.0
     True
     """
-    notices: list[Notice] = []
+    notices: list[Message] = []
     blocks = list(replay_blocks(log, calibration, engine, progress, notices))
     time_s = np.concatenate([block.t_s for block, _ in blocks])
     columns = np.concatenate([results for _, results in blocks]).T
@@ -84,13 +95,13 @@ def replay(
 
 def replay_to_csv(
     log: Source, calibration: CalibrationFile, engine: str, out: Path, progress: Progress | None = None
-) -> tuple[int, list[Notice]]:
+) -> tuple[int, list[Message]]:
     """Write LEAN.csv: the log's own times, then replay_engine.COLUMNS. Returns the number of samples and the notices.
 
     A long log uses two processes. Memory does not grow with its length, except on the emulated Pico, which is too slow
     for long logs. Raises InputError.
     """
-    notices: list[Notice] = []
+    notices: list[Message] = []
     whole = log.source if isinstance(log, Stretch) else log
     # only for the command: a second process imports the main program again, which other programs may not allow
     long = not isinstance(whole, Log) and total_bytes(whole) > _LONG_BYTES
@@ -100,23 +111,26 @@ def replay_to_csv(
 
 
 def replay_blocks(
-    log: Source, calibration: CalibrationFile, engine: str, progress: Progress | None, notices: list[Notice]
+    log: Source, calibration: CalibrationFile, engine: str, progress: Progress | None, notices: list[Message]
 ) -> Iterator[tuple[Block, Array]]:
     """Yield each block of the log with the engine's results (n, COLUMNS). They are NaN for frozen readings, which are a
     gap for the engine. A car's display shows no lean, so lean_sigma_deg is always NaN. notices: remarks are appended at
     the end."""
     car = calibration.vehicle == "car"
     whole, stretch = split_stretch(log)
+    misfit = Misfit()
     for block, results in _replayed(whole, calibration, engine, progress, notices):
+        if not car:
+            misfit.add(block.measured.t_s, results[:, _SIGMA] == replay_engine.ODD)
         found = _with_frozen(block, results)
         if car:
             found[:, _SIGMA] = np.nan
         yield from within(stretch, block, found)
-    notices += [Notice("car-replayed")] if car else []
+    notices += [CarReplayed()] if car else misfit.remarks(notices)
 
 
 def _replayed(
-    log: Source, calibration: CalibrationFile, engine: str, progress: Progress | None, notices: list[Notice]
+    log: Source, calibration: CalibrationFile, engine: str, progress: Progress | None, notices: list[Message]
 ) -> Iterator[tuple[Block, Array]]:
     """Yield each block with the results (n, COLUMNS) for its rows that are not frozen."""
     log = read_twice(log) if engine in _BY_RECORDS else log
@@ -138,7 +152,7 @@ def _with_frozen(block: Block, results: Array) -> Array:
     found = np.full((len(block.time_us), len(replay_engine.COLUMNS)), np.nan)
     found[~block.frozen] = results
     sigma = found[:, _SIGMA]
-    sigma[sigma == replay_engine.NOT_SHOWN] = np.nan
+    sigma[sigma < 0.0] = np.nan
     return found
 
 

@@ -32,7 +32,8 @@ COLUMNS = (
 CALIBRATION = "<47d"
 RECORD = "<q8d"
 RESULT = "<9d"
-NOT_SHOWN = -1.0  # lean_sigma_deg if the display shows no lean
+# lean_sigma_deg if the display shows no lean; and where it names a sensor whose readings do not fit again and again
+NOT_SHOWN, ODD = -1.0, -2.0
 NO_SPEED = -1.0  # not NaN, because a board's struct does not read NaN as NaN
 
 
@@ -115,7 +116,7 @@ class Replay:
             static_lean_deg(force),
             degrees(rate[1]),
             degrees(rate[2]),
-            degrees(sqrt(meter.filter.variance)) if meter.trusted else NOT_SHOWN,
+            degrees(sqrt(meter.filter.variance)) if meter.trusted else ODD if meter.odd else NOT_SHOWN,
         )
 
 

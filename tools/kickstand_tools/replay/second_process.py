@@ -23,7 +23,7 @@ _along: MeterAlong  # set in the second process only
 def columns_of(blocks: Iterator[Block], calibration: CalibrationFile) -> Iterator[tuple[Block, Array]]:
     """Yield each block with MeterAlong.columns() of its measured rows. Raises InputError, also if the second process
     ends."""
-    spawn = multiprocessing.get_context("spawn")  # a process with threads, as of a progress bar, must not be forked
+    spawn = multiprocessing.get_context("spawn")  # a process with threads (progress bar) must not be forked
     waiting: deque[tuple[Block, Future[Array]]] = deque()
     try:
         with ProcessPoolExecutor(1, spawn, _begin, (calibration,)) as pool:

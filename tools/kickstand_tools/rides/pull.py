@@ -15,7 +15,7 @@ from mpremote.transport import TransportExecError
 from ..common.errors import InputError
 from ..common.output import check_directory, make_directory
 from ..deploy.board_console import BrokenOff, lines
-from ..deploy.connection import ConnectedBoard, Port, Progress, connected, literal, printed, restart
+from ..deploy.connection import UPDATE, ConnectedBoard, Port, Progress, connected, literal, printed, restart
 from . import ride_log
 from .block_reader import CUT_SHORT, StoredBlock, missing_note, read
 
@@ -136,7 +136,7 @@ def _list(transport: ConnectedBoard, name: str) -> tuple[str, str, dict[int, lis
     directory, vehicle = literal(first, (str, str))
     in_order = sorted(_Part(*literal(line, (int, int, int, str))) for line in lines)
     if not all(part.path.startswith(f"{directory}/") and part.ride < 100_000 for part in in_order):
-        raise InputError(f"the board at {name} names rides that are none: kickstand flash brings it up to date")
+        raise InputError(f"the board at {name} lists invalid rides", UPDATE)
     by_ride = itertools.groupby(in_order, lambda part: part.ride)
     return directory, vehicle, {ride: list(group) for ride, group in by_ride}
 

@@ -69,7 +69,7 @@ class Bus:
         self.open = False
         self._driven_scl = 1
         self._driven_sda = 1
-        self._stuck_bits = -1  # zero bits that a hung device has yet to send; 0: it waits for ACK; -1: none hangs
+        self._stuck_bits = -1  # zero bits left to send for a hung device; 0: it waits for ACK; -1: none hangs
 
     def attach(self, device):
         """Connect a device."""

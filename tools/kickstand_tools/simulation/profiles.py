@@ -236,7 +236,7 @@ def held(plan: Plan) -> Conditions:
     speed = plan.uniform(18.0, 25.0)
     plan.to_speed(speed, 2.5)
     plan.straight(5.0)
-    lean = plan.side() * 35.0  # lean of the centre of mass: the chassis leans 3 degrees more by the tyres' width
+    lean = plan.side() * 35.0  # lean of the centre of mass: the tyres' width adds 3 degrees for the chassis
     while plan.going_on:
         plan.turn(lean, speed, seconds=60.0, roll_s=2.0)
         lean = -lean

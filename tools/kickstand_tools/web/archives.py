@@ -1,7 +1,7 @@
-"""What the pages get of the tools, in ZIP files that are the same whenever the files in them are.
+"""Packs the tools for the pages in ZIP files. The same content always gives the same ZIP file.
 
-install_archive() has what install_guest.py and cable_guest.py need to talk to a board, rides_archive() what
-rides_guest.py needs to look at a ride.
+install_archive() has the files that install_guest.py and cable_guest.py need to talk to a board. rides_archive() has
+those that rides_guest.py needs to show a ride.
 """
 
 import io
@@ -23,9 +23,9 @@ from ..deploy import bytecode
 from ..deploy.firmware_files import firmware_files
 
 _DATE = (1980, 1, 1, 0, 0, 0)
-# Of Pico; of Pico 2; of ESP32-C3, C6 and H2 and of a Pico 2's other processor; of all other ESP32
+# For Pico; Pico 2; ESP32-C3, C6, H2 and the other processor of a Pico 2; all other ESP32
 ARCHITECTURES = ("armv6m", "armv7emsp", "rv32imc", "xtensawin")
-# In place of pyserial, and of a module for terminals: what mpremote asks of them as it is imported
+# Replaces pyserial and a module for terminals: the names that mpremote needs when it is imported
 _STANDS_IN = {
     "serial/__init__.py": b"SerialException = OSError\n",
     "serial/tools/__init__.py": b"",
@@ -33,14 +33,14 @@ _STANDS_IN = {
     "mpremote/console.py": b"VT_ENABLED = False\n",
 }
 _MPREMOTE = ("__init__.py", "mp_errno.py", "transport.py", "transport_serial.py")
-_NUMPY = "lib/python3.12/site-packages/"  # in the package of conda
-# A third of numpy, which is for its developers, for other compilers, and for random numbers
+_NUMPY = "lib/python3.12/site-packages/"  # in the conda package
+# A third of numpy: parts for its developers, other compilers and random numbers
 _LEFT_OUT = ("/tests/", "/f2py/", "/random/", "/distutils/", "/testing/", "/include/", "/_pyinstaller/")
 _LICENCES = "info/licenses/"
 
 
 class _ToolsFinder(ModuleFinder):
-    """Finds modules of kickstand_tools alone: where it is installed, other packages are beside it."""
+    """Finds only modules of kickstand_tools, because other packages are beside an installed one."""
 
     def find_module(self, name: str, path: Any, parent: Any = None) -> Any:
         if path is None and name != "kickstand_tools":
@@ -49,8 +49,8 @@ class _ToolsFinder(ModuleFinder):
 
 
 def tools(*modules: str) -> dict[str, Path]:
-    """{path below the tools: file} of these modules of kickstand_tools, as "web/device.py", and of all that they
-    import of it, also within functions; with the templates and scripts beside them."""
+    """{path below the tools: file} of these modules of kickstand_tools, such as "web/device.py", and of everything that
+    they import from it, also within functions, with the templates and scripts beside them."""
     finder = _ToolsFinder([str(firmware_path.TOOLS)])
     for name in modules:
         finder.import_hook("kickstand_tools." + name.removesuffix(".py").replace("/", "."))
@@ -71,8 +71,8 @@ def zipped(contents: Mapping[str, bytes]) -> bytes:
 
 
 def install_archive() -> bytes:
-    """The tools that `kickstand flash`, `record` and `pull` consist of, mpremote, and the firmware, as sources and
-    compiled for every machine code of a board: tools/ and firmware/ as in a checkout, mpremote/, serial/, compiled/."""
+    """The tools of `kickstand flash`, `record` and `pull`, mpremote, and the firmware, as sources and compiled for
+    every machine code of a board: tools/ and firmware/ as in a checkout, mpremote/, serial/, compiled/."""
     files = {f"mpremote/{name}": Path(mpremote.__file__).parent / name for name in _MPREMOTE}
     files |= {f"tools/{name}": path for name, path in tools("web/cable_guest.py", "web/install_guest.py").items()}
     files |= {f"firmware{path}": source for path, source in firmware_files().items()}
@@ -80,13 +80,13 @@ def install_archive() -> bytes:
 
 
 def firmware() -> bytes:
-    """The firmware as a ZIP file, for a browser that cannot connect to a board: its rider takes mpremote."""
+    """The firmware as a ZIP file, for a browser that cannot connect to a board: its rider uses mpremote."""
     return zipped({f"kickstand-firmware{path}": source.read_bytes() for path, source in firmware_files().items()})
 
 
 def _compiled() -> dict[str, bytes]:
-    """compiled/ARCHITECTURE/... .mpy: of all but the first only what contains machine code. Nothing where there is no
-    compiler: then the sources are copied."""
+    """compiled/ARCHITECTURE/... .mpy: complete for the first architecture, only the files with machine code for the
+    others. Empty without a compiler: then the sources are copied."""
     sources = sorted(firmware_path.PACKAGE.rglob("*.py"))
     first, *others = ARCHITECTURES
     try:
@@ -105,9 +105,9 @@ def _compiled() -> dict[str, bytes]:
 
 
 def rides_archive() -> bytes:
-    """The tools that `kickstand report` and `plot` consist of, the firmware's mathematics, what reads GPX and FIT
-    files, Jinja, and markupsafe without its compiled module, which it also has in Python: packages to import. Raises
-    InputError without fitdecode or gpxpy."""
+    """The packages for `kickstand report` and `plot`: the tools, the firmware's mathematics, readers of GPX and FIT
+    files, Jinja, and markupsafe without its compiled module, which also exists in Python. Raises InputError without
+    fitdecode or gpxpy."""
     try:
         import fitdecode
         import gpxpy
@@ -120,7 +120,7 @@ def rides_archive() -> bytes:
 
 
 def numpy_archive(conda: bytes) -> tuple[bytes, bytes]:
-    """A ZIP file of numpy to import, and the text of its licences. conda: the package of emscripten-forge."""
+    """A ZIP file with an importable numpy, and the text of its licences. conda: the package of emscripten-forge."""
     kept, licences = {}, b""
     with tarfile.open(fileobj=io.BytesIO(conda)) as package:
         for entry in package:

@@ -1,5 +1,5 @@
 """`kickstand record` and `kickstand pull` in the browser: their own code on CPython for WebAssembly. page/live/live.mjs
-runs it. What goes to it is JSON, but for the files.
+runs it. Results are JSON, except files.
 """
 
 import contextlib
@@ -18,7 +18,7 @@ from .serial_guest import BrowserBoard
 
 
 class LiveStream:
-    """A board's stream, watched and kept."""
+    """Watches a board's stream and keeps it."""
 
     def __init__(self):
         self._stopped = threading.Event()
@@ -27,11 +27,11 @@ class LiveStream:
         self._began = datetime.now()
 
     def run(self, line, name, live):
-        """Listen to the board at a SerialLine until stop(), or until nothing more comes. name: of its port.
+        """Listen to the board at a SerialLine until stop(), or until nothing more arrives. name: of its port.
         live(reading): called every half second with a LiveReading's fields as JSON.
 
-        Returns JSON: {"notes": lines on what is missing, "changed": the log ended because of another calibration} or
-        {"refused": why}. What came until then is in files().
+        Returns JSON: {"notes": lines about missing parts, "changed": true if the log ended because of another
+        calibration} or {"refused": reason}. The data received until then is in files().
         """
         self._recording = stream.StreamLog(self._stopped, lambda reading: live(json.dumps(vars(reading))))
         notes = []
@@ -45,7 +45,7 @@ class LiveStream:
                     with contextlib.suppress(Exception):  # the cable may be out
                         restart(transport)
         except InputError as error:
-            return json.dumps({"refused": str(error)})
+            return json.dumps({"refused": error.line(page=True)})
         return json.dumps({"notes": notes, "changed": stream.CHANGED in notes})
 
     def stop(self):
@@ -53,8 +53,8 @@ class LiveStream:
         self._stopped.set()
 
     def files(self):
-        """[(name, content)] of the log, and of its calibration, both as `kickstand record` writes them; nothing
-        before the first readings."""
+        """[(name, content)] of the log and of its calibration, both as written by `kickstand record`. Empty before the
+        first readings."""
         first = self._recording and self._recording.first
         if not first:
             return []
@@ -68,15 +68,15 @@ class LiveStream:
 def pull(line, name, progress):
     """Fetch the rides from the board at a SerialLine. name: of its port.  progress(what, done, total): in bytes.
 
-    Returns (JSON, files): {"refused": why it ended early, or null, "rides": [a PulledRide's fields, "log" its name or
-    null]} and [(name, content)], the logs with their calibrations as `kickstand pull` writes them.
+    Returns (JSON, files): {"refused": the reason for an early end, or null, "rides": [a PulledRide's fields, "log" its
+    name or null]} and [(name, content)], the logs with their calibrations as written by `kickstand pull`.
     """
     refused, rides = None, []
     with tempfile.TemporaryDirectory() as directory:
         try:
             pulling.pull(BrowserBoard(line, name), Path(directory), progress=progress, pulled=rides.append)
         except InputError as error:
-            refused = str(error)
+            refused = error.line(page=True)
         written = [path for ride in rides if ride.log for path in (ride.log, calibration_path(ride.log))]
         files = [(path.name, path.read_bytes()) for path in written]
     found = [vars(ride) | {"log": ride.log and ride.log.name} for ride in rides]

@@ -1,5 +1,5 @@
 """`kickstand flash`, `status` and `check` in the browser: their own code on CPython for WebAssembly.
-page/install/install.mjs runs it. What goes to it is JSON.
+page/install/install.mjs runs it. Results are JSON.
 """
 
 import json
@@ -22,15 +22,15 @@ _POSE = "(lambda s: (s.platform, getattr(s.implementation, '_machine', '')))(__i
 
 
 class Installation:
-    """One board: first look(), then install(). check() at any time in between."""
+    """One board. Call look() first, then install(); call check() any time between."""
 
     def look(self, line, name):
-        """What the board at a SerialLine is, and what its config.py sets. name: of its port, for messages. The board is
+        """Identify the board at a SerialLine, and read its config.py. name: of its port, for messages. The board is
         restarted.
 
-        Returns {"refused": why} or {"board", "settings": {name: its value in config.py}, "usual": {name: the value that
-        is taken without one}, "by_hand": why a form cannot change this config.py, or null, "others": a line for each
-        file of another project that install() will give another name}.
+        Returns {"refused": reason} or {"board", "settings": {name: value in config.py}, "usual": {name: default value},
+        "by_hand": the reason why a form cannot change this config.py, or null, "others": one line per file of another
+        project that install() will rename}.
         """
         try:
             with connection.connected(BrowserBoard(line, name)) as (transport, name):
@@ -41,11 +41,11 @@ class Installation:
                 finally:
                     connection.restart(transport)
         except InputError as error:
-            return json.dumps({"refused": str(error)})
+            return json.dumps({"refused": error.line(page=True)})
         self._path = firmware_path.config()
         self._template = self._path.read_text(encoding="utf-8")
         for module in [module for module in sys.modules if module.startswith("kickstand.")]:
-            del sys.modules[module]  # of a board before: the firmware asks what it runs on as it is imported
+            del sys.modules[module]  # of an earlier board: the firmware identifies its board on import
         settings, self._by_hand, self._own = {}, None, None
         found = others.find(there, lambda path: _judged(path, *self._pose), True)
         own = None if CONFIG in found.moves else there.texts.get(CONFIG)
@@ -62,13 +62,12 @@ class Installation:
         return json.dumps(said | {"others": found.words()})
 
     def check(self, wanted):
-        """The config.py with these settings, {name: value or null for the usual one}, by the firmware's own rules.
-
-        Returns {"text", "fault": [name of the setting or null, what is wrong] or null}.
+        """Check the config.py with these settings, {name: value or null for the default}, by the firmware's own rules.
+        Returns {"text", "fault": [name of the setting or null, reason] or null}.
         """
         text = self._template if self._own is None else self._own
         values = json.loads(wanted)
-        for name, value in values.items():  # one by one, so that a fault can be put beside its field
+        for name, value in values.items():  # one by one, because a fault is shown beside its field
             try:
                 text = config_text.with_values(text, {name: value})
             except InputError as error:
@@ -84,10 +83,10 @@ class Installation:
         return json.dumps({"text": text, "fault": found})
 
     def install(self, line, name, wanted, progress):
-        """Put the firmware onto the board at a SerialLine, with the settings that check() has found right; a config.py
-        that a form cannot change stays. progress(what, done, total): the progress, bytes.
+        """Install the firmware on the board at a SerialLine, with the settings that check() accepted. A config.py that
+        a form cannot change is kept. progress(what, done, total): the progress, bytes.
 
-        Returns {"board", "copied": how many files, "kept": likewise, "config_kept"} or {"refused": why}.
+        Returns {"board", "copied": number of files, "kept": number of files, "config_kept"} or {"refused": reason}.
         """
         self._path.write_text(self._template, encoding="utf-8")
         text = None if self._by_hand else json.loads(self.check(wanted))["text"]
@@ -96,32 +95,33 @@ class Installation:
             board = BrowserBoard(line, name)
             done = flash.flash(board, replaces, progress, describe=_describe, compiler=_compiled, judge=_judged)
         except InputError as error:
-            return json.dumps({"refused": str(error)})
+            return json.dumps({"refused": error.line(page=True)})
         installed = done.installed
         counts = {"copied": len(installed.copied), "kept": len(installed.kept)}
         return json.dumps({"board": done.board, "config_kept": CONFIG not in installed.copied} | counts)
 
 
 def status(line, name):
-    """What `kickstand status` prints of the board at a SerialLine: {"text"} or {"refused": why}."""
+    """The output of `kickstand status` for the board at a SerialLine: {"text"} or {"refused": reason}."""
     try:
         return json.dumps({"text": connection.status(BrowserBoard(line, name))})
     except InputError as error:
-        return json.dumps({"refused": str(error)})
+        return json.dumps({"refused": error.line(page=True)})
 
 
 def check(line, name, say):
-    """`kickstand check` of the board at a SerialLine: {"text"} or {"refused": why}. say(text): each line."""
+    """Run `kickstand check` on the board at a SerialLine: {"text"} or {"refused": reason}. say(text): called with each
+    line."""
     try:
         checked = board_check.check(BrowserBoard(line, name), say)
     except InputError as error:
-        return json.dumps({"refused": str(error)})
+        return json.dumps({"refused": error.line(page=True)})
     lines = [board_check.line(finding) for finding in checked.findings]
     return json.dumps({"text": "\n".join([*lines, board_check.verdict(checked.findings)])})
 
 
 def _describe(transport, name):
-    """connection.describe(), and a look at whether the board is one that Kickstand runs on."""
+    """connection.describe(), which also refuses boards that Kickstand does not run on."""
     text = connection.describe(transport, name)
     version, platform = transport.eval(_VERSION)
     if version < OLDEST:
@@ -132,12 +132,12 @@ def _describe(transport, name):
 
 
 def _written(value):
-    """As it would stand in config.py: addresses in hexadecimal."""
+    """The value as written in config.py: addresses in hexadecimal."""
     return f"({', '.join(map(hex, value))})" if isinstance(value, tuple) else repr(value)
 
 
 def _compiled(source, architecture):
-    """bytecode.cross_compiled() from the archive. All but machine code is the same for every board."""
+    """bytecode.cross_compiled() from the archive. Everything except machine code is the same for every board."""
     folders = [ROOT / "compiled" / one for one in (architecture, COMMON)]
     path = source.relative_to(firmware_path.PACKAGE).with_suffix(".mpy")
     if not folders[0].is_dir():

@@ -1,4 +1,4 @@
-"""MicroPython, CPython and what runs on it for browsers: packages from npm, of the versions and with the hashes in
+"""Gets MicroPython, CPython and its packages for browsers from npm, with the versions and hashes in
 npm/package-lock.json."""
 
 import hashlib
@@ -13,7 +13,7 @@ from ..common.errors import InputError, cause, extra
 
 NPM = Path(__file__).resolve().parent / "npm"
 LISTS = ("package.json", "package-lock.json")
-# Folder in the site: package, and which of its files
+# Folder in the site: package, and the files from it
 PACKAGES = {
     "micropython": (
         "@micropython/micropython-webassembly-pyscript",
@@ -33,7 +33,7 @@ _TIMEOUT_S = 300
 def find() -> dict[str, bytes]:
     """{path in the site: content} of PACKAGES.
 
-    npm installs it once, into .cache/kickstand of the home directory. Raises InputError if that is not possible.
+    npm installs them once, in .cache/kickstand of the home directory. Raises InputError if that is not possible.
     """
     lists = b"".join((NPM / name).read_bytes() for name in LISTS)
     kept = Path.home() / ".cache" / "kickstand" / f"web-{hashlib.sha256(lists).hexdigest()[:16]}"
@@ -57,7 +57,7 @@ def _install(kept: Path) -> None:
 
     try:
         kept.parent.mkdir(parents=True, exist_ok=True)
-        # What has been renamed is no longer there to be removed
+        # A renamed directory cannot be removed in the end
         with tempfile.TemporaryDirectory(dir=kept.parent, ignore_cleanup_errors=True) as directory:
             for name in LISTS:
                 shutil.copy(NPM / name, directory)
@@ -91,7 +91,7 @@ def _rename(directory: str, kept: Path) -> None:
 
 
 def _reason(said: str) -> str:
-    """What npm gives as the reason: the first of its lines of errors that is not a code alone."""
+    """npm's reason: its first error line that is not only a code."""
     lines = [line.removeprefix("npm error ").strip() for line in said.splitlines() if line.startswith("npm error")]
     whole = [line for line in lines if " " in line and not line.startswith(("code ", "errno ", "syscall "))]
     return f"npm says: {whole[0]}" if whole else "npm failed; is there a network?"

@@ -1,4 +1,4 @@
-"""What the files that were given to the page Rides are: logs, recordings of an app, tables, calibrations, tracks."""
+"""Identifies the files given to the page Rides: logs, recordings of an app, tables, calibrations, tracks."""
 
 import re
 import zipfile
@@ -17,8 +17,8 @@ from ..logs.reader import is_log
 
 @dataclass
 class GivenRide:
-    """log: a file, or a folder of files that are one recording. files: all that belong to it. table: what is to be
-    asked about it, None if it is known. track: a .gpx or .fit to be joined with it, or ""."""
+    """log: a file, or a folder with the files of one recording. files: all its files. table: the table to ask the user
+    about, None if its columns are known. track: a .gpx or .fit to join with it, or ""."""
 
     log: str
     files: list[str]
@@ -29,7 +29,7 @@ class GivenRide:
 
 @dataclass
 class Given:
-    """rides: in the order of their names. kinds: what each file is, refused: why it is nothing that can be used."""
+    """rides: sorted by name. kinds: the kind of each file. refused: the reason why a file cannot be used."""
 
     rides: list[GivenRide] = field(default_factory=list)
     kinds: dict[str, str] = field(default_factory=dict)
@@ -37,9 +37,10 @@ class Given:
 
 
 def sorted_out(names: list[str]) -> Given:
-    """What these files of the working directory are; they are named in the order in which they were given.
+    """Identify these files of the working directory. names: in the order given.
 
-    A ride has the calibration beside it, or else the last one given that is beside no other ride; and the last track.
+    A ride gets the calibration beside it, or else the last given one that is not beside another ride; and the last
+    track.
     """
     found, loose = Given(), []
     track = ""
@@ -78,17 +79,18 @@ def sorted_out(names: list[str]) -> Given:
 
 
 def _in_folder(name: str, files: list[RecordingFile]) -> str:
-    """Put files into a folder of their own; returns its name."""
+    """Write files to a new folder; returns its name."""
     while Path(name).exists():
         name += "_"
     Path(name).mkdir()
     for file in files:
-        Path(name, file.name).write_bytes(file.content)  # not a link: an import leaves out those that lead out
+        Path(name, file.name).write_bytes(file.content)  # not a link: an import leaves out links to outside
     return name
 
 
 def _together(files: list[RecordingFile]) -> Iterator[tuple[str, list[RecordingFile]]]:
-    """(name, its files) of each recording among single files: the name is that of a folder where they are several."""
+    """(name, its files) of each recording among single files: the name is that of a folder if there are several
+    files."""
     found = recordings(files)
     used = {id(file) for _, group in found for file in group}
     for app, group in found:
@@ -102,7 +104,7 @@ def _together(files: list[RecordingFile]) -> Iterator[tuple[str, list[RecordingF
 
 
 def _add(found: Given, log: str, names: list[str], files: list[RecordingFile]) -> None:
-    """A ride, or why these files are none."""
+    """Add a ride, or the reason why these files are not one."""
     known = recordings(files)
     table = None if known else mapped.table_in(files)
     if not known and (table is None or len(table.columns) < len(mapped.REQUIRED)):
@@ -113,5 +115,5 @@ def _add(found: Given, log: str, names: list[str], files: list[RecordingFile]) -
 
 
 def _by_number(name: str) -> list[tuple[int, str]]:
-    """ride-2 comes before ride-10."""
+    """Sort key: ride-2 comes before ride-10."""
     return [(int(part or 0), "") if k % 2 else (0, part) for k, part in enumerate(re.split(r"(\d+)", name.lower()))]

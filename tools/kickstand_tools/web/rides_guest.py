@@ -1,7 +1,7 @@
 """`kickstand report`, `plot`, `smooth`, `import`, `join` and `calibrate ride` in the browser: their own code on CPython
-for WebAssembly. page/rides/worker.mjs runs it, in a folder of its own.
+for WebAssembly. page/rides/worker.mjs runs it, in a separate folder.
 
-Each function returns JSON: what its docstring says, or {"refused": why}, what the command would say in the words of
+Each function returns JSON as described in its docstring, or {"refused": reason}: the command's message in the words of
 a page.
 """
 
@@ -29,25 +29,23 @@ from ..imports.importing import import_recording, write_imported
 from ..joining.joined import join_track, write_joined
 from ..logs.csv_lines import write_lean
 from ..logs.reader import read_blocks
-from ..refusals import sentence
-from ..remedies import PAGE
 from .rides_given import sorted_out
 
 PLOTLY = "./plotly/plotly.min.js"  # the page of a ride loads it from the site
-MADE = Path("../made")  # not where what was given is: that may have any name
-_smoothed: dict[str, list] = {}  # of the ride that was looked at last: what smooth_blocks() gives, block by block
+MADE = Path("../made")  # not in the folder of the given files, which may have any name
+_smoothed: dict[str, list] = {}  # of the last shown ride: results of smooth_blocks(), block by block
 TOO_LONG = "this ride is too long for the memory of a browser: give a part of it"
 
 
 def in_json(function: Callable[..., Any]) -> Callable[..., str]:
-    """With the result as JSON, or why there is none."""
+    """A decorator: return the result as JSON, or the reason for none."""
 
     @functools.wraps(function)
     def as_json(*given):
         try:
             return json.dumps(function(*given))
         except InputError as error:
-            return json.dumps({"refused": _one_line(error.said(PAGE))})
+            return json.dumps({"refused": _one_line(error.line(page=True))})
         except MemoryError:
             return json.dumps({"refused": TOO_LONG})
 
@@ -56,11 +54,11 @@ def in_json(function: Callable[..., Any]) -> Callable[..., str]:
 
 @in_json
 def rides(given, names):
-    """What the files of these names (JSON) in the folder `given` are, in the order in which they were given.
+    """Identify the files of these names (JSON, in the order given) in the folder `given`.
 
-    {"rides": [{"log", "isLog": no app's recording, "calibration" and "track": name or "", "files": [names], "table":
-    asked_for() of one that nobody knows}, ...], in the order of their names; "kinds": {name: what it is};
-    "why": {name: why it cannot be used}}.
+    {"rides": [{"log", "isLog": true unless it is an app's recording, "calibration" and "track": name or "", "files":
+    [names], "table": asked_for() of an unknown table}, ...], sorted by name; "kinds": {name: kind}; "why": {name:
+    reason why it cannot be used}}.
     """
     _smoothed.clear()
     for old in Path().iterdir():
@@ -73,15 +71,14 @@ def rides(given, names):
         vars(one) | {"isLog": found.kinds.get(one.log) == "log", "table": one.table and asked_for(one.table)}
         for one in found.rides
     ]
-    refused = {name: _one_line(error.said(PAGE)) for name, error in found.refused.items()}
+    refused = {name: _one_line(error.line(page=True)) for name, error in found.refused.items()}
     return {"rides": rides, "kinds": found.kinds, "why": refused}
 
 
 def asked_for(table: mapped.MappedTable) -> dict[str, Any]:
-    """What the page asks about a table: {"columns": all, "keys": [[key, words, is it needed, column that seems to be
-    it or ""], ...], "units": [[key, words, [[unit, words], ...], the one that seems right, why], ...],
-    "lacking": what is not found, in words, "certain": nothing that is needed is uncertain, "picture":
-    Table.first_seconds()}."""
+    """The questions of the page about a table: {"columns": all, "keys": [[key, words, required, probable column or ""],
+    ...], "units": [[key, words, [[unit, words], ...], probable unit, reason], ...], "lacking": missing columns in
+    words, "certain": true if all required columns are certain, "picture": Table.first_seconds()}."""
     keys = [[key, words, key in mapped.REQUIRED, table.found.get(key, "")] for key, words in mapped.WORDS.items()]
     found = table.findings
     units = []
@@ -98,9 +95,9 @@ def asked_for(table: mapped.MappedTable) -> dict[str, Any]:
 
 @in_json
 def take(log, is_log, columns, units, track, progress):
-    """{"log": log}; of what is made of it, by `import` from an app's recording or by `join` with a track, {"log": that,
-    "path": likewise, "warnings": [...], "words": how it was joined or ""}. columns, units: of a table, as JSON of what
-    --columns and --units take, else "{}"; track: a .gpx, a .fit or ""."""
+    """{"log": log} for a log. For an app's recording (`import`) or with a track (`join`), {"log": the new log, "path":
+    the same, "warnings": [...], "words": how it was joined or ""}. columns, units: of a table, as JSON of the values of
+    --columns and --units, otherwise "{}". track: a .gpx, a .fit or ""."""
     if is_log and not track:
         return {"log": log}
     out, warnings, words = log, [], ""
@@ -108,7 +105,7 @@ def take(log, is_log, columns, units, track, progress):
         found = import_recording(log, json.loads(columns) or None, json.loads(units))
         out = str(_made(log, f"{log.partition('.')[0]}.csv"))
         write_imported(out, found)
-        warnings = [sentence(notice, PAGE) for notice in [*found.notices, *found.shortfalls]]
+        warnings = [notice.line(page=True) for notice in [*found.notices, *found.shortfalls]]
     if track:
         try:
             joined = join_track(Path(out), Path(track), progress)
@@ -117,13 +114,13 @@ def take(log, is_log, columns, units, track, progress):
             match = joined.match
             words = f"{track} is joined: correlation {match.correlation:.2f}, known to {match.sigma_s:.2f} s."
         except InputError as error:
-            warnings.append(f"{track} is not joined: {_one_line(error.said(PAGE))}")
+            warnings.append(f"{track} is not joined: {_one_line(error.line(page=True))}")
     made = {"path": out} if out != log else {}
     return {"log": out, "warnings": warnings, "words": words} | made
 
 
 class _Keeping(Ride):
-    """Keeps the smoothed lean that it comes by: it takes as long again to find."""
+    """Keeps the smoothed lean, because computing it again would take as long."""
 
     def _read(self, log, progress, notices):
         for block, found in super()._read(log, progress, notices):
@@ -133,7 +130,7 @@ class _Keeping(Ride):
 
 @in_json
 def look(log, calibration, progress):
-    """What `report` says and `plot` draws of a log with the calibration of a file: {"words": report.Words, "json":
+    """The results of `report` and `plot` for a log with the calibration of a file: {"words": report.Words, "json":
     report.as_data(), "warnings": [...], "page": HTML, "plotly": the script that the page loads, "stem": the name
     without suffixes}. progress(done, total): the progress."""
     opened = open_ride(Path(log), Path(calibration), smoothed=True)
@@ -142,9 +139,9 @@ def look(log, calibration, progress):
     seen = overview(ride, progress)
     table = {"units": report.STOPS_UNITS, "title": report.STOPS_TITLE, "terms": report.STOPS_TERMS}
     return {
-        "words": asdict(report.words(seen, PAGE)) | table,
+        "words": asdict(report.words(seen, on_page=True)) | table,
         "json": report.as_data(seen) | {"ride": Path(log).name},
-        "warnings": [sentence(notice, PAGE) for notice in seen.notices],
+        "warnings": [notice.line(page=True) for notice in seen.notices],
         "page": page(seen, f'<script src="{PLOTLY}"></script>', "'self'"),
         "plotly": PLOTLY,
         "stem": ride.stem,
@@ -153,7 +150,7 @@ def look(log, calibration, progress):
 
 @in_json
 def smooth(log, calibration, progress):
-    """{"path": of LEAN.csv as `smooth` writes it}. What look() has found is not computed again."""
+    """{"path": of LEAN.csv as written by `smooth`}. Results of look() are reused."""
     ride = open_ride(Path(log), Path(calibration))
     out = _made(log, f"{ride.stem}.lean.csv")
     kept = _smoothed.get(ride.name, [None])
@@ -174,7 +171,7 @@ def _blocks_with(values, ride, progress):
 
 @in_json
 def align(log, progress):
-    """{"path": of the calibration that `calibrate ride` finds, "roll_deg", "pitch_deg", "yaw_deg": how well}."""
+    """{"path": of the calibration from `calibrate ride`, "roll_deg", "pitch_deg", "yaw_deg": its standard errors}."""
     found = fit_ride(Path(log), progress=progress)
     out = _made(log, calibration_path(Path(log)).name)
     write_calibration(out, found.calibration)
@@ -183,14 +180,14 @@ def align(log, progress):
 
 
 def _made(log, name):
-    """A path for what is made of a log: those of another one may have the same name."""
+    """A path for a result of a log. Another log may have a result of the same name."""
     folder = Path(log).parent if MADE in Path(log).parents else MADE / log
     folder.mkdir(parents=True, exist_ok=True)
     return folder / name
 
 
 def _one_line(text):
-    """Without the folder of what was made: nobody knows of it."""
+    """The message without the folder of results, which is an internal path."""
     return re.sub(rf"{re.escape(str(MADE))}/[^/]*/", "", " ".join(text.split()))
 
 
@@ -211,5 +208,5 @@ def raising(function):
 
 
 def prepare():
-    """To be called once, before all others."""
+    """Prepare the module. Call it once, before all other functions."""
     np.linalg.inv, np.linalg.solve = raising(np.linalg.inv), raising(np.linalg.solve)

@@ -1,4 +1,4 @@
-"""The sample ride of the page Rides: a simulated one, as `pull` would have fetched it."""
+"""Makes the sample ride of the page Rides: a simulated one in the form of `pull`."""
 
 import functools
 import gzip
@@ -12,12 +12,12 @@ from ..simulation.files import simulate, write_poses, write_ride
 
 LOG, CALIBRATION = "simulated-ride.csv.gz", "simulated-ride.cal.json"
 PROFILE, SEED, SECONDS = "street", 2, 180.0
-_EACH = 2  # of the sensor's readings are one of the log's, as on a board that records
+_EACH = 2  # readings of the sensor per row of the log, as on a board that records
 
 
 @functools.cache
 def sample_ride() -> dict[str, bytes]:
-    """{name: content} of the log, with what a GPS receiver gives, and of the calibration by six and two poses."""
+    """{name: content} of the log, with values of a GPS receiver, and of the calibration from six and two poses."""
     with tempfile.TemporaryDirectory() as directory:
         folder = Path(directory)
         made = simulate(PROFILE, SEED, folder, SECONDS)

@@ -1,8 +1,8 @@
-"""A board at the browser's serial port, on CPython for WebAssembly. While it waits the page has the control."""
+"""A board at the browser's serial port, on CPython for WebAssembly. While it waits, the page keeps running."""
 
 import time
 
-from pyodide.ffi import run_sync  # waits for what JavaScript promises
+from pyodide.ffi import run_sync  # waits for a promise of JavaScript
 
 from ..deploy.connection import ANSWER_S, ConnectedBoard
 
@@ -11,7 +11,7 @@ _GONE = "nothing comes any more"
 
 
 class Port:
-    """pyserial's Serial, as much of it as mpremote uses. line: the SerialLine of cable.mjs."""
+    """The part of pyserial's Serial that mpremote uses. line: the SerialLine of cable.mjs."""
 
     dtr = rts = True
 
@@ -53,7 +53,7 @@ class Port:
 
 
 class BrowserBoard(ConnectedBoard):
-    """The board at a SerialLine that is open. name: of its port, for messages."""
+    """The board at an open SerialLine. name: of its port, for messages."""
 
     def __init__(self, line, name):
         self.serial, self.device_name = Port(line), name

@@ -12,10 +12,10 @@ from typing import Any
 from urllib.parse import unquote, urlsplit
 
 HOST = "127.0.0.1"
-MOST, PATIENCE_S = 64, 10.0  # connections at a time; for what a browser has to send
-FULL_S = 1.0  # a new connection waits for so long for another to end, then the oldest is ended; a silent one at once
-PORT = 8377  # the same each time, so that the browser finds what it has kept
-# Named here, because the registry of Windows may hold others, with which a browser runs no module
+MOST, PATIENCE_S = 64, 10.0  # most connections at a time; longest wait for a browser's data
+FULL_S = 1.0  # wait of a new connection for a free place; then the oldest is ended, a silent one at once
+PORT = 8377  # always the same, because the browser keeps files by address
+# Defined here, because the registry of Windows may have others, and then a browser does not run modules
 TYPES = {
     ".css": "text/css; charset=utf-8",
     ".gz": "application/gzip",
@@ -34,11 +34,12 @@ TYPES = {
 
 
 class Server(ThreadingHTTPServer):
-    """Says nothing of a browser that hangs up. Of more than MOST connections the oldest is ended: it may be held."""
+    """Ignores a browser that disconnects. If there are more than MOST connections, it ends the oldest, which may be
+    stuck."""
 
     request_queue_size = 128
     daemon_threads = True
-    allow_reuse_address = os.name != "nt"  # there it would share the port with whoever has it
+    allow_reuse_address = os.name != "nt"  # on Windows it would share the port with another program
 
     def __init__(self, *arguments: Any) -> None:
         self._free = BoundedSemaphore(MOST)
@@ -57,7 +58,7 @@ class Server(ThreadingHTTPServer):
         super().process_request(request, client_address)
 
     def _end_a_silent_one(self) -> bool:
-        """End the oldest connection that has asked for nothing yet, and take its place; False if there is none."""
+        """End the oldest connection that has sent no request, and use its place; False if there is none."""
         with contextlib.suppress(OSError, StopIteration, RuntimeError):
             next(one for one in list(self._open) if one not in self.has_asked).shutdown(socket.SHUT_RDWR)
             return self._free.acquire(timeout=FULL_S)
@@ -107,7 +108,7 @@ def server(files: dict[str, bytes], port: int = PORT) -> Server:
                 self.wfile.write(data)
 
         def log_message(self, format: str, *args: object) -> None:
-            """Say nothing of each request."""
+            """Do not print requests."""
 
     try:
         return Server((HOST, port), Handler)

@@ -1,4 +1,4 @@
-"""The files of the site: ours, the Python that the page runs, the display's characters, and what comes from npm."""
+"""Builds the files of the site: our pages, their Python code, the display's characters, and packages from npm."""
 
 import hashlib
 import json
@@ -17,35 +17,35 @@ from . import archives, npm_packages, sample_ride
 from .documents import documents
 
 PAGE = Path(__file__).resolve().parent / "page"
-# Large, and only for those who have a board or a ride: fetched when they ask for it
+# Large, and only for visitors with a board or a ride: fetched on demand
 LATER = ("esptool/", "firmware.zip", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip", "sample/")
 _BOARDS = {"pico": wiring.PICO, "esp32": wiring.ESP32}
-_NARROW = 4  # of the seven poses stand beside each other on a phone
+_NARROW = 4  # number of poses side by side on a phone
 _SHOWN = ("Kickstand", "starting")  # on the drawn display
-_NOT_KEPT = ("service_worker.js", "index.html")  # the browser keeps the first by itself, the second as "./"
-_WHEN_READ = (*LATER, documents.FOLDER)  # what the browser keeps once it was opened
+_NOT_KEPT = ("service_worker.js", "index.html")  # the browser keeps the first automatically, the second as "./"
+_WHEN_READ = (*LATER, documents.FOLDER)  # the browser keeps these after they were opened
 
 
 def python_files() -> dict[str, str]:
-    """{path as imported: source} of the firmware's package, and of the tools' modules that the page runs."""
+    """{path for import: source} of the firmware's package and of the tools' modules that the page runs."""
     package = firmware_path.PACKAGE
     found = {path.relative_to(package.parent).as_posix(): path for path in sorted(package.rglob("*.py"))}
     return {name: path.read_text(encoding="utf-8") for name, path in (found | archives.tools("web/device.py")).items()}
 
 
 def site_files() -> dict[str, bytes]:
-    """{path in the site: content} of the whole site. Raises InputError if what they carry cannot be fetched.
+    """{path in the site: content} of the whole site. Raises InputError if a required package cannot be downloaded.
 
     >>> sorted(site_files())[:2]  # doctest: +SKIP
     ['bike.mjs', 'board.mjs']
     """
     files = npm_packages.find()
     files |= {path.relative_to(PAGE).as_posix(): path.read_bytes() for path in sorted(PAGE.rglob("*.*"))}
-    files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # as a text a browser shows
+    files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # with this suffix a browser shows it as text
     files |= wiring_files()
     values = {"home": home(), "boards": wiring_tables()}
     library = files["plotly/plotly.min.js"].decode()
-    values["charts"] = " ".join(map(source_hash, (library, *page.SCRIPTS)))  # as a policy names them
+    values["charts"] = " ".join(map(source_hash, (library, *page.SCRIPTS)))  # in the form of a policy
     files |= {name: _filled(name, **values) for name in files if name.endswith(".html")}
     files |= documents.document_files(values["home"])
     files |= {f"sample/{name}": data for name, data in sample_ride.sample_ride().items()}
@@ -66,14 +66,14 @@ def site_files() -> dict[str, bytes]:
 
 
 def wiring_files() -> dict[str, bytes]:
-    """{name in the site: SVG}: wiring_pico.svg, wiring_esp32.svg, and what is built."""
+    """{name in the site: SVG}: wiring_pico.svg, wiring_esp32.svg, and the drawings of what to build."""
     display = lcd.draw([list(line.ljust(16).encode("ascii")) for line in _SHOWN], bytes(64))
     drawn = building.drawings(display, display) | {"six_positions_narrow.svg": building.six_positions(_NARROW)}
     return {name: svg.encode() for name, svg in drawn.items()}
 
 
 def wiring_tables() -> dict[str, tuple[str, list[tuple[str, str, str]]]]:
-    """{board: (its title, rows of part, its pin and the board's)} of what is drawn."""
+    """{board: (title, rows of (part, its pin, the board's pin))} of the wiring drawings."""
     return {
         name: (board.title, [(part, *both) for part, pins in wiring.connections(board) for both in pins.items()])
         for name, board in _BOARDS.items()
@@ -81,7 +81,7 @@ def wiring_tables() -> dict[str, tuple[str, list[tuple[str, str, str]]]]:
 
 
 def home() -> str:
-    """The address of the project, "" where what is installed does not know it: see tools/hatch_build.py."""
+    """The address of the project, "" if the installed package does not contain it: see tools/hatch_build.py."""
     try:
         named = metadata.metadata(DISTRIBUTION).get_all("Project-URL") or []
     except metadata.PackageNotFoundError:

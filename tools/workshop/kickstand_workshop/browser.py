@@ -1,4 +1,4 @@
-"""The site of `kickstand web` in a Chromium without a window."""
+"""Opens the site of `kickstand web` in a headless Chromium."""
 
 import contextlib
 import shutil
@@ -13,7 +13,7 @@ CHROMIUM = shutil.which("chromium")
 
 @contextlib.contextmanager
 def opened(files: dict[str, bytes]) -> Iterator[tuple[Any, str]]:
-    """A context with the browser, as playwright has it, and the address of a server of these files."""
+    """A context with playwright's browser and the address of a server of these files."""
     from playwright.sync_api import sync_playwright
 
     with serve.server(files, 0) as server, sync_playwright() as playwright:

@@ -20,8 +20,8 @@ from rich.console import Console
 from .evaluation import bands, integrity, integrity_report, picture, report, runs
 from .evaluation.estimators import missing
 
-FAULTS_SECONDS = 120.0  # of riding with each fault, where no other length is given
-_WIDTH = 110  # columns of a table that is not printed to a terminal
+FAULTS_SECONDS = 120.0  # of riding with each fault, unless another length is given
+_WIDTH = 110  # columns of a table not printed to a terminal
 
 
 @click.command()
@@ -81,12 +81,12 @@ def evaluate_command(
 
 
 def _given(option: str) -> bool:
-    """True where the command line has it."""
+    """True if the command line has this option."""
     return click.get_current_context().get_parameter_source(option) is click.core.ParameterSource.COMMANDLINE
 
 
 def _faults(jobs: list[integrity.FaultJob], out: Path | None, as_json: bool) -> None:
-    """What `evaluate --faults` does."""
+    """Run `evaluate --faults`."""
     if out is not None:
         picture.check()
         check_directory(out)
@@ -133,7 +133,7 @@ def bands_command(
 
 
 def _console() -> Console:
-    """Standard output, wide enough for a table where it is no terminal."""
+    """Standard output, wide enough for a table if it is not a terminal."""
     console = Console()
     return console if console.is_terminal else Console(width=_WIDTH)
 

@@ -7,9 +7,9 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-from kickstand.errors import Notice
 
 from ...common.errors import InputError, extra
+from ...common.messages import Message
 from ...common.output import whole_file
 from ...logs.log import Stretch
 from ...logs.reader import Source, read_blocks, read_twice
@@ -20,7 +20,7 @@ from ..ride import Ride
 from ..track import LogTrack, joined, track
 from . import export_columns, export_gpx, export_racechrono, export_vbo
 
-STEP_S = {"csv": 0.0, "gpx": 0.0, "parquet": 0.0, "racechrono": 0.001, "vbo": 0.01}  # the finest time that two hold
+STEP_S = {"csv": 0.0, "gpx": 0.0, "parquet": 0.0, "racechrono": 0.001, "vbo": 0.01}  # resolution of the time
 _WRITE: dict[str, Callable[[Path, Iterator[Channels], float], None]] = {
     "csv": export_columns.write_csv,
     "gpx": export_gpx.write,
@@ -28,13 +28,28 @@ _WRITE: dict[str, Callable[[Path, Iterator[Channels], float], None]] = {
     "racechrono": export_racechrono.write,
     "vbo": export_vbo.write,
 }
-_NEEDS = {"gpx": ("GPX", "gpxpy"), "parquet": ("Parquet", "pyarrow")}  # its name, and the library that writes it
+_NEEDS = {"gpx": ("GPX", "gpxpy"), "parquet": ("Parquet", "pyarrow")}  # format's name, and its library
 _DATED = ("gpx", "racechrono", "vbo")
 _CLOCK_S = 1e8  # March 1973: a log that starts later uses Unix time
 
 
+@dataclass(frozen=True)
+class RowsShare(Message):
+    """Several samples have one time in the format."""
+
+    samples: int
+    rows: int
+    step_s: float
+
+    code = "rows-share"
+    text = (
+        "this format holds times to {step_s:g} s: {samples} samples became {rows} rows, those with the same time their "
+        "mean"
+    )
+
+
 def export(
-    ride: Ride, form: str, out: Path | str, progress: Progress | None = None, notices: list[Notice] | None = None
+    ride: Ride, form: str, out: Path | str, progress: Progress | None = None, notices: list[Message] | None = None
 ) -> int:
     """Write a ride of open_ride() to a file, whole or not at all. Returns the number of rows. Raises InputError.
 
@@ -97,7 +112,7 @@ def export(
     with whole_file(Path(out)) as temporary:
         _WRITE[form](temporary, rows(), start_s)
     if notices is not None and step_s and count < given:
-        notices.append(Notice("rows-share", given, count, step_s))
+        notices.append(RowsShare(given, count, step_s))
     return count
 
 

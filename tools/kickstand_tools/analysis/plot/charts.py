@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...common.times import clock, tick_s
-from ...refusals import sentence
 from ...signals import Array, smoothed
 from ..channels import spacing_s
 from ..overview import Overview
@@ -135,7 +134,7 @@ def charts(seen: Overview) -> Charts:
     over_time += [_speed(seen)] if seen.has_speed else []
     over_time.append(_forces(seen, lateral, forward))
     below = [_g_against_g(seen, lateral, forward), *([] if car else [_shares(seen)]), _alignment(seen)]
-    return Charts(title(seen), over_time, below, [f"Warning: {sentence(notice)}." for notice in seen.notices])
+    return Charts(title(seen), over_time, below, [f"Warning: {notice.line()}." for notice in seen.notices])
 
 
 def shown_lean_deg(seen: Overview) -> Array:

@@ -162,7 +162,7 @@ def _annotations(chart: Chart, x: str, y: str, narrow: bool) -> list[dict[str, A
         for trace in chart.traces
         if isinstance(trace, Line) and trace.name
     ]
-    title = chart.title.replace(" (", "<br>(") if narrow and len(names) > 1 else chart.title  # it would be too long
+    title = chart.title.replace(" (", "<br>(") if narrow and len(names) > 1 else chart.title  # else too long
     said = title + (f":{'<br>' if narrow else ' '}{', '.join(names)}" if len(names) > 1 else "")
     words = [
         within | _note(Note(0.0, 1.0, said, "above")) | {"xanchor": "left", "align": "left"},

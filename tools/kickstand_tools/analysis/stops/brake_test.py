@@ -49,7 +49,7 @@ MAX_SIDE_M, MAX_HEADING_DEG = 15.0, 30.0  # limits of the deviation from a strai
 # between them. A degree of pitch makes 0.17 m/s2, and a gyro's drift adds to it: over more than SHOWING_S the speed
 # proves nothing.
 OPEN_MPS, OPEN_MPS2, SHOWING_S = 3.0, 0.7, 30.0
-SPEED_S, SURELY_MPS2 = 15.0, 1.5  # a stop that only the speed shows takes at most SPEED_S, and is at least so hard
+SPEED_S, SURELY_MPS2 = 15.0, 1.5  # longest time, least deceleration of a stop that only the speed shows
 
 STRAIGHT_S = 0.1  # the mean heading in this first part of the braking is the direction before it
 SMOOTH_S = 0.2  # accelerations and jerks are means over this time

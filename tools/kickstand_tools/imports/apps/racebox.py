@@ -8,12 +8,11 @@ it.
 
 from collections.abc import Mapping
 
-from kickstand.errors import Notice
-
 from ...common.errors import InputError
+from ...common.messages import Message
 from ..files import RecordingFile
 from ..recording import AppRecording, names_in, plain, read_sheet, sensor_of, track_of, unit_in
-from ..speeds import unit_by_positions
+from ..speeds import ImportSpeedUnit, unit_by_positions
 from ..units import SPEEDS, factor, unit
 
 NAME = "RaceBox"
@@ -44,13 +43,13 @@ def read(files: list[RecordingFile], name: str, units: Mapping[str, str] = {}) -
     accel = sensor_of(sheet, time_ns, places[:3], "accelerometer", "g", box)
     gyro = sensor_of(sheet, time_ns, places[3:], "gyro", "deg/s", "right-handed")
     lat, lon, speed = sheet.place("Latitude"), sheet.place("Longitude"), sheet.place("Speed", "KPH")
-    notices: list[Notice] = []
+    notices: list[Message] = []
     if speed is not None:
         speed_unit = (
             speed_unit or _unit_in_name(sheet.columns[speed]) or unit_by_positions(sheet, time_ns, speed, lat, lon)
         )
         if not speed_unit:
-            notices.append(Notice("import-speed-unit", sheet.columns[speed]))
+            notices.append(ImportSpeedUnit(sheet.columns[speed]))
             speed = None
     track = track_of(sheet, time_ns, speed, lat, lon, speed_unit or "m/s")
     return AppRecording(NAME, accel, gyro, track, notices=notices, utc_ns=0, vehicle_axes=True)

@@ -54,7 +54,7 @@ def inputs_only(machine):
 
 def i2c_controllers(machine):
     """Number of I2C controllers that machine.I2C can use."""
-    return 1 if _chip(machine)[:7] in ("ESP32C3", "ESP32C6") else 2  # the second of a C6 is its low-power one
+    return 1 if _chip(machine)[:7] in ("ESP32C3", "ESP32C6") else 2  # a C6 also has a low-power one
 
 
 def has_bluetooth(machine):

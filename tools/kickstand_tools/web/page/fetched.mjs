@@ -1,6 +1,6 @@
-// What the pages fetch of the site.
+// Fetches files of the site for the pages.
 
-/** The Response. Throws an Error, one sentence, where the site does not give the file. */
+/** The Response. Throws an Error with one sentence if the site does not deliver the file. */
 export async function fetched(url) {
   const answer = await fetch(url).catch(() => null);
   if (!answer) throw new Error(`${url} cannot be loaded: the server does not answer`);
@@ -8,8 +8,8 @@ export async function fetched(url) {
   return answer;
 }
 
-/** The bytes of files of the site, in their order. tell(done, of): in bytes, as sizes.json has them, because a server may
- * pack what it sends. */
+/** The bytes of files of the site, in their order. tell(done, of): in bytes by sizes.json, because a server may
+ * compress files. */
 export async function fetchedAll(names, base, tell = () => {}) {
   const sizes = await (await fetched(new URL("sizes.json", base))).json();
   const of = names.reduce((sum, name) => sum + sizes[name], 0);

@@ -1,13 +1,13 @@
 let registered = null;
 
 /**
- * Have the browser keep the site, so that each of its pages opens without a network. What a page loads only when it is
- * used (see LATER in web/site.py) is kept from its first use on. Resolves to true once it is so, to false where it cannot
- * be: without https, except on this computer's own address.
+ * Make the browser keep the site: then each page opens without a network. Files that a page loads on demand (see LATER
+ * in web/site.py) are kept from their first use on. Resolves to true when the site is kept, to false if that is
+ * impossible: without https, except on this computer's own address.
  */
 export async function keepOffline() {
   if (!navigator.serviceWorker || !isSecureContext) return false;
-  registered = navigator.serviceWorker.register("./service_worker.js").catch(() => null); // a browser may be set to keep nothing
+  registered = navigator.serviceWorker.register("./service_worker.js").catch(() => null); // the settings may forbid it
   if (!(await registered)) return false;
   await navigator.serviceWorker.ready;
   return true;
@@ -15,7 +15,7 @@ export async function keepOffline() {
 
 const LONGEST_MS = 5000;
 
-/** Wait until what the page fetches is kept, or for a while where that cannot be. */
+/** Wait until files fetched by the page will be kept. If that is impossible, wait only a short time. */
 export async function keptOffline() {
   if (!(await registered) || navigator.serviceWorker.controller) return;
   await new Promise((done) => {

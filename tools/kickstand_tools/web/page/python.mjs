@@ -1,19 +1,19 @@
-// CPython for WebAssembly, for the pages whose work the tools of the command line do.
+// CPython for WebAssembly, for the pages that use the command-line tools.
 
 import { fetchedAll } from "./fetched.mjs";
 import { loadPyodide } from "./pyodide/pyodide.mjs";
 
-// What Pyodide fetches. Where one of these does not come it waits for ever, so they are fetched before it asks for them.
+// Files that Pyodide fetches. If one is missing it waits for ever, so they are fetched in advance.
 const PARTS = ["pyodide.asm.js", "pyodide.asm.wasm", "python_stdlib.zip", "pyodide-lock.json"];
 const HERE = new URL("./", import.meta.url);
-export const PACKAGES = "/packages"; // where they are
+export const PACKAGES = "/packages"; // their folder
 
-/** A new Python. archives: ZIP files of the site; what is in them can be imported. tell(done, of): of fetchedAll(). */
+/** A new Python. archives: ZIP files of the site, whose content can be imported. tell(done, of): see fetchedAll(). */
 export async function loadPython(archives, tell) {
   const come = await fetchedAll([...archives, ...PARTS.map((name) => `pyodide/${name}`)], HERE, tell);
   const packed = come.slice(0, archives.length);
   const python = await loadPyodide({ indexURL: new URL("./pyodide/", HERE).href });
-  // numpy looks at its callers before it saves a copy. Pyodide has no backtrace(); 0 callers found means: do not save it.
+  // numpy checks its callers before it avoids a copy. Pyodide has no backtrace(); 0 callers means: make the copy.
   python._module.LDSO.loadedLibsByName["__main__"].exports.backtrace = () => 0;
   for (const archive of packed) python.unpackArchive(archive, "zip", { extractDir: PACKAGES });
   python.runPython(`import sys; sys.path.insert(0, "${PACKAGES}")`);

@@ -1,3 +1,3 @@
-"""`kickstand bench`: what the firmware costs on an emulated board. bench.py is the host's part; bench_guest.py and
-stages_guest.py are put on the board and run there.
+"""`kickstand bench`: measures the costs of the firmware on an emulated board. bench.py runs on the host; bench_guest.py
+and stages_guest.py are copied to the board and run there.
 """

@@ -1,4 +1,5 @@
-"""What the firmware costs on an emulated board in time, memory and flash: bench() measures, tables() lays it out."""
+"""Measures time, memory and flash of the firmware on an emulated board: bench() measures, tables() formats the
+result."""
 
 import ast
 from dataclasses import asdict
@@ -32,10 +33,10 @@ _MODES: dict[str, dict[str, Any]] = {
 
 
 def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
-    """Measure everything, which takes minutes. The figures' names end with their units.
+    """Measure everything, which takes minutes. The names of the figures end with their units.
 
-    seconds: emulated time of each of five runs; four on an ESP32, of which the stages are not known. Raises GuestError
-    if the program on the board fails.
+    seconds: emulated time of each of five runs (four on an ESP32, whose stages are not measured). Raises GuestError if
+    the program on the board fails.
     """
     plain = loop(seconds, chip)
     modes = {name: loop(seconds, chip, chosen) for name, chosen in _MODES.items()}
@@ -46,7 +47,7 @@ def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
         **plain,
         "chip": chip,
         "stage_us": {name: _spread(us) for name, us in _stages(_run(chip, seconds, detail=True)).items()}
-        if chip == "rp2040"  # elsewhere each note of a stage would take longer than the stage
+        if chip == "rp2040"  # on other chips noting a stage would take longer than the stage
         else {},
         "modes": modes,
         "boot": {form: asdict(start(chip, form == "mpy")) for form in ("py", "mpy")},
@@ -91,13 +92,13 @@ def _mode_text(mode: dict[str, Any]) -> str:
 
 
 def start(chip: str, compiled: bool = True) -> boot.Boot:
-    """From power to the first lean, upright and at rest. compiled: the firmware as .mpy."""
+    """Measure the time from power-on to the first lean, upright and at rest. compiled: the firmware as .mpy."""
     return boot.boot(device_class(chip), _SENSOR.world(Ride([upright(100.0)]).motion), _calibration(), compiled)
 
 
 def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = None) -> dict[str, Any]:
-    """What the app's loop costs in a run of so many emulated seconds; the names of the figures end with their units.
-    chosen: settings by name."""
+    """Measure the costs of the app's loop in a run of this emulated time. The names of the figures end with their
+    units. chosen: settings by name."""
     run = _run(chip, seconds, chosen=chosen)
     figures = run["figures"]
     return {
@@ -117,9 +118,8 @@ def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = Non
 
 
 def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Run the app's loop for so many emulated seconds. chosen: settings by name.
-
-    Returns the figures and arrays of bench_guest, and how many samples were taken and lost.
+    """Run the app's loop for this emulated time. chosen: settings by name. Returns the figures and arrays of
+    bench_guest, and the numbers of samples taken and lost.
     """
     chosen = chosen or {}
     mpy = device_class(chip).MPY
@@ -161,7 +161,7 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
 
 
 def _stages(run: dict[str, Any]) -> dict[str, np.ndarray]:
-    """The us that each stage took, in each turn in which it ran."""
+    """The time of each stage in each turn in which it ran, us."""
     columns = dict(zip(run["figures"]["stages"], run["stages"].T, strict=True))
     sampled = columns["decode and sum"] > 0
     watch = run["figures"]["stopwatch_us"]
@@ -187,7 +187,7 @@ def _spread(us: np.ndarray) -> dict[str, float]:
 
 
 def _calibration() -> dict[str, bytes]:
-    """The files with the calibration of _SENSOR, of which only the mounting is unknown."""
+    """The files with the calibration of _SENSOR, which only contains the mounting."""
     calibration = Calibration()
     calibration.aligned = True
     for i, value in enumerate(_SENSOR.vehicle_from_sensor):

@@ -1,4 +1,4 @@
-"""Runs on the emulated board: the app's own loop, whose turns are timed. bench.py starts it and takes its figures."""
+"""Runs the app's own loop on the emulated board, and times its turns. bench.py starts it and reads its figures."""
 
 import gc
 import sys
@@ -11,42 +11,42 @@ from kickstand.settings import Settings
 from machine import mem16
 from uctypes import addressof, bytearray_at
 
-SETTLE_TURNS = 150  # turns before anything is noted
-# Turns with the collector off, after which the heap that they have taken is noted. An ESP32's heap is small, and does
-# not grow meanwhile.
+SETTLE_TURNS = 150  # turns before anything is recorded
+# Number of turns without garbage collection, after which their heap use is recorded. An ESP32's heap is small, and does
+# not grow without collections.
 HEAP_TURNS = 3 if sys.platform == "esp32" else 10
 MAX_PAUSES = 2000
 MAX_TURNS_HZ = 200
 
 
 class Config:
-    """The settings in which the bench differs from the defaults, as in config.py."""
+    """The bench's settings that differ from the defaults, as in config.py."""
 
     SAMPLE_HZ = 200
     WATCHDOG = False
 
 
 class Done(Exception):
-    """The time to measure is over."""
+    """The measuring time is over."""
 
 
 class Canary:
-    """A piece of heap without a reference: once a collection has freed it, it is soon overwritten.
+    """A piece of heap without a reference. After a collection has freed it, it is soon overwritten.
 
-    So it shows that a collection has run. gc.mem_alloc() would show it as well, but takes 7 ms.
+    So it shows that a collection has run. gc.mem_alloc() would also show it, but takes 7 ms.
     """
 
     MARK = 0x5AC3
 
     def arm(self):
-        self._address = addressof(array("H", [self.MARK] * 8))  # an address is no reference to the collector
+        self._address = addressof(array("H", [self.MARK] * 8))  # the collector does not treat an address as a reference
 
     def died(self):
         return mem16[self._address] != self.MARK
 
 
 class TimedGc:
-    """Takes the place of the module gc in the app: times the collections that the app asks for."""
+    """Replaces the module gc in the app: times the collections that the app starts."""
 
     def __init__(self, app):
         self._app = app
@@ -57,7 +57,7 @@ class TimedGc:
             return
         start = ticks_us()
         gc.collect()
-        app_module.fill_gaps(app_module.SINGLE_GAPS)  # which the app does after each of its collections
+        app_module.fill_gaps(app_module.SINGLE_GAPS)  # as the app does after each of its collections
         if app.n_pauses < MAX_PAUSES:
             app.pauses[app.n_pauses] = min(ticks_diff(ticks_us(), start), 65535)
             app.n_pauses += 1
@@ -68,18 +68,18 @@ class TimedGc:
 
 
 class MeasuredApp(app_module.App):
-    """The app, with notes of what its turns cost; it stops after a given time."""
+    """The app, which records the costs of its turns and stops after a given time."""
 
     def prepare(self, seconds, out, spent):
-        """seconds: how long to take notes.  out: a Sink to the host.  spent: us of each stage in this turn, or None."""
-        gc.collect()  # or the arrays would lie behind garbage, and make each collection longer
+        """seconds: recording time. out: a Sink to the host. spent: us of each stage in this turn, or None."""
+        gc.collect()  # otherwise the arrays would be behind garbage, and make each collection longer
         turns = seconds * MAX_TURNS_HZ
         self._out, self._spent, self._turns = out, spent, turns
         self._until_us = seconds * 1_000_000
         self.count = -SETTLE_TURNS
         self.took = array("H", bytes(2 * turns))
         self._spent_bytes = bytearray_at(addressof(spent), 4 * len(spent)) if spent else None
-        self.pauses = array("H", bytes(2 * MAX_PAUSES))  # us of each collection that the app asked for
+        self.pauses = array("H", bytes(2 * MAX_PAUSES))  # us of each collection that the app started
         self.n_pauses = 0
         self.automatic = 0  # other collections
         self.canary = Canary()
@@ -115,7 +115,7 @@ class MeasuredApp(app_module.App):
             raise Done
         self.took[turn] = took
         if self._spent:
-            self._out.write(self._spent_bytes)  # at once: keeping it would take heap from what is measured
+            self._out.write(self._spent_bytes)  # at once, because keeping it would use heap that is measured
             self._clear()
         if self.count == HEAP_TURNS:
             self.heap_bytes = gc.mem_alloc() - self._allocated
@@ -135,7 +135,8 @@ class MeasuredApp(app_module.App):
 
 
 def _attach(app):
-    """A phone that wants everything, and no radio: a Pico has none, that of an emulated ESP32 does not start."""
+    """Attach a phone that wants everything, without a radio: a Pico has none, and that of an emulated ESP32 does not
+    start."""
     sys.modules["bluetooth"] = __import__("bluetooth_guest")
     from kickstand.live.live import attach
     from kickstand.live.radio import Radio
@@ -145,10 +146,10 @@ def _attach(app):
 
 
 def run(detail, seconds, out, chosen):
-    """Run the app for so many seconds and print one line, a dictionary of figures.
+    """Run the app for this time and print one line, a dictionary of figures.
 
     Writes to out b"begin", b"heap" after HEAP_TURNS, b"end", then two arrays of 16 bits: us of each turn, us of each
-    collection. detail: before the end also the us of each stage, an array of 32 bits for each turn.
+    collection. detail: before the end also the us of each stage, an array of 32 bits per turn.
     chosen: settings by name.
     """
     for name in chosen:

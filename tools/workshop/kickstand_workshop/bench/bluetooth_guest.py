@@ -1,5 +1,5 @@
-"""Runs on the emulated board in place of its module bluetooth: what is sent goes nowhere. A phone is always connected,
-and wants everything as often as it can have it."""
+"""Replaces the module bluetooth on the emulated board and discards what is sent. A phone is always connected, and wants
+everything as often as possible."""
 
 FASTEST_MS = 40
 
@@ -9,7 +9,7 @@ def UUID(value):
 
 
 class BLE:
-    """As much of it as live/radio.py uses."""
+    """The part of bluetooth.BLE that live/radio.py uses."""
 
     def __init__(self):
         self.sent = 0
@@ -37,7 +37,7 @@ class BLE:
         self.sent += 1
 
     def connect(self):
-        """A phone comes, and asks both services for all that they have."""
+        """Connect a phone, which subscribes to everything in both services."""
         self._handler(1, (0, 0, b"phone."))
         for handle, data in ((11, b"\x01" + FASTEST_MS.to_bytes(2, "big")), (17, FASTEST_MS.to_bytes(2, "little"))):
             self._values[handle] = data

@@ -1,4 +1,5 @@
-"""Where the time from reset to the first lean goes, on an emulated board: boot() measures, table() lays it out."""
+"""Measures the parts of the time from reset to the first lean on an emulated board: boot() measures, table() formats
+the result."""
 
 import ast
 from collections.abc import Callable, Iterator
@@ -12,9 +13,9 @@ from kickstand_tools.common import firmware_path
 from rich.table import Table
 
 _LIMIT_S = 10.0
-_ROWS = 10  # modules that the table names
+_ROWS = 10  # modules in the table
 
-# Imports each module after those that it imports itself, so that each time is the module's own.
+# Imports each module after the modules that it imports, so each time is only the module's own.
 _GUEST = """
 from time import ticks_diff, ticks_us
 took = []
@@ -28,9 +29,9 @@ print("took", took)
 
 @dataclass(frozen=True)
 class Boot:
-    """Seconds since the board got power. micropython_s: main.py begins.  starting_s: the display says that Kickstand
-    starts.  sampling_s: the sensor is set up and samples.  lean_s: the display shows the first lean.  import_s: seconds
-    that each module takes."""
+    """Seconds since power-on. micropython_s: main.py begins. starting_s: the display says that Kickstand starts.
+    sampling_s: the sensor is set up and samples. lean_s: the display shows the first lean. import_s: seconds for each
+    module."""
 
     micropython_s: float
     starting_s: float
@@ -40,8 +41,8 @@ class Boot:
 
 
 def boot(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes], compiled: bool = True) -> Boot:
-    """kind: of board.  world: as for a Device, upright and at rest.  files: the board's, besides the firmware: its
-    calibration.  compiled: the firmware as .mpy. Raises NotReached if there is no lean in 10 s."""
+    """kind: of board. world: as for a Device, upright and at rest. files: further files for the board: its calibration.
+    compiled: the firmware as .mpy. Raises NotReached if there is no lean in 10 s."""
     board_files = flash_image.firmware(compiled, kind.MPY) | files
     with kind(world, board_files) as device:
         device.run_until(lambda: device.lcd()[1].startswith("starting"), _LIMIT_S, 0.001)
@@ -72,10 +73,10 @@ def table(result: dict[str, Any]) -> Table:
 
 
 def _micropython_s(kind: Kind, files: dict[str, bytes]) -> float:
-    """Until MicroPython runs main.py."""
+    """Time until MicroPython runs main.py, s."""
     begun: list[bytes] = []
     with kind(files={**files, "/main.py": f"{kind.SINK}Sink().write(b'main')\n".encode()}) as device:
-        device.listen(begun.append)  # on a Pico not by USB, which begins later than its main.py
+        device.listen(begun.append)  # on a Pico not over USB, which starts later than main.py
         device.run_until(lambda: begun, _LIMIT_S, 0.001)
         return device.time_s
 
@@ -91,7 +92,7 @@ def _imports(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes
 
 
 def in_order(name: str, found: list[str]) -> list[str]:
-    """The module and all that it imports on being imported, each after its own imports; added to found."""
+    """The module and everything imported with it, each after its own imports. Appended to found."""
     for other in _imported(name):
         if other not in found:
             in_order(other, found)
@@ -101,7 +102,7 @@ def in_order(name: str, found: list[str]) -> list[str]:
 
 
 def _imported(name: str) -> Iterator[str]:
-    """The firmware's modules that this one imports at once."""
+    """The firmware's modules that this one imports at its top level."""
     path = _path(name)
     package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
     for node in ast.parse(path.read_text(encoding="utf-8")).body:

@@ -1,4 +1,4 @@
-"""How soon the site's pages are there on a phone with a quarter of this computer's speed, and how large they are:
+"""Measures the loading time of the site's pages on a phone with a quarter of this computer's speed, and their size:
 
 .venv/bin/python -m kickstand_workshop.bench.pages
 """
@@ -13,7 +13,7 @@ from kickstand_tools.web import site
 from ..browser import CHROMIUM, opened
 
 PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
-READY = {  # by page: what can be used then
+READY = {  # by page: the element that is usable when the page is ready
     "": "#kind:enabled",  # the firmware has started
     "install.html": ".python a:visible",
     "live.html": "#simulated:enabled",
@@ -25,8 +25,8 @@ _PAINT = "performance.getEntriesByName('first-contentful-paint')[0].startTime"
 
 
 class PageFigures(NamedTuple):
-    """Of a page that is opened for the first time. size: of the files that it has asked for until it is ready, as a
-    server compresses them, bytes."""
+    """Figures of a page that is opened for the first time. size: compressed size of the files that it requests until it
+    is ready, bytes."""
 
     paint_ms: float
     ready_ms: float

@@ -1,4 +1,4 @@
-"""Counts the samples that the simulated sensor takes, and those of them that are lost unread."""
+"""Counts the samples of the simulated sensor, and those that are lost unread."""
 
 from typing import Any
 
@@ -34,7 +34,7 @@ class SampleCount:
 
     def lost(self) -> int:
         """Samples that can no longer be read: overwritten, pushed out of the FIFO or cleared with it."""
-        taken = self.taken()  # first, because it brings the FIFO up to date
+        taken = self.taken()  # called first, because it updates the FIFO
         frame = len(self._sensor._fifo_registers)
         if frame:
             kept = self._popped + self._sensor.fifo.count - self._waiting

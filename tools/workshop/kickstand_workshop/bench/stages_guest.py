@@ -1,9 +1,9 @@
-"""Runs on the emulated Pico: times the stages of the app's loop. Imported only for a run with detail."""
+"""Times the stages of the app's loop on the emulated Pico. Imported only for a run with detail."""
 
 from array import array
 from time import ticks_diff, ticks_us
 
-# Name of a stage, and the method that it is: module, class, method with its parameters.
+# Name of a stage, and its method: module, class, method with its parameters.
 STAGES = (
     ("decode and sum", "imu.mpu6050", "Mpu6050", "add_up(self, n)"),
     ("calibrate and rotate", "calibration.transform", "Transform", "apply_sum(self, sums, n, force, rate)"),
@@ -17,8 +17,8 @@ WITHOUT_RESULT = ("apply_sum", "tick")  # methods that return nothing
 BUS = len(STAGES)  # one column more: the sensor's transfers
 COLUMNS = BUS + 1
 
-# Without *arguments and with few locals: both would take heap that is freed on return, and the allocations that are
-# measured would then search from there for longer.
+# Without *arguments and with few locals, because both use heap that is freed on return: then the measured allocations
+# would take longer to find free heap.
 _TIMED = """
 def {name}({parameters}):
     begin({i})
@@ -60,7 +60,7 @@ def time_stages(spent):
 
 
 def stopwatch_us(spent):
-    """How many us longer a call takes because it is timed."""
+    """The additional time of a timed call, us."""
 
     def function(self, n):
         pass

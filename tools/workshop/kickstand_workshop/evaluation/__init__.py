@@ -1,5 +1,5 @@
-"""How well the lean that the firmware shows follows the true one, beside other estimators: on simulated rides, whose
-lean is known, and on a recorded one. `kickstand evaluate` prints the results.
+"""Compares the firmware's shown lean, and other estimators, with the true lean: on simulated rides, whose lean is
+known, and on a recorded one. `kickstand evaluate` prints the results.
 
 from kickstand_workshop.evaluation.runs import Job, run
 print(run(Job("street", seed=1)).scores["kickstand"].rms_deg)

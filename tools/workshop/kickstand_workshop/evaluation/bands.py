@@ -1,4 +1,4 @@
-"""How rough rides are: rms by band of frequency, of simulated rides beside recorded ones."""
+"""Measures the roughness of simulated and recorded rides: rms by frequency band."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ BANDS_HZ = ((0.03, 0.1), (0.1, 0.3), (0.3, 1.0), (1.0, 3.0), (3.0, 10.0))
 QUANTITIES = ("vertical, g", "sideways, g", "pitch rate, deg/s", "yaw rate, deg/s", "roll rate, deg/s")
 _GRID_HZ = 50.0
 _LEAST_S = 2.0 / BANDS_HZ[0][0]
-_RIDING_DPS = 5.0  # a bike that stands does not turn so fast
+_RIDING_DPS = 5.0  # a standing bike does not turn so fast
 
 Figures = dict[str, NDArray[np.float64]]
 
@@ -35,14 +35,14 @@ def bands_of(force_g: NDArray[np.float64], rate_dps: NDArray[np.float64], rate_h
 
 
 def bands_of_log(log: Log, calibration: CalibrationFile) -> Figures:
-    """Of the log from where it first rides to where it last does. Raises InputError."""
+    """The bands of a log, from its first riding to its last. Raises InputError."""
     step = 1.0 / _GRID_HZ
     time = np.arange(log.t_s[0], log.t_s[-1], step)
     force, rate = calibration.in_vehicle(log.readings)
     number = np.searchsorted(time, log.t_s, side="right") - 1
 
     def mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Of the samples in each step, so that nothing aliases; between them a straight line."""
+        """The mean of the samples in each step, to avoid aliasing, interpolated along straight lines."""
         count = np.bincount(number, minlength=len(time))
         there = count > 0
         total = np.bincount(number, values, minlength=len(time))
@@ -57,20 +57,20 @@ def bands_of_log(log: Log, calibration: CalibrationFile) -> Figures:
 
 
 def of_recording(path: Path) -> Figures:
-    """Of a recorded ride, aligned by itself. Raises InputError."""
+    """The bands of a recorded ride, which also gives its alignment. Raises InputError."""
     log = read_log(path)
     return bands_of_log(log, fit_ride(log).calibration)
 
 
 def of_simulated(profile: str, seed: int, seconds: float, road: str | None, mount: str | None) -> Figures:
-    """Of a simulated ride, with its true alignment."""
+    """The bands of a simulated ride, with its true alignment."""
     made = ride(profile, seed, seconds, road=road, mount=mount)
     calibration = CalibrationFile(vehicle_from_sensor=made.vehicle_from_sensor, aligned=True)
     return bands_of_log(Log.from_readings(made.readings, made.rate_hz, "RIDE.csv"), calibration)
 
 
 def table(found: dict[str, Figures]) -> Table:
-    """A block of lines for each quantity. found: by the name of the ride."""
+    """A table with a block of lines per quantity. found: by the name of the ride."""
     made = Table(title="rms by band of frequency, Hz", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     made.add_column("ride", overflow="fold")
     for low, high in BANDS_HZ:

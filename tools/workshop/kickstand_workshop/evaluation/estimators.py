@@ -1,9 +1,9 @@
-"""The estimators that are compared: the firmware's own lean, the one looked back over after the ride, and the filters
-of hobby projects and of the literature.
+"""The compared estimators: the firmware's own lean, the lean smoothed after the ride, and filters of hobby projects and
+of the literature.
 
 Each takes Samples and returns the lean in degrees of every sample, > 0 to the right. The filters of the packages
-`ahrs`, `vqf` and `imufusion` run with their authors' default gains, and once more ("best") with the gain that has the
-least error on a ride of each profile with another seed (20); started from the first reading.
+`ahrs`, `vqf` and `imufusion` run with their authors' default gains, and again ("best") with the gain with the least
+error on a ride of each profile with another seed (20). They start from the first reading.
 """
 
 from collections.abc import Callable
@@ -20,7 +20,7 @@ from kickstand_tools.replay import replay_engine
 from numpy.typing import NDArray
 
 AVERAGE_S = 0.3  # of the formula's lean
-COMPLEMENTARY = 0.98  # weight of the integrated lean at each sample; the direction of the force has the rest
+COMPLEMENTARY = 0.98  # weight of the integrated lean at each sample; the rest is for the direction of the force
 
 _SHOWN, _FORMULA = (replay_engine.COLUMNS.index(name) for name in ("lean_deg", "lean_formula_deg"))
 _TO_XYZ = [2, 0, 1]  # left, up, forward to forward, left, up: the body frame of ahrs and vqf
@@ -114,7 +114,7 @@ OTHERS: dict[str, Callable[[Samples], NDArray[np.float64]]] = {
 
 
 def missing() -> list[str]:
-    """The packages that are not installed. estimate() leaves their filters out."""
+    """The missing packages. estimate() leaves out their filters."""
     return sorted({package for package in PACKAGES.values() if find_spec(package) is None})
 
 

@@ -1,7 +1,7 @@
-"""What may be wrong with a sensor in a ride: the table of faults, each a function that changes readings.
+"""The table of faults that a sensor may have in a ride, each a function that changes readings.
 
-A fault is of one of three kinds: SEEN, what counts and registers show (an axis that is dead, in standby or at the end
-of its range); ILL, what only shows in whether the readings fit together; HARMLESS, what leaves the lean nearly right.
+There are three kinds of faults. SEEN: counts and registers show it (an axis that is dead, in standby or at the end of
+its range). ILL: it only shows when readings do not fit each other. HARMLESS: the lean stays nearly right.
 """
 
 from collections.abc import Callable, Iterator
@@ -20,8 +20,8 @@ ACCEL_RANGE_G, GYRO_RANGE_DPS = 16.0, 500.0  # the board's defaults
 @dataclass
 class Part:
     """The readings while a fault lasts: force (n, 3, g) and rate (n, 3, deg/s) in the chip's axes, to be changed in
-    place; lost (n): True for readings that never arrive. rate_hz: of the readings. axis: the one that is ill, where it
-    is one; turned so that 0, 1, 2 may be the bike's left, up, forward. sign: 1 or -1."""
+    place; lost (n): True for readings that never arrive. rate_hz: of the readings. axis: the ill axis, if there is one;
+    0, 1, 2 may be the bike's left, up, forward. sign: 1 or -1."""
 
     force: Array
     rate: Array
@@ -34,8 +34,8 @@ class Part:
 
 @dataclass(frozen=True)
 class Fault:
-    """change: makes a Part ill. seconds: how long it lasts, None to the end of the ride. from_start: it is there from
-    power-on, else it begins in mid-ride."""
+    """change: applies the fault to a Part. seconds: its duration, None: to the end of the ride. from_start: True if it
+    exists from power-on; otherwise it begins in mid-ride."""
 
     name: str
     kind: str
@@ -45,7 +45,7 @@ class Fault:
 
     @property
     def title(self) -> str:
-        """Its name and when it is there."""
+        """Its name and its time."""
         if self.from_start:
             return f"{self.name}, from power-on"
         return self.name if self.seconds is None else f"{self.name}, {self.seconds:g} s"
@@ -97,7 +97,7 @@ def _gyro_bias_drifts(part: Part, dps: float) -> None:
 
 
 def _mount_slips(part: Part, degrees: float) -> None:
-    """About one of the bike's axes where the chip sits square, about one of the chip's where it does not."""
+    """Rotate about one of the bike's axes if the chip is mounted square, otherwise about one of the chip's."""
     turned = rotation_matrix(np.radians(part.sign * degrees) * np.eye(3)[part.axis])
     part.force[:] = part.force @ turned
     part.rate[:] = part.rate @ turned
@@ -120,7 +120,7 @@ def _accel_clipped(part: Part, g: float) -> None:
 
 
 def _accel_clipped_now_and_then(part: Part) -> None:
-    """Blows of a tenth of a second that reach the end of a small range, once in five seconds."""
+    """Clip a tenth of a second every five seconds, like blows that reach the end of a small range."""
     for start in range(0, len(part.force), round(5.0 * part.rate_hz)):
         end = start + round(0.1 * part.rate_hz)
         part.force[start:end] = (part.force[start:end] + 2.0 * part.chance.standard_normal(3)).clip(-2.0, 2.0)
@@ -136,7 +136,7 @@ def _gyro_axis_noisy(part: Part, dps: float) -> None:
 
 
 def _mount_swings(part: Part, degrees: float, hz: float) -> None:
-    """To and fro about one axis, as on a loose bracket."""
+    """Swing about one axis, as on a loose bracket."""
     phase = 2.0 * np.pi * hz * np.arange(len(part.force)) / part.rate_hz
     part.rate[:, part.axis] += degrees * 2.0 * np.pi * hz * np.cos(phase)
     angle = np.radians(degrees) * np.sin(phase)
@@ -149,13 +149,13 @@ def _readings_lost(part: Part) -> None:
 
 
 def _readings_lost_now_and_then(part: Part) -> None:
-    """For 0.3 s, once in ten seconds."""
+    """Lose readings for 0.3 s, every ten seconds."""
     every, n = round(10.0 * part.rate_hz), round(0.3 * part.rate_hz)
     part.lost[np.arange(len(part.lost)) % every < n] = True
 
 
 def _all(name: str, kind: str, change: Callable[[Part], None]) -> Iterator[Fault]:
-    """From power-on, in mid-ride to the end, and for 5 s."""
+    """Yield a fault from power-on, from mid-ride to the end, and for 5 s."""
     yield Fault(name, kind, change, from_start=True)
     yield Fault(name, kind, change)
     yield Fault(name, kind, change, seconds=5.0)
@@ -210,15 +210,15 @@ class Ill:
 
     @property
     def saturated(self) -> NDArray[np.bool_]:
-        """(n) True where an axis is at the end of its range: the driver takes such a reading as lost."""
+        """(n) True where an axis is at the end of its range: the driver treats such a reading as lost."""
         force, rate = np.abs(self.readings[:, :3]), np.abs(self.readings[:, 4:])
         return np.any(np.hstack((force >= ACCEL_RANGE_G, rate >= GYRO_RANGE_DPS)), axis=1)
 
 
 def apply(fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: int, vehicle_from_sensor: Array) -> Ill:
-    """A copy of the readings with the fault in it. begin_s: when one begins that is not there from power-on.
+    """A copy of the readings with the fault. begin_s: start of a fault that does not exist from power-on.
 
-    The seed chooses the axis, the sign, and whether the chip sits square: then its axes are the bike's.
+    The seed chooses the axis, the sign, and whether the chip is mounted square: then its axes are the bike's.
     """
     chance = np.random.default_rng([seed, *fault.title.encode()])
     made = readings.copy()
@@ -226,7 +226,7 @@ def apply(fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: i
     first = 0 if fault.from_start else round(begin_s * rate_hz)
     end = len(made) if fault.seconds is None else min(len(made), first + round(fault.seconds * rate_hz))
     span = slice(first, end)
-    # What counts show has to be in the chip's own axes
+    # A fault that shows in counts must be in the chip's own axes
     square = seed // 3 % 2 == 0 and fault.kind != SEEN
     turned = vehicle_from_sensor if square else np.eye(3)
     part = Part(

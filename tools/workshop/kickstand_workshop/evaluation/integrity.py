@@ -1,8 +1,7 @@
-"""Whether a wrong lean is ever shown as good: the firmware's meter over simulated rides with each of the faults.
+"""Tests whether a wrong lean is ever shown as good: runs the firmware's meter over simulated rides with each fault.
 
-What a fault leaves is judged as in aviation: at each instant a lean is good (shown and right), hidden, or misleading.
-"Right" is within WRONG_DEG. A lean that is wrong for a moment misleads nobody: misleading is what stands for longer
-than STANDS_S.
+The result is judged as in aviation: at each instant a lean is good (shown and right), hidden, or misleading. "Right" is
+within WRONG_DEG. A lean that is wrong for a moment misleads nobody: it counts as misleading after STANDS_S.
 """
 
 from collections.abc import Callable
@@ -29,19 +28,19 @@ Array = NDArray[np.float64]
 WRONG_DEG = 8.0
 STANDS_S = 1.0
 RECOVERY_S = 10.0
-TURN = 2  # readings in a turn of the loop
+TURN = 2  # readings per turn of the loop
 GPS_LATE_S = 0.4
 PROFILES = "street", "track", "hills", "city", "sweeper"
 SIGMA_EDGES = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0])  # degrees, claimed
-# What is claimed of a lean; a display gives no sigma
+# Claimed accuracy of a lean; a display gives no sigma
 CLAIMS = [f"{low:g}-{high:g}" for low, high in pairwise(SIGMA_EDGES)] + ["display", "hidden"]
 ERROR_EDGES = np.array([0.0, 1.0, 2.0, 3.0, 5.0, WRONG_DEG, 12.0, 20.0, 40.0, 180.0])  # degrees
 
 
 @dataclass(frozen=True)
 class FaultJob:
-    """A ride of this seed with a fault, or with none. road, mount: as for simulation.ride.ride(). profile: None for the
-    seed's own of PROFILES. device: on the whole device, not on the meter alone."""
+    """A ride of this seed with a fault, or without. road, mount: as for simulation.ride.ride(). profile: None: chosen
+    from PROFILES by the seed. device: True for the whole device instead of only the meter."""
 
     fault: Fault | None
     seed: int
@@ -53,7 +52,7 @@ class FaultJob:
 
     @property
     def gps(self) -> bool:
-        """Every fourth ride has a speed that is measured once a second, late, as by GPS."""
+        """True for every fourth ride: it has a late speed once per second, as from GPS."""
         return self.seed % 4 == 3
 
     @property
@@ -65,8 +64,9 @@ class FaultJob:
 
 @dataclass
 class Trace:
-    """A ride as it was shown, an entry for each turn of the loop (n): time (s), lean and sigma (degrees), shown, true
-    lean (degrees), speed (m/s). named_s: when a fault was named, or NaN. first_s, end_s: while the fault was there."""
+    """A ride as shown, one entry per turn of the loop (n): time (s), lean and sigma (degrees), shown, true lean
+    (degrees), speed (m/s). named_s: time at which a fault was named, or NaN. first_s, end_s: start and end of the
+    fault."""
 
     time: Array
     lean: Array
@@ -81,11 +81,11 @@ class Trace:
 
 @dataclass
 class Outcome:
-    """What a rider saw. Seconds count from setting off.
+    """The result for a rider. Seconds count from setting off.
 
-    misleading_s: see above. hidden, available: shares of the riding. hidden_after_s, named_after_s: from the fault's
-    begin, NaN where it never was. recovered: of a fault that ends, whether RECOVERY_S later the lean stands right;
-    None for the others. diagram: seconds, a row for each of CLAIMS, by ERROR_EDGES.
+    misleading_s: see above. hidden, available: shares of the riding. hidden_after_s, named_after_s: since the fault's
+    start, NaN for never. recovered: for a fault that ends, True if the lean is right RECOVERY_S later; None for the
+    others. diagram: seconds, one row per entry of CLAIMS, by ERROR_EDGES.
     """
 
     job: FaultJob
@@ -105,7 +105,7 @@ def stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def judge(job: FaultJob, trace: Trace) -> Outcome:
-    """What a rider saw of it."""
+    """Judge a ride as a rider saw it."""
     step = float(np.median(np.diff(trace.time)))
     off = int(np.argmax(trace.speed > 0.5)) if (trace.speed > 0.5).any() else 0
     error = np.abs(trace.lean - trace.true)
@@ -148,12 +148,12 @@ def _made(
     made = ride(profile, seed, seconds, road=road, mount=mount)
     try:
         return made, calibrated_by_poses(made)
-    except InputError:  # some sensors' cross-axis errors are more than the slanted pose may show
+    except InputError:  # some sensors' cross-axis errors exceed the limit for the slanted pose
         return made, calibrated_by_poses(replace(made, poses=made.poses[:6]))
 
 
 def follow(job: FaultJob) -> Trace:
-    """The job's ride, as it was shown."""
+    """Simulate the job's ride and return it as shown."""
     made, calibration = _made(
         job.profile or PROFILES[job.seed % len(PROFILES)], job.seed, job.seconds, job.road, job.mount
     )
@@ -162,7 +162,7 @@ def follow(job: FaultJob) -> Trace:
 
 
 def _ill(job: FaultJob, readings: Array, rate_hz: float, calibration: CalibrationFile) -> Ill:
-    """The readings with the job's fault in them."""
+    """The readings with the job's fault."""
     if not job.fault:
         return Ill(readings, np.zeros(len(readings), dtype=bool), 0, len(readings))
     begin_s = (0.35 + 0.2 * (job.seed * 0.618 % 1.0)) * len(readings) / rate_hz
@@ -172,7 +172,7 @@ def _ill(job: FaultJob, readings: Array, rate_hz: float, calibration: Calibratio
 def device_trace_of(
     job: FaultJob, readings: Array, rate_hz: float, calibration: CalibrationFile, true: Array, speed: Array
 ) -> Trace:
-    """trace_of() of the whole device, an entry for each tenth of a second; sigma is NaN."""
+    """trace_of() for the whole device, one entry per tenth of a second; sigma is NaN."""
     ill = _ill(job, readings, rate_hz, calibration)
     end = len(readings) - 1
 
@@ -190,8 +190,8 @@ def device_trace_of(
 def trace_of(
     job: FaultJob, readings: Array, rate_hz: float, calibration: CalibrationFile, true: Array, speed: Array
 ) -> Trace:
-    """The firmware's meter alone, without the driver, over any ride: readings (n, 7) in the chip's order, true lean (n,
-    degrees) and speed (n, m/s)."""
+    """Run only the firmware's meter, without the driver, over any ride: readings (n, 7) in the chip's order, true lean
+    (n, degrees) and speed (n, m/s)."""
     ill = _ill(job, readings, rate_hz, calibration)
     readings, lost, first, end = ill.readings, ill.lost | ill.saturated, ill.first, ill.end
     force, rate = calibration.in_vehicle(readings)
@@ -231,8 +231,8 @@ def run(job: FaultJob) -> Outcome:
 
 
 def jobs(seeds: int, first_seed: int = 0, seconds: float = 120.0, device: bool = False) -> list[FaultJob]:
-    """A ride of each seed with no fault, on good and bad mounts and roads, and one with each fault. device: all on the
-    whole device; else those are whose fault the driver sees."""
+    """For each seed a ride without a fault, on good and bad mounts and roads, and one with each fault. device: run all
+    on the whole device; otherwise only those whose fault the driver sees."""
     numbers = range(first_seed, first_seed + seeds)
     conditions: list[tuple[str | None, str | None]] = [(None, None), *[(None, road) for road in CLASSES]]
     conditions += [(mount, None) for mount in MOUNTS]
@@ -251,7 +251,7 @@ def evaluate(jobs: list[FaultJob], done: Callable[[], None] = lambda: None) -> l
         job = jobs[k]
         return (job.seed, str(job.profile), str(job.road), str(job.mount))
 
-    order = sorted(range(len(jobs)), key=ride_of)  # jobs of one ride one after the other: it is made once
+    order = sorted(range(len(jobs)), key=ride_of)  # jobs of the same ride in sequence: it is simulated once
     found: dict[int, Outcome] = {}
     for k, outcome in zip(order, on_all_processors(run, [jobs[k] for k in order], chunk=8), strict=True):
         found[k] = outcome

@@ -1,6 +1,6 @@
-"""The figures of integrity.py, over all rides of each fault: as tables for a terminal, as data for JSON, as a picture.
+"""Reports the results of integrity.py over all rides of each fault: tables for a terminal, data for JSON, a picture.
 
-The picture is the diagram that aviation calls after Stanford: error against what was claimed.
+The picture is aviation's Stanford diagram: error against claimed accuracy.
 """
 
 import json
@@ -27,7 +27,7 @@ _UNKNOWN = "--"
 @dataclass
 class FaultSummary:
     """All rides of one fault. misleading_s, most_s: mean and largest. available: share. hidden_s, named_s: medians, NaN
-    where it never was; hidden, named: shares of the rides. recovered: share, NaN of a fault that does not end."""
+    for never; hidden, named: shares of the rides. recovered: share, NaN for a fault that does not end."""
 
     kind: str
     title: str
@@ -43,7 +43,7 @@ class FaultSummary:
 
 
 def summaries(outcomes: list[Outcome]) -> list[FaultSummary]:
-    """In the order in which the faults first come."""
+    """One Summary per fault, in the order in which faults first appear."""
     groups: dict[tuple[str, str], list[Outcome]] = {}
     for outcome in outcomes:
         fault = outcome.job.fault
@@ -76,13 +76,13 @@ def _median(values: NDArray[np.float64]) -> float:
 
 
 def diagram(outcomes: list[Outcome], faulty: bool) -> NDArray[np.float64]:
-    """Shares of the riding a row for each of CLAIMS, by ERROR_EDGES. faulty: of rides with a fault."""
+    """Shares of the riding time, one row per entry of CLAIMS, by ERROR_EDGES. faulty: True for rides with a fault."""
     total = sum((o.diagram for o in outcomes if bool(o.job.fault) == faulty), np.zeros_like(outcomes[0].diagram))
     return total / max(float(total.sum()), 1e-9)
 
 
 def fault_table(outcomes: list[Outcome]) -> Table:
-    """A line for each fault, a block for each kind."""
+    """A table with a line per fault and a block per kind."""
     made = Table(title="Rides with a fault of the sensor", caption=CAPTION, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     made.add_column("fault", overflow="fold")
     for head in (
@@ -133,7 +133,7 @@ def diagram_table(outcomes: list[Outcome]) -> Table:
 
 
 def document(outcomes: list[Outcome]) -> dict[str, Any]:
-    """All figures for a JSON file; null where there is none."""
+    """All figures for a JSON file; null for a missing one."""
     rides = [
         {
             "fault": o.job.title,

@@ -1,4 +1,4 @@
-"""Figures that say how well a shown lean follows the true one."""
+"""Computes figures for how well a shown lean follows the true one."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ LEANED_DEG = 10.0  # the slope is fitted where the true lean is larger: most of 
 _LAG_RANGE_S = (-0.2, 0.8)  # searched
 _LAG_SMOOTHING_S = 0.05
 _STILL_DPS = 1.0  # rms of the true roll rate below which no lag can be found
-# A straight: yaw rate and lean are smaller and the speed larger than this, for so long
+# A straight: for this time, yaw rate and lean are below these limits and the speed is above
 _STRAIGHT_DPS, _STRAIGHT_DEG, _STRAIGHT_MPS, _STRAIGHT_S = 2.0, 6.0, 5.0, 1.0
 
 
@@ -32,7 +32,8 @@ def rms(error: NDArray) -> float:
 
 
 def slope(shown: NDArray, true: NDArray, beyond: float = LEANED_DEG) -> float:
-    """Shown over true lean where the true one is over `beyond` degrees: least squares through the origin. Or NaN."""
+    """Shown over true lean where the true one is over `beyond` degrees: least squares through the origin. NaN if
+    undefined."""
     leaned = np.abs(true) > beyond
     square = float(np.sum(true[leaned] ** 2))
     return float(np.sum(shown[leaned] * true[leaned]) / square) if square > 0.0 else float("nan")
@@ -56,7 +57,7 @@ def lag_ms(shown: NDArray, true: NDArray, rate_hz: float) -> float:
 
 
 def straights(truth: dict[str, NDArray], rate_hz: float) -> NDArray[np.bool_]:
-    """(N,) True where the bike has ridden straight on for at least a second, at over 5 m/s."""
+    """(N,) True where the bike has ridden straight ahead for at least a second, at over 5 m/s."""
     now = (
         (np.abs(truth["yaw_rate_dps"]) < _STRAIGHT_DPS)
         & (np.abs(truth["lean_deg"]) < _STRAIGHT_DEG)

@@ -1,4 +1,4 @@
-"""Draws every estimator's lean against time: the first ride whole, and of each ride the minute with most leaning."""
+"""Draws every estimator's lean over time: the whole first ride, and the minute of each ride with the most leaning."""
 
 from importlib.util import find_spec
 from pathlib import Path
@@ -9,7 +9,7 @@ from kickstand_tools.signals import window_spreads
 from numpy.typing import NDArray
 
 ZOOM_S = 60.0
-# Colour and line width, in the order of drawing: the noisy ones lie behind
+# Colour and line width, in the order of drawing: the noisy ones are behind
 _STYLES = {
     "formula": ("0.8", 0.4),
     "formula 0.3 s": ("tab:olive", 0.7),
@@ -54,7 +54,7 @@ def draw(path: Path, rides: dict[str, dict[str, NDArray[np.float64]]]) -> None:
 
 
 def zoom_start(time: NDArray, true: NDArray) -> float:
-    """The time in s at which the ZOOM_S with the largest variance of the lean begin."""
+    """Start of the ZOOM_S with the largest variance of the lean, s."""
     n = max(int(np.searchsorted(time, time[0] + ZOOM_S)), 1)
     if n >= len(time):
         return float(time[0])

@@ -1,8 +1,8 @@
-"""What is possible: leans that need what no board has, the sensor's true errors or a perfect position.
+"""Computes the best possible leans, from data that no board has: the sensor's true errors or a perfect position.
 
-oracle() is the firmware's own filter with readings without the sensor's errors (its noise stays), the true alignment
-and the true speed. Nothing that the filter has to estimate is left but the motion. gps_lean() is what apps on phones
-show: speed x yaw rate from a receiver's course.
+oracle() is the firmware's own filter with readings without the sensor's errors (except noise), the true alignment and
+the true speed. The filter only has to estimate the motion. gps_lean() is the lean that phone apps show: speed x yaw
+rate from a receiver's course.
 """
 
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 NAME = "possible"
 GPS_HZ = (1.0, 10.0)
 GPS_MPS = 0.05  # noise of each component of a receiver's velocity, 1 sigma: data sheet of u-blox M8 and M9
-# The filter's noises that are least in error for the oracle, found on two seeds of each profile
+# The filter's noises with the least error for the oracle, found on two seeds of each profile
 _ORACLE = {
     "SIGMA_START": tuple(s if i < BIAS_LEFT else 1e-3 * s for i, s in enumerate(measurements.SIGMA_START)),
     "SIGMA_FRESH_BIAS": 1e-4,
@@ -38,7 +38,7 @@ _ORACLE = {
 
 
 def oracle(made: SimulatedRide) -> NDArray[np.float64]:
-    """(N,) lean in degrees: the least error that a filter on this sensor can be asked for."""
+    """(N,) lean in degrees, with the least error that a filter on this sensor can reach."""
     readings, chip = made.readings, made.chip
     warm = (readings[:, 3] - CALIBRATED_C)[:, None]
     force = readings[:, :3] - chip.accel_offset - warm * chip.accel_per_c
@@ -53,13 +53,13 @@ def oracle(made: SimulatedRide) -> NDArray[np.float64]:
 
 @contextmanager
 def _knowing() -> Iterator[None]:
-    """The filter's parameters for readings without errors, in this process."""
+    """A context that sets the filter's parameters for readings without errors, in this process."""
     with patch.multiple(measurements, **_ORACLE), patch.object(upright_trim, "MAX_TRIM", 0.0):
         yield
 
 
 def gps_lean(made: SimulatedRide, rate_hz: float) -> NDArray[np.float64]:
-    """(N,) lean in degrees as apps show it: atan(speed x change of course / g), held until the next position."""
+    """(N,) lean in degrees as in phone apps: atan(speed x change of course / g), held until the next position."""
     time, truth = made.time, made.truth
     chance = np.random.default_rng(len(time))
     at = np.arange(time[0], time[-1], 1.0 / rate_hz)

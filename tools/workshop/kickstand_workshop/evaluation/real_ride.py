@@ -1,20 +1,20 @@
-"""Estimators compared on a recorded ride, which has neither a calibration nor a true lean: both come from the ride.
+"""Compares estimators on a recorded ride, which has neither a calibration nor a true lean: both come from the ride.
 
-The calibration is what `kickstand calibrate ride` finds. The reference lean is atan(v * yaw rate / g), averaged over
+The calibration is that of `kickstand calibrate ride`. The reference lean is atan(v * yaw rate / g), averaged over
 1 s, with the yaw rate about the bike's own up axis. It reads low (1 Hz speed, wide tyres, an axis that leans with the
-bike) and ignores slope and bank of the road: it can compare methods and show a lean that decays in a turn, but its
-degrees are not to be trusted.
+bike) and ignores slope and bank of the road: it can compare methods and show a lean that decays in a turn, but do not
+trust its values in degrees.
 """
 
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from kickstand.errors import Notice
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.checks.log import remarks
 from kickstand_tools.common.errors import InputError
+from kickstand_tools.common.messages import Message
 from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.reader import Log, read_log
 from kickstand_tools.signals import moving_mean
@@ -24,8 +24,8 @@ from .estimators import calibrated, estimate
 from .metrics import rms, slope
 
 AVERAGE_S = 1.0
-_RIDING_MPS = 2.0  # scored where the speed is higher
-_LEANED_DEG = 5.0  # the slope is fitted beyond: the reference is rarely over 10 degrees
+_RIDING_MPS = 2.0  # scored at higher speeds
+_LEANED_DEG = 5.0  # the slope is fitted above this: the reference is rarely over 10 degrees
 
 
 @dataclass
@@ -40,14 +40,14 @@ class RealScore:
 class RecordingScores:
     """name: of the recording's file. scores: by estimator.
 
-    traces: (N,) each: "time" in s; "reference" and each estimator's lean in degrees, > 0 to the right. notices: what is
-    remarkable in the recording, or contradicts the calibration that was found in it.
+    traces: (N,) each: "time" in s; "reference" and each estimator's lean in degrees, > 0 to the right. notices: remarks
+    about the recording, and contradictions to the calibration found in it.
     """
 
     name: str
     scores: dict[str, RealScore]
     traces: dict[str, NDArray[np.float64]]
-    notices: list[Notice] = field(default_factory=list)
+    notices: list[Message] = field(default_factory=list)
 
 
 def compare(path: Path) -> RecordingScores:

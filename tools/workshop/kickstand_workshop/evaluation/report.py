@@ -1,4 +1,4 @@
-"""The figures of an evaluation, pooled over the seeds: as tables for a terminal, as data for JSON, as files."""
+"""Reports an evaluation, pooled over the seeds: tables for a terminal, data for JSON, files."""
 
 import json
 from collections.abc import Mapping
@@ -47,7 +47,7 @@ def pooled(scores: list[LeanScore]) -> dict[str, float]:
 
 
 def by_profile(results: list[Result]) -> dict[str, dict[str, dict[str, float]]]:
-    """profile -> estimator -> pooled(), with the ratio of its rms to that of what is possible."""
+    """profile -> estimator -> pooled(), with the ratio of its rms to that of the best possible lean."""
     summary: dict[str, dict[str, dict[str, float]]] = {}
     for profile in dict.fromkeys(r.job.profile for r in results):
         rides = [r for r in results if r.job.profile == profile and r.refusal is None]
@@ -60,7 +60,7 @@ def by_profile(results: list[Result]) -> dict[str, dict[str, dict[str, float]]]:
 
 
 def table(results: list[Result]) -> Table:
-    """The simulated rides: a block of lines for each profile."""
+    """A table of the simulated rides: a block of lines per profile."""
     made = _table("Shown lean against the truth of simulated rides", CAPTION)
     made.add_column("profile (rides)", no_wrap=True)
     for head in ("rms", "ratio", "worst\nride", "95 %", "worst", "slope", "range", "lag ms", "bias"):
@@ -87,7 +87,7 @@ def table(results: list[Result]) -> Table:
 
 
 def real_table(scores: dict[str, RealScore], name: str) -> Table:
-    """The recorded ride. name: of its file."""
+    """A table of the recorded ride. name: of its file."""
     made = _table(
         f"{name}: against atan(v * yaw rate / g) averaged over 1 s",
         "a rough reference that reads low: it compares methods, it claims no degrees",
@@ -129,7 +129,7 @@ def write(evaluation: Evaluation, directory: Path) -> tuple[Path, Path]:
 
 
 def _scores(scores: Mapping[str, LeanScore | RealScore]) -> dict[str, dict[str, float]]:
-    """The file's entries in degrees have no unit in their names."""
+    """Scores by estimator, for the file; entries in degrees have no unit in their names."""
     return {name: {key.removesuffix("_deg"): value for key, value in asdict(s).items()} for name, s in scores.items()}
 
 

@@ -1,5 +1,5 @@
-"""Simulates rides, calibrates them with the firmware's own code and scores every estimator, on all processors: what
-`kickstand evaluate` computes."""
+"""Simulates rides, calibrates them with the firmware's own code and scores every estimator, on all processors, for
+`kickstand evaluate`."""
 
 import multiprocessing
 import os
@@ -24,7 +24,7 @@ from .metrics import LeanScore, score
 
 @dataclass(frozen=True)
 class Job:
-    """One ride to simulate. The signs of the two set-up errors depend on the seed. traces: keep the leans."""
+    """One ride to simulate. The signs of the two set-up errors depend on the seed. traces: True to keep the leans."""
 
     profile: str
     seed: int
@@ -36,7 +36,7 @@ class Job:
 
 @dataclass
 class Result:
-    """scores: by estimator. refusal: why the firmware refused to calibrate from the poses; None if it did not.
+    """scores: by estimator. refusal: the firmware's reason for refusing the poses, or None.
 
     traces: (N,) each: "time" in s; "true" and each estimator's lean in degrees. Empty unless the job asks for them.
     """
@@ -94,12 +94,12 @@ def run(job: Job) -> Result:
 
 
 def run_all(jobs: list[Job]) -> Iterator[Result]:
-    """Yield the result of run() for each job as it is ready."""
+    """Yield the result of run() for each job when it is ready."""
     yield from on_all_processors(run, jobs, ordered=False)
 
 
 def on_all_processors(function: Callable, jobs: list, chunk: int = 1, ordered: bool = True) -> Iterator:
-    """Yield function(job) of each job. ordered: in the order of the jobs, else as each is ready."""
+    """Yield function(job) for each job. ordered: in the order of the jobs, otherwise as results become ready."""
     with multiprocessing.Pool(min(len(jobs), os.cpu_count() or 1), _begin_worker) as pool:
         yield from (pool.imap if ordered else pool.imap_unordered)(function, jobs, chunk)
 
@@ -123,11 +123,11 @@ def _aligned(made: SimulatedRide, six: CalibrationFile) -> CalibrationFile:
 
 
 def as_log(made: SimulatedRide) -> Log:
-    """The ride as if read from its file."""
+    """The ride as a log, as if read from its file."""
     readings = made.readings
     return Log(made.time, readings[:, :3], readings[:, 4:], temperature_c=readings[:, 3], name="RIDE.csv")
 
 
 def _begin_worker() -> None:
-    """Without standard error: after Ctrl-C every worker would print a traceback."""
+    """Close standard error: after Ctrl-C every worker would print a traceback."""
     sys.stderr = open(os.devnull, "w", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""A ride with a fault on the whole device: the firmware on the simulated board, judged by what its display shows."""
+"""Runs a ride with a fault on the whole device: the firmware on the simulated board, judged by its display."""
 
 import contextlib
 import gc
@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from .faults import ACCEL_RANGE_G
 
 LOOK_S = 0.1
-# What names a fault of the sensor; `Lean  --` and what is said of a speed source or a display do not
+# Texts that name a fault of the sensor. `Lean --` and texts about a speed source or a display do not
 NAMES = re.compile("Sensor|Gyro|Accel|No sensor", re.IGNORECASE)
-STARTED_S = 2.0  # before, the display says what it is doing
-WRITING = 2  # looks at a display that is just being written, in a row
+STARTED_S = 2.0  # before this time, the display shows the start
+WRITING = 2  # successive reads of a display that is just being written
 
 
 def display_of(
@@ -31,9 +31,9 @@ def display_of(
     lost: NDArray[np.bool_],
     speed: Callable[[float], float] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """time (n, s), the lean on the display (n, degrees, NaN where it shows none), and when a fault was named, or NaN.
-
-    readings (m, 7): of the chip, in its order. lost (m): the sensor answers nothing then. speed(t_s): in m/s, of a GPS.
+    """time (n, s), the lean on the display (n, degrees, NaN where it shows none), and the time at which a fault was
+    named, or NaN. readings (m, 7): of the chip, in its order. lost (m): True where the sensor does not answer.
+    speed(t_s): in m/s, from a GPS.
     """
     rows = readings[:, [0, 1, 2, 4, 5, 6, 3]].tolist()
     last = len(rows) - 1
@@ -58,7 +58,7 @@ def display_of(
 
     board.every(LOOK_S, look)
     config = {"SPEED": "gps"} if speed else {}
-    gc.freeze()  # the firmware collects all the time: not what was there before
+    gc.freeze()  # the firmware collects all the time, but should not scan earlier objects
     try:
         with tempfile.TemporaryDirectory() as flash, contextlib.chdir(flash):
             with board, contextlib.redirect_stdout(io.StringIO()):
@@ -77,7 +77,7 @@ def display_of(
 
 
 def _read(leans: list[float]) -> NDArray[np.float64]:
-    """The leans as a rider reads them, who sees a line that is half written for what it was."""
+    """The leans as a rider reads them: a half-written line is read as its previous text."""
     read = np.array(leans)
     absent = np.isnan(read)
     for k in range(1, len(read)):

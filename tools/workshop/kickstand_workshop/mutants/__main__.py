@@ -4,7 +4,7 @@
     python3 tools/dev.py mutants imu --sample 50  a random sample of them, the same one each time for the same --seed
     python3 tools/dev.py mutants imu --file sensor.py --lines 60 90
 
-It works on a copy of the project. Linux and macOS only: each change is tested in a fork.
+It works on a copy of the project, on Linux and macOS only, because each change is tested in a fork.
 """
 
 import argparse
@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parents[4]
 
 def main() -> int:
     options = _options()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit("stopped"))  # so that the copy goes
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit("stopped"))  # so that the copy is removed
     package = PACKAGES[options.package]
     with tempfile.TemporaryDirectory(prefix="mutants-") as directory:
         copy = Path(directory) / "project"
@@ -53,7 +53,8 @@ def main() -> int:
 
 
 def _judge(wanted: list[Change], runner: Tests) -> int:
-    """Test each change, print those that survive and the counts of each file; 0 if none survived, else 1."""
+    """Test each change, print the surviving ones and the counts of each file. Returns 0 if none survived, otherwise
+    1."""
     counts = collections.defaultdict(collections.Counter)
     begin = time.monotonic()
     for number, change in enumerate(wanted, 1):
@@ -75,7 +76,7 @@ def _judge(wanted: list[Change], runner: Tests) -> int:
 
 
 def _diff(before: str, after: str) -> list[str]:
-    """The changed lines alone."""
+    """Only the changed lines."""
     lines = difflib.unified_diff(before.split("\n"), after.split("\n"), n=0, lineterm="")
     return [line for line in lines if not line.startswith(("---", "+++", "@@"))]
 

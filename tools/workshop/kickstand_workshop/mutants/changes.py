@@ -1,6 +1,5 @@
-"""The single changes made to a file: cosmic-ray's operators where it has them, a few of each kind, and two of our own.
-
-One or two neighbours stand for each operator; all eleven would say the same eleven times.
+"""Makes single changes to a file: some of cosmic-ray's operators of each kind, and two of our own. Each operator is
+replaced by one or two similar ones; all eleven would only repeat the result.
 """
 
 import ast
@@ -24,7 +23,7 @@ OPERATORS = (
     *("ReplaceBreakWithContinue", "ReplaceContinueWithBreak", "ExceptionReplacer", "ZeroIterationForLoop"),
     "AddNot",  # the opposite of a condition
 )
-SMALL = 16  # whole numbers up to this are counts and indices: one more and one less. Others: the double and the half
+SMALL = 16  # integers up to this are counts and indices: changed by +1 and -1. Others are doubled and halved
 
 
 class Change(NamedTuple):
@@ -36,7 +35,7 @@ class Change(NamedTuple):
     occurrence: int
 
     def mutant(self, source: str) -> str | None:
-        """The changed text of the file; None if it is no Python, or differs in annotations and decorators only."""
+        """The changed text of the file; None if it is not Python, or differs only in annotations and decorators."""
         try:
             text = mutate_code(source, self.operator, self.occurrence)
         except AttributeError:  # cosmic-ray replaces exceptions that have a plain name, not gzip.BadGzipFile
@@ -45,7 +44,7 @@ class Change(NamedTuple):
 
 
 class Number(Operator):
-    """Other numbers: a limit that could be doubled unnoticed is no limit."""
+    """Changed numbers: a limit that can be doubled unnoticed is not tested."""
 
     def mutation_positions(self, node):
         if is_number(node):
@@ -115,7 +114,7 @@ def changes(path: Path, root: Path) -> list[Change]:
 
 
 def _bare(source: str) -> str | None:
-    """What the text does, as a tree without annotations and decorators; None if it is no Python."""
+    """The text as a syntax tree without annotations and decorators; None if it is not Python."""
     try:
         tree = ast.parse(source)
     except SyntaxError:

@@ -1,4 +1,5 @@
-"""Runs tests in forks of a process that has already imported numpy and the like, which takes longer than most tests."""
+"""Runs tests in forks of a process that has already imported numpy and similar packages, because imports take longer
+than most tests."""
 
 import contextlib
 import gc
@@ -15,11 +16,11 @@ import pytest
 
 WARM = ("numpy", "hypothesis", "click", "rich.console", "matplotlib.pyplot", "pandas", "plotly.graph_objects")
 WARM += ("pyarrow.parquet",)
-# Without MicroPython, where a test can choose: a process each is slow, and the same tests run on CPython.
+# Without MicroPython if a test can choose: it is slow, and the same tests run on CPython.
 ARGUMENTS = ("-x", "-q", "-k", "not micropython", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0")
 KILLED, SURVIVED, TIMED_OUT = "killed", "survived", "timed out"
 TIMES, EXTRA_S = 3, 5  # processor time allowed for a change: that of the unchanged tests times 3, and 5 s
-WALL_TIMES = 10  # and so much time on the clock, for tests that wait for ever
+WALL_TIMES = 10  # factor on the wall-clock time, for tests that wait for ever
 
 
 class Tests:
@@ -38,10 +39,10 @@ class Tests:
         for name in WARM:
             with contextlib.suppress(ImportError):
                 importlib.import_module(name)
-        gc.freeze()  # pytest collects garbage at its end, and has not to look through all this each time
+        gc.freeze()  # pytest collects garbage at its end, and must not scan all this each time
 
     def pass_unchanged(self) -> bool:
-        """True if the tests pass as they are. Leaves their bytecode in the copy."""
+        """True if the tests pass without changes. Leaves their bytecode in the copy."""
         self._run(self._files)  # once without bytecode, once to take the time
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         passed = self._run(self._files) == SURVIVED
@@ -52,12 +53,12 @@ class Tests:
         return passed
 
     def judge(self, path: Path, mutant: str) -> str:
-        """KILLED, SURVIVED or TIMED_OUT: what the tests make of this text of the file path, relative to root. The tests
-        of the same name come first."""
+        """KILLED, SURVIVED or TIMED_OUT: the result of the tests with this text of the file path, relative to root.
+        Tests of the same name run first."""
         file = self.root / path
         original = file.read_text("utf-8")
         for bytecode in file.parent.glob(f"__pycache__/{file.stem}.*"):
-            bytecode.unlink()  # it is taken for that of any text of the same length and second
+            bytecode.unlink()  # Python would use it for any text of the same length and second
         try:
             file.write_text(mutant, "utf-8")
             return self._run(sorted(self._files, key=lambda name: file.stem not in name))
@@ -65,7 +66,7 @@ class Tests:
             file.write_text(original, "utf-8")
 
     def output(self) -> str:
-        """What the last run printed."""
+        """The output of the last run."""
         self._output.seek(0)
         return self._output.read()
 
@@ -86,7 +87,7 @@ class Tests:
                 os.killpg(child, signal.SIGKILL)
                 _, status = os.waitpid(child, 0)
         with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(child, signal.SIGKILL)  # what its tests started
+            os.killpg(child, signal.SIGKILL)  # also ends processes that its tests started
         if os.WIFSIGNALED(status):
             return TIMED_OUT
         return SURVIVED if os.WEXITSTATUS(status) == 0 else KILLED

@@ -1,4 +1,4 @@
-"""The packages whose tests are judged by mutants: the code of each, and the tests that ought to notice its changes."""
+"""The packages whose tests are judged by mutants: the code of each, and the tests that should notice its changes."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -7,8 +7,8 @@ UNTESTABLE = ("_viper.py", "_guest.py")  # they run on a board or on MicroPython
 
 
 class Package(NamedTuple):
-    """sources: patterns of files, from the project's root. tests: patterns in host_tests, in the order in which they
-    run, so those that notice most in least time first; before them all those of the same name as the code."""
+    """sources: patterns of files, from the project's root. tests: patterns in host_tests, in running order: the fastest
+    and most sensitive first. Tests of the same name as the code run before them."""
 
     sources: tuple[str, ...]
     tests: tuple[str, ...]
@@ -42,10 +42,11 @@ PACKAGES = {
         "rides/test_block rides/test_recording rides/test_ring rides/test_stream rides/test_card_trial",
     ),
     "live": _package("firmware/kickstand/live/*.py", "live/test_live_packets live/test_live_device"),
+    "published": _package("tools/kickstand_tools/calibration/published.py", "drive_alignment/test_published"),
     "aligning": _package(
-        "tools/kickstand_tools/calibration/*.py",
-        "drive_alignment/test_published drive_alignment/test_parts calibration/test_sensor_fit"
-        " calibration/test_cli_calibration_file calibration/test_cli_calibrate drive_alignment/test_cli_drive",
+        "tools/kickstand_tools/calibration/[!p]*.py tools/kickstand_tools/calibration/p[or]*.py",
+        "calibration/test_sensor_fit calibration/test_cli_calibration_file calibration/test_cli_calibrate"
+        " drive_alignment/test_cli_drive",
     ),
     "logs": _package("tools/kickstand_tools/logs/*.py", "logs/test_[!cm]* logs/test_c*"),
     "imports": _package("tools/kickstand_tools/imports/**/*.py", "imports/test_apps imports/test_[!a]*"),

@@ -1,6 +1,6 @@
-"""What the display of a simulated device says at chosen moments of the demo's ride.
+"""Reads the display of a simulated device at chosen moments of the demo's ride.
 
-In a process of its own, because the firmware sees the simulated board's clock and files: prints JSON,
+It runs in a separate process, because the firmware uses the simulated board's clock and files. It prints JSON,
 {name: [codes of both lines, character memory]}, or of an OLED {name: pixels}.
 """
 
@@ -34,7 +34,7 @@ MOMENTS_S = {
 }
 
 
-UNPLUGGED_S = 44.0, 0.3  # of the sensor, before "unsure": at which time, for how long
+UNPLUGGED_S = 44.0, 0.3  # of the sensor, before "unsure": start and duration
 OLED_MOMENTS_S = {"lean": 36.0, "unsure": 44.9, "maxima": 50.05, "brake": 53.07, "menu": 60.0}
 
 
@@ -62,7 +62,7 @@ def _device_pages(display: str) -> dict[str, Any]:
 
 
 def _run(display: str) -> dict[str, Any]:
-    """Turns this process into a board's."""
+    """Run the device. Afterwards this process can only be a board's."""
     ride = Ride(SCRIPT)
     board = Board(Sensor(seed=PART_SEED, share=PART_SHARE).world(ride.motion), display=display)
     for at_s in PRESSES_S:
@@ -79,7 +79,7 @@ def _run(display: str) -> dict[str, Any]:
     for name, at_s in (MOMENTS_S if display == "lcd" else OLED_MOMENTS_S).items():
         board.at(at_s, lambda name=name: look(name))
     board.install()
-    from kickstand.start import main  # after install(), which decides what `machine` and `time` are
+    from kickstand.start import main  # after install(), which replaces `machine` and `time`
 
     board.run(main, ride.seconds)
     return seen

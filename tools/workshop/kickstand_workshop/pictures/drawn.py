@@ -7,8 +7,8 @@ from .device_pages import lcd_pages, oled_pages
 
 
 def drawn() -> dict[str, str]:
-    """{file name: SVG}: pages of both displays, wiring of both boards, what is built, the demo, the forces in a
-    bend. Takes some seconds."""
+    """{file name: SVG}: pages of both displays, wiring of both boards, drawings of what to build, the demo, the forces
+    in a bend. Takes some seconds."""
     pictures = {f"lcd_{name}.svg": lcd.draw(codes, cgram) for name, (codes, cgram) in lcd_pages().items()}
     pictures |= {f"oled_{name}.svg": oled.draw(pixels) for name, pixels in oled_pages().items()}
     return (

@@ -1,4 +1,4 @@
-"""The page of `kickstand web` as Chromium shows it: two presses, then a bend to either side, as a moving picture."""
+"""Records the page of `kickstand web` in Chromium as an animation: two presses, then a bend to each side."""
 
 import hashlib
 import io
@@ -16,19 +16,19 @@ _SIZE = (1000, 560)
 _WIDTH = 720  # of the picture, pixels
 _WAIT_MS = 60_000
 _FRAME_S = 0.2
-_QUICKER = 1.5  # than it was
-_LAST_S = 2.5  # that the last picture stands
+_QUICKER = 1.5  # factor on the speed
+_LAST_S = 2.5  # duration of the last picture
 _QUALITY = 32
 _MOST = 100  # pictures
 _LEANS = (("ArrowRight", 7), ("ArrowLeft", 14))  # keys of 5 degrees each
 _HELD_S = 3.0
-_DRAWN = ("index.html", "style.css", "bike.mjs", "road.mjs", "display.mjs", "guide.mjs")  # what decides how it looks
+_DRAWN = ("index.html", "style.css", "bike.mjs", "road.mjs", "display.mjs", "guide.mjs")  # files for its look
 _SAYS = "text => document.querySelector('#display').ariaLabel.includes(text)"
 _ASKS = "text => document.querySelector('#todo').textContent.includes(text)"
 
 
 def looks() -> str:
-    """A hash of the page's files that decide how it looks. The picture carries it, so that a test knows a stale one."""
+    """A hash of the files that determine the page's look. The picture contains it, and a test detects a stale one."""
     return hashlib.sha256(b"".join((site.PAGE / name).read_bytes() for name in _DRAWN)).hexdigest()
 
 
@@ -43,7 +43,7 @@ def draw() -> bytes:
 
 
 def _ride(page: Any) -> list[tuple[float, bytes]]:
-    """[(s, PNG)] of the two presses and of a bend to either side."""
+    """[(s, PNG)] of the two presses and of a bend to each side."""
     shots: list[tuple[float, bytes]] = []
 
     def film(done: Callable[[], bool]) -> None:
@@ -80,7 +80,7 @@ def _ride(page: Any) -> list[tuple[float, bytes]]:
 
 
 def _animated(shots: list[tuple[float, bytes]]) -> bytes:
-    """One file of pictures taken at these times."""
+    """One animation of pictures taken at these times."""
     from PIL import Image
 
     shots = shots[:: -(-len(shots) // _MOST)]

@@ -1,4 +1,4 @@
-"""A long time on the simulated board: random rides, faults and presses, and checks that must hold all the while.
+"""A long test on the simulated board: random rides, faults and presses, with checks that must always hold.
 
     python -m kickstand_workshop.soak --hours 24 --seed 1
 

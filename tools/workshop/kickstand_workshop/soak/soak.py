@@ -24,16 +24,16 @@ from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 from .trip import Trip, make_trip
 from .watch import Watch
 
-TRIPS_WITH_A_BIKE = 8  # after so many trips: another sensor, mounting and speed source, and an empty flash
+TRIPS_WITH_A_BIKE = 8  # after this number of trips: another sensor, mounting and speed source, and an empty flash
 PART_SHARE = 0.5  # the sensor's errors over the data sheet's limits; the six positions have found offset and scale
 WHO_AM_I, RANGE_G = 0x68, 8
 WARM_TRIPS = 3  # in the first trips memory may grow: modules are imported when they are first needed
-MAX_GROWTH = 3000  # blocks of memory from the second minute of a trip to its end: a ride's recording takes some hundred
+MAX_GROWTH = 3000  # blocks of memory from the second minute of a trip to its end: recording a ride takes some hundred
 
 
 @dataclass
 class Tallies:
-    """Tallies of what was tried, and the worst figures. found: a line for each broken invariant."""
+    """Counts of what was tried, and the worst figures. found: one line per broken invariant."""
 
     seed: int
     hours: float = 0.0
@@ -54,7 +54,7 @@ class Tallies:
 
 
 class SoakBoard:
-    """A board with its sensor and its config.py. flash: the directory that stands for its flash."""
+    """A board with its sensor and its config.py. flash: the directory used as its flash."""
 
     def __init__(self, chance: random.Random, flash: Path) -> None:
         self.flash = flash
@@ -67,7 +67,7 @@ class SoakBoard:
         }
         if self.config["SAMPLE_HZ"] < 200:
             self.config["DLPF"] = 4 if self.config["SAMPLE_HZ"] == 100 else 5
-        self.aligned = False  # as its flash says
+        self.aligned = False  # as in its flash
 
     def store(self) -> Any:
         from kickstand.calibration.store import Store
@@ -75,7 +75,7 @@ class SoakBoard:
         return Store(WHO_AM_I, RANGE_G, str(self.flash))
 
     def do_six_positions(self) -> None:
-        """As the rider has done them before the sensor went onto the bike."""
+        """Do the six positions, as the rider did before mounting the sensor on the bike."""
         from kickstand.calibration.parameters import Calibration
 
         calibration = Calibration()
@@ -88,9 +88,8 @@ class SoakBoard:
 
 
 def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: None) -> Tallies:
-    """Run trips until they add up to so many hours of the board's time. say: called with its progress, each hour of it.
-
-    The same seed gives the same trips. It works in a directory of its own, which is gone afterwards."""
+    """Run trips for this total of the board's time. say: called with the progress, each hour of it. The same seed gives
+    the same trips. It works in a temporary directory."""
     figures = Tallies(seed)
     begun, said_h = time.monotonic(), 0.0
     chance = random.Random(seed)
@@ -133,7 +132,7 @@ def _board_of(bike: SoakBoard, trip: Trip | None) -> Board:
 
 
 def _run(bike: SoakBoard, trip: Trip, figures: Tallies) -> None:
-    """One trip, from power-on to power-off, and what was found in it."""
+    """Run one trip, from power-on to power-off, and record its results."""
     board = _board_of(bike, trip)
     readings = 0
     for at_s, for_s in trip.presses:
@@ -145,7 +144,7 @@ def _run(bike: SoakBoard, trip: Trip, figures: Tallies) -> None:
     board.every(60.0, lambda: blocks.append(_blocks()))
     console = io.StringIO()
     gc.collect()
-    gc.freeze()  # the app collects all the time, and what was there before is none of its own
+    gc.freeze()  # the app collects all the time, but earlier objects are not its own
     try:
         with board, redirect_stdout(console):
             from kickstand import settings, start
@@ -192,7 +191,7 @@ def _blocks() -> int:
 
 
 def _check_calibration(bike: SoakBoard, watch: Watch, figures: Tallies) -> None:
-    """After a power cut at whatever moment there is the old calibration or a new one, never none."""
+    """Check that after a power cut at any moment there is the old calibration or a new one, never none."""
     calibration = bike.store().load()
     if bike.aligned and not calibration.aligned:
         watch.found.append("the alignment is lost")

@@ -1,4 +1,4 @@
-"""A trip made up at random: how the bike moves, what fails, what is pressed. From power-on to power-off."""
+"""A random trip from power-on to power-off: motion of the bike, faults and presses."""
 
 import random
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ RIDES = {
     "walking pace": ((0, 4), (1.5, 3.5), (-2, 2)),
 }
 
-# name: (method of Faults; its arguments from when it begins, how long it lasts and a random source)
+# name: (method of Faults; function that computes its arguments from start, duration and a random source)
 FAULTS: dict[str, tuple[str, Any]] = {
     "sensor unplugged": ("unplug_sensor", lambda at, s, r: (at, s)),
     "sensor not acknowledging": ("nack_for", lambda at, s, r: (SENSOR, at, s)),
@@ -44,9 +44,9 @@ GPS_FAULTS = ("unplugged", "garbled", "void", "stuck")
 
 @dataclass
 class Trip:
-    """until_s: when the supply is cut.  presses: (when, how long).  faults: (name, when it begins, when it is over).
-    calls: (method of Faults, its arguments), which make them.  gps_faults: as Gps takes them.  cut_save: how many bytes
-    of the next calibration are written before the supply is cut, or None."""
+    """until_s: time of the power cut. presses: (start, duration). faults: (name, start, end). calls: (method of Faults,
+    its arguments) for them. gps_faults: as for Gps. cut_save: number of bytes of the next calibration that are written
+    before the power cut, or None."""
 
     kind: str
     ride: script.Ride
@@ -59,8 +59,8 @@ class Trip:
 
 
 def make_trip(chance: random.Random, speed: str | None, aligned: bool) -> Trip:
-    """A trip of some minutes. speed: the speed source, "gps", "wheel" or None. aligned: False where the trip has to
-    begin with an alignment; else a few trips repeat it."""
+    """A trip of some minutes. speed: the speed source, "gps", "wheel" or None. aligned: False if the trip must begin
+    with an alignment; otherwise a few trips repeat it."""
     kind = chance.choice(list(RIDES))
     ride = script.Ride(_manoeuvres(chance, kind), vibration_g=chance.uniform(0.01, 0.08))
     ride_s = KICKSTAND_S + UPRIGHT_S + 2 * script.MOVE_S
@@ -70,14 +70,14 @@ def make_trip(chance: random.Random, speed: str | None, aligned: bool) -> Trip:
         presses += [(3.0, SHORT_S), (ride_s - 6.0, SHORT_S)]
     elif again:  # through the menu, whose first entry it is
         presses += [(2.0, LONG_S), (4.5, LONG_S), (7.0, SHORT_S), (ride_s - 6.0, SHORT_S)]
-    # in most trips none, because they turn the page with the lean away
+    # in most trips no presses, because they leave the page with the lean
     t_s = ride_s + chance.uniform(5, 40) if chance.random() < 0.4 else ride.seconds
     while t_s < ride.seconds - 5.0:
         presses.append((t_s, chance.choice((SHORT_S, SHORT_S, SHORT_S, LONG_S))))
         t_s += chance.choice((1.0, 3.0, 20.0, 60.0))
     names = [name for name in FAULTS if name != "wheel storm" or speed == "wheel"]
     faults, calls = [], []
-    # the poses of an alignment are taken in peace
+    # no fault during the poses of an alignment
     t_s = chance.uniform(3, 20) if aligned and not again else ride_s
     while (t_s := t_s + QUIET_S + chance.expovariate(1 / 20)) < ride.seconds - 10.0:
         name, for_s = chance.choice(names), chance.choice((0.05, 0.3, 1.0, 4.0))

@@ -1,22 +1,22 @@
-// What the pages that connect to a board share: the browser's serial port, and the tools of the command line on CPython for
-// WebAssembly, which is fetched for this only.
+// Shared by the pages that connect to a board: the browser's serial port, and the command-line tools on CPython for
+// WebAssembly, which is fetched only for this.
 
 import { keptOffline } from "../offline.mjs";
 
 const BAUD = 115200;
-const BUFFER = 65_536; // bytes that may come while the page is busy
-const BACK_MS = 10_000; // until a board that has restarted is there again, at most
+const BUFFER = 65_536; // bytes that may arrive while the page is busy
+const BACK_MS = 10_000; // longest time until a restarted board is back
 const AGAIN_MS = 300;
-export const ASKING = "Asking the board, which takes up to 15 seconds …"; // until one that is silent is given up
+export const ASKING = "Asking the board, which takes up to 15 seconds …"; // time limit for a silent board
 
-/** share: of the work that is done; NaN while nobody knows, null to hide it. */
+/** share: of the work that is done; NaN if unknown, null to hide it. */
 export function showShare(bar, share) {
   bar.hidden = share === null;
   if (share >= 0) bar.value = share;
   else bar.removeAttribute("value");
 }
 
-/** The bytes of a serial port, for web/serial_guest.py. lost: nothing more can come. */
+/** The bytes of a serial port, for web/serial_guest.py. lost: nothing more can arrive. */
 export class SerialLine {
   lost = false;
   #port;
@@ -27,7 +27,7 @@ export class SerialLine {
     this.#port = port;
   }
 
-  /** restarted: the board may just be starting, and its port is away until then. */
+  /** restarted: the board may be starting, and its port is absent until then. */
   async open(restarted = false) {
     const until = performance.now() + (restarted ? BACK_MS : 0);
     for (;;) {
@@ -39,11 +39,11 @@ export class SerialLine {
         await this.sleep(AGAIN_MS);
       }
     }
-    // As a terminal program does: a Pico says nothing to a host without it
+    // Like a terminal program: a Pico sends nothing to a host without it
     try {
       await this.#port.setSignals?.({ dataTerminalReady: true, requestToSend: true });
     } catch (error) {
-      await this.close(); // it could not be opened again
+      await this.close(); // otherwise it could not be opened again
       throw error;
     }
     this.#read();
@@ -51,7 +51,7 @@ export class SerialLine {
 
   async #read() {
     let ended;
-    // After a disturbed byte or a break the port has another stream, which goes on
+    // After a disturbed byte or a break the port continues with another stream
     while (!this.lost && this.#port.readable && this.#port.readable !== ended) {
       ended = this.#port.readable;
       try {
@@ -71,7 +71,7 @@ export class SerialLine {
     this.lost = true;
   }
 
-  /** All that has come since the last call, a Uint8Array. */
+  /** All bytes received since the last call, a Uint8Array. */
   take() {
     const all = new Uint8Array(this.#received.reduce((length, chunk) => length + chunk.length, 0));
     let at = 0;
@@ -102,25 +102,25 @@ export class SerialLine {
   }
 
   async close() {
-    this.lost = true; // or what reads would go on with the port's next stream
-    // Each of these fails where the cable is out. A port that is not closed could not be opened again.
+    this.lost = true; // otherwise #read would continue with the port's next stream
+    // Each of these fails if the cable is out. A port that is not closed could not be opened again.
     await this.#reader?.cancel().catch(() => {});
     this.#reader?.releaseLock();
     await this.#port.close().catch(() => {});
   }
 }
 
-/** A new Python with the tools in it. withNumpy: those that write rides need it. */
+/** A new Python with the tools. withNumpy: needed to write rides. */
 export async function python(withNumpy = false) {
-  await keptOffline(); // so that what is fetched now is kept too
+  await keptOffline(); // because the files fetched now must be kept, too
   const { PACKAGES, loadPython } = await import("../python.mjs");
   const made = await loadPython(["install.zip", ...(withNumpy ? ["numpy/numpy.zip"] : [])]);
   made.runPython(`import sys; sys.path[:0] = ["${PACKAGES}/tools", "${PACKAGES}/firmware"]`);
   return made;
 }
 
-/** A function that does load() once and returns what came of it. Where that fails it returns null, tell(text) is given
- * why, and the next call tries again. */
+/** A function that calls load() once and returns its result. If load() fails, it calls tell(text) with the reason and
+ * returns null, and the next call tries again. */
 export function loadOnce(load) {
   let loaded;
   return async (tell) => {
@@ -134,7 +134,7 @@ export function loadOnce(load) {
   };
 }
 
-/** The port that the rider chooses, or null; tell(text) says why there is none. */
+/** The port that the rider chooses, or null; tell(text) is called with the reason for none. */
 export async function choosePort(tell) {
   try {
     return await navigator.serial.requestPort();
@@ -145,8 +145,8 @@ export async function choosePort(tell) {
 }
 
 /**
- * What use(line, name) returns, with a SerialLine open meanwhile, and the port's name for messages. tell(text) is given
- * what goes wrong, and null is returned then.
+ * Open a SerialLine and return the result of use(line, name), with the port's name for messages. After an error call
+ * tell(text) with it and return null.
  */
 export async function overCable(port, tell, use, restarted = false) {
   const line = new SerialLine(port);
@@ -158,8 +158,7 @@ export async function overCable(port, tell, use, restarted = false) {
     return null;
   }
   try {
-    // A line that is not USB, as a bridge to an emulated board is, is given time as `kickstand flash` gives it
-    return await use(line, port.getInfo?.().usbVendorId ? "this port" : "socket:this port");
+    return await use(line, "this port");
   } catch (error) {
     console.error(error);
     tell(`This went wrong: ${error.message.trim().split("\n").at(-1)}. Load the page again.`);
@@ -167,12 +166,4 @@ export async function overCable(port, tell, use, restarted = false) {
   } finally {
     await line.close();
   }
-}
-
-/** A line of the command's, in these pages' words. */
-export function inPages(text) {
-  return text
-    .replaceAll("socket:", "")
-    .replace(/this port: connection lost \(.*?\)/, "connection lost")
-    .replace(/kickstand flash (puts|brings)/, "the page Install $1");
 }

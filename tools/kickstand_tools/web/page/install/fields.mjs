@@ -1,11 +1,10 @@
-// The form for config.py: a field for each of its settings. What is left empty has the board's usual value, which the
-// field shows.
+// The form for config.py: one field per setting. An empty field means the board's default value, which the field shows.
 
 const SIDES = [['"left"', "left"], ['"right"', "right"]];
 const SWITCH = [["True", "yes"], ["False", "no"]];
 const numbers = (...values) => values.map((value) => [String(value), String(value)]);
 
-// [title, open from the beginning, [name, label, choices if there are only these]]
+// [title, open at first, [name, label, choices if only these are allowed]]
 export const GROUPS = [
   ["The motorcycle", true, [
     ["SIDE", "Its kickstand leans it to the", SIDES],
@@ -61,24 +60,24 @@ export class Fields {
   #place;
   #marked = null;
 
-  /** changed(): called when a field was. */
+  /** changed(): called when a field has changed. */
   constructor(place, changed) {
     this.#place = place;
     place.addEventListener("change", changed);
   }
 
-  /** settings: {name: value in config.py}; usual: {name: value without}; all as Python writes them. */
+  /** settings: {name: value in config.py}; usual: {name: default value}; all as Python literals. */
   fill(settings, usual) {
     this.#place.replaceChildren(...GROUPS.map(([title, open, fields]) => group(title, open, fields, settings, usual)));
     this.#marked = null;
   }
 
-  /** {name: value as Python writes it, or null for the usual one}. */
+  /** {name: value as a Python literal, or null for the default}. */
   values() {
     return Object.fromEntries([...this.#place.querySelectorAll("[name]")].map(({ name, value }) => [name, value.trim() || null]));
   }
 
-  /** Say what is wrong beside a field, in place of what was said before. name: null for none. */
+  /** Show a fault beside a field, instead of an earlier one. name: null for none. */
   mark(name, text) {
     if (this.#marked) {
       this.#marked.removeAttribute("aria-invalid");
@@ -112,7 +111,7 @@ function field(name, label, choices, value, usual) {
     const word = choices.find(([literal]) => same(literal, usual))?.[1] ?? usual;
     input.append(new Option(`${word} (usual)`, ""), ...choices.map(([literal, text]) => new Option(text, literal)));
     const chosen = [...input.options].find((option) => same(option.value, value));
-    if (chosen) chosen.value = value; // as the rider has written it
+    if (chosen) chosen.value = value; // as the rider wrote it
     else if (value) input.append(new Option(value, value));
     input.value = value;
   } else {
@@ -124,7 +123,8 @@ function field(name, label, choices, value, usual) {
   return made;
 }
 
-/** Are these two, neither left empty, the same to Python? As far as choices go: 'left' is "left", and 0x68 is 104. */
+/** True if these two values, both not empty, are equal in Python, as far as choices need it: 'left' is "left", and 0x68
+ * is 104. */
 function same(one, other) {
   const plain = (text) => (Number.isNaN(Number(text)) ? text.replaceAll("'", '"') : Number(text));
   return one !== "" && other !== "" && plain(one) === plain(other);

@@ -1,7 +1,7 @@
-// Puts the firmware and its config.py onto a board at the browser's serial port: `kickstand flash` itself, and what
-// `kickstand status` and `check` print, on CPython for WebAssembly (web/install_guest.py).
+// Installs the firmware and its config.py on a board at the browser's serial port with `kickstand flash`, and shows the
+// output of `kickstand status` and `check`, on CPython for WebAssembly (web/install_guest.py).
 
-import { ASKING, choosePort, inPages, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
+import { ASKING, choosePort, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
 import { connectImage } from "./image.mjs";
 import { Fields } from "./fields.mjs";
@@ -17,7 +17,7 @@ function tell(text, share = null) {
   showShare(byId("install-bar"), share);
 }
 
-/** What board is there, and what does its config.py say? */
+/** Identify the board, and read its config.py. */
 async function look() {
   const port = await choosePort(tell);
   if (!port) return;
@@ -34,7 +34,7 @@ async function look() {
   atWork(false);
   if (!said) return;
   const { refused, board: name, settings, usual, by_hand, others } = JSON.parse(said);
-  if (refused) return tell(`Not installed: ${inPages(refused)}.`);
+  if (refused) return tell(`Not installed: ${refused}.`);
   board = { port, guest };
   byHand = by_hand;
   byId("by-hand").textContent = byHand ? `The board’s own ${byHand}. It stays as it is.` : "";
@@ -46,7 +46,7 @@ async function look() {
   check();
 }
 
-/** Do the firmware's own rules take what is in the form? */
+/** Check the form by the firmware's own rules. */
 function check() {
   if (byHand) return true;
   const { text, fault } = JSON.parse(board.guest.check(JSON.stringify(fields.values())));
@@ -67,7 +67,7 @@ async function install() {
     port,
     tell,
     (line, name) => guest.install.callPromising(line, name, wanted, (what, done, total) => tell(what, done / total)),
-    true, // after the look
+    true, // after the board was identified
   );
   atWork(false);
   if (said) showResult(JSON.parse(said));
@@ -75,7 +75,7 @@ async function install() {
 
 function showResult({ refused, board: name, copied, kept, config_kept }) {
   if (refused) {
-    tell(`Not installed: ${inPages(refused)}.`);
+    tell(`Not installed: ${refused}.`);
     return;
   }
   byId("config").hidden = true;
@@ -87,7 +87,8 @@ function showResult({ refused, board: name, copied, kept, config_kept }) {
   tell(`Done: ${name}. ${files}.${config} The board starts now. ${next}`);
 }
 
-/** Ask the board for a text, to read and to copy into an issue. asks(tools, line, name, say): promises JSON. */
+/** Ask the board for a text, to read and to copy into an issue. asks(tools, line, name, say): returns a promise of
+ * JSON. */
 async function report(asks) {
   const say = (text) => (byId("status-said").textContent = text);
   const port = await choosePort(say);
@@ -106,15 +107,15 @@ async function report(asks) {
   atWork(false);
   if (!said) return;
   const { text, refused } = JSON.parse(said);
-  say(refused ? `${inPages(refused)}.` : "The board has restarted.");
+  say(refused ? `${refused}.` : "The board has restarted.");
   byId("status-text").textContent = text ?? "";
   byId("status-shown").hidden = !text;
 }
 
-/** What `kickstand status` prints. */
+/** The output of `kickstand status`. */
 const status = () => report((tools, line, name) => tools.status.callPromising(line, name));
 
-/** `kickstand check`: its lines as they come, and what the rider has to do. */
+/** `kickstand check`: its lines as they arrive, and instructions for the rider. */
 const checkBoard = () =>
   report((tools, line, name, say) => {
     byId("status-shown").hidden = false;

@@ -1,10 +1,10 @@
-// Lean, or what a car has in its place, and acceleration over the last minute, on one canvas.
+// Draws lean (for a car the sideways force) and acceleration over the last minute on one canvas.
 
 const SPAN_S = 60;
 const LEFT = 46; // px for the numbers beside the plots
 const GAP = 26;
-const EVERY_S = 10; // a line of the grid
-// value: of a moment; limit: at the upper end, and below 0 as far; step: between two lines
+const EVERY_S = 10; // distance of the grid's lines
+// value: of a moment; limit: at the upper end, minus it at the lower end; step: between two lines
 const ACCELERATION = {
   ...{ title: "acceleration: braking is down", value: ([, , forward]) => forward, limit: 1, step: 0.5, unit: " g" },
   ...{ share: 0.38, color: "--truth" },

@@ -1,4 +1,4 @@
-// Logs that came over the cable: to be saved, and to be looked at in the page Rides.
+// Offers logs that came over the cable: to save them, or to open them in the page Rides.
 
 import { leavePulled } from "../rides/pulled.mjs";
 
@@ -6,10 +6,10 @@ const RUNNING = Symbol("running");
 const unsaved = new Set();
 
 addEventListener("beforeunload", (event) => {
-  if (unsaved.size) event.preventDefault(); // the browser asks: what is not saved is lost
+  if (unsaved.size) event.preventDefault(); // the browser asks, because unsaved data is lost
 });
 
-/** on: something is under way that leaving the page would end. */
+/** on: work is in progress that leaving the page would end. */
 export function busy(on) {
   if (on) unsaved.add(RUNNING);
   else unsaved.delete(RUNNING);
@@ -32,12 +32,12 @@ export function offer(list, title, files) {
     try {
       await leavePulled(files);
     } catch {
-      item.setAttribute("role", "status"); // a screen reader says what takes the button's place
+      item.setAttribute("role", "status"); // a screen reader reads the text that replaces the button
       const why = "This browser hands nothing from page to page, as in a private window";
       look.replaceWith(`${why}: save both, and choose them on the page Rides.`);
       return;
     }
-    open("./rides.html#pulled"); // in a tab of its own: this page keeps what is not saved yet
+    open("./rides.html#pulled"); // in a new tab, because this page still has unsaved data
   });
   item.append(look);
   list.prepend(item);

@@ -1,4 +1,4 @@
-// The big gauge: an arc from left to right that fills up to a value, with the furthest to both sides marked on it.
+// The big gauge: an arc from left to right that fills up to a value, with the maximum of each side marked.
 
 import { sideOf } from "./measures.mjs";
 
@@ -12,7 +12,7 @@ export class Gauge {
     this.#svg = svg;
   }
 
-  /** measure: one of measures.mjs. The scale is as wide as a half circle. */
+  /** measure: one of measures.mjs. The scale is a half circle. */
   scale(measure) {
     this.#measure = measure;
     const { limit } = measure;
@@ -21,8 +21,7 @@ export class Gauge {
       <g class="marks">${this.#marks()}</g><path class="furthest left"/><path class="furthest right"/><path class="needle"/>`;
   }
 
-  /** value: > 0 to the right, or null for none that is known. left, right: the furthest until now, both > 0, 0 for
-   * none. */
+  /** value: > 0 to the right, or null if unknown. left, right: the maxima so far, both > 0, 0 for none. */
   show(value, left, right) {
     const set = (name, path) => this.#svg.querySelector(name).setAttribute("d", path);
     set(".fill", value === null ? "" : this.#arc(0, value));

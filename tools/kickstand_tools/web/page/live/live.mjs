@@ -1,7 +1,7 @@
-// Shows what a board streams, keeps it as a log, and fetches the rides that the board has recorded: `kickstand record` and
+// Shows a board's stream, keeps it as a log, and fetches recorded rides from the board: `kickstand record` and
 // `kickstand pull` on CPython for WebAssembly (web/cable_guest.py).
 
-import { ASKING, choosePort, inPages, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
+import { ASKING, choosePort, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
 import { Riding } from "./bluetooth/riding.mjs";
 import { Chart } from "./chart.mjs";
@@ -16,17 +16,17 @@ const gauge = new Gauge(byId("gauge"));
 const chart = new Chart(byId("chart"));
 const player = new Player();
 const guests = loadOnce(async () => (await python(true)).pyimport("kickstand_tools.web.cable_guest")); // no board is posed here
-let live; // the LiveStream of cable_guest.py that runs, or null
+let live; // the LiveStream of cable_guest.py, or null
 let stopped = false;
 let awake = null; // a WakeLockSentinel
 let aligned = false;
 let measure = null; // LEAN or SIDEWAYS
 let furthest = [0, 0];
-let riding = null; // the Riding that runs, or null
+let riding = null; // the running Riding, or null
 
 const tell = (text) => (byId("live-said").textContent = text);
 
-/** Listen until the rider stops it or the board is gone. After a new alignment another log begins. */
+/** Listen until the rider stops it or the board is gone. A new alignment starts another log. */
 async function start() {
   const port = await choosePort(tell);
   if (!port) return;
@@ -53,7 +53,7 @@ async function start() {
   if (said) tell(sentences(said.refused ? [said.refused] : ["Stopped", ...said.notes]));
 }
 
-/** Keep the screen on, where the browser can. It ends that itself when the page is covered. */
+/** Keep the screen on if the browser can. It stops doing so when the page is covered. */
 async function stayAwake() {
   awake = await navigator.wakeLock?.request("screen").catch(() => null);
 }
@@ -68,7 +68,7 @@ function received(text) {
   if (!stopped) tell(`Recording${lacking}: ${clock(reading.seconds)}`);
 }
 
-/** What a Riding shows here. */
+/** Functions with which a Riding shows values here. */
 const shown = {
   begin() {
     player.restart();
@@ -80,14 +80,14 @@ const shown = {
 };
 
 async function ride() {
-  await stayAwake(); // while the press still counts
+  await stayAwake(); // while the button press still counts
   riding = new Riding(shown);
   await riding.run();
   riding = null;
   awake?.release();
 }
 
-let simulated = null; // the SimulatedRide that runs
+let simulated = null; // the running SimulatedRide
 
 function simulate() {
   shown.begin();
@@ -152,10 +152,10 @@ async function pull() {
 
 /** Lines of the commands, one after the other. */
 function sentences(lines) {
-  return lines.map((line) => inPages(line).replace(/^./, (first) => first.toUpperCase())).join(". ") + ".";
+  return lines.map((line) => line.replace(/^./, (first) => first.toUpperCase())).join(". ") + ".";
 }
 
-/** Of Python's [(name, bytes)]. */
+/** From Python's [(name, bytes)]. */
 function byName(list) {
   return list.toJs().map(([name, data]) => ({ name, data }));
 }
@@ -171,7 +171,7 @@ function clock(seconds) {
   return `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
 }
 
-/** Show this one of measures.mjs from now on. */
+/** From now on show this measure of measures.mjs. */
 function show(wanted) {
   if (wanted === measure) return;
   measure = wanted;

@@ -1,7 +1,7 @@
-// What the page shows of a vehicle: the lean of a motorcycle; of a car, which does not lean, the specific force sideways.
+// The value that the page shows: a motorcycle's lean; for a car, which does not lean, the specific force sideways.
 //
-// value: of a moment of LiveReading (rides/stream.py), > 0 to the right, null where it is not known.  limit: at the ends of
-// gauge and chart; mark: between two marks of the gauge, every second one with its number.
+// value: of a moment of LiveReading (rides/stream.py), > 0 to the right, null if unknown. limit: at the ends of gauge
+// and chart; mark: between two marks of the gauge, every second one with a number.
 
 export const LEAN = {
   title: "Lean now",
@@ -37,13 +37,13 @@ export function written({ digits, unit }, value) {
   return `${Math.abs(value).toFixed(digits)}${unit}`;
 }
 
-/** With its sign, which 0 has not. */
+/** With its sign; 0 has none. */
 export function signed(value) {
   const size = Math.abs(value).toFixed(2);
   return Number(size) === 0 ? size : `${value < 0 ? "−" : "+"}${size}`;
 }
 
-/** "left" or "right", "" where the size would be written as 0. */
+/** "left" or "right", "" if the size is shown as 0. */
 export function sideOf({ digits }, value) {
   if (Number(value.toFixed(digits)) === 0) return "";
   return value < 0 ? "left" : "right";

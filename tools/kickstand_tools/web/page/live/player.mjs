@@ -1,23 +1,23 @@
-// Readings come in blocks of half a second: they are played at the pace at which they were taken, half a second late.
+// Readings arrive in blocks of half a second. They are played at the pace of the recording, half a second late.
 
 const KEPT_S = 62;
-const STALE_MS = 1200; // without a block, two of which should have come: what was shown is no longer so
+const STALE_MS = 1200; // after this time without a block (two are missing) the shown value is no longer valid
 const JUMP_S = 0.7;
-const EASE = 0.1; // of what a block comes early or late
+const EASE = 0.1; // share of a block's earliness or delay that is corrected
 
 export class Player {
-  /** All of the last minute, as LiveReading (rides/stream.py) has them. */
+  /** The moments of the last minute, as in LiveReading (rides/stream.py). */
   moments = [];
   #late = null; // s of our time minus s of the recording
   #heardMs = -Infinity;
 
-  /** Forget what came before: another recording begins. */
+  /** Forget earlier moments: another recording begins. */
   restart() {
     this.moments = [];
     this.#late = null;
   }
 
-  /** Take the moments of a block, which has just come. */
+  /** Add the moments of a block that has just arrived. */
   take(moments, nowMs) {
     if (!moments.length) return;
     const late = nowMs / 1000 - moments[0][0];
@@ -28,7 +28,8 @@ export class Player {
     this.moments.splice(0, this.moments.findIndex(([s]) => s >= since));
   }
 
-  /** {moment, until}: what to show now, null where nothing has come for too long; and up to where time has come, s. */
+  /** {moment, until}: the moment to show now, null if nothing has arrived for too long; and the current time of the
+   * recording, s. */
   now(nowMs) {
     const last = this.moments.at(-1);
     if (!last) return { moment: null, until: 0 };

@@ -1,10 +1,10 @@
-// A board to watch where there is none: the firmware on the simulated board of the page Try, on a ride that repeats.
+// A board to watch without a real one: the firmware on the simulated board of the page Try, on a repeating ride.
 
 import { Board } from "../board.mjs";
 
 const CRUISE_MPS = 17;
 const TOWN_MPS = 9;
-// s of the board's time: the two presses, and straight on until the firmware is sure of its lean
+// s of the board's time: the two presses, and straight ahead until the firmware is sure of its lean
 const BEFORE = [
   [1.5, "button", true],
   [1.7, "button", false],
@@ -14,7 +14,7 @@ const BEFORE = [
   [15, "pose", CRUISE_MPS],
   [27, "lean", 0],
 ];
-// What the rider does, each for so many seconds, over and over
+// The rider's actions with their durations in seconds, repeated
 const RIDE = [
   [4, "lean", 28],
   [3.5, "lean", -36],

@@ -1,15 +1,15 @@
-// The files that were given to the page, what each of them is, and a button to remove each.
+// The files given to the page, with their kinds, and a button to remove each.
 
-const MANY = 8; // and the list begins closed
+const MANY = 8; // from this number on the list is closed at first
 const UNREADABLE = "it is a folder, or was changed or moved after it was given. Give it again, or what is in the folder";
 
 export class Held {
-  #files = new Map(); // by name, in the order in which they were given
+  #files = new Map(); // by name, in the order given
   #found = { kinds: {}, why: {} };
   #place;
   #removed;
 
-  /** place: the <details> to show them in. removed(): is called when one was removed. */
+  /** place: the <details> in which to show them. removed(): called when one was removed. */
   constructor(place, removed) {
     this.#place = place;
     this.#removed = removed;
@@ -17,7 +17,7 @@ export class Held {
 
   add(files) {
     for (const file of files) {
-      this.#files.delete(file.name); // the last given of a name counts
+      this.#files.delete(file.name); // of files with the same name, the last one counts
       this.#files.set(file.name, file);
     }
   }
@@ -26,7 +26,7 @@ export class Held {
     return [...this.#files.values()];
   }
 
-  /** Those of the files that the browser can read. The others are left in {name: why not} of `why`. */
+  /** The files that the browser can read. For the others the reason is stored in why[name]. */
   async readable(why) {
     const tried = await Promise.allSettled(this.files.map((file) => file.slice(0, 1).arrayBuffer()));
     return this.files.filter(({ name }, k) => {
@@ -39,12 +39,12 @@ export class Held {
     return this.#files.get(name);
   }
 
-  /** found: {kinds: {name: what it is}, why: {name: why it cannot be used}}, as far as that is known. */
+  /** found: {kinds: {name: kind}, why: {name: reason why it cannot be used}}, as far as known. */
   show(found = this.#found) {
     this.#found = found;
     const { kinds, why } = found;
     const rows = this.files.map((file) => this.#row(file, kinds[file.name], why[file.name]));
-    this.#place.querySelector("ul").replaceChildren(...rows.toReversed()); // the last given first
+    this.#place.querySelector("ul").replaceChildren(...rows.toReversed()); // the last one first
     const wrong = this.files.filter(({ name }) => why[name]).length;
     const count = rows.length === 1 ? "1 file" : `${rows.length} files`;
     this.#place.querySelector("summary").textContent = wrong ? `${count}, ${wrong} cannot be used` : count;
@@ -72,7 +72,7 @@ export class Held {
   }
 }
 
-/** The name stands beside it. */
+/** Remove the name, which is shown beside the text. */
 function without(name, why) {
   const words = why.startsWith(name) ? why.slice(name.length).replace(/^:? /, "") : why;
   return /[.?!]$/.test(words) ? words : `${words}.`;

@@ -1,4 +1,4 @@
-// Wires the page: files come in, what the tools say of them is shown.
+// Connects the parts of the page: passes files to the tools and shows their results.
 
 import { fetched } from "../fetched.mjs";
 import { keepOffline, keptOffline } from "../offline.mjs";
@@ -16,19 +16,19 @@ const tools = new Tools((done, of, loading) => {
   if (loading) showReady(done, of);
 });
 const held = new Held(byId("held"), () => sortOut([]));
-let rides = []; // as rides() of web/rides_guest.py says, with what became of each: see kept()
+let rides = []; // from rides() of web/rides_guest.py, each with its result: see kept()
 let looked = null;
-let current = ""; // the ride that was chosen last
-let loaded = false; // Python, and what the tools need
-let turn = 0; // of the work that is wanted: what was begun for an earlier one is not shown
+let current = ""; // the ride chosen last
+let loaded = false; // Python, and everything that the tools need
+let turn = 0; // number of the current request: results of earlier ones are not shown
 
-/** Look at a ride. files: File objects, which join those of before. */
+/** Show a ride. files: File objects, added to earlier ones. */
 export async function openRide(files) {
   held.add(files);
   await sortOut(files.map((file) => file.name));
 }
 
-/** Find out what the files are that are held, and look at the ride that the new ones make. added: their names. */
+/** Identify the held files, and show the ride of the new ones. added: names of the new files. */
 async function sortOut(added) {
   held.show();
   await work(loaded ? "Looking through the files …" : "Loading the tools, 8 MB the first time …", async () => {
@@ -36,8 +36,8 @@ async function sortOut(added) {
     await keptOffline();
     const unreadable = {};
     const files = await held.readable(unreadable);
-    if (mine !== turn) return; // a later one has given the worker its files
-    if (tools.give(files)) [rides, looked] = [[], null]; // what was made of them is gone
+    if (mine !== turn) return; // a later request has passed its files to the worker
+    if (tools.give(files)) [rides, looked] = [[], null]; // the results for them are gone
     const found = await tools.call("rides", JSON.stringify(files.map(({ name }) => name)));
     return { ...found, why: { ...found.why, ...unreadable } };
   }, async (found) => {
@@ -63,7 +63,7 @@ async function sortOut(added) {
   }, true);
 }
 
-/** A ride with what was made of it, if it has the same files as before. given: its name in what was given. */
+/** A ride with its earlier results, if it has the same files. given: its name among the given files. */
 function kept(ride) {
   const sources = [...ride.files, ...(ride.track ? [ride.track] : [])].map((name) => held.file(name));
   const bytes = sources.reduce((sum, file) => sum + file.size, 0);
@@ -74,7 +74,7 @@ function kept(ride) {
 
 const calibrationOf = (ride) => ride.calibration || ride.fitted?.path;
 
-/** Is this what the page shows already? */
+/** True if the page already shows this ride. */
 function isShown(ride) {
   const { given, sources } = looked?.ride ?? {};
   const same = given === ride.given && sources.length === ride.sources.length && sources.every((file, k) => file === ride.sources[k]);
@@ -123,7 +123,7 @@ async function look(ride) {
   });
 }
 
-/** What is to be known about a ride that is shown. */
+/** The remarks about the shown ride. */
 function sayOf(ride) {
   const sample = ride.given === SAMPLE[0] ? "This ride is simulated: nobody has ridden it." : "";
   const aligned = ride.calibration ? "" : ride.fitted?.words;
@@ -151,11 +151,11 @@ async function saveLean() {
   const { ride, stem, calibration } = looked;
   await work(`Finding the lean of each sample of ${ride.given} …`, async () => {
     const { made } = await tools.call("smooth", ride.log, calibration);
-    save(`${stem}.lean.csv`, "text/csv", made); // also where another ride was chosen meanwhile
+    save(`${stem}.lean.csv`, "text/csv", made); // even if another ride was chosen meanwhile
   }, () => say(""), true);
 }
 
-/** The page of the charts with the library in it. A frame without this page's rights has not what is kept offline. */
+/** The page of the charts including the library. A frame without this page's rights cannot use the offline files. */
 function whole(page, plotly, library) {
   const [allowed] = document.querySelector("meta[http-equiv]").content.match(/'sha256-[^']+'/); // see web/site.py
   return page
@@ -173,14 +173,14 @@ async function savePage() {
 
 const library = () => fetched(PLOTLY).then((answer) => answer.text());
 
-/** How far what reads and draws rides has come, while nobody waits for it yet. */
+/** Show the progress of fetching the tools, while nobody waits for them. */
 function showReady(done, of) {
   loaded = of === 1;
   if (loaded) byId("work-bar").removeAttribute("value");
   byId("ready").textContent = loaded ? "" : `Loading the tools: ${Math.floor((100 * done) / of)} %.`;
 }
 
-/** Fetch while the visitor reads, unless the browser is set to save data. */
+/** Fetch the tools while the visitor reads, unless the browser is set to save data. */
 async function fetchAhead() {
   await keptOffline();
   if (navigator.connection?.saveData) return;
@@ -201,8 +201,8 @@ async function sample() {
 
 const chosen = () => rides[Math.max(0, byId("ride").selectedIndex)];
 
-/** Do it, saying so, then show what came of it; or say why nothing did, and return false. stays: what is shown stays
- * meanwhile. */
+/** Announce and do a piece of work, then show its result; or show why it failed, and return false. stays: keep the
+ * current content meanwhile. */
 async function work(text, begin, show, stays = false) {
   const mine = ++turn;
   say(text);
@@ -244,7 +244,7 @@ function stop() {
   say("Stopped.");
 }
 
-/** What was made of the files went with the worker, and what is shown could not be saved any more. */
+/** Clear the page: results for the files are lost with the worker, and the shown ride could no longer be saved. */
 function forget() {
   rides = [];
   looked = null;

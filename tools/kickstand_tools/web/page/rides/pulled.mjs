@@ -1,15 +1,15 @@
-// Rides that the page Live has read from a board: it leaves them in the browser's store, and opens the page Rides as
+// Passes rides from the page Live to the page Rides: Live leaves them in the browser's store and opens
 // rides.html#pulled.
 
 const NAME = "pulled";
 
-/** files: [{name, data: Uint8Array}]. Throws an Error where the browser does not keep them. */
+/** files: [{name, data: Uint8Array}]. Throws an Error if the browser does not store them. */
 export async function leavePulled(files) {
   const given = files.map(({ name, data }) => ({ name, data: data.slice().buffer }));
   await inStore((store) => store.put(given, NAME));
 }
 
-/** The files, and none of them is left in the store. Empty where there are none. */
+/** Take the files out of the store. Empty if there are none. */
 export async function takePulled() {
   const found = await inStore((store) => {
     const reading = store.get(NAME);
@@ -19,7 +19,7 @@ export async function takePulled() {
   return (found ?? []).map(({ name, data }) => new File([data], name));
 }
 
-/** The result of the request that begin(store) makes, once all is done. */
+/** The result of the request made by begin(store), after the transaction is complete. */
 async function inStore(begin) {
   const opening = indexedDB.open("kickstand", 1);
   opening.onupgradeneeded = () => opening.result.createObjectStore("files");

@@ -1,4 +1,4 @@
-// Puts the report of a ride into the page.
+// Shows the report of a ride in the page.
 
 const byId = (id) => document.getElementById(id);
 
@@ -8,7 +8,7 @@ function element(name, ...inside) {
   return made;
 }
 
-/** words, warnings: of look() in web/rides_guest.py; name: of the ride as it was given. */
+/** words, warnings: of look() in web/rides_guest.py; name: of the ride as given. */
 export function showReport({ words, warnings, name, calibration }) {
   byId("report-title").textContent = name;
   byId("calibration").textContent = calibration;
@@ -38,8 +38,8 @@ export function showReport({ words, warnings, name, calibration }) {
   byId("report").hidden = false;
 }
 
-/** page: the HTML of the charts, which is as high as it is wide enough for. Its frame is a new one, and seen before it
- * loads: a frame that was hidden until then may believe that it still is, and draw nothing. */
+/** page: the HTML of the charts, whose height depends on the width. Its frame is new, and visible before it loads: a
+ * previously hidden frame may behave as if still hidden, and draw nothing. */
 export function showCharts(page) {
   byId("charts").hidden = byId("drawing").hidden = false;
   byId("drawing").textContent = "Drawing the charts …";
@@ -49,7 +49,8 @@ export function showCharts(page) {
   byId("plot").replaceWith(frame);
 }
 
-// The frame may run scripts, but not reach this page: it says how high it is, and when it has drawn, or that it cannot
+// The frame may run scripts, but has no access to this page. It sends messages: its height, and whether it has drawn or
+// cannot
 addEventListener("message", ({ source, data }) => {
   if (source !== byId("plot").contentWindow) return;
   if (Number.isFinite(data?.height)) byId("plot").style.height = `${data.height}px`;

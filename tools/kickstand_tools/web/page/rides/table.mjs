@@ -1,9 +1,9 @@
-// Asks which column of a table is what, and in which unit: what the options --columns and --units of `kickstand import`
-// take.
+// Asks for the meaning and unit of a table's columns: the values of the options --columns and --units of `kickstand
+// import`.
 
 const form = document.getElementById("table");
 
-/** table: asked_for() of web/rides_guest.py. use(columns, units): is called with the answers, {key: name}. */
+/** table: from asked_for() of web/rides_guest.py. use(columns, units): called with the answers, {key: name}. */
 export function askColumns(name, table, use) {
   form.querySelector("legend").textContent = `Which column of ${name} is what?`;
   const columns = table.keys.map(([key, words, needed, found]) => {
@@ -31,7 +31,7 @@ export function askNothing() {
   form.hidden = true;
 }
 
-/** The first seconds of both sensors, a small chart each: so one sees what was taken for what. */
+/** The first seconds of both sensors, in a small chart each, to check the choice of columns. */
 function drawn({ t = [], ...sensors }) {
   const words = { a: "acceleration", g: "rates" };
   return Object.entries(sensors).map(([key, axes]) => {

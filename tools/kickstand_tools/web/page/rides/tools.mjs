@@ -3,26 +3,27 @@
 export class Tools {
   #worker = null;
   #answer = null;
-  #before = Promise.resolve(); // the calls are made one after the other
+  #before = Promise.resolve(); // calls run one after the other
   #tell;
 
-  /** tell(done, of, loading): the progress of what is worked on, or fetched for it; (1, 1, true) once all of it is. */
+  /** tell(done, of, loading): the progress of a call, or with loading of the files fetched for it; (1, 1, true) when
+   * all are fetched. */
   constructor(tell) {
     this.#tell = tell;
   }
 
-  /** False: there are no files, because nothing was opened, or the work was stopped or has failed. */
+  /** False if there are no files: nothing was opened, or the work was stopped or has failed. */
   get open() {
     return this.#worker !== null;
   }
 
-  /** Fetch and start Python, if that is not done. */
+  /** Fetch and start Python, unless done. */
   begin() {
     this.#worker ??= this.#start();
   }
 
-  /** Take these File objects in place of all before; what was being worked on is given up. True if all that was made of
-   * files before is gone. */
+  /** Use these File objects instead of all earlier ones. Work in progress is abandoned. True if all results of earlier
+   * files are gone. */
   give(files) {
     if (this.#answer) this.stop();
     const begins = !this.open;
@@ -31,7 +32,7 @@ export class Tools {
     return begins;
   }
 
-  /** The result of a function of web/rides_guest.py: what it returns, with `made`, the bytes of the file it made.
+  /** The result of a function of web/rides_guest.py, with `made`: the bytes of the file that it made.
    *
    * Throws an Error with the line of a refusal. */
   call(...call) {
@@ -46,7 +47,7 @@ export class Tools {
     return said;
   }
 
-  /** Give up what is being worked on, and the files: whoever waits for it waits for ever. */
+  /** Abandon work in progress, and the files. A caller that waits for a result waits for ever. */
   stop() {
     this.#worker?.terminate();
     this.#worker = null;
@@ -59,12 +60,12 @@ export class Tools {
     worker.onmessage = ({ data }) => {
       if (data.of !== undefined) return this.#tell(data.done, data.of, data.loading);
       if (data.ready) return this.#tell(1, 1, true);
-      if (!this.#answer) return this.stop(); // what was fetched ahead is missing: the next call tries again, and says so
+      if (!this.#answer) return this.stop(); // fetching in advance failed: the next call tries again, and reports it
       const { resolve, reject } = this.#answer;
       this.#answer = null;
       if (data.failed || data.said.refused) reject(new Error(data.failed ?? data.said.refused));
       else resolve({ ...data.said, made: data.made });
-      if (data.failed) this.stop(); // Python does not go on after an error of its own
+      if (data.failed) this.stop(); // Python cannot continue after an internal error
     };
     worker.onerror = (event) => {
       this.#answer?.reject(new Error(event.message || "the page cannot start its worker"));

@@ -1,13 +1,13 @@
-// The tools of the command line, away from the page's own thread.
+// The command-line tools, outside the page's own thread.
 //
-// Takes {files}: what was given to the page, and {call: [name, ...arguments]}: a function of web/rides_guest.py.
-// Sends {done, of}: the progress of a call, or with {loading} that of what is fetched first, {ready} once that is done,
-// {said}: a call's result, {failed: text}, and {made}: with the file that it made.
+// Receives {files}: the files given to the page, and {call: [name, ...arguments]}: a function of web/rides_guest.py.
+// Sends {done, of}: the progress of a call, or with {loading} of fetching the tools, {ready} after that, {said}: a
+// call's result, {failed: text}, and {made}: the file that a call made.
 
 import { loadPython } from "../python.mjs";
 
 const GIVEN = "/given";
-const HERE = "/ride"; // where Python works
+const HERE = "/ride"; // Python's working directory
 const OFTEN_MS = 100; // between two messages of progress
 
 let guest;
@@ -31,7 +31,7 @@ async function load() {
   postMessage({ ready: true });
 }
 
-/** The files are read where they lie, part by part: none is copied into Python's memory as a whole. */
+/** Mount the files: Python reads them in parts, and none is copied into its memory as a whole. */
 function give(files) {
   if (mounted) python.FS.unmount(GIVEN);
   mounted = true;
@@ -55,7 +55,7 @@ onmessage = async ({ data }) => {
   try {
     await loaded;
   } catch {
-    return; // which has been said
+    return; // which has already been reported
   }
   try {
     if (data.files) give(data.files);

@@ -1,15 +1,15 @@
-// The time of a board whose packets carry 16 bits of it, in ms, and arrive late.
+// Computes the time of a board from packets that contain 16 bits of it, in ms, and arrive late.
 
 const PERIOD = 65536;
-const DRIFT = 1e-4; // of a board's clock: what a packet may seem to be older by, in each second that passes
+const DRIFT = 1e-4; // of a board's clock: apparent delay of a packet per second
 
 export class BoardTime {
-  #board = null; // ms of the packet before, counted on
+  #board = null; // ms of the previous packet, without overflow
   #arrived = 0;
-  #least = Infinity; // of arrival minus board: the quickest packet
+  #least = Infinity; // arrival minus board time of the fastest packet
 
-  /** ms: of a packet that came at arrivedMs. Returns {s, lateMs}: its time since the first, in seconds, and by how much
-   * later it came than the quickest. */
+  /** ms: of a packet that arrived at arrivedMs. Returns {s, lateMs}: its time since the first packet, in seconds, and
+   * its delay relative to the fastest packet. */
   take(ms, arrivedMs) {
     const passed = arrivedMs - this.#arrived;
     if (this.#board === null) this.#board = this.#first = ms;
@@ -23,7 +23,7 @@ export class BoardTime {
     return { s: (this.#board - this.#first) / 1000, lateMs: offset - this.#least };
   }
 
-  /** A new connection, perhaps to a board that was switched off and on: how quick the packets were says nothing. */
+  /** Reset after a new connection, perhaps to a board that was switched off and on: earlier delays mean nothing. */
   reconnected() {
     this.#least = Infinity;
   }

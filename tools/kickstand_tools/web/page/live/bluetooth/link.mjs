@@ -1,11 +1,11 @@
-// The connection to a board over Web Bluetooth, which comes back by itself when it is lost.
+// The connection to a board over Web Bluetooth. A lost connection is restored automatically.
 
 import { BOARD, NOW, PERIOD_MS, RATE, RIDE, SERVICE, VERSION } from "./packets.mjs";
 
 const AGAIN_MS = 1000;
-const QUIET_MS = 5000; // a connection over which nothing comes for so long is no better than a lost one
+const QUIET_MS = 5000; // a connection that is silent for this time is treated as lost
 
-/** The board that the rider chooses, or null; tell(text) says why there is none. */
+/** The board that the rider chooses, or null; tell(text) is called with the reason for none. */
 export async function chooseBoard(tell) {
   try {
     return await navigator.bluetooth.requestDevice({ filters: [{ services: [SERVICE] }] });
@@ -15,7 +15,7 @@ export async function chooseBoard(tell) {
   }
 }
 
-/** device: of chooseBoard(). on: {now(view), ride(view), state(text), back()}, what comes and how it is. */
+/** device: from chooseBoard(). on: callbacks {now(view), ride(view), state(text), back()} for packets and states. */
 export class Link {
   #device;
   #on;
@@ -28,7 +28,7 @@ export class Link {
     device.addEventListener("gattserverdisconnected", () => this.#lost());
   }
 
-  /** Until stop(). Returns null, or one sentence why it ended. */
+  /** Run until stop(). Returns null, or one sentence with the reason for the end. */
   async run() {
     for (let count = 0; !this.#ended; count += 1) {
       try {
@@ -74,7 +74,7 @@ export class Link {
 
   #heardMs = 0;
 
-  /** Until the connection is lost, or silent. */
+  /** Listen until the connection is lost or silent. */
   async #listen(lost) {
     this.#heardMs = performance.now();
     for (let over = false; !over && !this.#ended && performance.now() - this.#heardMs < QUIET_MS; ) {

@@ -1,5 +1,5 @@
-// What came over Bluetooth, as a log and its calibration: the axes of the log are the vehicle's own, x left, y up, z
-// forward, because the board has aligned its readings already.
+// Writes readings from Bluetooth as a log and its calibration. The log's axes are the vehicle's own, x left, y up, z
+// forward, because the board has already aligned its readings.
 
 import { CAR } from "./packets.mjs";
 
@@ -17,8 +17,8 @@ export class BluetoothLog {
     return this.#lines.length ? this.#last : 0;
   }
 
-  /** now: of decodeNow(), at s seconds. What a board says before it is aligned has no axes, and is left out; so is what
-   * came twice. */
+  /** now: from decodeNow(), at s seconds. Readings before the alignment have no axes and are left out, as are repeated
+   * ones. */
   take(now, s) {
     if (now.force.includes(null) || s <= this.#last) return;
     const fresh = now.speed !== this.#speed && now.speed !== null;
@@ -34,7 +34,7 @@ export class BluetoothLog {
     this.#trim = ride.trim_deg;
   }
 
-  /** [{name, data}], none where nothing came. began: a Date. */
+  /** [{name, data}], empty without readings. began: a Date. */
   files(began) {
     if (this.#lines.length < 2) return [];
     const stem = `bluetooth-${began.toISOString().slice(0, 19).replaceAll(/[-:]/g, "").replace("T", "-")}`;

@@ -1,4 +1,4 @@
-// The packets of a board's radio, decoded by the tables in firmware/docs/live.md.
+// Decodes the packets of a board's radio by the tables in firmware/docs/live.md.
 
 export const VERSION = 1;
 export const SERVICE = "7b6f0000-3c1e-4d5a-9a55-6b69636b7374";
@@ -12,7 +12,7 @@ export const NO_READINGS = 64;
 
 const UNKNOWN = -0x8000;
 
-/** view: DataView of a packet of the kind `now`. Numbers that are not known are null; g and degrees a second. */
+/** view: DataView of a packet of the kind `now`. Unknown numbers are null; units are g and degrees per second. */
 export function decodeNow(view) {
   const signed = (at, scale) => (view.getInt16(at, true) === UNKNOWN ? null : view.getInt16(at, true) / scale);
   const three = (at, scale) => [0, 2, 4].map((more) => signed(at + more, scale));
@@ -27,7 +27,7 @@ export function decodeNow(view) {
   };
 }
 
-/** view: of a packet of the kind `ride`, as LiveReading (rides/stream.py) names what is in it. */
+/** view: of a packet of the kind `ride`. Returns its values with the names of LiveReading (rides/stream.py). */
 export function decodeRide(view) {
   return {
     max_left_deg: view.getUint16(2, true) / 10,

@@ -1,4 +1,4 @@
-// The page while a board on the motorcycle sends over Bluetooth: the lean fills the screen, and what came is kept.
+// The page while a board on the motorcycle sends over Bluetooth: the lean fills the screen, and the readings are kept.
 
 import { busy, offer } from "../files.mjs";
 import { LEAN, SIDEWAYS } from "../measures.mjs";
@@ -8,10 +8,10 @@ import { BluetoothLog } from "./log.mjs";
 import { ALIGNED, AT_REST, CAR, FALLEN, NO_READINGS, decodeNow, decodeRide } from "./packets.mjs";
 import { Stops } from "./stops.mjs";
 
-const LATE_MS = 500; // an older packet, out of a queue after the connection was poor, is not shown: only kept
+const LATE_MS = 500; // an older packet, queued during a poor connection, is kept but not shown
 const byId = (id) => document.getElementById(id);
 
-/** shown: what live.mjs shows, see there. Ends when the rider stops it. */
+/** shown: the object of this name in live.mjs. Ends when the rider stops it. */
 export class Riding {
   #shown;
   #link = null;
@@ -47,7 +47,7 @@ export class Riding {
     this.#link?.stop();
   }
 
-  /** on: only what is to be read while riding. */
+  /** on: show only what the rider needs while riding. */
   #look(on) {
     document.body.classList.toggle("riding", on);
     byId("ride").hidden = on;
@@ -80,7 +80,7 @@ export class Riding {
   }
 }
 
-/** What there is to say beside the lean, "" for nothing. */
+/** The text beside the lean, "" for none. */
 function said({ state, lean }) {
   if (state & NO_READINGS) return "The sensor gives no readings";
   if (!(state & ALIGNED)) return "The board is not aligned yet";

@@ -1,8 +1,8 @@
-// The last stop: a braking after which the vehicle stood.
+// Finds the last stop: braking to a standstill.
 
 const BRAKING_G = -0.1;
-const PAUSE_S = 1; // without braking for longer, it was over
-const STOOD_S = 6; // between the end of the braking and the board's being sure that it stands
+const PAUSE_S = 1; // after a longer pause the braking has ended
+const STOOD_S = 6; // longest time from the end of the braking until the board detects the standstill
 
 export class Stops {
   last = null; // {peak: g, seconds}
@@ -10,7 +10,7 @@ export class Stops {
   #end = 0;
   #peak = 0;
 
-  /** forward: g, or null for not known; atRest: the vehicle stands, by the board. */
+  /** forward: g, or null if unknown; atRest: the board has detected a standstill. */
   take(s, forward, atRest) {
     if (this.#begun !== null && s - this.#end > STOOD_S) this.#begun = null;
     if (atRest) {

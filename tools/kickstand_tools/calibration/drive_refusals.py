@@ -1,0 +1,147 @@
+"""Why the firmware refuses a drive: a class for each code of kickstand.drive_alignment, and of_firmware(), which makes
+it of the refusal."""
+
+from dataclasses import dataclass
+
+from kickstand.errors import Refusal
+
+from ..checks.units import SpeedStuck, SpeedUnit
+from ..common.messages import Message, Remedy
+
+_MOVED = {
+    "between-stops": "two stops differ by over {angle_deg:.0f} degrees; those of a motorcycle on its kickstand do: is "
+    "it one?",
+    "vertical": "the vertical changed by {angle_deg:.0f} degrees during the drive",
+    "parts": "the vertical is no longer where it was",
+    "since-standing": "standing and driving differ by {angle_deg:.0f} degrees",
+    "since-upright": "the upright pose and driving differ by {angle_deg:.0f} degrees",
+    "forward": "forward is no longer where it was",
+    "since-alignment": "it is no longer as it was aligned",
+}
+
+
+@dataclass(frozen=True)
+class MountMoved(Message):
+    """The mount has moved. how: a key of _MOVED. angle_deg: None if it is not known."""
+
+    how: str
+    angle_deg: float | None = None
+
+    code = "mount-moved"
+
+    def sentence(self) -> str:
+        """See Message."""
+        return "the mount has moved: " + _MOVED[self.how].format(angle_deg=self.angle_deg)
+
+
+@dataclass(frozen=True)
+class SpeedNegative(Message):
+    """The speed is below 0."""
+
+    speed_mps: float
+
+    code = "speed-negative"
+    text = "the speed is {speed_mps:.1f} m/s: it must not be negative"
+
+
+@dataclass(frozen=True)
+class SpeedLate(Message):
+    """The speed comes too late after the force."""
+
+    late_s: float
+
+    code = "speed-late"
+    text = "the speed is {late_s:.1f} s late"
+    todo = Remedy("under 2 s are needed")
+
+
+@dataclass(frozen=True)
+class NoSpeed(Message):
+    """There is no speed."""
+
+    code = "no-speed"
+    text = "no speed"
+    todo = Remedy("it needs a speed, from a GPS or a wheel")
+
+
+@dataclass(frozen=True)
+class NotDriven(Message):
+    """The vehicle did not move. needed: number of braking events."""
+
+    needed: int
+
+    code = "not-driven"
+    text = "it only stood still"
+    todo = Remedy("drive, and brake in a straight line {needed} times")
+
+
+@dataclass(frozen=True)
+class NotStopped(Message):
+    """The vehicle did not stop."""
+
+    stop_s: float
+
+    code = "not-stopped"
+    text = "it never stood still"
+    todo = Remedy("a stop of {stop_s:.0f} s is needed for the vertical")
+
+
+@dataclass(frozen=True)
+class FewEvents(Message):
+    """There are too few braking events. turned: events in bends."""
+
+    used: int
+    needed: int
+    turned: int
+
+    code = "few-events"
+    text = (
+        "only {used} of {needed} braking events in a straight line, {turned} more were not straight: not enough for "
+        "forward"
+    )
+
+
+@dataclass(frozen=True)
+class PartsDiffer(Message):
+    """Two parts of the drive give two directions of forward."""
+
+    differ_deg: float
+
+    code = "parts-differ"
+    text = "two parts of the drive disagree by {differ_deg:.0f} degrees about forward"
+    todo = Remedy("did the mount move? Else drive on")
+
+
+@dataclass(frozen=True)
+class Uncertain(Message):
+    """The standard error of forward is too large."""
+
+    sigma_deg: float
+    used: int
+
+    code = "uncertain"
+    text = "forward is known to {sigma_deg:.1f} degrees only, after {used} braking events"
+    todo = Remedy("drive on")
+
+
+CODES: dict[str, type[Message]] = {
+    one.code: one
+    for one in (
+        MountMoved,
+        SpeedStuck,
+        SpeedUnit,
+        SpeedNegative,
+        SpeedLate,
+        NoSpeed,
+        NotDriven,
+        NotStopped,
+        FewEvents,
+        PartsDiffer,
+        Uncertain,
+    )
+}
+
+
+def of_firmware(refusal: Refusal) -> Message:
+    """The message for an AlignmentError of a drive."""
+    return CODES[refusal.code](*refusal.values)

@@ -1,0 +1,141 @@
+"""What the tools report: a class for each notice and each refusal, with named fields, its words and what to do.
+
+A class is beside the check that makes its objects:
+
+    @dataclass(frozen=True)
+    class SpeedLate(Message):
+        late_s: float
+
+        code = "speed-late"
+        text = "the speed is {late_s:.1f} s late"
+        todo = Remedy("under 2 s are needed")
+
+Override sentence() or remedy() if a template is not enough.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from math import isfinite
+from typing import Any, ClassVar
+
+AT_REST = "at rest up reads +1 g"
+OPPOSITE_SIGN = f"do all accelerations have the opposite sign? {AT_REST.capitalize()}"
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """What to do: in a terminal, with commands and options, and on a page, which has neither.
+
+    page: None if both say the same.
+    """
+
+    terminal: str = ""
+    page: str | None = None
+
+    def words(self, page: bool = False) -> str:
+        """The words for one of the two; "" if there is nothing to do."""
+        return self.terminal if not page or self.page is None else self.page
+
+    def followed(self, more: str) -> "Remedy":
+        """The remedy with these words at the end of both."""
+        return Remedy(self.terminal + more, None if self.page is None else self.page + more)
+
+    def filled(self, **values: object) -> "Remedy":
+        """The remedy with {name} replaced by the value of that name."""
+        return Remedy(self.terminal.format(**values), None if self.page is None else self.page.format(**values))
+
+
+NOTHING_TO_DO = Remedy()
+
+
+@dataclass(frozen=True)
+class Message:
+    """A notice, or the reason of a refusal. Its fields are the values; JSON has them in this order.
+
+    code: a name for programs. text, todo: templates, in which {name} is a field. Equal messages say the same.
+    """
+
+    code: ClassVar[str] = ""
+    text: ClassVar[str] = ""
+    todo: ClassVar[Remedy] = NOTHING_TO_DO
+
+    def sentence(self) -> str:
+        """What happened: one line without a full stop."""
+        return self.text.format(**vars(self))
+
+    def remedy(self) -> Remedy:
+        """What to do about it."""
+        return self.todo.filled(**vars(self))
+
+    def line(self, page: bool = False) -> str:
+        """Sentence and remedy in one line, without a full stop. page: in the words of a page, not of a terminal."""
+        remedy = self.remedy().words(page)
+        return f"{self.sentence()}: {remedy}" if remedy else self.sentence()
+
+    @property
+    def values(self) -> tuple[Any, ...]:
+        """The values of its fields, in their order."""
+        return tuple(getattr(self, field.name) for field in fields(self))
+
+
+@dataclass(frozen=True)
+class Plain(Message):
+    """A message that needs no code, in words of one place in the tools."""
+
+    said: str
+    what_to_do: Remedy = NOTHING_TO_DO
+
+    def sentence(self) -> str:
+        """See Message."""
+        return self.said
+
+    def remedy(self) -> Remedy:
+        """See Message."""
+        return self.what_to_do
+
+
+@dataclass(frozen=True)
+class WrongAxes(Message):
+    """The log's axes, their signs or the unit of the rates are wrong: correct the log before you use it."""
+
+
+@dataclass(frozen=True)
+class WrongMount(Message):
+    """The calibration is not the one of this mount.
+
+    judged: the log still shows how far the alignment is off.
+    """
+
+    judged: ClassVar[bool] = False
+
+
+def sentence(message: Message, page: bool = False) -> str:
+    """One line, without the full stop at its end: what is wrong, and where it helps what to do.
+
+    page: in the words of a page, which has no commands.
+
+    >>> from kickstand_tools.calibration.pose_refusals import SamePose
+    >>> sentence(SamePose(0.4))
+    'both poses are the same (0.4 degrees apart): one on the kickstand, one upright'
+    """
+    return message.line(page)
+
+
+def distinct(messages: Iterable[Message]) -> list[Message]:
+    """The messages in their order, each line once: a log that is read twice is checked twice."""
+    found: dict[str, Message] = {}
+    for message in messages:
+        found.setdefault(message.line(), message)
+    return list(found.values())
+
+
+def as_data(messages: Iterable[Message]) -> list[dict[str, object]]:
+    """Code, values and words of each, for JSON; None for a value that is not finite."""
+
+    def plain(value: object) -> object:
+        return (round(value, 3) if isfinite(value) else None) if isinstance(value, float) else value
+
+    return [
+        {"code": message.code, "values": [plain(value) for value in message.values], "words": message.line()}
+        for message in messages
+    ]
