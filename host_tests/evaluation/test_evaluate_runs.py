@@ -105,7 +105,7 @@ def test_a_refused_calibration_is_reported_not_scored(monkeypatch):
     def refuse(*_):
         raise InputError("the free pose reads 1.021 g")
 
-    monkeypatch.setattr(runs, "fit_six_positions", refuse)
+    monkeypatch.setattr(runs, "fit_procedure", refuse)
     result = runs.run(runs.Job("parked", 0, seconds=60.0))
     assert result.refusal == "the free pose reads 1.021 g"
     assert not result.scores
