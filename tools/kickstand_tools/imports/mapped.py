@@ -124,9 +124,7 @@ def read_mapped(
     track = track_of(sheet, time_ns, speed, places.get("lat"), places.get("lon"), speed_unit, (lat, lon))
     temp_c = sheet.numbers(places["temp"]) if "temp" in places else None
     utc_ns = 0 if len(time_ns) and int(np.median(time_ns)) > EPOCH_NS else None
-    recording = AppRecording(
-        NAME, accel, gyro, track, temp_c, notices, utc_ns=utc_ns, sign_known=_sign_changed(units)
-    )
+    recording = AppRecording(NAME, accel, gyro, track, temp_c, notices, utc_ns=utc_ns, sign_known=_sign_changed(units))
     if why is not None:
         for taken, key in zip(recording.taken, ("t", "a", "g")):
             taken.why = why.found[key].why

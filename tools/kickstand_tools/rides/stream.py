@@ -142,8 +142,8 @@ class StreamLog:
 
 
 def blocks(transport: ConnectedBoard, name: str, notes: list[str], stopped: threading.Event) -> Iterator[StoredBlock]:
-    """Yield the whole blocks that the board sends, until `stopped` is set or the connection is lost. name: the port's.
-    notes: a line with the reason for the end is appended. Raises InputError."""
+    """Yield the whole blocks that the board sends, until `stopped` is set or the connection is lost. name: the port's;
+    "" on a page, which has one port. notes: a line with the reason for the end is appended. Raises InputError."""
     parts: list[bytes] = []
     vehicle = ""
     for line in _lines(transport, name, notes, stopped):
@@ -162,12 +162,14 @@ def blocks(transport: ConnectedBoard, name: str, notes: list[str], stopped: thre
 
 def _lines(transport: ConnectedBoard, name: str, notes: list[str], stopped: threading.Event) -> Iterator[bytes]:
     """Yield the lines that the app on the board prints."""
+    at = f"{name}: " if name else ""
     try:
         yield from lines(transport, _START, _SILENT_S, stopped)
         if not stopped.is_set():
-            notes.append(f"{name}: the board stopped by itself: what came until then is kept")
+            notes.append(f"{at}the board stopped by itself: what came until then is kept")
     except OSError as error:
-        notes.append(f"{name}: connection lost ({cause(error)}): what came until then is kept")
+        why = f" ({cause(error)})" if name else ""  # a browser gives no cause
+        notes.append(f"{at}connection lost{why}: what came until then is kept")
     except BrokenOff as error:
         refuse_unfit_firmware(str(error), name)
-        notes.append(f"{name}: {error}: what came until then is kept")
+        notes.append(f"{at}{error}: what came until then is kept")

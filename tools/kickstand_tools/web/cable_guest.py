@@ -39,7 +39,7 @@ class LiveStream:
             with connected(BrowserBoard(line, name)) as (transport, _):
                 try:
                     describe(transport, name)
-                    blocks = stream.blocks(transport, name, notes, self._stopped)
+                    blocks = stream.blocks(transport, "", notes, self._stopped)
                     self._recording.write(self._log, blocks, notes)
                 finally:
                     with contextlib.suppress(Exception):  # the cable may be out
