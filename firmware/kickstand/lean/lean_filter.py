@@ -331,8 +331,11 @@ class LeanFilter:
         if x[SPEED] < measurements.BALANCE_SPEED or p.rows[SPEED][SPEED] > measurements.SIGMA_BALANCE_SPEED**2:
             sideways = 0.0
         if abs(means[7]) < measurements.MOST_FORWARD * abs(means[6]):  # else the sensor is on no bike
+            up_misfit = p.misfit
+            if abs(x[PITCH]) > 2 * measurements.STEEP:
+                misfit = up_misfit = 0.0  # in a wheelie the equations do not hold: only its length is judged
             lean = x[LEAN] - self._upright
-            self._failed = self.consistency.add(misfit, p.misfit, sideways, x[PITCH], lean, model.yaw_rate, seconds)
+            self._failed = self.consistency.add(misfit, up_misfit, sideways, x[PITCH], lean, model.yaw_rate, seconds)
         self._remember(seconds)
         yield from p.update(*measurements.level_road(model, x, seconds))
         lean, speed, measured = x[LEAN] - self._upright, x[SPEED], self._speed
