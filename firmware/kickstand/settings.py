@@ -36,13 +36,13 @@ class Settings:
     """
 
     def __init__(self, config=None, refusal=None):
-        from .setting_table import fill
-
         try:
+            from .setting_table import fill
+
             fill(self, config, refusal)
         except SettingsError as error:
             error.settings = self
             raise
         finally:  # it takes 8 KB of heap
-            del sys.modules["kickstand.setting_table"]
-            del sys.modules["kickstand"].setting_table  # type: ignore[attr-defined]
+            if sys.modules.pop("kickstand.setting_table", None):
+                del sys.modules["kickstand"].setting_table  # type: ignore[attr-defined]

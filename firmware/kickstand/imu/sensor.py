@@ -58,7 +58,7 @@ class Sensor:
         self.chip.setup()
 
     def fetch(self, now_ms):
-        """Read the waiting samples; return their number, at most MAX_FRAMES. now_ms: ticks_ms().
+        """Read the waiting samples; return their number, at most eight. now_ms: ticks_ms().
 
         Their sum is in chip.sums; chip.take(k) gives each of them. The number is 0 while an axis is faulty. A chip that
         does not run is set up first, by calls over 0.2 s. Raises SettingsError for pins that cannot be used, and

@@ -73,6 +73,7 @@ class LeanFilter:
     def restart(self):
         """Reset lean, pitch and speed after missing readings. Keep the sensor's errors and the bike's dive."""
         x = [0.0] * STATES
+        self._failed = False
         self.dive.restart()
         self._kept = []  # (state, variance) of the sensor's errors
         if self._p is not None:

@@ -171,5 +171,5 @@ def _lines(transport: ConnectedBoard, name: str, notes: list[str], stopped: thre
         why = f" ({cause(error)})" if name else ""  # a browser gives no cause
         notes.append(f"{at}connection lost{why}: what came until then is kept")
     except BrokenOff as error:
-        refuse_unfit_firmware(str(error), name)
+        refuse_unfit_firmware(str(error), name or "this port")
         notes.append(f"{at}{error}: what came until then is kept")
