@@ -24,8 +24,8 @@ LEVEL = np.array([[2, -2, -1], [2, 1, 2], [-1, -2, 2]]) / 3
 # For a = (0.6, 0, -0.8) and b = backward: a x b = (0, 0.6, 0), u.L = L_y, sin t = 0.6, cos t = 0.8, L_y^2 =
 # diag(-1, 0, -1), so R = I + 0.6 L_y + 0.2 L_y^2:
 TURN = np.array([[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]])
-# TURN LEVEL, multiplied out by hand: a sensor that reads (2, 1, 2) / 3 at rest, and whose levelled reading of braking
-# is along (0.6, 0, -0.8)
+# The matrix product TURN @ LEVEL, by hand: a sensor that reads (2, 1, 2) / 3 at rest, and whose levelled reading of
+# braking is along (0.6, 0, -0.8)
 MOUNT = np.array([[1.0, -2.8, 0.4], [2, 1, 2], [-2.0, -0.4, 2.2]]) / 3
 # The same with braking along (0.6, 0, 0.8), over 90 degrees from backward: about up sin t = 0.6, cos t = -0.8, so the
 # turn is [[-0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, -0.8]]
@@ -137,7 +137,8 @@ def test_forward_is_along_the_sum_of_the_brakings_forces():
 
 def test_a_longer_braking_counts_for_more():
     """Force times 10 means of 100 ms for each second: (0.18, -0.24) for 4 s and (0, -0.3) twice for 2 s make
-    40 x 0.18 = 7.2 to the left and 40 x 0.24 + 2 x 20 x 0.3 = 21.6 back: left of back by the tangent 1 / 3."""
+    40 x 0.18 = 7.2 to the left and 40 x 0.24 + 2 x 20 x 0.3 = 21.6 back. So the mean points to the left of
+    backward by atan(1 / 3)."""
     drive = Drive()
     drive.brake((0.18, 1.0, -0.24), seconds=4.0, mps2=-0.24 * G)
     drive.brake()

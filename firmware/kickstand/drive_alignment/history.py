@@ -19,7 +19,8 @@ def difference(a, b):
 
 
 class ForceHistory:
-    """A ring of the integrals of force and yaw rate at the end of each bin. now: time in us, wraps at MASK."""
+    """A ring of running integrals of force and yaw rate, one entry at the end of each bin. now: the end of the newest
+    bin in us, the sum of the bins' lengths; wraps at MASK."""
 
     def __init__(self):
         self._times = array("i", [0] * SIZE)

@@ -23,12 +23,12 @@ class Sensor:
     """Samples of one chip, which may fail at any time. Every failed transfer (NACK or time-out) ends in _missed().
 
     chip: an Mpu6050.  reopen(): frees the bus and returns it as a machine.I2C.  explain(chip, error): returns a Notice,
-    why the chip could not be set up, and the addresses that answer. With error None it tests the FIFO, and the first
-    value is a Notice for a broken one or None. explain may be None.
+    why the chip could not be set up, and the addresses that answer. explain(chip, None) tests the FIFO: the first
+    value is then a Notice if it is broken, else None. explain may be None.
     found: list of the addresses on the bus at the last explanation.
-    fault: the Notice of a fault, or None.  restarts: number of times that the chip was set up, that no sample could be
-    read for _STALE_MS, or that an axis was faulty. After each there is a gap in the samples.  clipped: samples that
-    fetch() skipped because an axis was at the end of its range; the caller sets it to 0.
+    fault: the Notice of a fault, or None.  restarts: number of gaps in the samples: after a set-up, after
+    _STALE_MS without a sample, after a faulty axis.  clipped: samples that fetch() skipped because an axis was at the
+    end of its range; the caller sets it to 0.
     """
 
     def __init__(self, chip, reopen, explain=None):

@@ -77,8 +77,8 @@ SIGMA_LOST_FORCE = 0.3  # g: likewise for the forward force. Larger, both: after
 # Measurement noise while riding
 _SIGMA_LEFT = const(0.04)  # g: force to the left. Larger: lean follows it less, and the gyro and level roads more.
 _SIGMA_UP = const(0.07)  # g: upward force, which bumps disturb. Larger: in held turns scale errors are found later.
-# times speed x pitch rate / g: noise of the upward force (1 sigma), and times sin(lean) that of the force to the left,
-# because the springs pitch the bike while its wheels do not rise. Larger: braking disturbs less.
+# ratio: the noise of the upward force (1 sigma) is this times speed x pitch rate / g, that of the force to the left
+# sin(lean) times as much. The springs pitch the bike, but its wheels do not rise. Larger: braking disturbs less.
 _PITCHING_SHARE = const(2.0)
 # ratio: part of the samples' variance by vibration that stays in a window's mean, and is added to the noise of the
 # force to the left. Larger: forces count less on rough roads.

@@ -257,7 +257,7 @@ def _minutes(field, degrees, negative):
 
 
 def _date(field):
-    """The date ddmmyy in the form of place(), or 0 if the date does not exist or cannot be today's."""
+    """The date ddmmyy in the form of place(), or 0 if it does not exist or its year is outside _YEARS."""
     try:
         date = int(field)
     except ValueError:

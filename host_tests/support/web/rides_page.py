@@ -12,7 +12,7 @@ PHONE_MOUNTED = analysis_rides.CALIBRATION | {"vehicle_from_sensor": app_exports
 
 
 class Rides:
-    """The page, with somebody who gives it files."""
+    """Drives the page Rides in a browser: gives it files, and returns what it says."""
 
     def __init__(self, rider):
         self.rider, self.page = rider, rider.page

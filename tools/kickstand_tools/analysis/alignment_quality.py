@@ -31,9 +31,8 @@ class Quality:
     """Angles in degrees by which the aligned axes seem to be off; None if the ride does not show an angle.
 
     roll > 0: "up" leans to the right of the bike's own. pitch > 0: "forward" points up. yaw > 0: "forward" points
-    to the right of the direction in which the bike speeds up. gravity_g: mean force at rest. straight_s: time of riding
-    straight ahead, from which roll and yaw are found, s. lateral_g, forward_g: forces in that time, means over
-    SMOOTH_S.
+    to the right of the direction in which the bike speeds up. gravity_g: mean force at rest. straight_s: seconds
+    of straight riding, which give roll and yaw. lateral_g, forward_g: the forces during it, means over SMOOTH_S.
     """
 
     roll_deg: float | None

@@ -38,7 +38,7 @@ BALANCE_G, BALANCE_S = 0.011, 3.0  # force to the side, by wind, camber and the 
 # Further noise of that force: g, times sin(lean), and g s2/rad, times the roll acceleration
 BALANCE_LEANED_G, BALANCE_ROLLING = 0.045, 0.05
 BALANCE_MIN_MPS = 4.0  # at lower speeds, steering and feet matter
-ANY_MPS, ANY_S = 20.0, 60.0  # speed minus USUAL_MPS, if nothing else shows the speed
+ANY_MPS, ANY_S = 20.0, 60.0  # deviation of the speed from USUAL_MPS, used if nothing else shows the speed
 SPEED_MPS = 1.0  # the log's speed, in each second: a receiver's error lasts for some seconds
 REST_MPS, REST_RADPS = 0.05, np.radians(0.15)  # velocity and rates of a bike that stands
 HAND_MPS = 0.5  # velocity of a sensor that is moved about by hand, over a window
