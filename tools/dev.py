@@ -2,7 +2,7 @@
 """One command per task, on a machine with only Python 3.11 or newer:
 
     python3 tools/dev.py demo         the firmware on a simulated board, live in the terminal
-    python3 tools/dev.py test         ruff, pyright and every test; further arguments go to pytest
+    python3 tools/dev.py test         ruff, pyright and the tests; further arguments go to pytest
     python3 tools/dev.py mutants imu  which single changes of a package's code its tests do not notice
 
 They create .venv beside pyproject.toml and install the project in it. They install again only if pyproject.toml has

@@ -14,7 +14,7 @@ from math import cos, radians
 
 def page(app):
     """Return two lines of at most 16 characters, and a picture for a display that draws."""
-    if not app.screen.pages.trusted:  # there is no reliable lean
+    if not app.trusted:  # there is no reliable lean
         return "Load     --", "not sure yet"
     meter = app.meter
     times = 1.0 / cos(radians(meter.lean_deg))  # weight and cornering force together, of a turn in balance

@@ -94,10 +94,10 @@ def test_side_force_of_tyres_grows_with_the_force_up():
 
 
 def test_wheelies_do_not_count_as_a_soft_mount():
-    """Before, they were, and the error was 0.4 degrees."""
+    """Counted as one the error was 0.4 degrees, as slopes 0.16."""
     ride, found = known("wheelie"), smoothed("wheelie")
     assert not np.any(found.doubtful)
-    assert rms((found.lean_deg - ride.lean_deg)[ride.riding]) < 0.17
+    assert rms((found.lean_deg - ride.lean_deg)[ride.riding]) < 0.155
 
 
 @pytest.mark.parametrize("dive_deg_per_g", [-1.5, 6.0])

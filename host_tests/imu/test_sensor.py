@@ -103,7 +103,7 @@ def test_a_new_chip_is_at_fault_until_its_first_sample(board):
 
 
 def test_a_chip_that_is_prepared_starts_with_the_first_fetch(board):
-    """So no samples from before the loop are waiting."""
+    """So no earlier samples are waiting."""
     sensor, chip = made(board)
     for now_ms in range(0, 1000, 15):
         sensor.prepare(now_ms)

@@ -4,3 +4,5 @@ manifest.py finds out which logs belong together. period.py works on the logs of
 whose mathematics is in evidence.py, forward.py and moved.py. cluster.py runs it with Dask for all mounts. journal.py
 saves each result at once. tables.py and the modules in show/ write the results.
 """
+
+KEPT = "finished work is kept: run the same command again to resume"

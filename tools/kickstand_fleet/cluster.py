@@ -22,6 +22,8 @@ from typing import Any
 
 from kickstand_tools.common.errors import InputError, cause, extra
 
+from . import KEPT
+
 CRASHED, TIMED_OUT = "crashed", "timed-out"
 _PER_WORKER = 2  # tasks per worker: one runs, one waits
 _LOOK_S = 0.5  # time between two checks for tasks that take too long
@@ -168,10 +170,7 @@ class Cluster:
             elif self._client.status == "running":
                 suspects.append(index)  # its worker was ended because of another task
             else:
-                raise InputError(
-                    f"the cluster{f' at {self._address}' if self._address else ''} was lost; finished work is kept: "
-                    "run the same command again to resume"
-                )
+                raise InputError(f"the cluster{f' at {self._address}' if self._address else ''} was lost; {KEPT}")
             future.release()
         yield from self._end_overdue_tasks()
 

@@ -6,6 +6,8 @@ import click
 from kickstand_tools.cli.common import VEHICLES, echo
 from kickstand_tools.common.progress import Bar
 
+from . import KEPT
+
 
 @click.command(short_help="Align many vehicles, find moved mounts, test their brakes.")
 @click.argument("manifests", nargs=-1, required=True, metavar="MANIFEST.csv|GLOB")
@@ -43,7 +45,7 @@ def fleet_command(manifests: tuple[str, ...], out: str, vehicle: str, **how: Any
         with Bar("vehicles", lines_s=10.0, patience_s=0.0) as bar:
             found = run_fleet(periods, out, progress=bar.reach, **how)
     except KeyboardInterrupt:
-        echo("finished work is kept: run the same command again to resume", err=True)
+        echo(KEPT, err=True)
         raise
     before = found.vehicles - found.new
     done = f", {before} of them finished earlier" if before else ""

@@ -16,7 +16,7 @@ from typing import Any
 
 from kickstand_tools.common.errors import InputError, cause
 
-from . import files
+from . import KEPT, files
 from .period import PeriodResult
 
 _AT_ONCE = 200  # results that are fetched from a store together
@@ -116,10 +116,7 @@ class Journal:
                         yield entry[2]
 
     def _write_error(self, error: OSError) -> InputError:
-        return InputError(
-            f"{self._path} cannot be written: {cause(error)}; finished work is kept: run the same command again to "
-            "resume"
-        )
+        return InputError(f"{self._path} cannot be written: {cause(error)}; {KEPT}")
 
     def _note(self, line: bytes) -> bool:
         """Note the place of a line's result; return False for a damaged line."""

@@ -35,7 +35,7 @@ NO_SPEED, MOVED = "no-speed", "mount-moved"
 # signals
 AFTERWARDS, DISK_FULL = "not-finished", "disk-full"
 # Notices about parts of a log that are not used, or of a sensor that is ill
-_LEFT_OUT = (CutLine, CutGzip, NulEnd, FrozenReadings, AxisDead, GyroSaturated, AccelClipped)
+_REPORTED = (CutLine, CutGzip, NulEnd, FrozenReadings, AxisDead, GyroSaturated, AccelClipped)
 _SUSPECTS = (MOVED, "parts-differ", "uncertain")  # refusals of the firmware after which moves are searched
 _PLOTTED = 160  # intervals in a picture
 _AGAINST = -0.5  # evidence.handedness() below this, the gyro or the axes are mirrored
@@ -108,7 +108,7 @@ def _result(period: Period, signals_to: str | None) -> PeriodResult:
         _error(period, log.name, notice.code, notice.line())
         for log in logs
         for notice in log.notices
-        if isinstance(notice, _LEFT_OUT)
+        if isinstance(notice, _REPORTED)
     ]
     moved = [_vehicle_columns(period) | _moved_row(move, logs) for move in drive.moves]
     result = PeriodResult(row, moved, [], errors, _picture(drive))

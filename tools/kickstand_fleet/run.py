@@ -13,7 +13,7 @@ from kickstand import __version__
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.common.output import check_directory, new_directory
 
-from . import files, tables
+from . import KEPT, files, tables
 from .cluster import run_tasks
 from .journal import Journal, StoreJournal
 from .manifest import Period
@@ -148,7 +148,7 @@ def _keep(directory: str, journal: Journal | StoreJournal, key: str, kept: Perio
         raise unshown
     full = next((row for row in missing if row["reason"] == DISK_FULL), None)
     if full:
-        raise InputError(f"{full['message']}; finished work is kept: run the same command again to resume")
+        raise InputError(f"{full['message']}; {KEPT}")
 
 
 def _marks(periods: list[Period]) -> dict[str, str]:

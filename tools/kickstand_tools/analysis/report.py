@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..calibration.file import BY_RIDE
 from ..checks.mount import SWAPPED_DEG
 from ..common.messages import Remedy, WrongAxes, WrongMount, as_data as remarks_as_data
 from ..common.times import clock
@@ -28,16 +29,15 @@ STOPS_TERMS = (
 )
 
 
-_BY_RIDE = "remove the calibration and let the ride show how the sensor sits"
 _LESS_ROLL = Remedy(
-    "calibrate ride takes it out, or calibrate two, held upright", f"{_BY_RIDE}, or align the bike again, held upright"
+    "calibrate ride takes it out, or calibrate two, held upright", f"{BY_RIDE}, or align the bike again, held upright"
 )
 _LESS_PITCH = Remedy(
     "calibrate ride takes it out, or calibrate two, on level ground",
-    f"{_BY_RIDE}, or align the bike again, on level ground",
+    f"{BY_RIDE}, or align the bike again, on level ground",
 )
-_LESS_YAW = Remedy("calibrate ride takes it out", _BY_RIDE)
-_LESS_YAW_BY_SPEED = Remedy("calibrate ride or drive takes it out", _BY_RIDE)
+_LESS_YAW = Remedy("calibrate ride takes it out", BY_RIDE)
+_LESS_YAW_BY_SPEED = Remedy("calibrate ride or drive takes it out", BY_RIDE)
 _SIX_POSITIONS = Remedy("kickstand calibrate six takes that out", "the six positions of the sensor take that out")
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from kickstand.errors import Refusal
 
 from ..checks.units import SpeedStuck, SpeedUnit
-from ..common.messages import Message, Remedy
+from ..common.messages import Message, Remedy, by_code
 
 _MOVED = {
     "between-stops": "two stops differ by over {angle_deg:.0f} degrees; those of a motorcycle on its kickstand do: is "
@@ -124,22 +124,19 @@ class Uncertain(Message):
     todo = Remedy("drive on")
 
 
-CODES: dict[str, type[Message]] = {
-    one.code: one
-    for one in (
-        MountMoved,
-        SpeedStuck,
-        SpeedUnit,
-        SpeedNegative,
-        SpeedLate,
-        NoSpeed,
-        NotDriven,
-        NotStopped,
-        FewEvents,
-        PartsDiffer,
-        Uncertain,
-    )
-}
+CODES = by_code(
+    MountMoved,
+    SpeedStuck,
+    SpeedUnit,
+    SpeedNegative,
+    SpeedLate,
+    NoSpeed,
+    NotDriven,
+    NotStopped,
+    FewEvents,
+    PartsDiffer,
+    Uncertain,
+)
 
 
 def of_firmware(refusal: Refusal) -> Message:

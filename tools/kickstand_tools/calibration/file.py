@@ -34,9 +34,8 @@ _NEUTRAL = {"accel_matrix": np.eye(3), "gyro_matrix": np.eye(3), "gyro_sigma": n
 _MATRICES = tuple(_NEUTRAL)  # in the order of the firmware's Calibration.matrices()
 ROTATION_TOLERANCE = 2e-3  # a matrix copied with three or four decimals is still good to 0.1 degrees
 
-
-_BY_RIDE = "remove the calibration and let the ride show how the sensor sits"
-ALIGN = Remedy("kickstand calibrate two, or calibrate ride, first", _BY_RIDE)
+BY_RIDE = "remove the calibration and let the ride show how the sensor sits"
+ALIGN = Remedy("kickstand calibrate two, or calibrate ride, first", BY_RIDE)
 GIVE_CALIBRATION = Remedy("give a file made by kickstand calibrate", "give the .cal.json of the ride")
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from kickstand.errors import Refusal
 
-from ..common.messages import Message, Remedy
+from ..common.messages import Message, Remedy, by_code
 
 
 @dataclass(frozen=True)
@@ -265,35 +265,32 @@ class TiltLarge(Message):
     todo = Remedy("no kickstand leans over {most_deg:.0f}, repeat both poses")
 
 
-CODES: dict[str, type[Message]] = {
-    one.code: one
-    for one in (
-        Moved,
-        Vibration,
-        Tilting,
-        Saturated,
-        TooFew,
-        FrozenPose,
-        StuckAccel,
-        DeadGyro,
-        NoisyGyro,
-        GyroOffset,
-        GyroScale,
-        GyroReversed,
-        GyroMisfit,
-        UnprovedGyro,
-        GyroTilt,
-        DeadAxis,
-        Unclear,
-        OddAxis,
-        SideTilted,
-        FreePoseOff,
-        NotOneG,
-        SamePose,
-        TiltSmall,
-        TiltLarge,
-    )
-}
+CODES = by_code(
+    Moved,
+    Vibration,
+    Tilting,
+    Saturated,
+    TooFew,
+    FrozenPose,
+    StuckAccel,
+    DeadGyro,
+    NoisyGyro,
+    GyroOffset,
+    GyroScale,
+    GyroReversed,
+    GyroMisfit,
+    UnprovedGyro,
+    GyroTilt,
+    DeadAxis,
+    Unclear,
+    OddAxis,
+    SideTilted,
+    FreePoseOff,
+    NotOneG,
+    SamePose,
+    TiltSmall,
+    TiltLarge,
+)
 
 
 def of_firmware(refusal: Refusal) -> Message:

@@ -110,7 +110,8 @@ class WrongMount(Message):
 
 
 def sentence(message: Message, page: bool = False) -> str:
-    """One line, without the full stop at its end: what is wrong, and where it helps what to do.
+    """The same as message.line(): one line without the full stop at its end. It says what is wrong and, if that helps,
+    what to do.
 
     page: in the words of a page, which has no commands.
 
@@ -119,6 +120,16 @@ def sentence(message: Message, page: bool = False) -> str:
     'both poses are the same (0.4 degrees apart): one on the kickstand, one upright'
     """
     return message.line(page)
+
+
+def by_code(*classes: type[Message]) -> dict[str, type[Message]]:
+    """The classes by their code."""
+    return {one.code: one for one in classes}
+
+
+def is_explained(messages: Iterable[Message]) -> bool:
+    """True if wrong axes or another mount are the reason why the readings do not fit."""
+    return any(isinstance(message, (WrongAxes, WrongMount)) for message in messages)
 
 
 def distinct(messages: Iterable[Message]) -> list[Message]:

@@ -5,7 +5,7 @@
     unknowns.py       the states, the parameters, and the prior of these
     equations.py      process model, measurement model and their Jacobian
     noise.py          process noise and measurement noise
-    hypotheses.py other changes possible in a ride, and the posterior weight of each such hypothesis
+    hypotheses.py     other changes possible in a ride, and the posterior weight of each such hypothesis
     solver.py         the linear least squares of one step: states by Schur complement, then the chain of blocks
     least_squares.py  the steps: states and parameters with their covariance
 

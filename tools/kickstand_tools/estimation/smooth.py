@@ -8,7 +8,7 @@ import numpy as np
 
 from ..calibration.file import ALIGN, CalibrationFile
 from ..common.errors import InputError
-from ..common.messages import Message, Remedy, WrongAxes, WrongMount
+from ..common.messages import Message, Remedy, is_explained
 from ..logs.csv_lines import write_lean
 from ..logs.log import Block, Table, within
 from ..logs.reader import Source, read_blocks, split_stretch
@@ -38,7 +38,6 @@ POSE_DEG = 1.8
 # An estimated error of the gyro over this many standard deviations of its prior means a faulty gyro: no sound one was
 # over 2.6 on good and bad mounts. Then the lean's standard deviation grows by that factor.
 ODD_SIGMAS = 4.0
-CAUSES = WrongAxes, WrongMount  # reasons why accelerations do not fit a bike: then there is no remark about the pose
 
 
 @dataclass(frozen=True)
@@ -255,7 +254,7 @@ class Smoother:
 
     def remarks(self, known: Iterable[Message]) -> list[Message]:
         """The remarks about the whole ride. known: existing remarks about it."""
-        if not self._riding_s or any(isinstance(notice, CAUSES) for notice in known):
+        if not self._riding_s or is_explained(known):
             return []
         if self._odd:
             return [SensorOdd(self._odd)]

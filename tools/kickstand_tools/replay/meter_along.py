@@ -11,12 +11,11 @@ import numpy as np
 from kickstand.lean.meter import LeanMeter
 
 from ..calibration.file import CalibrationFile
-from ..common.messages import Message, Remedy, WrongAxes, WrongMount
+from ..common.messages import Message, Remedy, is_explained
 from ..logs.log import Block
 from ..signals import Array, Bools
 from .replay_engine import NOT_SHOWN, ODD, Replay
 
-CAUSES = WrongAxes, WrongMount  # remarks that say why readings do not fit
 TOO_SMALL = 0.01  # g2, as in kickstand.lean: in free fall the force has no direction
 
 
@@ -90,7 +89,7 @@ class Misfit:
 
     def remarks(self, known: Iterable[Message]) -> list[Message]:
         """The notice of it, unless `known` has the reason."""
-        if not self.seconds or any(isinstance(notice, CAUSES) for notice in known):
+        if not self.seconds or is_explained(known):
             return []
         return [ReadingsMisfit(self.seconds, self.first_s)]
 

@@ -121,7 +121,7 @@ def replay_blocks(
     misfit = Misfit()
     for block, results in _replayed(whole, calibration, engine, progress, notices):
         if not car:
-            misfit.add(block.measured.t_s, results[:, _SIGMA] == replay_engine.ODD)
+            misfit.add(block.t_s[~block.frozen], results[:, _SIGMA] == replay_engine.ODD)
         found = _with_frozen(block, results)
         if car:
             found[:, _SIGMA] = np.nan
