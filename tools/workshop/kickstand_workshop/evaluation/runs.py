@@ -3,6 +3,7 @@
 
 import multiprocessing
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -102,6 +103,9 @@ def on_all_processors(function: Callable, jobs: list, chunk: int = 1, ordered: b
     """Yield function(job) for each job. ordered: in the order of the jobs, otherwise as results become ready."""
     with multiprocessing.Pool(min(len(jobs), os.cpu_count() or 1), _begin_worker) as pool:
         yield from (pool.imap if ordered else pool.imap_unordered)(function, jobs, chunk)
+        # Let the workers end on their own: SIGTERM may come before _begin_worker(), and then one would wait forever
+        pool.close()
+        pool.join()
 
 
 def calibrated_by_poses(made: SimulatedRide) -> CalibrationFile:
@@ -129,5 +133,7 @@ def as_log(made: SimulatedRide) -> Log:
 
 
 def _begin_worker() -> None:
-    """Close standard error: after Ctrl-C every worker would print a traceback."""
+    """Close standard error, because every worker would print a traceback after Ctrl-C. Let SIGTERM end the worker at
+    once: the command's handler, which it inherits, would wait with it for a lock."""
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     sys.stderr = open(os.devnull, "w", encoding="utf-8")
