@@ -76,6 +76,28 @@ def test_tried_it_is_turned_to_after_the_first_turn():
     assert max(loads) == pytest.approx(1.41, abs=0.08)  # 1 / cos(45 degrees), in the ride's last turn
 
 
+@pytest.mark.parametrize("engine", [[], ["--cpython"]], ids=["micropython", "cpython"])
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("README.md", "A lean meter\n", "README.md, line 1: "),
+        ("user.py", "import time\n\ndef page(app)\n    pass\n", "user.py, line 3: "),
+        ("user.py", None, "user.py: No such file or directory: check the name and its directory"),
+        (".", None, "Is a directory: give the name of a file"),
+    ],
+)
+def test_try_refuses_what_is_no_program_before_the_ride(tmp_path, engine, name, text, words):
+    if text:
+        (tmp_path / name).write_text(text)
+    said = command.refused(tmp_path, "try", tmp_path / name, *engine, words=words)
+    assert text is None or said.endswith("cannot run this file: correct it, or give your program\n")
+
+
+def test_try_refuses_what_only_cpython_can_run(tmp_path):
+    (tmp_path / "user.py").write_text("match 3:\n    case 3:\n        pass\n")
+    command.refused(tmp_path, "try", tmp_path / "user.py", words="user.py, line 1: ")
+
+
 def test_user_light(tmp_path):
     """It stays off at 35 degrees, and comes on there when its limit is lower."""
     _, seen = run_all(tmp_path, "user_light.py", 12.0)

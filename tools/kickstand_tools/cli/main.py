@@ -93,7 +93,7 @@ def main(arguments: list[str] | None = None) -> None:
         _refuse(error.format_message())
     except OSError as error:
         about = f"{error.filename}: " if error.filename else ""
-        _refuse(f"{about}{cause(error)}: check the disk, the file or the connection, then repeat this")
+        _refuse(f"{about}{cause(error)}: {_remedy(error)}")
     except MemoryError:
         _refuse("this takes more memory than there is: give a part of it, or close other programs")
     except RecursionError:
@@ -104,6 +104,15 @@ def main(arguments: list[str] | None = None) -> None:
         if sys.flags.dev_mode:  # python -X dev: for debugging
             raise
         _refuse(f"unexpected {type(error).__name__}: {error}: a fault in {added.owner(error)}, please report it")
+
+
+def _remedy(error: OSError) -> str:
+    """What to do about an error of the operating system."""
+    if error.filename and isinstance(error, FileNotFoundError | NotADirectoryError):
+        return "check the name and its directory"
+    if error.filename and isinstance(error, IsADirectoryError):
+        return "give the name of a file"
+    return "check the disk, the file or the connection, then repeat this"
 
 
 class _Ended(BaseException):

@@ -10,6 +10,7 @@ from rich.live import Live
 
 from ..common import unix_port
 from ..common.errors import InputError
+from . import user_program
 from .device_process import DeviceProcess
 from .keyboard import BIKE_KEYS, keyboard
 from .score import Score, table
@@ -71,7 +72,8 @@ def demo(hand: bool = False, cpython: bool = False, display: str = "lcd", user: 
 
     hand: the user steers the bike with keys. cpython: run on CPython, not on MicroPython. display: "lcd", "ssd1306" or
     "sh1106". user: the user's code for the board; then its console is printed, too.
-    Raises InputError without a terminal for steering, DeviceStopped if the device ended early.
+    Raises InputError without a terminal for steering and for user code that is not a program, DeviceStopped if the
+    device ended early.
     """
     watched = sys.stdin.isatty() and sys.stdout.isatty()
     if hand and not watched:
@@ -81,6 +83,8 @@ def demo(hand: bool = False, cpython: bool = False, display: str = "lcd", user: 
     engine = "CPython" if cpython or not unix_port.available() else "MicroPython"
     if not cpython and engine == "CPython":
         print("No MicroPython package for this system: the same firmware runs on CPython instead.")
+    if user:
+        user_program.check(user, engine)
     score = Score()
     speed = HAND_SPEED if hand else SCRIPT_SPEED if watched else 0.0
     with DeviceProcess(engine.lower(), "hand" if hand else "script", speed, display, user) as device:
