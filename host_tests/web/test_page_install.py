@@ -9,7 +9,7 @@ from kickstand_tools.deploy.bytecode import PICO
 from support import command, fake_board
 from support.fake_board import FakeBoard
 from support.web.raw_prompt import RawPrompt
-from support.web.rider import Rider
+from support.web.rider import LAPTOP, PHONE, Rider
 from support.web.serial_line import SerialLine
 
 FIRMWARE = firmware_files.contents(PICO)
@@ -169,6 +169,7 @@ def test_unsuitable_board_is_not_changed(line, board, differs, platform, words):
 def test_file_that_is_no_esp32_image_is_not_written(line, board, tmp_path):
     """Nor an image for another chip; no chip answers here at all."""
     page = line.rider.page
+    page.click("a[href='#micropython']")
     page.click("text=ESP32: a file that ends in .bin")
     for name, content, words in (
         ("notes.bin", b"hello", "no image for an ESP32"),
@@ -224,15 +225,15 @@ def test_browser_without_serial_ports_is_told_so(chromium, address):
         assert first.get_attribute("id") == "unable"
         assert "in Chrome or Edge on a computer" in first.inner_text() and "Firefox, Safari" in first.inner_text()
         if name == "install.html":  # each step is there, with what a terminal does in its place
-            steps = rider.page.locator("main h2:visible").all_inner_texts()[1:]
-            assert [one.partition(".")[0] for one in steps] == ["1", "2", "3", "4", "5"]
+            assert rider.page.locator("main h2:visible").count() == 5
             assert rider.text("#here") == address + name
-            rider.page.click("text=ESP32: a file that ends in .bin")
+            rider.page.evaluate("document.querySelectorAll('details').forEach((one) => (one.open = true))")
             said = rider.text("main")
             assert all(
                 f"python3 -m {one}" in said for one in ("esptool write-flash", "mpremote cp -r", "mpremote exec")
             )
             assert "README" not in said and "project" not in said, "nothing leads there from here"
+            assert "Choose the board" not in said, "there is no such button here"
             rider.page.set_viewport_size({"width": 390, "height": 844})
             wide = "all => all.filter((one) => one.checkVisibility() && one.scrollWidth > one.clientWidth).length"
             assert rider.page.eval_on_selector_all("main pre, main a:has(img)", wide) == 0, "cut at the right edge"
@@ -240,6 +241,27 @@ def test_browser_without_serial_ports_is_told_so(chromium, address):
         for button in rider.page.locator("main button:not(#simulated, #simulated-stop)").all():
             assert button.is_hidden()
     assert rider.axe() == []
+    rider.context.close()
+
+
+def test_the_board_is_chosen_first_and_the_steps_around_it_open(chromium, address):
+    """On a phone's and on a laptop's first screen. There the first step is open; a link opens its step."""
+    rider = Rider(chromium, address + "install.html", **PHONE)
+    rider.page.evaluate("document.documentElement.dataset.serial = 'yes'")
+    page = rider.page
+    steps = "all => all.map((one) => [one.id, one.open])"
+    for kind, opened in ((PHONE, []), (LAPTOP, ["parts"])):
+        page.set_viewport_size(kind["viewport"])
+        page.reload()
+        look = page.locator("#look").bounding_box()
+        assert look["y"] + look["height"] < kind["viewport"]["height"] / 3
+        assert page.evaluate("document.documentElement.scrollHeight") < 2 * kind["viewport"]["height"]
+        assert [id for id, is_open in page.eval_on_selector_all("details.step", steps) if is_open] == opened
+    page.click("a[href='#micropython']")
+    assert page.is_visible("#micropython .steps") and rider.fits()
+    page.goto(address + "install.html#calibrate")
+    page.reload()
+    assert page.is_visible("#calibrate picture") and rider.axe() == []
     rider.context.close()
 
 

@@ -1,14 +1,23 @@
-"""Makes HTML and SVG from Jinja templates. A template is a file beside the module that fills it."""
+"""Makes HTML, CSS and SVG from Jinja templates.
+
+A template is a file beside the module that fills it. It names others by their paths in kickstand_tools, as in
+`{% include "common/theme.css" %}`.
+"""
 
 import base64
 import hashlib
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 _ENVIRONMENT = Environment(
-    autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True
+    autoescape=True,
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    keep_trailing_newline=True,
+    loader=FileSystemLoader(Path(__file__).parents[1]),
 )
 _ENVIRONMENT.policies["json.dumps_kwargs"] = {"allow_nan": False, "ensure_ascii": False}
 

@@ -55,7 +55,7 @@ def tools(*modules: str) -> dict[str, Path]:
     for name in modules:
         finder.import_hook("kickstand_tools." + name.removesuffix(".py").replace("/", "."))
     found = {Path(path) for module in finder.modules.values() if (path := vars(module)["__file__"])}
-    beside = {file for path in found for file in path.parent.iterdir() if file.suffix in (".html", ".js")}
+    beside = {file for path in found for file in path.parent.iterdir() if file.suffix in (".html", ".js", ".css")}
     return {path.relative_to(firmware_path.TOOLS).as_posix(): path for path in sorted(found | beside)}
 
 

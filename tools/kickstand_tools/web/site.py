@@ -21,6 +21,7 @@ PAGE = Path(__file__).resolve().parent / "page"
 LATER = ("esptool/", "firmware.zip", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip", "sample/")
 _BOARDS = {"pico": wiring.PICO, "esp32": wiring.ESP32}
 _NARROW = 4  # number of poses side by side on a phone
+_STYLE = "style.css"  # a template too
 _SHOWN = ("Kickstand", "starting")  # on the drawn display
 _NOT_KEPT = ("service_worker.js", "index.html")  # the browser keeps the first automatically, the second as "./"
 _WHEN_READ = (*LATER, documents.FOLDER)  # the browser keeps these after they were opened
@@ -46,7 +47,7 @@ def site_files() -> dict[str, bytes]:
     values = {"home": home(), "boards": wiring_tables()}
     library = files["plotly/plotly.min.js"].decode()
     values["charts"] = " ".join(map(source_hash, (library, *page.SCRIPTS)))  # in the form of a policy
-    files |= {name: _filled(name, **values) for name in files if name.endswith(".html")}
+    files |= {name: _filled(name, **values) for name in files if name.endswith(".html") or name == _STYLE}
     files |= documents.document_files(values["home"])
     files |= {f"sample/{name}": data for name, data in sample_ride.sample_ride().items()}
     files["python.json"] = json.dumps(python_files()).encode()
