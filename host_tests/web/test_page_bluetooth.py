@@ -106,7 +106,8 @@ def test_lean_fills_the_screen_and_returns(on_the_bar, tmp_path):
 def test_browser_without_serial_and_bluetooth_gives_advice(chromium, address):
     rider = Rider(chromium, address + "live.html", **PHONE)
     rider.page.evaluate("['serial', 'bluetooth'].forEach((one) => (document.documentElement.dataset[one] = 'no'))")
-    assert rider.page.is_visible("#unable") and not rider.page.is_visible(".live")
+    assert rider.page.is_visible("#unable") and not rider.page.is_visible(".side")
+    assert rider.page.is_visible("#simulated")
     rider.page.evaluate("document.documentElement.dataset.bluetooth = 'yes'")
     assert rider.page.is_visible("#ride") and not rider.page.is_visible("#unable")
     assert not rider.page.is_visible("#start") and not rider.page.is_visible("#pull")

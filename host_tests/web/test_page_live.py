@@ -242,10 +242,14 @@ def test_board_without_firmware_is_sent_to_page_install(line, rider, board):
 
 
 def test_simulated_board_is_watched_without_a_real_one(chromium, address):
-    """Also in a browser that cannot connect to a board, such as a phone's: a lean to each side, marked as simulated."""
+    """Also in a browser that cannot connect to a board, such as a phone's: a lean to each side, marked as simulated.
+    The last minute is on the first screen. Before, there are neither empty figures nor an empty chart."""
     rider = Rider(chromium, address + "live.html", **PHONE)
-    rider.page.evaluate("document.documentElement.dataset.serial = 'no'")
-    rider.page.click("#simulated")
+    page = rider.page
+    page.evaluate("document.documentElement.dataset.serial = 'no'")
+    nothing_yet = "#chart", "#max-left", "#lean"
+    assert not any(page.is_visible(one) for one in nothing_yet)
+    page.click("#simulated")
     for side in "right", "left":
         rider.page.wait_for_function("side => document.querySelector('#side').textContent === side", arg=side)
         assert rider.page.is_visible("#gauge") and not rider.page.is_visible("#start")
@@ -253,10 +257,13 @@ def test_simulated_board_is_watched_without_a_real_one(chromium, address):
     assert rider.text("#max-right") != "--"
     assert rider.axe() == []
     for kind in PHONE, LAPTOP:
-        rider.page.set_viewport_size(kind["viewport"])
+        page.set_viewport_size(kind["viewport"])
         assert rider.fits()
-    rider.page.click("#simulated-stop")
+        chart = page.locator("#chart").bounding_box()
+        assert chart["y"] + chart["height"] < kind["viewport"]["height"], "it is not on the first screen"
+    page.click("#simulated-stop")
     assert rider.text("#pretend-said") == "Stopped."
-    rider.page.wait_for_function("document.querySelector('#lean').textContent === '--'")
+    page.wait_for_function("document.querySelector('#lean').textContent === '--'")
+    assert not any(page.is_visible(one) for one in nothing_yet)
     assert rider.errors == [] and rider.strangers() == []
     rider.context.close()

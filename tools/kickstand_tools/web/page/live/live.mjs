@@ -58,8 +58,12 @@ async function stayAwake() {
   awake = await navigator.wakeLock?.request("screen").catch(() => null);
 }
 
+/** Make room for values: before the first there are neither figures nor a chart. */
+const watch = () => (document.documentElement.dataset.watching = "yes");
+
 function received(text) {
   const reading = JSON.parse(text);
+  watch();
   aligned = reading.aligned;
   show(reading.car ? SIDEWAYS : LEAN);
   furthest = measure.most(reading);
@@ -75,7 +79,10 @@ const shown = {
     furthest = [0, 0];
   },
   measure: show,
-  moment: (moment) => player.take([moment], performance.now()),
+  moment(moment) {
+    watch();
+    player.take([moment], performance.now());
+  },
   furthest: (ride) => (furthest = measure.most(ride)),
 };
 
@@ -101,7 +108,7 @@ function simulate() {
 function endSimulated() {
   simulated.stop();
   shown.begin();
-  delete document.documentElement.dataset.simulated;
+  for (const state of ["simulated", "watching"]) delete document.documentElement.dataset[state];
   byId("simulated").focus();
 }
 
