@@ -131,10 +131,10 @@ def test_files_are_added_and_removed_in_any_order(page, ride, calibration, tmp_p
     assert page.add(bike) == ""
     assert (page.page.inner_text("#report-title"), page.page.inner_text("#calibration")) == ("other.csv", "bike.json")
     assert list(page.held()) == ["bike.json", "other.csv", "RIDE.csv", "RIDE.cal.json"]
-    page.page.click("[aria-label='Remove bike.json']")
+    page.remove("[aria-label='Remove bike.json']")
     assert "other.csv has no calibration" in page.said()
     assert page.page.is_hidden("#report")
-    page.page.click("[aria-label='Remove other.csv']")
+    page.remove("[aria-label='Remove other.csv']")
     page.said()
     assert page.page.inner_text("#report-title") == "RIDE.csv"
 

@@ -20,7 +20,7 @@ class Rides:
     def give(self, *files):
         """Choose files in place of all before; what the page says in the end."""
         while self.held():
-            self.page.click("#held li:first-child button")
+            self.remove("#held li:first-child button")
             self.said()
         return self.add(*files)
 
@@ -33,6 +33,11 @@ class Rides:
         """Choose files; what the page says in the end."""
         self.page.set_input_files("#files", files)
         return self.said()
+
+    def remove(self, button):
+        """Press a button in the list of the files."""
+        self.page.eval_on_selector("#held", "list => (list.open = true)")
+        self.page.click(button)
 
     def held(self):
         """{name: what the page says of it} of the files that it has."""
@@ -52,7 +57,8 @@ class Rides:
     def report(self):
         """The rows of the report as the page shows them."""
         return self.page.eval_on_selector_all(
-            "#report tbody tr", "rows => rows.map((row) => [...row.cells].map((cell) => cell.textContent.trim()))"
+            ":is(#report, #more) tbody tr",
+            "rows => rows.map((row) => [...row.cells].map((cell) => cell.textContent.trim()))",
         )
 
     def warnings(self):

@@ -38,6 +38,7 @@ _WORDS = {
     "fault": "a fault in kickstand",
 }
 _DAY_S = 86_400.0
+_BLUE, _ORANGE = "var(--truth)", "var(--accent)"  # colours of the page
 
 
 class Glance:
@@ -97,7 +98,7 @@ class Glance:
         tiles = [
             (self.statuses["aligned"], f"aligned ({_share(self.statuses['aligned'], self.count)})", "good"),
             (self.statuses["refused"], "refused: the drives do not show it", "warn"),
-            (self.statuses["error"], "errors: no log could be used", "bad" if self.statuses["error"] else ""),
+            (self.statuses["error"], "errors: no log could be used", "bad"),
             (self.moved_vehicles, "whose mount seems to have moved", "warn"),
             (tests, "brake tests", ""),
             (round(hours, 1) if hours < 10.0 else round(hours), "hours of driving", ""),
@@ -128,7 +129,7 @@ def _quality(values: Sequence[float]) -> Markup:
         return Markup()
     top = 1.6  # standard errors of aligned vehicles are under 1.5 degrees
     title = f"Standard error of forward, median {statistics.median(values):.2f}°"
-    return _histogram(values, top, 26, title, 230, "degrees", "vehicles", "#2563eb")
+    return _histogram(values, top, 26, title, 230, "degrees", "vehicles", _BLUE)
 
 
 def _braking(utc_s: Sequence[float], values: Sequence[float]) -> list[Markup]:
@@ -137,13 +138,13 @@ def _braking(utc_s: Sequence[float], values: Sequence[float]) -> list[Markup]:
         return []
     hardest = min(12.0, max(values) * 1.05)
     title = f"Mean fully developed deceleration, median {statistics.median(values):.2f} m/s²"
-    pictures = [_histogram(values, hardest, 24, title, 260, "m/s²", "brake tests", "#c2410c")]
+    pictures = [_histogram(values, hardest, 24, title, 260, "m/s²", "brake tests", _ORANGE)]
     dated = [(time, value) for time, value in zip(utc_s, values) if time == time]  # not NaN
     if len(dated) > 1:
         first, last = min(dated)[0], max(dated)[0]
         span = (first - _DAY_S / 4.0, last + _DAY_S / 4.0)
         over = Panel(0, 0, 620, 260, span, (0.0, hardest), "Over time, with the median", "", "MFDD, m/s²", date_text)
-        over.dots(dated[:: max(1, len(dated) // _MOST_DOTS)], "#c2410c", 1.2)
+        over.dots(dated[:: max(1, len(dated) // _MOST_DOTS)], _ORANGE, 1.2)
         over.line(_medians(dated, max(_DAY_S, (last - first) / 30.0)), "currentColor", 2.0)
         pictures.append(_picture(over))
     return pictures
@@ -173,7 +174,7 @@ def _spark(values: Sequence[float]) -> Markup:
     """Decelerations in sequence, as small bars of up to 8 m/s2."""
     width = min(4.0, 100.0 / len(values))
     path = "".join(f"M{(k + 0.5) * width:.1f} 20v{-max(1.0, min(y, 8.0) * 2.4):.1f}" for k, y in enumerate(values))
-    bars = element("path", d=path, stroke="#c2410c", stroke_width=0.7 * width)
+    bars = element("path", d=path, stroke=_ORANGE, stroke_width=0.7 * width)
     return element("svg", bars, viewBox="0 0 100 20", width=100, height=20)
 
 

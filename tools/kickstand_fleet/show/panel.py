@@ -9,6 +9,7 @@ from kickstand_tools.common.svg import element, path
 from markupsafe import Markup
 
 Point = tuple[float, float]
+_LETTER = 7.0  # at most, the width of a digit
 _QUIET, _RULE = "#777", "#8883"
 
 
@@ -69,7 +70,8 @@ class Panel:
             ((x, _),) = self._places([(value, 0.0)])
             axes.append(element("path", d=path([(x, self._top), (x, self._bottom)]), stroke=_RULE))
             words = self.words(value)
-            axes.append(element("text", words, x=x, y=self._bottom + 14.0, text_anchor="middle", fill=_QUIET))
+            middle = min(x, self.x + self.width - 0.5 * _LETTER * len(words))  # all of it is in the picture
+            axes.append(element("text", words, x=middle, y=self._bottom + 14.0, text_anchor="middle", fill=_QUIET))
         for value in ticks(*self.along, 5):
             ((_, y),) = self._places([(0.0, value)])
             axes.append(element("path", d=path([(self._left, y), (self._right, y)]), stroke=_RULE))

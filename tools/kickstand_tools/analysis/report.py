@@ -158,7 +158,7 @@ def _ride(seen: Overview) -> list[tuple[str, str, str]]:
     total = seen.summary
     rows = [("Duration", clock(total.duration_s), f"riding {clock(seen.riding_s)}")]
     if not seen.ride.car:
-        smoothed = ("Lean", "smoothed", "from the whole ride")
+        smoothed = ("Lean", "best estimate", "from the whole ride")
         rows.append(smoothed if seen.ride.smoothed else ("Lean", "as the display showed it", ""))
         rows.append(("Max left", *peak_words(total.left_deg, "{:.0f}°")))
         rows.append(("Max right", *peak_words(total.right_deg, "{:.0f}°")))
@@ -213,7 +213,7 @@ def _gravity(found_g: float | None, on_page: bool) -> str:
     if found_g is None:
         return ""
     if abs(found_g - 1.0) <= GRAVITY_G:
-        return f" At rest the force is {found_g:.3f} g, as good as 1."
+        return f" At rest the force is {found_g:.3f} g: right, {GRAVITY_G} g from 1 are allowed."
     return f" At rest the force is {found_g:.3f} g and not 1: {_SIX_POSITIONS.words(on_page)}."
 
 

@@ -44,7 +44,7 @@ def site_files() -> dict[str, bytes]:
     files |= {path.relative_to(PAGE).as_posix(): path.read_bytes() for path in sorted(PAGE.rglob("*.*"))}
     files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # with this suffix a browser shows it as text
     files |= wiring_files()
-    values = {"home": home(), "boards": wiring_tables()}
+    values = {"home": home(), "boards": wiring_tables(), "preview": sample_ride.preview()}
     library = files["plotly/plotly.min.js"].decode()
     values["charts"] = " ".join(map(source_hash, (library, *page.SCRIPTS)))  # in the form of a policy
     files |= {name: _filled(name, **values) for name in files if name.endswith(".html") or name == _STYLE}

@@ -44,6 +44,7 @@ def page(seen: Overview, library: str, allowed: str, tiles: bool = False, warnin
     beside = None
     if points is not None:
         beside = {"map": track_map.figure(points, seen), "axes": interactive.time_axes(drawn)}
+        beside["shape"] = track_map.shape(points)
         beside["tiles"] = tiles_at(points) if tiles else None
     policy = (
         "default-src 'none'; base-uri 'none'; form-action 'none'; style-src 'unsafe-inline'; "

@@ -19,6 +19,7 @@ POINTS = 20_000
 SHORTEST_S = 0.2  # between points
 SAME_M = 0.5  # points closer to the previous one are left out: a bike that stands is one point
 MOST_LAT_DEG = 85.0  # beyond it Mercator has no map
+_SHAPES = (0.6, 2.2)  # width over height
 LEAST_LEAN_DEG = 30.0  # the lean with the full colour is at least this
 # From left to right: colour-blind people can also distinguish blue and orange; upright is grey
 _COLOURS = [[0.0, "#0d3a73"], [0.25, LEFT_COLOUR], [0.5, "#c9c9c9"], [0.75, RIGHT_COLOUR], [1.0, "#7a2c05"]]
@@ -113,6 +114,12 @@ def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
     }
     track_line = line | {"x": x, "y": y, "customdata": rows}
     return {"data": [track_line, {"type": "scattergl", "mode": "markers", "hoverinfo": "none"} | at], "layout": layout}
+
+
+def shape(points: MapPoints) -> float:
+    """The width of a map over its height, so that the track fills it: between a tall one and a wide one."""
+    east, north = (float(np.nanmax(metres) - np.nanmin(metres)) for metres in (points.east_m, points.north_m))
+    return float(np.clip((east or 1.0) / (north or 1.0), *_SHAPES))
 
 
 def _times(places: LogTrack, seconds: float) -> Array:

@@ -1,6 +1,5 @@
 // The files given to the page, with their kinds, and a button to remove each.
 
-const MANY = 8; // from this number on the list is closed at first
 const UNREADABLE = "it is a folder, or was changed or moved after it was given. Give it again, or what is in the folder";
 
 export class Held {
@@ -48,7 +47,7 @@ export class Held {
     const wrong = this.files.filter(({ name }) => why[name]).length;
     const count = rows.length === 1 ? "1 file" : `${rows.length} files`;
     this.#place.querySelector("summary").textContent = wrong ? `${count}, ${wrong} cannot be used` : count;
-    if (wrong || rows.length <= MANY) this.#place.open = true;
+    if (wrong) this.#place.open = true;
     this.#place.hidden = !rows.length;
   }
 

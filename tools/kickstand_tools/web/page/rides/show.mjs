@@ -35,7 +35,7 @@ export function showReport({ words, warnings, name, calibration }) {
   );
   byId("terms").textContent = words.stops.length ? words.terms : "";
   byId("remark").textContent = words.remark;
-  byId("report").hidden = false;
+  for (const id of ["report", "more"]) byId(id).hidden = false;
 }
 
 /** page: the HTML of the charts, whose height depends on the width. Its frame is new, and visible before it loads: a
@@ -62,7 +62,7 @@ addEventListener("message", ({ source, data }) => {
 });
 
 export function hideRide() {
-  for (const id of ["report", "charts"]) byId(id).hidden = true;
+  for (const id of ["report", "charts", "more"]) byId(id).hidden = true;
   byId("plot").removeAttribute("srcdoc");
 }
 
