@@ -216,3 +216,24 @@ def test_line_is_broken_in_a_gap(points):
     assert x[np.isnan(y)] == pytest.approx([50.0, 72.5], abs=0.05)
     assert np.all(np.diff(x) > 0.0)
     assert not np.any(np.isnan(envelope(time, values, points)[1]))
+
+
+HUE_180 = np.array([[-0.574, 1.43, 0.144], [0.426, 0.43, 0.144], [0.426, 1.43, -0.856]])  # CSS's hue-rotate(180deg)
+
+
+def luminance(rgb):
+    """Relative luminance as in WCAG 2; rgb: 0 to 1."""
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])
+
+
+def test_rarest_g_is_visible_on_white_and_on_dark_paper(seen):
+    """The page inverts the charts in the dark. The rarest value has the scale's first colour."""
+    (cells,) = [trace for trace in interactive.figure(charts(seen))["data"] if trace["type"] == "heatmap"]
+    logs = np.array([[np.nan if value is None else value for value in row] for row in cells["z"]])
+    assert cells["zmin"] == pytest.approx(np.nanmin(logs), abs=0.001)
+    rgb = np.array([int(cells["colorscale"][0][1][k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
+    inverted = np.clip(HUE_180 @ (0.9 - 0.8 * rgb), 0.0, 1.0)
+    dark = luminance(np.array([0x1A, 0x1D, 0x24]) / 255.0)
+    assert 1.05 / (luminance(rgb) + 0.05) > 2.5
+    assert (luminance(inverted) + 0.05) / (dark + 0.05) > 2.5

@@ -40,6 +40,14 @@ def points_of(*place, **kind) -> track_map.MapPoints:
     return found
 
 
+@pytest.mark.parametrize(
+    ("east_m", "north_m", "shape"), [(100.0, 100.0, 1.0), (900.0, 100.0, 2.2), (100.0, 900.0, 0.6), (0.0, 0.0, 1.0)]
+)
+def test_the_map_has_the_shape_of_its_track_within_limits(east_m, north_m, shape):
+    track = replace(points_of(), east_m=np.array([0.0, np.nan, east_m]), north_m=np.array([north_m, np.nan, 0.0]))
+    assert track_map.shape(track) == pytest.approx(shape)
+
+
 @pytest.mark.parametrize("place", [(-33.9, 151.2), (69.6, 18.9), (47.6, 179.999), (-0.001, 0.001)])
 def test_metre_of_the_map_is_right_in_both_directions(place):
     """At every latitude, on both sides of the equator and across the meridian of 180 degrees."""

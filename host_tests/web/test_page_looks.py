@@ -68,3 +68,34 @@ def test_a_phone_leans_the_motorcycle_and_a_tablet_without_motion_data_says_so(c
     rider.page.wait_for_function("document.querySelector('#lean-out').value === '20° right'")
     rider.page.wait_for_function("seen.last.lean_deg > 15")
     rider.context.close()
+
+
+def test_nothing_is_below_the_choice_of_the_display(chromium, address):
+    """In a narrow window of a computer too, whose mouse has keys beside it."""
+    rider = Rider(chromium, address, viewport={"width": 390, "height": 844})
+    for width in (360, 390, 420, 480, 512, 560, 800):
+        rider.page.set_viewport_size({"width": width, "height": 844})
+        words = rider.page.evaluate(
+            "() => { const all = document.createRange(); all.selectNodeContents(document.querySelector('#press-help'));"
+            " return all.getBoundingClientRect().right; }"
+        )
+        choice = rider.page.locator("#kind").bounding_box()
+        beside = rider.page.locator("#press-help").bounding_box()["y"] < choice["y"] + choice["height"]
+        assert words <= choice["x"] or not beside, width
+    rider.context.close()
+
+
+def test_motorcycle_is_seen_in_the_dark(chromium, address):
+    """Mirrors, frame and tyre have another colour than the road behind them."""
+    rider = Rider(chromium, address, color_scheme="dark", **LAPTOP)
+    rider.page.wait_for_selector(".mirror")
+    colours = (
+        "() => { const style = (one) => getComputedStyle(document.querySelector(one));"
+        " const of = (one, name) => style(one)[name].match(/[0-9]+/g).map(Number);"
+        " const road = document.createElement('p'); road.style.color = 'var(--road)'; road.id = 'paint';"
+        " document.body.append(road); return [of('#paint', 'color'), of('.mirror', 'fill'), of('.frame', 'stroke'),"
+        " of('.tyre', 'stroke')]; }"
+    )
+    road, *parts = rider.page.evaluate(colours)
+    assert all(sum(part) - sum(road) > 130 for part in parts), (road, parts)
+    rider.context.close()

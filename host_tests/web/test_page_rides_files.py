@@ -187,7 +187,10 @@ def test_a_track_joins_a_ride_without_gps(page, tmp_path, write):
 
 
 def test_sample_ride_is_shown_as_simulated(page):
+    """Before, a drawing of it is beside the place for files; then the charts are beside the figures."""
     page.give()
+    drop, drawn = (page.page.locator(one).bounding_box() for one in ("#drop", ".sample svg"))
+    assert drop["height"] > 300 and drawn["y"] + drawn["height"] < page.page.viewport_size["height"]
     page.page.click("#sample")
     page.page.wait_for_selector("#report", timeout=WAIT_MS)
     assert page.said() == "This ride is simulated: nobody has ridden it."
@@ -196,7 +199,10 @@ def test_sample_ride_is_shown_as_simulated(page):
     assert page.page.is_visible("#drawing") or page.page.locator("#plot[style]").count()
     page.page.frame_locator("#plot").locator("#map .main-svg").first.wait_for()
     page.page.wait_for_selector("#drawing", state="hidden")
-    assert page.warnings() == ""
+    assert page.warnings() == "" and page.page.is_hidden("#sample")
+    plot, figures = (page.page.locator(one).bounding_box() for one in ("#plot", "#figures"))
+    assert plot["y"] < figures["y"] and plot["x"] > figures["x"] + figures["width"]
+    assert "right, 0.02 g from 1 are allowed" in page.page.inner_text("#alignment")
 
 
 def test_browser_without_a_store_is_told_so(chromium, address):
