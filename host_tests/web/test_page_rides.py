@@ -52,7 +52,7 @@ def test_the_charts_are_those_of_the_command(page, ride, calibration):
             assert near(now[axis], was[axis], 0.002), was.get("name")
     html = page.saved("#save-page").decode()
     assert "Plotly.newPlot" in html and "src=" not in html.split("<body>")[0].rpartition("</script>")[2]
-    assert '<script src="' not in html
+    assert '<script src="' not in html and "<h1>RIDE</h1>" in html
     frame = page.page.locator("#plot").bounding_box()
     assert frame["height"] > 900  # as high as its charts: nothing to scroll within
 

@@ -15,7 +15,7 @@ from ..browser import CHROMIUM, opened
 PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
 READY = {  # by page: the element that is usable when the page is ready
     "": "#kind:enabled",  # the firmware has started
-    "install.html": ".python a:visible",
+    "install.html": "#look:visible, #unable:visible",
     "live.html": "#simulated:enabled",
     "rides.html": "#sample:enabled",
 }
