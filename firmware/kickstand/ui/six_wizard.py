@@ -76,7 +76,7 @@ class SixWizard(Wizard):
 
     def bears(self, fault, now_ms):
         """Return True for rates at the end of the range: a turn too fast for the gyro is not a defect."""
-        if fault is None or (fault.code, *fault.values) != ("clips", "Gyro") or not self._turn.running:
+        if fault is None or fault.code != "clips" or fault.values[0] != "Gyro" or not self._turn.running:
             return False
         self._turn.quick = True
         self._followed(now_ms)
