@@ -59,7 +59,7 @@ PACKAGES = {
     "overlay": _package("tools/kickstand_tools/overlay/*.py", "overlay/test_[!h]*"),
     "deploy": _package(
         "tools/kickstand_tools/deploy/*.py",
-        "deploy/test_config* deploy/test_check deploy/test_[unmo]* deploy/test_cli_flash",
+        "deploy/test_check* deploy/test_config* deploy/test_[unmo]* deploy/test_cli_flash",
     ),
     "simulation": _package("tools/kickstand_tools/simulation/**/*.py", "simulation/test_*"),
     "pull": _package(
