@@ -1,6 +1,7 @@
 """What is done with each speed, and the state that the rider sees."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from kickstand.drive_alignment import alignment
@@ -15,7 +16,7 @@ def device(leans=True, counted=9, problem=None, speed_problem=None, state=alignm
     """A BackgroundAlignment whose drive is in this state; passed: the speeds that the lean filter got."""
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):  # the module needs a board's time
         from kickstand.drive_alignment.background import BackgroundAlignment
-    made = object.__new__(BackgroundAlignment)
+    made: Any = object.__new__(BackgroundAlignment)
     quality = SimpleNamespace(speed_problem=speed_problem)
     made.drive = SimpleNamespace(counted=counted, problem=problem, quality=quality, state=state)
     made._leans, made._speed_mps = leans, speed_mps

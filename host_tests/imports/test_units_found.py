@@ -54,10 +54,10 @@ def driving(mps, rows=40, period_s=0.5, east=True, per_degree=(1.0, 1.0)):
     return (t_s * 1e9).astype(np.int64), [lat / per_degree[0], lon / per_degree[1]]
 
 
-def found_unit(said, mps, per_degree=(1.0, 1.0), places=(1, 2), **way):
+def found_unit(said, mps, per_degree=(1.0, 1.0), places: tuple[int | None, int | None] = (1, 2), **way):
     time_ns, columns = driving(mps, per_degree=per_degree, **way)
     sheet = Sheet("a.csv", ["speed", "lat", "lon"], [np.full(len(time_ns), said), *columns])
-    return unit_by_positions(sheet, time_ns, 0, *places, per_degree)
+    return unit_by_positions(sheet, time_ns, 0, places[0], places[1], per_degree)
 
 
 @pytest.mark.parametrize("east", [True, False])

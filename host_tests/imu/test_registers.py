@@ -3,6 +3,8 @@
 The values are those of the register map, RM-MPU-6000A rev 4.2, and of the other chips' data sheets.
 """
 
+from typing import Any
+
 import pytest
 from kickstand.lean import lean_filter
 from kickstand_tools.simulated_board.mpu6050 import DLPF_DELAY_US, VARIANTS
@@ -307,7 +309,7 @@ def test_temperature_by_the_data_sheet(who_am_i, name, zero_c, per_degree):
 def test_a_write_or_a_read_that_fails_is_repeated_once():
     from kickstand.imu.mpu6050 import Mpu6050
 
-    wires = Wires(0x68)
+    wires: Any = Wires(0x68)
     chip = Mpu6050(wires)
     failures = []
 

@@ -101,3 +101,8 @@ def test_a_file_that_is_no_log_is_named(log, line, words):
 def test_a_header_may_have_spaces_and_any_order():
     names = command.HEADER.split(",")[::-1]
     assert log_cells.header("A.csv", " , ".join(names)) == names
+
+
+def test_a_directory_is_no_log(tmp_path):
+    with pytest.raises(InputError, match="is a directory: give the name of a log in it"):
+        read_log(tmp_path)

@@ -163,3 +163,16 @@ def test_the_problem_of_a_pose_is_known_until_the_next_pose(screen):
     assert screen.lines(300) == ("Moved!", "Hold it still")
     screen.press(SHORT, 400)
     assert screen.wizard.problem is None
+
+
+def test_a_menu_ends_20_s_after_the_last_press(screen):
+    screen.press(LONG, 0)
+    screen.press(SHORT, 15_000)
+    assert first_line(screen, 34_900).startswith("\x7e")  # the arrow before an entry
+    assert first_line(screen, 35_000).startswith("Lean")
+    assert screen.menu is None
+
+
+def test_the_pages_use_a_short_press_and_leave_a_long_one(screen):
+    assert screen.pages.press(SHORT, 0) is True
+    assert screen.pages.press(LONG, 100) is False
