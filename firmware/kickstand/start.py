@@ -4,6 +4,7 @@ Safe mode: if the button is held at power-on nothing is started, and new firmwar
 the button is ignored: a press while an error is shown must not leave the rider without a display.
 """
 
+import gc
 import sys
 from time import sleep_ms, ticks_ms
 
@@ -42,8 +43,8 @@ def _held(button):
 
 
 def main(loop=None):
-    """Run until Ctrl-C, power-off or a reset. loop: called with the App in place of App.run(), for a simulation that
-    calls App.begin() and App.step() later."""
+    """Run until Ctrl-C, power-off or a reset. An exception is reported on display and console, then the board restarts.
+    loop: called with the App in place of App.run(), for a simulation that calls App.begin() and App.step() later."""
     lcd = None
     try:
         chosen = settings.load()
@@ -69,6 +70,27 @@ def main(loop=None):
         if lcd:
             lcd.end(*STOPPED)
         print("Kickstand stopped. Ctrl-D starts it again; import kickstand; kickstand.status() reports how it is.")
+    except ImportError as error:  # an interrupted update: a restart would not help
+        port.rest_watchdog()
+        print("Kickstand stopped: incomplete firmware (%s). Run kickstand flash." % error)
+        _last_words(lcd, "Incomplete:", "flash it again")
+    except Exception as error:
+        sys.print_exception(error)
+        _last_words(lcd, "Error, restarts", type(error).__name__)
+        sleep_ms(3000)
+        machine.reset()
+
+
+def _last_words(lcd, line1, line2):
+    """Show two lines when the firmware ends. lcd: None before it was opened: then the default pins are used."""
+    try:
+        if lcd is None:
+            sys.modules.pop("config", None)  # the memory may be missing because of it
+            gc.collect()
+            lcd = open_lcd(settings.Settings())
+        _show(lcd, line1, line2)
+    except Exception:  # no memory, or no file: the console has said it
+        pass
 
 
 def _live(function, *arguments):
@@ -101,35 +123,22 @@ def _attach(opened, app):
 
 
 def run(chosen, lcd, loop=None):
-    """Run the app, or call loop with it: see main(). An exception in it is reported on display and console, then the
-    board restarts."""
+    """Run the app, or call loop with it: see main()."""
     radio = []
-    try:
-        # First, because an ESP32-C3 may crash when its radio is switched on after 40 KB are allocated
-        problem = _live(_open_radio, radio, chosen.LIVE_PIN) if chosen.LIVE else None
-        sensor = open_sensor(chosen)
-        for name in STEPS + ["app"]:
-            now_ms = ticks_ms()
-            lcd.tick(now_ms)
-            sensor.prepare(now_ms)
-            __import__("kickstand." + name)
-        from .app import App
+    # First, because an ESP32-C3 may crash when its radio is switched on after 40 KB are allocated
+    problem = _live(_open_radio, radio, chosen.LIVE_PIN) if chosen.LIVE else None
+    sensor = open_sensor(chosen)
+    for name in STEPS + ["app"]:
+        now_ms = ticks_ms()
+        lcd.tick(now_ms)
+        sensor.prepare(now_ms)
+        __import__("kickstand." + name)
+    from .app import App
 
-        print("Kickstand %s. Ctrl-C stops it." % __version__)
-        app = App(chosen, lcd, sensor)
-        if chosen.LIVE:
-            problem = problem or _live(_attach, radio, app)
-            if problem:
-                app.screen.notify(problem, ticks_ms())
-        (loop or App.run)(app)
-    except SettingsError:
-        raise
-    except ImportError as error:  # an interrupted update: a restart would not help
-        port.rest_watchdog()
-        print("Kickstand stopped: incomplete firmware (%s). Run kickstand flash." % error)
-        _show(lcd, "Incomplete:", "flash it again")
-    except Exception as error:
-        sys.print_exception(error)
-        _show(lcd, "Error, restarts", type(error).__name__)
-        sleep_ms(3000)
-        machine.reset()
+    print("Kickstand %s. Ctrl-C stops it." % __version__)
+    app = App(chosen, lcd, sensor)
+    if chosen.LIVE:
+        problem = problem or _live(_attach, radio, app)
+        if problem:
+            app.screen.notify(problem, ticks_ms())
+    (loop or App.run)(app)

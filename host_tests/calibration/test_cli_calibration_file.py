@@ -1,5 +1,6 @@
 """CAL.json: refused and accepted contents."""
 
+import io
 import json
 import os
 from array import array
@@ -7,6 +8,7 @@ from array import array
 import numpy as np
 import pytest
 from kickstand.calibration.transform import Transform
+from kickstand_tools.calibration import file as calibration_file
 from kickstand_tools.calibration.file import CalibrationFile, read_calibration, write_calibration
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.replay.replay_engine import ReplayMeter
@@ -203,3 +205,19 @@ def test_matrices_that_no_sensor_has_are_refused(tmp_path, entry, value, words):
     path.write_text(json.dumps(whole().as_json() | {entry: value}))
     with pytest.raises(InputError, match=words):
         read_calibration(path)
+
+
+def test_a_calibration_that_is_missing_or_too_large_is_refused(tmp_path, monkeypatch):
+    with pytest.raises(InputError, match="there is no such file: make it with kickstand calibrate"):
+        read_calibration(tmp_path / "none.json")
+    path = tmp_path / "A.json"
+    write_calibration(path, CalibrationFile(accel_offset_g=np.array([0.01, 0.0, 0.0])))
+    size = len(path.read_bytes())
+    for most, good in ((size, True), (size - 1, False)):
+        monkeypatch.setattr(calibration_file, "MOST_BYTES", most)
+        for source in (path, io.StringIO(path.read_text())):
+            if good:
+                assert read_calibration(source).accel_offset_g[0] == 0.01
+            else:
+                with pytest.raises(InputError, match="too large for a calibration"):
+                    read_calibration(source)

@@ -209,3 +209,23 @@ def test_seconds_without_a_speed_or_without_samples():
         far.add(log.t_s + at_s, log.accel_g, log.gyro_dps, log.speed_mps)
     assert far.cells() is None
     assert CellTable().cells() is None
+
+
+def swaying(yaw_dps: float, seconds: float) -> Log:
+    """Yawing to and fro every 4 s by up to yaw_dps, and rolling as a motorcycle does then: by half the change."""
+    time = np.arange(0.0, seconds, 0.02)
+    yaw, roll = yaw_dps * np.sin(np.pi / 2 * time), -0.5 * yaw_dps * np.cos(np.pi / 2 * time)
+    return Log(time, np.tile([0.0, 1.0, 0.0], (len(time), 1)), np.column_stack((0 * yaw, yaw, roll)))
+
+
+@pytest.mark.parametrize(
+    ("yaw_dps", "seconds", "shown"), [(1.16, 90.0, False), (1.24, 90.0, True), (3.0, 61.0, False), (3.0, 63.0, True)]
+)
+def test_small_or_short_bends_show_no_forward(yaw_dps, seconds, shown):
+    """Means over 0.5 s have 0.974 of the amplitude, their changes over a second 1.414 times that, evened out 0.854: a
+    standard deviation of 0.832 yaw_dps, of which 1 deg/s is needed. Of 61 s 118 changes are left, of 63 s 122; 120 are
+    needed."""
+    calibration = CalibrationFile(aligned=True)
+    log = swaying(yaw_dps, seconds)
+    assert said(log, calibration) == ""
+    assert ("by the bends of this ride forward is 90 degrees" in said(log, other(calibration, up=90.0))) is shown

@@ -5,10 +5,11 @@ import functools
 import numpy as np
 import pytest
 from checked import cells_of, simulated, words
+from kickstand_tools.checks import log as checks_log
 from kickstand_tools.checks.units import speed_unit
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.logs import reader
-from kickstand_tools.logs.log import Log
+from kickstand_tools.logs.log import Block, Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.simulation.profiles import PROFILES
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
@@ -41,7 +42,7 @@ def record(brakings=7, **source):
     return Log(np.arange(len(mps)) / driving_runs.RATE_HZ, force, rate, speed, name="drive.csv")
 
 
-@pytest.mark.parametrize(("every_s", "late_s"), [(0.1, 1.0), (1.0, 0.0)])
+@pytest.mark.parametrize(("every_s", "late_s"), [(0.1, 1.0), (0.1, 2.0), (1.0, 0.0)])
 @pytest.mark.parametrize(
     ("scale", "words"),
     [
@@ -111,3 +112,18 @@ def test_recordings(shared_data):
         if log.name.startswith("car-urban"):
             assert "it is in km/h" in said(time, force, speed * KMH)
             assert "it is in mph or knots" in said(time, force, speed * MPH)
+
+
+def test_the_unit_is_judged_once_in_20_s_while_a_log_is_read(monkeypatch):
+    """Of parts of 8 s at 24 and 48 s, and at the end."""
+    judged_s = []
+    monkeypatch.setattr(checks_log, "speed_unit", lambda cells: judged_s.append(round(len(cells.known) * 0.1)))
+    checks = checks_log.Checks("ride.csv")
+    missing, sound = np.full(400, np.nan), np.zeros(400, dtype=bool)
+    readings = np.tile([0.0, 1.0, 0.0, 20.0, 0.0, 0.0, 0.0], (400, 1))
+    for begin in range(0, 2800, 400):
+        time_us = 20_000 * np.arange(begin, begin + 400)
+        checks.add(Block(time_us, readings, missing, missing, missing, missing, sound, True, 0.0, 0))
+    assert judged_s == [24, 48]
+    assert checks.remarks() == []
+    assert judged_s == [24, 48, 56]

@@ -161,6 +161,17 @@ def test_a_fast_turn_is_reported_and_repeated(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(("faults", "goes_on"), [([], True), ([["unplug_sensor", [10.8]]], False)])
+def test_a_turn_beyond_the_range_does_not_end_six_positions(faults, goes_on, tmp_path):
+    """Half a turn in 0.3 s is 600 deg/s, beyond the 500 of the range; without the sensor's wire it does end."""
+    poses = [[0, None], [6, [1, 0, 0]], [10.7, None], [11, [-1, 0.05, 0.05]], [30, None]]
+    plan = {"poses": poses, "presses": [[2, 1.2], [4, 0.15], [5, 1.2]], "until": 17, "faults": faults}
+    record = device_plans.run("cpython", tmp_path, plan)
+    assert (record.first("stopped: fault") == math.inf) is goes_on
+    assert (record.first("Side -x done") < math.inf) is goes_on
+    assert (record.first("Turned too fast") < 12.5) is goes_on
+
+
 def ill(monkeypatch, change):
     """Parts whose gyro reads change(rate) about x."""
     read = sensor_errors.Sensor.read

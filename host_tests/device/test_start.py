@@ -185,6 +185,21 @@ def test_a_display_without_its_driver_is_probed_less_often(without, board, monke
     assert 8 <= times <= 10 and board.boots == 1  # after 0.4, 0.8, 1.6, 3.2, 6.4 s, then every 6.4 s; once at the start
 
 
+@pytest.mark.parametrize("missing", [MemoryError, ImportError])
+def test_settings_that_cannot_be_loaded_end_on_the_display(missing, board, monkeypatch, capsys):
+    """It must not keep the lean that it showed before a reset."""
+    from kickstand import settings, start
+
+    def load():
+        raise missing("in setting_table")
+
+    monkeypatch.setattr(settings, "load", load)
+    restarts = missing is MemoryError
+    assert board.run(start.main, 6.0) == ("reset" if restarts else "returned")
+    assert board.lcd.text() == (["Error, restarts ", "MemoryError     "] if restarts else INCOMPLETE)
+    assert "in setting_table" in "".join(capsys.readouterr())
+
+
 def test_a_failed_import_can_be_repeated(tmp_path):
     """MicroPython keeps a module after an interrupted import, without its later definitions."""
     (tmp_path / "outer.py").write_text("import inner\n\n\nclass Outer:\n    inner = inner.Inner\n")

@@ -7,7 +7,7 @@ import pytest
 from kickstand.drive_alignment.alignment import DriveAlignment
 from kickstand.drive_alignment.history import BIN_US
 from kickstand_tools.calibration.drive import fit_logs
-from kickstand_tools.calibration.drive_feed import drive_bins
+from kickstand_tools.calibration.drive_feed import Steps, drive_bins
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
@@ -108,3 +108,35 @@ def test_another_slope_in_the_next_log_is_no_moved_mount():
             log.speed_mps = np.where(at & ~np.isnan(log.speed_mps), 0.0, log.speed_mps)
         logs.append(log)
     assert fit_logs(logs, None, "car").reason != "mount-moved"
+
+
+def test_bins_have_their_speeds_where_they_came():
+    """At 100 samples a second bins of 50 ms: a speed at the first sample, in the middle, at the end of a bin, and after
+    a gap of 2 s. The ages are before the end of all but the last sample."""
+    t_s = np.append(np.arange(11), np.arange(210, 216)) / 100.0
+    speed = np.full(17, np.nan)
+    speed[[0, 2, 5, 7, 11]] = [10.0, 10.2, 10.5, 10.7, 11.0]
+    force = np.tile([0.0, 1.0, 0.0], (17, 1))
+    force[6:11, 2] = 0.5
+    bins = list(drive_bins(Log(t_s, force, np.zeros((17, 3)), speed), CalibrationFile(), 50_000))
+    assert [(one.begins, one.samples, one.first_us, one.last_us, one.end_us) for one in bins] == [
+        (True, 6, 40_000, 10_000, 50_000),
+        (False, 5, 40_000, 10_000, 100_000),
+        (True, 6, 40_000, 10_000, 2_150_000),
+    ]
+    assert [(one.start_mps, one.speeds, one.end_mps) for one in bins] == [
+        (10.0, [(20_000, 10.2)], 10.5),
+        (None, [(20_000, 10.7)], None),
+        (11.0, [], None),
+    ]
+    assert bins[0].force == pytest.approx([0.0, 1.0, 0.0])
+    assert bins[1].force == pytest.approx([0.0, 1.0, 0.5])
+
+
+def test_progress_is_told_every_thousand_samples_and_at_the_end():
+    said = []
+    steps = Steps(lambda done, total: said.append((done, total)), 2300)
+    for samples in (999, 1, 999, 2, 299):
+        steps.more(samples)
+    assert said == [(1000, 2300), (2001, 2300), (2300, 2300)]
+    Steps(None, 5).more(5)

@@ -220,6 +220,19 @@ def test_a_braking_with_a_gap_is_dropped_and_earlier_ones_stay(lost):
     assert drive.alignment.counted == 2
 
 
+@pytest.mark.parametrize("lost", [lost_samples, lost_speeds])
+def test_the_loss_of_a_dropped_braking_is_dropped_too(lost):
+    """3 m/s are lost before the gap, 0.5 s x 2 m/s2 = 1 m/s after it: less than the 1.5 m/s of a braking."""
+    drive = Drive()
+    drive.reach_15_mps()
+    drive.go(BRAKES, 1.0, -3.0)
+    lost(drive)
+    drive.go(STEADY, 1.0)
+    drive.go(BRAKES, 0.5, -2.0)
+    drive.go(STEADY, 1.0)
+    assert (drive.alignment.counted, drive.alignment.turned) == (0, 0)
+
+
 def test_brakings_before_the_first_stop_show_no_direction():
     drive = Drive()
     drive.alignment = PublishedAlignment("car")

@@ -12,6 +12,7 @@ import sys
 from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, kickstand, turn
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
+from support.page_turner import PageTurner
 
 RIDE = (kickstand(2.0, 0.0), accelerate(15.0, 4.0), turn(35.0, 6.0))
 
@@ -31,19 +32,17 @@ def save_calibration(part, directory=""):
 
 def run(program, until_s, turn_to):
     """See above. until_s: s. turn_to: [[at_s, name of a view], ...]: from then on it presses the button until that
-    view is shown."""
+    view is shown. Raises AssertionError if it never is."""
     part = Sensor(seed=3)
     board = Board(part.world(Ride(RIDE).motion))
     board.install()
     save_calibration(part)
-    wanted, apps = [], []
+    turner, apps = PageTurner(), []
     for at_s, name in turn_to:
-        board.at(at_s, lambda name=name: wanted.append(name))
+        board.at(at_s, lambda name=name: turner.turn_to(name))
 
     def turn_page():
-        if wanted and apps and apps[0].state()["view"] == wanted[0]:
-            wanted.pop(0)
-        if wanted:
+        if turner.presses(apps[0].state()["view"] if apps else None):
             board.press()
 
     def run_app(app):
@@ -63,6 +62,7 @@ def run(program, until_s, turn_to):
         from kickstand.start import main
 
         board.run(lambda: main(run_app), until_s)
+    turner.check()
     return {"frames": frames, "lamp": lamp, "sent": board.sent.decode()}
 
 

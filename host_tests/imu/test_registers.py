@@ -3,6 +3,8 @@
 The values are those of the register map, RM-MPU-6000A rev 4.2, and of the other chips' data sheets.
 """
 
+from typing import Any
+
 import pytest
 from kickstand.lean import lean_filter
 from kickstand_tools.simulated_board.mpu6050 import DLPF_DELAY_US, VARIANTS
@@ -302,3 +304,51 @@ def test_temperature_by_the_data_sheet(who_am_i, name, zero_c, per_degree):
     assert chip.name == name
     assert chip.temperature_c(0) == zero_c
     assert chip.temperature_c(10 * per_degree) == pytest.approx(zero_c + 10.0)
+
+
+def test_a_write_or_a_read_that_fails_is_repeated_once():
+    from kickstand.imu.mpu6050 import Mpu6050
+
+    wires: Any = Wires(0x68)
+    chip = Mpu6050(wires)
+    failures = []
+
+    def failing(function):
+        def call(*arguments):
+            if failures:
+                raise failures.pop()
+            return function(*arguments)
+
+        return call
+
+    wires.writeto_mem, wires.readfrom_mem_into = failing(wires.writeto_mem), failing(wires.readfrom_mem_into)
+    failures[:] = [OSError(5)]
+    chip.write_register(CONFIG, 4)
+    assert wires.log == [(CONFIG, 4)]
+    failures[:] = [OSError(5)]
+    assert chip.read_register(CONFIG) == 4
+    for use in (lambda: chip.write_register(CONFIG, 5), lambda: chip.read_register(CONFIG)):
+        failures[:] = [OSError(5), OSError(5)]
+        with pytest.raises(OSError):
+            use()
+    assert wires.log == [(CONFIG, 4)]
+
+
+def test_the_low_pass_of_a_rate_is_the_widest_under_half_of_it():
+    """DLPF_CFG of the register map, p. 13: bandwidth of the gyro in Hz; 0 is 256 Hz."""
+    from kickstand.imu.mpu6050 import MIN_DLPF
+
+    hz = [256, 188, 98, 42, 20, 10, 5]
+    widest = {rate: next(k for k, band in enumerate(hz) if band < rate / 2) for rate in (50, 100, 125, 200)}
+    assert widest == MIN_DLPF
+
+
+def test_a_row_of_samples_at_the_end_of_the_range_clips():
+    """20 samples are 0.1 s. The axes are bits: the accelerometer's three are below the gyro's."""
+    from kickstand.imu import fifo_frames
+
+    watch = fifo_frames.AxisWatch(200, 3, 1, 3, 20)
+    for row, ends, said in ((19, 0b0001, None), (20, 0b0001, "Accel"), (20, 0b0100, "Accel"), (21, 0b10000, "Gyro")):
+        watch.notes[fifo_frames._ROW], watch.notes[fifo_frames._ENDS] = row, ends
+        found = watch.clips()
+        assert (found and (found.code, *found.values)) == (said and ("clips", said)), (row, ends)

@@ -3,6 +3,7 @@
 from math import radians
 
 from bike_motion import DT_US, force_and_rate, meter, near, ride, roll, speed_up
+from kickstand.calibration.parameters import Calibration
 from kickstand.lean import consistency
 from kickstand.lean.consistency import Consistency
 from kickstand.lean.lean_filter import LeanFilter
@@ -224,6 +225,26 @@ def test_a_measured_speed_vetoes_rest():
                 estimator.measure_speed(speed_mps)
             estimator.update([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], DT_US if k else 0)
         assert estimator.at_rest == rests
+
+
+def test_a_speed_from_before_a_gap_vetoes_no_rest():
+    estimator = LeanFilter()
+    for k in range(100):
+        estimator.measure_speed(20.0)
+        estimator.update([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], DT_US if k else 0)
+    estimator.restart()
+    for _ in range(200):
+        estimator.update([0.0, 1.0, 0.0], [0.0, 0.0, 0.0], DT_US)
+    assert estimator.at_rest
+
+
+def test_an_accelerometer_of_six_positions_has_the_narrow_limits():
+    """Also where they have not measured the gyro, as in version 0.4.0."""
+    for six_done in (True, False):
+        calibration = Calibration()
+        calibration.six_done = six_done
+        judge = meter(calibration).filter.consistency
+        assert bool(windows(judge, 30.0, up=0.55)) == six_done
 
 
 def test_a_long_smooth_bend_at_power_on_shows_no_lean_of_a_stand():

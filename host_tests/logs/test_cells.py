@@ -6,6 +6,7 @@ import io
 import numpy as np
 import pytest
 from kickstand_tools.common.errors import InputError
+from kickstand_tools.logs import cells as log_cells
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_blocks, read_log
 from support import command
@@ -76,3 +77,32 @@ def test_common_wrong_units_are_refused(size_g, step_s, words):
     log = Log(np.arange(9) * step_s, force, np.zeros((9, 3)))
     with pytest.raises(InputError, match=words) if words else contextlib.nullcontext():
         read_log(log)
+
+
+@pytest.mark.parametrize(
+    ("log", "line", "words"),
+    [
+        ("A.gpx", "<?xml version", "A.gpx is a track: kickstand join puts it to a ride"),
+        ("A.FIT", "x", "A.FIT is a track"),
+        ("A.cal.json", "{", "A.cal.json is no log: give the ride, and a calibration with --calibration"),
+        ("A.csv", "t_s,lean_deg", "A.csv holds a lean, no readings: give the log that it was made from"),
+        ("A.csv", "t_s;ax_g;ay_g", "A.csv, line 1: values stand apart by ; or tab"),
+        ("A.csv", "t_s\tax_g", "A.csv, line 1: values stand apart by ; or tab"),
+        ("A.csv", command.HEADER + ",ax_g", "A.csv, line 1"),
+        ("A.csv", command.HEADER.replace("ay_g,", ""), "ay_g"),
+    ],
+)
+def test_a_file_that_is_no_log_is_named(log, line, words):
+    with pytest.raises(InputError) as caught:
+        log_cells.header(log, line)
+    assert words in str(caught.value)
+
+
+def test_a_header_may_have_spaces_and_any_order():
+    names = command.HEADER.split(",")[::-1]
+    assert log_cells.header("A.csv", " , ".join(names)) == names
+
+
+def test_a_directory_is_no_log(tmp_path):
+    with pytest.raises(InputError, match="is a directory: give the name of a log in it"):
+        read_log(tmp_path)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from kickstand_tools.logs.csv_lines import csv_lines, joined_cells, number_cells, text_cells
-from kickstand_tools.logs.csv_reader import numbers_in
+from kickstand_tools.logs.csv_reader import columns_of, numbers_in
 
 AWKWARD = [0.0, -0.0, -1e-9, 5e-324, 0.5, 1.5, 2.5, -0.5, 9.9999999, 99999.5, 2.0**53, -(2.0**60), 1e300]
 
@@ -80,3 +80,13 @@ def test_numbers_of_any_length_are_read_as_python_reads_them():
     wanted = [[float(cell) for cell in row.split(",")] for row in rows]
     found = numbers_in("\n".join(rows).encode(), 2)
     assert found is not None and np.array_equal(found, wanted)
+
+
+def test_columns_are_those_of_all_blocks_of_rows():
+    rows = [["1", "x"], ["2", ""], ["3"]]
+    assert [cells.tolist() for cells in columns_of(rows, 2)] == [[1, 2, 3], ["x", "", ""]]
+    assert [cells.tolist() for cells in columns_of([], 2)] == [[], []]
+    many = [[str(k), f"{k}.5"] for k in range(70_000)]
+    whole, halves = columns_of(many, 2)
+    assert whole.tolist() == list(range(70_000))
+    assert halves.tolist() == [k + 0.5 for k in range(70_000)]

@@ -83,3 +83,23 @@ def test_invalid_time_is_refused():
 
 def test_example_in_the_docstring_works():
     assert doctest.testmod(sys.modules[even_times.__module__]).failed == 0
+
+
+@pytest.mark.parametrize(("gap", "error"), [(4, 0.01), (8, 0.01), (40, 0.01)])
+def test_gaps_do_not_lengthen_the_period(gap, error):
+    """Every 20 samples of 10.4 ms, with times of 10 ms, some are missing."""
+    numbers = np.concatenate([np.arange(20) + (19 + gap) * k for k in range(60)])
+    found = even_times(np.rint(numbers * 1.04) / 100.0)
+    steps = np.diff(found).reshape(-1)
+    inside = np.arange(len(steps)) % 20 != 19
+    assert np.mean(steps[inside]) == pytest.approx(0.0104, rel=error)
+    assert np.max(np.abs(steps[inside] / 0.0104 - 1.0)) < 0.4
+
+
+def test_a_time_that_goes_back_is_named():
+    with pytest.raises(InputError, match=r"log: time goes back at 0.02 s: it has to increase"):
+        even_times([0.0, 0.01, 0.01, 0.03, 0.02], "log")
+    with pytest.raises(InputError, match="the time is the same in all samples"):
+        even_times([1.0, 1.0, 1.0])
+    with pytest.raises(InputError, match="some times are no numbers"):
+        even_times([0.0, np.nan])

@@ -8,7 +8,7 @@ from kickstand_tools.calibration import drive
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.common.messages import sentence
 from kickstand_tools.logs import reader
-from kickstand_tools.logs.frozen import without_frozen
+from kickstand_tools.logs.frozen import FrozenFinder, without_frozen
 from kickstand_tools.logs.reader import read_blocks
 from support import command
 from support.recordings import analysis_rides
@@ -150,3 +150,34 @@ def test_quiet_phone_in_a_ride_is_not_frozen(digits):
     readings = riding(30, 4, digits)
     readings[1000:2000] = readings[1000]
     assert np.count_nonzero(frozen(log_of(readings))) == 999
+
+
+@pytest.mark.parametrize(("count", "marked"), [(9, 0), (10, 9), (11, 10)])
+@pytest.mark.parametrize("block", [6, 24])
+def test_ten_equal_readings_are_frozen_across_blocks(count, marked, block):
+    """Two readings a second, so that the number decides. Across blocks only those of the later blocks are marked."""
+    readings = np.insert(riding(24 / HZ), 3, 20.0, axis=1)
+    readings[4 : 4 + count] = readings[4]
+    finder, found = FrozenFinder(), []
+    for begin in range(0, 24, block):
+        time_us = 500_000 * np.arange(begin, begin + block)
+        found.append(finder.mark(time_us, readings[begin : begin + block]))
+    where = np.flatnonzero(np.concatenate(found)).tolist()
+    if block == 24:
+        assert where == list(range(5, 5 + marked))
+    else:
+        assert where == (list(range(12, 4 + count)) if marked else [])
+
+
+@pytest.mark.parametrize(("near_s", "marked"), [(0.2, True), (0.4, False)])
+def test_half_a_second_beside_decides_whether_rounding_hid_the_noise(near_s, marked):
+    """Digits of 0.01 g: 0.025 g from the mean is near. At 0.1 g for the rest of half a second the mean is 0.06 or 0.02
+    off."""
+    readings = np.round(np.tile(REST, (400, 1)), 2)
+    readings[:, 3:] = 0.0
+    readings[:100, 0] += 0.1
+    readings[100 - round(near_s * HZ) : 100, 0] -= 0.1
+    readings[:100:2, 3] = 0.1
+    readings[200:, 0] += 0.1
+    readings[200::2, 0] += 0.01
+    assert np.any(frozen(log_of(readings))) == marked

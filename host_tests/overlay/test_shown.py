@@ -5,7 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from kickstand_tools import api
-from kickstand_tools.overlay.shown import shown
+from kickstand_tools.analysis.summary import HELD_S
+from kickstand_tools.joining.motion import STEP_S, CellMotion
+from kickstand_tools.overlay.camera_match import camera_offset_s
+from kickstand_tools.overlay.gpmf import Telemetry
+from kickstand_tools.overlay.shown import _maximum, shown
 from support.recordings import analysis_rides
 
 
@@ -57,3 +61,34 @@ def test_contradicted_calibration_is_reported_by_overlay(ride):
         notices: list[api.Message] = []
         shown(api.open_ride(ride, given), notices=notices)
         assert [notice.code for notice in notices] == codes
+
+
+def test_a_maximum_must_last_and_unknown_leans_count_as_none():
+    """At 100 samples a second, with HELD_S of 0.15 s: sixteen samples in a row."""
+    t_s = np.arange(60) / 100.0
+    lean = np.full(60, np.nan)
+    assert _maximum(t_s, lean).tolist() == [0.0] * 60
+    assert HELD_S == 0.15
+    lean[5:20], lean[30:46] = 30.0, 20.0  # for 15 and for 16 samples
+    lean[50:] = -5.0
+    found = _maximum(t_s, lean)
+    assert found.tolist() == [0.0] * 45 + [20.0] * 15
+
+
+def test_a_camera_with_uneven_times_is_found_in_the_ride():
+    """Cells of 50 ms hold one to four of the camera's readings; the ride began 12 s earlier."""
+    chance = np.random.default_rng(4)
+    knots_s = np.arange(0.0, 62.0, 0.7)
+    knots = chance.normal(scale=30.0, size=(len(knots_s), 3))
+
+    def rates(t_s):
+        return np.column_stack([np.interp(t_s, knots_s, axis) for axis in knots.T])
+
+    cells_s = STEP_S * (np.arange(1200) + 0.5)
+    still = np.zeros((1200, 3))
+    ride = CellMotion(still, rates(cells_s), np.ones(1200, dtype=bool), False, False)
+    t_s = np.cumsum(chance.choice([0.0125, 0.025, 0.05], size=1200))
+    camera = Telemetry(t_s, rates(t_s + 12.0)[:, [2, 0, 1]] + [1.0, -2.0, 0.5])
+    offset_s, correlation = camera_offset_s(ride, camera)
+    assert offset_s == pytest.approx(12.0, abs=0.03)
+    assert correlation > 0.95

@@ -1,16 +1,21 @@
 """kickstand pull from a fake board: rides become logs, damage is reported, nothing unverified is deleted."""
 
+import binascii
 import errno
 import json
 import os
 import types
+import zlib
 from pathlib import Path
 
 import numpy as np
 import pytest
 from kickstand import __version__
 from kickstand.rides import ride_paths
+from kickstand_tools.common.errors import InputError
+from kickstand_tools.deploy.board_console import BrokenOff
 from kickstand_tools.logs.reader import read_log
+from kickstand_tools.rides import pull
 from support import command, fake_board
 from support.recordings import ride_writer
 
@@ -261,3 +266,53 @@ def test_a_folder_that_cannot_be_made_is_named(board, tmp_path, monkeypatch):
     said = command.refused(tmp_path, "pull", "--out", tmp_path / "new", "--delete", words="give --out another place")
     assert str(tmp_path / "new") in said
     assert "connection" not in said
+
+
+def copied(monkeypatch, printed, size=6, end=None):
+    """What _read() gives for a board that prints these lines at each try, and what came of it in parts."""
+    part, came, tries = pull._Part(3, 1, size, "rides/3.rid"), [], []
+
+    def lines(transport, program, silent_s, most_bytes):
+        tries.append(most_bytes)
+        yield from printed[min(len(tries), len(printed)) - 1]
+        if end:
+            raise BrokenOff(end)
+
+    monkeypatch.setattr(pull, "lines", lines)
+    result = pull._read(None, part, "ride 3, part 1", lambda what, count: came.append((what, count)))  # type: ignore
+    return *result, came, len(tries)
+
+
+def sent(content, announced=None):
+    """The lines of a file, three bytes each, and its size and sum."""
+    of = content if announced is None else announced
+    pieces = [binascii.b2a_base64(content[at : at + 3]).strip() for at in range(0, len(content), 3)]
+    return [*pieces, str((len(of), zlib.crc32(of))).encode()]
+
+
+def test_a_file_comes_in_parts_and_is_compared_with_its_sum(monkeypatch):
+    content, whole, came, tries = copied(monkeypatch, [sent(b"abcdef")])
+    assert (content, whole, tries) == (b"abcdef", True, 1)
+    assert came == [("pulling ride 3, part 1", count) for count in (0, 3, 3)]
+
+
+@pytest.mark.parametrize(
+    ("first", "kept"),
+    [
+        (sent(b"abc", b"abcdef"), b"abc"),  # half of it
+        (sent(b"abcdef", b"abcdeg"), b"abcdef"),  # another byte
+        ([b"?", *sent(b"abcdef")[1:]], b"def"),  # a line that is not base64
+        (sent(b"abcdef")[:-1], b"abcdef"),  # without its sum
+    ],
+)
+def test_a_file_that_is_not_whole_is_copied_again(monkeypatch, first, kept):
+    content, whole, came, tries = copied(monkeypatch, [first, sent(b"abcdef")])
+    assert (content, whole, tries) == (b"abcdef", True, 2)
+    assert sum(count for _, count in came) == len(kept)  # a second try is not shown
+    content, whole, _, tries = copied(monkeypatch, [first])
+    assert (content, whole, tries) == (kept, False, pull._TRIES)
+
+
+def test_a_lost_connection_names_the_file(monkeypatch):
+    with pytest.raises(InputError, match=r"rides/3.rid did not come over whole \(it has gone\): try again"):
+        copied(monkeypatch, [sent(b"abcdef")[:1]], end="it has gone")

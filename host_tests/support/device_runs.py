@@ -13,6 +13,7 @@ from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted import script, sensor_errors
 
 from support import sd_cards, simulated_phones
+from support.page_turner import PageTurner
 
 FRAME_S = 0.1
 PRESS_EVERY_S = 0.4  # while a page is looked for
@@ -92,11 +93,12 @@ class Device:
         self.frames, self.ends = [], []
         self.phones = []
         self._app = None
-        self._wanted = []  # the names of views, in this order
+        self._turner = PageTurner()
 
     def turn_to(self, at_s, name):
-        """From at_s on, press the button until the view has this name: see kickstand/state.py."""
-        self.board.at(at_s, lambda: self._wanted.append(name))
+        """From at_s on, press the button until the view has this name: see kickstand/state.py. run() raises
+        AssertionError if it has not been shown."""
+        self.board.at(at_s, lambda: self._turner.turn_to(name))
 
     def fit_speed(self, source, ride, place=None, **model):
         """A "gps" or "wheel" that measures the speed of the ride. place: [latitude, longitude, degrees north a second,
@@ -129,6 +131,7 @@ class Device:
             settings.load = load
             if self.ends[-1] == "returned":  # with power on: what it leaves on the display
                 self._watch()
+            self._turner.check()
         finally:
             self.board.uninstall()
             if self.board.poses:
@@ -140,9 +143,7 @@ class Device:
         app.run()
 
     def _turn_page(self):
-        if self._wanted and self._app and self._app.state()["view"] == self._wanted[0]:
-            self._wanted.pop(0)
-        if self._wanted:
+        if self._turner.presses(self._app.state()["view"] if self._app else None):
             self.board.press(for_s=0.15)
 
     def record(self):

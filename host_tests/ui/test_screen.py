@@ -3,7 +3,7 @@
 import types
 
 import pytest
-from kickstand.errors import Notice
+from kickstand.errors import CaptureError, Notice
 from kickstand_tools.simulated_board.simulator import Board
 
 SHORT, LONG = 1, 2  # as in board/button.py
@@ -101,3 +101,78 @@ def test_a_fault_hides_the_pages_and_the_menu_the_fault(sensor, screen):
     assert screen.lines(300) == ("Sensor lost", "check wiring")
     sensor.fault = None
     assert first_line(screen, 2400).startswith("Lean")
+
+
+def test_pages_of_the_owner_follow_the_last_page(screen):
+    screen.pages.own += [lambda: ("one", ""), lambda: ("two", "")]
+    screen._meter.trusted = False  # so that each page has the same lines
+    shown = []
+    for k in range(8):
+        line = first_line(screen, 100 * k)
+        shown.append((screen.pages.name, line))
+        screen.press(SHORT, 100 * k + 50)
+    assert [name for name, _ in shown] == ["lean", "maxima", "acceleration", "formula", "raw", "own", "own", "lean"]
+    assert [line for name, line in shown if name == "own"] == ["one", "two"]
+
+
+def test_the_menu_shows_the_owners_pages_without_an_alignment(screen):
+    screen._calibration.aligned = False
+    screen.pages.own.append(lambda: ("one", "mine"))
+    screen.pages.show_own(0)
+    assert screen.lines(0) == ("one", "mine")
+    screen.press(SHORT, 100)
+    assert screen.pages._own_at is None
+
+
+def test_only_the_first_page_shows_that_a_ride_is_recorded(screen):
+    screen._rides.recorder.active = True
+    assert [len(line) for line in screen.lines(0)] == [16, 16]
+    assert screen.lines(0)[0].endswith("*")
+    screen.press(SHORT, 100)
+    assert not screen.lines(200)[0].endswith("*")
+
+
+def test_a_display_that_draws_gets_a_picture_of_the_first_page(screen):
+    assert len(screen.lines(0)) == 2
+    screen.pages.draws = True
+    assert len(screen.lines(100)) == 3
+    screen._meter.trusted = False
+    assert screen.lines(200)[:2] == ("Lean  --", "not sure yet")
+    assert len(screen.lines(200)) == 3
+
+
+def test_the_menu_asks_for_alignment_by_driving(drive, screen):
+    asked = []
+    drive.ask = lambda: asked.append(True)
+    screen.press(LONG, 0)
+    for k in range(10):
+        if "Align by drive" in first_line(screen, 100 * k):
+            break
+        screen.press(SHORT, 100 * k + 50)
+    screen.press(LONG, 1500)
+    assert asked == [True]
+    assert screen.pages._at == 5  # after the five pages
+
+
+def test_the_problem_of_a_pose_is_known_until_the_next_pose(screen):
+    screen.press(LONG, 0)
+    screen.press(LONG, 100)
+    problem = CaptureError("moved")
+    screen.wizard._spoilt(problem, 200)
+    assert screen.wizard.problem is problem
+    assert screen.lines(300) == ("Moved!", "Hold it still")
+    screen.press(SHORT, 400)
+    assert screen.wizard.problem is None
+
+
+def test_a_menu_ends_20_s_after_the_last_press(screen):
+    screen.press(LONG, 0)
+    screen.press(SHORT, 15_000)
+    assert first_line(screen, 34_900).startswith("\x7e")  # the arrow before an entry
+    assert first_line(screen, 35_000).startswith("Lean")
+    assert screen.menu is None
+
+
+def test_the_pages_use_a_short_press_and_leave_a_long_one(screen):
+    assert screen.pages.press(SHORT, 0) is True
+    assert screen.pages.press(LONG, 100) is False

@@ -66,10 +66,10 @@ class Consistency:
     """Read-only attributes. doubt: the lean must not be shown. doubts: number of misfits minus the forgotten ones. odd:
     None, or the code of repeated misfits: "odd-left", "odd-up" (forces) or "odd-pitch".
 
-    measured: the six positions have measured the sensor."""
+    six_done: the six positions have measured the accelerometer."""
 
-    def __init__(self, measured=True):
-        self._up_share = 1.0 if measured else _UNMEASURED
+    def __init__(self, six_done=True):
+        self._up_share = 1.0 if six_done else _UNMEASURED
         self.doubt = False
         self.odd = None
         self.doubts = 0

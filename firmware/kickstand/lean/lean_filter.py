@@ -47,10 +47,10 @@ class LeanFilter:
 
     delay_s: delay of the gyro's low-pass; lean is extrapolated to now. trim: rad, see UprightTrim.
     posed: see LeanMeter.use(). gyro_variances: of the priors of its scale and cross-axis errors, the last five
-    states, if the six positions have measured them.
+    states, if the six positions have measured them. six_done: they have measured the accelerometer.
     """
 
-    def __init__(self, delay_s=DELAY_S, trim=0.0, posed=False, gyro_variances=None):
+    def __init__(self, delay_s=DELAY_S, trim=0.0, posed=False, gyro_variances=None, six_done=False):
         self.trim = UprightTrim(trim)
         self._delay_s = delay_s
         self._posed = posed
@@ -60,14 +60,13 @@ class LeanFilter:
         # rest, where it should read 1 g
         self._force_error = 0.0
         self.dive = Dive()
-        self.consistency = Consistency(gyro_variances is not None)
+        self.consistency = Consistency(six_done)
         self._failed = False  # just now the readings do not fit any more
         # the sensor's errors (from BIAS_LEFT on) some time ago, and less long ago, while all fitted
         self._good = self._next_good = [0.0] * (STATES - BIAS_LEFT)
         self._good_s = 0.0
         self._kept_speed = None  # (speed, variance) for the next start
         self._gap = False  # readings were missing before the next start
-        self._moving_s = 0.0  # for so long a measured speed still says that the bike does not stand
         self.restart()
 
     def restart(self):
@@ -89,6 +88,7 @@ class LeanFilter:
         # since that; _straight_s: seconds since straight_or_prior_speed()
         self._speed = self._last_speed = None
         self._speed_s = self._straight_s = 0.0
+        self._moving_s = 0.0  # for so long a measured speed still says that the bike does not stand
         self._work = None  # the generator of _process() while it is not finished
         self._steps = 1  # steps of it that each sample runs
         self._sums = [0.0] * 9  # see predict()
@@ -124,8 +124,9 @@ class LeanFilter:
         knowledge."""
         good = self.consistency.doubts in (1, 3)
         speed, variance, rest = self._x[SPEED], self._p.rows[SPEED][SPEED], self._rest
+        moving_s = self._moving_s
         self._forget()
-        self._rest = rest
+        self._rest, self._moving_s = rest, moving_s
         if not good:
             self._good = self._next_good = [0.0] * (STATES - BIAS_LEFT)
             return

@@ -52,7 +52,7 @@ class LeanMeter:
         self.smooth_force[0] = self.smooth_force[1] = 0.0 if self._smooth_all else float("nan")
         self._transform = Transform(calibration)
         measured = gyro_variances(calibration.gyro_sigma, calibration.vehicle_from_sensor)
-        self.filter = LeanFilter(self._delay_s, radians(calibration.trim_deg), posed, measured)
+        self.filter = LeanFilter(self._delay_s, radians(calibration.trim_deg), posed, measured, calibration.six_done)
         self.restart()
 
     def restart(self):

@@ -75,8 +75,8 @@ class SixWizard(Wizard):
         return self._turn.running and (self._turn.quick or self._turn.lost)
 
     def bears(self, fault, now_ms):
-        """Return True for readings at the end of the range: a turn too fast for the gyro is not a defect."""
-        if fault is None or fault.code != "gyro-clips" or not self._turn.running:
+        """Return True for rates at the end of the range: a turn too fast for the gyro is not a defect."""
+        if fault is None or fault.code != "clips" or fault.values[0] != "Gyro" or not self._turn.running:
             return False
         self._turn.quick = True
         self._followed(now_ms)

@@ -140,7 +140,7 @@ class PublishedAlignment:
         if self._interval_us < MIN_INTERVAL_US:
             return
         if self._speed < 0.0 or self._interval_us > MAX_INTERVAL_US:
-            self._event = []
+            self._event, self._loss = [], 0.0
         elif (speed_mps - self._speed) / seconds < BRAKING_MPS2:
             self._event += self._interval
             self._loss += self._speed - speed_mps

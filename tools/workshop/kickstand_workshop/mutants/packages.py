@@ -41,12 +41,12 @@ PACKAGES = {
         "firmware/kickstand/rides/*.py",
         "rides/test_block rides/test_recording rides/test_ring rides/test_stream rides/test_card_trial",
     ),
-    "live": _package("firmware/kickstand/live/*.py", "live/test_live_packets live/test_live_device"),
+    "live": _package("firmware/kickstand/live/*.py", "live/test_bonds live/test_live_packets live/test_live_device"),
     "published": _package("tools/kickstand_tools/calibration/published.py", "drive_alignment/test_published"),
     "aligning": _package(
         "tools/kickstand_tools/calibration/[!p]*.py tools/kickstand_tools/calibration/p[or]*.py",
         "calibration/test_sensor_fit calibration/test_cli_calibration_file calibration/test_cli_calibrate"
-        " drive_alignment/test_cli_drive",
+        " drive_alignment/test_drive_bins drive_alignment/test_cli_drive",
     ),
     "logs": _package("tools/kickstand_tools/logs/*.py", "logs/test_[!cm]* logs/test_c*"),
     "imports": _package("tools/kickstand_tools/imports/**/*.py", "imports/test_apps imports/test_[!a]*"),
@@ -59,7 +59,7 @@ PACKAGES = {
     "overlay": _package("tools/kickstand_tools/overlay/*.py", "overlay/test_[!h]*"),
     "deploy": _package(
         "tools/kickstand_tools/deploy/*.py",
-        "deploy/test_config* deploy/test_check deploy/test_[unmo]* deploy/test_cli_flash",
+        "deploy/test_check* deploy/test_config* deploy/test_[unmo]* deploy/test_cli_flash",
     ),
     "simulation": _package("tools/kickstand_tools/simulation/**/*.py", "simulation/test_*"),
     "pull": _package(
@@ -68,7 +68,7 @@ PACKAGES = {
     ),
     "signals": _package("tools/kickstand_tools/signals/*.py", "signals/*"),
     "checks": _package("tools/kickstand_tools/checks/*.py", "checks/*"),
-    "replay": _package("tools/kickstand_tools/replay/*.py", "replay/test_cli_replay"),
+    "replay": _package("tools/kickstand_tools/replay/*.py", "replay/test_meter_along replay/test_cli_replay"),
     "export": _package(
         "tools/kickstand_tools/analysis/export/*.py",
         "analysis/test_export_formats analysis/test_export_positions analysis/test_cli_export",

@@ -1,0 +1,70 @@
+"""Other chips at the sensor's addresses are named by their registers, as their data sheets have them."""
+
+import pytest
+from kickstand_tools.simulated_board.simulator import Board
+
+OTHER, MOTION, SUPPORTED = 0, 1, 2
+WHO_AM_I, PWR_MGMT_1 = 0x75, 0x6B
+# second 37, minute 59, hour 23, then by the chip; binary-coded decimals
+DS3231 = [0x37, 0x59, 0x23, 0x05, 0x26, 0x11, 0x26, 0, 0, 0]  # day of the week, date, month, year
+PCF8523 = [0, 0, 0, 0x37, 0x59, 0x23, 0x26, 0x04, 0x11, 0x26]  # date, day of the week, month, year
+
+
+@pytest.fixture
+def chips():
+    with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):  # the driver needs a board's time
+        from kickstand.imu import other_chips
+
+        yield other_chips
+
+
+class Wires:
+    """A machine.I2C with a device at one address. registers: {register: value}, 0 for the others."""
+
+    def __init__(self, address, registers):
+        self._address, self._registers = address, registers
+
+    def readfrom_mem(self, address, register, count):
+        if address != self._address:
+            raise OSError(5)
+        return bytes(self._registers.get(register + k, 0) for k in range(count))
+
+
+@pytest.mark.parametrize(
+    ("address", "registers", "named"),
+    [
+        (0x68, {WHO_AM_I: 0x68}, ("MPU6050", SUPPORTED)),
+        (0x69, {WHO_AM_I: 0x68}, ("MPU6050", SUPPORTED)),
+        (0x68, {WHO_AM_I: 0x47, 0x00: 0x55}, ("ICM-42688", MOTION)),
+        (0x69, {0x00: 0x24}, ("BMI270", MOTION)),
+        (0x6A, {0x0F: 0x69}, ("LSM6DS3", MOTION)),
+        (0x6B, {0x0F: 0x6C}, ("LSM6DSO", MOTION)),
+        (0x28, {0x00: 0xA0}, ("BNO055", MOTION)),
+        (0x53, {0x00: 0xE5}, ("ADXL345", MOTION)),
+        (0x53, {0x00: 0xE4}, ("EEPROM", OTHER)),
+        (0x76, {}, ("barometer", OTHER)),
+        (0x57, {}, ("EEPROM", OTHER)),
+        (0x58, {}, ("", OTHER)),
+        (0x27, {}, ("display", OTHER)),
+        # Register 0 of chips like the MPU6050 can hold any number; these are named by WHO_AM_I
+        *[((0x68), {WHO_AM_I: 0x68, PWR_MGMT_1: power, 0: 0xD1}, ("MPU6050", SUPPORTED)) for power in (0x40, 0x41, 1)],
+        (0x68, {WHO_AM_I: 0x68, PWR_MGMT_1: 0x02, 0: 0xD1}, ("BMI160", MOTION)),
+        (0x68, {WHO_AM_I: 0x55, PWR_MGMT_1: 0x40}, ("", OTHER)),
+        (0x68, dict(enumerate(DS3231)), ("clock", OTHER)),
+        (0x68, dict(enumerate(PCF8523)), ("clock", OTHER)),
+    ],
+)
+def test_a_device_is_named_by_its_registers(chips, address, registers, named):
+    assert chips.name_of(Wires(address, registers), address) == named
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [(0, 0x60), (0, 0x3A), (1, 0x60), (2, 0x33), (3, 0x08), (4, 0x00), (4, 0x32), (5, 0x13), (5, 0x00), (6, 0x9A)],
+)
+def test_no_clock_shows_such_a_time(chips, place, value):
+    time = list(DS3231)
+    time[place] = value
+    assert chips.is_clock(Wires(0x68, dict(enumerate(DS3231))), 0x68)
+    assert not chips.is_clock(Wires(0x68, dict(enumerate(time))), 0x68)
+    assert not chips.is_clock(Wires(0x69, dict(enumerate(DS3231))), 0x68)

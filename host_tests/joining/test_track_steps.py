@@ -1,0 +1,88 @@
+"""The steps, speeds and segments of a track, and the weights of its errors, with numbers by hand."""
+
+import numpy as np
+import pytest
+from kickstand_tools.joining import fit
+from kickstand_tools.joining.track import Course, Track, course, segments, without_trend
+
+METRE = 1.0 / 111_194.9  # degrees of latitude, and of longitude at the equator
+
+
+def track(utc_s, east_m, north_m, speed_mps=None):
+    n = len(utc_s)
+    speed = np.full(n, np.nan) if speed_mps is None else np.array(speed_mps)
+    return Track(np.array(utc_s, float), np.array(north_m) * METRE, np.array(east_m) * METRE, speed, "t")
+
+
+def test_a_track_of_ten_points_a_second_is_thinned_to_one():
+    quick = track(np.arange(35) / 10.0 + 100.0, np.arange(35.0), np.zeros(35))
+    assert quick.once_a_second().utc_s.tolist() == [100.0, 101.0, 102.0, 103.0]
+    assert quick.once_a_second().lon_deg == pytest.approx(np.array([0.0, 10.0, 20.0, 30.0]) * METRE)
+    for step_s, same in ((0.69, False), (0.71, True)):
+        one = track(np.arange(20) * step_s, np.zeros(20), np.zeros(20))
+        assert (one.once_a_second() is one) is same
+    single = track([5.0], [0.0], [0.0])
+    assert single.once_a_second() is single
+
+
+def test_a_course_turns_to_the_left_by_hand():
+    """20 m east, 20 m north, 20 m west, then 3 m and 400 m west: the last two are too slow and too fast."""
+    found = course(track([0, 1, 2, 3, 5, 6], [0, 20, 20, 0, -3, -403], [0, 0, 20, 20, 20, 20]))
+    assert found.begin_s.tolist() == [0, 1, 2, 3, 5] and found.end_s.tolist() == [1, 2, 3, 5, 6]
+    assert found.speed_mps == pytest.approx([20.0, 20.0, 20.0, 1.5, 400.0], rel=1e-3)
+    assert found.good.tolist() == [True, True, True, False, False]
+    assert found.turn_deg == pytest.approx([0.0, 90.0, 90.0, 0.0, 0.0], abs=0.01)
+    # 1 m across 20 m is 2.865 degrees, with 4 degrees of other errors 4.920
+    assert found.sigma_deg[:3] == pytest.approx(4.920, abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("step_s", "step_m", "good"), [(1.0, 2.4, False), (1.0, 2.6, True), (1.0, 99.0, True), (1.0, 101.0, False)]
+    + [(5.9, 60.0, True), (6.1, 60.0, False)],
+)  # fmt: skip
+def test_a_step_is_good_between_a_walk_and_a_jump(step_s, step_m, good):
+    assert course(track([0.0, step_s], [0.0, step_m], [0.0, 0.0])).good.tolist() == [good]
+
+
+def test_speeds_without_their_own_are_means_over_four_steps():
+    east = np.cumsum([0.0, 10.0, 10.0, 20.0, 20.0, 20.0, 20.0, 1.0, 1.0, 1.0, 1.0])
+    found = track(np.arange(11.0), east, np.zeros(11)).speeds_mps()
+    assert np.isnan(found[[0, 1, 8, 9, 10]]).all()  # the ends, and under 2.5 m/s
+    assert found[2:8] == pytest.approx([15.0, 17.5, 20.0, 15.25, 10.5, 5.75], rel=1e-3)
+    assert track([0, 1], [0, 9], [0, 0], [3.0, np.nan]).speeds_mps()[0] == 3.0
+    assert np.isnan(track(np.arange(4.0), np.arange(4.0) * 9, np.zeros(4)).speeds_mps()).all()
+
+
+def test_segments_have_thirty_steps_and_at_least_eight():
+    """Of 47 good steps 30 and 17, of 7 none; mean and trend are subtracted, so an even bend is nothing."""
+    n = 55
+    good = np.ones(n, dtype=bool)
+    good[47] = False
+    t_s = np.arange(n + 1.0)
+    found = segments(Course(t_s[:-1], t_s[1:], np.full(n, 2.0), np.full(n, 9.0) + t_s[:-1], good, np.full(n, 3.0)))
+    assert found.begin_s.shape == (2, 30)
+    assert found.begin_s[1, :17].tolist() == list(range(30, 47))
+    assert found.course_weight[0] == pytest.approx(np.full(30, 0.25))
+    assert found.course_weight[1].tolist() == [0.25] * 17 + [0.0] * 13
+    assert found.turned_deg[0] == pytest.approx(np.zeros(30), abs=1e-9)
+    assert found.speed_mps[0] == pytest.approx(np.zeros(30), abs=1e-9)
+    assert found.middle_s[0, :2].tolist() == [0.5, 1.5]
+
+
+def test_a_trend_is_subtracted_by_weight():
+    """The line through the weighted points (0, 0), (1, 0) and (2, 3), the last with weight 0, is 0."""
+    weight = np.array([[1.0, 1.0, 0.0]])
+    found = without_trend(np.array([[0.0, 0.0, 3.0]]), weight, np.array([[0.0, 1.0, 2.0]]))
+    assert found == pytest.approx(np.array([[0.0, 0.0, 3.0]]))
+    even = without_trend(np.array([[0.0, 0.0, 3.0]]), np.ones((1, 3)), np.array([[0.0, 1.0, 2.0]]))
+    assert even == pytest.approx(np.array([[0.5, -1.0, 0.5]]))  # the line is -0.5 + 1.5 t
+
+
+def test_an_outlier_weighs_less_by_students_distribution():
+    """Of errors 1, 1, 1, 4 of weight 1 the median over 0.6745 is 1.4826. With f degrees of freedom each has the weight
+    (1 + 1 / f) / (1 + e^2 / f) / 1.4826^2, where e = error / 1.4826."""
+    f, usual = fit._FREEDOM, 1.0 / 0.6745
+    error = np.array([[1.0, -1.0, 1.0, 4.0, 9.0]])
+    weight = np.array([[1.0, 1.0, 1.0, 1.0, 0.0]])
+    by_hand = [(1.0 + 1.0 / f) / (1.0 + (e / usual) ** 2 / f) / usual**2 for e in (1.0, 1.0, 1.0, 4.0)]
+    assert fit._robust_weights(error, weight) == pytest.approx(np.array([[*by_hand, 0.0]]))

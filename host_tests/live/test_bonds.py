@@ -1,0 +1,61 @@
+"""The keys of paired phones stay in flash, until the PIN changes."""
+
+import json
+
+import pytest
+from kickstand.live.bonds import PATH, Bonds
+
+
+@pytest.fixture(autouse=True)
+def flash(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / PATH
+
+
+def test_keys_are_found_by_kind_and_key_or_by_their_index():
+    bonds = Bonds("123456")
+    assert bonds.get(1, 0, b"a") is None and bonds.get(1, 0, None) is None
+    assert bonds.put(1, memoryview(b"a"), memoryview(b"one"))
+    assert bonds.put(2, b"a", b"other kind")
+    assert bonds.put(1, b"b", b"two")
+    assert [bonds.get(1, 0, key) for key in (b"a", b"b", b"c")] == [b"one", b"two", None]
+    assert bonds.get(2, 0, b"a") == b"other kind"
+    assert [bonds.get(1, index, None) for index in (0, 1, 2)] == [b"one", b"two", None]
+    assert bonds.get(2, 1, None) is None
+    assert bonds.put(1, b"a", b"newer") and bonds.get(1, 0, b"a") == b"newer"
+
+
+def test_a_key_can_be_deleted_once():
+    bonds = Bonds("123456")
+    bonds.put(1, b"a", b"one")
+    assert bonds.put(1, b"a", None) is True
+    assert bonds.put(1, b"a", None) is False
+    assert bonds.get(1, 0, b"a") is None
+
+
+def test_saved_keys_are_read_back_with_the_same_pin_only(flash):
+    bonds = Bonds("123456")
+    bonds.save()
+    assert not flash.exists()
+    bonds.put(1, b"a", b"\x00\xff")
+    bonds.save()
+    assert json.loads(flash.read_text()) == {"pin": "123456", "keys": [[1, "61", "00ff"]]}
+    assert Bonds("123456").get(1, 0, b"a") == b"\x00\xff"
+    assert Bonds("654321").get(1, 0, b"a") is None
+    flash.unlink()
+    bonds.save()  # nothing has changed since
+    assert not flash.exists()
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"pin": "123456"}', '{"pin": "123456", "keys": [[1, "x", "y"]]}'])
+def test_a_damaged_file_means_no_keys(flash, text):
+    flash.write_text(text)
+    assert Bonds("123456").get(1, 0, None) is None
+
+
+def test_flash_that_cannot_be_written_is_no_error(flash):
+    flash.mkdir()
+    bonds = Bonds("123456")
+    bonds.put(1, b"a", b"one")
+    bonds.save()
+    assert bonds.get(1, 0, b"a") == b"one"

@@ -1,0 +1,31 @@
+"""Finds a page of the display by pressing the button. CPython and MicroPython."""
+
+MOST_PRESSES = 20  # twice as many as there are pages
+
+
+class PageTurner:
+    """Says when to press the button, until the views that are wanted have been shown, one after the other."""
+
+    def __init__(self):
+        self._wanted = []
+        self._seen = []  # the views at the presses for the first of _wanted
+
+    def turn_to(self, name):
+        """Want the view with this name next: see kickstand/state.py."""
+        self._wanted.append(name)
+
+    def presses(self, view):
+        """True if the button must be pressed now. view: the name of the view that is shown, or None if no app runs."""
+        if self._wanted and view == self._wanted[0]:
+            self._wanted.pop(0)
+            self._seen = []
+        if not self._wanted or view is None or len(self._seen) == MOST_PRESSES:
+            return False
+        self._seen.append(view)
+        return True
+
+    def check(self):
+        """Raise AssertionError if a view has not been shown. It names the views that were."""
+        if self._wanted:
+            seen = ", ".join(sorted(set(self._seen))) or "nothing"
+            raise AssertionError(f"no view {self._wanted[0]} after {len(self._seen)} presses, only: {seen}")
