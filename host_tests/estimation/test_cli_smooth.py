@@ -70,7 +70,7 @@ def test_report_has_the_smoothed_or_the_live_lean(ride):
     directory, lean, _ = ride
     log = directory / "RIDE.csv"
     largest = {}
-    for option, word, said in ((), "smoothed", "smoothed"), (("--live",), "live", "as the display showed it"):
+    for option, word, said in ((), "smoothed", "best estimate"), (("--live",), "live", "as the display showed it"):
         data = json.loads(works("report", log, "--json", *option).out)
         assert data["lean"] == word
         assert said in works("report", log, *option).out
