@@ -7,8 +7,10 @@ Vibration and bumps, which a good sensor has too, cancel in this mean. A dead or
 step of the bias and a slipped mount do not cancel. The forces to the left and up each have a short mean, which shows
 large errors within a second or two, and a long one, which shows small errors after some seconds.
 
-Two more means are of quantities that never last long on a real ride: a force to the side, because a bike is in balance,
-and a steep pitch.
+Three more means are of quantities that never last long on a real ride: a force to the side, because a bike is in
+balance, a steep pitch, and a pitch without its force. On a real slope the forward force has gravity's part, sin(pitch).
+If that part is missing, wrong rates have made the pitch, and the filter takes the difference for an acceleration: up
+the slope it seems to brake, down the slope to accelerate. Real bikes do so for a few seconds only.
 
 Each mean is judged by its own spread, as in Student's t: on a road that is rougher than the filter expects the
 innovations are large, of either sign, and so are their means.
@@ -29,7 +31,7 @@ _SHORT_S = const(3.0)  # s: time constant of the short means. Larger: seen later
 _LONG_S = const(10.0)  # s: that of the others. Larger: as above.
 _MOST = const(4.0)  # standard deviations: a larger innovation counts as this. Larger: a blow counts for more.
 # Limits of the means. Larger, each: less is hidden, also of what is wrong. On sound rides on good and bad roads and
-# mounts they reach .4, .25, .7, .25, .12 and 8 degrees.
+# mounts they reach .4, .25, .7, .25, .12, 8 degrees and .096, the last on a recorded ride.
 LEFT_SHORT, LEFT_LONG = 0.75, 0.5  # standard deviations
 UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations
 # ratio: the limits of up are wider by this without the six positions, as the data sheet allows the accelerometer
@@ -37,6 +39,7 @@ UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations
 _UNMEASURED = const(2.0)
 _SIDEWAYS = const(0.15)  # ratio: force to the side over force up, less the trim
 _STEEP = const(0.21)  # rad: pitch
+_SLOPE = const(0.12)  # rad: a pitch without its force, the root of the short mean of its square
 # The limits of left and up grow with the spread, the root of this mean square: half the square of the change between
 # windows. Larger: more is hidden on the roughest roads.
 _SPREAD = const(0.4)  # standard deviations, squared
@@ -80,7 +83,7 @@ class Consistency:
 
     def _forget_means(self):
         self._left = self._left_long = self._up = self._up_long = self._side = self._pitch = 0.0
-        self._lean = self._lean_square = self._mean_s = 0.0
+        self._lean = self._lean_square = self._mean_s = self._slope_square = 0.0
         self._left_before = self._up_before = self._left_square = self._up_square = 0.0
 
     def gap(self, in_rest=True):
@@ -93,17 +96,16 @@ class Consistency:
 
     @property
     def one_sided(self):
-        """True after a recent misfit if the lean has been on one side: steadily, or for long after a second doubt."""
+        """True after a recent misfit if the lean has been steadily on one side."""
         lean = abs(self._lean)
-        if not self.doubts or lean <= _ONE_SIDE:
+        if not self.doubts or lean <= _ONE_SIDE or lean * lean <= _STEADY * self._lean_square:
             return False
-        steady, long = lean * lean > _STEADY * self._lean_square, self._mean_s >= _LONG_S
-        return (steady and (long or lean < _SURE_LEAN)) or (long and self.doubts > 1)
+        return lean < _SURE_LEAN or self._mean_s >= _LONG_S
 
-    def add(self, left, up, sideways, pitch, lean, yaw_rate, seconds):
+    def add(self, left, up, sideways, pitch, push, lean, yaw_rate, seconds):
         """Take a window of `seconds` while riding. left, up: the normalised innovations of these forces. sideways:
-        force to the side over force up. pitch and lean in rad, yaw_rate in rad/s. Return True if a misfit has just
-        begun."""
+        force to the side over force up. pitch and lean in rad, yaw_rate in rad/s. push: estimated forward
+        acceleration, g. Return True if a misfit has just begun."""
         gain, long_gain = min(1.0, seconds / _SHORT_S), min(1.0, seconds / _LONG_S)
         left, up = max(-_MOST, min(_MOST, left)), max(-_MOST, min(_MOST, up))
         self._left += gain * (left - self._left)
@@ -112,6 +114,8 @@ class Consistency:
         self._up_long += long_gain * (up - self._up_long)
         self._side += long_gain * (max(-_MOST_SIDEWAYS, min(_MOST_SIDEWAYS, sideways)) - self._side)
         self._pitch += long_gain * (pitch - self._pitch)
+        square = -pitch * max(-abs(pitch), min(abs(pitch), push))  # pitch * pitch if all of the force is missing
+        self._slope_square += gain * (square - self._slope_square)
         change = left - self._left_before
         self._left_square += long_gain * (0.5 * change * change - self._left_square)
         change = up - self._up_before
@@ -125,7 +129,7 @@ class Consistency:
         left = max(left / sqrt(max(1.0, self._left_square / _SPREAD)), abs(self._side) / _SIDEWAYS)
         up = max(abs(self._up) / UP_SHORT, abs(self._up_long) / UP_LONG)
         up /= self._up_share * sqrt(max(1.0, self._up_square / _SPREAD))
-        pitch = abs(self._pitch) / _STEEP
+        pitch = max(abs(self._pitch) / _STEEP, sqrt(max(0.0, self._slope_square)) / _SLOPE)
         worst = max(left, up, pitch)
         self._since_s += seconds
         if self.doubts > MILD and self._since_s < _AGAIN_S:

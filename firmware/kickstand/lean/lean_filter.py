@@ -119,10 +119,9 @@ class LeanFilter:
             self._good, self._next_good = self._next_good, self._x[BIAS_LEFT:STATES]
 
     def _doubt(self):
-        """Restart because the readings do not fit. Alternate between the sensor's earlier errors, because the fault may
-        be over, and no prior knowledge, because a bias may have stepped. After many misfits, restart without prior
-        knowledge."""
-        good = self.consistency.doubts in (1, 3)
+        """Restart because the readings do not fit. The first two times take the sensor's earlier errors, because the
+        fault may be over. Later take no prior knowledge, because a bias may have stepped."""
+        good = self.consistency.doubts <= 2
         speed, variance, rest = self._x[SPEED], self._p.rows[SPEED][SPEED], self._rest
         moving_s = self._moving_s
         self._forget()
@@ -324,7 +323,8 @@ class LeanFilter:
         """Update with the window's forces, the level road, and the measured speed, or without a new speed with
         straight_or_prior_speed(). Update the trim if speed and lean are certain enough. A generator."""
         p, x = self._p, self._x
-        dive = self.dive.update(means[7] - model.sin_pitch, model.pitch_rate, model.speed, seconds)
+        push = means[7] - model.sin_pitch
+        dive = self.dive.update(push, model.pitch_rate, model.speed, seconds)
         left, up = measurements.forces(model, means, roll_acceleration, self._force_error, dive)
         yield from p.update(*left)
         misfit = p.misfit
@@ -337,7 +337,8 @@ class LeanFilter:
             if abs(x[PITCH]) > 2 * measurements.STEEP:
                 misfit = up_misfit = 0.0  # in a wheelie the equations do not hold: only its length is judged
             lean = x[LEAN] - self._upright
-            self._failed = self.consistency.add(misfit, up_misfit, sideways, x[PITCH], lean, model.yaw_rate, seconds)
+            pitch, turning = x[PITCH], model.yaw_rate
+            self._failed = self.consistency.add(misfit, up_misfit, sideways, pitch, push, lean, turning, seconds)
         self._remember(seconds)
         yield from p.update(*measurements.level_road(model, x, seconds))
         lean, speed, measured = x[LEAN] - self._upright, x[SPEED], self._speed

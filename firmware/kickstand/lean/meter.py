@@ -104,7 +104,7 @@ class LeanMeter:
         fits, doubts = lean.consistency, lean.consistency.doubts
         if fits.doubt or fits.one_sided or abs(lean.pitch_deg) >= _WHEELIE_DEG:
             return False
-        return 0.0 <= lean.variance <= (MAX_VARIANCE if doubts < MILD else DOUBTED_VARIANCE)
+        return 0.0 <= lean.variance <= (MAX_VARIANCE if doubts <= MILD else DOUBTED_VARIANCE)
 
     def keep_trim(self):
         """If the bike is at rest and the trim is certain and has changed, copy it to the calibration and return
