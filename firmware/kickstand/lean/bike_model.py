@@ -11,9 +11,9 @@ State                                       Measured (a vector with [3] has the 
          5 degrees per degree of pitch at 11 degrees of tilt, 11 at 5
     s_x, c_xy        SCALE_LEFT, CROSS_LEFT_UP: scale error of the gyro's left axis, and its reading of a rate about up
     c_zx, c_zy, s_z  CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD: the same of its forward axis
-The data sheet allows 3 % of scale error and 2 % of cross-axis sensitivity. In a long turn they are mistaken for bias,
-in a quick roll for lean. The up axis has no such states: without a measured speed its scale and
-the speed are not separately observable.
+The data sheet allows 3 % of scale error and 2 % of cross-axis sensitivity. A filter without these states mistakes them
+for bias in a long turn, and for lean in a quick roll. The up axis has no such states: without a measured speed its
+scale and the speed are not separately observable.
 
 Equations, with ' for the derivative by time
     rates, corrected         w = w_m - b,  then  w_z -= c_zx w_x + c_zy w_y + s_z w_z,  w_x -= s_x w_x + c_xy w_y
@@ -49,15 +49,15 @@ YAW_ERROR = 6
 SCALE_LEFT, CROSS_LEFT_UP = 7, 8
 CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD = 9, 10, 11
 
-MAX_PITCH = 1.2  # rad. No motorcycle reaches it, a sensor in the hand may; at 90 degrees lean has no meaning.
-MIN_PITCH = -MAX_PITCH  # once: in each sample a negation would take heap and time
+MAX_PITCH = 1.2  # rad. No motorcycle reaches it, but a sensor in the hand may. At 90 degrees lean has no meaning.
+MIN_PITCH = -MAX_PITCH  # a constant, because a negation in each sample would take heap and time
 
 # Where the yaw rate of a bike in balance replaces the measured one. Comments in the form of measurements.py.
 _BALANCE_MIN_SPEED = const(4.0)  # m/s. Larger: the balanced rate is not used in slow turns.
 # The balanced rate is used where the measured one is within _BALANCE_RATE + _BALANCE_SHARE x |balanced rate| of it.
-_BALANCE_RATE = const(0.1)  # rad/s: constant part of that tolerance. Larger: used too where lean or speed are wrong.
-_BALANCE_SHARE = const(0.5)  # ratio: part of that tolerance that grows with the rate. Larger: as above.
-# rad: the lean's standard deviation has to be smaller. Larger: the balanced rate is used with a lean that is uncertain.
+_BALANCE_RATE = const(0.1)  # rad/s: constant part of that tolerance. Larger: it is used with a wrong lean or speed.
+_BALANCE_SHARE = const(0.5)  # ratio: part of that tolerance per rate. Larger: it is used with a wrong lean or speed.
+# rad: the lean's standard deviation must be smaller. Larger: the balanced rate is used with a more uncertain lean.
 BALANCE_SIGMA = radians(20.0)
 _BALANCE_MIN_COS = const(0.3)  # ratio: lower bound of cos(lean). Larger: too little rate about left in deep leans.
 

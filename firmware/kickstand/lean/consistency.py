@@ -27,15 +27,15 @@ from math import sqrt
 from ..units import const
 
 # Symbol = default  # unit: what it is. "Larger:" says what raising it does.
-_SHORT_S = const(3.0)  # s: time constant of the short means. Larger: seen later, and less of what is sound is hidden.
-_LONG_S = const(10.0)  # s: that of the others. Larger: as above.
+_SHORT_S = const(3.0)  # s: time constant of the short means. Larger: fewer leans are hidden, and later.
+_LONG_S = const(10.0)  # s: time constant of the other means. Larger: as for the short means.
 _MOST = const(4.0)  # standard deviations: a larger innovation counts as this. Larger: a blow counts for more.
-# Limits of the means. Larger, each: less is hidden, also of what is wrong. On sound rides on good and bad roads and
-# mounts they reach .4, .25, .7, .25, .12, 8 degrees and .096, the last on a recorded ride.
+# Limits of the means. Larger, each: fewer leans are hidden, good and wrong ones. On rides without a fault, on good and
+# bad roads and mounts, they reach .4, .25, .7, .25, .12, 8 degrees and .096, the last on a recorded ride.
 LEFT_SHORT, LEFT_LONG = 0.75, 0.5  # standard deviations
 UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations
 # ratio: the limits of up are wider by this without the six positions, as the data sheet allows the accelerometer
-# 3 % of scale error and 80 mg of offset, and only rest shows them. Larger: less is hidden, also of what is wrong.
+# 3 % of scale error and 80 mg of offset, and only rest shows them. Larger: fewer leans are hidden.
 _UNMEASURED = const(2.0)
 _SIDEWAYS = const(0.15)  # ratio: force to the side over force up, less the trim
 _STEEP = const(0.21)  # rad: pitch
@@ -43,26 +43,27 @@ _SLOPE = const(0.12)  # rad: a pitch without its force, the root of the short me
 # The limits of left and up grow with the spread, the root of this mean square: half the square of the change between
 # windows. Larger: more is hidden on the roughest roads.
 _SPREAD = const(0.4)  # standard deviations, squared
-# rad: mean lean after a doubt, and a larger one that the force up confirms for a while. Larger, the first, and
-# smaller, the second: less is hidden in long bends, and on straights that are taken for bends.
+# rad: limit of a steady mean lean after a doubt. Larger: less is hidden in bends, and on straights that seem bends.
 _ONE_SIDE = const(0.13)
+# rad: a larger steady lean is hidden only after _LONG_S, because the force up confirms it. Smaller: as for _ONE_SIDE.
 _SURE_LEAN = const(0.3)
 # ratio: of the mean square of the lean, above which it has been steady. Larger: as _ONE_SIDE.
 _STEADY = const(0.75)
 _MOST_SIDEWAYS = const(0.5)  # ratio: more counts as this. Larger: a blow counts for more.
-_STRICT = const(0.85)  # ratio: share of the limits after a doubt. Larger: a fault that is still there is seen later.
+_STRICT = const(0.85)  # ratio: share of the limits after a doubt. Larger: a lasting fault is detected later.
 # ratio: share of the limits in which the means have to stay while doubted. Larger: shown again sooner.
 _FIT = const(0.6)
-# s: for how long, after the first doubt, the second and so on. Larger: a fault that is over is hidden for longer.
+# s: time for which everything must fit after the first doubt, the second and so on. Larger: after a fault the lean
+# stays hidden for longer.
 HOLDS_S = (3.0, 4.0, 4.0, 20.0, 60.0)
-_GAP_S = const(4.5)  # s: the same after a gap of the readings. Larger: as above.
-MILD = 3  # doubts; after more of them it has to fit in turns, because on a straight nearly all does, and is called odd
-# s: then the next doubt comes no sooner, so that rest is found. Larger: what has changed is found later.
+_GAP_S = const(4.5)  # s: the same after a gap in the readings. Larger: after a gap the lean stays hidden for longer.
+MILD = 3  # doubts. With more of them only turns count as fitting, because on a straight nearly everything fits.
+# s: least time between doubts after MILD of them, so that rest is found. Larger: changed errors are found later.
 _AGAIN_S = const(12.0)
-_TURNING = const(0.05)  # rad/s: yaw rate of a turn. Larger: it takes longer.
-FORGET_S = 60.0  # s: fitting for so long takes one doubt back. Larger: a fault that comes again is hidden for longer.
+_TURNING = const(0.05)  # rad/s: least yaw rate of a turn. Larger: the lean stays hidden for longer.
+FORGET_S = 60.0  # s: after fitting for this time one doubt is forgotten. Larger: a repeated fault is hidden for longer.
 
-last_odd = None  # the last code of `odd`, for the status report
+last_odd = None  # the last code of `odd`, for `kickstand status`
 
 
 class Consistency:

@@ -17,8 +17,8 @@ from .bike_model import BIAS_LEFT, LEAN, PITCH, SCALE_LEFT, SPEED, YAW_ERROR
 # Symbol = default  # unit: what it is. "Larger:" says what raising it does.
 
 # The start: before anything is measured
-START_MAX_RATE = 0.02  # rad/s: largest rate that counts as standing. Larger: riding is mistaken for it.
-START_MAX_FORCE = 0.05  # g: largest deviation from 1 g that counts as standing. Larger: as above.
+START_MAX_RATE = 0.02  # rad/s: largest rate that counts as standing. Larger: riding is mistaken for standing.
+START_MAX_FORCE = 0.05  # g: largest deviation from 1 g that counts as standing. Larger: riding is mistaken for it.
 # Standard deviations of the prior. Larger: this state is found sooner, but takes up errors that belong to other states.
 SIGMA_START = (
     radians(1.5),  # rad: lean of a bike that stands, by the force
@@ -34,45 +34,45 @@ SIGMA_START = (
     0.014,  # ratio: forward axis' reading of a rate about up
     0.014,  # ratio: scale error of the forward axis
 )
-# Where the readings do not fit any more (consistency.py) the filter restarts, first with the speed and with the
-# sensor's errors as they were REMEMBER_S to twice as long ago, then with nothing kept.
-REMEMBER_S = 10.0  # s. Larger: less of what came before the doubt is remembered, and it is older.
-SIGMA_GOOD_BIAS = radians(0.6)  # rad/s: of a bias that is remembered. Larger: one that has changed is found sooner.
-GOOD_SHARE = 0.7  # ratio: of SIGMA_START, for the other errors that are remembered. Larger: as above.
+# If the readings no longer fit (consistency.py), the filter restarts. The first two times it keeps the speed and the
+# sensor's errors of REMEMBER_S to twice as long ago, later nothing.
+REMEMBER_S = 10.0  # s. Larger: the remembered errors are older.
+SIGMA_GOOD_BIAS = radians(0.6)  # rad/s: of a remembered bias. Larger: a changed bias is found sooner.
+GOOD_SHARE = 0.7  # ratio: of SIGMA_START, for the other remembered errors. Larger: changed errors are found sooner.
 SIGMA_GOOD_SPEED = 3.0  # m/s: added to the speed's standard deviation. Larger: less is kept of the speed.
-# rad/s: of a bias of which nothing is known. Larger: as SIGMA_START, a stepped one sooner.
+# rad/s: of a bias without prior knowledge. Larger: a stepped bias is found sooner.
 SIGMA_DOUBT_BIAS = radians(2.5)
-# rad: a lean that no bike has, where the force does not show it for so many seconds. Larger: a filter that has gone
-# astray restarts later.
-IMPOSSIBLE_LEAN = radians(80.0)
-IMPOSSIBLE_S = 1.0
-# A bike whose measured speed is above the first does not stand, for so many seconds.
+# A lean above the first, which the force does not confirm for the second, is impossible. Larger: a wrong filter
+# restarts later.
+IMPOSSIBLE_LEAN = radians(80.0)  # rad
+IMPOSSIBLE_S = 1.0  # s
+# After a measured speed above the first, the bike does not stand for the second.
 MOVING_SPEED = 2.0  # m/s. Larger: slow riding on a smooth road is taken for rest.
 MOVING_S = 2.5  # s. Larger: a stop is detected later.
-# A bike is in balance above this speed, if it is known so well.
-BALANCE_SPEED = 2.0  # m/s. Larger: a mount that has slipped is seen at fewer speeds.
-SIGMA_BALANCE_SPEED = 12.0  # m/s. Larger: a bike that is pushed about is taken for one that rides.
-# ratio: force forward over force up of a bike. Larger: a board on a table is taken for one that is ill.
+# A bike is in balance above this speed, if the speed's standard deviation is below the second value.
+BALANCE_SPEED = 2.0  # m/s. Larger: a slipped mount is detected at fewer speeds.
+SIGMA_BALANCE_SPEED = 12.0  # m/s. Larger: a pushed bike is mistaken for a ridden one.
+# ratio: largest force forward over force up on a bike. Larger: a board on a table is mistaken for a faulty sensor.
 MOST_FORWARD = 1.5
 # ratio: change of the gyro's errors with temperature since the six positions have measured them; the data sheet allows
-# 2 % from -40 to 85 C. Larger: what was measured counts for less.
+# 2 % from -40 to 85 C. Larger: the measured errors count for less.
 _SIGMA_GYRO_DRIFT = const(0.002)
-# rad/s: the bias where the pose on the kickstand has just measured it. Larger: after it the lean is shown later.
+# rad/s: of a bias that the pose on the kickstand has just measured. Larger: the first lean is shown later.
 SIGMA_FRESH_BIAS = radians(0.2)
-# rad: the first lean's standard deviation where the bike moves. Larger: lean is shown later, and follows forces more.
+# rad: of the first lean if the bike moves. Larger: lean is shown later, and follows forces more.
 SIGMA_START_LEAN_MOVING = radians(30.0)
-# m/s: mean of the speed's prior while nothing measures it. Larger: leans that began before power-on come out larger.
+# m/s: mean of the speed's prior without a measured speed. Larger: leans that began before power-on come out larger.
 PRIOR_SPEED = 15.0
 
 # Process noise, per square root of a second
 NOISE_ANGLE = radians(0.24)  # rad: vibration of the gyro. Larger: lean follows the forces more and the gyro less.
 NOISE_SPEED = 0.35  # m/s. Larger: speed follows turns sooner, and is less steady on straights.
 NOISE_BIAS = radians(0.01)  # rad/s: 0.6 deg/s in five minutes of warming up. Larger: long turns are mistaken for bias.
-# Where readings are lost
-# rad/s: process noise over lost readings: how far the roll rate may have been from the one measured after the gap; a
-# quarter of it for the pitch rate. Larger: see below.
+# Lost readings
+# rad/s: process noise over lost readings. So far may the roll rate have been from the rate measured after the gap, and
+# the pitch rate a quarter of it. Larger: after a gap the lean is hidden longer.
 SIGMA_LOST_RATE = radians(30.0)
-SIGMA_LOST_FORCE = 0.3  # g: likewise for the forward force. Larger, both: after a gap the lean is hidden longer.
+SIGMA_LOST_FORCE = 0.3  # g: the same for the forward force. Larger: after a gap the lean is hidden longer.
 
 # Measurement noise while riding
 _SIGMA_LEFT = const(0.04)  # g: force to the left. Larger: lean follows it less, and the gyro and level roads more.
@@ -91,30 +91,31 @@ _SIGMA_MEASURED_SPEED = const(1.0)  # m/s: speed by a receiver or a wheel sensor
 # axis: speed x yaw rate has both errors. Larger: measured speeds count for less, most where the bike is fast.
 _SIGMA_SPEED_SCALE = const(0.05)
 _MEASURED_SPEED_S = const(4.0)  # s: how long the first of these errors lasts. Larger: measured speeds count for less.
-# s: how long the error of scale lasts: a wheel is small for as long as a bend. Larger: as above, in long bends most.
+# s: how long the scale error lasts: a wheel is smaller during a whole bend. Larger: measured speeds count for less,
+# most in long bends.
 SPEED_SCALE_S = 40.0
-# s: delay that speed may have. Larger: it counts for less while speeding up and braking.
+# s: possible delay of the speed. Larger: it counts for less during acceleration and braking.
 _MEASURED_SPEED_LATE_S = const(1.0)
-# s: shorter after one measured speed the next is not used, so that straights count between them. Larger: older speeds.
+# s: least time between two used speeds, so that straights count between them. Larger: the used speeds are older.
 MEASURED_SPEED_EVERY_S = 0.3
 
-# ratio: standard deviation of the lean's errors over that of the covariance. The noises above are wide, because
-# disturbances last, and the lean is nearer than they say: on simulated rides of both simulators, even seeds, two thirds
-# of the errors are within this share. Larger: the stated sigma is larger. The lean stays.
+# ratio: standard deviation of the lean's errors over that of the covariance. The noises above are set wide, because
+# disturbances last, so the covariance is too large. On rides of both simulators, even seeds, two thirds of the errors
+# are within this share. Larger: the stated sigma is larger. The lean does not change.
 SIGMA_SHARE = 0.46
 
 # Assumptions that take the place of measurements
 SIGMA_SLOPE = radians(1.6)  # rad: slopes of roads. Larger: slopes are followed better, bends are found less well.
-_SLOPE_S = const(3.0)  # s: how long a slope lasts; fitted, real ones last longer. Larger: as for SIGMA_SLOPE.
-# rad: a pitch of this counts half as much as a level one, a pitch of twice this a fifth. Larger: wheelies are mistaken
+_SLOPE_S = const(3.0)  # s: how long a slope lasts. Fitted: real slopes last longer. Larger: bends are found less well.
+# rad: at this pitch the level road has half its weight, at twice this pitch a fifth. Larger: wheelies are mistaken
 # for slopes.
 STEEP = radians(6.0)
 # The bike rides straight where lean and yaw rate are under the first two of these and the speed is over the third.
 STRAIGHT_MAX_LEAN = radians(8.0)  # rad. Larger: the lean of wide turns is drawn towards upright.
 STRAIGHT_MAX_RATE = radians(2.5)  # rad/s, about the vertical. Larger: the lean of slow turns is drawn towards upright.
-STRAIGHT_MIN_SPEED = 4.0  # m/s. Larger: drift on slow straights is not taken off.
-SIGMA_STRAIGHT = radians(0.8)  # rad: lean on straights, by wind and camber. Larger: drift is taken off later.
-_STRAIGHT_S = const(3.0)  # s: how long such a lean lasts. Larger: drift is taken off later.
+STRAIGHT_MIN_SPEED = 4.0  # m/s. Larger: drift on slow straights is not removed.
+SIGMA_STRAIGHT = radians(0.8)  # rad: lean on straights, by wind and camber. Larger: drift is removed later.
+_STRAIGHT_S = const(3.0)  # s: how long such a lean lasts. Larger: drift is removed later.
 _SIGMA_PRIOR_SPEED = const(20.0)  # m/s: speed less PRIOR_SPEED. Larger: less pull towards PRIOR_SPEED.
 _PRIOR_SPEED_S = const(60.0)  # s: how long a speed lasts. Larger: less pull towards PRIOR_SPEED.
 
@@ -122,18 +123,18 @@ _PRIOR_SPEED_S = const(60.0)  # s: how long a speed lasts. Larger: less pull tow
 SIGMA_STAND = radians(0.5)  # rad: lean and pitch by the force on coming to rest. Larger: later forces count more.
 SIGMA_REST_RATE = radians(0.1)  # rad/s: rates of a bike that feet hold. Larger: bias is found later.
 _SIGMA_REST_FORCE = const(0.02)  # g: force at rest, with the engine idling. Larger: lean settles later.
-# ratio: weight of a window in the mean magnitude of the force at rest. Larger: it is found sooner, and less steady.
+# ratio: weight of a window in the mean magnitude of the force at rest. Larger: the mean is found sooner, and varies
+# more.
 REST_FORCE_SHARE = 0.1
 SIGMA_REST_SPEED = 0.02  # m/s: speed at rest, measured as 0. Larger: speed is drawn to 0 less.
 # g: limit of the forward force that pitch does not explain; more is braking. Larger: steady braking is mistaken for
 # rest.
 MAX_REST_PUSH = 0.08
-# The bike surely rolls where the estimated speed is above both: this one, and that times its standard deviation.
-# Larger: a smooth road is mistaken for rest.
+# The bike certainly rolls if the estimated speed is above both of these. Larger: a smooth road is mistaken for rest.
 ROLLING_SPEED = 3.0  # m/s
-ROLLING_SIGMAS = 3.0  # standard deviations
-# The trim is measured while speed and lean have smaller standard deviations than these. Larger: it is found sooner,
-# and less exact.
+ROLLING_SIGMAS = 3.0  # standard deviations of the speed
+# The trim is measured while the standard deviations of speed and lean are below these. Larger: it is found sooner, but
+# less exactly.
 SIGMA_TRIM_SPEED = 8.0  # m/s
 SIGMA_TRIM_LEAN = radians(1.4)  # rad
 
@@ -165,14 +166,14 @@ def forces(model, means, roll_acceleration, force_error, dive=0.0):
     uncertain = _SIGMA_ROLL_HEIGHT_M * rolling
     left = means[0]
     shaken = max(0.0, means[8] - left * left)
-    # Where the springs pitch the bike its wheels do not rise: v times that pitch rate is no acceleration. dive is the
-    # part of it that braking explains, (8); the rest is noise.
+    # If the springs pitch the bike, its wheels do not rise: v times that pitch rate is not an acceleration. dive is the
+    # part of it that braking explains, (8). The rest is noise.
     pitching = _PITCHING_SHARE * model.pitching
     sideways = pitching * model.sin_lean
     left_variance = _SIGMA_LEFT**2 + _SHAKEN_SHARE * shaken + uncertain**2 + sideways * sideways
     left += _ROLL_HEIGHT_M * rolling * model.cos_lean + dive * model.sin_lean
-    # In a held turn the upward force, 1 / cos(lean), makes the lean observable whatever the gyro's scale factor. One
-    # window tells little, a minute tells much, as long as no error of this force keeps its sign.
+    # In a held turn the upward force, 1 / cos(lean), makes the lean observable without the gyro's scale factor. One
+    # window says little, but a minute says much, unless an error of this force keeps its sign.
     square = means[4] * means[4] / STANDARD_GRAVITY
     up = means[1] + _ROLL_HEIGHT_M * square - force_error * means[6] + dive * model.cos_lean
     up_variance = (

@@ -9,15 +9,15 @@ from .lean_filter import DELAY_S, LeanFilter
 from .measurements import SIGMA_SHARE, gyro_variances
 
 _SMOOTH_US = const(300_000)  # time constant of smooth_force
-# A lean less certain than this (1.4 degrees) is not shown. The share: of what the covariance says
+# A lean with a larger variance is not shown. Standard deviation: 1.4 degrees, SIGMA_SHARE of the covariance's 3.
 MAX_VARIANCE = (SIGMA_SHARE * radians(3.0)) ** 2
-DOUBTED_VARIANCE = (SIGMA_SHARE * radians(2.0)) ** 2  # the same after they did not fit again and again
+DOUBTED_VARIANCE = (SIGMA_SHARE * radians(2.0)) ** 2  # the same after repeated misfits
 TRIM_MAX_VARIANCE = radians(0.5) ** 2  # a trim less certain than this is not kept
 _TRIM_STEP_DEG = const(0.3)  # a smaller change of the trim is not saved: flash wears
 FALLEN_DEG = 65.0  # the bike has fallen after _FALLEN_US of at least this lean
 _FALLEN_US = const(1_000_000)
-HELD_US = 75_000  # a maximum lasts twice as long: a pothole jerks the sensor for less
-_WHEELIE_DEG = const(20.0)  # pitch: no road is as steep, and with a wheel in the air the filter's equations do not hold
+HELD_US = 75_000  # a maximum must last twice as long, because a pothole jerks the sensor for a shorter time
+_WHEELIE_DEG = const(20.0)  # pitch. No road is so steep, and the filter's equations do not hold in a wheelie.
 
 
 class LeanMeter:
@@ -32,7 +32,7 @@ class LeanMeter:
     def __init__(self, calibration, leans=True, delay_s=DELAY_S):
         self._leans = leans
         self._delay_s = delay_s
-        # lists: on a board reading an array's element takes heap, reading a list's does not
+        # Lists, because on a board reading an element of an array takes heap
         self.force = [0.0] * 3
         self.rate = [0.0] * 3
         self.smooth_force = [0.0] * 3

@@ -4,15 +4,16 @@ averages out."""
 from ..units import const
 
 # Symbol = default  # unit: what it is. "Larger:" says what raising it does.
-# Deviation of a window's mean from the recent average: of forces, and of rates. Larger: smooth roads are mistaken for
-# rest.
+# Largest deviation of a window's mean from the recent average, for forces and for rates. Larger: smooth roads are
+# mistaken for rest.
 _MAX_FORCE_G = const(0.010)  # g
 _MAX_RATE_RADPS = const(0.009)  # rad/s (0.5 deg/s)
 MAX_BIAS_RADPS = 0.02  # rad/s (1.2 deg/s): mean rate that may be bias. Larger: smooth turns are mistaken for rest.
-# rad/s: the same limit before the first rest, since the bias has drifted since the calibration. Larger: the same.
+# rad/s: the same limit before the first rest, because the bias has drifted since the calibration. Larger: more turns
+# are mistaken for rest.
 _MAX_FIRST_BIAS_RADPS = const(0.1)
-_REST_S = const(1.5)  # s: stillness that is rest. Larger: rest is detected later, and more surely.
-_REST_ROLLING_S = const(10.0)  # s: the same where the bike seems to move or to brake: no road is smooth for so long.
+_REST_S = const(1.5)  # s: stillness for this time is rest. Larger: rest is detected later and more reliably.
+_REST_ROLLING_S = const(10.0)  # s: the same if the bike seems to move or brake: no road is smooth for so long.
 _AVERAGE_S = const(0.5)  # s: time constant of the recent average. Larger: rest is detected later after a movement.
 
 
@@ -27,20 +28,20 @@ class RestDetector:
         self.resting = False
         self._still_s = 0.0
         self._not_rolling_s = 0.0  # stillness without a sign of moving
-        self._average = None  # rates without the estimated bias taken off, and forces
+        self._average = None  # of the rates, before the estimated bias is subtracted, and of the forces
         self._max_bias = _MAX_FIRST_BIAS_RADPS if first else MAX_BIAS_RADPS
 
     def update(self, rates, force, bias, seconds, rolling=False, moving=False):
         """Take the means over a window of `seconds`: rates (rad/s) less the estimated bias, that bias (rad/s), and
-        force (g). rolling: other evidence shows that the bike moves. moving: a measured
-        speed shows it: the bike is certainly not at rest."""
+        force (g). rolling: other evidence shows that the bike moves. moving: a measured speed shows that the bike is
+        certainly not at rest."""
         readings = [rates[i] + bias[i] for i in range(3)] + force
         if self._average is None:
             self._average = readings
         average = self._average
         gain = min(1.0, seconds / _AVERAGE_S)
-        # The average rate must be small with the estimated bias taken off, or with the calibrated one alone: else an
-        # estimate that went astray, as in the hand, would never be put right.
+        # The average rate must be small after subtracting the estimated bias or only the calibrated one. Otherwise a
+        # wrong estimate, as after moving the sensor by hand, would never be corrected.
         still = near_estimate = near_calibration = True
         for i in range(6):
             deviation = readings[i] - average[i]
@@ -53,7 +54,7 @@ class RestDetector:
                 still = still and abs(deviation) < _MAX_FORCE_G
         still = still and (near_estimate or near_calibration) and not moving
         self._still_s = self._still_s + seconds if still else 0.0
-        # A second timer: steady braking looks still, and must not count as rest the moment the estimated speed gets low
+        # A second timer, because steady braking looks still. It must not be rest as soon as the estimated speed is low.
         self._not_rolling_s = self._not_rolling_s + seconds if still and not rolling else 0.0
         self.resting = self._not_rolling_s >= _REST_S or self._still_s >= _REST_ROLLING_S
         if self.resting:
