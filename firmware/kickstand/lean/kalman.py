@@ -16,16 +16,20 @@ _TERMS_PER_STEP = const(3)  # terms of a Jacobian's row between two yields: with
 _GATE = const(25.0)  # 5 sigma, squared. An innovation beyond it is not dropped, because the state may be what is wrong.
 
 
-def add_products_python(out, factors, source, rows, n):
-    """Add factors[i] * source[k] to out[i * n + k], for each i below rows and k below n.
+def add_products_python(out, factors, source, n, rows):
+    """Add factors[i] * source[k] to out[i * n + k], for i below rows and k below n.
 
-    All are arrays of floats. On the board, add_products() is the machine code of kalman_viper.py, for array('f');
-    elsewhere it is this function.
+    rows: 1, or n for a symmetric matrix: then only half of it is computed, and copied to the other half. All others are
+    arrays of floats. On the board, add_products() is the machine code of kalman_viper.py, for array("f"); elsewhere it
+    is this function.
     """
     for i in range(rows):
         factor = factors[i]
-        for k in range(n):
-            out[i * n + k] += factor * source[k]
+        for k in range(i + 1 if rows > 1 else n):
+            value = out[i * n + k] + factor * source[k]
+            out[i * n + k] = value
+            if rows > 1:
+                out[k * n + i] = value
 
 
 try:
@@ -33,10 +37,10 @@ try:
 except NO_MACHINE_CODE:
     add_products = add_products_python
 else:
-    # Sums that grow, shrink, vanish, change their sign and are rounded
-    _OUT = array("f", (0.0, 0.7, -2.5, 1e-9, -0.75, 8388609.0, 4.0, -3e9))
-    _SOURCE = array("f", (1.5, -0.001953125, 1677721.0, -1e-7))
-    add_products = checked(add_products, add_products_python, _OUT, array("f", (0.5, -2.6875)), _SOURCE, 2, 4)
+    # Sums that grow, vanish, change their sign and are rounded; their products are exact in 32 bits
+    _TRIAL = array("f", (0.65625, 0, 0, -0.75, 8388609, 0, 1e-9, 3e9, -0.984))
+    _FACTORS, _SOURCE = array("f", (1.5, -2.6875, 0.75)), array("f", (-0.4375, 98304.5, 1.3125))
+    add_products = checked(add_products, add_products_python, _TRIAL, _FACTORS, _SOURCE, 3, 3)
 _KIND = "d" if add_products is add_products_python else "f"  # of the arrays
 
 
@@ -54,7 +58,7 @@ class Covariance:
         self.rows = [every[n * i : n * (i + 1)] for i in range(n)]  # parts of _p
         for i, variance in enumerate(variances):
             self._p[i * n + i] = variance
-        self.correction, self._column, self._scaled, self._negative = [array(_KIND, self._zeros) for _ in range(4)]
+        self.correction, self._column, self._gain = [array(_KIND, self._zeros) for _ in range(3)]
         self._factor = array(_KIND, [0.0])
         self.misfit = 0.0  # see update()
 
@@ -69,28 +73,24 @@ class Covariance:
         """Add process noise to the variance of state i. For states that do not depend on others."""
         self._p[i * self.n + i] += variance
 
-    def _add(self, out, factor, source):
-        """out += factor * source, of n values each."""
-        self._factor[0] = factor
-        add_products(out, self._factor, source, 1, self.n)
-
     def propagate_row(self, i, derivatives, seconds, noise):
         """Compute P = F P F^T for one row of F, plus process noise. A generator.
 
         derivatives: of state i's rate of change, ((j, d rate_i / d state_j), ...) with j other than i. seconds: length
         of the step. noise: added to state i's variance.
         """
-        rows = self.rows
+        rows, factor, n = self.rows, self._factor, self.n
         row = rows[i]
         for m, (j, a) in enumerate(derivatives):
             if m == _TERMS_PER_STEP:
                 yield
-            self._add(row, a * seconds, rows[j])
+            factor[0] = a * seconds
+            add_products(row, factor, rows[j], n, 1)
         variance = row[i] + noise
         for j, a in derivatives:
             variance += a * seconds * row[j]
         row[i] = variance
-        for k in range(self.n):
+        for k in range(n):
             rows[k][i] = row[k]  # P is symmetric
         yield
 
@@ -102,31 +102,29 @@ class Covariance:
         innovation's variance is raised until the innovation equals it. misfit is then the innovation in standard
         deviations.
         """
-        p, rows, column, correction = self._p, self.rows, self._column, self.correction
-        n = self.n
+        p, rows, column, gain, factor = self._p, self.rows, self._column, self._gain, self._factor
+        correction, n = self.correction, self.n
         column[:] = self._zeros
         for m, (j, h) in enumerate(derivatives):
             if m == _TERMS_PER_STEP:
                 yield
-            self._add(column, h, rows[j])
+            factor[0] = h
+            add_products(column, factor, rows[j], n, 1)
         expected = variance
         for j, h in derivatives:
             expected += h * column[j]
             innovation -= h * correction[j]
         square = innovation * innovation
-        sigma = sqrt(expected)
-        self.misfit = innovation / sigma
+        self.misfit = innovation / sqrt(expected)
         if square > _GATE * expected:
             expected = square / _GATE
-            sigma = sqrt(expected)
-        self._add(correction, innovation / expected, column)
+        factor[0] = innovation / expected
+        add_products(correction, factor, column, n, 1)
         yield
-        # K H P = (P H^T / sigma) (P H^T / sigma)^T: a product that is symmetric to the last digit
-        scaled, negative = self._scaled, self._negative
-        scaled[:] = negative[:] = self._zeros
-        self._add(scaled, 1.0 / sigma, column)
-        self._add(negative, -1.0 / sigma, column)
-        add_products(p, negative, scaled, n, n)
+        gain[:] = self._zeros
+        factor[0] = -1.0 / expected
+        add_products(gain, factor, column, n, 1)
+        add_products(p, gain, column, n, n)
         yield
         for i in range(0, n * n, n + 1):
             if p[i] < _MIN_VARIANCE:

@@ -9,52 +9,59 @@ import micropython
 
 
 @micropython.viper
-def add_products(out: ptr32, factors: ptr32, source: ptr32, rows: int, n: int):  # noqa: F821 the names are viper's
-    not_a_number = 0 - 1  # all bits are 1
-    at = 0
+def add_products(out: ptr32, factors: ptr32, source: ptr32, n: int, rows: int):  # noqa: F821 the names are viper's
     for i in range(rows):
         a = factors[i]
         a_exponent = (a >> 23) & 255
+        if a_exponent == 0:
+            continue
+        if a_exponent == 255:
+            a_exponent = 1024  # whatever it is multiplied by
+        a_exponent -= 126
         a_high = ((a >> 12) & 0x7FF) | 0x800  # the mantissa in halves of 12 bits: a product must fit in 31 bits
         a_low = a & 0xFFF
-        for k in range(n):
+        at = i * n
+        for k in range(i + 1 if rows > 1 else n):
             b = source[k]
-            c = out[at]
             exponent = (b >> 23) & 255
-            c_exponent = (c >> 23) & 255
-            if a_exponent == 255 or exponent == 255 or c_exponent == 255:
-                out[at] = not_a_number
-            elif a_exponent and exponent:
-                # Mantissas have 30 bits from here on: six more than a float's, and that of the product begins with 01
-                # or 1. The value of both is mantissa x 2^(exponent - 156).
-                exponent += a_exponent - 126
+            if exponent:
+                # Mantissas have 30 bits from here on: six more than a float's. That of the product begins with 01 or 1.
+                # A value is mantissa x 2^(exponent - 156).
+                if exponent == 255:
+                    exponent = 1024
+                exponent += a_exponent
                 high = ((b >> 12) & 0x7FF) | 0x800
                 low = b & 0xFFF
                 value = (a_high * high << 6) + ((a_high * low + a_low * high + (a_low * low >> 12)) >> 6)
-                if ((a ^ b) >> 31) & 1:
+                if (a ^ b) >> 31:
                     value = 0 - value
-                shift = c_exponent - exponent
+                c = out[at]
+                shift = ((c >> 23) & 255) - exponent
                 if shift > 0:
-                    exponent = c_exponent
+                    exponent += shift
                     value >>= shift if shift < 31 else 31
                     shift = 0
-                if c_exponent and shift > -31:
-                    low = ((c & 0x7FFFFF) | 0x800000) << 6 >> (0 - shift)
-                    value += 0 - low if (c >> 31) & 1 else low
-                sign = 0
-                if value < 0:
-                    value = 0 - value
-                    sign = 1
-                if value >> 30:
-                    value >>= 1
-                    exponent += 1
-                while value and value < 0x20000000:
-                    value <<= 1
-                    exponent -= 1
-                if value == 0 or exponent <= 0:
-                    out[at] = 0
-                elif exponent > 254:
-                    out[at] = not_a_number
-                else:
-                    out[at] = sign << 31 | (exponent << 23) + ((value + 32) >> 6) - 0x800000
+                if shift > -31 and exponent + shift:
+                    low = (((c & 0x7FFFFF) | 0x800000) << 6) >> (0 - shift)
+                    value += 0 - low if c >> 31 else low
+                if value:
+                    sign = 0
+                    if value < 0:
+                        value = 0 - value
+                        sign = 1
+                    if value >> 30:
+                        value >>= 1
+                        exponent += 1
+                    while value < 0x20000000:
+                        value <<= 1
+                        exponent -= 1
+                    if exponent > 254:
+                        value = 0 - 1  # not-a-number: all bits are 1
+                    elif exponent > 0:
+                        value = sign << 31 | (exponent << 23) + ((value + 32) >> 6) - 0x800000
+                    else:
+                        value = 0
+                out[at] = value
+                if rows > 1:
+                    out[k * n + i] = value
             at += 1
