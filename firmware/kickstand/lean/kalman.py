@@ -55,7 +55,8 @@ class Covariance:
         self._zeros = array(_KIND, [0.0] * n)
         self._p = array(_KIND, [0.0] * n * n)
         every = memoryview(self._p)
-        self.rows = [every[n * i : n * (i + 1)] for i in range(n)]  # parts of _p
+        # Parts of _p. The type checker takes the elements of a memoryview for integers.
+        self.rows = [every[n * i : n * (i + 1)] for i in range(n)]  # type: list
         for i, variance in enumerate(variances):
             self._p[i * n + i] = variance
         self.correction, self._column, self._gain = [array(_KIND, self._zeros) for _ in range(3)]
