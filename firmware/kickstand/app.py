@@ -26,9 +26,10 @@ from .ui.screen import Screen
 from .units import const
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
-_COLLECT_TURNS = const(42)  # turns between two garbage collections: they use 90 KB of heap, of 120 free while recording
+_COLLECT_TURNS = const(40)  # turns between two garbage collections: they use 80 KB of heap, of 105 free while recording
 # The same while aligning by driving, with an OLED, a phone or user.py: 80 KB are free
 _COLLECT_TURNS_DRIVING = const(23)
+_PLAN_EVERY = const(4)  # collections between two looks at the free heap, which take 3 ms on an ESP32
 SINGLE_GAPS = 300  # single free heap blocks that a collection leaves
 _PAGE_MS = const(100)
 # A page shows no lean if its own delay and the age of the readings still in the FIFO add up to more: so a lean on the
@@ -129,7 +130,8 @@ class App:
         self._watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
         gc.threshold(-1)
         self._due_us = ticks_us()
-        self._turns_left = self._turns_to_collect()
+        self._planned_turns = self._turns_left = self._turns_to_collect()
+        self._collections = 0
 
     def step(self):
         """One pass of the loop, LOOP_US long: turn(), collect garbage if it is time, feed the watchdog, wait."""
@@ -138,7 +140,10 @@ class App:
         if self._turns_left <= 0:  # here, not in the middle of a sample: the FIFO keeps the samples meanwhile
             gc.collect()
             fill_gaps(SINGLE_GAPS)
-            self._turns_left = self._turns_to_collect()
+            self._collections += 1
+            if self._collections % _PLAN_EVERY == 0:
+                self._planned_turns = self._turns_to_collect()
+            self._turns_left = self._planned_turns
             if self.user:
                 self.user.check_memory()
         if self._watchdog:

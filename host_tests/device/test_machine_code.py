@@ -14,8 +14,10 @@ from support import emulated
 _CHOSEN = """
 from kickstand.calibration import transform
 from kickstand.imu import fifo_frames
+from kickstand.lean import kalman
 from kickstand.rides import block
-for module, name in (fifo_frames, "decode"), (fifo_frames, "add_up"), (transform, "products"), (block, "encode"):
+PAIRS = (fifo_frames, "decode"), (fifo_frames, "add_up"), (transform, "products"), (block, "encode")
+for module, name in PAIRS + ((kalman, "add_products"),):
     plain = getattr(module, name + "_python")
     print(name, "plain" if getattr(module, name) is plain else "quick")
 """
@@ -25,6 +27,7 @@ MISTAKES = {
     ("imu/fifo_frames_viper.py", "add_up"): ("value > 32767", "value > 32768"),
     ("calibration/transform_viper.py", "products"): ("matrices[at + 2] * z", "matrices[at + 2] * (z & 0x1FFFF)"),
     ("rides/block_viper.py", "encode"): ("guess * n // before", "guess // before * n"),
+    ("lean/kalman_viper.py", "add_products"): ("value += 0 - low", "value -= 0 - low"),
 }
 NAMES = [name for _, name in MISTAKES]
 
@@ -80,6 +83,7 @@ def test_wrong_machine_code_is_not_used(tmp_path, path, name):
         ("imu/fifo_frames_viper.py", 'MemoryError("no memory to run it from")'),
         ("calibration/transform_viper.py", 'ValueError("incompatible .mpy arch")'),
         ("rides/block_viper.py", 'MemoryError("no memory to run it from")'),
+        ("lean/kalman_viper.py", 'MemoryError("no memory to run it from")'),
     ],
 )
 def test_machine_code_that_cannot_be_loaded_is_not_used(tmp_path, path, error):

@@ -1,8 +1,11 @@
-"""The covariance's sparse arithmetic against the textbook's matrices."""
+"""The covariance's sparse arithmetic against the textbook's matrices, and its machine code against exact sums."""
+
+from math import inf, isnan, nan
 
 import numpy as np
 import pytest
 from kickstand.lean.kalman import Covariance
+from support.mpy import run_mpy
 
 N = 12
 RATES = [(2, 0.7), (4, -1.3), (0, 0.2), (11, 2.1), (7, -0.4)]  # of state 5, by others
@@ -87,3 +90,57 @@ def test_noise_is_added_to_one_state():
     p.add_noise(3, 0.25)
     matrix[3, 3] += 0.25
     np.testing.assert_allclose(p.rows, matrix, rtol=0, atol=1e-12)
+
+
+def added(cases):
+    """What the machine code makes of each case: out, factors, source and rows."""
+    script = (
+        "from array import array\n"
+        "from math import inf, nan\n"
+        "from kickstand.lean.kalman_viper import add_products\n"
+        f"for out, factors, source, rows in {cases}:\n"
+        "    out = array('f', out)\n"
+        "    add_products(out, array('f', factors), array('f', source), len(source), rows)\n"
+        "    print(list(out))\n"
+    )
+    return [eval(line, {"inf": inf, "nan": nan}) for line in run_mpy(script).splitlines()]
+
+
+@pytest.mark.parametrize("decades", [0, 3, 12])
+def test_machine_code_rounds_a_sum_once(decades):
+    """To the nearest float, within what 30 bits of the larger term leave open."""
+    chance = np.random.default_rng(decades)
+    size = chance.normal(size=(3, 400)) * 10.0 ** chance.uniform(-decades, decades, (3, 400))
+    size[0, ::3] = -size[1, ::3] * size[2, ::3] * (1.0 + 1e-3 * chance.normal(size=134))  # nearly cancelled
+    out, factors, source = size.astype(np.float32).astype(float)
+    found = np.array(added([([c], [a], [b], 1) for c, a, b in size.astype(np.float32).T.tolist()]))
+    exact = out + factors * source
+    finest = np.maximum(np.abs(out), np.abs(factors * source)) * 2.0**-28
+    assert np.all(np.abs(found[:, 0] - exact) <= np.spacing(np.abs(exact).astype(np.float32)) / 2 + finest)
+
+
+def test_machine_code_keeps_a_matrix_symmetric():
+    chance = np.random.default_rng(1)
+    p, gain, column = (chance.normal(size=n).astype(np.float32).astype(float) for n in (N * N, N, N))
+    p = np.tril(p.reshape(N, N)) + np.tril(p.reshape(N, N), -1).T
+    found = np.reshape(added([(p.ravel().tolist(), gain.tolist(), column.tolist(), N)])[0], (N, N))
+    np.testing.assert_array_equal(found, found.T)
+    np.testing.assert_allclose(np.tril(found), np.tril(p + np.outer(gain, column)), rtol=0, atol=1e-6)
+
+
+def test_machine_code_at_the_ends_of_the_range():
+    """What is too small counts as 0; what is too large, infinite or not a number makes the sum not-a-number."""
+    cases = {
+        (0.0, 1e-30, 1e-30): 0.0,
+        (2.5, 1e-30, 1e-30): 2.5,
+        (2.5, 0.0, 3e38): 2.5,
+        (2.5, 3e38, 0.0): 2.5,
+        (1e-40, 0.5, 2.0): 1.0,
+        (1.5, -3.0, 0.5): 0.0,
+        (3e38, 1e-3, 1e-3): float(np.float32(3e38)),
+        (1e-3, 1e30, 1e-30): float(np.float32(1e-3) + np.float32(1e30) * np.float32(1e-30)),
+    }
+    found = [out[0] for out in added([([c], [a], [b], 1) for c, a, b in cases])]
+    np.testing.assert_allclose(found, list(cases.values()), rtol=1e-7)
+    wrong = [(0.0, 1e30, 1e30), (3e38, 1e19, 1e19), (nan, 0.5, 0.5), (1.0, nan, 0.1), (1.0, 0.1, nan), (-inf, 1.0, 1.0)]
+    assert all(isnan(out[0]) for out in added([([c], [a], [b], 1) for c, a, b in wrong]))

@@ -50,7 +50,7 @@ if not _KNOWN:  # these pins may be missing or used otherwise on the board
 
 
 _SOFT_I2C_HZ = 250_000  # half a period of 2 us: at 400 kHz SoftI2C has 1 us, but the MPU6050 needs 1.3
-_TURN_BYTES = 2800  # bytes of heap used by one pass of the app's loop
+_TURN_BYTES = 2000  # bytes of heap used by one pass of the app's loop; 3000 while aligning by driving
 _FEWEST_TURNS = 3
 
 _WATCHDOG_MS = 8000  # rp2 allows 8388 at most

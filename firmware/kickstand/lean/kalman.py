@@ -1,45 +1,78 @@
 """The covariance of a Kalman filter, updated in steps short enough for the time of one sample.
 
-Matrices are lists of lists of floats, not arrays: on a board, reading an element of an array takes heap. The long
-methods are generators, which yield where the work may be interrupted. Rows of Jacobians are written as ((state, value),
-...), because most of their values are zero.
+Nearly all of the work is sums of products. On a board a product of floats takes 12 us and 32 bytes of heap. There,
+machine code computes these sums on arrays, without heap. The long methods are generators, which yield where the work
+may be interrupted. Rows of Jacobians are written as ((state, value), ...), because most of their values are zero.
 """
 
+from array import array
 from math import sqrt
 
+from ..errors import NO_MACHINE_CODE, checked
 from ..units import const
 
 _MIN_VARIANCE = const(1e-10)  # rounding in 32-bit floats could make a variance negative
-# How much is done between two yields: about a millisecond on an RP2040
-_TERMS_PER_STEP = const(3)  # terms of a Jacobian's row
-_ROWS_PER_STEP = const(8)  # rows of the covariance's triangle: the first eight of twelve are half of the work
+_TERMS_PER_STEP = const(3)  # terms of a Jacobian's row between two yields: without machine code they take a millisecond
 _GATE = const(25.0)  # 5 sigma, squared. An innovation beyond it is not dropped, because the state may be what is wrong.
+
+
+def add_products_python(out, factors, source, n, rows):
+    """Add factors[i] * source[k] to out[i * n + k], for i below rows and k below n.
+
+    rows: 1, or n for a symmetric matrix: then only half of it is computed, and copied to the other half. All others are
+    arrays of floats. On the board, add_products() is the machine code of kalman_viper.py, for array("f"); elsewhere it
+    is this function.
+    """
+    for i in range(rows):
+        factor = factors[i]
+        for k in range(i + 1 if rows > 1 else n):
+            value = out[i * n + k] + factor * source[k]
+            out[i * n + k] = value
+            if rows > 1:
+                out[k * n + i] = value
+
+
+try:
+    from .kalman_viper import add_products
+except NO_MACHINE_CODE:
+    add_products = add_products_python
+else:
+    # Sums that grow, vanish, change their sign and are rounded; their products are exact in 32 bits
+    _TRIAL = array("f", (0.65625, 0, 0, -0.75, 8388609, 0, 1e-9, 3e9, -0.984))
+    _FACTORS, _SOURCE = array("f", (1.5, -2.6875, 0.75)), array("f", (-0.4375, 98304.5, 1.3125))
+    add_products = checked(add_products, add_products_python, _TRIAL, _FACTORS, _SOURCE, 3, 3)
+_KIND = "d" if add_products is add_products_python else "f"  # of the arrays
 
 
 class Covariance:
     """P, the covariance of n states, and the correction of these states by measurements.
 
-    variances: n initial variances, uncorrelated.
+    variances: n initial variances, uncorrelated. rows: P, n rows of n floats; correction: n floats.
     """
 
     def __init__(self, variances):
-        self.n = len(variances)
-        self.rows = [[0.0] * self.n for _ in variances]
+        n = self.n = len(variances)
+        self._zeros = array(_KIND, [0.0] * n)
+        self._p = array(_KIND, [0.0] * n * n)
+        every = memoryview(self._p)
+        # Parts of _p. The type checker takes the elements of a memoryview for integers.
+        self.rows = [every[n * i : n * (i + 1)] for i in range(n)]  # type: list
         for i, variance in enumerate(variances):
-            self.rows[i][i] = variance
-        self.correction = [0.0] * self.n
-        self._column = [0.0] * self.n
+            self._p[i * n + i] = variance
+        self.correction, self._column, self._gain = [array(_KIND, self._zeros) for _ in range(3)]
+        self._factor = array(_KIND, [0.0])
         self.misfit = 0.0  # see update()
 
     def set_variance(self, i, variance):
         """Set the variance of state i, and its covariances with the other states to 0."""
-        for k in range(self.n):
-            self.rows[i][k] = self.rows[k][i] = 0.0
-        self.rows[i][i] = variance
+        p, n = self._p, self.n
+        for k in range(n):
+            p[i * n + k] = p[k * n + i] = 0.0
+        p[i * n + i] = variance
 
     def add_noise(self, i, variance):
         """Add process noise to the variance of state i. For states that do not depend on others."""
-        self.rows[i][i] += variance
+        self._p[i * self.n + i] += variance
 
     def propagate_row(self, i, derivatives, seconds, noise):
         """Compute P = F P F^T for one row of F, plus process noise. A generator.
@@ -47,20 +80,18 @@ class Covariance:
         derivatives: of state i's rate of change, ((j, d rate_i / d state_j), ...) with j other than i. seconds: length
         of the step. noise: added to state i's variance.
         """
-        rows = self.rows
+        rows, factor, n = self.rows, self._factor, self.n
         row = rows[i]
         for m, (j, a) in enumerate(derivatives):
             if m == _TERMS_PER_STEP:
                 yield
-            a *= seconds
-            source = rows[j]
-            for k in range(self.n):
-                row[k] += a * source[k]
+            factor[0] = a * seconds
+            add_products(row, factor, rows[j], n, 1)
         variance = row[i] + noise
         for j, a in derivatives:
             variance += a * seconds * row[j]
         row[i] = variance
-        for k in range(self.n):
+        for k in range(n):
             rows[k][i] = row[k]  # P is symmetric
         yield
 
@@ -72,18 +103,14 @@ class Covariance:
         innovation's variance is raised until the innovation equals it. misfit is then the innovation in standard
         deviations.
         """
-        rows, column, correction = self.rows, self._column, self.correction
-        n = self.n
-        j, h = derivatives[0]
-        for i in range(n):
-            column[i] = h * rows[j][i]
-        for m in range(1, len(derivatives)):
+        p, rows, column, gain, factor = self._p, self.rows, self._column, self._gain, self._factor
+        correction, n = self.correction, self.n
+        column[:] = self._zeros
+        for m, (j, h) in enumerate(derivatives):
             if m == _TERMS_PER_STEP:
                 yield
-            j, h = derivatives[m]
-            row = rows[j]
-            for i in range(n):
-                column[i] += h * row[i]
+            factor[0] = h
+            add_products(column, factor, rows[j], n, 1)
         expected = variance
         for j, h in derivatives:
             expected += h * column[j]
@@ -92,19 +119,17 @@ class Covariance:
         self.misfit = innovation / sqrt(expected)
         if square > _GATE * expected:
             expected = square / _GATE
-        innovation /= expected
-        for i in range(n):
-            correction[i] += column[i] * innovation
+        factor[0] = innovation / expected
+        add_products(correction, factor, column, n, 1)
         yield
-        for i in range(n):
-            gain = column[i] / expected
-            row = rows[i]
-            for j in range(i + 1):
-                rows[j][i] = row[j] = row[j] - gain * column[j]
-            if row[i] < _MIN_VARIANCE:
-                row[i] = _MIN_VARIANCE
-            if i == _ROWS_PER_STEP - 1:
-                yield
+        gain[:] = self._zeros
+        factor[0] = -1.0 / expected
+        add_products(gain, factor, column, n, 1)
+        add_products(p, gain, column, n, n)
+        yield
+        for i in range(0, n * n, n + 1):
+            if p[i] < _MIN_VARIANCE:
+                p[i] = _MIN_VARIANCE
         yield
 
     def take_correction(self, i):
