@@ -1,8 +1,9 @@
 """Estimates the errors of the aligned axes against the bike's own, from the ride itself.
 
-On a straight a balanced bike is upright: the mean force shows its own up, and so `roll`. Braking and speeding up on a
-straight push along its own forward, which shows `yaw`. From one standstill to another on level ground, speeding up and
-braking cancel out, which leaves `pitch`. At standstill the force is 1 g, which shows `gravity`.
+`roll`: on a straight a balanced bike is upright, so the mean force points along the bike's own up axis. `yaw`: braking
+and speeding up on a straight push along the bike's own forward axis. `pitch`: between two standstills on level ground,
+speeding up and braking cancel out, and the mean forward force that remains comes from pitch. `gravity`: at standstill
+the force must be 1 g.
 """
 
 from dataclasses import dataclass
@@ -13,16 +14,16 @@ from kickstand.lean.upright_trim import MAX_TRIM
 from ..signals import Array, Bools
 from .channels import Channels, spacing_s
 
-# The rms error of the shown lean caused by each error, measured with simulated rides and rotated calibrations. With a
-# yaw error, pitching looks like rolling: roll rate' = roll rate cos(yaw) + pitch rate sin(yaw), and the lean's error is
-# the bike's pitching times sin(yaw). With a pitch error, yawing looks like rolling in the same way; the filter corrects
-# most of that. A roll error adds to the lean, but riding corrects up to MAX_TRIM of it.
-YAW_COSTS_DEG, PITCH_COSTS_DEG = 3.0, 5.0  # rms error of the lean, over the sine of that error
+# The rms error of the shown lean caused by each error, measured with simulated rides and rotated calibrations. With
+# a yaw error, pitching looks like rolling: roll rate' = roll rate cos(yaw) + pitch rate sin(yaw), and the lean's error
+# is the bike's pitching times sin(yaw). With a pitch error, yawing looks like rolling in the same way; the filter
+# corrects most of that. A roll error adds to the lean, but riding corrects up to MAX_TRIM of it.
+YAW_COSTS_DEG, PITCH_COSTS_DEG = 3.0, 5.0  # rms error of the lean, divided by the sine of the angle
 
 SMOOTH_S = 0.5
 STRAIGHT_DPS, STRAIGHT_DEG = 2.0, 8.0  # riding straight: yaw rate and lean are smaller
 ENOUGH_S = 10.0  # least time of riding straight
-LEVEL_S = 60.0  # least time of riding in which hills even out
+LEVEL_S = 60.0  # over this time of riding, hills even out
 ENOUGH_G = 0.05  # least rms of braking and speeding up on straights
 
 
@@ -90,7 +91,7 @@ def quality(ride: Channels, standing: Bools) -> Quality:
     still = means(standing.astype(float)) == 1.0
     static = np.degrees(np.arctan2(left, up))
     ahead = moving & (np.abs(yaw_rate) < STRAIGHT_DPS)
-    usual = float(np.median(static[ahead])) if np.any(ahead) else 0.0  # when upright, for any error of "up"
+    usual = float(np.median(static[ahead])) if np.any(ahead) else 0.0  # the upright lean, even if "up" is wrong
     straight = ahead & (np.abs(static - usual) < STRAIGHT_DEG)
     straight_s = float(np.count_nonzero(straight)) * n * step_s
     roll = pitch = yaw = None
