@@ -70,7 +70,7 @@ def test_times_are_read_as_seconds_minutes_and_hours(text, seconds):
 
 @pytest.mark.parametrize("text", ["", "early", "1:", ":30", "1:2:3:4", "1:-5", "1.5:00", "nan", "inf", "--5"])
 def test_invalid_time_is_refused_with_the_format(text):
-    with pytest.raises(click.UsageError, match="is no time: give seconds such as 60"):
+    with pytest.raises(click.UsageError, match="is not a time: give seconds such as 60"):
         TIME.convert(text, None, None)
 
 
