@@ -1,5 +1,5 @@
-// The map of a ride, linked with its charts. Plotly draws both. The page gives CHART_AXES, the names of the time axes
-of // the charts, and TILES: null, or where tiles of a map come from and what the map's origin is.
+// The map of a ride, linked with its charts. Plotly draws both. The page gives CHART_AXES, the names of the time axes of
+// the charts, and TILES: null, or where tiles of a map come from and what the map's origin is.
 const { map: MAP, axes: CHART_AXES, tiles: TILES } = JSON.parse(document.getElementById("map-data").textContent);
 if (finger) MAP.layout.dragmode = false;
 Plotly.newPlot("map", MAP.data, MAP.layout, { ...FEW, scrollZoom: true });

@@ -38,9 +38,9 @@ const OVER_TIME = ["left", "right", "speed", "to the left", "forward"];
   const chart = document.getElementById("chart"), tip = document.getElementById("tip");
   chart.on("plotly_hover", function ({ points, event, xvals }) {
     if (!event) return; // the mouse is over the map, and map.js shows the values
-    const empty = ({ y, data }) => y === null || !SAID[data.name] || (y === 0 && points.length > 1 && ["left",
-    "right"].includes(data.name)); const at = (point) => (xvals && OVER_TIME.includes(point.data.name) ? { ...point, x:
-    xvals[0] } : point); const said = points.flatMap((point) => (empty(point) ? [] : SAID[point.data.name](at(point))));
+    const empty = ({ y, data }) => y === null || !SAID[data.name] || (y === 0 && points.length > 1 && ["left", "right"].includes(data.name));
+    const at = (point) => (xvals && OVER_TIME.includes(point.data.name) ? { ...point, x: xvals[0] } : point);
+    const said = points.flatMap((point) => (empty(point) ? [] : SAID[point.data.name](at(point))));
     tip.textContent = [...new Set(said)].join(", ");
     tip.hidden = !said.length;
     const room = document.documentElement.clientWidth - tip.offsetWidth - 8;
