@@ -20,7 +20,7 @@ _AWAY_SILENT_S = 5.0  # longest silence of the board after such a pause
 
 
 class BrokenOff(Exception):
-    """The program has ended with an error, or has stopped printing. The text says which."""
+    """The program has ended with an error, or has stopped printing. The text gives the reason."""
 
 
 def lines(

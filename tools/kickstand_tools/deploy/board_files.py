@@ -1,4 +1,4 @@
-"""Lists a board's flash: its files with their hashes, its folders, its free flash blocks."""
+"""Lists the files on a board's flash with their hashes, its folders, and its free flash blocks."""
 
 import hashlib
 from dataclasses import dataclass

@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-PICO, ESP32 = 0x1306, 0x2B06  # sys.implementation._mpy of the images 1.23 to 1.29
+PICO, ESP32 = 0x1306, 0x2B06  # sys.implementation._mpy of MicroPython 1.23 to 1.29
 # mpy-cross's names of the machine codes 1, 2, ...
 _ARCHITECTURES = "x86 x64 armv6 armv6m armv7m armv7em armv7emsp armv7emdp xtensa xtensawin rv32imc rv64imc".split()
 

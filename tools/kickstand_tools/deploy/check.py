@@ -46,12 +46,12 @@ class Checked:
 
 
 def line(finding: Finding) -> str:
-    """A Finding as a line of text."""
+    """Format a Finding as a line of text."""
     return f"{finding.verdict:5}{finding.what:29}{finding.words}"
 
 
 def verdict(findings: list[Finding]) -> str:
-    """The last line of a check."""
+    """The last line of a check: the number of faults and their names."""
     faults = [one.what for one in findings if one.verdict in (LOOK, BAD)]
     count = sum(one.verdict != SKIPPED for one in findings)
     if not faults:

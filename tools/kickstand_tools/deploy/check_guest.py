@@ -285,8 +285,8 @@ def i2c(parts, transfers):
 
 
 def display(parts, rounds):
-    """(address or 0, True if it draws pictures, number of times it answered, number of times it was written to, wires
-    in words)."""
+    """(address or 0, True if the display draws pictures, acknowledged texts, written texts, fault of the wires in
+    words)."""
     from time import sleep_ms
 
     from kickstand.console import sentence

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from kickstand.settings import Settings
 
 
-# Modules of the standard library that MicroPython has on a Pico and an ESP32
+# Standard modules that MicroPython has on a Pico and on an ESP32
 _MODULES = set(
     "array asyncio binascii builtins cmath collections errno gc hashlib heapq io json math os platform random re "
     "select socket ssl struct sys time zlib __future__".split()

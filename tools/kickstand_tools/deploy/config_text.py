@@ -33,7 +33,7 @@ def decoded(data: bytes) -> str:
 
 
 def lines(text: str) -> list[str]:
-    """The lines as Python counts them. str.splitlines() would also split at a form feed or U+2028."""
+    """Split the text into lines as Python counts them. str.splitlines() would also split at a form feed or U+2028."""
     found = re.split(r"\r\n|\r|\n", text)
     return found if found[-1] else found[:-1]
 

@@ -114,7 +114,7 @@ class ConnectedBoard(SerialTransport):
         limits: list[Any] = [math.inf if limit is None else limit * self.slower for limit in (timeout, timeout_overall)]
         while not said.endswith(ending):
             now_s = time.monotonic()
-            # An emulator's pseudo-terminal may not report waiting bytes. Older versions of mpremote do not have is_pty.
+            # An emulator's pseudo-terminal may not report waiting bytes. Older versions of mpremote lack is_pty.
             if piece := serial.read(1) if getattr(self, "is_pty", False) or serial.inWaiting() > 0 else b"":
                 said += piece
                 self.heard = (self.heard + piece)[-_HEARD_BYTES:]
@@ -229,7 +229,7 @@ def ask(transport: SerialTransport, expression: str, *shapes: Any) -> Any:
 
 
 def literal(text: bytes, *shapes: Any) -> Any:
-    """The Python value that a line of a board's output represents.
+    """Convert a line of a board's output to the Python value that it represents.
 
     shapes: the allowed types. Each is a type, a tuple of the types of a tuple's values, or None for None. Numbers are
         integers >= 0. Raises InputError for other values, which can come from another device.

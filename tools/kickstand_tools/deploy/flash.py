@@ -152,7 +152,7 @@ def install(transport: SerialTransport, update: Update, progress: Progress | Non
 
 
 def _contents(transport: SerialTransport, compiler: bytecode.Compiler | None) -> tuple[dict[str, bytes], str | None]:
-    """The firmware for this board, and the reason why it is not compiled."""
+    """The firmware for this board, and the reason why it is not compiled, or None."""
     # 0: the board accepts no compiled files
     mpy = ask(transport, "getattr(__import__('sys').implementation, '_mpy', 0)", int)
     try:

@@ -94,7 +94,7 @@ def needed_blocks(update: Update, board: BoardFiles) -> int:
 
 
 def refuse_without_room(update: Update, board: BoardFiles) -> None:
-    """Raise InputError for an update that would fill the flash."""
+    """Raise InputError if the flash has not enough room for an update."""
     blocks = needed_blocks(update, board)
     if blocks <= board.free_blocks:
         return
