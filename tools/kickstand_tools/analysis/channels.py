@@ -23,13 +23,12 @@ class Channels(Table):
     """A ride in the vehicle's axes left, up, forward: n samples each; NaN where there is no value.
 
     t_s: seconds since the log's first sample. lean_deg: > 0 to the right; lean_formula_deg: by Nicolae's formulas
-        (25)-(26) alone. left_g, up_g, forward_g: specific force; lateral_g: acceleration to the left in the road's
-        plane, (23).
-    pitch_rate_dps: > 0 nose up; yaw_rate_dps: > 0 in a left turn; roll_rate_dps: > 0 to the right. shown_g: the forward
-    force, smoothed as on the display. lean_sigma_deg: standard deviation of the lean. These are 1 or 0: resting: the
-    meter has detected a standstill; rolling: its estimated speed is surely not 0; sure: it trusts its lean; doubtful:
-    from smooth(), 0 if the lean is not smoothed. lat_deg, lon_deg (degrees north and east) and utc_s (s since 1970) are
-    given only for new values.
+    (25)-(26) alone. left_g, up_g, forward_g: specific force; lateral_g: acceleration to the left in the road's plane,
+    (23). pitch_rate_dps: > 0 nose up; yaw_rate_dps: > 0 in a left turn; roll_rate_dps: > 0 to the right. shown_g: the
+    forward force, smoothed as on the display. lean_sigma_deg: standard deviation of the lean. These are 1 or 0:
+    resting: the meter has detected a standstill; rolling: its estimated speed is surely not 0; sure: it trusts its
+    lean; doubtful: from smooth(), 0 if the lean is not smoothed. lat_deg, lon_deg (degrees north and east) and utc_s (s
+    since 1970) are given only for new values.
     """
 
     t_s: Array

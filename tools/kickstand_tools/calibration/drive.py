@@ -45,13 +45,10 @@ class DriveFit:
     refusal, calibration is the earlier calibration.
 
     vehicle: "car" or "motorcycle". used: number of braking events that count. turned: number of braking events in
-    bends,
-        which do not count. quality_deg: standard error of forward about the vertical. ready_s: seconds of logs, in all,
-        until
-            the alignment was ready. lag_s: delay of the speed; halves_deg: difference of two halves of the drive; None
-            for the
-    published method. poses: for a motorcycle with an earlier alignment from two poses. notices: remarks about the logs,
-    with the log's name. bias_dps (3): the gyro's bias.
+    bends, which do not count. quality_deg: standard error of forward about the vertical. ready_s: seconds of logs, in
+    all, until the alignment was ready. lag_s: delay of the speed; halves_deg: difference of two halves of the drive;
+    None for the published method. poses: for a motorcycle with an earlier alignment from two poses. notices: remarks
+    about the logs, with the log's name. bias_dps (3): the gyro's bias.
     """
 
     calibration: CalibrationFile
@@ -98,12 +95,11 @@ def fit_drive(
     straight lines.
 
     logs: recorded with one mount, in chronological order (see read_log). calibration: an earlier calibration with
-        offset and slope and, for a motorcycle, the alignment from two poses. vehicle: "motorcycle" or "car"; None: a
-        motorcycle if calibration has two poses,
-    otherwise a car. method: "improved", or "published" for ViriCiti's published method. progress: called with the
-    samples done and their total (each is read twice). on_event: called with each DriveEvent as it happens, even if the
-        drive is refused later. Raises InputError; RefusedInput, a subclass with a Message, if the drive does not
-    determine the sensor's mounting.
+    offset and slope and, for a motorcycle, the alignment from two poses. vehicle: "motorcycle" or "car"; None: a
+    motorcycle if calibration has two poses, otherwise a car. method: "improved", or "published" for ViriCiti's
+    published method. progress: called with the samples done and their total (each is read twice). on_event: called with
+    each DriveEvent as it happens, even if the drive is refused later. Raises InputError; RefusedInput, a subclass with
+    a Message, if the drive does not determine the sensor's mounting.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("city", seed=3, seconds=240.0)

@@ -23,10 +23,9 @@ class DriveEvent:
     """Something that happened in a drive, t_s seconds from the first sample of the log of that name.
 
     what: USED (a braking event in a straight line, or a start; counted and needed give the progress), TURNING (a
-    braking
-        event in a bend, not counted), PROBLEM (refusal gives the reason), READY (the alignment is good enough, to
-        quality_deg), NOT_READY (no longer ready; refusal gives the reason unless a PROBLEM does), LOG_BEGINS,
-        LOG_WITHOUT_EVENTS.
+    braking event in a bend, not counted), PROBLEM (refusal gives the reason), READY (the alignment is good enough, to
+    quality_deg), NOT_READY (no longer ready; refusal gives the reason unless a PROBLEM does), LOG_BEGINS,
+    LOG_WITHOUT_EVENTS.
     """
 
     log: str

@@ -30,10 +30,10 @@ class Bin:
     """Successive samples that are passed to DriveAlignment as sums.
 
     begins: True if the samples do not continue the previous bin; then start_mps is the speed at the bin's start. force
-        (3, g), rate (3, deg/s): means in the sensor's axes. first_us: duration of all samples but the last. last_us:
-        duration of the last sample, 0 if the bin is not full. speeds: (microseconds before the end of first_us, m/s)
-        for the speeds during first_us. end_mps: speed of the last sample. start_mps and end_mps are None without a new
-        value. end_us: the log's time at the last sample. samples: number of samples.
+    (3, g), rate (3, deg/s): means in the sensor's axes. first_us: duration of all samples but the last. last_us:
+    duration of the last sample, 0 if the bin is not full. speeds: (microseconds before the end of first_us, m/s) for
+    the speeds during first_us. end_mps: speed of the last sample. start_mps and end_mps are None without a new value.
+    end_us: the log's time at the last sample. samples: number of samples.
     """
 
     begins: bool

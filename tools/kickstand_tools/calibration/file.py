@@ -43,16 +43,14 @@ GIVE_CALIBRATION = Remedy("give a file made by kickstand calibrate", "give the .
 class CalibrationFile:
     """The parameters of one mounted sensor: calibrated = slope * reading + offset, Nicolae's (18)-(20).
 
-    accel_offset_g (3), accel_slope (3), gyro_bias_dps (3); vehicle_from_sensor (3, 3): rows left, up, forward.
-    aligned: the matrix was measured; six_done: offset and slope were measured. trim_deg: the roll-misalignment
-    correction found while riding. vehicle: "car" or "motorcycle" if the matrix was measured by driving; also "car" if
-    the board was set
-        to a car; otherwise "".
-    kickstand_side: "left" or "right", the side of the kickstand in the two poses, otherwise "". notes: further entries
-    for the file. gyro_delay_s: delay of the gyro by its low-pass filter (DLPF) in a recorded ride, None if unknown.
-    accel_matrix, gyro_matrix (3, 3): the cross-axis corrections: force = accel_matrix x (slope * reading + offset),
-    rate = gyro_matrix x (reading - bias). gyro_sigma (3, 3): standard errors of gyro_matrix, zeros if it was not
-    measured.
+    accel_offset_g (3), accel_slope (3), gyro_bias_dps (3); vehicle_from_sensor (3, 3): rows left, up, forward. aligned:
+    the matrix was measured; six_done: offset and slope were measured. trim_deg: the roll-misalignment correction found
+    while riding. vehicle: "car" or "motorcycle" if the matrix was measured by driving; also "car" if the board was set
+    to a car; otherwise "". kickstand_side: "left" or "right", the side of the kickstand in the two poses, otherwise "".
+    notes: further entries for the file. gyro_delay_s: delay of the gyro by its low-pass filter (DLPF) in a recorded
+    ride, None if unknown. accel_matrix, gyro_matrix (3, 3): the cross-axis corrections: force = accel_matrix x (slope *
+    reading + offset), rate = gyro_matrix x (reading - bias). gyro_sigma (3, 3): standard errors of gyro_matrix, zeros
+    if it was not measured.
 
     >>> calibration = CalibrationFile(gyro_bias_dps=[1.0, 0.0, 0.0])
     >>> calibration.vehicle_from_sensor @ [0.0, 1.0, 0.0]

@@ -88,11 +88,10 @@ class SixPositions:
     """The calibration from six or seven poses.
 
     sides: the pose of each side in the order of kickstand.calibration.six_position.SIDES (+x -x +y -y +z -z up);
-    tilt_deg: the tilt of each pose from its axis. free_pose, free_pose_error_g: the seventh, slanted pose, and
-        its calibrated length minus 1 g; None without a seventh pose. beyond_sheet: axes whose offset or slope exceeds
-        the data sheet's
-    limits. turns: number of turns between poses that calibrated the gyro. all_turns: number of all turns. Both are 0 if
-        each pose has its own log.
+    tilt_deg: the tilt of each pose from its axis. free_pose, free_pose_error_g: the seventh, slanted pose, and its
+    calibrated length minus 1 g; None without a seventh pose. beyond_sheet: axes whose offset or slope exceeds the data
+    sheet's limits. turns: number of turns between poses that calibrated the gyro. all_turns: number of all turns. Both
+    are 0 if each pose has its own log.
     """
 
     calibration: CalibrationFile
@@ -109,10 +108,9 @@ def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
     """Find offset (g) and slope of each axis from six still poses, each side up once, in any order.
 
     poses: six logs, or seven with a slanted pose that checks the result (see read_log for the kinds of log). Solves the
-        equations (16)-(20) of Nicolae's paper, section 4, such that each calibrated reading is 1 g long, even if the
-        axis does not point exactly up. The gyro's bias is the median of the poses. Raises InputError; RefusedInput, a
-        subclass with
-    a Message, if the firmware refuses a pose or the result.
+    equations (16)-(20) of Nicolae's paper, section 4, such that each calibrated reading is 1 g long, even if the axis
+    does not point exactly up. The gyro's bias is the median of the poses. Raises InputError; RefusedInput, a subclass
+    with a Message, if the firmware refuses a pose or the result.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("parked", seed=1, seconds=20.0)
@@ -213,11 +211,9 @@ def fit_two_positions(
     """Find the alignment of a sensor on a bike from two poses: on the kickstand, and upright.
 
     kickstand, upright: logs (see read_log). calibration: the result of fit_six_positions(), with offset and slope;
-    None:
-        the readings are treated as calibrated. side: "left" or "right", the side of the kickstand. The gyro's bias is
-        its mean reading in the pose on the kickstand. The method is Nicolae's paper, section 2, equations (3)-(8).
-        Raises InputError; RefusedInput, a
-    subclass with a Message, if the firmware refuses the poses.
+    None: the readings are treated as calibrated. side: "left" or "right", the side of the kickstand. The gyro's bias is
+    its mean reading in the pose on the kickstand. The method is Nicolae's paper, section 2, equations (3)-(8). Raises
+    InputError; RefusedInput, a subclass with a Message, if the firmware refuses the poses.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("parked", seed=1, seconds=20.0)

@@ -36,10 +36,8 @@ def fit_procedure(source: Source) -> SixPositions:
     order, and slanted at least once; the log also contains the turns between the poses.
 
     The result has offset, slope and cross-axis errors of the accelerometer, and bias, scale and cross-axis errors of
-    the
-        gyro (see kickstand.calibration.sensor_fit). Every still pose and every turn counts. source: see read_log.
-        Raises InputError;
-    RefusedInput, a subclass, if the firmware refuses a pose or the result.
+    the gyro (see kickstand.calibration.sensor_fit). Every still pose and every turn counts. source: see read_log.
+    Raises InputError; RefusedInput, a subclass, if the firmware refuses a pose or the result.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("parked", seed=1, seconds=20.0)

@@ -35,7 +35,7 @@ def rotation_between(a: Array, b: Array, axis: int) -> Array:
         R = I + K + K^2 / (1 + c),  K the cross product matrix of a x b, c = a . b
 
     Near c = -1 the quotient has no significant digits left. If c < 0, a half turn D about a coordinate axis is
-        therefore applied first, which makes c > 0: R = Rodrigues(D a, b) D.
+    therefore applied first, which makes c > 0: R = Rodrigues(D a, b) D.
 
     axis: 0, 1 or 2, the coordinate axis of the half turn, perpendicular to b.
     """
@@ -69,7 +69,7 @@ class PublishedAlignment:
     finds the vertical.
 
     counted: number of accepted braking events. turned: number of events refused for their dispersion. needed: required
-        number of accepted events.
+    number of accepted events.
     """
 
     def __init__(self, vehicle: str, up: list[float] | None = None, bias: list[float] | None = None) -> None:

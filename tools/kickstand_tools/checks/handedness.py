@@ -67,7 +67,7 @@ class RatesMisfit(WrongAxes):
         """See Message.
 
         Reversing one axis of the accelerometer has the same effect as reversing the two others in the gyro, because the
-                check cannot see the sign of all accelerations. The same holds for two exchanged axes.
+        check cannot see the sign of all accelerations. The same holds for two exchanged axes.
         """
         exchange = self.about_x, self.about_y, self.about_z
         kept = [axis for k, axis in enumerate(AXES) if exchange[k][k] == 1]

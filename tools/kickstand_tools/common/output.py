@@ -112,7 +112,7 @@ def flush_to_disk(path: Path) -> None:
     """Wait until a file, or the entries of a directory, are on the disk. Raises OSError.
 
     Otherwise a file system may store the new name before the content, and a power loss would leave neither the old
-        content nor the new (fsync(2)).
+    content nor the new (fsync(2)).
     """
     directory = path.is_dir()
     # a browser has no disk; Windows cannot open directories

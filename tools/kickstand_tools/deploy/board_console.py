@@ -32,8 +32,8 @@ def lines(
 ) -> Iterator[bytes]:
     """Run code on the board and yield each printed line, without its line end. Raises BrokenOff, OSError.
 
-    silent_s: longest silence of the program.  stopped: once set, the program gets a Ctrl-C.  most_bytes: limit of the
-        program's output.
+    silent_s: longest silence of the program. stopped: once set, the program gets a Ctrl-C. most_bytes: limit of the
+    program's output.
     """
     transport.exec_raw_no_follow(code)
     serial: Any = transport.serial

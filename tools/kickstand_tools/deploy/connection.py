@@ -232,7 +232,7 @@ def literal(text: bytes, *shapes: Any) -> Any:
     """Convert a line of a board's output to the Python value that it represents.
 
     shapes: the allowed types. Each is a type, a tuple of the types of a tuple's values, or None for None. Numbers are
-        integers >= 0. Raises InputError for other values, which can come from another device.
+    integers >= 0. Raises InputError for other values, which can come from another device.
 
     >>> literal(b"('/rides', 3)", (str, int))
     ('/rides', 3)

@@ -29,8 +29,7 @@ def contents(mpy: int | None, compiler: bytecode.Compiler | None = None) -> dict
     """{path on the board: content}, in the order of firmware_files().
 
     mpy: the board's sys.implementation._mpy, for which the package is compiled to .mpy files; None: the package stays
-        .py. main.py and config.py are always .py, because MicroPython does not start a main.mpy and users edit
-        config.py.
+    .py. main.py and config.py are always .py, because MicroPython does not start a main.mpy and users edit config.py.
     compiler: see bytecode.compiled(). Raises CannotCompile.
     """
     files = firmware_files()

@@ -62,9 +62,9 @@ def flash(
     """Bring a board's files up to date, verify them and restart it.
 
     replace_config: also update the user's config.py. describe: returns the board's name, and refuses other devices.
-        compiler, judge: functions to use where mpy-cross or another process cannot run; None: bytecode.cross_compiled()
-        and config_check.judge(). agree: called with one line per file of another project that will be renamed; may
-        raise InputError. Raises InputError. If the board has too little room, nothing is changed.
+    compiler, judge: functions to use where mpy-cross or another process cannot run; None: bytecode.cross_compiled() and
+    config_check.judge(). agree: called with one line per file of another project that will be renamed; may raise
+    InputError. Raises InputError. If the board has too little room, nothing is changed.
     """
     with connected(port) as (transport, name):
         board = describe(transport, name)

@@ -56,9 +56,9 @@ def export(
     form: "csv" (gzipped if out ends in .gz), "gpx", "parquet", "racechrono" or "vbo". progress: called with (done,
     total) of the log. notices: remarks about the log are appended.
 
-    gpx needs positions. gpx, racechrono and vbo need date and time, which come with positions.  A board without a
-        satellite receiver has no clock. Its ride, recorded live or pulled, is therefore assumed to end when the file
-        was last written.
+    gpx needs positions. gpx, racechrono and vbo need date and time, which come with positions. A board without a
+    satellite receiver has no clock. Its ride, recorded live or pulled, is therefore assumed to end when the file was
+    last written.
 
     >>> import tempfile
     >>> import numpy as np

@@ -37,8 +37,7 @@ def page(seen: Overview, library: str, allowed: str, tiles: bool = False, warnin
     warnings: show the charts' warnings above them.
 
     The policy allows only the page's own scripts, and images of the map's tiles. It also allows 'unsafe-eval' and
-    inline
-        styles: plotly.js compiles functions from text for charts with many points, and sets styles.
+    inline styles: plotly.js compiles functions from text for charts with many points, and sets styles.
     """
     drawn, points = charts(seen), track_map.map_points(seen)
     beside = None

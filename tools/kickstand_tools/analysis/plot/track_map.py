@@ -70,7 +70,7 @@ def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
 
     The first trace is the track as a line: customdata are time (s), lean (degrees) and speed (km/h), None if missing.
     The second trace has the coloured points: customdata are their times. The first shape marks a place, the second is
-        the scale bar, and the first annotation names the bar's length. map.js moves all three.
+    the scale bar, and the first annotation names the bar's length. map.js moves all three.
     """
     x, y = plain(points.east_m, 1), plain(points.north_m, 1)
     rows = [plain(row, 1) for row in np.column_stack((points.t_s, points.lean_deg, points.speed_kmh))]

@@ -52,9 +52,8 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
         u(t) = (1 + k) v(t) + integral of b from t to the end - d a(t)
 
     with the arguments v and a, the scale error k, the acceleration error b (m/s2) and the delay error d (s). The error
-    b
-        comes from slopes and fork dive that the gyro did not measure. It is modelled as a random walk backwards in
-        time, nearly 0 at standstill and linear between knots (the basis are hat functions, the linear B-splines).
+    b comes from slopes and fork dive that the gyro did not measure. It is modelled as a random walk backwards in time,
+    nearly 0 at standstill and linear between knots (the basis are hat functions, the linear B-splines).
     """
     time = part.t_s
     values = np.flatnonzero(~np.isnan(part.speed_mps))
