@@ -48,7 +48,7 @@ def test_bug_is_reported_in_one_line(tmp_path, monkeypatch):
 
 def test_the_convention_of_logs_is_in_the_help():
     words = " ".join(command.works("import", "--help").out.split())
-    assert "At rest the axis that points up reads +1 g, and a rate is positive right-handed about its axis." in words
+    assert "At rest, the axis that points up reads +1 g. Rates are right-handed about their axes." in words
 
 
 def test_shell_sees_one_line_on_standard_error_and_status_2(tmp_path):

@@ -14,8 +14,7 @@ The measurements are differences that should be 0:
 
     SLIDING      the wheels' velocity sideways, because wheels do not slide
     CLIMBING     the wheels' velocity up minus the part due to the chassis' pitch: the chassis points along the road,
-                     except for dive in braking, (8) in the firmware's kickstand.lean.dive, which does not move the
-                     wheels
+                 except for dive in braking, (8) in the firmware's kickstand.lean.dive, which moves no wheel
     SLOPING      the wheels' velocity up, because roads are level on average
     BALANCED     the force to the side minus TYRES, CAMBER and BESIDE (see unknowns.py): a moving bike is balanced
     ANY_SPEED    the speed minus USUAL_MPS        MEASURED_SPEED    the speed minus the log's, delayed
