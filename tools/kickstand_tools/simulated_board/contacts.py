@@ -93,7 +93,7 @@ class Wheel(Contact):
         clock.at(clock.now_us, self._add_distance)
 
     def _add_distance(self):
-        """Add the distance since the last call. At a pulse, schedule closing and opening. Then schedule the next call."""
+        """Add the distance since the last call. At a pulse, schedule closing and opening. Schedule the next call."""
         now_us = self._clock.now_us
         speed = self._speed(now_us / 1e6)
         rate = speed * self._pulses_per_metre / 1e6 if speed > _CREEP_MPS else 0.0  # pulses per us
