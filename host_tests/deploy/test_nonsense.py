@@ -129,7 +129,7 @@ def test_ride_longer_than_announced_is_abandoned(tmp_path, plug_in, monkeypatch)
             self.serial.data += b"AAAA\n" * 100_000
 
     plug_in(Long(tmp_path / "flash"))
-    line = command.refused(tmp_path / "out", "pull", "--out", tmp_path / "out", words="did not come over whole")
+    line = command.refused(tmp_path / "out", "pull", "--out", tmp_path / "out", words="did not arrive completely")
     assert "does not come to an end" in line
 
 

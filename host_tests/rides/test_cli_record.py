@@ -275,7 +275,7 @@ def test_a_computer_that_slept_is_reported(streaming, tmp_path, monkeypatch):
     streaming(data, "asleep")
     monkeypatch.setattr(stream, "_SILENT_S", 60.0)
     result = command.works("record", "--out", tmp_path / "ride.csv")
-    assert "this computer took nothing for 300 s: keep it awake: what came until then is kept" in result.err
+    assert "this computer took nothing for 300 s: keep it awake: the log up to there is kept" in result.err
     assert result.err.count("\n") == 1
     assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
 
@@ -322,7 +322,7 @@ def test_a_full_disk_keeps_what_was_recorded(name, share, streaming, tmp_path, m
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
         signal.signal(signal.SIGXFSZ, handler)
-    assert "the log cannot be written any further (File too large): what came until then is kept" in result.err
+    assert "writing the log failed (File too large): the log up to there is kept" in result.err
     kept = len(read_log(tmp_path / name).time_us)
     assert (share - 0.2) * len(turns) < kept < len(turns)
     assert f", {kept} readings" in result.out

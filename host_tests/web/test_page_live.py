@@ -56,7 +56,7 @@ def test_pulled_cable_leaves_the_log(line, rider, board, tmp_path):
     assert (rider.text("#lean"), rider.text("#max-left")) == ("--", "--")
     line.connected = False
     rider.page.wait_for_selector("#files li")
-    assert rider.text("#live-said") == "Stopped. Connection lost: what came until then is kept."
+    assert rider.text("#live-said") == "Stopped. Connection lost: the log up to there is kept."
     assert list(saved(rider, tmp_path).values()) == recorded(blocks)
 
 

@@ -1,4 +1,4 @@
-"""Reads and writes videos with ffmpeg, which the package imageio-ffmpeg contains."""
+"""Reads and writes videos with ffmpeg, which is part of the package imageio-ffmpeg."""
 
 import re
 import subprocess
@@ -10,13 +10,13 @@ from pathlib import Path
 from ..common.errors import InputError, extra
 
 _QUIET = ("-hide_banner", "-loglevel", "error", "-nostdin", "-y")
-_LARGEST, _FASTEST = 16_384, 1000.0  # limits of a side in pixels, and of pictures per second: beyond any camera's
+_LARGEST, _FASTEST = 16_384, 1000.0  # limits of a side, pixels, and of pictures per second, which no camera exceeds
 
 
 @dataclass
 class Video:
-    """width, height: as shown, pixels. fps: pictures per second. seconds: its duration. telemetry: the number of the
-    stream of a GoPro's sensors, None if there is none."""
+    """A video file. width, height: as shown, pixels. fps: pictures per second. seconds: duration. telemetry: number of
+    the stream of a GoPro's sensors, None without one."""
 
     path: Path
     width: int
@@ -40,8 +40,8 @@ def ffmpeg() -> str:
 
 
 def input_of(path: Path) -> list[str]:
-    """ffmpeg's arguments to read a file. By its name alone ffmpeg would treat 12:30.mp4 as a protocol, and a file that
-    poses as a video could make it read from the network."""
+    """ffmpeg's arguments to read a file safely. With only a name, ffmpeg would take 12:30.mp4 for a protocol, and a
+    file that poses as a video could make ffmpeg read from the network."""
     return ["-protocol_whitelist", "file,pipe", "-i", f"file:{path}"]
 
 
