@@ -2,7 +2,7 @@
 
 `roll`: on a straight a balanced bike is upright, so the mean force points along the bike's own up axis. `yaw`: braking
 and speeding up on a straight push along the bike's own forward axis. `pitch`: between two standstills on level ground,
-speeding up and braking cancel out, and the mean forward force that remains comes from pitch. `gravity`: at standstill
+speeding up and braking cancel out, so the remaining mean forward force shows the pitch error. `gravity`: at standstill
 the force must be 1 g.
 """
 
@@ -22,7 +22,7 @@ YAW_COSTS_DEG, PITCH_COSTS_DEG = 3.0, 5.0  # rms error of the lean, divided by t
 
 SMOOTH_S = 0.5
 STRAIGHT_DPS, STRAIGHT_DEG = 2.0, 8.0  # riding straight: yaw rate and lean are smaller
-ENOUGH_S = 10.0  # least time of riding straight
+ENOUGH_S = 10.0  # straight riding must last at least this long
 LEVEL_S = 60.0  # over this time of riding, hills even out
 ENOUGH_G = 0.05  # least rms of braking and speeding up on straights
 
@@ -33,7 +33,8 @@ class Quality:
 
     roll > 0: "up" leans to the right of the bike's own. pitch > 0: "forward" points up. yaw > 0: "forward" points
     to the right of the direction in which the bike speeds up. gravity_g: mean force at rest. straight_s: seconds
-    of straight riding, which give roll and yaw. lateral_g, forward_g: the forces during it, means over SMOOTH_S.
+    of straight riding, which give roll and yaw. lateral_g, forward_g: the forces during this riding, means over
+    SMOOTH_S.
     """
 
     roll_deg: float | None

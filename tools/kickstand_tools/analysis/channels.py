@@ -20,7 +20,7 @@ _LAST = ("lat_deg", "lon_deg", "utc_s")
 
 @dataclass(eq=False)
 class Channels(Table):
-    """A ride in the vehicle's axes left, up, forward: n samples each; NaN where there is no value.
+    """A ride in the vehicle's axes left, up, forward: n samples each; NaN for a missing value.
 
     t_s: seconds since the log's first sample. lean_deg: > 0 to the right; lean_formula_deg: by Nicolae's formulas
     (25)-(26) alone. left_g, up_g, forward_g: specific force; lateral_g: acceleration to the left in the road's plane,
@@ -55,8 +55,8 @@ class Channels(Table):
 
     @property
     def trusted(self) -> Bools:
-        """(n) True where the display shows the lean and updates its maxima. For a smoothed lean its standard deviation
-        and FALLEN_DEG decide."""
+        """(n) True where the display shows the lean and updates its maxima. A smoothed lean is
+        trusted by its standard deviation and FALLEN_DEG."""
         return (self.sure > 0.0) & ~(np.abs(self.lean_deg) >= FALLEN_DEG)
 
     @property

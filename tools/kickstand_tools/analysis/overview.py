@@ -94,8 +94,8 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
 
 def _riding_s(ride: Channels, standing: Bools, whole: bool = True) -> float:
     """The time for which a vehicle was moving, s. ride: with evenly spaced samples (see downsampled()). standing (n):
-    True where it stands still. whole: False for a stretch of a ride, in which a vehicle may go straight ahead, or keep
-    the same turn, from start to end."""
+    True where the vehicle stands still. whole: False for a stretch of a ride, in which a vehicle may go straight ahead,
+    or keep the same turn, from start to end."""
     if whole and not _has_moved(ride):
         return 0.0
     return float(np.count_nonzero(~standing)) * spacing_s(ride)

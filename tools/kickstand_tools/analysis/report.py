@@ -43,8 +43,8 @@ _SIX_POSITIONS = Remedy("kickstand calibrate six takes that out", "the six posit
 
 @dataclass
 class Words:
-    """The texts of a report. name: the log's. too_little: sentence that the log has too little of a ride, or "". ride:
-    rows of (quantity, value, time or ""). alignment: a paragraph. stops: a row per stop with the columns of
+    """The texts of a report. name: the log's name. too_little: sentence that the log has too little of a ride, or "".
+    ride: rows of (quantity, value, time or ""). alignment: a paragraph. stops: a row per stop with the columns of
     STOPS_UNITS, some of which STOPS_TERMS explains. remark: about the stops, or the reason for none, or ""."""
 
     name: str

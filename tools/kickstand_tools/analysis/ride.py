@@ -49,7 +49,7 @@ class AbsurdReadings(Message):
 
 @dataclass
 class Ride:
-    """A log and its calibration. smoothed: use the smoothed lean, not the one that the display showed."""
+    """A log and its calibration. smoothed: use the smoothed lean, not the displayed lean."""
 
     log: Source
     calibration: CalibrationFile

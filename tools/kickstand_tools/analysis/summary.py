@@ -84,7 +84,7 @@ class Summary:
         self.histogram_s += np.histogram(block.lean_deg[held], BINS_DEG, weights=step[held])[0]
 
     def _update_maxima(self, t_s: Array, lean: Array) -> None:
-        """Update the maxima of the lean that last for HELD_S. lean: NaN where it is not trusted."""
+        """Update the maxima of the lean that last for HELD_S. lean: NaN if not trusted."""
         if not len(t_s):
             return
         step_s = float(np.median(np.diff(t_s))) if len(t_s) > 1 else HELD_S

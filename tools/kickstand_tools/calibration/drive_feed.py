@@ -49,8 +49,8 @@ class Bin:
 
 
 def drive_bins(log: Log, calibration: CalibrationFile, length_us: int) -> Iterator[Bin]:
-    """Split the samples of a log into bins of at least length_us, as short as possible. With 0, each bin has one
-    sample."""
+    """Split the samples of a log into bins of at least length_us, as short as possible. If length_us is 0, each bin has
+    one sample."""
     time_us = log.time_us
     step_us = np.diff(time_us, prepend=time_us[0])
     is_gap = step_us > GAP_US
@@ -157,7 +157,7 @@ def feed(
 
 
 def _end_stop(standing: StandingVertical) -> None:
-    """End a stop at the end of a log: at the start of the next one the vehicle stands elsewhere."""
+    """End a stop at the end of a log, because the vehicle stands elsewhere at the start of the next log."""
     standing.update((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 2.0 * MOVED_MPS, 0.0)  # as if the vehicle had driven
 
 

@@ -121,7 +121,7 @@ class CalibrationFile:
         return np.sqrt(squared @ self.gyro_sigma**2 @ squared.T)
 
     def delay_s(self) -> float:
-        """gyro_delay_s, or that of the default DLPF."""
+        """gyro_delay_s or, if unknown, the delay of the default DLPF setting."""
         return DELAY_S if self.gyro_delay_s is None else self.gyro_delay_s
 
     def as_json(self) -> dict[str, Any]:

@@ -85,7 +85,7 @@ def fit_procedure(source: Source) -> SixPositions:
 
 
 def _still_stretches(log: Log) -> list[tuple[int, int]]:
-    """The stretches in which the sensor was still: index of the first sample, and index after the last."""
+    """The stretches in which the sensor was still: (index of the first sample, index after the last sample)."""
     step_s = float(np.median(np.diff(log.t_s))) if len(log.t_s) > 1 else 1.0
     n = max(4, round(_WINDOW_S / step_s))
     if len(log.t_s) < n:

@@ -54,7 +54,7 @@ def circular_dispersion(directions: Sequence[complex]) -> float:
 
         d = (1 - rho2) / (2 R^2),  R = |mean of e^(i a)|,  rho2 = the mean cosine of 2 (a - mean direction)
 
-    For small spreads d is about the variance in rad^2: 0.02 is 8 degrees, 0.005 is 4.
+    For small spreads, d is about the variance in rad^2: 0.02 means 8 degrees, 0.005 means 4 degrees.
     """
     mean = np.mean(directions)
     square = float(abs(mean)) ** 2

@@ -11,9 +11,9 @@ from ..signals import Array, best_lag, distance_m
 from .cells import CellTable, LogCells
 
 SLOWEST_MPS = 3.0  # at a lower speed, positions do not show the course
-TURNING_DPS = 4.0  # only seconds in which the course changes faster count
+TURNING_DPS = 4.0  # seconds count if the course changes faster than this
 FASTEST_DPS = 90.0  # if the course changes faster, the positions jumped
-ENOUGH = 8  # least number of seconds that count
+ENOUGH = 8  # this many seconds must count
 CLEAR = 0.6  # least correlation of course and gyro, of either sign
 LAGS_S = np.arange(0.0, 2.1, 0.25)  # tried delays of the positions
 LONGEST_S = 2.5  # longest time between two positions

@@ -32,9 +32,10 @@ TRIED = 6  # number of exchanges that are fitted, those that are best without ve
 # The factor by which an exchange must reduce the mean square (g2) of the residual force. In correct logs, simulated and
 # recorded, no exchange reaches more than 1.1. If the gyro has the opposite sign, the factor is 1.7 to 470.
 CLEARLY = 2.0
-LIKELY, SIGMAS = 1.25, 3.0  # or LIKELY, if the mean reduction in the windows is over SIGMAS standard errors
+# the factor LIKELY is enough if the mean reduction in the windows is over SIGMAS standard errors
+LIKELY, SIGMAS = 1.25, 3.0
 FEW_WINDOWS, FEW_CLEARLY = 3, 5.0  # up to FEW_WINDOWS windows need FEW_CLEARLY, and a bias near 0 such as a phone's
-LEAST_G2 = 0.001  # least reduction of the mean square in any case; drift in a parked vehicle reduces it by under 0.0002
+LEAST_G2 = 0.001  # the mean square must fall by this in any case; in a parked vehicle, drift reduces it by under 0.0002
 # Factors on the residual of an exchange. If several fit about equally well, the likeliest mistake wins: first all axes
 # reversed (or none), then some reversed, then axes exchanged
 PENALTY = 1.0, 1.3, 1.6
@@ -67,7 +68,7 @@ class RatesMisfit(WrongAxes):
         """See Message.
 
         Reversing one axis of the accelerometer has the same effect as reversing the two others in the gyro, because the
-        check cannot see the sign of all accelerations. The same holds for two exchanged axes.
+        check cannot see the sign of all accelerations. Exchanging two axes also has the same effect in either sensor.
         """
         exchange = self.about_x, self.about_y, self.about_z
         kept = [axis for k, axis in enumerate(AXES) if exchange[k][k] == 1]

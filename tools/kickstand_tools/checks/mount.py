@@ -23,26 +23,27 @@ from .cells import CELL_S, LogCells
 
 MEAN_S = 0.5  # up and the bends are judged by means over this time
 UP_DEG, FORWARD_DEG = 15.0, 20.0  # if up or forward differs by more, the calibration belongs to another mount
-LEANED_DEG = 25.0  # if the two poses were swapped, up is that of the pose on the kickstand, up to this angle away
+# if the two poses were swapped, "up" is the bike's up on the kickstand, which leans by up to this angle
+LEANED_DEG = 25.0
 BACKWARD_DEG = 150.0  # if forward differs by more, forward and backward are exchanged
 TURNING_DPS, TURNING_S = 5.0, 10.0  # up is judged where the rates are over TURNING_DPS, for at least TURNING_S
 STRAIGHT_DPS = 8.0  # forward is judged by the speed where the rates are lower
 SPEEDS, SPEED_MPS = 20, 0.5  # least number of changes of speed from second to second, and their standard deviation
 LATE_S = (0, 1, 2)  # tried delays of the speed
 BENDS, BENDS_DPS = 120, 1.0  # least number of means, and the standard deviation of the changes of their yaw rate
-# From these correlations on, forward is certain, by the speed and by the bends. Correct calibrations have over 0.85 and
+# Forward is certain above these correlations, by the speed and by the bends. Correct calibrations have over 0.85 and
 # 0.6
 SURE_SPEED, SURE_BENDS = 0.8, 0.55
 # If the correlation of the force along forward with all changes of speed is lower, forward is certainly reversed. A
 # correct calibration has over 0.8, even on slopes of 12 %
 SURE_REVERSED = -0.6
 UPSIDE_DOWN = 0.87  # cosine of the angle to straight down: within 30 degrees
-ANOTHER_MOUNT_DEG = 10.0  # two alignments that differ by more are of two mounts
+ANOTHER_MOUNT_DEG = 10.0  # if two alignments differ by more, they belong to different mounts
 
 
 SWAPPED_DEG = 4.0  # an upright pose is hardly ever so far off, but a pose on the kickstand always is
 UPSIDE_DOWN_DEG = 150.0  # an up that is further off may come from accelerations of the opposite sign
-# For a motorcycle, and for a car
+# The remedies for a motorcycle, and for a car
 AGAIN = Remedy(
     "is it another mount's? Calibrate again: calibrate two, or calibrate ride",
     "is it another mount's? Remove the calibration and let the ride show how the sensor sits, or align the bike again",
@@ -187,7 +188,7 @@ def of_calibration(found: CalibrationFile, before: CalibrationFile | None = None
 
 
 class _Ride:
-    """A log in the axes of a calibration."""
+    """A log, expressed in the axes of a calibration."""
 
     def __init__(self, cells: LogCells, calibration: CalibrationFile) -> None:
         def along(over_s: float) -> tuple[Array, Array, Array]:

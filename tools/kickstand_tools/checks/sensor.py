@@ -92,7 +92,7 @@ class SensorHealth:
         self._run_s = np.zeros(6)  # how long each axis has been dead until now
         self._begin_s = np.full(6, np.nan)
         self._saturated: list[list[float]] = [[], [], []]  # begin of the first case, number of cases, seconds
-        # for each axis and sign: largest reading in g, number of samples, time of the first
+        # for each axis and sign: largest reading in g, number of samples with it, time of the first
         self._ends: list[tuple[float, int, float]] = [(0.0, 0, 0.0)] * 6
         self._alive = np.zeros(2, dtype=bool)  # True once noise was seen: accelerometer, gyro
 

@@ -34,7 +34,8 @@ class Turning:
 
     def __init__(self, force: Array, rate: Array, bias: Array, speed: Array | None, places: Ints) -> None:
         self._force, self._rate, self._bias = force, rate, bias
-        # each: k functions of time whose combination is the velocity, and their derivatives: (k, w, n), per second
+        # for each delay: k functions of time, which combine to the velocity, and their derivatives per second: (k, w,
+        # n)
         self._velocities = [_knots(*places.shape)]
         self._usual = VELOCITY_MPS
         if speed is not None:

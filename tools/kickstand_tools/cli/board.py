@@ -133,7 +133,7 @@ def _live_text(reading: LiveReading) -> str:
     if left_g is not None:  # a car, and aligned
         side = "left " if left_g > 0.0 else "right"
         return f"forward {forward_g:+.2f} g  {side} {abs(left_g):.2f} g  {how_long}"
-    if lean is None:  # as on the display, an uncertain lean is not shown
+    if lean is None:  # an uncertain lean is hidden, as on the display
         return f"{'lean --' if reading.aligned else 'not aligned'}  {how_long}"
     bar = "#" * min(20, round(abs(lean) / 3))
     picture = f"{bar if lean < 0 else '':>20}|{bar if lean > 0 else '':<20}"

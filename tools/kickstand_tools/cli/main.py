@@ -107,7 +107,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _remedy(error: OSError) -> str:
-    """What to do about an error of the operating system."""
+    """The remedy for an error of the operating system."""
     if error.filename and isinstance(error, FileNotFoundError | NotADirectoryError):
         return "check the name and its directory"
     if error.filename and isinstance(error, IsADirectoryError):

@@ -336,7 +336,7 @@ def _log_of(source: Path, calibration: Path | None, out: Path) -> tuple[Path | L
 
 
 def _overview(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> Overview:
-    """The overview of a ride from _opened(). Its notices begin with those of the import; all are printed."""
+    """The overview of a ride from _opened(). Prints all its notices, first the notices of the import."""
     opened, imported = _opened(source, calibration, live, **stretch)
     with Bar("reading") as bar:
         seen = overview(opened, bar.reach)

@@ -66,8 +66,8 @@ def printable(text: str) -> str:
 def extra(name: str) -> str:
     """The command that installs an optional part of the project.
 
-    For a checkout, the command has -e and the path. Without them, pip would install a copy, and `kickstand flash` would
-    use the copy's firmware.
+    For a checkout, the command has -e and the path. Otherwise pip would install a copy, and `kickstand flash` would use
+    the copy's firmware.
     """
     if firmware_path.installed():
         return f'{sys.executable} -m pip install "{DISTRIBUTION}[{name}]"'

@@ -24,7 +24,7 @@ OPPOSITE_SIGN = f"do all accelerations have the opposite sign? {AT_REST.capitali
 
 @dataclass(frozen=True)
 class Remedy:
-    """What to do, in two versions: for a terminal, with commands and options, and for a page, which has neither.
+    """A remedy in two versions: for a terminal, with commands and options, and for a page, which has neither.
 
     page: the version for a page; None if it is the same.
     """
@@ -60,11 +60,11 @@ class Message:
     todo: ClassVar[Remedy] = NOTHING_TO_DO
 
     def sentence(self) -> str:
-        """What happened: one line without a full stop."""
+        """One line that says what happened, without a full stop."""
         return self.text.format(**vars(self))
 
     def remedy(self) -> Remedy:
-        """What the user should do."""
+        """The remedy for the user."""
         return self.todo.filled(**vars(self))
 
     def line(self, page: bool = False) -> str:

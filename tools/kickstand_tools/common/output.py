@@ -89,8 +89,8 @@ def make_directory(path: Path) -> None:
 
 @contextlib.contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """A context with a temporary path to write to. At its end, the file is renamed to path, and a power loss no longer
-    affects it. If writing fails, an earlier file at path stays. Raises InputError.
+    """A context with a temporary path to write to. At its end, the file is renamed to path, and survives a power
+    loss. If writing fails, an earlier file at path stays. Raises InputError.
 
     The temporary name has the ending of path, because libraries choose the format by it.
     """

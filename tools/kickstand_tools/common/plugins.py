@@ -14,8 +14,8 @@ SIMULATIONS = "kickstand.simulations"  # functions like simulation.files.simulat
 
 
 def entry_points(group: str) -> dict[str, EntryPoint]:
-    """The entry points of a group, by name. If two have the same name, this project's is used, otherwise the first
-    one."""
+    """The entry points of a group, by name. If two have the same name, this project's entry point is preferred,
+    then the first."""
     found: dict[str, EntryPoint] = {}
     for distribution in distributions():
         try:

@@ -24,7 +24,7 @@ TICK_S = 0.05
 PART_SEED = 1
 PART_SHARE = 0.5  # the sensor's errors as a share of the data sheet's limits: an ordinary sensor
 HAND_LIMIT_S = 3600.0
-BATTERY_V = 12.6 / 11  # at GPIO 26, behind the divider of firmware/examples/user_battery.py
+BATTERY_V = 12.6 / 11  # voltage at GPIO 26, after the divider in firmware/examples/user_battery.py
 LONG_PRESS_S = 1.2
 
 # The rider presses the button once on the kickstand and once upright, and switches to two other pages after the ride.

@@ -84,7 +84,7 @@ def button(parts, wait_ms):
     parts.show("Check: press", "the button")
     at_first = held()
     if at_first:
-        sleep_ms(200)  # a weak pull-up may have to charge a capacitor
+        sleep_ms(200)  # a weak pull-up may need this time to charge a capacitor
         at_first = held()
     if at_first and not change(False, wait_ms)[0]:
         return True, True, False, 0, 0, parts.settings.BUTTON_PIN

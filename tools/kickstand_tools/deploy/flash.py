@@ -162,6 +162,6 @@ def _contents(transport: SerialTransport, compiler: bytecode.Compiler | None) ->
 
 
 def _differing(transport: SerialTransport, copied: dict[str, bytes]) -> dict[str, bytes]:
-    """The files whose content on the board differs from the sent content."""
+    """The files that read back from the board with another content than sent."""
     found = survey(transport).files if copied else {}
     return {path: data for path, data in copied.items() if found.get(unfinished(path)) != fingerprint(data)}

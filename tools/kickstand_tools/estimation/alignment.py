@@ -239,7 +239,7 @@ def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | N
     if np.any(error > MAX_DEG):
         raise RefusedInput(RideUncertain(*(float(error[i]) for i in (2, 0, 1))))
     pitch, yaw, roll = (float(angle) for angle in error)
-    # so that the calibrated force on a level, upright bike is 1 g up despite scale errors
+    # with this offset, the calibrated force on a level, upright bike is 1 g up despite scale errors
     offset = parameters[OFFSET] + parameters[ACCEL].reshape(3, 3)[:, 1]
     matrix, states = found.matrix @ guess.matrix, found.states[: len(windows) + 1]
     bias = guess.bias + np.median(states[:, BIAS], axis=0) @ matrix

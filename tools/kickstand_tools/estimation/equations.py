@@ -30,7 +30,7 @@ from . import unknowns as of
 from .unknowns import BIAS, FORWARD, LEAN, LEFT, PITCH, STATES, UP
 from .windows import Windows
 
-# Rows of the measurements, after those of the process model
+# Rows of the measurements, after the rows of the process model
 SLIDING, CLIMBING, SLOPING, BALANCED, ANY_SPEED, MEASURED_SPEED = range(STATES, STATES + 6)
 RESTING, RESTING_RATE, BACKWARD = slice(14, 17), slice(17, 20), 20
 ROWS = 21
@@ -99,7 +99,8 @@ def _corrected(readings: Array, p: Array, errors: slice) -> Array:
     x, y, z = readings
     a, b, c = p[of.ROTATION]
     e = p[errors]
-    # to second order: to first order, a yaw of 7 degrees would lengthen the readings by 0.8 %, like an error of scale
+    # second order is needed: to first order, a yaw of 7 degrees would lengthen the readings by 0.8 %, like a scale
+    # error
     u, v, w = 0.5 * (b * z - c * y), 0.5 * (c * x - a * z), 0.5 * (a * y - b * x)
     return np.array(
         (

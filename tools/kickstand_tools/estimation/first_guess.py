@@ -20,7 +20,7 @@ STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # 1 sigma over STILL_S; the wind
 BIAS_RADPS = np.radians(4.0)  # limit of the gyro's bias since its calibration: a higher mean rate is a bend
 MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # while the sensor is mounted, its mean force over MOUNTED_S is this close to up
 BETWEEN_S = 20.0  # a shorter time between two movements in a hand also counts as in the hand
-SURELY_S = 4.0  # a shorter movement may be riding or a fall, a longer one is certainly in a hand
+SURELY_S = 4.0  # a longer movement is certainly in a hand; a shorter one may be riding or a fall
 SLOW_S = 4.0  # slower changes of lean are computed from the yaw rate, faster ones from the roll rate
 TURNS_S = 40.0  # the speed is computed from the bends in this time
 CALM_S = 1.0  # without a standstill, the gyro's bias is the mean over calm stretches of this length
@@ -141,9 +141,9 @@ class Axes:
 def axes(w: Windows) -> Axes:
     """The vehicle's axes, within some degrees, and the gyro's bias. w: windows along the sensor's axes.
 
-    In balance, the specific force points along the bike's own up, so the mean force while riding gives up. For forward
-    and the handedness see signals/leaning.py. Raises RefusedInput if the ride is not a motorcycle's, or has too little
-    lean.
+    In balance, the specific force points along the bike's own up, so the mean force while riding shows "up". For
+    forward and the handedness see signals/leaning.py. Raises RefusedInput if the ride is not a motorcycle's, or has too
+    little lean.
     """
     bias = _bias(w)
     w = replace(w, rate=w.rate - bias)

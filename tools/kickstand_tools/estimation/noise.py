@@ -39,7 +39,7 @@ STEEP = np.radians(10.0)  # at this pitch DIVE_RAD and SLOPE_RAD double: roads a
 BALANCE_G, BALANCE_S = 0.011, 3.0  # force to the side, due to wind, camber and the rider
 # Further noise of the force to the side: g, times sin(lean), and g s2/rad, times the roll acceleration
 BALANCE_LEANED_G, BALANCE_ROLLING = 0.045, 0.05
-BALANCE_MIN_MPS = 4.0  # at lower speeds, steering and feet matter
+BALANCE_MIN_MPS = 4.0  # at lower speeds, steering and feet also balance the bike
 ANY_MPS, ANY_S = 20.0, 60.0  # difference of the speed from USUAL_MPS, for a ride in which nothing else shows the speed
 SPEED_MPS = 1.0  # the log's speed, per second, because a receiver's error lasts for some seconds
 REST_MPS, REST_RADPS = 0.05, np.radians(0.15)  # velocity and rates of a bike that stands
@@ -52,11 +52,11 @@ LASTING_S = {eq.SLIDING: SLIDE_S, eq.CLIMBING: DIVE_S, eq.SLOPING: SLOPE_S, eq.B
 ROUGH = [LEAN, PITCH, LEFT, UP, FORWARD, eq.SLIDING, eq.CLIMBING]
 EXPECTED = np.array([0.38, 0.38, 0.38, 0.38, 0.38, 0.5, 0.5])
 ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
-# Accelerations that are not the bike's, such as those of a resonating mount, are white noise only if they are brief.
-# CLIMBING shows their size and correlation time: the upward velocity from integrated forces and the one from pitch and
-# speed differ for seconds. The misfit is the rms of this residual in means over LASTING_MISFIT_S, times the root of the
-# number of windows in a mean, divided by the value of an ordinary ride, USUAL_MISFIT. The velocities' standard
-# deviation grows with its square. At any speed, the unit of the residual is CLIMBING's standard deviation at
+# Accelerations that are not the bike's, for example in a resonating mount, are white noise only if they are brief.
+# CLIMBING shows their size and correlation time: the upward velocity from integrated forces and the upward velocity
+# from pitch and speed differ for seconds. The misfit is the rms of this residual in means over LASTING_MISFIT_S, times
+# the root of the number of windows in a mean, divided by the value of an ordinary ride, USUAL_MISFIT. The velocities'
+# standard deviation grows with its square. At any speed, the unit of the residual is CLIMBING's standard deviation at
 # MISFIT_MPS, because a mount's error in m/s is the same in town as on a motorway.
 LASTING_MISFIT_S, MISFIT_MPS, USUAL_MISFIT, MOST_MISFIT = 2.0, 25.0, 0.25, 6.0
 # If the misfit is over 1, roughness is at least this factor times the misfit, because lasting errors have small

@@ -32,7 +32,7 @@ TIMING_S = 0.002  # s
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps", "doubtful")
 DIGITS = 3, 3, 3, 3, 0
 DOUBTFUL = 0.2  # a larger share of doubtful riding gives a remark
-# On straights, a bike without luggage on one side is in balance within this lean, if the upright pose was right
+# On straights, a bike balances within this lean if the upright pose was right and no luggage is on one side
 POSE_DEG = 1.8
 # A gyro is faulty if an estimated error is over this many standard deviations of its prior; good gyros stayed under
 # 2.6, on good and bad mounts. The error in standard deviations then multiplies the lean's standard deviation
@@ -213,7 +213,7 @@ class Smoother:
 
     def estimated(self, segments: list[Block], own: slice) -> Array | None:
         """The values (samples, COLUMNS), NaN where the readings are not from riding; None for under SLOWEST_HZ samples
-        per second. own: the samples whose lean is needed. The other samples only improve the estimate. Remarks count
+        per second. own: the samples that need a lean. The other samples only improve the estimate. Remarks count
         only the samples in own."""
         t_s = np.concatenate([segment.t_s for segment in segments])
         readings = np.concatenate([segment.readings for segment in segments])

@@ -14,7 +14,7 @@ from ..signals import Array, Ints
 LEAN, PITCH, LEFT, UP, FORWARD, BIAS = 0, 1, 2, 3, 4, slice(5, 8)
 STATES = 8
 
-ROTATION = slice(0, 3)  # rad: misalignment about left, up, forward
+ROTATION = slice(0, 3)  # rad: misalignment of the sensor about left, up, forward
 GYRO = slice(3, 12)  # ratio: scale and cross-axis errors of the gyro, 3 x 3
 ACCEL = slice(12, 21)  # ratio: scale and cross-axis errors of the accelerometer, 3 x 3
 OFFSET = slice(21, 24)  # g: bias of the accelerometer
@@ -82,8 +82,8 @@ class Prior:
         """(m, m): information matrix (inverse covariance) of the prior with the standard deviations sigma (PARAMETERS).
         A hypothesis may have enlarged these.
 
-                The upright pose was measured with a biased accelerometer. Therefore the prior is a prior of the lean
-                and pitch that the sensor reads in that pose, which is the sum of misalignment and bias.
+                The upright pose was measured with a biased accelerometer. Therefore the prior is about the sum of
+                        misalignment and bias, which is the lean and pitch that the sensor reads in that pose.
         """
         found = np.diag(np.divide(1.0, sigma**2, out=np.zeros(PARAMETERS), where=sigma > 0.0))
         if self.posed:

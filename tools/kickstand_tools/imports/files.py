@@ -111,7 +111,7 @@ def _without_gzip(name: str, file: IO[bytes]) -> bytes:
 
 
 def _check_directory(file: IO[bytes], path: Path) -> None:
-    """Refuse a zip with a directory larger than that of MOST_FILES files, because zipfile reads it whole."""
+    """Refuse a zip whose directory lists over MOST_FILES files, because zipfile reads the whole directory."""
     size = file.seek(0, 2)
     file.seek(max(0, size - 65_557))
     _, mark, last = file.read().rpartition(b"PK\5\6")

@@ -53,7 +53,7 @@ CALM_S = 0.5  # a sensor is judged calm over this duration
 CALMEST = 0.2  # share of the samples that count as calm
 NEAR = 1.3  # largest factor between a calm length and gravity in a unit; clones and rough rides differ by up to this
 NOISE_DPS = 0.1  # standard deviation of a gyro at rest
-LINEAR = 0.35  # without gravity, the length of the mean vector is a smaller share of the mean length
+LINEAR = 0.35  # without gravity, the mean vector's length is a smaller share of the vectors' mean length
 _SLOWEST_S, _QUICKEST_S = 1.0, 1e-4  # limits of the time between samples
 
 

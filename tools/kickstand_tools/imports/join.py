@@ -19,7 +19,8 @@ GAP_NS = LOST_US * 1000  # no interpolation between samples that are further apa
 FASTER = 1.5  # a gyro with over FASTER times the accelerometer's rate is averaged over each accelerometer sample
 MANY = 0.02  # a larger share of readings over MOST_G or MOST_DPS means another unit, not damaged cells
 SHUFFLED_NS = 500_000_000  # samples in the wrong order are sorted if they are less late than this
-LATE_STEPS, MOST_LATE = 4.0, 0.02  # and if at most the share MOST_LATE is late by over LATE_STEPS median steps
+# samples are sorted only if at most the share MOST_LATE is late by over LATE_STEPS median steps
+LATE_STEPS, MOST_LATE = 4.0, 0.02
 MOST_HZ = 10_000.0  # highest rate of an inertial sensor; the fastest have 8,000 Hz
 
 
@@ -38,7 +39,8 @@ def join(recording: AppRecording, name: str) -> tuple[Log, int]:
         raise InputError(f"{name}: its readings are past any sensor's, {_most(accel.values, rates)}: check their units")
     there &= ~past
     lost = int(np.count_nonzero(past)) + len(recording.accel.time_ns) - len(accel.time_ns)
-    lost += max(recording.accel.damaged, recording.gyro.damaged)  # the same rows may contain both sensors
+    # not the sum, because the same rows may contain both sensors
+    lost += max(recording.accel.damaged, recording.gyro.damaged)
     if np.count_nonzero(there) < 2:
         raise InputError(f"{name}: accelerometer and gyro have no time in common: were they recorded together?")
     temp_c = recording.temp_c

@@ -54,8 +54,8 @@ class Grid:
 
 
 def sheet_in(file: RecordingFile, wanted: Collection[str] = ()) -> Sheet | None:
-    """The table in a file; None if there is none. wanted: names that its line of names must have. Raises InputError for
-    a table that is too large."""
+    """The table in a file; None without a table. wanted: names that the table's line of names must have. Raises
+    InputError for a table that is too large."""
     text = without_stamps(file.text)
     labelled = _labelled(file.name, text)
     if labelled is not None:

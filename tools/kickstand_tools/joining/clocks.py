@@ -27,10 +27,10 @@ _ROUNDS = 8
 
 @dataclass
 class Clocks:
-    """later_s: time of B's first sample minus that of A's, s. drift: seconds per second that B's clock loses against
-    A's. correlation: correlation of the rates. common_s: time for which both have samples, without gaps and frozen
-    readings, s. apart_deg: B's rotation relative to A, once from the calibrations and once from the gyros: the angle
-    between the two."""
+    """later_s: time of B's first sample minus the time of A's first sample, s. drift: seconds per second that B's clock
+    loses against A's. correlation: correlation of the rates. common_s: time for which both have samples, without gaps
+    and frozen readings, s. apart_deg: B's rotation relative to A, once from the calibrations and once from the gyros:
+    the angle between the two."""
 
     later_s: float
     drift: float

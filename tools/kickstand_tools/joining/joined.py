@@ -127,7 +127,7 @@ def _nearest(time_us: Ints, at_us: Ints) -> tuple[Ints, Ints]:
         return np.zeros(len(points), dtype=int), points
     rows = after - (at_us[points] - time_us[after - 1] < time_us[after] - at_us[points])
     near = np.abs(time_us[rows] - at_us[points]) <= LOST_US
-    rows, last = np.unique(rows[near][::-1], return_index=True)  # if a row has two points, the later one
+    rows, last = np.unique(rows[near][::-1], return_index=True)  # if a row has two points, use the later point
     return rows, points[near][::-1][last]
 
 

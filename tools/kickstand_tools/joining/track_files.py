@@ -12,7 +12,7 @@ from ..common.errors import InputError, cause, extra
 from ..logs.source import Progress, open_input
 from .track import FASTEST_MPS, Track
 
-_DEGREES = 180.0 / 2**31  # degrees of one unit ("semicircle") in a FIT file
+_DEGREES = 180.0 / 2**31  # one unit of a FIT file ("semicircle"), in degrees
 _FEWEST = 30  # least number of points of a track
 # largest file; a day with a fix per second has 20 million, and parsing takes ten times as much memory
 _MOST_BYTES = 50_000_000

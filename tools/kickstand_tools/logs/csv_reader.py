@@ -35,7 +35,7 @@ _PLAIN = b"0123456789.-,\n"
 
 
 def separator_of(line: str) -> str:
-    """The separator of a line's cells, one of , ; and tab: the most frequent one outside quotation marks."""
+    """The separator of a line's cells, comma, semicolon or tab, whichever is most frequent outside quotation marks."""
     bare = re.sub(r'"[^"]*"', "", line)
     return max(",;\t", key=bare.count)
 

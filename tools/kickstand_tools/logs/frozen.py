@@ -17,8 +17,9 @@ from .log import Log
 
 FROZEN_S, FROZEN_SAMPLES = 0.5, 10  # least duration and number of equal readings
 COARSE_G, COARSE_DPS = 0.002, 0.05  # with last digits this large, rounding may hide the noise of a phone's sensor
-BESIDE_S = 0.5  # time before and after a stretch that is compared with it
-NEAR_G, NEAR_DPS = 0.02, 0.5  # at standstill, the means beside a stretch differ from it by at most this
+BESIDE_S = 0.5  # a stretch is compared with this time before and after it
+# at a standstill, the means before and after a stretch differ from the stretch by at most this
+NEAR_G, NEAR_DPS = 0.02, 0.5
 
 _MOTION = [0, 1, 2, 4, 5, 6]  # columns in the chip's order, without the temperature
 

@@ -28,7 +28,7 @@ BLOCK_SAMPLES = 60_000  # samples in a block of a log in memory
 MOST_SAMPLES = 10_000_000  # largest log that is read as a whole: 14 hours at 200 Hz take 1 GB of memory
 _READINGS = ("ax_g", "ay_g", "az_g", "temp_c", "gx_dps", "gy_dps", "gz_dps")  # in the order of Block.readings
 
-Source = File | Log | Stretch  # what can be read as a log
+Source = File | Log | Stretch  # everything that can be read as a log
 
 
 @dataclass(frozen=True)

@@ -106,7 +106,7 @@ class _Heading:
         lat, lon = (np.concatenate((last, now)) for last, now in zip(self._last, (lat_deg, lon_deg)))
         east, north = distance_m(lat[:-1], lon[:-1], lat[1:], lon[1:])
         found = np.concatenate((self._last[2], np.degrees(np.arctan2(east, north)) % 360.0))
-        # also True for NaN, because a gap ends the track
+        # NaN counts as moved, because a gap ends the track
         moved = np.concatenate(([True], ~(np.hypot(east, north) <= _SAME_M)))
         found = found[np.maximum.accumulate(np.where(moved, np.arange(len(found)), 0))]
         first = np.flatnonzero(np.isnan(found[:-1]) & np.isfinite(lat[:-1]))

@@ -21,7 +21,7 @@ GUIDE_COLOUR = "#bbbbbb"
 DOUBT_COLOUR, DOUBT_WIDTH = "#d99a00", 4.0
 SMOOTH_S = 0.3
 GG_BIN_G = 0.025
-GAP_S = 1.0  # lines are interrupted if there is no value for longer
+GAP_S = 1.0  # a line is interrupted after this time without a value
 SPEED_GAP_S = 5.0  # GAP_S for the speed, which has fewer values
 _HIGH, _LOW, _SQUARE = 2.5, 1.5, 3.0  # heights of charts, inches of the picture
 _MARKED = 0.82  # share of a chart's height: above it, lines of the maxima would cross the words in the corner
@@ -256,7 +256,7 @@ def _shares(seen: Overview) -> Chart:
     for peak, sign in _maxima(seen):
         at = sign * peak.value
         made.traces.append(Line(np.array([at, at]), np.array([0.0, _MARKED * top]), "#555555", dotted=True))
-        beside = "left" if sign < 0 else "right"  # on the inner side, so that the words of two leans do not overlap
+        beside = "left" if sign < 0 else "right"  # towards the middle, so that the words at both maxima do not overlap
         made.notes.append(
             Note(at, _MARKED * top, f"{peak.value:.0f}°", "above" if peak.value > 0.3 * limit else beside)
         )

@@ -1,5 +1,5 @@
 """The charts of a ride for plotly.js, to zoom into: {"data": traces, "layout": of a wide window, "narrow": of a phone}.
-In a wide window the last charts are side by side below those over time."""
+In a wide window, the last charts are side by side, below the charts over time."""
 
 import html
 from typing import Any
@@ -9,7 +9,7 @@ import numpy as np
 from ...signals import Array
 from .charts import LEFT_COLOUR, RIGHT_COLOUR, Bars, Chart, Charts, Dots, Line, Note, Sides, Trace, envelope
 
-POINTS = 40_000  # most points of a line: with more, a browser no longer zooms smoothly
+POINTS = 40_000  # largest number of points in a line; with more, a browser does not zoom smoothly
 _INCH = 86  # pixels per inch of a chart's height
 _GAP, _NARROW_GAP = 62, 96  # pixels between rows of charts; in a narrow window axes have names there
 _MARGIN = {"l": 80, "r": 80, "t": 100, "b": 80}
@@ -108,7 +108,7 @@ def _traces(trace: Trace) -> list[dict[str, Any]]:
 
 
 def _filled(name: str, x: Array, y: Array, colour: str) -> dict[str, Any]:
-    """A trace filled from zero to y (n). Of each run of zeros only both ends are kept."""
+    """A trace filled from zero to y (n). Each run of zeros is reduced to its two ends."""
     leans = y != 0.0
     kept = leans.copy()
     kept[1:] |= leans[:-1]

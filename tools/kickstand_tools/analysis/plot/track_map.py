@@ -17,11 +17,11 @@ from .interactive import PAPER, plain
 
 POINTS = 20_000
 SHORTEST_S = 0.2  # least time between points
-SAME_M = 0.5  # points closer to the previous one are left out: a bike that stands is one point
+SAME_M = 0.5  # points closer to the previous point are left out, so a standing bike is one point
 MOST_LAT_DEG = 85.0  # the map ends here, because Mercator cannot show the poles
 _SHAPES = (0.6, 2.2)  # width over height
 LEAST_LEAN_DEG = 30.0  # the lean with the full colour is at least this
-# From left lean to right lean; upright is grey. Colour-blind people can distinguish blue and orange
+# Colours from left lean to right lean, grey when upright. Colour-blind people can distinguish blue from orange
 _COLOURS = [[0.0, "#0d3a73"], [0.25, LEFT_COLOUR], [0.5, "#c9c9c9"], [0.75, RIGHT_COLOUR], [1.0, "#7a2c05"]]
 
 

@@ -29,7 +29,7 @@ from .standstill import standing
 
 RATE_S = 0.02  # time between samples for the search of stops
 MIN_SPEED_MPS = 10.0 / 3.6
-MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0  # limits of a stop's deceleration: a larger one is a fall or a fault
+MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0  # limits of a stop's deceleration; above them it is a fall or a fault
 LONGEST_S = 60.0
 FEWEST = 10  # a standstill with fewer samples shows neither slope nor bias
 GAP_S = 0.5  # longest gap in the readings over which speed and pitch are integrated

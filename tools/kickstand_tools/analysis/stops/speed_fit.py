@@ -47,7 +47,7 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
     part: the ride up to a standstill; speed, acceleration (n): integrated and measured, m/s and m/s2. begin: index at
     which braking begins. delay_s: delay of the log's speed.
 
-    Least squares with a prior. The log's speed at the time t is
+    The correction is found by least squares with a prior. The log's speed at the time t is
 
         u(t) = (1 + k) v(t) + integral of b from t to the end - d a(t)
 
@@ -65,7 +65,7 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
     knots = np.arange(float(time[-1]), float(min(time[wanted[0]], time[begin])) - KNOT_S, -KNOT_S)
     hats = np.column_stack([np.interp(time, knots[::-1], row[::-1]) for row in np.eye(len(knots))])
     pushed = np.column_stack([integral(time, hat) for hat in hats.T])
-    pushed = pushed[-1] - pushed  # from each sample to the end
+    pushed = pushed[-1] - pushed  # integral from each sample to the end
     terms = np.column_stack((speed, pushed, -smoothed(acceleration, time, SMOOTH_S)))[wanted]
     error = part.speed_mps[values] - speed[wanted]
     prior = _prior(len(knots))

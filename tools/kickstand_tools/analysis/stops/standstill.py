@@ -12,7 +12,7 @@ from ..channels import Channels, spacing_s
 
 STALE_S = 3.0  # an older speed is not used
 
-# Without a speed: a vehicle stands still while, over QUIET_S, it shakes by less than a share of its shaking when moving
+# Without a speed, a vehicle stands still if it shakes over QUIET_S by less than a share of its shaking when moving
 QUIET_S = 1.0
 QUIET_SHARE = 0.15  # the share for pitch and yaw
 QUIET_UP_SHARE = 0.2  # the share for up and down: smooth roads and an idling engine leave more than a standing fork
@@ -79,7 +79,8 @@ def _is_calm(values: Array, n: int, share: float) -> Bools:
 
 
 def _has_force_at_rest(ride: Channels, n: int) -> Bools:
-    """True where the force over n successive samples equals that at rest, within the sensor's calibration errors."""
+    """True where the force over n successive samples equals the force at rest, within the sensor's calibration
+    errors."""
     size = np.sqrt(sum(window_means(axis, n) ** 2 for axis in (ride.left_g, ride.up_g, ride.forward_g)))
     rests = size[window_means(ride.resting, n) > 0.99]
     weight = float(np.median(rests)) if len(rests) else 1.0
