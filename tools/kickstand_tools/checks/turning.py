@@ -34,8 +34,7 @@ class Turning:
 
     def __init__(self, force: Array, rate: Array, bias: Array, speed: Array | None, places: Ints) -> None:
         self._force, self._rate, self._bias = force, rate, bias
-        # for each delay: k functions of time, which combine to the velocity, and their derivatives per second: (k, w,
-        # n)
+        # for each delay: k functions of time, of which the velocity is a sum, and their derivatives: (k, w, n)
         self._velocities = [_knots(*places.shape)]
         self._usual = VELOCITY_MPS
         if speed is not None:

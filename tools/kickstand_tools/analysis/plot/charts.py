@@ -256,7 +256,7 @@ def _shares(seen: Overview) -> Chart:
     for peak, sign in _maxima(seen):
         at = sign * peak.value
         made.traces.append(Line(np.array([at, at]), np.array([0.0, _MARKED * top]), "#555555", dotted=True))
-        beside = "left" if sign < 0 else "right"  # towards the middle, so that the words at both maxima do not overlap
+        beside = "left" if sign < 0 else "right"  # the side for small leans, so that the words do not overlap
         made.notes.append(
             Note(at, _MARKED * top, f"{peak.value:.0f}°", "above" if peak.value > 0.3 * limit else beside)
         )
