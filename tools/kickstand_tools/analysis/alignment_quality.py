@@ -1,4 +1,4 @@
-"""Estimates the errors of the aligned axes against the bike's own, from the ride itself.
+"""Estimates from a ride how far the aligned axes are from the bike's own axes.
 
 `roll`: on a straight a balanced bike is upright, so the mean force points along the bike's own up axis. `yaw`: braking
 and speeding up on a straight push along the bike's own forward axis. `pitch`: between two standstills on level ground,
@@ -72,7 +72,7 @@ def lean_cost(found: Quality) -> LeanCost:
 
 
 def yaw_cost_deg(yaw_deg: float) -> float:
-    """The rms error of the shown lean, degrees, that a yaw error of the alignment causes on average."""
+    """The average rms error of the shown lean, degrees, caused by a yaw error of the alignment."""
     return YAW_COSTS_DEG * abs(float(np.sin(np.radians(yaw_deg))))
 
 

@@ -226,8 +226,8 @@ def judged(seen: Overview) -> bool:
 
 
 def _cost_sentences(cost: LeanCost, speed: bool, on_page: bool) -> str:
-    """A sentence for each angle that causes a lean error, and the remedy; "" if none does. speed: True if the log has
-    one."""
+    """A sentence, with the remedy, for each angle that causes a lean error. "" without such an angle. speed: True if
+    the log has a speed."""
     costs = {
         "Roll": (cost.roll_deg, _LESS_ROLL),
         "Pitch": (cost.pitch_deg, _LESS_PITCH),

@@ -150,7 +150,7 @@ def wrong_number(captures: int) -> InputError:
 def _sides(poses: list[Pose]) -> tuple[list[Pose], Pose | None]:
     """The pose of each side in the order of SIDES, and the free pose (None without one).
 
-    In seven poses one side is nearest to up twice. The pose further from the axis is then the free pose.
+    With seven poses, two poses have the same side up. The one that is further from the axis is the free pose.
     """
     found: dict[int, list[Pose]] = {}
     for pose in poses:

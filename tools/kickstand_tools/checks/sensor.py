@@ -20,7 +20,7 @@ LEAST_SAMPLES = 10  # least number of samples in such a stretch
 OTHER_G, OTHER_DPS, OTHER_STEPS = 0.01, 0.3, 20.0
 # Least share of samples at which the readings change direction: noise gives two thirds, a log without noise less
 NOISY = 0.15
-# A sensor whose axes have all never changed is judged over a part of the log of this length
+# If no axis of a sensor ever changes, the sensor is judged over a part of the log of this length
 DEAD_ALL_S = 20.0
 DEAD_FROM_S = 2.0  # shorter stretches are kept, because rounding may hide the noise for a second
 SATURATED_DPS, SATURATED_S, SATURATED_SAMPLES = 100.0, 0.1, 5
@@ -89,7 +89,7 @@ class SensorHealth:
     def __init__(self) -> None:
         self._step = np.full(6, np.inf)  # smallest change seen on each axis: the last digit
         self._dead_s = np.zeros(6)
-        self._run_s = np.zeros(6)  # how long each axis has been dead until now
+        self._run_s = np.zeros(6)  # for each axis, how long it has been dead at the end of the last stretch
         self._begin_s = np.full(6, np.nan)
         self._saturated: list[list[float]] = [[], [], []]  # begin of the first case, number of cases, seconds
         # for each axis and sign: largest reading in g, number of samples with it, time of the first

@@ -26,8 +26,8 @@ LATE_S = (0.0, 0.5, 1.0, 1.5)  # tried delays of the speed, because a satellite 
 
 
 class Turning:
-    """The fit. force (w, n, 3, g), rate (w, n, 3, deg/s): w windows of n cells of CELL_S. bias (3, deg/s): a first
-    guess of the gyro's bias.
+    """Fits rates to forces. force (w, n, 3, g), rate (w, n, 3, deg/s): w windows of n cells of CELL_S. bias (3, deg/s):
+    a first guess of the gyro's bias.
 
     speed (m, 2): index of the cell and m/s, or None; places (w, n): the indices of the windows' cells.
     """

@@ -129,7 +129,7 @@ def noise(
         unit, digits = ("mg", 1) if k < 3 else ("deg/s", 3)
         factor = 1000.0 if k < 3 else 1.0
         sheet = (ACCEL_NOISE_G if k < 3 else GYRO_NOISE_DPS) * math.sqrt(1.57 * bands[k // 3])
-        sheet = math.hypot(sheet, 0.3 / lsb[k])  # rounding to whole counts adds noise
+        sheet = math.hypot(sheet, 0.3 / lsb[k])  # rounding to whole counts adds a noise of 0.3 counts
         words = f"{factor * noises[k]:.{digits}f} {unit} (data sheet {factor * sheet:.{digits}f}, "
         words += f"limit {factor * NOISE_TIMES * sheet:.{digits}f})"
         if dead[k]:

@@ -101,7 +101,9 @@ def in_hand(w: Windows) -> tuple[Bools, Bools]:
     mean = averaged(w.force * there[:, None], MOUNTED_S)
     off = there & (mean[:, 1] < np.cos(np.radians(MOUNTED_DEG)) * np.linalg.norm(mean, axis=1))
     places = np.flatnonzero(off)
-    if len(places):  # between two such movements, and between one and an end of the log, the sensor may not be mounted
+    if len(
+        places
+    ):  # between two such movements, or between a movement and an end of the log, the sensor may not be mounted
         ends = np.concatenate(([0], places, [len(w) - 1]))
         for begin, end in itertools.pairwise(ends):
             if w.edges[end + 1] - w.edges[begin] < BETWEEN_S:
@@ -168,8 +170,8 @@ def _bias(w: Windows) -> Array:
 
 
 def _refuse_no_motorcycle(found: Leaning, sideways: Array, riding: Bools) -> None:
-    """Raise RefusedInput unless the ride is a motorcycle's with enough leaning and right-handed rates. sideways (n):
-    force to the left, g, without its slow changes."""
+    """Raise RefusedInput if the ride is not a motorcycle's, leans too little, or has rates that are not right-handed.
+    sideways (n): force to the left, g, without its slow changes."""
     in_radians_mps = speed_in_radians(found)
     if in_radians_mps is not None:
         raise RefusedInput(RatesInRadians(in_radians_mps))

@@ -54,10 +54,11 @@ EXPECTED = np.array([0.38, 0.38, 0.38, 0.38, 0.38, 0.5, 0.5])
 ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
 # Accelerations that are not the bike's, for example in a resonating mount, are white noise only if they are brief.
 # CLIMBING shows their size and correlation time: the upward velocity from integrated forces and the upward velocity
-# from pitch and speed differ for seconds. The misfit is the rms of this residual in means over LASTING_MISFIT_S, times
-# the root of the number of windows in a mean, divided by the value of an ordinary ride, USUAL_MISFIT. The velocities'
-# standard deviation grows with its square. At any speed, the unit of the residual is CLIMBING's standard deviation at
-# MISFIT_MPS, because a mount's error in m/s is the same in town as on a motorway.
+# from pitch and speed differ for seconds. The misfit is the factor on the velocities'
+# standard deviation. It is the square of a ratio: the rms of this residual in means over LASTING_MISFIT_S, times the
+# root of the number of windows in a mean, divided by the same value of an ordinary ride, USUAL_MISFIT. At any speed,
+# the unit of the residual is CLIMBING's standard deviation at MISFIT_MPS, because a mount's error in m/s is the same in
+# town as on a motorway.
 LASTING_MISFIT_S, MISFIT_MPS, USUAL_MISFIT, MOST_MISFIT = 2.0, 25.0, 0.25, 6.0
 # If the misfit is over 1, roughness is at least this factor times the misfit, because lasting errors have small
 # residuals
@@ -74,9 +75,9 @@ class Noise:
     """The standard deviations of n windows. still (n): True where the bike stands.
 
     lean, pitch (n, rad), speed (n, m/s): estimates, which must be set before sigma() is called. riding (n): True where
-    the bike is riding, or may be riding. roughness (n): factor on the noise of vibration, 1 for a rough ride. misfit
-    (n): factor on the velocities' noise, 1 if the accelerations are the bike's. doubtful (n): True where the bike is
-    riding and the misfit is at its limit. unbalance: factor on the noise of BALANCED, 1 for an average ride.
+    the bike may be riding. roughness (n): factor on the noise of vibration, 1 for a rough ride. misfit (n): factor on
+    the velocities' noise, 1 if the accelerations are the bike's. doubtful (n): True where the bike is riding and the
+    misfit is at its limit. unbalance: factor on the noise of BALANCED, 1 for an average ride.
     """
 
     def __init__(self, windows: Windows, still: Bools) -> None:
@@ -180,7 +181,7 @@ class Noise:
             return
         off = force - averaged(np.where(counted, force, 0.0), LASTS_S) / np.maximum(share, 1e-9)
         mean = averaged(np.where(counted, off / self._of_balance(), 0.0), over_s)[whole]
-        # share of the variance of an error that lasts BALANCE_S, which remains in a mean over over_s
+        # the share of the variance that is left in a mean over over_s, for an error that lasts BALANCE_S
         ratio = over_s / BALANCE_S
         left = 2.0 * (ratio - 1.0 + np.exp(-ratio)) / ratio**2
         self.unbalance = float(np.clip(np.sqrt(np.mean(mean**2) / left), LEAST_UNBALANCE, MOST_UNBALANCE))

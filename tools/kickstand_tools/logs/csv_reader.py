@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from ..common.errors import InputError
 from ..signals import Array, Bools
 
-Cells = NDArray[Any]  # (n): int64; float64, NaN for no number; or str as objects, "" for an empty cell
+# (n) cells of one column: int64, or float64 with NaN for no number, or str as objects with "" for an empty cell
+Cells = NDArray[Any]
 
 ROWS = 50_000  # rows converted at once, because text takes ten times the memory of numbers
 LONGEST = 40  # most characters in a number

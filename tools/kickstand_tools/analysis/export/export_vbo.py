@@ -20,7 +20,7 @@ import numpy as np
 from ...signals import Array, distance_m
 from ..channels import Channels
 
-# standard channels: (title in [header], name in [column names]); other channels: (title and name, unit, channel)
+# standard channels have a title in [header] and a name in [column names]; other channels a title, a unit, a channel
 STANDARD = (
     ("satellites", "sats"),
     ("time", "time"),

@@ -161,7 +161,7 @@ def lean_limit(seen: Overview) -> float:
 
 
 def envelope(time: Array, values: Array, points: int, gap_s: float = np.inf) -> tuple[Array, Array]:
-    """Reduce a long line to few points that look the same: the smallest and the largest value of each stretch.
+    """Reduce a long line to the smallest and the largest value of each stretch. The drawn line looks the same.
 
     Returns at most about `points` of the samples, in their order, or all if there are not more. NaNs are left out,
     except one in the middle of each gap of over gap_s, which breaks the line.
@@ -256,7 +256,7 @@ def _shares(seen: Overview) -> Chart:
     for peak, sign in _maxima(seen):
         at = sign * peak.value
         made.traces.append(Line(np.array([at, at]), np.array([0.0, _MARKED * top]), "#555555", dotted=True))
-        beside = "left" if sign < 0 else "right"  # the side for small leans, so that the words do not overlap
+        beside = "left" if sign < 0 else "right"  # labels of small leans go to the side, to avoid overlap
         made.notes.append(
             Note(at, _MARKED * top, f"{peak.value:.0f}°", "above" if peak.value > 0.3 * limit else beside)
         )

@@ -77,8 +77,8 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
 
 
 def _prior(knots: int) -> Array:
-    """The matrix of the prior, (knots + 2, knots + 2). Multiplied by the unknowns (k; b at each knot, last knot first;
-    d) it gives values with mean 0 and standard deviation 1."""
+    """The matrix of the prior, (knots + 2, knots + 2). The matrix times the unknowns (k; b at each knot, last knot
+    first; d) has mean 0 and standard deviation 1."""
     walk = [SIGMA_WALK_MPS2 * KNOT_S**0.5] * (knots - 1)
     sigma = np.array([SIGMA_SCALE, SIGMA_SLOPE_MPS2, *walk, SIGMA_DELAY_S])
     prior = np.eye(knots + 2)

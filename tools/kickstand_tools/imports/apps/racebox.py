@@ -26,8 +26,8 @@ def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 
 def read(files: list[RecordingFile], name: str, units: Mapping[str, str] = {}) -> AppRecording:
-    """Read a recording. units: "speed" is the unit of the column Speed; if missing, it is found from the positions.
-    Raises InputError for a missing column and for a unit that is not a unit of speed."""
+    """Read a recording. units: "speed" is the unit of the column Speed. Without it, the unit is found from the
+    positions. Raises InputError for a missing column and for a unit that is not a unit of speed."""
     said = units.get("speed", "")
     if said:
         factor(said, SPEEDS, "speed")
