@@ -15,7 +15,7 @@ STALE_S = 3.0  # an older speed is not used
 # Without a speed, a vehicle stands still if it shakes over QUIET_S by less than a share of its shaking when moving
 QUIET_S = 1.0
 QUIET_SHARE = 0.15  # this share, for pitch and yaw
-QUIET_UP_SHARE = 0.2  # this share, for up and down, between a standing bike and smooth roads or an idling engine
+QUIET_UP_SHARE = 0.2  # this share, for up and down: a fork at a stop shakes less, smooth roads and idling engines more
 RIDING_PERCENTILE = 90.0  # this percentile of the shaking is from moving, even in a ride with long pauses
 ENGINE_S, BEND_S = 0.1, 0.5  # shaking by the road is slower than an engine's, and faster than bends and the fork's dive
 STILL_DPS, STILL_G = 1.0, 0.01  # limits at standstill: rate, change of the forward force from beginning to end

@@ -65,7 +65,7 @@ class Bike:
 
     @property
     def pendulum(self) -> float:
-        """Length of the equivalent pendulum in roll, m. A bike with a longer one falls into a lean more slowly."""
+        """Length of the equivalent pendulum in roll, m. A longer pendulum falls into a lean more slowly."""
         return (self.mass_height**2 + self.roll_gyration**2) / self.mass_height
 
 

@@ -36,7 +36,7 @@ def through(x: Signal, transfer: Callable[[Signal], NDArray], rate_hz: float) ->
     spectrum = np.fft.rfft(padded)
     del padded
     frequency = np.linspace(0.0, rate_hz / 2.0, len(spectrum))
-    for start in range(0, len(spectrum), _BLOCK):  # a transfer function makes many arrays of the size of its argument
+    for start in range(0, len(spectrum), _BLOCK):  # a transfer function needs several times the memory of its argument
         part = slice(start, start + _BLOCK)
         spectrum[part] *= transfer(frequency[part])
     del frequency

@@ -1,7 +1,7 @@
 """Simulates the readings of an MPU6050 with factory errors, mounted at any angle, for a given motion.
 
 Plain Python for CPython and MicroPython. Random numbers depend only on the seed and the time, not on earlier readings.
-So both give the same reading at the same time.
+So CPython and MicroPython get the same reading at the same time.
 
     world = Sensor(seed=3).world(ride.motion)
     world(20.0)         # (fx, fy, fz, wx, wy, wz, temp_c): g and deg/s in the sensor's axes, errors included
@@ -140,7 +140,7 @@ def turning(sensor, before, after, begin_s, end_s):
         at = angle * u * u * u * (10.0 + u * (6.0 * u - 15.0))
         rate = angle * 30.0 * u * u * (1.0 - u) * (1.0 - u) / (end_s - begin_s)
         up = [cos(at) * a[i] + sin(at) * across[i] for i in range(3)]
-        turn = [-degrees(rate) * n[i] for i in range(3)]  # the sensor turns opposite to `up` in its axes
+        turn = [-degrees(rate) * n[i] for i in range(3)]  # in the sensor's axes `up` turns the other way
         return tuple(
             [m[3 * i] * v[0] + m[3 * i + 1] * v[1] + m[3 * i + 2] * v[2] for v in (up, turn) for i in range(3)]
         )
