@@ -255,7 +255,7 @@ def test_status_prints_the_boards_output_and_restarts_it(board):
 
 @pytest.mark.parametrize(
     ("there", "words"),
-    [(False, "kickstand flash puts it there"), (True, "kickstand flash brings it up to date")],
+    [(False, "install it with kickstand flash"), (True, "kickstand flash brings it up to date")],
 )
 def test_status_of_a_board_without_it_is_refused(board, there, words):
     if there:

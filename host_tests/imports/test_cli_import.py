@@ -62,7 +62,7 @@ def test_export_of_one_file_is_read(tmp_path):
         tmp_path, "report", tmp_path / "A.cal.json", words="is not a log: give the ride, and a calibration with"
     )
     (tmp_path / "any").mkdir()
-    command.refused(tmp_path, "report", tmp_path / "any", words="any holds no recording")
+    command.refused(tmp_path, "report", tmp_path / "any", words="any contains no recording")
 
 
 def test_export_in_vehicle_axes_needs_no_alignment(tmp_path):

@@ -131,7 +131,7 @@ def test_links_out_of_a_folder_are_not_followed(tmp_path):
     inside = tmp_path / "export"
     inside.mkdir()
     (inside / "a.csv").symlink_to(tmp_path / "secret.csv")
-    line = command.refused(tmp_path, "import", inside, "--out", tmp_path / "x.csv", words="holds no recording")
+    line = command.refused(tmp_path, "import", inside, "--out", tmp_path / "x.csv", words="contains no recording")
     assert "the secret" not in line
 
 

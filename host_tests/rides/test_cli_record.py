@@ -221,7 +221,7 @@ def test_an_earlier_recording_is_not_overwritten(name, streaming, tmp_path):
     board = streaming(half_seconds(3)[0], "ctrl-c")
     (tmp_path / name).write_text("yesterday")
     out = tmp_path / "ride.csv"
-    command.refused(tmp_path, "record", "--out", out, words=f"{tmp_path / name} is there already: give --out another")
+    command.refused(tmp_path, "record", "--out", out, words=f"{tmp_path / name} exists already: give --out another")
     assert not board.resets
 
 
@@ -235,7 +235,7 @@ def test_a_board_without_the_firmware_is_reported_alike(arguments, streaming, tm
     monkeypatch.chdir(tmp_path)
     board = streaming([], None)
     fails(board, b"ImportError: no module named 'kickstand'")
-    words = "kickstand: Kickstand is not on the board at /dev/ttyACM0: kickstand flash puts it there\n"
+    words = "kickstand: Kickstand is not on the board at /dev/ttyACM0: install it with kickstand flash\n"
     assert command.refused(tmp_path, *arguments) == words
 
 

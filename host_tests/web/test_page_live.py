@@ -237,7 +237,7 @@ def test_board_without_firmware_is_sent_to_page_install(line, rider, board):
     line.plug_in(RawPrompt(board))
     rider.page.click("#pull")
     rider.page.wait_for_selector("#pull:enabled:visible")
-    assert rider.text("#pull-said") == "Kickstand is not on the board at this port: the page Install puts it there."
+    assert rider.text("#pull-said") == "Kickstand is not on the board at this port: install it with the page Install."
     assert board.resets == 1
 
 

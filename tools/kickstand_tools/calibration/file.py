@@ -240,7 +240,7 @@ def _list(name: str, data: dict[str, Any], entry: str) -> list[Any]:
         raise InputError(f"{name}: {entry} is missing", GIVE_CALIBRATION)
     if not isinstance(data[entry], list) or len(data[entry]) != 3:
         what = "3 rows of 3 numbers" if entry in ("vehicle_from_sensor", *_MATRICES) else "3 numbers"
-        raise InputError(f"{name}: {entry} has to be {what}: calibrate again")
+        raise InputError(f"{name}: {entry} must be {what}: calibrate again")
     return data[entry]
 
 
@@ -253,7 +253,7 @@ def _matrix(name: str, data: dict[str, Any], entry: str) -> Array:
 def _numbers(name: str, entry: str, values: Any) -> list[float]:
     """The values of an entry, three finite floats. Raises InputError for other values."""
     if not isinstance(values, list) or len(values) != 3:
-        raise InputError(f"{name}: {entry} has to be 3 numbers: calibrate again")
+        raise InputError(f"{name}: {entry} must be 3 numbers: calibrate again")
     for value in values:
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e6:
             raise InputError(f"{name}: {entry} has {_shown(value)} where a number should be: calibrate again")
@@ -287,7 +287,7 @@ def _check_ranges(name: str, calibration: CalibrationFile) -> None:
                 f"{name}: {entry} is {worst:g} from the identity, a sensor's is within {most:g}: calibrate again"
             )
     if not (np.all(calibration.gyro_sigma >= 0.0) and np.all(calibration.gyro_sigma <= MAX_GYRO_SIGMA)):
-        raise InputError(f"{name}: gyro_sigma has to be 0 to {MAX_GYRO_SIGMA:g}: calibrate again")
+        raise InputError(f"{name}: gyro_sigma must be 0 to {MAX_GYRO_SIGMA:g}: calibrate again")
     if not is_rotation(calibration.vehicle_from_sensor.ravel().tolist(), ROTATION_TOLERANCE):
         raise InputError(f"{name}: vehicle_from_sensor is no rotation (rows left, up, forward): align again")
 

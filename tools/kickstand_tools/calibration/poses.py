@@ -79,7 +79,7 @@ def refuse_same_file(sources: Sequence[Source]) -> None:
     seen: set[Path] = set()
     for path in (Path(source) for source in sources if isinstance(source, (Path, str))):
         if path.resolve() in seen:
-            raise InputError(f"{path} is given twice: each one has to be a recording of its own")
+            raise InputError(f"{path} is given twice: each must be a separate recording")
         seen.add(path.resolve())
 
 
@@ -168,7 +168,7 @@ def _sides(poses: list[Pose]) -> tuple[list[Pose], Pose | None]:
         near, free = same
         if _tilt_deg(free) < six_position.FREE_TILT_DEG or _tilt_deg(free) - _tilt_deg(near) < _EQUAL_TILT_DEG:
             raise InputError(
-                f"side {SIDES[side]} is there twice ({names}): the seventh pose has to be "
+                f"side {SIDES[side]} exists twice ({names}): the seventh pose must be "
                 f"slanted, over {six_position.FREE_TILT_DEG:.0f} degrees from every side"
             )
     return [found[side][0] for side in range(6)], free

@@ -68,7 +68,7 @@ def check_units(name: str, time_us: Ints, accel_g: Array) -> None:
             f"{said}: gravity has been taken off, and without it there is no lean; record the acceleration with gravity"
         )
     if MPS2_G[0] < usual_g < MPS2_G[1]:
-        raise InputError(f"{said}: they look like m/s2, their unit has to be g (9.80665 m/s2)")
+        raise InputError(f"{said}: they look like m/s2, their unit must be g (9.80665 m/s2)")
     if len(time_us) > 1 and (time_us[-1] - time_us[0]) / (len(time_us) - 1) >= MILLISECONDS_US:
         raise InputError(f"{name}: seconds between samples: is t_s in milliseconds?")
 

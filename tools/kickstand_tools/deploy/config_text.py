@@ -96,7 +96,7 @@ def _assignments(text: str) -> dict[str, ast.Assign]:
             continue  # the file's docstring
         target = node.targets[0] if isinstance(node, ast.Assign) and len(node.targets) == 1 else None
         if not (isinstance(node, ast.Assign) and isinstance(target, ast.Name)) or node.col_offset:
-            raise InputError(f"config.py, line {node.lineno} is no setting NAME = VALUE: change this file by hand")
+            raise InputError(f"config.py, line {node.lineno} is not a setting NAME = VALUE: change this file by hand")
         if target.id in found:
             raise InputError(f"config.py, line {node.lineno} sets {target.id} again: change this file by hand")
         try:

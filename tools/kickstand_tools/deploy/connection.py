@@ -69,7 +69,7 @@ class NotInstalled(Message):
     name: str
 
     text = "Kickstand is not on the board at {name}"
-    todo = Remedy("kickstand flash puts it there", "the page Install puts it there")
+    todo = Remedy("install it with kickstand flash", "install it with the page Install")
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ def read_files(source: Path | str) -> list[RecordingFile]:
         files = [file for file in files if file is not None] or _no_text(path)
     files = [file for file in files if file.text.strip() or file.name.endswith(".parquet")]
     if not files:
-        raise InputError(f"{path} holds no recording: give the file, the folder or the zip that an app has exported")
+        raise InputError(f"{path} contains no recording: give the file, the folder or the zip that an app has exported")
     return files
 
 

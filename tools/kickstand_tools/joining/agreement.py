@@ -159,7 +159,7 @@ def check_picture(path: Path) -> None:
     if not find_spec("matplotlib"):
         raise InputError(f"a picture needs matplotlib: {extra('rides')}")
     if path.suffix != ".png":
-        raise InputError(f"{path}: the picture is a .png")
+        raise InputError(f"{path}: the name of the picture must end in .png")
 
 
 def draw(path: Path, found: Agreement) -> None:

@@ -59,7 +59,7 @@ def clocks(a: CellMotion, b: CellMotion, axes_a: CalibrationFile, axes_b: Calibr
         tried.append((float(ratio), alike, shift_s))
     tried.sort(reverse=True)
     if not tried or tried[0][0] < LEAST_EVIDENCE or tried[0][1] < _LEAST_CORRELATION:
-        raise InputError("nowhere do they turn alike for a minute: are they of one ride, and both on the bike?")
+        raise InputError("at no time do they turn alike for a minute: are they of one ride, and both on the bike?")
     if len(tried) > 1 and tried[1][0] > tried[0][0] - LEAST_LEAD:
         raise InputError("they fit at two times: a longer ride with more bends is needed")
     turn = _rotation(a, b, tried[0][2])

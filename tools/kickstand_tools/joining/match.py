@@ -69,18 +69,18 @@ def match(motion: CellMotion, track: Track) -> Match:
         if best.correlation > _ALIKE:
             common_s = best.segments * STEPS
             raise InputError(f"they have {common_s} s with too few bends in common to be sure: {_LONGER}")
-        raise InputError(f"nowhere does the ride turn as the track does: {_OTHER}")
+        raise InputError(f"at no time does the ride turn like the track: {_OTHER}")
     others = [fit for fit in found if abs(fit.shift_s - best.shift_s) > AROUND_S]
     if others and others[0].evidence > best.evidence - LEAST_LEAD:
         far_s = abs(others[0].shift_s - best.shift_s)
         raise InputError(f"the track fits at two times, {far_s:.0f} s apart, as its bends are alike: {_LONGER}")
     if abs(best.drift) > MOST_DRIFT or cost_of_one_shift(motion, steps, parts, best) > _MOST_APART:
         raise InputError(
-            "the ride turns as the track does, but at other times: it is the same road on another day, or other bends "
+            "the ride turns like the track, but at other times: it is the same road on another day, or other bends "
             "that are alike"
         )
     if best.sigma_s > _MOST_SIGMA_S:
-        raise InputError(f"the track fits to {best.sigma_s:.1f} s only, not to {_MOST_SIGMA_S} s: {_LONGER}")
+        raise InputError(f"the track fits only to {best.sigma_s:.1f} s, not to {_MOST_SIGMA_S} s: {_LONGER}")
     start_utc_s = float(track.utc_s[0]) + best.shift_s
     made = Match(start_utc_s, best.drift, best.sigma_s, best.correlation, 0.0)
     begin_s, end_s = made.ride_s(track.utc_s[[0, -1]])
@@ -104,7 +104,7 @@ def _check_turns(motion: CellMotion, steps: Course) -> None:
     yaw_dps = moving_mean(motion.rate_dps @ motion.up, round(1.0 / STEP_S))
     turned_deg = float(np.abs(yaw_dps[np.abs(yaw_dps) > 3.0]).sum()) * STEP_S
     if turned_deg < _LEAST_TURN_DEG:
-        raise InputError(f"the ride turns by {turned_deg:.0f} degrees in all: too few bends to tell where it was when")
+        raise InputError(f"the ride turns by {turned_deg:.0f} degrees in all: too few bends to match a track")
 
 
 def _rough_shifts(motion: CellMotion, steps: Course) -> tuple[bool, list[float]]:

@@ -51,7 +51,7 @@ def read_track(path: Path | str, progress: Progress | None = None) -> Track:
     except OSError as error:
         raise InputError(f"{path} cannot be read: {cause(error)}") from error
     except Exception as error:  # for damaged files, the libraries raise many kinds of errors
-        raise InputError(f"{path} is damaged, or not of the format that its name says: {_words(error)}") from error
+        raise InputError(f"{path} is damaged, or in another format than its name says: {_words(error)}") from error
     table = np.array(points, dtype=float).reshape(-1, 4)
     on_earth = (np.abs(table[:, 1]) <= 90.0) & (np.abs(table[:, 2]) <= 180.0)
     table = table[np.all(np.isfinite(table[:, :3]), axis=1) & on_earth]
@@ -75,7 +75,7 @@ def _gpx(path: Path, progress: Progress | None) -> Iterator[Point]:
     try:
         document = gpxpy.parse(content)
     except (gpxpy.gpx.GPXException, ValueError, LookupError) as error:
-        raise InputError(f"{path} is no GPX file, or its copy is not whole: {_words(error)}") from error
+        raise InputError(f"{path} is not a GPX file, or its copy is incomplete: {_words(error)}") from error
     for track in document.tracks:
         for segment in track.segments:
             for point in segment.points:
@@ -119,7 +119,7 @@ def _fit(path: Path, progress: Progress | None) -> Iterator[Point]:
                 if progress:
                     progress(min(file.tell(), total), total)
     except (fitdecode.FitError, TypeError, ValueError) as error:
-        raise InputError(f"{path} is no FIT file, or a damaged one: {_words(error)}") from error
+        raise InputError(f"{path} is not a FIT file, or it is damaged: {_words(error)}") from error
 
 
 def _words(error: Exception) -> str:

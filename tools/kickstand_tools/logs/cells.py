@@ -53,7 +53,7 @@ def header(log: str, line: str) -> list[str]:
     if missing and log.lower().endswith(".json"):
         raise InputError(f"{log} is not a log: give the ride, and a calibration with --calibration")
     if missing and "lean_deg" in names:
-        what = f"{log} holds a lean, no readings"
+        what = f"{log} contains a lean but no readings"
         raise InputError(f"{what}: give the log that it was made from{_made_from(log)}")
     if missing and any(mark in "".join(names) for mark in ";\t"):
         raise InputError(f"{log}, line 1: values are separated by ; or tab: save it with commas between them")
@@ -64,7 +64,7 @@ def header(log: str, line: str) -> list[str]:
         )
     for name in COLUMNS + OPTIONAL:
         if names.count(name) > 1:
-            raise InputError(f"{log}, line 1: column {name} is there twice: leave one")
+            raise InputError(f"{log}, line 1: column {name} exists twice: remove one")
     return names
 
 
@@ -107,7 +107,7 @@ def read(log: str, text: str, width: int, places: dict[str, int], lines_before: 
             now = round(value[0] * 1e6)
             if before_us is not None and now < before_us:
                 at = cells[places["t_s"]].strip()
-                raise _Mistake(f"time goes back from {before_us / 1e6:.6f} at {at} s: it has to increase")
+                raise _Mistake(f"time goes back from {before_us / 1e6:.6f} at {at} s: it must increase")
         except csv.Error as error:
             raise InputError(f"{log}, line {number}: not CSV ({error}): is it a log?") from error
         except _Mistake as mistake:

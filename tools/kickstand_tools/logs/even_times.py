@@ -72,10 +72,10 @@ def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
     steps_us = np.diff(time_us)
     if np.any(steps_us < 0):
         at = recorded[int(np.argmax(steps_us < 0)) + 1]
-        raise InputError(f"{name}: time goes back at {at:g} s: it has to increase")
+        raise InputError(f"{name}: time goes back at {at:g} s: it must increase")
     starts = np.flatnonzero(np.diff(time_us, prepend=time_us[0] - 1))  # first sample of each time
     if len(starts) == 1:
-        raise InputError(f"{name}: the time is the same in all samples: it has to increase")
+        raise InputError(f"{name}: the time is the same in all samples: it must increase")
     counts = np.diff(np.append(starts, len(recorded)))
     between_us = np.diff(time_us[starts])
     usual_us = float(np.median(between_us))
@@ -87,7 +87,7 @@ def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
         tick_us = max(tick_us, usual_us)
     if np.any((counts > CROWD) & (counts > CROWDED * max(1.0, tick_us / period_us))):
         at = recorded[starts[int(np.argmax(counts))]]
-        raise InputError(f"{name}: time stands still at {at:g} s, in {np.max(counts)} samples: it has to increase")
+        raise InputError(f"{name}: time stands still at {at:g} s, in {np.max(counts)} samples: it must increase")
     if not repeated and (tick_us < COARSE * period_us or _one_step(between_us)):
         return recorded
     times = _spread_repeated(recorded, starts, counts, period_us * 1e-6)

@@ -111,9 +111,9 @@ class Log(Table):
         shapes = {"t_s": (n,), "accel_g": (n, 3), "gyro_dps": (n, 3)} | dict.fromkeys((*TRACK, "temperature_c"), (n,))
         for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
-                raise InputError(f"{self.name}: {name} has the shape {getattr(self, name).shape}, it has to be {shape}")
+                raise InputError(f"{self.name}: {name} has the shape {getattr(self, name).shape}, it must be {shape}")
         if n and not np.all(np.diff(np.rint(self.t_s * 1e6)) > 0):
-            raise InputError(f"{self.name}: the time t_s has to increase from sample to sample")
+            raise InputError(f"{self.name}: the time t_s must increase from sample to sample")
         if n and self.t_s[0] != 0.0:
             self.start_s += float(self.t_s[0])
             self.t_s = self.t_s - self.t_s[0]

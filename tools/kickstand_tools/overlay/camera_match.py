@@ -33,9 +33,9 @@ def camera_offset_s(ride: CellMotion, camera: Telemetry) -> tuple[float, float]:
     likely = log_likelihood_ratio(found, common, STEP_S / _ALIKE_S)
     best = peaks(likely, round(_APART_S / STEP_S), 2)
     if not best or likely[best[0]] < _LEAST_EVIDENCE or found[best[0]] < _LEAST_CORRELATION:
-        raise InputError("nowhere does the ride turn as the camera does")
+        raise InputError("at no time does the camera turn like the bike")
     if len(best) > 1 and likely[best[1]] > likely[best[0]] - _LEAST_LEAD:
-        raise InputError("the camera turns as the ride does at two times or more")
+        raise InputError("the camera turns like the bike at several times")
     at = best[0]
     between = peak_offset(found[at - 1 : at + 2]) if 0 < at < len(found) - 1 else 0.0
     shift = at - (len(filmed) - 1) + between

@@ -121,13 +121,13 @@ def _check(out: Path, video: Path | str | None, offset_s: float | None, height: 
         if out.suffix.lower() not in _TRANSPARENT:
             raise InputError(f"{out}: the name of a transparent clip ends in .mov or .webm; an .mp4 needs --video")
         if offset_s is not None:
-            raise InputError("an offset is that of a video: give --video, or --from and --to")
+            raise InputError("an offset needs a video: give --video, or --from and --to")
         ffmpeg()
         return None
     if out.suffix.lower() != ".mp4":
-        raise InputError(f"{out}: over a video the name has to end in .mp4")
+        raise InputError(f"{out}: over a video the name must end in .mp4")
     if height is not None:
-        raise InputError("a height is that of a clip: over a video the gauge goes by the video's own")
+        raise InputError("a height is only for a clip: over a video the gauge follows the video's height")
     return open_video(Path(video))
 
 
@@ -135,7 +135,7 @@ def _found_offset(log: Source, video: Video, progress: Progress | None) -> tuple
     todo = "give --offset, the ride's time in seconds at the video's first picture"
     measured = telemetry(video)
     if measured is None:
-        raise InputError(f"{video.path}: no readings of a GoPro's gyro in it show when it was filmed: {todo}")
+        raise InputError(f"{video.path}: it has no gyro readings of a GoPro that show when it was filmed: {todo}")
     try:
         return camera_offset_s(motion(log, progress), measured)
     except InputError as error:

@@ -51,7 +51,7 @@ def record(
     beside = ride_log.calibration_path(out)
     for path in (out, beside):
         if path.exists():
-            raise InputError(f"{path} is there already: give --out another name")
+            raise InputError(f"{path} exists already: give --out another name")
     with connected(port) as (transport, name):
         try:
             if begin:

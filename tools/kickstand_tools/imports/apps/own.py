@@ -40,7 +40,7 @@ def read(files: list[RecordingFile], name: str) -> AppRecording:
         accel = sensor_of(sheet, time_ns, exported[:3], "accelerometer", "g", "left, up, forward")
         gyro = sensor_of(sheet, time_ns, exported[3:], "gyro", "deg/s", "left, up, forward", _RATE_SIGNS)
     else:
-        raise InputError(f"{name} holds a lean, no readings: give the log that it was made from")
+        raise InputError(f"{name} contains a lean but no readings: give the log that it was made from")
     speed, lat, lon = (sheet.place(column) for column in ("speed_mps", "lat_deg", "lon_deg"))
     track = track_of(sheet, time_ns, speed, lat, lon)
     temp_c = sheet.numbers(sheet.place("temp_c"))
