@@ -75,7 +75,7 @@ def simulate_command(profile: str | None, seed: int, vehicles: int | None, out: 
         raise click.UsageError("Missing option '--profile', or '--fleet' for a fleet.")
     if (out / "MANIFEST.csv").exists():
         raise InputError(f"{out} holds a fleet, whose truth would be lost: give --out another directory")
-    with spinner("making up a ride"):
+    with spinner("simulating a ride"):
         made = simulate(profile, seed, out, **of_a_ride)
     echo(f"written: {out / 'RIDE.csv'}, {len(made.time)} samples, with its poses and TRUTH.csv")
     begin = made.truth["lean_deg"][0]
