@@ -66,7 +66,7 @@ def simulate_command(profile: str | None, seed: int, vehicles: int | None, out: 
     """Simulate a ride, with its truth, the six poses and a free one, the kickstand and upright poses; or a fleet."""
     if vehicles is not None:
         _check_fleet(out)
-        with Bar("making up vehicles", lines_s=LINES_S) as bar:
+        with Bar("simulating vehicles", lines_s=LINES_S) as bar:
             fleet = plugins.part(plugins.SIMULATIONS, "fleet")(out, vehicles, seed, progress=bar.reach)
         logs = sum(len(vehicle.paths) for vehicle in fleet)
         echo(f"written: {out}/MANIFEST.csv and TRUTH.csv, {vehicles} vehicles, {logs} logs")
