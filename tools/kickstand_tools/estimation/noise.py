@@ -53,8 +53,8 @@ ROUGH = [LEAN, PITCH, LEFT, UP, FORWARD, eq.SLIDING, eq.CLIMBING]
 EXPECTED = np.array([0.38, 0.38, 0.38, 0.38, 0.38, 0.5, 0.5])
 ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
 # Accelerations that are not the bike's, for example in a resonating mount, are white noise only if they are brief.
-# CLIMBING shows their size and correlation time: the upward velocity from integrated forces and the upward velocity
-# from pitch and speed differ for seconds. The misfit is the factor on the velocities'
+# The residual CLIMBING shows their size and correlation time: it is the difference between the upward velocity from
+# integrated forces and the one from pitch and speed, and lasts for seconds. The misfit is the factor on the velocities'
 # standard deviation. It is the square of a ratio: the rms of this residual in means over LASTING_MISFIT_S, times the
 # root of the number of windows in a mean, divided by the same value of an ordinary ride, USUAL_MISFIT. At any speed,
 # the unit of the residual is CLIMBING's standard deviation at MISFIT_MPS, because a mount's error in m/s is the same in

@@ -30,7 +30,7 @@ from .units import ACCELERATIONS, factor
 # units). Each module gets the files that no earlier module has claimed. phyphox is last, because it only looks at names
 # of columns.
 _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
-LEAST_HZ = 19.5  # least samples per second for a lean: 20, minus the error of a phone's clock
+LEAST_HZ = 19.5  # a lean needs this many samples per second: 20, minus the error of a phone's clock
 NAMES = [app.NAME for app in reversed(_APPS)]
 
 
