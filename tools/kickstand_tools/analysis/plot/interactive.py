@@ -157,7 +157,7 @@ def _layout(charts: Charts, narrow: bool, linked: bool) -> dict[str, Any]:
 
 def _annotations(chart: Chart, x: str, y: str, narrow: bool) -> list[dict[str, Any]]:
     """All words on a chart: the title, the names of the traces in their colours, and the words in the corners, at
-    points and above spans."""
+    points and in spans."""
     within = {"xref": f"{x} domain", "yref": f"{y} domain"}
     names = [
         f"<span style='color:{trace.colour}'>{trace.name}</span>"
