@@ -133,7 +133,7 @@ def test_a_repeated_side_and_the_missing_side_are_named(tmp_path, six_poses):
 
 def test_a_seventh_pose_on_a_side_proves_nothing(tmp_path, six_poses):
     flat = command.still(tmp_path / "flat.csv", reads(command.AXES["+y"]), BIAS, seed=5)
-    line = six_refused(tmp_path, [*six_poses, flat], "has to be slanted")
+    line = six_refused(tmp_path, [*six_poses, flat], "must be slanted")
     assert "flat.csv" in line
 
 

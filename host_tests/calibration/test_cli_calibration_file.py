@@ -20,7 +20,7 @@ BAD = {
     "no version": ({"version": None}, "version is missing"),
     "version of tomorrow": ({"version": 2}, "version 2"),
     "no offset": ({"accel_offset_g": None}, "accel_offset_g is missing"),
-    "slope a number": ({"accel_slope": 1.0}, "accel_slope has to be 3 numbers"),
+    "slope a number": ({"accel_slope": 1.0}, "accel_slope must be 3 numbers"),
     "offset nan": ({"accel_offset_g": [float("nan"), 0, 0]}, "accel_offset_g has nan"),
     "offset very large": ({"accel_offset_g": [10**400, 0, 0]}, "accel_offset_g has 1000"),
     "offset too large": ({"accel_offset_g": [0, 0.5, 0]}, "offset of y is 0.5 g"),
@@ -195,9 +195,9 @@ def test_a_file_without_matrices_has_none_of_their_keys():
     ("entry", "value", "words"),
     [
         ("gyro_matrix", [[1.3, 0, 0], [0, 1, 0], [0, 0, 1]], "gyro_matrix is 0.3 from the identity"),
-        ("accel_matrix", [1.0, 1.0, 1.0], "accel_matrix, row 1, has to be 3 numbers"),
-        ("gyro_matrix", [[1, 0, 0], [0, 1, 0]], "gyro_matrix has to be 3 rows of 3 numbers"),
-        ("gyro_sigma", [[-0.1] * 3] * 3, "gyro_sigma has to be 0 to 0.05"),
+        ("accel_matrix", [1.0, 1.0, 1.0], "accel_matrix, row 1, must be 3 numbers"),
+        ("gyro_matrix", [[1, 0, 0], [0, 1, 0]], "gyro_matrix must be 3 rows of 3 numbers"),
+        ("gyro_sigma", [[-0.1] * 3] * 3, "gyro_sigma must be 0 to 0.05"),
     ],
 )
 def test_matrices_that_no_sensor_has_are_refused(tmp_path, entry, value, words):

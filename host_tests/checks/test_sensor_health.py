@@ -71,7 +71,7 @@ def test_a_bias_that_steps_is_said_by_replay_and_report(street):
         (notice,) = (n for n in notices if n.code == "readings-misfit")
         assert notice.values[0] > 2.0
         assert notice.values[1] > 30.0
-        assert "the readings do not fit together" in sentence(notice)
+        assert "the readings repeatedly contradict each other" in sentence(notice)
 
 
 def test_a_saturated_gyro_is_said_and_the_rest_of_the_ride_is_good(street):

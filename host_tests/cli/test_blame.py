@@ -24,7 +24,7 @@ def test_links_in_a_circle_are_named(verb, tmp_path):
     ride = command.still(tmp_path / "ride.csv", (0, 1, 0), seconds=20)
     command.write_cal(tmp_path / "ride.cal.json")
     given = {"simulate": ["--profile", "street"], "web": []}.get(verb, [ride])
-    command.refused(tmp_path, verb, *given, "--out", tmp_path / "a", words="links lead in a circle")
+    command.refused(tmp_path, verb, *given, "--out", tmp_path / "a", words="links form a circle")
 
 
 @needs_links

@@ -48,7 +48,7 @@ def test_bug_is_reported_in_one_line(tmp_path, monkeypatch):
 
 def test_the_convention_of_logs_is_in_the_help():
     words = " ".join(command.works("import", "--help").out.split())
-    assert "At rest the axis that points up reads +1 g, and a rate is positive right-handed about its axis." in words
+    assert "At rest, the axis that points up reads +1 g. Rates are right-handed about their axes." in words
 
 
 def test_shell_sees_one_line_on_standard_error_and_status_2(tmp_path):
@@ -70,7 +70,7 @@ def test_times_are_read_as_seconds_minutes_and_hours(text, seconds):
 
 @pytest.mark.parametrize("text", ["", "early", "1:", ":30", "1:2:3:4", "1:-5", "1.5:00", "nan", "inf", "--5"])
 def test_invalid_time_is_refused_with_the_format(text):
-    with pytest.raises(click.UsageError, match="is no time: give seconds such as 60"):
+    with pytest.raises(click.UsageError, match="is not a time: give seconds such as 60"):
         TIME.convert(text, None, None)
 
 

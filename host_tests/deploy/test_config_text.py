@@ -55,13 +55,13 @@ def test_riders_settings_are_kept():
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("import machine\n", "line 1 is no setting"),
-        ("SIDE = 'left'\nif True:\n    SIDE = 'right'\n", "line 2 is no setting"),
+        ("import machine\n", "line 1 is not a setting"),
+        ("SIDE = 'left'\nif True:\n    SIDE = 'right'\n", "line 2 is not a setting"),
         ("SIDE = \n", "cannot be read"),
-        ("A = B = 3\n", "line 1 is no setting"),
+        ("A = B = 3\n", "line 1 is not a setting"),
         ("# mine\nSIDE = __import__('os').name\n", "line 2 computes SIDE"),
         ("SIDE = right\n", "line 1 computes SIDE"),
-        ("print('x')\nSIDE = 'left'\n", "line 1 is no setting"),
+        ("print('x')\nSIDE = 'left'\n", "line 1 is not a setting"),
         ("SIDE = 'left'\nDLPF = 4\nSIDE = 'right'\n", "line 3 sets SIDE again"),
     ],
 )

@@ -129,8 +129,8 @@ def test_ride_longer_than_announced_is_abandoned(tmp_path, plug_in, monkeypatch)
             self.serial.data += b"AAAA\n" * 100_000
 
     plug_in(Long(tmp_path / "flash"))
-    line = command.refused(tmp_path / "out", "pull", "--out", tmp_path / "out", words="did not come over whole")
-    assert "does not come to an end" in line
+    line = command.refused(tmp_path / "out", "pull", "--out", tmp_path / "out", words="did not arrive completely")
+    assert "the program on the board does not end" in line
 
 
 def test_a_link_in_the_directory_is_not_followed(tmp_path, plug_in):

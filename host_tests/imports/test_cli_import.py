@@ -56,13 +56,13 @@ def test_export_of_one_file_is_read(tmp_path):
     (tmp_path / "any.csv").write_text(app_exports.any_table(riding().every(4)))
     command.refused(tmp_path, "report", tmp_path / "any.csv", words="has to go through kickstand import first")
     (tmp_path / "t.gpx").write_text("<?xml version='1.0'?>\n")
-    command.refused(tmp_path, "report", tmp_path / "t.gpx", words="t.gpx is a track: kickstand join puts it to a ride")
+    command.refused(tmp_path, "report", tmp_path / "t.gpx", words="t.gpx is a track: kickstand join adds it to a ride")
     command.write_cal(tmp_path / "A.cal.json")
     command.refused(
-        tmp_path, "report", tmp_path / "A.cal.json", words="is no log: give the ride, and a calibration with"
+        tmp_path, "report", tmp_path / "A.cal.json", words="is not a log: give the ride, and a calibration with"
     )
     (tmp_path / "any").mkdir()
-    command.refused(tmp_path, "report", tmp_path / "any", words="any holds no recording")
+    command.refused(tmp_path, "report", tmp_path / "any", words="any contains no recording")
 
 
 def test_export_in_vehicle_axes_needs_no_alignment(tmp_path):

@@ -89,7 +89,7 @@ def test_log_without_line_ends_or_too_long_is_refused(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="16 MB without the end of a line"):
         reader.read_log(log)
     monkeypatch.setattr(reader, "MOST_SAMPLES", 100)
-    with pytest.raises(InputError, match="million samples: kickstand cut makes a part"):
+    with pytest.raises(InputError, match="million samples: kickstand cut writes a part"):
         reader.read_log(command.still(log, (0, 1, 0)))
 
 
@@ -131,7 +131,7 @@ def test_links_out_of_a_folder_are_not_followed(tmp_path):
     inside = tmp_path / "export"
     inside.mkdir()
     (inside / "a.csv").symlink_to(tmp_path / "secret.csv")
-    line = command.refused(tmp_path, "import", inside, "--out", tmp_path / "x.csv", words="holds no recording")
+    line = command.refused(tmp_path, "import", inside, "--out", tmp_path / "x.csv", words="contains no recording")
     assert "the secret" not in line
 
 

@@ -24,10 +24,12 @@ def refused(directory, source, words, *more):
 def test_folder_without_tables_is_refused(tmp_path):
     (tmp_path / "in").mkdir()
     refused(
-        tmp_path, tmp_path / "in", "holds no recording: give the file, the folder or the zip that an app has exported"
+        tmp_path,
+        tmp_path / "in",
+        "contains no recording: give the file, the folder or the zip that an app",
     )
     (tmp_path / "in" / "a.jpg").write_bytes(b"\xff\xd8")
-    refused(tmp_path, tmp_path / "in", "holds no recording")
+    refused(tmp_path, tmp_path / "in", "contains no recording")
 
 
 DAMAGED = [lambda content, keep=keep: content[: int(keep * len(content))] for keep in (0.1, 0.5, 0.99)]
@@ -127,7 +129,7 @@ def test_replay_output_and_own_vbo_are_refused(tmp_path, ride):
     assert "take the log that it was made from" in line
     names = ("t_s", *replay_engine.COLUMNS)
     (tmp_path / "LEAN.csv").write_text(app_exports.lines(names, [range(len(names))] * 3))
-    refused(tmp_path, tmp_path / "LEAN.csv", "holds a lean, no readings: give the log")
+    refused(tmp_path, tmp_path / "LEAN.csv", "contains a lean but no readings: give the log")
 
 
 def test_known_units_are_not_asked_for(tmp_path, ride):
@@ -173,7 +175,7 @@ def test_zip_with_a_password_is_refused(tmp_path):
         ("none.zip", None, "there is no such file"),
         ("a.csv.gz", b"\x1f\x8b\x08\x00\x00\x00\x00\x00", "a.csv.gz is damaged or cut short"),
         ("a.png", bytes(range(256)) * 4, "not text: give what an app has exported as CSV or VBO"),
-        ("a.csv", b"", "holds no recording"),
+        ("a.csv", b"", "contains no recording"),
         ("b.csv", b"Record,Time,Speed,GForceX,GForceY,GForceZ,GyroX,GyroY,GyroZ\n", "no rows under the names of the"),
         ("mk.py", b"import os\nprint('x')\n", "no table of sensors ('import os')"),
         ("old.xls", b"\xd0\xcf\x11\xe0" + bytes(600), "a table of Excel: export it as CSV"),

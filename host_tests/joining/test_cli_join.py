@@ -125,10 +125,10 @@ def test_track_of_another_ride_is_refused(tmp_path, log, track):
     short = api.Track(*(values[:20] for values in track.columns().values()), name="short")
     other = phone_tracks.track(api.simulate_ride("hills", seed=2, seconds=200.0))
     for name, words, make in (
-        ("other.gpx", "nowhere does the ride turn as the track does", lambda p: phone_tracks.write_gpx(p, other)),
+        ("other.gpx", "at no time does the ride turn like the track", lambda p: phone_tracks.write_gpx(p, other)),
         ("route.gpx", "not a planned route", lambda p: p.write_text('<gpx version="1.1" creator="x"></gpx>')),
-        ("text.gpx", "is no GPX file", lambda p: p.write_text("lat,lon\n")),
-        ("text.fit", "is no FIT file, or a damaged one", lambda p: p.write_text("lat,lon\n" * 99)),
+        ("text.gpx", "is not a GPX file", lambda p: p.write_text("lat,lon\n")),
+        ("text.fit", "is not a FIT file, or it is damaged", lambda p: p.write_text("lat,lon\n" * 99)),
         ("track.kml", "ends in .gpx or .fit", lambda p: p.write_text("")),
         ("no.gpx", "there is no such file", lambda p: None),
         ("short.gpx", "has 20 points", lambda p: phone_tracks.write_gpx(p, short)),

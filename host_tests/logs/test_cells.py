@@ -82,12 +82,12 @@ def test_common_wrong_units_are_refused(size_g, step_s, words):
 @pytest.mark.parametrize(
     ("log", "line", "words"),
     [
-        ("A.gpx", "<?xml version", "A.gpx is a track: kickstand join puts it to a ride"),
+        ("A.gpx", "<?xml version", "A.gpx is a track: kickstand join adds it to a ride"),
         ("A.FIT", "x", "A.FIT is a track"),
-        ("A.cal.json", "{", "A.cal.json is no log: give the ride, and a calibration with --calibration"),
-        ("A.csv", "t_s,lean_deg", "A.csv holds a lean, no readings: give the log that it was made from"),
-        ("A.csv", "t_s;ax_g;ay_g", "A.csv, line 1: values stand apart by ; or tab"),
-        ("A.csv", "t_s\tax_g", "A.csv, line 1: values stand apart by ; or tab"),
+        ("A.cal.json", "{", "A.cal.json is not a log: give the ride, and a calibration with --calibration"),
+        ("A.csv", "t_s,lean_deg", "A.csv contains a lean but no readings: give the log that it was made from"),
+        ("A.csv", "t_s;ax_g;ay_g", "A.csv, line 1: values are separated by ; or tab"),
+        ("A.csv", "t_s\tax_g", "A.csv, line 1: values are separated by ; or tab"),
         ("A.csv", command.HEADER + ",ax_g", "A.csv, line 1"),
         ("A.csv", command.HEADER.replace("ay_g,", ""), "ay_g"),
     ],

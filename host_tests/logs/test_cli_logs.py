@@ -20,7 +20,7 @@ BAD = {
     "one sample.csv": (text(ROW), "too short"),
     "no header.csv": (b"\n".join(g.encode() for g in GOOD), "line 1: no column t_s"),
     "no gz.csv": (text(*GOOD, header=command.HEADER.replace(",gz_dps", "")), "line 1: no column gz_dps"),
-    "column twice.csv": (text(*GOOD, header=command.HEADER + ",ax_g"), "line 1: column ax_g is there twice"),
+    "column twice.csv": (text(*GOOD, header=command.HEADER + ",ax_g"), "line 1: column ax_g exists twice"),
     "word.csv": (text(*GOOD[:3], "0.03,0,0,one,0,0,0"), "line 5: az_g is 'one', not a number"),
     "underscore.csv": (text(*GOOD[:3], "0.03,0,0,1_0,0,0,0"), "line 5: az_g is '1_0', not a number"),
     "empty cell.csv": (text(*GOOD[:3], "0.03,0,,1,0,0,0"), "line 5: ay_g is empty"),
@@ -72,7 +72,7 @@ def test_calibration_names_its_bad_capture(tmp_path):
     assert "pose2.csv" in line
 
 
-@pytest.mark.parametrize(("name", "words"), [(".", "holds no recording"), ("none.csv", "there is no such file")])
+@pytest.mark.parametrize(("name", "words"), [(".", "contains no recording"), ("none.csv", "there is no such file")])
 def test_directory_or_missing_log_is_refused(tmp_path, name, words):
     cal, out = command.write_cal(tmp_path / "CAL.json"), tmp_path / "LEAN.csv"
     command.refused(tmp_path, "replay", tmp_path / name, "--calibration", cal, "--out", out, words=words)

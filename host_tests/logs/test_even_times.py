@@ -97,9 +97,9 @@ def test_gaps_do_not_lengthen_the_period(gap, error):
 
 
 def test_a_time_that_goes_back_is_named():
-    with pytest.raises(InputError, match=r"log: time goes back at 0.02 s: it has to increase"):
+    with pytest.raises(InputError, match=r"log: time goes back at 0.02 s: it must increase"):
         even_times([0.0, 0.01, 0.01, 0.03, 0.02], "log")
     with pytest.raises(InputError, match="the time is the same in all samples"):
         even_times([1.0, 1.0, 1.0])
-    with pytest.raises(InputError, match="some times are no numbers"):
+    with pytest.raises(InputError, match="some times are not numbers"):
         even_times([0.0, np.nan])

@@ -51,14 +51,14 @@ def test_the_chips_order_and_the_names_of_the_columns():
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"t_s": [[0.0], [1.0]]}, r"t_s has the shape \(2, 1\), it has to be \(2,\)"),
-        ({"accel_g": [[0.0, 1.0]] * 2}, r"accel_g has the shape \(2, 2\), it has to be \(2, 3\)"),
-        ({"gyro_dps": [RATE]}, r"gyro_dps has the shape \(1, 3\), it has to be \(2, 3\)"),
-        ({"lat_deg": [1.0]}, r"lat_deg has the shape \(1,\), it has to be \(2,\)"),
-        ({"speed_mps": [1.0]}, r"speed_mps has the shape \(1,\), it has to be \(2,\)"),
-        ({"t_s": [0.0, 0.0]}, "has to increase"),
-        ({"t_s": [1.0, 0.5]}, "has to increase"),
-        ({"t_s": [0.0, 4e-7]}, "has to increase"),  # the same microsecond
+        ({"t_s": [[0.0], [1.0]]}, r"t_s has the shape \(2, 1\), it must be \(2,\)"),
+        ({"accel_g": [[0.0, 1.0]] * 2}, r"accel_g has the shape \(2, 2\), it must be \(2, 3\)"),
+        ({"gyro_dps": [RATE]}, r"gyro_dps has the shape \(1, 3\), it must be \(2, 3\)"),
+        ({"lat_deg": [1.0]}, r"lat_deg has the shape \(1,\), it must be \(2,\)"),
+        ({"speed_mps": [1.0]}, r"speed_mps has the shape \(1,\), it must be \(2,\)"),
+        ({"t_s": [0.0, 0.0]}, "must increase"),
+        ({"t_s": [1.0, 0.5]}, "must increase"),
+        ({"t_s": [0.0, 4e-7]}, "must increase"),  # the same microsecond
     ],
 )
 def test_arrays_that_do_not_fit_are_refused(changed, words):

@@ -82,7 +82,7 @@ def test_cut_refuses_unsafe_outputs_and_bad_stretches(log, tmp_path):
     out = tmp_path / "cut.csv"
     command.refused(tmp_path, "cut", log, "--out", out, words="Give --from, --to or both")
     command.refused(tmp_path, "cut", log, "--from", "1", "--out", log, words="is also an input")
-    command.refused(tmp_path, "cut", log, "--from", "early", "--out", out, words="'early' is no time: give seconds")
+    command.refused(tmp_path, "cut", log, "--from", "early", "--out", out, words="'early' is not a time: give seconds")
 
 
 def test_replay_and_report_accept_a_stretch(tmp_path):

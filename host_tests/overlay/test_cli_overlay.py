@@ -137,8 +137,8 @@ def test_file_that_is_not_a_video_of_the_ride_is_refused(tmp_path, ride):
     ffmpeg("-i", tmp_path / "loud.mp4", "-vn", "-c", "copy", sound)
     out = "--out", tmp_path / "out.mp4"
     for video, more, words in (
-        ("text.mp4", ("--offset", 1), "is no video that ffmpeg can read"),
-        ("half.mp4", ("--offset", 1), "is no video that ffmpeg can read"),
+        ("text.mp4", ("--offset", 1), "is not a video that ffmpeg can read"),
+        ("half.mp4", ("--offset", 1), "is not a video that ffmpeg can read"),
         ("sound.mp4", ("--offset", 1), "has no pictures"),
         ("no.mp4", ("--offset", 1), "there is no such file"),
         ("film.mp4", (), "no readings of a GoPro's gyro"),
@@ -148,7 +148,7 @@ def test_file_that_is_not_a_video_of_the_ride_is_refused(tmp_path, ride):
     ):
         command.refused(tmp_path, "overlay", ride, "--video", tmp_path / video, *more, *out, words=words)
     clip = "--out", tmp_path / "clip.mov"
-    command.refused(tmp_path, "overlay", ride, "--video", film, "--offset", 1, *clip, words="has to end in .mp4")
+    command.refused(tmp_path, "overlay", ride, "--video", film, "--offset", 1, *clip, words="must end in .mp4")
     given = "overlay", ride, "--video", film, "--offset", 1
     command.refused(tmp_path, *given, "--height", 480, *out, words="over a video the gauge goes by the video's own")
     command.refused(tmp_path, "overlay", ride, *out, words="ends in .mov or .webm")

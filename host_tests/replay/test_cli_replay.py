@@ -172,7 +172,7 @@ def test_calibration_beside_the_log_is_used(tmp_path):
     command.refused(tmp_path, "replay", log, "--out", lean, words=f"no calibration {beside.name} beside it")
     analysis_rides.calibration(beside)
     command.works("replay", log, "--out", lean)
-    words = f"LEAN.csv holds a lean, no readings: give the log that it was made from, {log}\n"
+    words = f"LEAN.csv contains a lean but no readings: give the log that it was made from, {log}\n"
     exported = tmp_path / "EXPORTED.csv"
     command.works("export", log, "--to", "csv", "--out", exported)
     out = tmp_path / "x.csv"

@@ -314,5 +314,5 @@ def test_a_file_that_is_not_whole_is_copied_again(monkeypatch, first, kept):
 
 
 def test_a_lost_connection_names_the_file(monkeypatch):
-    with pytest.raises(InputError, match=r"rides/3.rid did not come over whole \(it has gone\): try again"):
+    with pytest.raises(InputError, match=r"rides/3.rid did not arrive completely \(it has gone\): try again"):
         copied(monkeypatch, [sent(b"abcdef")[:1]], end="it has gone")

@@ -221,7 +221,7 @@ def test_an_earlier_recording_is_not_overwritten(name, streaming, tmp_path):
     board = streaming(half_seconds(3)[0], "ctrl-c")
     (tmp_path / name).write_text("yesterday")
     out = tmp_path / "ride.csv"
-    command.refused(tmp_path, "record", "--out", out, words=f"{tmp_path / name} is there already: give --out another")
+    command.refused(tmp_path, "record", "--out", out, words=f"{tmp_path / name} exists already: give --out another")
     assert not board.resets
 
 
@@ -235,7 +235,7 @@ def test_a_board_without_the_firmware_is_reported_alike(arguments, streaming, tm
     monkeypatch.chdir(tmp_path)
     board = streaming([], None)
     fails(board, b"ImportError: no module named 'kickstand'")
-    words = "kickstand: Kickstand is not on the board at /dev/ttyACM0: kickstand flash puts it there\n"
+    words = "kickstand: Kickstand is not on the board at /dev/ttyACM0: install it with kickstand flash\n"
     assert command.refused(tmp_path, *arguments) == words
 
 
@@ -275,7 +275,7 @@ def test_a_computer_that_slept_is_reported(streaming, tmp_path, monkeypatch):
     streaming(data, "asleep")
     monkeypatch.setattr(stream, "_SILENT_S", 60.0)
     result = command.works("record", "--out", tmp_path / "ride.csv")
-    assert "this computer took nothing for 300 s: keep it awake: what came until then is kept" in result.err
+    assert "this computer took nothing for 300 s: keep it awake: the log up to there is kept" in result.err
     assert result.err.count("\n") == 1
     assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
 
@@ -322,7 +322,7 @@ def test_a_full_disk_keeps_what_was_recorded(name, share, streaming, tmp_path, m
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
         signal.signal(signal.SIGXFSZ, handler)
-    assert "the log cannot be written any further (File too large): what came until then is kept" in result.err
+    assert "writing the log failed (File too large): the log up to there is kept" in result.err
     kept = len(read_log(tmp_path / name).time_us)
     assert (share - 0.2) * len(turns) < kept < len(turns)
     assert f", {kept} readings" in result.out

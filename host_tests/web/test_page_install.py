@@ -102,7 +102,7 @@ def test_config_with_more_than_settings_stays_with_the_rider(line, board):
     board.path("config.py").write_bytes(own)
     line.plug_in(RawPrompt(board))
     line.look()
-    assert "own config.py, line 1 is no setting" in line.rider.text("#by-hand")
+    assert "own config.py, line 1 is not a setting" in line.rider.text("#by-hand")
     assert line.rider.page.is_hidden("#settings")
     assert "Its own config.py stays" in line.install()
     assert board.path("config.py").read_bytes() == own
@@ -131,7 +131,7 @@ def test_a_check_of_a_board_without_the_firmware_is_refused(line, board):
 def test_status_equals_the_output_of_the_command(line, board, monkeypatch):
     """The text can be copied into an issue."""
     line.plug_in(RawPrompt(board))
-    assert line.status().startswith("Kickstand is not on the board at this port: the page Install puts it there")
+    assert line.status().startswith("Kickstand is not on the board at this port: install it with the page Install")
     report = "Kickstand 9.9.9\nSensor   MPU6050 at 0x68\n\nDisplay  none found"
     board.path("kickstand/__init__.py").write_text(f"def status():\n    print({report!r})\n")
     shown = line.status()

@@ -56,7 +56,7 @@ def test_pulled_cable_leaves_the_log(line, rider, board, tmp_path):
     assert (rider.text("#lean"), rider.text("#max-left")) == ("--", "--")
     line.connected = False
     rider.page.wait_for_selector("#files li")
-    assert rider.text("#live-said") == "Stopped. Connection lost: what came until then is kept."
+    assert rider.text("#live-said") == "Stopped. Connection lost: the log up to there is kept."
     assert list(saved(rider, tmp_path).values()) == recorded(blocks)
 
 
@@ -237,7 +237,7 @@ def test_board_without_firmware_is_sent_to_page_install(line, rider, board):
     line.plug_in(RawPrompt(board))
     rider.page.click("#pull")
     rider.page.wait_for_selector("#pull:enabled:visible")
-    assert rider.text("#pull-said") == "Kickstand is not on the board at this port: the page Install puts it there."
+    assert rider.text("#pull-said") == "Kickstand is not on the board at this port: install it with the page Install."
     assert board.resets == 1
 
 

@@ -79,7 +79,7 @@ def test_site_is_served_and_opened(files, built, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(serve.Server, "serve_forever", look)
-    assert works("web").out == f"Kickstand in the browser: {opened[0]} (Ctrl-C ends it)\n"
+    assert works("web").out == f"Kickstand in the browser: {opened[0]} (press Ctrl-C to stop)\n"
     assert seen == [files["index.html"]]
 
 

@@ -8,11 +8,11 @@
     after = api.smooth("RIDE.csv.gz", two.calibration)                    # after.lean_deg, after.lean_sigma_deg, ...
     stops = api.find_stops(api.vehicle_channels("RIDE.csv.gz", two.calibration))
 
-A log is a path, an open file of text or bytes, a Log made of arrays, or a Stretch of one of these. Tables have
-to_pandas(). Long functions accept `progress`, a function that is called with (done, total).
+A log is a path, an open file of text or bytes, a Log made of arrays, or a Stretch of one of these. Tables can be
+converted with to_pandas(). Long functions accept `progress`, a function that is called with (done, total).
 
-InputError says in one line what is wrong with the input. Its subclass RefusedInput has the
-reason as a Message. A notice is a Message, too: a code, named fields, and sentence() puts it into words.
+The text of an InputError is one line: what is wrong with the input, and what to do. Its subclass RefusedInput has the
+reason as a Message. Notices are Messages too. A Message has a code and named fields; sentence() returns its text.
 """
 
 from .analysis.brake_tests import brake_tests as brake_tests

@@ -1,8 +1,9 @@
-"""Estimates the errors of the aligned axes against the bike's own, from the ride itself.
+"""Estimates from a ride how far the aligned axes are from the bike's own axes.
 
-On a straight a balanced bike is upright: the mean force shows its own up, and so `roll`. Braking and speeding up on a
-straight push along its own forward, which shows `yaw`. From one standstill to another on level ground, speeding up and
-braking cancel out, which leaves `pitch`. At standstill the force is 1 g, which shows `gravity`.
+`roll`: on a straight a balanced bike is upright, so the mean force points along the bike's own up axis. `yaw`: braking
+and speeding up on a straight push along the bike's own forward axis. `pitch`: between two standstills on level ground,
+speeding up and braking cancel out, so the remaining mean forward force shows the pitch error. `gravity`: at standstill
+the force must be 1 g.
 """
 
 from dataclasses import dataclass
@@ -13,16 +14,16 @@ from kickstand.lean.upright_trim import MAX_TRIM
 from ..signals import Array, Bools
 from .channels import Channels, spacing_s
 
-# The rms error of the shown lean caused by each error, measured with simulated rides and rotated calibrations. With a
-# yaw error, pitching looks like rolling: roll rate' = roll rate cos(yaw) + pitch rate sin(yaw), and the lean's error is
-# the bike's pitching times sin(yaw). With a pitch error, yawing looks like rolling in the same way; the filter corrects
-# most of that. A roll error adds to the lean, but riding corrects up to MAX_TRIM of it.
-YAW_COSTS_DEG, PITCH_COSTS_DEG = 3.0, 5.0  # rms error of the lean, over the sine of that error
+# The rms error of the shown lean caused by each error, measured with simulated rides and rotated calibrations. With
+# a yaw error, pitching looks like rolling: roll rate' = roll rate cos(yaw) + pitch rate sin(yaw), and the lean's error
+# is the bike's pitching times sin(yaw). With a pitch error, yawing looks like rolling in the same way; the filter
+# corrects most of that. A roll error adds to the lean, but riding corrects up to MAX_TRIM of it.
+YAW_COSTS_DEG, PITCH_COSTS_DEG = 3.0, 5.0  # rms error of the lean, divided by the sine of the angle
 
 SMOOTH_S = 0.5
 STRAIGHT_DPS, STRAIGHT_DEG = 2.0, 8.0  # riding straight: yaw rate and lean are smaller
-ENOUGH_S = 10.0  # least time of riding straight
-LEVEL_S = 60.0  # least time of riding in which hills even out
+ENOUGH_S = 10.0  # straight riding must last at least this long
+LEVEL_S = 60.0  # over this time of riding, hills even out
 ENOUGH_G = 0.05  # least rms of braking and speeding up on straights
 
 
@@ -32,7 +33,8 @@ class Quality:
 
     roll > 0: "up" leans to the right of the bike's own. pitch > 0: "forward" points up. yaw > 0: "forward" points
     to the right of the direction in which the bike speeds up. gravity_g: mean force at rest. straight_s: seconds
-    of straight riding, which give roll and yaw. lateral_g, forward_g: the forces during it, means over SMOOTH_S.
+    of straight riding, which give roll and yaw. lateral_g, forward_g: the forces during this riding, means over
+    SMOOTH_S.
     """
 
     roll_deg: float | None
@@ -70,7 +72,7 @@ def lean_cost(found: Quality) -> LeanCost:
 
 
 def yaw_cost_deg(yaw_deg: float) -> float:
-    """The rms error of the shown lean, degrees, that a yaw error of the alignment causes on average."""
+    """The average rms error of the shown lean, degrees, caused by a yaw error of the alignment."""
     return YAW_COSTS_DEG * abs(float(np.sin(np.radians(yaw_deg))))
 
 
@@ -90,7 +92,7 @@ def quality(ride: Channels, standing: Bools) -> Quality:
     still = means(standing.astype(float)) == 1.0
     static = np.degrees(np.arctan2(left, up))
     ahead = moving & (np.abs(yaw_rate) < STRAIGHT_DPS)
-    usual = float(np.median(static[ahead])) if np.any(ahead) else 0.0  # when upright, for any error of "up"
+    usual = float(np.median(static[ahead])) if np.any(ahead) else 0.0  # the upright lean, even if "up" is wrong
     straight = ahead & (np.abs(static - usual) < STRAIGHT_DEG)
     straight_s = float(np.count_nonzero(straight)) * n * step_s
     roll = pitch = yaw = None

@@ -11,7 +11,8 @@ from .stops.brake_test import RATE_S, Stop, find_stops
 
 
 def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
-    """Every stop of a log from over 10 km/h, as UN Regulation No. 13 measures it (see find_stops). Raises InputError.
+    """Find every stop of a log from over 10 km/h and measure it by UN Regulation No. 13 (see find_stops). Raises
+    InputError.
 
     calibration: must be aligned. A car has no lean, so the firmware's lean filter, which takes most of the time, runs
     only for motorcycles.

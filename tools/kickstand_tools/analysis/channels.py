@@ -1,4 +1,4 @@
-"""Computes a ride in the vehicle's axes, for plot, report and export, and reduces its sample rate by means.
+"""Converts a ride to the vehicle's axes for plot, report and export, and averages it to a lower sample rate.
 
 The lean is the firmware's own for each sample, or the smoothed one. numpy computes everything that does not depend on
 earlier samples; a test compares it with the firmware.
@@ -20,15 +20,15 @@ _LAST = ("lat_deg", "lon_deg", "utc_s")
 
 @dataclass(eq=False)
 class Channels(Table):
-    """A ride in the vehicle's axes left, up, forward: n samples each; NaN where there is no value.
+    """A ride in the vehicle's axes left, up, forward: n samples each; NaN for a missing value.
 
-    t_s: seconds since the log's first sample. lean_deg: > 0 to the right; lean_formula_deg: by Nicolae's (25)-(26)
-    alone. left_g, up_g, forward_g: specific force; lateral_g: acceleration to the left in the road's plane, (23).
-    pitch_rate_dps: > 0 nose up; yaw_rate_dps: > 0 in a left turn; roll_rate_dps: > 0 to the right. shown_g: the forward
-    force, smoothed as on the display. lean_sigma_deg: standard deviation of the lean. These are 1 or 0: resting: the
-    meter has detected a standstill; rolling: its estimated speed is surely not 0; sure: it trusts its lean; doubtful:
-    from smooth(), 0 if the lean is not smoothed. lat_deg, lon_deg (degrees north and east) and utc_s (s since 1970) are
-    given only for new values.
+    t_s: seconds since the log's first sample. lean_deg: > 0 to the right; lean_formula_deg: by Nicolae's formulas
+    (25)-(26) alone. left_g, up_g, forward_g: specific force; lateral_g: acceleration to the left in the road's plane,
+    (23). pitch_rate_dps: > 0 nose up; yaw_rate_dps: > 0 in a left turn; roll_rate_dps: > 0 to the right. shown_g: the
+    forward force, smoothed as on the display. lean_sigma_deg: standard deviation of the lean. These are 1 or 0:
+    resting: the meter has detected a standstill; rolling: its estimated speed is surely not 0; sure: it trusts its
+    lean; doubtful: from smooth(), 0 if the lean is not smoothed. lat_deg, lon_deg (degrees north and east) and utc_s (s
+    since 1970) are given only for new values.
     """
 
     t_s: Array
@@ -55,8 +55,8 @@ class Channels(Table):
 
     @property
     def trusted(self) -> Bools:
-        """(n) True where the display shows the lean and updates its maxima. For a smoothed lean its standard deviation
-        and FALLEN_DEG decide."""
+        """(n) True where the display shows the lean and updates its maxima. A smoothed lean is
+        trusted by its standard deviation and FALLEN_DEG."""
         return (self.sure > 0.0) & ~(np.abs(self.lean_deg) >= FALLEN_DEG)
 
     @property
@@ -74,8 +74,9 @@ def channels(block: Block, calibration: CalibrationFile, lean: dict[str, Array],
     """Convert a block to the vehicle's axes. lean: lean_deg, lean_sigma_deg, shown_g, resting, rolling, sure and
     doubtful.
 
-    Forces by Nicolae's (18)-(20) and the matrix, then (25)-(26) and (23). A car has no lean, and its lateral
-    acceleration is the force to the left: of `lean` only shown_g, resting and sure are used.
+    The forces come from Nicolae's formulas (18)-(20) and the matrix, then lean and lateral from (25)-(26) and (23). A
+    car has no lean, and its lateral acceleration is the force to the left: of `lean` only shown_g, resting and sure are
+    used.
     """
     none = np.zeros(len(block.time_us))
     if car:
@@ -119,7 +120,7 @@ def joined(parts: Iterable[Channels]) -> Channels:
                     continue
                 column = columns[k] = np.full(end, np.nan)
             if end > len(column):
-                longer = np.empty(2 * end)  # except in a browser, memory not yet written to is free
+                longer = np.empty(2 * end)  # unwritten memory costs nothing, except in a browser
                 longer[:length] = column[:length]
                 column = columns[k] = longer
             column[length:end] = values
@@ -131,7 +132,7 @@ def joined(parts: Iterable[Channels]) -> Channels:
 
 
 def thinned(course: Channels, step_s: float) -> Channels:
-    """A whole ride in means over step_s; unchanged if it does not have more samples."""
+    """Average a whole ride over steps of step_s. A ride with fewer samples is returned unchanged."""
     if np.all(np.diff(_stretches(course.t_s, step_s)) > 0.0):
         return course
     return joined(downsampled([course], step_s))

@@ -18,9 +18,10 @@ from .stops.brake_test import RATE_S, Stop, stops_of
 from .stops.standstill import standing
 from .summary import Summary
 
-_NOT_KEPT = ("lean_formula_deg", "temp_c", "shown_g", "lean_sigma_deg", "utc_s")  # a quarter of a long ride's memory
-# A vehicle that has moved has turned, sped up or braked by this much for a second. An engine that idles at standstill
-# shakes as much as a road, but the mean over a second hardly changes.
+# they would take a quarter of a long ride's memory
+_NOT_KEPT = ("lean_formula_deg", "temp_c", "shown_g", "lean_sigma_deg", "utc_s")
+# A vehicle counts as moved if it turned, sped up or braked by this much for a second. An engine that idles at
+# standstill shakes as much as a road, but the mean over a second hardly changes.
 OVER_S = 1.0
 TURNS_DPS, PUSHES_G = 3.0, 0.05
 MOVES_MPS = 1.0
@@ -28,7 +29,7 @@ MOVES_MPS = 1.0
 
 @dataclass
 class Overview:
-    """A ride: the summary of every sample, and its course in means over RATE_S. Columns that neither report nor
+    """A ride: the summary of all samples, and the channels averaged over RATE_S. Columns that neither report nor
     pictures need are NaN (vehicle_channels() has them).
 
     riding_s: time without the standstills of standing(), s, as shown by `report`. notices: remarks about the log, and
@@ -55,7 +56,7 @@ class Overview:
 
 
 def overview(ride: Ride, progress: Progress | None = None) -> Overview:
-    """Read a ride of open_ride(), block by block: memory hardly grows with its length. Raises InputError.
+    """Read a ride of open_ride(), block by block, so the memory hardly grows with the ride's length. Raises InputError.
 
     progress: called with (done, total) of the log.
 
@@ -75,7 +76,8 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
             yield replace(block, **dict.fromkeys(_NOT_KEPT, np.full(len(block.t_s), np.nan)))
 
     course = joined(downsampled(blocks(), RATE_S))
-    if total.speed_mps.time_s is None:  # always 0, as with a broken wheel contact: it does not mean that the bike stood
+    # a speed that is always 0, as from a broken wheel contact, does not mean that the bike stood
+    if total.speed_mps.time_s is None:
         course = replace(course, speed_mps=np.broadcast_to(np.nan, len(course.t_s)))
     frozen_s = sum((notice.seconds for notice in notices if isinstance(notice, FrozenReadings)), 0.0)
     # The notice is about the whole log, even if the ride is a stretch of it.
@@ -92,8 +94,8 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
 
 def _riding_s(ride: Channels, standing: Bools, whole: bool = True) -> float:
     """The time for which a vehicle was moving, s. ride: with evenly spaced samples (see downsampled()). standing (n):
-    True where it stands still. whole: False for a stretch of a ride: there a vehicle may go straight ahead, or keep one
-    turn, from start to end."""
+    True where the vehicle stands still. whole: False for a stretch of a ride, in which a vehicle may go straight ahead,
+    or keep the same turn, from start to end."""
     if whole and not _has_moved(ride):
         return 0.0
     return float(np.count_nonzero(~standing)) * spacing_s(ride)
@@ -105,11 +107,11 @@ def _has_moved(ride: Channels) -> bool:
     half = round(0.5 * OVER_S / spacing_s(ride))
     if len(ride.t_s) <= 2 * half:
         return False
-    inner = slice(half, len(ride.t_s) - half)  # at the ends a mean is mostly that of the first or the last sample
+    inner = slice(half, len(ride.t_s) - half)  # near the ends, a mean contains mostly the first or the last sample
     turns, pushes = (smoothed(values, ride.t_s, OVER_S)[inner] for values in (ride.yaw_rate_dps, ride.forward_g))
     return _changes(turns) > TURNS_DPS or _changes(pushes) > PUSHES_G
 
 
 def _changes(means: Array) -> float:
-    """The largest difference of means from their median. The median is a gyro's bias, or the slope of the ground."""
+    """The largest difference of the means from their median, which is a gyro's bias or the slope of the ground."""
     return float(np.max(np.abs(means - np.median(means))))

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 COSTS_DEG = 0.25  # smaller errors of the lean are invisible on the display and need no action
 GRAVITY_G = 0.02  # allowed difference of the force at rest from 1 g, as in the check of the six positions
-RIDDEN_S = 10.0  # least riding: in less time the bike was only pushed around
+RIDDEN_S = 10.0  # shorter riding means that the bike was only pushed around
 STOPS_TITLE = "Stops"
 STOPS_UNITS = {"at": "", "from": "km/h", "time": "s", "distance": "m", "MFDD": "m/s²", "peak": "m/s²", "jerk": "m/s³"}
-STOPS_UNITS |= {"pulls": "m"}  # one line per stop in 80 columns: no room for units
+STOPS_UNITS |= {"pulls": "m"}  # a stop must fit one line of 80 columns, without room for units
 STOPS_TERMS = (
     "MFDD: mean deceleration while the speed falls from 80 to 10 % of what it was (UN R13). peak: the largest. "
     "jerk: how fast the deceleration changes, at most. pulls: how far the bike ends beside its straight line."
@@ -43,8 +43,8 @@ _SIX_POSITIONS = Remedy("kickstand calibrate six takes that out", "the six posit
 
 @dataclass
 class Words:
-    """The texts of a report. name: the log's. too_little: sentence that the log has too little of a ride, or "". ride:
-    rows of (quantity, value, time or ""). alignment: a paragraph. stops: a row per stop with the columns of
+    """The texts of a report. name: the log's name. too_little: sentence that the log has too little of a ride, or "".
+    ride: rows of (quantity, value, time or ""). alignment: a paragraph. stops: a row per stop with the columns of
     STOPS_UNITS, some of which STOPS_TERMS explains. remark: about the stops, or the reason for none, or ""."""
 
     name: str
@@ -124,7 +124,7 @@ def page(seen: Overview) -> "Group":
 
 
 def words(seen: Overview, on_page: bool = False) -> Words:
-    """The ride in words. on_page: what to do is said for a page, which has no commands."""
+    """The ride in words. on_page: name the buttons of the page, not commands, as remedies."""
     alignment = _alignment(seen, on_page)
     return Words(
         Path(seen.ride.name).name, _too_little(seen), _ride(seen), alignment, _stops(seen.stops), _remark(seen)
@@ -148,7 +148,7 @@ def _no_stops(seen: Overview) -> str:
     if seen.exchanged:
         return "Stops: not known, see the warning."
     if not seen.has_speed and seen.riding_s > RIDDEN_S:
-        return "Stops: not known, the log has no speed."  # there may have been stops, but none was sure enough
+        return "Stops: not known, the log has no speed."  # there may have been stops, but none that is certain
     if stops_by_speed(seen.course):
         return "The speed falls to a stop, the force says otherwise: is the calibration this ride's?"
     return "No stop from over 10 km/h found."
@@ -187,7 +187,7 @@ def _alignment(seen: Overview, on_page: bool) -> str:
     known = angles(quality)
     if known:
         far = abs(quality.roll_deg or 0.0) > SWAPPED_DEG and not seen.ride.car
-        # swapped poses exchange forward and backward too
+        # swapped poses also exchange forward and backward
         swapped = far and (seen.exchanged or not seen.has_speed)
         costs = "" if seen.ride.car or seen.exchanged else _cost_sentences(lean_cost(quality), seen.has_speed, on_page)
         said = f"Alignment: it seems off by {', '.join(known)}"
@@ -226,8 +226,8 @@ def judged(seen: Overview) -> bool:
 
 
 def _cost_sentences(cost: LeanCost, speed: bool, on_page: bool) -> str:
-    """A sentence for each angle that causes a lean error, and the remedy; "" if none does. speed: True if the log has
-    one."""
+    """A sentence, with the remedy, for each angle that causes a lean error. "" without such an angle. speed: True if
+    the log has a speed."""
     costs = {
         "Roll": (cost.roll_deg, _LESS_ROLL),
         "Pitch": (cost.pitch_deg, _LESS_PITCH),

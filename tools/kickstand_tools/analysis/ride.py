@@ -17,7 +17,7 @@ from ..replay.meter_along import MeterAlong, Misfit
 from ..signals import Array, Bools
 from .channels import Channels, channels, joined
 
-_MAX_SIGMA_DEG = 3.0  # a smoothed lean less certain than this counts as not sure
+_MAX_SIGMA_DEG = 3.0  # a smoothed lean with a larger standard deviation is not trusted
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class AbsurdReadings(Message):
 
 @dataclass
 class Ride:
-    """A log and its calibration. smoothed: use the smoothed lean, not the one that the display showed."""
+    """A log and its calibration. smoothed: use the smoothed lean, not the displayed lean."""
 
     log: Source
     calibration: CalibrationFile
@@ -72,7 +72,7 @@ class Ride:
 
     def blocks(self, progress: Progress | None = None, notices: list[Message] | None = None) -> Iterator[Channels]:
         """Yield the channels of the ride, block by block, without frozen readings, which become gaps. progress,
-        notices: see read_blocks(); they are for the whole log, even if the ride is a stretch of it. Raises
+        notices: see read_blocks(); they concern the whole log, even if the ride is a stretch of it. Raises
         InputError."""
         along, absurd, slow, some = MeterAlong(self.calibration), False, False, False
         log, stretch = split_stretch(self.log)
@@ -110,8 +110,8 @@ class Ride:
     def _read(
         self, log: Source, progress: Progress | None, notices: list[Message] | None
     ) -> Iterator[tuple[Block, Array | None]]:
-        """The blocks of the log, each with its smoothed values (see smooth_blocks()); None instead of these if the ride
-        is not smoothed or the log has under 10 samples per second."""
+        """Yield the blocks of the log, each with its smoothed values (see smooth_blocks()). The values are None if the
+        ride is not smoothed or the log has under 10 samples per second."""
         if self.smoothed:
             return smooth_blocks(log, self.calibration, progress, notices, lines=False)
         blocks = read_blocks(log, 2, progress, notices, lines=False, calibration=self.calibration)
@@ -119,8 +119,8 @@ class Ride:
 
 
 def calibration_beside(log: Path) -> Path:
-    """calibration_path() of an existing file. Raises InputError without it, without the log, and if log is not a
-    log."""
+    """The path of the calibration beside a log. Raises InputError if the calibration or the log does not exist, or if
+    log is not a log."""
     if not log.is_file():
         what = "is a directory: give the name of a ride in it" if log.is_dir() else "there is no such file"
         raise InputError(f"{log}: {what}")
@@ -135,7 +135,8 @@ def calibration_beside(log: Path) -> Path:
 
 
 def open_ride(log: Source, calibration: CalibrationFile | File | None = None, smoothed: bool = False) -> Ride:
-    """Open a ride: a log (see read_log) with a calibration, or the file of one; None: NAME.cal.json beside the log.
+    """Open a ride from a log (see read_log) and its calibration.
+    calibration: an object or a file; None: NAME.cal.json beside the log.
 
     smoothed: use the lean of smooth() instead of the firmware's; a car has none. Raises InputError, also for a
     calibration that is not aligned, because lean and braking are then unknown.
@@ -164,7 +165,7 @@ def vehicle_channels(
 ) -> Channels:
     """The whole ride in the vehicle's axes, with the firmware's lean. log, calibration and errors: as open_ride().
 
-    progress: called with how much of the log is done of how much. Forces are Nicolae's (18)-(20) and the matrix.
+    progress: called with (done, total) of the log. Forces come from Nicolae's formulas (18)-(20) and the matrix.
 
     >>> import numpy as np
     >>> from kickstand_tools.api import CalibrationFile, Log
@@ -184,10 +185,9 @@ def _divergence_notice(block: Block, at: int) -> Message:
 
 
 def _lean_along(along: MeterAlong, block: Block, shown: bool) -> tuple[dict[str, Array], Array, Bools]:
-    """The arguments of channels(), computed by the firmware's meter; the variance of its lean (rad2), < 0 if it
-    diverged, and True where it named the sensor, because its readings do not fit.
-
-    shown: compute the lean that was shown; otherwise it and sure are 0, which saves a tenth of the time.
+    """Run the firmware's meter over a block. Returns the `lean` of channels(), the variance of the lean (rad2; < 0 if
+    the filter diverged), and True where the meter blamed the sensor because its readings do not fit.
+    shown: compute the displayed lean; otherwise lean_deg and sure are 0, which saves a tenth of the time.
     """
     names = ("lean_deg", "shown_g", "variance", "resting", "rolling", "odd", "sure")
     columns: list[list[float]] = [[] for _ in names]
@@ -205,6 +205,6 @@ def _lean_along(along: MeterAlong, block: Block, shown: bool) -> tuple[dict[str,
     n = len(block.time_us)
     found = {name: np.array(column or np.zeros(n), dtype=float) for name, column in zip(names, columns)}
     variances = found.pop("variance")
-    found["doubtful"] = np.zeros(n)  # known afterwards only
+    found["doubtful"] = np.zeros(n)  # only smooth() finds these
     found["lean_sigma_deg"] = np.degrees(np.sqrt(np.where(variances >= 0.0, variances, np.nan)))
     return found, variances, found.pop("odd") > 0.0

@@ -34,11 +34,11 @@ class Summary:
     """A ride in numbers. Call add() block by block.
 
     left_deg, right_deg: the largest lean to each side that lasted HELD_S. brake_g, accel_g: the largest forces,
-    smoothed as on the display. These four count only while the display would show the lean. riding_s: time in which the
-    lean filter finds no rest; unlike in Overview.riding_s, a stop with a shaking engine counts as riding. beyond_s:
-    time at a lean of at least each key in degrees. histogram_s: time, of riding_s, in each bin of BINS_DEG.
+    smoothed as on the display. These four maxima count only while the display would show the lean. riding_s: time in
+    which the lean filter finds no rest; unlike in Overview.riding_s, a stop with a shaking engine counts as riding.
+    beyond_s: time at a lean of at least each key in degrees. histogram_s: the part of riding_s in each bin of BINS_DEG.
     not_sure_s: time in which the meter does not trust its lean. missing_s: time without readings, longer than LOST_US
-    each. frozen_s: part of it with frozen readings.
+    each. frozen_s: the part of missing_s with frozen readings.
     """
 
     samples: int = 0
@@ -55,7 +55,7 @@ class Summary:
     missing_s: float = 0.0
     frozen_s: float = 0.0
     _begin_s: float = 0.0
-    _last_t_s: Array = field(default_factory=lambda: np.zeros(0))  # end of the previous block, as far as needed
+    _last_t_s: Array = field(default_factory=lambda: np.zeros(0))  # the last samples of the previous block
     _last_deg: Array = field(default_factory=lambda: np.zeros(0))
 
     def add(self, block: Channels) -> None:
@@ -63,7 +63,7 @@ class Summary:
         t = block.t_s
         self._begin_s = t[0] if not self.samples else self._begin_s
         step = np.diff(t, prepend=self._begin_s + self.duration_s)
-        longest_s = max(LOST_US / 1e6, 4.0 * float(np.median(step)))  # in a slow log such steps are no gaps
+        longest_s = max(LOST_US / 1e6, 4.0 * float(np.median(step)))  # in a slow log, long steps are not gaps
         self.missing_s += float(np.sum(step[step > longest_s]))
         step = np.where(step * 1e6 > GAP_US, 0.0, step)  # readings were missing
         self.samples += len(t)
@@ -84,7 +84,7 @@ class Summary:
         self.histogram_s += np.histogram(block.lean_deg[held], BINS_DEG, weights=step[held])[0]
 
     def _update_maxima(self, t_s: Array, lean: Array) -> None:
-        """Update the maxima of the lean that last for HELD_S. lean: NaN where it is not trusted."""
+        """Update the maxima of the lean that last for HELD_S. lean: NaN if not trusted."""
         if not len(t_s):
             return
         step_s = float(np.median(np.diff(t_s))) if len(t_s) > 1 else HELD_S

@@ -35,12 +35,12 @@ class LogTrack:
 
 
 def track(part: Channels | Block) -> LogTrack:
-    """The positions in one block of a ride or of a log, or in a whole course."""
+    """The positions in a block of a ride or of a log, or in a whole ride."""
     there = np.isfinite(part.lat_deg) & np.isfinite(part.lon_deg)
     return LogTrack(part.t_s[there], part.lat_deg[there], part.lon_deg[there])
 
 
 def joined(tracks: list[LogTrack]) -> LogTrack:
-    """The tracks of successive blocks as one."""
+    """Join the tracks of successive blocks."""
     columns = ([getattr(one, field.name) for one in tracks] for field in fields(LogTrack))
     return LogTrack(*(np.concatenate(column) for column in columns))

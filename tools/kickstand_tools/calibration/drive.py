@@ -24,8 +24,9 @@ from .poses import refuse_same_file
 from .published import PublishedAlignment
 
 METHODS = {"improved": DriveAlignment, "published": PublishedAlignment}
-_SLOWEST_US = 50_000  # longest time between samples
-# Standard error of up, pitch and roll combined: slopes and camber common to a whole drive, or to a pose
+_SLOWEST_US = 50_000  # longest allowed time between samples
+# Standard error of the up direction, pitch and roll combined. It is due to a slope or camber that a whole drive, or a
+# pose, has throughout
 UP_DEG = 1.1
 
 
@@ -40,14 +41,14 @@ class PoseCheck:
 
 @dataclass
 class DriveFit:
-    """The alignment from drives. refusal: the reason why they do not determine it, otherwise None. With a refusal,
-    calibration is the earlier one.
+    """The alignment from drives. refusal: the reason why the drives do not determine it, otherwise None. With a
+    refusal, calibration is the earlier calibration.
 
-    vehicle: "car" or "motorcycle". used: number of braking events that count. turned: number of those in bends, which
-    do not count. quality_deg: standard error of forward about the vertical. ready_s: seconds of all logs until the
-    alignment was ready. lag_s: delay of the speed; halves_deg: difference of two halves of the drive; None for the
-    published method. poses: for a motorcycle with an earlier alignment from two poses. notices: remarks about the logs,
-    with the log's name. bias_dps (3): the gyro's.
+    vehicle: "car" or "motorcycle". used: number of braking events that count. turned: number of braking events in
+    bends, which do not count. quality_deg: standard error of forward about the vertical. ready_s: seconds of logs, in
+    all, until the alignment was ready. lag_s: delay of the speed; halves_deg: difference of two halves of the drive;
+    None for the published method. poses: for a motorcycle with an earlier alignment from two poses. notices: remarks
+    about the logs, with the log's name. bias_dps (3): the gyro's bias.
     """
 
     calibration: CalibrationFile
@@ -78,7 +79,7 @@ class DriveFit:
 
     @property
     def reason(self) -> str:
-        """The code of the refusal, "" for none."""
+        """The code of the refusal, or "" without a refusal."""
         return self.refusal.code if self.refusal else ""
 
 
@@ -90,15 +91,15 @@ def fit_drive(
     progress: Progress | None = None,
     on_event: Callable[[DriveEvent], None] | None = None,
 ) -> DriveFit:
-    """Find the alignment of a sensor on a vehicle from logs of driving with speed: stops, and braking in straight
-    lines.
+    """Find the alignment of a sensor on a vehicle from logs of drives. The logs need a speed, stops, and braking in
+    straight lines.
 
-    logs: of one mount in chronological order (see read_log). calibration: the earlier one, with offset and slope, and
-    the two poses of a motorcycle. vehicle: "motorcycle" or "car"; None: a motorcycle if calibration has two poses,
-    otherwise a car. method: "improved", or "published" for ViriCiti's published method. progress: called with the
-    samples done and their total (each is read twice). on_event: called with each DriveEvent as it happens, even if the
-    drive is refused in the end. Raises InputError; RefusedInput, a subclass with a Message, if the drive does not
-    determine the sensor's mounting.
+    logs: recorded with one mount, in chronological order (see read_log). calibration: an earlier calibration with
+    offset and slope and, for a motorcycle, the alignment from two poses. vehicle: "motorcycle" or "car"; None: a
+    motorcycle if calibration has two poses, otherwise a car. method: "improved", or "published" for ViriCiti's
+    published method. progress: called with the samples done and their total (each is read twice). on_event: called with
+    each DriveEvent as it happens, even if the drive is refused later. Raises InputError; RefusedInput, a subclass with
+    a Message, if the drive does not determine the sensor's mounting.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("city", seed=3, seconds=240.0)
@@ -131,14 +132,14 @@ def fit_logs(
     kind = vehicle or (MOTORCYCLE if poses else CAR)
     up = before.vehicle_from_sensor[1].tolist() if kind == MOTORCYCLE and poses else None
     steps = Steps(progress, 2 * sum(len(log.t_s) for log in logs))
-    # the gyro's bias is found at a stop: a first pass searches one, so driving before it also counts
+    # a first pass finds the gyro's bias at a stop, so that the driving before the first stop also counts
     stood = standing(logs, before, steps)
     known = stood.stops or calibration is not None
     alignment = METHODS[method](kind, up, list(stood.bias) if known else None)
     watch = DriveWatch(alignment, on_event)
     feed(alignment, logs, before, steps, watch)
     matrix = array("f", [0.0] * 9)
-    # `standing` gives a rate, but the bias is a reading
+    # `standing` gives a calibrated rate, but the bias must be a reading
     bias = before.gyro_bias_dps + np.linalg.solve(before.gyro_matrix, alignment.standing.bias)
     refusal, result = None, before
     try:
@@ -181,7 +182,7 @@ def fit_logs(
 
 def usable(log: Log, others: bool) -> Log:
     """The log without frozen readings, checked for a speed and enough samples. others: True if there are other logs, so
-    this one can be left out. Raises InputError."""
+    that you can leave this log out. Raises InputError."""
     log = without_frozen(log)
     if np.all(np.isnan(log.speed_mps)):
         instead = ", or leave this log out" if others else ""

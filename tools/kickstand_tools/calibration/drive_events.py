@@ -1,4 +1,4 @@
-"""The events in an alignment by driving: used braking events, readiness, problems."""
+"""Reports what happens during an alignment by driving: used braking events, readiness, problems."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,9 +22,10 @@ READY, NOT_READY = "ready", "not-ready"
 class DriveEvent:
     """Something that happened in a drive, t_s seconds from the first sample of the log of that name.
 
-    what: USED (a braking event in a straight line, or a start; counted of needed), TURNING (a braking event in a bend,
-    not counted), PROBLEM (refusal says which), READY (the alignment is good enough, with quality_deg), NOT_READY (no
-    longer ready; refusal gives the reason if no PROBLEM does), LOG_BEGINS, LOG_WITHOUT_EVENTS.
+    what: USED (a braking event in a straight line, or a start; counted and needed give the progress), TURNING (a
+    braking event in a bend, not counted), PROBLEM (refusal gives the reason), READY (the alignment is good enough, to
+    quality_deg), NOT_READY (no longer ready; refusal gives the reason unless a PROBLEM does), LOG_BEGINS,
+    LOG_WITHOUT_EVENTS.
     """
 
     log: str
@@ -43,7 +44,7 @@ class DriveWatch:
         self, alignment: DriveAlignment | PublishedAlignment, on_event: Callable[[DriveEvent], None] | None
     ) -> None:
         self.events: list[DriveEvent] = []
-        self.ready_s = 0.0  # seconds of all logs until the alignment was first READY, 0 if never
+        self.ready_s = 0.0  # seconds of logs, in all, until the alignment was first READY; 0 if never
         self._alignment, self._on_event = alignment, on_event
         self._log = ""
         self._counts = (0, 0)  # used, turned
@@ -57,7 +58,8 @@ class DriveWatch:
         self._add(0.0, LOG_BEGINS)
 
     def end(self, t_s: float) -> None:
-        """End a log after its last sample, at t_s: emit the pending events, or LOG_WITHOUT_EVENTS if it had none."""
+        """End a log at t_s, after its last sample. Emit the pending events, or LOG_WITHOUT_EVENTS if the log had no
+        event."""
         self.look(t_s)
         if self.events[-1].what == LOG_BEGINS:
             self._add(t_s, LOG_WITHOUT_EVENTS)

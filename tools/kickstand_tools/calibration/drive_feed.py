@@ -1,7 +1,7 @@
 """Runs recorded drives through the firmware's classes for alignment by driving, in numpy sums over 100 ms.
 
-DriveAlignment adds up its samples and only uses the sums. Adding them here and passing the sums gives it the same
-numbers. Ten minutes at 200 Hz take 0.2 s instead of 0.9 s.
+DriveAlignment uses only sums of its samples. This module computes the sums with numpy and passes them on, which gives
+the same results. Ten minutes at 200 Hz take 0.2 s instead of 0.9 s.
 """
 
 from bisect import bisect_left
@@ -27,13 +27,13 @@ _CHUNK = 1000  # least number of samples between two calls of progress
 
 @dataclass
 class Bin:
-    """Successive samples that DriveAlignment only adds up, until the last one.
+    """Successive samples that are passed to DriveAlignment as sums.
 
-    begins: True if they do not continue the previous bin; then start_mps is the speed at their start. force (3, g),
-    rate (3, deg/s): means, in the sensor's axes. first_us: the time that all samples but the last cover; last_us: that
-    of the last one, 0 if the bin is not full. speeds: (microseconds before the end of first_us, m/s) in first_us;
-    end_mps: the speed of the last sample. Speeds are None without a new value. end_us: the log's time at the last
-    sample; samples: their number.
+    begins: True if the samples do not continue the previous bin; then start_mps is the speed at the bin's start. force
+    (3, g), rate (3, deg/s): means in the sensor's axes. first_us: duration of all samples but the last. last_us:
+    duration of the last sample, 0 if the bin is not full. speeds: (microseconds before the end of first_us, m/s) for
+    the speeds during first_us. end_mps: speed of the last sample. start_mps and end_mps are None without a new value.
+    end_us: the log's time at the last sample. samples: number of samples.
     """
 
     begins: bool
@@ -49,7 +49,8 @@ class Bin:
 
 
 def drive_bins(log: Log, calibration: CalibrationFile, length_us: int) -> Iterator[Bin]:
-    """The samples of a log in bins, each the shortest of at least length_us (one sample each if that is 0)."""
+    """Split the samples of a log into bins of at least length_us, as short as possible. If length_us is 0, each bin has
+    one sample."""
     time_us = log.time_us
     step_us = np.diff(time_us, prepend=time_us[0])
     is_gap = step_us > GAP_US
@@ -96,9 +97,9 @@ def drive_bins(log: Log, calibration: CalibrationFile, length_us: int) -> Iterat
 
 
 def standing(logs: Sequence[Log], calibration: CalibrationFile, steps: "Steps") -> StandingVertical:
-    """The StandingVertical from the stops in all logs. It uses nothing else, so it is much faster than an alignment."""
+    """The StandingVertical from the stops in all logs. Only stops are computed: much faster than an alignment."""
     standing = StandingVertical()
-    speed_mps, silent_us = -1.0, 0  # none yet
+    speed_mps, silent_us = -1.0, 0  # no speed yet
     for log in logs:
         _end_stop(standing)
         for part in drive_bins(log, calibration, BIN_US):
@@ -146,7 +147,7 @@ def feed(
                     alignment.update(part.force, part.rate, part.last_us)
                 if part.end_mps is not None:
                     measure(part.end_mps, 0, end_us)
-            except ValueError as error:  # from a null vector
+            except ValueError as error:  # raised for a null vector
                 what = f"{log.name}, at {end_us / 1e6:.1f} s: accelerations of nearly 0"
                 raise InputError(f"{what}: at rest 1 g is needed, check the sensor") from error
             steps.more(part.samples)
@@ -156,8 +157,8 @@ def feed(
 
 
 def _end_stop(standing: StandingVertical) -> None:
-    """End a stop at the end of a log: at the start of the next one the vehicle stands elsewhere."""
-    standing.update((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 2.0 * MOVED_MPS, 0.0)  # as if it had driven
+    """End a stop at the end of a log, because the vehicle stands elsewhere at the start of the next log."""
+    standing.update((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 2.0 * MOVED_MPS, 0.0)  # as if the vehicle had driven
 
 
 class Steps:

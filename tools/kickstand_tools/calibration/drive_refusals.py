@@ -1,5 +1,5 @@
-"""Why the firmware refuses a drive: a class for each code of kickstand.drive_alignment, and of_firmware(), which makes
-it of the refusal."""
+"""The messages for the firmware's refusals of a drive: one class per code of kickstand.drive_alignment. of_firmware()
+converts a refusal to its message."""
 
 from dataclasses import dataclass
 
@@ -22,7 +22,7 @@ _MOVED = {
 
 @dataclass(frozen=True)
 class MountMoved(Message):
-    """The mount has moved. how: a key of _MOVED. angle_deg: None if it is not known."""
+    """The mount has moved. how: a key of _MOVED. angle_deg: the change, None if unknown."""
 
     how: str
     angle_deg: float | None = None
@@ -46,7 +46,7 @@ class SpeedNegative(Message):
 
 @dataclass(frozen=True)
 class SpeedLate(Message):
-    """The speed comes too late after the force."""
+    """The speed is delayed too much relative to the force."""
 
     late_s: float
 

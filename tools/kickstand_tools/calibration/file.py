@@ -28,11 +28,11 @@ from ..logs.source import File, log_stem, name_of, open_input
 from ..signals import Array, rotated
 
 VERSION = 1
-MOST_BYTES = 1_000_000  # largest file; those of kickstand are a thousand times smaller
-MAX_DELAY_S = 0.05  # largest delay of a chip's low-pass: the slowest has 33 ms
+MOST_BYTES = 1_000_000  # largest accepted file; Kickstand's own are a thousand times smaller
+MAX_DELAY_S = 0.05  # largest accepted delay of a chip's low-pass filter; the slowest filter has 33 ms
 _NEUTRAL = {"accel_matrix": np.eye(3), "gyro_matrix": np.eye(3), "gyro_sigma": np.zeros((3, 3))}
 _MATRICES = tuple(_NEUTRAL)  # in the order of the firmware's Calibration.matrices()
-ROTATION_TOLERANCE = 2e-3  # a matrix copied with three or four decimals is still good to 0.1 degrees
+ROTATION_TOLERANCE = 2e-3  # accepts a matrix copied with three or four decimals, which is exact to 0.1 degrees
 
 BY_RIDE = "remove the calibration and let the ride show how the sensor sits"
 ALIGN = Remedy("kickstand calibrate two, or calibrate ride, first", BY_RIDE)
@@ -43,14 +43,14 @@ GIVE_CALIBRATION = Remedy("give a file made by kickstand calibrate", "give the .
 class CalibrationFile:
     """The parameters of one mounted sensor: calibrated = slope * reading + offset, Nicolae's (18)-(20).
 
-    accel_offset_g (3), accel_slope (3), gyro_bias_dps (3); vehicle_from_sensor (3, 3): rows left, up, forward.
-    aligned: the matrix was measured; six_done: offset and slope were. trim_deg: the roll-misalignment correction found
-    while riding. vehicle: "car" or "motorcycle" if the matrix was measured by driving, "car" also if the board was set
-    to one, otherwise "".
-    kickstand_side: "left" or "right", the side of the kickstand in the two poses, otherwise "". notes: further entries
-    for the file. gyro_delay_s: delay of the gyro by the low-pass DLPF in a recorded ride, None if unknown.
-    accel_matrix, gyro_matrix (3, 3): the remaining corrections: force = accel_matrix x (slope * reading + offset), rate
-    = gyro_matrix x (reading - bias). gyro_sigma (3, 3): standard errors of gyro_matrix, zeros if it was not measured.
+    accel_offset_g (3), accel_slope (3), gyro_bias_dps (3); vehicle_from_sensor (3, 3): rows left, up, forward. aligned:
+    the matrix was measured; six_done: offset and slope were measured. trim_deg: the roll-misalignment correction found
+    while riding. vehicle: "car" or "motorcycle" if the matrix was measured by driving; also "car" if the board was set
+    to a car; otherwise "". kickstand_side: "left" or "right", the side of the kickstand in the two poses, otherwise "".
+    notes: further entries for the file. gyro_delay_s: delay of the gyro by its low-pass filter (DLPF) in a recorded
+    ride, None if unknown. accel_matrix, gyro_matrix (3, 3): the cross-axis corrections: force = accel_matrix x (slope *
+    reading + offset), rate = gyro_matrix x (reading - bias). gyro_sigma (3, 3): standard errors of gyro_matrix, zeros
+    if it was not measured.
 
     >>> calibration = CalibrationFile(gyro_bias_dps=[1.0, 0.0, 0.0])
     >>> calibration.vehicle_from_sensor @ [0.0, 1.0, 0.0]
@@ -80,7 +80,7 @@ class CalibrationFile:
             setattr(self, name, np.reshape(np.array(getattr(self, name), dtype=float), (3, 3)))
 
     def __eq__(self, other: object) -> bool:
-        """True if both give the same file."""
+        """True if both would be written as the same file."""
         return isinstance(other, CalibrationFile) and self.as_json() == other.as_json()
 
     def parameters(self) -> list[float]:
@@ -101,25 +101,27 @@ class CalibrationFile:
         return calibration
 
     def in_vehicle(self, readings: Array) -> tuple[Array, Array]:
-        """Force (n, 3, g) and rate (n, 3, deg/s) along left, up, forward of readings (n, 7) in the chip's order."""
+        """Convert readings (n, 7), in the chip's order, to force (n, 3, g) and rate (n, 3, deg/s) along left, up,
+        forward."""
         force, rate = rotated(self.vehicle_from_sensor, *self.in_sensor(readings[:, :3], readings[:, 4:]))
         return force, rate
 
     def in_sensor(self, accel_g: Array, gyro_dps: Array) -> tuple[Array, Array]:
-        """Force (n, 3, g) and rate (n, 3, deg/s) along the sensor's own axes, by (18)-(20) and the matrices, with the
-        firmware's Calibration.apply()."""
-        readings = [*accel_g.T, None, *gyro_dps.T]  # the firmware's function for one reading, with arrays as numbers
+        """Calibrate readings with the firmware's Calibration.apply(), by (18)-(20) and the matrices. Returns force
+        (n, 3, g) and rate (n, 3, deg/s) along the sensor's own axes."""
+        # the firmware's function takes one reading; arrays in place of numbers give it n
+        readings = [*accel_g.T, None, *gyro_dps.T]
         force, rate = [np.zeros(0)] * 3, [np.zeros(0)] * 3
         self.to_firmware().apply(readings, force, rate)
         return np.column_stack(force), np.column_stack(rate)
 
     def gyro_sigma_in_vehicle(self) -> Array:
-        """(3, 3): gyro_sigma along left, up, forward, where the errors of its entries are independent."""
+        """(3, 3): gyro_sigma along left, up, forward, if the errors of the entries are independent."""
         squared = self.vehicle_from_sensor**2
         return np.sqrt(squared @ self.gyro_sigma**2 @ squared.T)
 
     def delay_s(self) -> float:
-        """gyro_delay_s, or that of the default DLPF."""
+        """gyro_delay_s or, if unknown, the delay of the default DLPF setting."""
         return DELAY_S if self.gyro_delay_s is None else self.gyro_delay_s
 
     def as_json(self) -> dict[str, Any]:
@@ -197,7 +199,8 @@ def read_calibration(source: File) -> CalibrationFile:
 
 
 def _one_of(name: str, data: dict[str, Any], entry: str, words: tuple[str, str]) -> str:
-    """The entry, which must be one of these words; "" without it. Raises InputError for another word."""
+    """The value of an entry, which must be one of these words; "" if the entry is missing. Raises InputError
+    otherwise."""
     if data.get(entry) in (None, ""):
         return ""
     if data[entry] not in words:
@@ -206,7 +209,7 @@ def _one_of(name: str, data: dict[str, Any], entry: str, words: tuple[str, str])
 
 
 def write_calibration(target: Path | str | IO[str], calibration: CalibrationFile) -> None:
-    """Write a CAL.json. target: a path, whose file is written whole or not at all, or an open file of text.
+    """Write a CAL.json. target: a path, whose file is written whole or not at all, or a file open for text.
 
     Raises InputError.
 
@@ -226,8 +229,8 @@ def write_calibration(target: Path | str | IO[str], calibration: CalibrationFile
 
 
 def calibration_path(log: Path) -> Path:
-    """NAME.cal.json beside NAME.csv or NAME.csv.gz, or beside another app's export: the calibration of a ride."""
-    if log.name in ("", ".."):  # the current folder, or its parent: the file is beside that folder
+    """The path of a ride's calibration: NAME.cal.json beside NAME.csv, NAME.csv.gz or another app's export."""
+    if log.name in ("", ".."):  # the current folder or its parent: use the file beside that folder
         log = Path(os.path.abspath(log))
     return log.parent / f"{log_stem(log.name)}.cal.json"
 
@@ -237,7 +240,7 @@ def _list(name: str, data: dict[str, Any], entry: str) -> list[Any]:
         raise InputError(f"{name}: {entry} is missing", GIVE_CALIBRATION)
     if not isinstance(data[entry], list) or len(data[entry]) != 3:
         what = "3 rows of 3 numbers" if entry in ("vehicle_from_sensor", *_MATRICES) else "3 numbers"
-        raise InputError(f"{name}: {entry} has to be {what}: calibrate again")
+        raise InputError(f"{name}: {entry} must be {what}: calibrate again")
     return data[entry]
 
 
@@ -250,7 +253,7 @@ def _matrix(name: str, data: dict[str, Any], entry: str) -> Array:
 def _numbers(name: str, entry: str, values: Any) -> list[float]:
     """The values of an entry, three finite floats. Raises InputError for other values."""
     if not isinstance(values, list) or len(values) != 3:
-        raise InputError(f"{name}: {entry} has to be 3 numbers: calibrate again")
+        raise InputError(f"{name}: {entry} must be 3 numbers: calibrate again")
     for value in values:
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e6:
             raise InputError(f"{name}: {entry} has {_shown(value)} where a number should be: calibrate again")
@@ -284,13 +287,13 @@ def _check_ranges(name: str, calibration: CalibrationFile) -> None:
                 f"{name}: {entry} is {worst:g} from the identity, a sensor's is within {most:g}: calibrate again"
             )
     if not (np.all(calibration.gyro_sigma >= 0.0) and np.all(calibration.gyro_sigma <= MAX_GYRO_SIGMA)):
-        raise InputError(f"{name}: gyro_sigma has to be 0 to {MAX_GYRO_SIGMA:g}: calibrate again")
+        raise InputError(f"{name}: gyro_sigma must be 0 to {MAX_GYRO_SIGMA:g}: calibrate again")
     if not is_rotation(calibration.vehicle_from_sensor.ravel().tolist(), ROTATION_TOLERANCE):
         raise InputError(f"{name}: vehicle_from_sensor is no rotation (rows left, up, forward): align again")
 
 
 def _rounded(values: Any) -> list[float]:
-    """values rounded to nine significant digits: all that the firmware's 32-bit floats hold."""
+    """Round values to nine significant digits, which is all that the firmware's 32-bit floats hold."""
     return [float(f"{value:.9g}") for value in values]
 
 

@@ -1,6 +1,8 @@
-"""Why the firmware refuses poses: a class for each of its codes, and of_firmware(), which makes it of the refusal.
+"""The messages for the firmware's refusals of poses: one class per code. of_firmware() converts a refusal to its
+message.
 
-A pose is refused by kickstand.calibration.still_pose, six poses by six_position and sensor_fit, two by two_position.
+In kickstand.calibration, still_pose refuses a single pose, six_position and sensor_fit refuse six poses, and
+two_position refuses two.
 """
 
 from dataclasses import dataclass
@@ -130,7 +132,7 @@ class GyroReversed(Message):
 
 @dataclass(frozen=True)
 class GyroMisfit(Message):
-    """The gyro does not explain a turn between two poses."""
+    """The gyro's rates do not add up to the turn between two poses."""
 
     off_deg: float
 
@@ -184,7 +186,7 @@ class Unclear(Message):
 
 @dataclass(frozen=True)
 class OddAxis(Message):
-    """Offset or slope are not a sensor's."""
+    """Offset or slope are impossible for a sensor."""
 
     axis: str
     offset_g: float
@@ -209,7 +211,7 @@ class SideTilted(Message):
 
 @dataclass(frozen=True)
 class FreePoseOff(Message):
-    """The seventh pose contradicts the calibration."""
+    """The seventh (free) pose contradicts the calibration."""
 
     reads_g: float
 
@@ -220,7 +222,7 @@ class FreePoseOff(Message):
 
 @dataclass(frozen=True)
 class NotOneG(Message):
-    """A pose of the two does not read 1 g. pose: "kickstand" or "upright"."""
+    """One of the two poses does not read 1 g. pose: "kickstand" or "upright"."""
 
     pose: str
     reads_g: float

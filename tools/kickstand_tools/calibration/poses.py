@@ -1,5 +1,5 @@
-"""Computes a calibration from recorded still poses with the firmware's own modules: offset and slope of the
-accelerometer from six poses, the alignment from two."""
+"""Computes a calibration from recorded still poses with the firmware's own modules. Six poses give offset and slope of
+the accelerometer, two poses give the alignment."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,16 +20,16 @@ from .file import CalibrationFile
 from .pose_refusals import FreePoseOff, SideTilted, of_firmware
 
 _MICRO = 1_000_000  # StillPose sums integers: millionths of g and deg/s
-_SATURATED = 1_990_000  # a still pose is measured with a range of at least 2 g: an axis at 2 g may be at its limit
-GOOD_FREE_POSE_G = 0.010  # a free pose closer to 1 g than this confirms a good calibration
+_SATURATED = 1_990_000  # the smallest range is 2 g, so an axis that reads almost 2 g may be at its limit
+GOOD_FREE_POSE_G = 0.010  # a free pose that is closer to 1 g confirms the calibration
 _SHEET_OFFSET_G = (0.05, 0.05, 0.08)  # the data sheet's limit of the MPU6050's offset, for each axis
 _SHEET_SLOPE_ERROR = 0.03
-_EQUAL_TILT_DEG = 3.0  # least tilt of the free pose from its nearest axis, beyond that of the side pose there
+_EQUAL_TILT_DEG = 3.0  # the free pose must tilt from its nearest axis by this much more than the side pose on that axis
 
 
 @dataclass
 class Pose:
-    """The mean of one still pose. name: of its log; still: the firmware's own object."""
+    """The mean of one still pose. name: the name of its log. still: the firmware's StillPose."""
 
     name: str
     still: StillPose
@@ -41,7 +41,7 @@ class Pose:
 
     @property
     def accel_g(self) -> Array:
-        """(3) mean specific force, sensor's axes, not calibrated."""
+        """(3) mean specific force in the sensor's axes, not calibrated."""
         return np.array(self.still.accel)
 
     @property
@@ -58,8 +58,8 @@ def read_pose(source: Source) -> Pose:
 
 
 def take_pose(name: str, readings: Array, advice: str) -> Pose:
-    """Average the readings (n, 7) of a still pose, in the chip's order (g, C, deg/s). name: its name in messages.
-    Raises RefusedInput, with the advice, if it was not still."""
+    """Average the readings (n, 7) of a still pose, in the chip's order (g, C, deg/s). name: the pose's name in
+    messages. Raises RefusedInput, with the advice, if the pose was not still."""
     still = StillPose(_MICRO, _MICRO, _SATURATED, len(readings))
     where = f"{name}: pose refused"
     counts = np.round(np.nan_to_num(readings, nan=ROOM_TEMP_C) * _MICRO).astype(int).tolist()
@@ -79,7 +79,7 @@ def refuse_same_file(sources: Sequence[Source]) -> None:
     seen: set[Path] = set()
     for path in (Path(source) for source in sources if isinstance(source, (Path, str))):
         if path.resolve() in seen:
-            raise InputError(f"{path} is given twice: each one has to be a recording of its own")
+            raise InputError(f"{path} is given twice: each must be a separate recording")
         seen.add(path.resolve())
 
 
@@ -88,10 +88,10 @@ class SixPositions:
     """The calibration from six or seven poses.
 
     sides: the pose of each side in the order of kickstand.calibration.six_position.SIDES (+x -x +y -y +z -z up);
-    tilt_deg: the tilt of each from its axis. free_pose, free_pose_error_g: the seventh, slanted pose, and its
-    calibrated length minus 1 g; None without one. beyond_sheet: axes whose offset or slope exceeds the data sheet's
-    limits. turns: number of turns between poses that calibrated the gyro. all_turns: number of all turns. Both are 0 if
-    each pose was a separate log.
+    tilt_deg: the tilt of each pose from its axis. free_pose, free_pose_error_g: the seventh, slanted pose, and its
+    calibrated length minus 1 g; None without a seventh pose. beyond_sheet: axes whose offset or slope exceeds the data
+    sheet's limits. turns: number of turns between poses that calibrated the gyro. all_turns: number of all turns. Both
+    are 0 if each pose has its own log.
     """
 
     calibration: CalibrationFile
@@ -107,10 +107,10 @@ class SixPositions:
 def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
     """Find offset (g) and slope of each axis from six still poses, each side up once, in any order.
 
-    poses: six logs, or seven with a slanted one that checks the result (see read_log for what a log may be). Nicolae's
-    paper, section 4, equations (16)-(20), solved so that each calibrated reading is 1 g long whether or not the axis
-    points exactly up. The gyro's bias is the median of the poses. Raises InputError; RefusedInput, a subclass with
-    a Message, if the firmware refuses a pose or the result.
+    poses: six logs, or seven with a slanted pose that checks the result (see read_log for the kinds of log). Solves the
+    equations (16)-(20) of Nicolae's paper, section 4, such that each calibrated reading is 1 g long, even if the axis
+    does not point exactly up. The gyro's bias is the median of the poses. Raises InputError; RefusedInput, a subclass
+    with a Message, if the firmware refuses a pose or the result.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("parked", seed=1, seconds=20.0)
@@ -140,7 +140,7 @@ def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
 
 
 def wrong_number(captures: int) -> InputError:
-    """The refusal of a wrong number of captures of a still pose."""
+    """The error for a wrong number of captures."""
     return InputError(
         f"{captures} captures given: six are needed, one for each side up, or seven with a free pose; or one log of "
         "the whole procedure"
@@ -150,7 +150,7 @@ def wrong_number(captures: int) -> InputError:
 def _sides(poses: list[Pose]) -> tuple[list[Pose], Pose | None]:
     """The pose of each side in the order of SIDES, and the free pose (None without one).
 
-    Of seven poses, two have the same side nearest to up: the one further from the axis is the free pose.
+    With seven poses, two poses have the same side up. The one that is further from the axis is the free pose.
     """
     found: dict[int, list[Pose]] = {}
     for pose in poses:
@@ -168,7 +168,7 @@ def _sides(poses: list[Pose]) -> tuple[list[Pose], Pose | None]:
         near, free = same
         if _tilt_deg(free) < six_position.FREE_TILT_DEG or _tilt_deg(free) - _tilt_deg(near) < _EQUAL_TILT_DEG:
             raise InputError(
-                f"side {SIDES[side]} is there twice ({names}): the seventh pose has to be "
+                f"side {SIDES[side]} exists twice ({names}): the seventh pose must be "
                 f"slanted, over {six_position.FREE_TILT_DEG:.0f} degrees from every side"
             )
     return [found[side][0] for side in range(6)], free
@@ -179,7 +179,7 @@ def _tilt_deg(pose: Pose) -> float:
 
 
 def _with_file(error: CalibrationError, sides: list[Pose], free: Pose | None) -> RefusedInput:
-    """The refusal with its file, if it is about one."""
+    """The refusal, with the name of the file if it concerns one pose."""
     reason = of_firmware(error)
     if isinstance(reason, SideTilted):
         return RefusedInput(reason, sides[SIDES.index(reason.side)].name, ": capture this side again")
@@ -187,7 +187,7 @@ def _with_file(error: CalibrationError, sides: list[Pose], free: Pose | None) ->
 
 
 def beyond_sheet(offset: Sequence[float], slope: Sequence[float]) -> list[str]:
-    """The axes whose offset or slope exceeds the data sheet's limits: usable, but worth a warning."""
+    """The axes whose offset or slope exceeds the data sheet's limits. The sensor is usable, but the user is warned."""
     return [
         axis
         for axis, o, s, most in zip(AXES, offset, slope, _SHEET_OFFSET_G, strict=True)
@@ -197,7 +197,7 @@ def beyond_sheet(offset: Sequence[float], slope: Sequence[float]) -> list[str]:
 
 @dataclass
 class TwoPositions:
-    """The alignment from two poses. tilt_deg: the angle between them; under 8 degrees, forward is uncertain."""
+    """The alignment from two poses. tilt_deg: the angle between the poses; under 8 degrees, forward is uncertain."""
 
     calibration: CalibrationFile
     kickstand: Pose
@@ -208,12 +208,12 @@ class TwoPositions:
 def fit_two_positions(
     kickstand: Source, upright: Source, calibration: CalibrationFile | None = None, side: str = "left"
 ) -> TwoPositions:
-    """Find the alignment of a sensor on a bike from a pose on the kickstand and one upright: rows left, up, forward.
+    """Find the alignment of a sensor on a bike from two poses: on the kickstand, and upright.
 
-    kickstand, upright: logs (see read_log). calibration: that of fit_six_positions(), with offset and slope; None: the
-    readings are treated as calibrated. side: "left" or "right", the side of the kickstand. The gyro's bias is that of
-    the pose on the kickstand. Nicolae's paper, section 2, equations (3)-(8). Raises InputError; RefusedInput, a
-    subclass with a Message, if the firmware refuses the poses.
+    kickstand, upright: logs (see read_log). calibration: the result of fit_six_positions(), with offset and slope;
+    None: the readings are treated as calibrated. side: "left" or "right", the side of the kickstand. The gyro's bias is
+    its mean reading in the pose on the kickstand. The method is Nicolae's paper, section 2, equations (3)-(8). Raises
+    InputError; RefusedInput, a subclass with a Message, if the firmware refuses the poses.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("parked", seed=1, seconds=20.0)

@@ -19,24 +19,25 @@ from .poses import Pose, SixPositions, beyond_sheet, take_pose, wrong_number
 
 _WINDOW_S = 0.5  # stillness is searched in windows of this length
 _LEAST_S = 1.0  # a shorter still stretch is not a pose
-_MARGIN_S = 0.1  # left out at both ends of a pose
+_MARGIN_S = 0.1  # this much is left out at both ends of a pose
 _STILL_G, _STILL_DPS = 0.1, 6.0  # largest change of an axis in a window
-_STILL_SPREAD_G = 0.02  # largest standard deviation
-_STILL_DRIFT_G = 0.007  # largest difference of the means of both halves
-_ROUGH_TILT_DEG = 30.0  # a pose further from every axis is a slanted one
+_STILL_SPREAD_G = 0.02  # largest standard deviation in a window
+_STILL_DRIFT_G = 0.007  # largest difference between the means of a window's halves
+_ROUGH_TILT_DEG = 30.0  # a pose further from every axis counts as slanted
 _MICRO = 1_000_000  # Turn sums integers: millionths of deg/s
 _RANGES_DPS = (250.0, 500.0, 1000.0, 2000.0)  # ranges of a gyro; a log does not contain its range
-_AT_RANGE = 0.985, 1.01  # a largest rate between these shares of a range counts as the end of that range
-_QUICK = 0.95  # from this share of the range on, a rate may have been clipped before the chip's low-pass
+# if the largest rate is between these shares of a range, the gyro reached the end of that range
+_AT_RANGE = 0.985, 1.01
+_QUICK = 0.95  # from this share of the range on, a rate may have been clipped before the chip's low-pass filter
 
 
 def fit_procedure(source: Source) -> SixPositions:
-    """Calibrate the whole sensor from one log of the six positions: still on each side once, in any order, and slanted
-    at least once, with the turns between.
+    """Calibrate the whole sensor from one log of the six positions. The sensor was still on each side once, in any
+    order, and slanted at least once; the log also contains the turns between the poses.
 
-    Offset, slope and cross-axis errors of the accelerometer, scale and cross-axis errors of the gyro, and its bias: see
-    kickstand.calibration.sensor_fit. Every still pose counts, and every turn. source: see read_log. Raises InputError;
-    RefusedInput, a subclass, where the firmware refuses a pose or the result.
+    The result has offset, slope and cross-axis errors of the accelerometer, and bias, scale and cross-axis errors of
+    the gyro (see kickstand.calibration.sensor_fit). Every still pose and every turn counts. source: see read_log.
+    Raises InputError; RefusedInput, a subclass, if the firmware refuses a pose or the result.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("parked", seed=1, seconds=20.0)
@@ -84,7 +85,7 @@ def fit_procedure(source: Source) -> SixPositions:
 
 
 def _still_stretches(log: Log) -> list[tuple[int, int]]:
-    """The stretches in which the sensor was still: index of the first sample, and index after the last."""
+    """The stretches in which the sensor was still: (index of the first sample, index after the last sample)."""
     step_s = float(np.median(np.diff(log.t_s))) if len(log.t_s) > 1 else 1.0
     n = max(4, round(_WINDOW_S / step_s))
     if len(log.t_s) < n:
@@ -97,7 +98,7 @@ def _still_stretches(log: Log) -> list[tuple[int, int]]:
     drift = np.mean(accel[:, half:], axis=1) - np.mean(accel[:, :half], axis=1)
     still &= np.all(np.abs(drift) <= _STILL_DRIFT_G, axis=1)
     still &= np.all(np.ptp(log.gyro_dps[within], axis=1) <= _STILL_DPS, axis=1)
-    still &= log.t_s[within[:, -1]] - log.t_s[starts] < 2 * _WINDOW_S  # not across a gap
+    still &= log.t_s[within[:, -1]] - log.t_s[starts] < 2 * _WINDOW_S  # no window across a gap
     lies = np.zeros(len(log.t_s) + 2, dtype=int)
     for start in starts[still]:
         lies[start + 1 : start + 1 + n] = 1
@@ -108,8 +109,8 @@ def _still_stretches(log: Log) -> list[tuple[int, int]]:
 
 
 def _pose(log: Log, first: int, last: int) -> Pose:
-    """The mean of these samples, or of the calmest half if the sensor still tilts a little, as when a hand puts it down
-    slowly."""
+    """The mean of these samples. If the sensor tilts a little, as when a hand puts it down slowly, the mean of the
+    calmest half."""
     name = f"{log.name}, {log.t_s[first]:.1f} to {log.t_s[last - 1]:.1f} s"
     quarter = (last - first) // 4
     problem = None
@@ -123,7 +124,8 @@ def _pose(log: Log, first: int, last: int) -> Pose:
 
 
 def _sides(log: Log, means: list[list[float]]) -> list[int]:
-    """The number of the pose of each side, in the order of SIDES; of several, the least tilted."""
+    """The index of the pose for each side, in the order of SIDES. If a side has several poses, the least tilted is
+    used."""
     best: dict[int, int] = {}
     for k, mean in enumerate(means):
         side = six_position.side_of(mean)
@@ -141,7 +143,7 @@ def _sides(log: Log, means: list[list[float]]) -> list[int]:
 
 
 def _turns(log: Log, stretches: list[tuple[int, int]], poses: list[Pose]) -> list[tuple[list[float], float] | None]:
-    """The turns between the poses, for SensorFit: None if readings are missing or clipped."""
+    """The turns between the poses, for SensorFit. None for a turn with missing or clipped readings."""
     times_us = np.round(log.t_s * 1e6).astype(int)
     steps_us = np.diff(times_us, prepend=times_us[0])
     rates = np.round(log.gyro_dps * _MICRO).astype(int).tolist()

@@ -1,9 +1,9 @@
 """Alignment by driving with ViriCiti's published method: R = R2 R1, each a rotation by Rodrigues' formula.
 
 R1 rotates the mean direction of gravity at the stops to up. R2 rotates the mean force of the braking events, levelled
-by R1, to backward. A braking event counts if the directions of its levelled force spread little. A remaining tilt of
-the vertical from the stops causes a yaw error of some 3 to 4 degrees, which more braking events do not reduce. The
-firmware's DriveAlignment does not have this error. The published method is here for comparison.
+by R1, to backward. A braking event counts if the directions of its levelled force spread little. The vertical
+from the stops is slightly tilted, which causes a yaw error of about 3 to 4 degrees. More braking events do not reduce
+this error. The firmware's DriveAlignment does not have it. The published method is here for comparison.
 """
 
 from array import array
@@ -26,7 +26,7 @@ LOSS_MPS = 1.5  # a braking event that reduces the speed by less is noise
 MIN_EVENTS = 3
 UP = np.array([0.0, 1.0, 0.0])
 BACKWARD = np.array([0.0, 0.0, -1.0])
-NO_MEAN = 9.9  # the value without a mean direction, such as for opposite directions; also the largest value returned
+NO_MEAN = 9.9  # the largest value returned, also if there is no mean direction, as for opposite directions
 
 
 def rotation_between(a: Array, b: Array, axis: int) -> Array:
@@ -34,10 +34,10 @@ def rotation_between(a: Array, b: Array, axis: int) -> Array:
 
         R = I + K + K^2 / (1 + c),  K the cross product matrix of a x b, c = a . b
 
-    Near c = -1 the quotient has no significant digits left. So if c < 0, a half turn D about a coordinate axis is done
-    first, after which c > 0: R = Rodrigues(D a, b) D.
+    Near c = -1 the quotient has no significant digits left. If c < 0, a half turn D about a coordinate axis is
+    therefore applied first, which makes c > 0: R = Rodrigues(D a, b) D.
 
-    axis: 0, 1 or 2, the coordinate axis of the half turn; it must be perpendicular to b.
+    axis: 0, 1 or 2, the coordinate axis of the half turn, perpendicular to b.
     """
     half_turn = np.eye(3)
     if a @ b < 0.0:
@@ -54,7 +54,7 @@ def circular_dispersion(directions: Sequence[complex]) -> float:
 
         d = (1 - rho2) / (2 R^2),  R = |mean of e^(i a)|,  rho2 = the mean cosine of 2 (a - mean direction)
 
-    For small spreads d is about the variance in rad^2: 0.02 is 8 degrees, 0.005 is 4.
+    For small spreads, d is about the variance in rad^2: 0.02 means 8 degrees, 0.005 means 4 degrees.
     """
     mean = np.mean(directions)
     square = float(abs(mean)) ** 2
@@ -65,10 +65,11 @@ def circular_dispersion(directions: Sequence[complex]) -> float:
 
 
 class PublishedAlignment:
-    """Has the methods of a DriveAlignment. It also runs one, which checks speed and mount and finds the vertical.
+    """The published method, with the interface of DriveAlignment. A DriveAlignment inside checks speed and mount and
+    finds the vertical.
 
-    counted: number of accepted braking events. turned: number refused for their dispersion. needed: required number of
-    accepted ones.
+    counted: number of accepted braking events. turned: number of events refused for their dispersion. needed: required
+    number of accepted events.
     """
 
     def __init__(self, vehicle: str, up: list[float] | None = None, bias: list[float] | None = None) -> None:
@@ -76,10 +77,11 @@ class PublishedAlignment:
         self.standing = self._improved.standing
         self.needed = MIN_EVENTS
         self.counted = self.turned = 0
-        self._accepted = np.zeros(3)  # sum of their forces
+        self._accepted = np.zeros(3)  # sum of the forces of accepted braking events
         self._means: list[complex] = []  # one direction for each accepted braking event
-        # Mean forces over MEAN_US each (g, along the sensor's axes) with their levelled directions: those of the
-        # current braking event, and those since the last speed: the next speed shows whether they were braking
+        # Mean forces over MEAN_US each (g, along the sensor's axes) and their levelled directions. The first list
+        # belongs to the current braking event. The second holds those since the last speed: the next speed shows
+        # whether they were braking
         self._event: list[tuple[Array, complex]] = []
         self._interval: list[tuple[Array, complex]] = []
         self._level = np.eye(3)
@@ -87,7 +89,7 @@ class PublishedAlignment:
 
     @property
     def problem(self) -> Refusal | None:
-        """The fault of the speed or of the mount: an AlignmentError, or None."""
+        """An AlignmentError that names the fault of the speed or of the mount, or None."""
         return self._improved.problem
 
     @property
@@ -104,7 +106,7 @@ class PublishedAlignment:
 
     @property
     def reason(self) -> Refusal:
-        """The reason why matrix() gives no alignment yet: an AlignmentError."""
+        """An AlignmentError that says why matrix() gives no alignment yet."""
         return self.problem or self._improved.missing(self.counted, self.needed, self.turned)
 
     def update(self, force: Sequence[float], rate: Sequence[float], dt_us: int) -> None:
@@ -134,7 +136,7 @@ class PublishedAlignment:
         self._improved.finish()
 
     def measure_speed(self, speed_mps: float, age_us: int = 0) -> None:
-        """Add a new speed: see DriveAlignment.measure_speed(), but the lag is not estimated."""
+        """Add a new speed: see DriveAlignment.measure_speed(), but this method does not estimate the lag."""
         self._improved.measure_speed(speed_mps, age_us)
         seconds = self._interval_us * 1e-6
         if self._interval_us < MIN_INTERVAL_US:
@@ -173,7 +175,7 @@ class PublishedAlignment:
         return known
 
     def _levelled(self, force: Array) -> complex:
-        """The level part of a force: to the left, and forward as the imaginary part."""
+        """The horizontal part of a force as a complex number: real part to the left, imaginary part forward."""
         left, _, forward = self._level @ force
         return complex(left, forward)
 

@@ -1,7 +1,7 @@
-"""Remarks about a log, as data: a class for each, with its fields, its words and what to do. Nothing about the vehicle
-must be known.
+"""Checks a log and returns remarks as data. Each remark is a class with its fields, its text and a remedy. The checks
+need no data about the vehicle.
 
-cells.py: the log as a table of cells, which the other modules judge. units.py: units. handedness.py (with
-turning.py), bends.py, course.py: axes and signs. mount.py: a calibration against a log. log.py: all of these together,
-for whoever reads a log. sensor.py: dead axes and a gyro at the end of its range, whose readings are left out.
+cells.py reduces the log to a table of cells, which the other modules judge. units.py checks units. handedness.py (with
+turning.py), bends.py and course.py check axes and signs. mount.py compares a calibration with a log. log.py runs all of
+these checks. sensor.py finds dead axes and a gyro at the end of its range, whose readings are left out.
 """

@@ -1,9 +1,10 @@
-"""Are the angular rates of a log in deg/s, and of the right sign? The bends of a motorcycle ride show it.
+"""Checks in the bends of a motorcycle ride that the angular rates of a log are in deg/s and have the right sign.
 
-In a bend a leaning bike's rate about its own left is its yaw rate times the sine of its lean. All three come from the
-rates. Where they are in rad/s, which is 57 times too small, the product is 57 x 57 times too small, but the rate about
-left only 57 times. Where all rates have the opposite sign, or all axes are left-handed, the product keeps its sign and
-the rate about left has the opposite one. Logs of a car, which does not lean, and of a parked vehicle are never judged.
+In a bend, the rate of a leaning bike about its own left axis is the yaw rate times the sine of the lean. All three are
+computed from the log's rates. If these are in rad/s, they are 57 times too small: the product is then 57 x 57 times too
+small, but the rate about left only 57 times. If all rates have the opposite sign, or all axes are left-handed, the
+product keeps its sign, but the rate about left changes its sign. Logs of a car, which does not lean, and of a parked
+vehicle are never judged.
 """
 
 from dataclasses import dataclass
@@ -15,22 +16,22 @@ from ..signals import Array
 from ..signals.leaning import LIKENESS, WINDOW_S, leaning_of, leans, speed_in_radians, unrest
 from .cells import CELL_S, LogCells
 
-KEPT_S, RIDING_S = 1800.0, 15.0  # the last half hour is judged; less riding shows nothing
-MOVES_S, MOVES = 1.6, 0.1  # it rides where the rates' deviation over MOVES_S is over MOVES times its 95th percentile
-# The gyro has the opposite sign if Leaning.share is under AGAINST (it is -1.6 to -1.0 then) and differs from 0 by over
-# SURE standard deviations
+KEPT_S, RIDING_S = 1800.0, 15.0  # the last half hour is judged; it needs this much riding
+MOVES_S, MOVES = 1.6, 0.1  # riding: the deviation of the rates over MOVES_S is over MOVES times its 95th percentile
+# The gyro has the opposite sign if Leaning.share is under AGAINST and differs from 0 by over SURE standard deviations.
+# With the opposite sign the share is -1.6 to -1.0
 AGAINST, SURE = -0.5, 5.0
-# The calmest seconds are a share of CALMEST of all, at least LEAST; CALM_G scales the force's standard deviation in
-# them
+# The calmest seconds are the share CALMEST of all seconds, at least LEAST. CALM_G scales their standard deviation of
+# the force
 CALMEST, LEAST, CALM_G = 0.2, 3, 0.02
-# The bias is known where AGREE of these seconds, or else of the FEW calmest, are within KNOWN_DPS: a ride may be mostly
-# one long steady bend, but what is calmest is then a standstill
+# The bias is known if AGREE of these seconds, or else of the FEW calmest, are within KNOWN_DPS. In a ride that is
+# mostly one long, steady bend, the FEW calmest seconds are a standstill
 AGREE, FEW, KNOWN_DPS = 0.8, 5, 3.0
 
 
 @dataclass(frozen=True)
 class RatesInRadians(WrongAxes):
-    """The rates are those of deg/s only if the bike is very slow. speed_mps: the speed that they give."""
+    """As deg/s, the rates would mean a very slow bike. speed_mps: the speed that they would mean."""
 
     speed_mps: float
 
@@ -52,18 +53,18 @@ class LeftHanded(WrongAxes):
 
 
 def bends(cells: LogCells) -> Message | None:
-    """A notice if the rates seem to be in rad/s or of the opposite sign; None if not, or if the log does not show
-    it."""
+    """A notice if the rates seem to be in rad/s or to have the opposite sign; None if they seem right, or if the log
+    does not show it."""
     force, rate, _ = cells.means(round(WINDOW_S / CELL_S))
     there = np.flatnonzero(~np.isnan(force[:, 0]))[-round(KEPT_S / WINDOW_S) :]
     force, rate = force[there], np.radians(rate[there])
     if len(rate) * WINDOW_S < RIDING_S:
         return None
     changes = unrest(rate, MOVES_S)
-    moves = MOVES * np.percentile(changes, 95)  # relative, because the unit is not known
+    moves = MOVES * np.percentile(changes, 95)  # relative, because the unit is unknown
     if np.count_nonzero(changes > moves) * WINDOW_S < RIDING_S:
         return None
-    whole = len(rate) // 5 * 5  # seconds
+    whole = len(rate) // 5 * 5  # in whole seconds
     calm = calm_rates(force[:whole].reshape(-1, 5, 3), rate[:whole].reshape(-1, 5, 3), moves)
     bias = calm_bias(np.degrees(calm))
     if bias is None:
@@ -78,7 +79,7 @@ def bends(cells: LogCells) -> Message | None:
 
 
 def calm_bias(calm: Array) -> Array | None:
-    """(3) deg/s: the gyro's bias, from calm_rates() in deg/s; None where these differ."""
+    """(3) deg/s: the gyro's bias, from calm_rates() in deg/s; None if these rates differ too much."""
     for some in (calm, calm[:FEW]):
         bias = np.median(some, axis=0)
         if np.mean(np.linalg.norm(some - bias, axis=1) < KNOWN_DPS) > AGREE:
@@ -87,7 +88,7 @@ def calm_bias(calm: Array) -> Array | None:
 
 
 def calm_rates(force: Array, rate: Array, calm_rate: float) -> Array:
-    """(k, 3) mean rates of the calmest of m seconds, the calmest first. force, rate (m, cells, 3). calm_rate: standard
-    deviation of the rates that weighs as much as CALM_G of the force."""
+    """The mean rates (k, 3) of the calmest of m seconds, calmest first. force, rate (m, cells, 3). calm_rate: the
+    standard deviation of the rates that weighs as much as a standard deviation CALM_G of the force."""
     changes = np.sum(np.std(force, axis=1), axis=1) / CALM_G + np.sum(np.std(rate, axis=1), axis=1) / calm_rate
     return np.mean(rate, axis=1)[np.argsort(changes)[: max(LEAST, round(CALMEST * len(changes)))]]

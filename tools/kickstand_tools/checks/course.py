@@ -1,7 +1,8 @@
-"""The sign of a log's accelerations, by its track: the gyro's rate about up has to have the sign of the course's.
+"""Checks the sign of a log's accelerations by its track: the gyro's rate about up and the rate of the course must have
+the same sign.
 
-Where only the accelerations have the opposite sign, the log is an exact mirror image of the ride, left and right
-exchanged, and the motion of the sensor cannot show it. Positions can.
+If only the accelerations have the opposite sign, the log is an exact mirror image of the ride, with left and right
+exchanged. The motion of the sensor cannot show this, but the positions can.
 """
 
 import numpy as np
@@ -9,18 +10,18 @@ import numpy as np
 from ..signals import Array, best_lag, distance_m
 from .cells import CellTable, LogCells
 
-SLOWEST_MPS = 3.0  # at a lower speed positions show no course
-TURNING_DPS = 4.0  # only seconds in which the course changes faster count
-FASTEST_DPS = 90.0  # a course that changes faster is a jump of the positions
-ENOUGH = 8  # least number of seconds that count
+SLOWEST_MPS = 3.0  # at a lower speed, positions do not show the course
+TURNING_DPS = 4.0  # seconds count if the course changes faster than this
+FASTEST_DPS = 90.0  # if the course changes faster, the positions jumped
+ENOUGH = 8  # this many seconds must count
 CLEAR = 0.6  # least correlation of course and gyro, of either sign
-LAGS_S = np.arange(0.0, 2.1, 0.25)  # delays of the positions that are tried
+LAGS_S = np.arange(0.0, 2.1, 0.25)  # tried delays of the positions
 LONGEST_S = 2.5  # longest time between two positions
 
 
 def course_agrees(cells: LogCells) -> bool | None:
-    """True where the rate about up has the sign of the course's, False for the opposite one, None where there are too
-    few bends to both sides to decide."""
+    """True if the rate about up and the rate of the course have the same sign, False if they have opposite signs. None
+    if there are too few bends to both sides."""
     if len(cells.places) < ENOUGH:
         return None
     at_s, lat, lon = cells.places.T
@@ -44,7 +45,7 @@ def course_agrees(cells: LogCells) -> bool | None:
 
 
 def log_agrees(time_s: Array, accel_g: Array, gyro_dps: Array, lat_deg: Array, lon_deg: Array) -> bool | None:
-    """course_agrees() for n samples. accel_g, gyro_dps (n, 3); lat_deg, lon_deg (n): NaN where there is no new one."""
+    """course_agrees() for n samples. accel_g, gyro_dps (n, 3); lat_deg, lon_deg (n): NaN for no new position."""
     table = CellTable()
     table.add(time_s, accel_g, gyro_dps, np.full(len(time_s), np.nan), lat_deg, lon_deg)
     cells = table.cells()

@@ -1,14 +1,15 @@
-"""Do the angular rates of a log fit its accelerations? A rotation of the sensor rotates the direction of gravity in it.
+"""Checks that the angular rates of a log fit its accelerations: if the sensor turns, gravity turns in the sensor's
+axes.
 
-At rest the axis that points up reads +1 g; the axes are right-handed, and so are the rates about them. Then gravity's
-direction u turns in the sensor's axes as du/dt = -rate x u. Left-handed axes, a gyro of the opposite sign, and axes
-exchanged or reversed in one sensor alone break that. Left-handed axes in both sensors look like a gyro of the opposite
-sign, because a rate is an axial vector. Accelerations of the opposite sign are the mirror image of another ride: no
-motion shows them.
+In a correct log, the axis that points up reads +1 g at rest, and axes and rates are right-handed. The direction u of
+gravity then turns in the sensor's axes by du/dt = -rate x u. This equation fails for left-handed axes, for a gyro of
+the opposite sign, and for axes exchanged or reversed in only one of the sensors. Left-handed axes in both sensors look
+like a gyro of the opposite sign, because a rate is an axial vector. Accelerations of the opposite sign are the mirror
+image of another ride, so no motion shows them.
 
-A ride's force is hardly gravity's alone: in a balanced bend it keeps its direction along the bike. Therefore each
-window is judged as a whole (see turning.py). The hypotheses are the 48 signed permutations of the gyro's axes ("an
-exchange" below); the one that explains the forces best is reported if it is clearly better than the axes as they are.
+The force in a ride is hardly ever gravity alone: in a balanced bend it keeps its direction along the bike. Therefore
+each window is judged as a whole (see turning.py). The hypotheses are the 48 signed permutations of the gyro's axes,
+here called exchanges. The best exchange is reported if it explains the forces clearly better than the axes as they are.
 """
 
 import itertools
@@ -23,19 +24,20 @@ from .bends import KNOWN_DPS, LeftHanded, calm_bias, calm_rates
 from .cells import CELL_S, LogCells
 from .turning import Turning
 
-WINDOW_S, SHORT_WINDOW_S = 20.0, 10.0  # the short ones are used where the log has no stretch for a long one
-MOST_WINDOWS = 16  # windows that are judged: those with the largest rates
-CALM_DPS = 2.0  # scales the rates' standard deviation in calm seconds, as CALM_G the force's; see calm_rates()
-TRIED = 6  # of the 48 exchanges so many are fitted, those that are best without velocity and bias
+WINDOW_S, SHORT_WINDOW_S = 20.0, 10.0  # short windows are used if the log has no stretch for a long one
+MOST_WINDOWS = 16  # number of judged windows, those with the largest rates
+CALM_DPS = 2.0  # scales the standard deviation of the rates in calm seconds: see calm_rates()
+TRIED = 6  # number of exchanges that are fitted, those that are best without velocity and bias
 
-# By which factor an exchange has to reduce the mean square (g2) of the residual force. In right logs, simulated and
-# recorded, none reduces it by more than 1.1; where the gyro has the opposite sign that factor is 1.7 to 470.
+# The factor by which an exchange must reduce the mean square (g2) of the residual force. In correct logs, simulated and
+# recorded, no exchange reaches more than 1.1. If the gyro has the opposite sign, the factor is 1.7 to 470.
 CLEARLY = 2.0
-LIKELY, SIGMAS = 1.25, 3.0  # or by LIKELY, where the mean reduction in the windows is over SIGMAS standard errors
-FEW_WINDOWS, FEW_CLEARLY = 3, 5.0  # with so few windows by FEW_CLEARLY, and only for a bias near 0, such as a phone's
-LEAST_G2 = 0.001  # least reduction in any case: a parked vehicle's drift is under 0.0002
-# Factors on a hypothesis's residual, so that of hypotheses that fit about equally well the likelier mistake wins: all
-# axes reversed (or none), some reversed, axes exchanged
+# the factor LIKELY is enough if the mean reduction in the windows is over SIGMAS standard errors
+LIKELY, SIGMAS = 1.25, 3.0
+FEW_WINDOWS, FEW_CLEARLY = 3, 5.0  # up to FEW_WINDOWS windows need FEW_CLEARLY, and a bias near 0 such as a phone's
+LEAST_G2 = 0.001  # the mean square must fall by this in any case; in a parked vehicle, drift reduces it by under 0.0002
+# Factors on the residual of an exchange. If several fit about equally well, the likeliest mistake wins: first all axes
+# reversed (or none), then some reversed, then axes exchanged
 PENALTY = 1.0, 1.3, 1.6
 
 
@@ -53,8 +55,8 @@ EXCHANGES = _exchanges()  # rate = exchange @ reading of the gyro
 
 @dataclass(frozen=True)
 class RatesMisfit(WrongAxes):
-    """The gyro's axes are not the accelerometer's. The rows (3 numbers each) of a signed permutation: times the rates
-    of the log it gives the rates about x, y and z."""
+    """The gyro's axes are not those of the accelerometer. The fields are the rows (3 numbers each) of a signed
+    permutation: multiplied by the rates of the log it gives the rates about x, y and z."""
 
     about_x: tuple[int, ...]
     about_y: tuple[int, ...]
@@ -65,8 +67,8 @@ class RatesMisfit(WrongAxes):
     def sentence(self) -> str:
         """See Message.
 
-        A reversed axis of the accelerometer is the same as the two others reversed in the gyro, because accelerations
-        of the opposite sign are as good as the right ones; likewise with two that are exchanged.
+        Reversing one axis of the accelerometer has the same effect as reversing the two others in the gyro, because the
+        check cannot see the sign of all accelerations. Exchanging two axes also has the same effect in either sensor.
         """
         exchange = self.about_x, self.about_y, self.about_z
         kept = [axis for k, axis in enumerate(AXES) if exchange[k][k] == 1]
@@ -92,7 +94,7 @@ class RatesMisfit(WrongAxes):
 
 
 def handedness(cells: LogCells) -> Message | None:
-    """A notice that says what is wrong with the axes; None if nothing is, or if the log does not show it."""
+    """A notice that says what is wrong with the axes; None if they seem right, or if the log does not show it."""
     turning = liveliest(cells)
     found = None if turning is None else better_exchange(turning)
     if found is None:
@@ -103,9 +105,9 @@ def handedness(cells: LogCells) -> Message | None:
 
 
 def better_exchange(turning: Turning) -> int | None:
-    """The index in EXCHANGES of one that fits clearly better than the first; None if there is none."""
+    """The index of an exchange in EXCHANGES that fits clearly better than the first; None without such an exchange."""
     near = np.argsort(turning.rough(EXCHANGES))[:TRIED]
-    # always the identity, and the likeliest mistake
+    # always fit the identity and the likeliest mistake
     places = {0, 1, *(int(k) for k in near)}
     left = {k: turning.unexplained(EXCHANGES[k]) for k in places}
     best = min(left, key=lambda k: float(np.mean(left[k])) * _penalty(EXCHANGES[k]))
@@ -121,7 +123,7 @@ def better_exchange(turning: Turning) -> int | None:
 
 
 def liveliest(cells: LogCells) -> Turning | None:
-    """The windows of the log with the largest rates; None if there is none, or if the gyro's bias is not known."""
+    """The windows of the log with the largest rates; None without a window, or if the gyro's bias is unknown."""
     places = _windows(cells.known, WINDOW_S)
     places = places if len(places) else _windows(cells.known, SHORT_WINDOW_S)
     bias = _bias(cells)
@@ -136,15 +138,15 @@ def liveliest(cells: LogCells) -> Turning | None:
 
 
 def _windows(known: Bools, seconds: float) -> Ints:
-    """(windows, cells): indices of cells, for windows of so many seconds without unknown cells."""
+    """The indices (windows, cells) of the cells of each window. A window has this many seconds and no unknown cell."""
     length = round(seconds / CELL_S)
     starts = [k for begin, end in stretches(known) for k in range(begin, end - length + 1, length)]
     return np.array(starts, dtype=int).reshape(-1, 1) + np.arange(length)
 
 
 def _bias(cells: LogCells) -> Array | None:
-    """(3) deg/s: the gyro's bias, its mean reading in the calmest seconds, which are mostly straight. Where these
-    differ: 0 if the log's mean rate allows it (a phone subtracts its bias itself), else None."""
+    """(3) deg/s: the gyro's bias, its mean reading in the calmest seconds, which are mostly straight. If the
+    rates of these seconds differ: 0 if the log's mean rate allows it (a phone subtracts its bias), else None."""
     seconds = _windows(cells.known, 1.0)
     if not len(seconds):
         return None

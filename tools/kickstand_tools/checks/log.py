@@ -1,4 +1,4 @@
-"""All remarks about a log, from one table of cells."""
+"""Runs all checks on one table of cells, and collects the remarks."""
 
 from dataclasses import dataclass
 
@@ -16,8 +16,8 @@ from .course import course_agrees
 from .handedness import handedness
 from .units import speed_unit
 
-_LIMITS = np.array(3 * [MOST_G] + [np.inf] + 3 * [MOST_DPS])  # of readings; a log made in Python may have larger ones
-_AGAIN_S = 20.0  # while a log is read, the unit of its speed is checked again after each such time of the log
+_LIMITS = np.array(3 * [MOST_G] + [np.inf] + 3 * [MOST_DPS])  # limits of readings; a log made in Python may exceed them
+_AGAIN_S = 20.0  # while a log is read, the unit of its speed is checked again after each such period of the log
 
 
 @dataclass(frozen=True)
@@ -38,10 +38,10 @@ class Checks:
         self._judged_s = 0.0
 
     def add(self, part: Block | Log) -> None:
-        """Take a part of the log without frozen readings. Raises RefusedInput as soon as it is sure that the speed is
-        not in m/s."""
+        """Take a part of the log without frozen readings. Raises RefusedInput as soon as the speed is
+        certainly not in m/s."""
         there = ~np.any(np.abs(part.readings) > _LIMITS, axis=1)
-        part = part if np.all(there) else part.part(there)  # one such reading would outweigh a ride
+        part = part if np.all(there) else part.part(there)  # a single huge reading would outweigh a whole ride
         readings = part.readings
         self._table.add(part.t_s, readings[:, :3], readings[:, 4:], part.speed_mps, part.lat_deg, part.lon_deg)
         if len(part.t_s) and part.t_s[-1] > self._judged_s + _AGAIN_S:

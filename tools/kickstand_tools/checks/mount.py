@@ -1,14 +1,14 @@
-"""Does a calibration fit the mount of this ride? Force, rates and speed show where up and forward are.
+"""Checks that a calibration fits the mount of a ride. Force, rates and speed show where up and forward are.
 
-Up: while riding, a balanced bike's force has the direction of its own up, and a car's nearly so. Forward: braking and
-speeding up in a straight line change the force along it, so the changes of a log's speed show it. A motorcycle's bends
-show it without a speed too: leaning to the right means yawing more to the right, so minus the change of the yaw rate
-correlates with the rate about forward.
+Up: on a balanced bike, the force while riding points along the bike's own up axis; in a car it nearly does. Forward:
+braking and speeding up in a straight line change the force along the forward axis, so it correlates with the changes of
+the log's speed. The bends of a motorcycle show forward without a speed: leaning to the right means yawing more to the
+right, so minus the change of the yaw rate correlates with the rate about forward.
 
-A kickstand on the other side than `calibrate two` was given exchanges forward with backward and left with right, and so
-do two poses that were swapped. The force alone does not show it, because braking then looks like speeding up.
+If `calibrate two` was told the wrong side of the kickstand, or if two poses were swapped, forward and backward are
+exchanged, and so are left and right. The force alone does not show this, because braking then looks like speeding up.
 
-On simulated rides and recordings with a right calibration up is found within 8 degrees and forward within 5.
+In simulated and recorded rides with a correct calibration, up is found within 8 degrees and forward within 5.
 """
 
 from dataclasses import dataclass
@@ -21,27 +21,29 @@ from ..common.messages import AT_REST, OPPOSITE_SIGN, Message, Remedy, WrongMoun
 from ..signals import Array, Lag, best_lag, correlation, rotated, rotation_vector
 from .cells import CELL_S, LogCells
 
-MEAN_S = 0.5  # up and the bends are judged by means over this
-UP_DEG, FORWARD_DEG = 15.0, 20.0  # a calibration whose up or forward differs by more is another mount's
-LEANED_DEG = 25.0  # where the two poses were swapped, up is the kickstand pose's: it may differ by as much
-BACKWARD_DEG = 150.0  # forward and backward are exchanged where forward differs by more
+MEAN_S = 0.5  # up and the bends are judged by means over this time
+UP_DEG, FORWARD_DEG = 15.0, 20.0  # if up or forward differs by more, the calibration belongs to another mount
+# if the two poses were swapped, "up" is the bike's up on the kickstand, which leans by up to this angle
+LEANED_DEG = 25.0
+BACKWARD_DEG = 150.0  # if forward differs by more, forward and backward are exchanged
 TURNING_DPS, TURNING_S = 5.0, 10.0  # up is judged where the rates are over TURNING_DPS, for at least TURNING_S
 STRAIGHT_DPS = 8.0  # forward is judged by the speed where the rates are lower
 SPEEDS, SPEED_MPS = 20, 0.5  # least number of changes of speed from second to second, and their standard deviation
-LATE_S = (0, 1, 2)  # delays of the speed that are tried
+LATE_S = (0, 1, 2)  # tried delays of the speed
 BENDS, BENDS_DPS = 120, 1.0  # least number of means, and the standard deviation of the changes of their yaw rate
-# Correlations from which forward is sure, by the speed and by the bends: right calibrations have over 0.85 and 0.6
+# Forward is certain above these correlations, by the speed and by the bends. Correct calibrations have over 0.85 and
+# 0.6
 SURE_SPEED, SURE_BENDS = 0.8, 0.55
-# Correlation of the force along forward with all changes of speed below which forward is surely reversed: a right
-# calibration has over 0.8, on slopes of 12 % too
+# If the correlation of the force along forward with all changes of speed is lower, forward is certainly reversed. A
+# correct calibration has over 0.8, even on slopes of 12 %
 SURE_REVERSED = -0.6
 UPSIDE_DOWN = 0.87  # cosine of the angle to straight down: within 30 degrees
-ANOTHER_MOUNT_DEG = 10.0  # two alignments that differ by more are of two mounts
+ANOTHER_MOUNT_DEG = 10.0  # if two alignments differ by more, they belong to different mounts
 
 
-SWAPPED_DEG = 4.0  # an upright pose is hardly ever so far off; a pose on the kickstand taken for it is
+SWAPPED_DEG = 4.0  # an upright pose is hardly ever so far off, but a pose on the kickstand always is
 UPSIDE_DOWN_DEG = 150.0  # an up that is further off may come from accelerations of the opposite sign
-# For a motorcycle, and for a car
+# The remedies for a motorcycle, and for a car
 AGAIN = Remedy(
     "is it another mount's? Calibrate again: calibrate two, or calibrate ride",
     "is it another mount's? Remove the calibration and let the ride show how the sensor sits, or align the bike again",
@@ -54,7 +56,7 @@ AGAIN_CAR = Remedy(
 
 @dataclass(frozen=True)
 class UpOff(WrongMount):
-    """The calibration's up is not the ride's."""
+    """Up differs between the calibration and the ride."""
 
     angle_deg: float
     car: bool
@@ -70,8 +72,8 @@ class UpOff(WrongMount):
 
 @dataclass(frozen=True)
 class ForwardOff(WrongMount):
-    """The calibration's forward is not the ride's. angle_deg: from the calibration's to the ride's, > 0 to the left.
-    by: "speed" or "bends"."""
+    """Forward differs between the calibration and the ride. angle_deg: from the calibration's forward to the ride's, >
+    0 to the left. by: "speed" or "bends"."""
 
     angle_deg: float
     by: str
@@ -124,8 +126,7 @@ class ForwardExchanged(WrongMount):
 
 @dataclass(frozen=True)
 class UpsideDown(WrongMount):
-    """Accelerations of the opposite sign look like a sensor that is mounted upside down. axis: the one that points
-    down."""
+    """The sensor is upside down, or its accelerations have the opposite sign. axis: the axis that points down."""
 
     axis: str
 
@@ -139,7 +140,7 @@ class UpsideDown(WrongMount):
 
 @dataclass(frozen=True)
 class AnotherMount(WrongMount):
-    """The calibration that a new one builds on is of another mount: only its offset and slope are used."""
+    """The calibration that a new one builds on belongs to another mount. Only its offset and slope are used."""
 
     angle_deg: float
 
@@ -148,7 +149,7 @@ class AnotherMount(WrongMount):
 
 
 def contradiction(cells: LogCells, calibration: CalibrationFile) -> Message | None:
-    """A notice that says what in a log contradicts a calibration; None if nothing does or it is not aligned."""
+    """A notice that says how a log contradicts a calibration. None without a contradiction or an alignment."""
     if not calibration.aligned:
         return None
     ride = _Ride(cells, calibration)
@@ -162,15 +163,16 @@ def contradiction(cells: LogCells, calibration: CalibrationFile) -> Message | No
     if up is not None and up > (LEANED_DEG if exchanged else UP_DEG):
         return UpOff(up, car)
     if exchanged:
-        return ForwardExchanged(car, calibration.kickstand_side, None)  # None: the error of up is not known
+        return ForwardExchanged(car, calibration.kickstand_side, None)  # None: the error of up is unknown
     return None if found is None or abs(found) < FORWARD_DEG else ForwardOff(found, by, car)
 
 
 def of_calibration(found: CalibrationFile, before: CalibrationFile | None = None) -> list[Message]:
-    """Notices about a new alignment `found`, and about the calibration `before` that it was to build on.
+    """Notices about a new alignment `found`, and about the calibration `before` on which it should build.
 
-    upside-down: accelerations of the opposite sign look like a sensor upside down, and no log shows which it is. (A
-    phone's x may point down: it lies on its side.) another-mount: of `before` only offset and slope are used.
+    upside-down: accelerations of the opposite sign look like a sensor upside down, and no log shows which of the two
+    it is. (A phone's x axis may point down, because a phone can lie on its side.) another-mount: only offset and slope
+    of `before` are used.
     """
     notices: list[Message] = []
     up = found.vehicle_from_sensor[1]
@@ -186,12 +188,12 @@ def of_calibration(found: CalibrationFile, before: CalibrationFile | None = None
 
 
 class _Ride:
-    """A log in the axes of a calibration."""
+    """A log, expressed in the axes of a calibration."""
 
     def __init__(self, cells: LogCells, calibration: CalibrationFile) -> None:
         def along(over_s: float) -> tuple[Array, Array, Array]:
-            """Mean force (n, 3, g), mean rate (n, 3, deg/s) less its median, and first speed (n, m/s) of each
-            over_s."""
+            """Mean force (n, 3, g), mean rate (n, 3, deg/s) minus its median, and first speed (n, m/s) of
+            each over_s."""
             accel, gyro, speed = cells.means(round(over_s / CELL_S))
             force, rate = rotated(calibration.vehicle_from_sensor, *calibration.in_sensor(accel, gyro))
             return force, rate - np.nanmedian(rate, axis=0), speed
@@ -201,7 +203,7 @@ class _Ride:
         self._change_g = np.diff(speed) / STANDARD_GRAVITY
 
     def up_deg(self) -> float | None:
-        """The angle between the calibration's up and the ride's; None where there are hardly any bends."""
+        """The angle between the calibration's up and the ride's; None if there are hardly any bends."""
         turning = np.linalg.norm(self._rate, axis=1) > TURNING_DPS
         if np.count_nonzero(turning) * MEAN_S < TURNING_S:
             return None
@@ -209,19 +211,21 @@ class _Ride:
         return float(np.degrees(np.arctan2(np.hypot(left, forward), up)))
 
     def forward_by_speed(self) -> float | None:
-        """Degrees from the calibration's forward to the ride's by the log's speed, > 0 to the left; None if
-        uncertain."""
+        """The angle from the calibration's forward to the ride's, degrees, found from the log's speed. > 0 to the left;
+        None if uncertain."""
         straight = np.linalg.norm(self._second_rate, axis=1) < STRAIGHT_DPS
         found = self._pushed(np.where(straight[:, None], self._second_force[:, [0, 2]], np.nan))
         return _angle_deg(found.direction) if found and found.value > SURE_SPEED else None
 
     def speed_correlation(self) -> float | None:
-        """Correlation of the force along the calibration's forward with the changes of speed, -1 to 1; None without."""
+        """Correlation, -1 to 1, of the force along the calibration's forward with the changes of speed. None without
+        enough speeds."""
         found = self._pushed(self._second_force[:, 2:])
         return found.value * float(found.direction[0]) if found else None
 
     def _pushed(self, force: Array) -> Lag | None:
-        """The Lag of the changes of speed behind the force (n, k, NaN where it is not to be used); None for too few."""
+        """The Lag of the changes of speed behind the force (n, k; NaN where it must not be used). None if there are too
+        few changes."""
 
         def earlier(by: float) -> tuple[Array, Array] | None:
             change = self._change_g[int(by) :]
@@ -233,7 +237,7 @@ class _Ride:
         return best_lag(LATE_S, earlier, whole=True)
 
     def forward_by_bends(self) -> float | None:
-        """Like forward_by_speed(), but by how a motorcycle leans into bends; None if uncertain."""
+        """Like forward_by_speed(), but found from the way a motorcycle leans into bends; None if uncertain."""
         if len(self._rate) < BENDS:
             return None
         turned = _smooth(self._rate[2:, 1] - self._rate[:-2, 1])

@@ -1,9 +1,9 @@
-"""Was the sensor ill? A dead axis, a sensor at the end of its range.
+"""Finds faults of the sensor: dead axes, and sensors at the end of their range.
 
-Noise changes every reading of a working axis within a second. An axis that stays the same to the last digit while the
-others of its sensor change was not measured. A rate of over SATURATED_DPS does not stay the same either: the gyro is at
-the end of its range, and how fast the bike rolled there is unknown. Lean must not be found from either of them. Of an
-accelerometer that vibration clips the force is nearly right between the blows: these readings are used, and remarked.
+Noise changes every reading of a working axis within a second. An axis is dead if it stays the same to the last digit
+while other axes of its sensor change. A rate that stays the same above SATURATED_DPS means that the gyro is at the end
+of its range, so the true rate is unknown. The lean must not be computed from either. If vibration clips the
+accelerometer, the force between the shocks is nearly right, so these readings are used, with a remark.
 """
 
 from dataclasses import dataclass
@@ -15,21 +15,21 @@ from ..common.messages import Message, Remedy
 from ..signals import Array, Bools, Ints, cell_numbers
 
 DEAD_S = 1.0  # an axis is judged in each stretch of this length
-LEAST_SAMPLES = 10  # of such a stretch
+LEAST_SAMPLES = 10  # least number of samples in such a stretch
 # The other axes must change by this much, and by OTHER_STEPS of their last digits: rounding hides the noise of a phone
 OTHER_G, OTHER_DPS, OTHER_STEPS = 0.01, 0.3, 20.0
-# Least share of samples at which they turn round: those of noise are two thirds, those of a made log have no noise
+# Least share of samples at which the readings change direction: noise gives two thirds, a log without noise less
 NOISY = 0.15
-# A sensor of which no axis has ever moved is judged in a part of the log of this length
+# If no axis of a sensor ever changes, the sensor is judged over a part of the log of this length
 DEAD_ALL_S = 20.0
-DEAD_FROM_S = 2.0  # less is left in: rounding may hide the noise for a second
+DEAD_FROM_S = 2.0  # shorter stretches are kept, because rounding may hide the noise for a second
 SATURATED_DPS, SATURATED_S, SATURATED_SAMPLES = 100.0, 0.1, 5
-# An accelerometer is clipped where its largest reading, of over CLIPPED_G, is repeated to the last digit
+# An accelerometer is clipped if its largest reading, over CLIPPED_G, is repeated to the last digit
 CLIPPED_G, CLIPPED_SAMPLES, CLIPPED_STEPS = 1.1, 10, 200.0
 NAMES = tuple(f"{sensor} {axis}" for sensor in ("accelerometer", "gyro") for axis in AXES)
 
 _SENSORS = slice(0, 3), slice(3, 6)
-_MOTION = [0, 1, 2, 4, 5, 6]  # of the chip's order: without the temperature
+_MOTION = [0, 1, 2, 4, 5, 6]  # columns in the chip's order, without the temperature
 _LEAST = np.repeat([OTHER_G, OTHER_DPS], 3)
 
 
@@ -51,7 +51,7 @@ class AxisDead(Message):
 
 @dataclass(frozen=True)
 class GyroSaturated(Message):
-    """The gyro was at the end of its range. begin_s: of the first time."""
+    """The gyro was at the end of its range. begin_s: when this first happened."""
 
     axis: str
     times: int
@@ -68,7 +68,7 @@ class GyroSaturated(Message):
 
 @dataclass(frozen=True)
 class AccelClipped(Message):
-    """Vibration clipped the accelerometer. end_g: the end of its range. begin_s: of the first such sample."""
+    """Vibration clipped the accelerometer. end_g: the end of its range. begin_s: time of the first such sample."""
 
     axis: str
     end_g: float
@@ -84,19 +84,20 @@ class AccelClipped(Message):
 
 
 class SensorHealth:
-    """Finds sick readings. mark() takes a log part by part."""
+    """Finds faulty readings. mark() takes a log part by part."""
 
     def __init__(self) -> None:
         self._step = np.full(6, np.inf)  # smallest change seen on each axis: the last digit
         self._dead_s = np.zeros(6)
-        self._run_s = np.zeros(6)  # for how long an axis has been dead now
+        self._run_s = np.zeros(6)  # for each axis, how long it has been dead at the end of the last stretch
         self._begin_s = np.full(6, np.nan)
-        self._saturated: list[list[float]] = [[], [], []]  # begin of the first time, number of times, seconds
-        self._ends: list[tuple[float, int, float]] = [(0.0, 0, 0.0)] * 6  # of each axis and sign: g, samples, first
-        self._alive = np.zeros(2, dtype=bool)  # noise was seen: of accelerometer and gyro
+        self._saturated: list[list[float]] = [[], [], []]  # begin of the first case, number of cases, seconds
+        # for each axis and sign: largest reading in g, number of samples with it, time of the first
+        self._ends: list[tuple[float, int, float]] = [(0.0, 0, 0.0)] * 6
+        self._alive = np.zeros(2, dtype=bool)  # True once noise was seen: accelerometer, gyro
 
     def mark(self, time_us: Ints, readings: Array) -> Bools:
-        """(n) True where readings (n, 7), as in a Block, are sick. A part must not be longer than memory allows."""
+        """(n) True where readings (n, 7), as in a Block, are faulty. The memory must hold a whole part."""
         time_s, values = time_us.astype(float) * 1e-6, readings[:, _MOTION]
         sick = np.zeros(len(time_s), dtype=bool)
         if len(time_s) < LEAST_SAMPLES:
@@ -114,7 +115,7 @@ class SensorHealth:
             constant = np.array([np.all(change[:, sensor] == 0.0) for sensor in _SENSORS])
         else:
             constant = np.zeros(2, dtype=bool)
-        before = 0  # begin of the stretch before: a first second of a dead axis is sick too
+        before = 0  # begin of the previous stretch: the first second of a dead axis is faulty too
         for begin, end, spreads, noise in zip(begins.tolist(), ends.tolist(), spread, noisy):
             if end - begin >= LEAST_SAMPLES:
                 dead = self._dead(spreads, noise, constant)
@@ -151,7 +152,7 @@ class SensorHealth:
         others = [bool(np.any(moves[sensor])) for sensor in reversed(_SENSORS)]
         for k, sensor in enumerate(_SENSORS):
             if np.all(still[sensor]):
-                # In made logs a gyro has no noise, and is still on each straight
+                # In simulated logs a gyro may have no noise, so it does not change on straights
                 still[sensor] &= others[k] and (self._alive[k] or constant[k])
             else:
                 still[sensor] &= np.any(moves[sensor])
@@ -178,7 +179,7 @@ class SensorHealth:
             self._saturated[axis] = [at[0], at[1] + 1.0, at[2] + seconds]
 
     def _find_clipped(self, axis: int, time_s: Array, force: Array) -> None:
-        """Count how often the axis' largest and smallest reading so far occur."""
+        """Count the samples with the axis' largest and smallest readings so far."""
         for at, values in ((axis, force), (axis + len(AXES), -force)):
             end, count, first = self._ends[at]
             most = float(np.max(values))
@@ -190,5 +191,5 @@ class SensorHealth:
                 self._ends[at] = (most, count + int(np.count_nonzero(there)), first)
 
     def _is_clipped(self, axis: int, end: tuple[float, int, float]) -> bool:
-        """A log with few digits repeats its largest reading too."""
+        """True if the axis is clipped, and not merely a log with few digits that repeats its largest reading."""
         return end[1] >= CLIPPED_SAMPLES and end[0] > CLIPPED_STEPS * self._step[axis]

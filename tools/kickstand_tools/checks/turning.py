@@ -1,10 +1,10 @@
-"""How well rates explain the forces of a log, window by window.
+"""Measures how well the rates of a log explain its forces, window by window.
 
-The rates of a window are integrated to the rotation C from the sensor's axes at each instant to those at its beginning.
-In these the specific force (g) is `up`, a constant vector, plus the change of a velocity V given in the sensor's
-rotating axes: C f = up + C (dV/dt + rate x V) / g. V is the log's speed times a constant direction, or without a speed
-a velocity that changes slowly. up, V and the gyro's bias are fitted by least squares, V and the bias with a prior; the
-residual shows how well the rates fit the forces.
+The rates of a window are integrated to a rotation C, from the sensor's axes at each instant to the axes at the window's
+beginning. In the latter axes, the specific force f (g) is a constant vector `up` plus the change of a velocity V, which
+is given in the sensor's rotating axes: C f = up + C (dV/dt + rate x V) / g. V is the log's speed times a constant
+direction. Without a speed, V is a velocity that changes slowly. up, V and the gyro's bias are fitted by least squares,
+with a prior for V and the bias. The residual shows how well the rates fit the forces.
 """
 
 from dataclasses import dataclass
@@ -15,26 +15,26 @@ from kickstand.units import STANDARD_GRAVITY
 from ..signals import Array, Ints, cross_matrix, rotation_matrix
 from .cells import CELL_S
 
-KNOT_S = 5.0  # an unknown velocity is interpolated between knots of this distance
-EVENED = 10  # cells over which forces, once they are in the same axes, are averaged against vibration
-FORCE_G = 0.1  # standard deviation of these means: measurement noise
-# Standard deviations of the prior: an unknown velocity, a component of the direction of a known speed, the correction
-# of the gyro's bias
+KNOT_S = 5.0  # time between the knots of an unknown velocity
+EVENED = 10  # number of cells over which forces in common axes are averaged to suppress vibration
+FORCE_G = 0.1  # measurement noise of these means, standard deviation
+# Standard deviations of the prior: of an unknown velocity, of a component of the direction of a known speed, and of the
+# correction of the gyro's bias
 VELOCITY_MPS, DIRECTION, BIAS_DPS = 20.0, 1.0, 3.0
-BIAS_STEPS, MOST_DPS = 2, 5.0  # steps that correct the bias, and the largest change in one
-LATE_S = (0.0, 0.5, 1.0, 1.5)  # delays of the speed that are tried: a satellite receiver's is late
+BIAS_STEPS, MOST_DPS = 2, 5.0  # number of steps that correct the bias, and largest change in one step
+LATE_S = (0.0, 0.5, 1.0, 1.5)  # tried delays of the speed, because a satellite receiver's speed is late
 
 
 class Turning:
-    """The fit. force (w, n, 3, g), rate (w, n, 3, deg/s): w windows of n cells of CELL_S. bias (3, deg/s): a first
-    guess of the gyro's.
+    """Fits rates to forces. force (w, n, 3, g), rate (w, n, 3, deg/s): w windows of n cells of CELL_S. bias (3, deg/s):
+    a first guess of the gyro's bias.
 
     speed (m, 2): index of the cell and m/s, or None; places (w, n): the indices of the windows' cells.
     """
 
     def __init__(self, force: Array, rate: Array, bias: Array, speed: Array | None, places: Ints) -> None:
         self._force, self._rate, self._bias = force, rate, bias
-        # each: k functions of time whose combination is the velocity, and their derivatives: (k, w, n), per second
+        # for each delay: k functions of time, of which the velocity is a sum, and their derivatives: (k, w, n)
         self._velocities = [_knots(*places.shape)]
         self._usual = VELOCITY_MPS
         if speed is not None:
@@ -43,12 +43,12 @@ class Turning:
 
     @property
     def unbiased(self) -> bool:
-        """True where the first guess of the gyro's bias is about 0."""
+        """True if the first guess of the gyro's bias is about 0."""
         return bool(np.max(np.abs(self._bias)) < BIAS_DPS)
 
     def rough(self, exchanges: Array) -> Array:
-        """Returns (k): mean square, g2, of the force that the integrated rates do not explain, with no velocity of the
-        vehicle fitted. exchanges (k, 3, 3): rate = exchange @ reading."""
+        """The mean square (k, g2) of the force that the integrated rates do not explain, if the vehicle's velocity is
+        not fitted. exchanges (k, 3, 3): rate = exchange @ reading."""
         sizes = np.mean(np.sum(self._force**2, axis=2))
         left = np.empty(len(exchanges))
         for sign in 1.0, -1.0:
@@ -63,7 +63,7 @@ class Turning:
     def unexplained(self, exchange: Array) -> Array:
         """(w): mean square in each window, g2, of the force that the rates exchange @ reading do not explain."""
         sign = np.linalg.det(exchange)
-        force = self._force @ (sign * exchange)  # the force is permuted in place of the rates: these need only the sign
+        force = self._force @ (sign * exchange)  # permuting the force instead of the rates leaves only a sign for these
         bias, velocity = self._bias, self._velocities[0]
         if len(self._velocities) > 1:
             turned = self._turned(force, sign, bias)
@@ -93,7 +93,7 @@ class Turning:
 
     def _bias_change(self, sign: float, rate: Array, turn: Array, turned: Array, fit: "_Fit") -> Array:
         """(3) deg/s: the correction of the bias by one linear least-squares step. A change of the bias rotates the
-        force by its integral, taken from the middle of the window."""
+        force by the integral of this change from the middle of the window."""
         angle = np.cumsum(turn, axis=1) * CELL_S
         angle -= angle[:, rate.shape[1] // 2, None]
         by_bias = _evened(-sign * np.radians(1.0) * cross_matrix(turned) @ angle)
@@ -131,7 +131,8 @@ def _turn(rate: Array) -> Array:
 
 
 def _evened(values: Array) -> Array:
-    """values (w, n, ...) in means over EVENED cells, less each window's mean: this removes the constant vector `up`."""
+    """Average values (w, n, ...) over EVENED cells, and subtract each window's mean to remove the constant vector
+    `up`."""
     means = np.mean(values.reshape(len(values), -1, EVENED, *values.shape[2:]), axis=2)
     return means - np.mean(means, axis=1, keepdims=True)
 
@@ -148,7 +149,7 @@ def _knots(windows: int, cells: int) -> tuple[Array, Array]:
 
 
 def _given(speed: Array, places: Ints, late_s: float) -> tuple[Array, Array]:
-    """The function of a velocity that is the log's speed, delayed by late_s, times a constant direction."""
+    """The functions for a velocity that is the log's speed, delayed by late_s, times a constant direction."""
     second = round(1.0 / CELL_S)
     cells = np.arange(-second, places.max() + 1 + second)
     values = np.interp(cells + late_s / CELL_S, *speed.T)

@@ -1,10 +1,9 @@
-"""Are a log's values in the units that they should be in? Usual mix-ups (m/s2 for g, ms for s) show in its first
-samples.
+"""Checks the units of a log. The first samples show the usual mistakes: m/s2 instead of g, ms instead of s.
 
-Whether the speed is in m/s shows later: its changes are compared with the specific force that caused them. From one
-second to the next a speed changes by the acceleration along the vehicle. How the sensor is mounted does not matter: the
-direction along the vehicle is the one in which force and change of speed correlate best. Turns, slopes of the road and
-a rider who moves about add to the force alone: they can make the speed seem to change too little, never too much.
+A wrong unit of the speed shows later, when changes of the speed are compared with the specific force that caused them.
+From one second to the next, the speed changes by the acceleration along the vehicle. The mounting of the sensor does
+not matter: the direction along the vehicle is the one in which force and change of speed correlate best. Turns, slopes
+and a moving rider add to the force only, so the speed can seem to change too little because of them, never too much.
 """
 
 from dataclasses import dataclass
@@ -18,21 +17,22 @@ from ..common.messages import Message, Remedy
 from ..signals import Array, Ints, best_lag
 from .cells import LogCells
 
-LEAST_G = 0.4  # a smaller median force is without gravity; even a pose with an offset of 0.6 g has more
-MPS2_G = 5.0, 20.0  # a median force between these is in m/s2; larger ones are no readings, and are left out later
-MILLISECONDS_US = 4e6  # samples that far apart have times in ms that were read as s: 250 a second, or fewer
-# Largest ratio of the observed change of speed to what the force explains: knots give 1.94, speeds in m/s at most 1.1
+LEAST_G = 0.4  # a smaller median force means that gravity is missing; even a pose with an offset of 0.6 g has more
+MPS2_G = 5.0, 20.0  # a median force between these is in m/s2; larger values are not readings, and are left out later
+MILLISECONDS_US = 4e6  # samples this far apart have times in ms that were read as s, at 250 samples per second or fewer
+# Largest ratio of the observed change of speed to the change that the force explains. Speeds in knots give 1.94, speeds
+# in m/s at most 1.1
 MOST_RATIO = 1.5
 PUSH_G = 0.15  # a stronger force cannot come from the slope of an ordinary road
 ENOUGH = 10  # seconds of such forces: two or three braking events
-SIGMAS = 5.0  # standard deviations by which the correlation of force and change of speed has to exceed chance
-LAGS_S = np.arange(0.0, 2.1, 0.25)  # by which a satellite receiver's speed may be late
+SIGMAS = 5.0  # the correlation of force and change of speed must exceed chance by this many standard deviations
+LAGS_S = np.arange(0.0, 2.1, 0.25)  # possible delays of a satellite receiver's speed
 SHORTEST_S, LONGEST_S = 0.5, 2.2  # between two speeds
 
 
 @dataclass(frozen=True)
 class SpeedUnit(Message):
-    """The speed is not in m/s. factor: its changes over those that the force explains."""
+    """The speed is not in m/s. factor: its changes divided by the changes that the force explains."""
 
     factor: float
 
@@ -50,7 +50,7 @@ class SpeedUnit(Message):
 
 @dataclass(frozen=True)
 class SpeedStuck(Message):
-    """The speed does not change, but the vehicle's does."""
+    """The speed in the log is constant, but the vehicle speeds up and brakes."""
 
     speed_mps: float
 
@@ -60,7 +60,7 @@ class SpeedStuck(Message):
 
 def check_units(name: str, time_us: Ints, accel_g: Array) -> None:
     """Raise InputError for accelerations without gravity or in m/s2, and for times in ms. time_us (n), accel_g (n, 3):
-    of the first samples of the log."""
+    the first samples of the log."""
     usual_g = np.median(np.linalg.norm(accel_g, axis=1))
     said = f"{name}: accelerations are usually {usual_g:.2f} g, where gravity makes it 1"
     if usual_g < LEAST_G:
@@ -68,14 +68,14 @@ def check_units(name: str, time_us: Ints, accel_g: Array) -> None:
             f"{said}: gravity has been taken off, and without it there is no lean; record the acceleration with gravity"
         )
     if MPS2_G[0] < usual_g < MPS2_G[1]:
-        raise InputError(f"{said}: they look like m/s2, their unit has to be g (9.80665 m/s2)")
+        raise InputError(f"{said}: they look like m/s2, their unit must be g (9.80665 m/s2)")
     if len(time_us) > 1 and (time_us[-1] - time_us[0]) / (len(time_us) - 1) >= MILLISECONDS_US:
         raise InputError(f"{name}: seconds between samples: is t_s in milliseconds?")
 
 
 def speed_unit(cells: LogCells) -> SpeedUnit | None:
-    """The refusal if the speed changes too much at most of the strong forces; None if not, or if the log does not show
-    it."""
+    """The refusal if the speed changes too much during most of the strong forces. None if it does not, or if the log
+    does not show it."""
     time_s, mps = cells.speeds.T
     seconds = np.diff(time_s)
     good = (seconds > SHORTEST_S) & (seconds < LONGEST_S)
@@ -96,5 +96,5 @@ def speed_unit(cells: LogCells) -> SpeedUnit | None:
     strong = np.abs(push) > PUSH_G
     if np.count_nonzero(strong) < ENOUGH or np.median(change[strong] / push[strong]) <= MOST_RATIO:
         return None
-    # the same regression as on the board
+    # the same regression as in the firmware
     return SpeedUnit(*speed_unit_problem(float(change @ push / (change @ change))).values)

@@ -5,8 +5,8 @@ The name of an entry point is the command's name; its object is a click.Command.
     [project.entry-points."kickstand.commands"]
     laps = "my_package.laps:laps_command"
 
-Kickstand's own commands come first; its leaves add `fleet` and `emulate` in this way. A package is imported only when
-its command runs, or for its line in the help.
+If names are equal, Kickstand's own command is used. kickstand_fleet and kickstand_emulator add `fleet` and `emulate` in
+this way. A package is imported only when its command runs, or for its line in the help.
 """
 
 import traceback
@@ -21,7 +21,7 @@ GROUP = "kickstand.commands"
 
 
 def entry_points() -> dict[str, EntryPoint]:
-    """The entry points of the commands of all installed packages, by the command's name."""
+    """The entry points of all installed commands, by the command's name."""
     return plugins.entry_points(GROUP)
 
 
@@ -47,7 +47,7 @@ def help_line(entry_point: EntryPoint) -> str:
 
 
 def owner(error: Exception) -> str:
-    """The package responsible for an unexpected error: the one whose command was running, or kickstand."""
+    """The package responsible for an unexpected error: the package of the running command, or kickstand."""
     packages = {entry_point.module.partition(".")[0]: _package(entry_point) for entry_point in entry_points().values()}
     for frame, _ in traceback.walk_tb(error.__traceback__):
         package = packages.get(frame.f_globals.get("__name__", "").partition(".")[0], DISTRIBUTION)

@@ -23,8 +23,8 @@ _NAMED_ONE_BY_ONE = 5
 
 @click.command()
 @PORT
-@click.option("--config", is_flag=True, help="Replace the board's config.py too, which is otherwise kept.")
-@click.option("--yes", is_flag=True, help="Do not ask before files of another project on the board get other names.")
+@click.option("--config", is_flag=True, help="Also replace the board's config.py, which is otherwise kept.")
+@click.option("--yes", is_flag=True, help="Rename files of another project on the board without asking.")
 def flash_command(port: str | None, config: bool, yes: bool) -> None:
     """Copy the firmware to a board that runs MicroPython, check it, and start it."""
     with _bar() as progress:
@@ -35,19 +35,19 @@ def flash_command(port: str | None, config: bool, yes: bool) -> None:
     if result.config:
         echo(f"config.py is {result.config}")
         if firmware_path.installed() and result.config.parent == firmware_path.directory():
-            echo("to change settings, copy that file into a folder of yours, edit it, and run this command there")
+            echo("to change settings, copy that file to a folder of your own, edit it, and run this command there")
     for setting in result.unused:
         echo(f"note: {setting} is not used, because a '#' is in front of it: remove it, and flash --config")
     if result.why_sources:
-        echo(f"note: {result.why_sources}: it gets the sources, and starts more slowly")
+        echo(f"note: {result.why_sources}: the board gets the sources and starts more slowly")
     done = result.installed
     if done.config_differs:
         echo("kept: config.py on the board is not this version's; --config would replace it")
     if len(done.removed) > _NAMED_ONE_BY_ONE:
-        echo(f"removed: {len(done.removed)} files that are no longer part")
+        echo(f"removed: {len(done.removed)} files that are no longer part of the firmware")
     else:
         for path in done.removed:
-            echo(f"removed: {path[1:]} is no longer part")
+            echo(f"removed: {path[1:]} is no longer part of the firmware")
     echo(
         f"copied {len(done.copied)} files, {done.copied_bytes / 1000:.1f} kB, and verified them; "
         f"{len(done.kept)} left as they were"
@@ -56,29 +56,29 @@ def flash_command(port: str | None, config: bool, yes: bool) -> None:
 
 
 def _agree(lines: list[str]) -> None:
-    """Ask whether these files may be renamed. Raises InputError if not."""
+    """Ask the user for permission to rename these files. Raises InputError if the user refuses."""
     if not sys.stdin.isatty():
         raise InputError(f"{'; '.join(lines)}: run kickstand flash --yes for that")
     for line in lines:
         echo(line, err=True)
-    if not click.confirm("Put Kickstand onto this board?", err=True):
+    if not click.confirm("Install Kickstand on this board?", err=True):
         raise InputError("nothing was changed on the board")
 
 
 @click.command()
 @PORT
-@click.option("--wirings", is_flag=True, help="Show each LCD_WIRING on a character display that stays blank.")
+@click.option("--wirings", is_flag=True, help="If a character display stays blank, try each LCD_WIRING on it.")
 def status_command(port: str | None, wirings: bool) -> None:
-    """Ask a board how it is: versions, settings, sensor, display, calibration."""
+    """Show a board's versions, settings, sensor, display and calibration."""
     echo(status(port, wirings))
 
 
 @click.command()
 @PORT
 def check_command(port: str | None) -> None:
-    """Measure a board and all that is wired to it, each figure with its limit, in two minutes.
+    """Measure a board and everything wired to it in two minutes, and print each figure with its limit.
 
-    The sensor must lie still. Exit status 1: something is not as it should be."""
+    Keep the sensor still. The exit status is 1 if a figure exceeds its limit."""
     checked = check(port, echo)
     echo(verdict(checked.findings))
     if checked.faults:
@@ -87,8 +87,8 @@ def check_command(port: str | None) -> None:
 
 @click.command()
 @PORT
-@click.option("--out", type=PATH, default=Path(), help="The directory to write to; this one if not given.")
-@click.option("--delete", is_flag=True, help="Remove from the board what was fetched completely.")
+@click.option("--out", type=PATH, default=Path(), help="The directory to write to. Default: the current one.")
+@click.option("--delete", is_flag=True, help="Delete completely fetched rides from the board.")
 def pull_command(port: str | None, out: Path, delete: bool) -> None:
     """Fetch the rides that a board has recorded, as logs with their calibration."""
 
@@ -100,24 +100,24 @@ def pull_command(port: str | None, out: Path, delete: bool) -> None:
         if ride.deleted:
             echo(f"deleted from the board: ride {ride.number}")
         elif delete:
-            warning(f"ride {ride.number}: not deleted from the board, because not all of it came over")
+            warning(f"ride {ride.number}: not deleted from the board, because it was not fetched completely")
 
     with _bar() as progress:
         result = pull(port, out, delete, progress, say)
     if not result.rides:
-        echo(f"no rides on the board at {result.port}: its menu's Record ride makes one")
+        echo(f"no rides on the board at {result.port}: start one with Record ride in its menu")
 
 
 @click.command()
 @PORT
 @OUT
 def record_command(port: str | None, out: Path) -> None:
-    """Write a log live over USB until Ctrl-C; the board's display goes on."""
+    """Write a log live over USB until Ctrl-C. The board's display continues to work."""
     with contextlib.ExitStack() as stack:
         show: list[Callable[[str], None]] = []
 
         def begin(name: str) -> None:
-            echo(f"recording from {name}: Ctrl-C ends it")
+            echo(f"recording from {name}: press Ctrl-C to stop")
             show.append(stack.enter_context(live_line()))
 
         result = record(port, out, begin, lambda reading: show[0](_live_text(reading)))
@@ -127,13 +127,13 @@ def record_command(port: str | None, out: Path) -> None:
 
 
 def _live_text(reading: LiveReading) -> str:
-    """The lean as a bar to the left or right (in a car the forces), and the duration of the recording."""
+    """One line: the lean as a bar to the left or right (in a car the forces), and the duration of the recording."""
     how_long = f"{reading.rate_hz:3.0f} readings/s  {reading.seconds // 60:.0f}:{reading.seconds % 60:04.1f}"
     lean, forward_g, left_g = reading.moments[-1][1:] if reading.moments else (None, None, None)
     if left_g is not None:  # a car, and aligned
         side = "left " if left_g > 0.0 else "right"
         return f"forward {forward_g:+.2f} g  {side} {abs(left_g):.2f} g  {how_long}"
-    if lean is None:  # as on the display, an uncertain lean is not shown
+    if lean is None:  # an uncertain lean is hidden, as on the display
         return f"{'lean --' if reading.aligned else 'not aligned'}  {how_long}"
     bar = "#" * min(20, round(abs(lean) / 3))
     picture = f"{bar if lean < 0 else '':>20}|{bar if lean > 0 else '':<20}"

@@ -30,15 +30,15 @@ def calibrate_command() -> None:
     """Compute a calibration from recorded poses or drives."""
 
 
-@calibrate_command.command(short_help="The sensor's own errors, from six poses.")
+@calibrate_command.command(short_help="Measure the sensor's errors, from six poses.")
 @file_argument("poses", "LOG.csv | POSE.csv...", nargs=-1, required=True)
 @OUT
 def six(poses: tuple[Path, ...], out: Path) -> None:
-    """The sensor's own errors from six still poses, each side up once, in any order.
+    """Measure the sensor's errors from six still poses, each side up once, in any order.
 
-    One log of the whole procedure calibrates accelerometer and gyro: the sensor lies still for three seconds on each
-    side and once slanted, and the turns in between measure the gyro. Six logs of a pose each give offset and slope of
-    the accelerometer; a seventh, slanted pose checks them.
+    One log of the whole procedure calibrates accelerometer and gyro. In it, the sensor lies still for three seconds on
+    each side and once slanted, and the turns between the poses calibrate the gyro. Six logs of one pose each give
+    offset and slope of the accelerometer. A seventh, slanted pose checks them.
     """
     check_output(out, list(poses))
     found = fit_procedure(poses[0]) if len(poses) == 1 else fit_six_positions(poses)
@@ -46,15 +46,15 @@ def six(poses: tuple[Path, ...], out: Path) -> None:
     _write(out, found.calibration)
 
 
-@calibrate_command.command(short_help="The alignment, from a pose on the kickstand and upright.")
+@calibrate_command.command(short_help="Align to the bike, from a pose on the kickstand and one upright.")
 @file_argument("kickstand", "KICKSTAND.csv")
 @file_argument("upright", "UPRIGHT.csv")
 @click.option("--calibration", type=PATH, help="The result of `kickstand calibrate six`, to build on.")
-@click.option("--side", type=click.Choice(["left", "right"]), default="left", help="Where the kickstand leans to.")
+@click.option("--side", type=click.Choice(["left", "right"]), default="left", help="The side of the kickstand.")
 @OUT
 @RIGHT_HANDED
 def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out: Path) -> None:
-    """How the sensor sits on the bike, from a pose on the kickstand and one upright."""
+    """Find how the sensor is mounted on the bike, from a pose on the kickstand and one upright."""
     check_output(out, [kickstand, upright])
     before = read_calibration(calibration) if calibration else None
     found = fit_two_positions(kickstand, upright, before, side)
@@ -63,15 +63,15 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
     _write(out, found.calibration)
 
 
-@calibrate_command.command(short_help="The alignment of any vehicle, from driving with braking.")
+@calibrate_command.command(short_help="Align to any vehicle, from driving with braking.")
 @file_argument("logs", "LOG.csv...", nargs=-1, required=True)
-@click.option("--calibration", type=PATH, help="What is known already: six positions, and a motorcycle's two poses.")
-@click.option("--vehicle", type=VEHICLES, help="motorcycle if the calibration has two poses, else car, if not given.")
+@click.option("--calibration", type=PATH, help="An earlier calibration: six positions, a motorcycle's two poses.")
+@click.option("--vehicle", type=VEHICLES, help="Default: motorcycle with a calibration by two poses, else car.")
 @click.option("--method", type=click.Choice(["improved", "published"]), default="improved")
 @OUT
 @RIGHT_HANDED
 def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None, method: str, out: Path) -> None:
-    """How the sensor sits on the vehicle, from logs of driving with speed: stops and braking in a straight line."""
+    """Find how the sensor is mounted on a vehicle. Needs logs with speed, stops and braking in a straight line."""
     check_output(out, list(logs))
     before = read_calibration(calibration) if calibration else None
     several = len(logs) > 1
@@ -89,7 +89,7 @@ def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None,
     _write(out, found.calibration)
 
 
-@calibrate_command.command(short_help="The alignment of a motorcycle, from riding with bends.")
+@calibrate_command.command(short_help="Align to a motorcycle, from riding with bends.")
 @file_argument("log", "LOG.csv")
 @click.option(
     "--phone",
@@ -99,7 +99,7 @@ def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None,
 @OUT
 @RIGHT_HANDED
 def ride(log: Path, phone: str | None, out: Path) -> None:
-    """How the sensor sits on a motorcycle, from any ride with bends: no poses, and no speed, are needed."""
+    """Find how the sensor is mounted on a motorcycle, from any ride with bends. Needs no poses and no speed."""
     check_output(out, [log])
     with Bar("aligning") as bar:
         found = fit_ride(log, phone, bar.reach)
@@ -131,13 +131,13 @@ def _six_lines(found: SixPositions) -> Iterable[str]:
         yield f"gyro scale  {_along_axes(scales, '%+.2f %%')}, by {found.turns} turns, known to {max(known):.1f} %"
         if found.turns < found.all_turns:
             left_out = found.all_turns - found.turns
-            yield f"warning: {left_out} of {found.all_turns} turns left out, too quick or with a gap: turn it slower"
+            yield f"warning: {left_out} of {found.all_turns} turns left out, too quick or with a gap: turn more slowly"
     if found.beyond_sheet:
         axes = ", ".join(found.beyond_sheet)
         yield f"warning: {axes} is beyond the data sheet (50 mg, z 80 mg, slope 3 %): used anyway"
     if found.free_pose is None:
-        yield "warning: no free pose: six poses fit exactly whatever they were, only a seventh can show an error"
-    yield "not aligned yet: next is kickstand calibrate two"
+        yield "warning: no free pose: any six poses fit exactly, only a seventh pose can show an error"
+    yield "not aligned yet: next run kickstand calibrate two"
 
 
 def _two_lines(found: TwoPositions) -> Iterable[str]:
@@ -175,11 +175,11 @@ def _drive_lines(found: DriveFit, several: bool) -> Iterable[str]:
                 f"or, if no board wrote this log, {OPPOSITE_SIGN}"
             )
         elif found.poses.verdict == verdict.MOVED:
-            yield f"warning: the mount is {yaw_deg:.0f} degrees from where the two poses saw it: was it moved since?"
+            yield f"warning: the mount is {yaw_deg:.0f} degrees off its place in the two poses: was it moved since?"
         else:
             cost_deg = alignment_quality.yaw_cost_deg(yaw_deg)
             costs = f", which usually costs about {cost_deg:.1f} degrees of lean" if cost_deg >= 0.05 else ""
-            yield f"the two poses had forward {yaw_deg:.1f} degrees off{costs}: now it is put right"
+            yield f"the two poses had forward {yaw_deg:.1f} degrees off{costs}: now corrected"
     yield from _matrix_lines(found.calibration.vehicle_from_sensor)
     if not found.calibration.six_done:
         what = "warning: no six-position calibration: an offset of 50 mg tilts the vertical by 3 degrees"
@@ -187,7 +187,7 @@ def _drive_lines(found: DriveFit, several: bool) -> Iterable[str]:
 
 
 def _event_lines(event: events.DriveEvent, several: bool) -> Iterable[str]:
-    """Print the events; of several logs, print each name before its events."""
+    """Describe the events. With several logs, the name of each log comes before its events."""
     if event.what in (events.LOG_BEGINS, events.LOG_WITHOUT_EVENTS):
         if several:
             yield f"{event.log}:" if event.what == events.LOG_BEGINS else "           no braking in it"
@@ -205,8 +205,8 @@ def _event_lines(event: events.DriveEvent, several: bool) -> Iterable[str]:
 
 def _ride_lines(found: RideFit) -> Iterable[str]:
     begin, end = found.used_s
-    stood = f"{found.standing_s:.0f} s of it certainly standing"
-    leaning = f"else leaning {found.lean_deg:.0f} degrees rms"
+    stood = f"{found.standing_s:.0f} s of these certainly standing"
+    leaning = f"otherwise leaning {found.lean_deg:.0f} degrees rms"
     yield f"used: {max(begin, 0.0):.0f} to {end:.0f} s of the log, {stood}, {leaning}"
     yield known_to(found)
     roll, pitch, yaw = (abs(angle) for angle in found.halves_deg)
@@ -218,7 +218,7 @@ def _ride_lines(found: RideFit) -> Iterable[str]:
     yield "gyro bias  " + _along_axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
     yield "offset     " + _along_axes(found.calibration.accel_offset_g, "%+.4f g")
     yield from _matrix_lines(found.calibration.vehicle_from_sensor)
-    yield "upright is where the bike is balanced on straights; a ride does not show the accelerometer's slopes"
+    yield "upright means balanced on straights; a ride does not show the accelerometer's slopes"
 
 
 def _matrix_lines(vehicle_from_sensor) -> Iterable[str]:

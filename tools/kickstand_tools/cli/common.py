@@ -1,4 +1,4 @@
-"""Shared by commands: arguments and options, their times, notices in words on standard error."""
+"""Shared by commands: arguments, options, their times, and the output of notices on standard error."""
 
 from collections.abc import Callable, Iterable
 from inspect import cleandoc
@@ -17,7 +17,7 @@ Command = Callable[..., Any]
 
 
 class Time(click.ParamType):
-    """Seconds (60, 12.5), minutes and seconds (1:00) or hours too (1:02:03); negative: before the end (-1:30)."""
+    """Seconds (60, 12.5), minutes and seconds (1:00), or with hours (1:02:03). Negative: before the end (-1:30)."""
 
     name = "time"
 
@@ -33,17 +33,17 @@ class Time(click.ParamType):
             numbers = [-1.0]
         seconds = sum(60**place * number for place, number in enumerate(reversed(numbers)))
         if len(cells) > 3 or min(numbers) < 0 or not seconds < float("inf"):
-            self.fail(f"{text!r} is no time: give seconds such as 60 or 12.5, or minutes and seconds such as 1:00")
+            self.fail(f"{text!r} is not a time: give seconds such as 60 or 12.5, or minutes and seconds such as 1:00")
         return sign * seconds
 
 
 TIME = Time()
 PATH = click.Path(path_type=Path)
 PORT = click.option(
-    "--port", help="Serial port of the board, as COM3 or /dev/ttyACM0; found by itself if only one is there."
+    "--port", help="Serial port of the board, such as COM3 or /dev/ttyACM0. Not needed with only one board."
 )
 DISPLAY = click.option(
-    "--display", type=click.Choice(["lcd", "ssd1306", "sh1106"]), default="lcd", help="Which display it has."
+    "--display", type=click.Choice(["lcd", "ssd1306", "sh1106"]), default="lcd", help="The board's display."
 )
 JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 VEHICLES = click.Choice(["motorcycle", "car"])
@@ -63,11 +63,11 @@ OUT = out_option("The file to write.")
 OUT_LOG = out_option("The log to write, packed if it ends in .gz.")
 OUT_DIRECTORY = out_option("The directory to write to.")
 RIDE = file_argument("ride", "RIDE.csv")
-CALIBRATION = click.option("--calibration", type=PATH, help="A CAL.json; if not given, the one beside the ride.")
+CALIBRATION = click.option("--calibration", type=PATH, help="A CAL.json. Default: the one beside the ride.")
 
 
 def from_to(start: str, end: str) -> Command:
-    """The options --from and --to with these words, as from_s and to_s."""
+    """The options --from and --to with these help texts, passed as from_s and to_s."""
 
     def add(command: Command) -> Command:
         first = click.option("--from", "from_s", type=TIME, metavar="TIME", help=start)
@@ -77,13 +77,13 @@ def from_to(start: str, end: str) -> Command:
 
 
 STRETCH = from_to(
-    "Leave out what is before: seconds from the beginning, or 1:30.",
-    "Leave out what is after; a negative time counts from the end.",
+    "Where to begin: seconds from the beginning, or 1:30.",
+    "Where to end. A negative time counts from the end.",
 )
 
 
 def help_adds(text: str) -> Command:
-    """A further paragraph of a command's help."""
+    """Add a paragraph to a command's help."""
 
     def add(command: Command) -> Command:
         command.__doc__ = f"{cleandoc(command.__doc__ or '')}\n\n{text}"
@@ -93,28 +93,28 @@ def help_adds(text: str) -> Command:
 
 
 def ride_or_export(command: Command) -> Command:
-    """The argument ride, a log or what import reads."""
-    words = "What a phone's app has exported (file, folder or zip) is imported and aligned on the way."
+    """The argument ride: a log, or a recording that import can read."""
+    words = "An export of a phone's app (file, folder or zip) is imported and aligned first."
     return file_argument("ride", "RIDE.csv|EXPORT")(help_adds(words)(command))
 
 
 RIGHT_HANDED = help_adds(
-    "The axes of the log have to be right-handed. At rest the axis that points up reads +1 g, and a rate is positive "
-    "right-handed about its axis."
+    "The axes of the log must be right-handed. At rest, the axis that points up reads +1 g. Rates are right-handed "
+    "about their axes."
 )
 
 
 def live(command: Command) -> Command:
-    """The smoothed lean, or with --live the one that was shown."""
+    """The option --live: use the lean that was shown instead of the smoothed lean."""
     smoothed = (
-        "The lean is the smoothed one: from the whole ride, and nearer to the truth than what the display showed."
+        "The lean is smoothed: computed from the whole ride, and more exact than the lean that the display showed."
     )
-    option = click.option("--live", is_flag=True, help="The lean that the display showed, not the smoothed one.")
+    option = click.option("--live", is_flag=True, help="Use the lean that the display showed, not the smoothed lean.")
     return option(help_adds(smoothed)(command))
 
 
 def known_to(found: "RideFit") -> str:
-    """The standard errors of an alignment by a ride."""
+    """The standard errors of an alignment by a ride, in words."""
     return f"known to: roll {found.roll_deg:.1f}, pitch {found.pitch_deg:.1f}, yaw {found.yaw_deg:.1f} degrees"
 
 
@@ -125,12 +125,12 @@ def warn(log: Path | str, notices: Iterable[Message]) -> None:
 
 
 def echo(text: object = "", err: bool = False) -> None:
-    """Print text. Control characters, such as in a file name from a zip, would control the terminal."""
+    """Print text. Control characters, for example in a file name from a zip, are made visible."""
     click.echo(printable(str(text)), err=err)
 
 
 def warning(text: str) -> None:
-    """A line on standard error."""
+    """Print a line on standard error."""
     echo(f"warning: {text}", err=True)
 
 

@@ -1,4 +1,4 @@
-"""The `kickstand` command. A refusal is one line on standard error with status 2; nothing is written."""
+"""The `kickstand` command. A refused input gives one line on standard error and status 2; nothing is written."""
 
 import contextlib
 import importlib
@@ -13,34 +13,34 @@ import click
 from ..common.errors import DISTRIBUTION, InputError, cause, printable
 from . import added
 
-# name: (the module of its function name_command, a line of help). Modules are imported when a command runs, because
-# most import numpy, which is slow
+# name: (module of the function name_command, line of help). A module is imported only when its command runs, because
+# most modules import numpy, which is slow
 COMMANDS = {
     "calibrate": (".calibrate", "Compute a calibration from recorded poses or drives."),
-    "check": (".board", "Measure a board and all that is wired to it, in two minutes."),
+    "check": (".board", "Measure a board and everything wired to it, in two minutes."),
     "compare": (".ride", "Compare the leans of two devices on one bike."),
     "cut": (".ride", "Cut a stretch out of a log."),
-    "demo": (".without_a_board", "The firmware on a simulated board, in the terminal."),
+    "demo": (".without_a_board", "Run the firmware on a simulated board, in the terminal."),
     "export": (".ride", "Write a ride for another program."),
     "flash": (".board", "Copy the firmware to a board, and start it."),
-    "import": (".ride", "Make a log of a recording of another app or logger."),
-    "join": (".ride", "Put a phone's or a watch's track to a ride without GPS."),
+    "import": (".ride", "Convert a recording of another app or logger to a log."),
+    "join": (".ride", "Add a phone's or a watch's track to a ride without GPS."),
     "overlay": (".ride", "Draw the lean over a video of the ride."),
-    "plot": (".ride", "Draw a ride, as a picture and as a page to zoom into."),
+    "plot": (".ride", "Draw a ride, as a picture and as a page that you can zoom."),
     "pull": (".board", "Fetch the rides that a board has recorded."),
     "record": (".board", "Write a log live over USB."),
-    "replay": (".ride", "Find the lean as the firmware shows it during the ride."),
+    "replay": (".ride", "Compute the lean as the firmware shows it during a ride."),
     "report": (".ride", "Print maxima, time at large leans, and brake tests."),
-    "simulate": (".simulated", "Make up a ride with its true lean, or drives of a fleet."),
-    "smooth": (".ride", "Find the lean afterwards, from the whole ride."),
-    "status": (".board", "Ask a board for versions, settings, sensor and calibration."),
-    "try": (".without_a_board", "Your own code, as user.py on the simulated board."),
+    "simulate": (".simulated", "Simulate a ride with its true lean, or drives of a fleet."),
+    "smooth": (".ride", "Compute a more exact lean afterwards, from the whole ride."),
+    "status": (".board", "Show a board's versions, settings, sensor and calibration."),
+    "try": (".without_a_board", "Run your own code as user.py on the simulated board."),
     "web": (".without_a_board", "Open the lean meter's pages in the browser."),
 }
 
 
 class CommandGroup(click.Group):
-    """The commands of COMMANDS, and those of other packages: see added.py."""
+    """The commands of COMMANDS, and commands of other packages (see added.py)."""
 
     def list_commands(self, ctx: click.Context | None) -> list[str]:
         return sorted(COMMANDS.keys() | added.entry_points().keys())
@@ -66,15 +66,15 @@ class CommandGroup(click.Group):
 @click.version_option(package_name=DISTRIBUTION)
 @click.pass_context
 def kickstand(context: click.Context) -> None:
-    """Lean meter for any motorcycle: put it on a board, calibrate it, replay rides."""
+    """Lean meter for any motorcycle: install it on a board, calibrate it, replay rides."""
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """The console script: runs a command and leaves with its exit status."""
-    # Set this before a command imports numpy. The matrices are small: more threads would double the processor time for
-    # nothing
+    """Run a command and exit with its status. This is the console script."""
+    # Set this before a command imports numpy. The matrices are small, so more threads would only double the processor
+    #     # time
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         with _ended_by_signals():
@@ -95,11 +95,11 @@ def main(arguments: list[str] | None = None) -> None:
         about = f"{error.filename}: " if error.filename else ""
         _refuse(f"{about}{cause(error)}: {_remedy(error)}")
     except MemoryError:
-        _refuse("this takes more memory than there is: give a part of it, or close other programs")
+        _refuse("not enough memory: use a shorter part of the log, or close other programs")
     except RecursionError:
-        _refuse("a file has data within data, deeper than this program follows: it is damaged, or of no use here")
+        _refuse("the data in a file is nested too deeply: the file is damaged, or not meant for this command")
     except UnicodeError as error:
-        _refuse(f"a name or a text is not in the letters that it should be in ({error}): rename the file")
+        _refuse(f"a file name or a text has characters that cannot be used here ({error}): rename the file")
     except Exception as error:
         if sys.flags.dev_mode:  # python -X dev: for debugging
             raise
@@ -107,7 +107,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _remedy(error: OSError) -> str:
-    """What to do about an error of the operating system."""
+    """The remedy for an error of the operating system."""
     if error.filename and isinstance(error, FileNotFoundError | NotADirectoryError):
         return "check the name and its directory"
     if error.filename and isinstance(error, IsADirectoryError):
@@ -116,7 +116,7 @@ def _remedy(error: OSError) -> str:
 
 
 class _Ended(BaseException):
-    """A signal asks this program to end. number: that of the signal."""
+    """A signal asks this program to end. number: the signal's number."""
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
@@ -125,14 +125,14 @@ class _Ended(BaseException):
 
 @contextlib.contextmanager
 def _ended_by_signals() -> Iterator[None]:
-    """A context in which kill and a closed terminal raise _Ended: then no temporary file is left."""
+    """A context in which `kill` and a closed terminal raise _Ended, so that temporary files are removed."""
 
     def end(number: int, _frame: object) -> None:
         raise _Ended(number)
 
     before = {}
     if threading.current_thread() is threading.main_thread():
-        names = ("SIGTERM", "SIGHUP")  # the second is not on Windows, and is ignored after nohup
+        names = ("SIGTERM", "SIGHUP")  # Windows has no SIGHUP, and nohup ignores it
         numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
         before = {n: signal.signal(n, end) for n in numbers if signal.getsignal(n) == signal.SIG_DFL}
     try:
@@ -143,7 +143,7 @@ def _ended_by_signals() -> Iterator[None]:
 
 
 def _refuse(text: str, status: int = 2) -> None:
-    """Leave with one printable line on standard error."""
+    """Exit with one printable line on standard error."""
     line = " ".join(text.split())
     print("kickstand: " + printable(line), file=sys.stderr)
     sys.exit(status)

@@ -40,25 +40,27 @@ from . import common
 @click.option(
     "--columns",
     metavar="t=NAME,ax=NAME,...",
-    help="For a table of an unknown format: which column is t, ax, ay, az, gx, gy, gz; also speed, lat, lon, temp. "
+    help="For a table of an unknown format: the columns of t, ax, ay, az, gx, gy, gz; also speed, lat, lon, temp. "
     "#3 means the third column.",
 )
 @click.option(
     "--units",
     metavar="a=UNIT,g=UNIT,...",
-    help="Of t, a (or ax, ay, az), g (or gx, gy, gz), speed; a - before the unit reverses the sign.",
+    help="The units of t, a (or ax, ay, az), g (or gx, gy, gz) and speed. A - before the unit reverses the sign.",
 )
-@common.from_to("Seconds from the start; negative: from the end.", "The same, for the end.")
+@common.from_to(
+    "Where to begin, in seconds; negative: before the end.", "Where to end, in seconds; negative: before the end."
+)
 @common.RIGHT_HANDED
 @common.help_adds(
-    f"Known: {', '.join(NAMES)}. Of any other table of accelerations (with gravity) and rates of rotation, columns and "
-    "units are found from its values; what is not certain is asked for, with the --columns and --units to type. "
+    f"Known: {', '.join(NAMES)}. In any other table of accelerations (with gravity) and rates of rotation, columns and "
+    "units are found from the values. If some are uncertain, the command shows the --columns and --units to type. "
     "Raw counts of a sensor have the unit counts, or counts/131 for 131 counts per deg/s."
 )
 def import_command(
     source: Path, out: Path, columns: str | None, units: str | None, from_s: float | None, to_s: float | None
 ) -> None:
-    """Make a log of a recording of another app or logger."""
+    """Convert a recording of another app or logger to a log."""
     check_output(out, _inputs(source))
     named = _pairs(columns, "--columns") if columns is not None else None
     with spinner("importing"):
@@ -70,7 +72,7 @@ def import_command(
     t_s, gaps_s = found.log.t_s, found.gaps_s
     count = "1 gap" if len(gaps_s) == 1 else f"{len(gaps_s)} gaps"
     gaps = f", {count} of {gaps_s.sum():.1f} s in all" if len(gaps_s) else ""
-    common.echo(f"written: {out}, {len(t_s)} samples in {t_s[-1]:.1f} s, {found.rate_hz:.0f} a second{gaps}")
+    common.echo(f"written: {out}, {len(t_s)} samples in {t_s[-1]:.1f} s, {found.rate_hz:.0f} per second{gaps}")
     if found.vehicle_axes:
         common.echo("x is left, y up, z forward, as far as the logger was mounted so")
     beside = calibration_path(out)
@@ -90,7 +92,7 @@ def import_command(
 @common.file_argument("track", "TRACK.gpx|.fit")
 @common.OUT_LOG
 def join_command(ride: Path, track: Path, out: Path) -> None:
-    """Put the track of a phone or a watch to a ride of a board without GPS.
+    """Add the track of a phone or a watch to a ride of a board without GPS.
 
     The time offset is found by matching the turns and accelerations of ride and track. The written log has the track's
     positions, times and speeds. A track of another ride is refused.
@@ -112,17 +114,17 @@ def join_command(ride: Path, track: Path, out: Path) -> None:
 @click.command()
 @common.file_argument("a", "A.csv")
 @common.file_argument("b", "B.csv")
-@click.option("--calibration-a", type=common.PATH, help="A's CAL.json; if not given, the one beside it.")
-@click.option("--calibration-b", type=common.PATH, help="B's CAL.json; if not given, the one beside it.")
+@click.option("--calibration-a", type=common.PATH, help="The CAL.json of A. Default: the one beside A.")
+@click.option("--calibration-b", type=common.PATH, help="The CAL.json of B. Default: the one beside B.")
 @click.option("--plot", "picture", type=common.PATH, metavar="FILE.png", help="Draw both leans and their difference.")
 @common.JSON
 @common.RIGHT_HANDED
 def compare_command(
     a: Path, b: Path, calibration_a: Path | None, calibration_b: Path | None, picture: Path | None, as_json: bool
 ) -> None:
-    """How the leans of two devices on one bike agree: two recordings of one ride.
+    """Compare the leans of two devices on one bike, from two recordings of the same ride.
 
-    For example two phones, or a phone and the board. Their clocks are aligned by matching their rates of rotation.
+    The devices can be two phones, or a phone and the board. The clocks are aligned by matching the rates of rotation.
     """
     paths = [given or calibration_beside(log) for log, given in ((a, calibration_a), (b, calibration_b))]
     if picture is not None:
@@ -170,7 +172,7 @@ def replay_command(ride: Path, calibration: Path | None, engine: str, out: Path,
 @common.OUT
 @common.RIGHT_HANDED
 def smooth_command(ride: Path, calibration: Path | None, out: Path, **stretch: float | None) -> None:
-    """Find the lean afterwards, from the whole ride, each sample with its standard deviation."""
+    """Compute the lean afterwards from the whole ride. Each sample has a standard deviation."""
     log, parameters = _log_of(ride, calibration, out)
     with Bar("smoothing") as bar:
         count, notices = smooth_to_csv(_stretch(log, **stretch), parameters, out, bar.reach)
@@ -203,7 +205,7 @@ def export_command(ride: Path, form: str, calibration: Path | None, live: bool, 
 @common.JSON
 @common.RIGHT_HANDED
 def report_command(ride: Path, calibration: Path | None, live: bool, as_json: bool, **stretch: float | None) -> None:
-    """Summarise a ride on one page: maxima, time at large leans, and each stop evaluated as a brake test."""
+    """Summarise a ride: maxima, time at large leans, and each stop measured as a brake test."""
     seen = _overview(ride, calibration, live, **stretch)
     if as_json:
         common.echo(json.dumps(as_data(seen)))
@@ -215,14 +217,14 @@ def report_command(ride: Path, calibration: Path | None, live: bool, as_json: bo
 @common.ride_or_export
 @common.CALIBRATION
 @common.STRETCH
-@click.option("--tiles", is_flag=True, help="Streets below the track: the page asks a server for them when it is open.")
+@click.option("--tiles", is_flag=True, help="Show streets below the track. The open page loads them from a server.")
 @common.live
 @common.OUT_DIRECTORY
 @common.RIGHT_HANDED
 def plot_command(
     ride: Path, calibration: Path | None, tiles: bool, live: bool, out: Path, **stretch: float | None
 ) -> None:
-    """Draw a ride: a picture (PNG) and a page to zoom into (HTML)."""
+    """Draw a ride as a picture (PNG) and as a page that you can zoom (HTML)."""
     plot.check(out)
     seen = _overview(ride, calibration, live, **stretch)
     with spinner("drawing"):
@@ -235,7 +237,7 @@ def plot_command(
 @common.STRETCH
 @common.OUT
 def cut_command(log: Path, from_s: float | None, to_s: float | None, out: Path) -> None:
-    """Cut a stretch out of a log: a still pose for calibrate two or six, or one ride of several."""
+    """Cut a stretch out of a log, such as a still pose for calibrate two or six, or one of several rides."""
     if from_s is None and to_s is None:
         raise click.UsageError("Give --from, --to or both: seconds from the beginning of the log.")
     check_output(out, [log])
@@ -249,31 +251,31 @@ def cut_command(log: Path, from_s: float | None, to_s: float | None, out: Path) 
 @click.command()
 @common.RIDE
 @common.CALIBRATION
-@click.option("--video", type=common.PATH, help="A video of the ride; without it a transparent clip is written.")
+@click.option("--video", type=common.PATH, help="A video of the ride. Without a video, a transparent clip is written.")
 @click.option(
     "--offset",
     "offset_s",
     type=common.TIME,
     metavar="TIME",
     help="The ride's time at the video's first picture: 12.5 if the video begins 12.5 s after the ride, -3 if 3 s "
-    "before it. Not needed for a GoPro on the bike.",
+    "before. Not needed for a GoPro on the bike.",
 )
-@click.option("--fps", type=click.Choice(["30", "60"]), help="Frames per second; if not given, the video's, or 30.")
-@common.from_to("Only from this time of the ride on: 90 or 1:30.", "Only up to there; negative: from the end.")
+@click.option("--fps", type=click.Choice(["30", "60"]), help="Frames per second. Default: as in the video, or 30.")
+@common.from_to("Begin at this time of the ride: 90 or 1:30.", "End at this time; negative: before the end.")
 @click.option(
     "--height",
     type=click.IntRange(240, 4320),
-    help="Height in pixels of the video that the clip is meant for; if not given, 1080.",
+    help="Height, in pixels, of the video that you will lay the clip over. Default: 1080.",
 )
-@click.option("--mph", is_flag=True, help="Miles an hour instead of kilometres.")
+@click.option("--mph", is_flag=True, help="Show miles per hour, not km/h.")
 @common.live
 @common.out_option("FILE.mp4 with --video, else FILE.mov or FILE.webm.")
 def overlay_command(
     ride: Path, calibration: Path | None, video: Path | None, fps: str | None, out: Path, **options: Any
 ) -> None:
-    """Draw lean, forces, speed and maxima over a video, or as a transparent clip to lay over one.
+    """Draw lean, forces, speed and maxima over a video, or write them as a transparent clip.
 
-    .mov is ProRes 4444, .webm is VP9, both with alpha. Where the lean is not known the gauge shows --.
+    .mov is ProRes 4444, .webm is VP9, both with alpha. The gauge shows -- while the lean is unknown.
     """
     calibration = _given_or_beside(ride, calibration, out, *([video] if video else []))
     rate = float(fps) if fps else None
@@ -282,22 +284,22 @@ def overlay_command(
     common.warn(ride, made.notices)
     if made.correlation is not None:
         common.echo(
-            f"the video begins at {made.offset_s:.2f} s of the ride, as the camera's gyro has it (correlation "
+            f"the video begins at {made.offset_s:.2f} s of the ride, found with the camera's gyro (correlation "
             f"{made.correlation:.2f}): --offset {made.offset_s:.2f}"
         )
     common.echo(f"written: {out}, {made.pictures} frames, {made.end_s - made.begin_s:.1f} s, {made.fps:g} per second")
 
 
 def _from_export(source: Path, calibration: Path | None) -> tuple[Imported, CalibrationFile] | None:
-    """Import an app's export or a table, with its calibration: the given one, or the one beside it; otherwise it is
-    aligned by its bends, which a line reports. None for anything else, such as a log."""
+    """Import an app's export or a table. Its calibration is the given one, or the one beside it. Without one, the
+    recording is aligned by its bends, and a line says so. Returns None for anything else, such as a log."""
     found = None
     if not is_log(source):
         with spinner("importing"):
             found = import_of_app(source)
     if found is None:
         return None
-    said = f"{source}: imported from {found.app}, {len(found.log.t_s)} samples, {found.rate_hz:.0f} a second"
+    said = f"{source}: imported from {found.app}, {len(found.log.t_s)} samples, {found.rate_hz:.0f} per second"
     beside = calibration_path(source)
     path = calibration or (beside if beside.exists() else None)
     if path is not None:
@@ -312,7 +314,7 @@ def _from_export(source: Path, calibration: Path | None) -> tuple[Imported, Cali
 
 
 def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> tuple[Ride, list[Message]]:
-    """A ride, and notices about its import. See _from_export()."""
+    """Open a ride. Returns it with notices about its import (see _from_export())."""
     taken = _from_export(source, calibration)
     if taken is None:
         return open_ride(_stretch(source, **stretch), calibration, smoothed=not live), []
@@ -321,8 +323,8 @@ def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float
 
 
 def _log_of(source: Path, calibration: Path | None, out: Path) -> tuple[Path | Log, CalibrationFile]:
-    """A ride's log and its calibration; notices about its import are printed. See _from_export(). Raises InputError
-    without a calibration, and if writing out would fail or destroy an input."""
+    """The log of a ride and its calibration. Prints notices about its import (see _from_export()). Raises InputError
+    without a calibration, and if writing to out would fail or destroy an input."""
     if is_log(source) or source.suffix.lower() == ".json":
         return source, read_calibration(_given_or_beside(source, calibration, out))
     check_output(out, [*_inputs(source), *([calibration] if calibration else [])])
@@ -334,17 +336,17 @@ def _log_of(source: Path, calibration: Path | None, out: Path) -> tuple[Path | L
 
 
 def _overview(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> Overview:
-    """The overview of a ride from _opened(). Its notices begin with those of the import; all are printed."""
+    """The overview of a ride from _opened(). Prints all its notices, first the notices of the import."""
     opened, imported = _opened(source, calibration, live, **stretch)
     with Bar("reading") as bar:
         seen = overview(opened, bar.reach)
-    seen.notices = distinct([*imported, *seen.notices])  # the imported log is checked again
+    seen.notices = distinct([*imported, *seen.notices])  # reading the imported log finds the same notices again
     common.warn(source, seen.notices)
     return seen
 
 
 def _inputs(source: Path) -> list[Path]:
-    """The files that writing must not destroy: the source or its content."""
+    """The files that the output must not overwrite: the source, or the files in it."""
     return sorted(source.rglob("*")) if source.is_dir() else [source]
 
 
@@ -354,7 +356,8 @@ def _stretch(log: Path | Log, from_s: float | None = None, to_s: float | None = 
 
 
 def _given_or_beside(ride: Path, calibration: Path | None, out: Path, *inputs: Path) -> Path:
-    """The calibration. Raises InputError without one, and if writing out would fail or destroy an input."""
+    """The path of the calibration. Raises InputError without one, and if writing to out would fail or destroy an
+    input."""
     calibration = calibration or calibration_beside(ride)
     check_output(out, [ride, calibration, *inputs])
     return calibration

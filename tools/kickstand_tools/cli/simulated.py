@@ -14,7 +14,7 @@ from ..simulation.physics.road import CLASSES
 from ..simulation.profiles import MAIN, PROFILES
 from .common import OUT_DIRECTORY, Command, echo
 
-LINES_S = 10.0  # between two lines of progress without a terminal for a bar
+LINES_S = 10.0  # time between two lines of progress; used without a terminal for a bar
 PROFILE_NAMES = f"{', '.join(MAIN)}; hard ones: {', '.join(name for name in PROFILES if name not in MAIN)}."
 
 
@@ -28,7 +28,11 @@ def pose_options(pitch_change_deg: float | None, words: str) -> Command:
     def add(command: Command) -> Command:
         upright, pitch = click.FloatRange(-30.0, 30.0), click.FloatRange(-10.0, 10.0)
         return click.option(
-            "--upright-error", "upright_error_deg", type=upright, default=0.0, help="Of the upright pose, degrees."
+            "--upright-error",
+            "upright_error_deg",
+            type=upright,
+            default=0.0,
+            help="Error of the upright pose, degrees.",
         )(click.option("--pitch-change", "pitch_change_deg", type=pitch, default=pitch_change_deg, help=words)(command))
 
     return add
@@ -36,33 +40,33 @@ def pose_options(pitch_change_deg: float | None, words: str) -> Command:
 
 @click.command()
 @click.option("--profile", help=PROFILE_NAMES)
-@click.option("--seed", type=click.IntRange(min=0), default=0, help="Another seed, another ride.")
-@seconds_option(20.0, "Length of the log, from the kickstand on.")
-@pose_options(None, "Between the poses, degrees; at random if not given.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, help="Each seed gives another ride.")
+@seconds_option(20.0, "Length of the log, which begins on the kickstand.")
+@pose_options(None, "Change of pitch between the poses, degrees. Default: random.")
 @click.option(
-    "--road", type=click.Choice(list(CLASSES)), help="Roughness by ISO 8608, with camber; if not given, the profile's."
+    "--road", type=click.Choice(list(CLASSES)), help="Roughness by ISO 8608, with camber. Default: the profile's."
 )
-@click.option("--mount", type=click.Choice(list(MOUNTS)), help="What is wrong with the sensor's mount or its logger.")
+@click.option("--mount", type=click.Choice(list(MOUNTS)), help="A fault of the sensor's mount or of its logger.")
 @click.option(
     "--dive",
     type=(click.FloatRange(-2.0, 8.0), click.FloatRange(-2.0, 8.0)),
     metavar="BRAKING ACCELERATING",
-    help="How far the springs pitch the bike, degrees per g; at random, about 3 and 1.4, if not given.",
+    help="How far the springs pitch the bike, degrees per g. Default: random, about 3 and 1.4.",
 )
-@click.option("--speed", is_flag=True, help="Write what a GPS receiver gives into the log: speed, position, time.")
+@click.option("--speed", is_flag=True, help="Write speed, position and time to the log, as from a GPS receiver.")
 @click.option(
     "--fleet",
     "vehicles",
     type=click.IntRange(min=1),
     metavar="N",
-    help="Instead: N cars, buses and motorcycles with a few drives each, a manifest, and what is wrong with some.",
+    help="Simulate N cars, buses and motorcycles instead: a few drives each, some with faults, and a manifest.",
 )
 @OUT_DIRECTORY
 def simulate_command(profile: str | None, seed: int, vehicles: int | None, out: Path, **of_a_ride: Any) -> None:
-    """Make up a ride: six poses and a free one, kickstand, upright, the ride, its truth. Or a fleet (see fleet)."""
+    """Simulate a ride, with its truth, the six poses and a free one, the kickstand and upright poses; or a fleet."""
     if vehicles is not None:
         _check_fleet(out)
-        with Bar("making up vehicles", lines_s=LINES_S) as bar:
+        with Bar("simulating vehicles", lines_s=LINES_S) as bar:
             fleet = plugins.part(plugins.SIMULATIONS, "fleet")(out, vehicles, seed, progress=bar.reach)
         logs = sum(len(vehicle.paths) for vehicle in fleet)
         echo(f"written: {out}/MANIFEST.csv and TRUTH.csv, {vehicles} vehicles, {logs} logs")
@@ -71,7 +75,7 @@ def simulate_command(profile: str | None, seed: int, vehicles: int | None, out: 
         raise click.UsageError("Missing option '--profile', or '--fleet' for a fleet.")
     if (out / "MANIFEST.csv").exists():
         raise InputError(f"{out} holds a fleet, whose truth would be lost: give --out another directory")
-    with spinner("making up a ride"):
+    with spinner("simulating a ride"):
         made = simulate(profile, seed, out, **of_a_ride)
     echo(f"written: {out / 'RIDE.csv'}, {len(made.time)} samples, with its poses and TRUTH.csv")
     begin = made.truth["lean_deg"][0]

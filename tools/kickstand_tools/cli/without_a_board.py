@@ -14,7 +14,7 @@ from ..demo.demo import DeviceStopped, demo
 from ..web import serve, site
 from .common import DISPLAY, PATH, echo, file_argument
 
-_HAND = click.option("--hand", is_flag=True, help="Lean the bike and press the button yourself, with keys.")
+_HAND = click.option("--hand", is_flag=True, help="Lean the bike and press the button yourself, on the keyboard.")
 _CPYTHON = click.option("--cpython", is_flag=True, help="Run the firmware on CPython, not on MicroPython.")
 
 
@@ -33,7 +33,7 @@ def demo_command(**chosen: Any) -> None:
 @_CPYTHON
 @DISPLAY
 def try_command(**chosen: Any) -> None:
-    """Try your own code: FILE is the simulated board's user.py, in the demo's ride."""
+    """Try your own code: FILE runs as user.py on the simulated board, during the demo's ride."""
     _demo(**chosen)
 
 
@@ -48,18 +48,18 @@ def _demo(**chosen: Any) -> None:
 @click.command()
 @click.option("--out", type=PATH, help="Write the site to this directory instead of opening it.")
 def web_command(out: Path | None) -> None:
-    """Ride the simulated board in the browser; with --out write the site for any web server."""
+    """Open the simulated board and the other pages in the browser. With --out, write the site for any web server."""
     if out is not None:
         check_directory(out)
     with spinner("putting the site together"):
         files = site.site_files()
     if out is not None:
         site.write_site(files, out)
-        echo(f"written: {out}, {len(files)} files for a web server: opened as files they do not run")
+        echo(f"written: {out}, {len(files)} files for a web server; they do not work if opened directly")
         return
     with serve.server(files) as server:
         address = f"http://{serve.HOST}:{server.server_address[1]}/"
-        echo(f"Kickstand in the browser: {address} (Ctrl-C ends it)")
+        echo(f"Kickstand in the browser: {address} (press Ctrl-C to stop)")
         webbrowser.open(address)
         with contextlib.suppress(KeyboardInterrupt):
             server.serve_forever()

@@ -1,4 +1,4 @@
-"""The error for input that cannot be used, and parts of its text."""
+"""Defines the error for unusable input, and functions for its text."""
 
 import sys
 
@@ -9,10 +9,10 @@ DISTRIBUTION = "kickstand-lean"  # as in pyproject.toml; the package "kickstand"
 
 
 class InputError(Exception):
-    """Input from the user that cannot be used. The text is one line: the fault, and what to do.
+    """Input from the user that cannot be used. The text is one line: what is wrong, and what to do.
 
-    what: a Message, or what is wrong in words. remedy: what to do about it; leave it out if `what` says it in words
-    that suit a terminal and a page.
+    what: a Message, or a text that says what is wrong. remedy: what to do. Leave it out if `what` already says what to
+    do, in words for both a terminal and a page.
     """
 
     def __init__(self, what: Message | str, remedy: Remedy = NOTHING_TO_DO) -> None:
@@ -23,19 +23,19 @@ class InputError(Exception):
         return self.line()
 
     def line(self, page: bool = False) -> str:
-        """What is wrong and what to do, in one line. page: in the words of a page, not of a terminal."""
+        """The error in one line: what is wrong, and what to do. page: True for a page, which has no commands."""
         return self.message.line(page)
 
 
 class RefusedInput(InputError):
-    """Data that a check refuses, or the firmware's own modules. message: the reason, with its code and its fields.
+    """Data refused by a check or by the firmware's own modules. message: the reason, with its code and its fields.
 
-    where: put before the line, usually the file. advice: put after it.
+    where: text before the message, usually the file. advice: text after it.
     """
 
     def __init__(self, message: Message, where: str = "", advice: str = "") -> None:
         super().__init__(message)
-        self.args = message, where, advice  # what it is pickled with: another process may raise it
+        self.args = message, where, advice  # needed for pickling, because another process may raise the error
         self.where, self.advice = where, advice
 
     @property
@@ -44,7 +44,7 @@ class RefusedInput(InputError):
         return self.message.code
 
     def at(self, where: str) -> "RefusedInput":
-        """The same refusal of data from `where`."""
+        """The same refusal, with `where` before its message."""
         return RefusedInput(self.message, where, self.advice)
 
     def line(self, page: bool = False) -> str:
@@ -64,9 +64,9 @@ def printable(text: str) -> str:
 
 
 def extra(name: str) -> str:
-    """How to install an optional part of the project.
+    """The command that installs an optional part of the project.
 
-    For a checkout it uses -e and the path. Otherwise a copy would replace the checkout, and `kickstand flash` would use
+    For a checkout, the command has -e and the path. Otherwise pip would install a copy, and `kickstand flash` would use
     the copy's firmware.
     """
     if firmware_path.installed():

@@ -6,7 +6,7 @@ from pathlib import Path
 import kickstand
 
 TOOLS = Path(__file__).resolve().parents[2]  # the directory that kickstand_tools is imported from
-PACKAGE = Path(kickstand.__file__).resolve().parent  # the firmware's package, which the host imports too
+PACKAGE = Path(kickstand.__file__).resolve().parent  # the firmware's package, also imported by these tools
 
 
 def directory() -> Path:
@@ -19,13 +19,13 @@ def _packaged() -> Path:
 
 
 def installed() -> bool:
-    """True if these tools were installed as a package. False in a checkout, whose files a rider may edit."""
+    """True if these tools were installed as a package. False in a checkout, where the user may edit the files."""
     return _packaged().is_dir()
 
 
 def config() -> Path:
-    """The rider's config.py: that of a checkout in the current directory; for an installed package also config.py in
-    the current directory; otherwise the one beside these tools."""
+    """The path of the user's config.py. If the current directory is a checkout, the checkout's file. For an installed
+    package, also a config.py in the current directory. Otherwise the file beside these tools."""
     here = Path("firmware").resolve()
     if (here / "kickstand").is_dir() and (here / "config.py").is_file():
         return here / "config.py"

@@ -1,6 +1,6 @@
-"""What the tools report: a class for each notice and each refusal, with named fields, its words and what to do.
+"""The base classes of notices and refusals. Each kind of notice is a class with named fields, a text and a remedy.
 
-A class is beside the check that makes its objects:
+Define a class in the module of the check that returns it:
 
     @dataclass(frozen=True)
     class SpeedLate(Message):
@@ -24,20 +24,20 @@ OPPOSITE_SIGN = f"do all accelerations have the opposite sign? {AT_REST.capitali
 
 @dataclass(frozen=True)
 class Remedy:
-    """What to do: in a terminal, with commands and options, and on a page, which has neither.
+    """A remedy in two versions: for a terminal, with commands and options, and for a page, which has neither.
 
-    page: None if both say the same.
+    page: the version for a page; None if it is the same.
     """
 
     terminal: str = ""
     page: str | None = None
 
     def words(self, page: bool = False) -> str:
-        """The words for one of the two; "" if there is nothing to do."""
+        """The text for a page or for a terminal. "" if there is nothing to do."""
         return self.terminal if not page or self.page is None else self.page
 
     def followed(self, more: str) -> "Remedy":
-        """The remedy with these words at the end of both."""
+        """The remedy with these words added to both versions."""
         return Remedy(self.terminal + more, None if self.page is None else self.page + more)
 
     def filled(self, **values: object) -> "Remedy":
@@ -50,9 +50,9 @@ NOTHING_TO_DO = Remedy()
 
 @dataclass(frozen=True)
 class Message:
-    """A notice, or the reason of a refusal. Its fields are the values; JSON has them in this order.
+    """A notice, or the reason for a refusal. JSON has the values of its fields in the order of the fields.
 
-    code: a name for programs. text, todo: templates, in which {name} is a field. Equal messages say the same.
+    code: a name for programs. text, todo: templates, in which {name} is a field. Equal messages have equal text.
     """
 
     code: ClassVar[str] = ""
@@ -60,15 +60,15 @@ class Message:
     todo: ClassVar[Remedy] = NOTHING_TO_DO
 
     def sentence(self) -> str:
-        """What happened: one line without a full stop."""
+        """One line that says what happened, without a full stop."""
         return self.text.format(**vars(self))
 
     def remedy(self) -> Remedy:
-        """What to do about it."""
+        """The remedy for the user."""
         return self.todo.filled(**vars(self))
 
     def line(self, page: bool = False) -> str:
-        """Sentence and remedy in one line, without a full stop. page: in the words of a page, not of a terminal."""
+        """Sentence and remedy in one line, without a full stop. page: True for a page, which has no commands."""
         remedy = self.remedy().words(page)
         return f"{self.sentence()}: {remedy}" if remedy else self.sentence()
 
@@ -80,7 +80,7 @@ class Message:
 
 @dataclass(frozen=True)
 class Plain(Message):
-    """A message that needs no code, in words of one place in the tools."""
+    """A message without a code of its own. Its text is written where it is raised."""
 
     said: str
     what_to_do: Remedy = NOTHING_TO_DO
@@ -101,19 +101,18 @@ class WrongAxes(Message):
 
 @dataclass(frozen=True)
 class WrongMount(Message):
-    """The calibration is not the one of this mount.
+    """The calibration belongs to another mount.
 
-    judged: the log still shows how far the alignment is off.
+    judged: True if the log still shows how far the alignment is off.
     """
 
     judged: ClassVar[bool] = False
 
 
 def sentence(message: Message, page: bool = False) -> str:
-    """The same as message.line(): one line without the full stop at its end. It says what is wrong and, if that helps,
-    what to do.
+    """The message in one line without a full stop: what is wrong and, if there is a remedy, what to do.
 
-    page: in the words of a page, which has no commands.
+    page: True for a page, which has no commands.
 
     >>> from kickstand_tools.calibration.pose_refusals import SamePose
     >>> sentence(SamePose(0.4))
@@ -123,17 +122,17 @@ def sentence(message: Message, page: bool = False) -> str:
 
 
 def by_code(*classes: type[Message]) -> dict[str, type[Message]]:
-    """The classes by their code."""
+    """A dictionary of the classes by their codes."""
     return {one.code: one for one in classes}
 
 
 def is_explained(messages: Iterable[Message]) -> bool:
-    """True if wrong axes or another mount are the reason why the readings do not fit."""
+    """True if one of the messages, wrong axes or another mount, explains readings that do not fit."""
     return any(isinstance(message, (WrongAxes, WrongMount)) for message in messages)
 
 
 def distinct(messages: Iterable[Message]) -> list[Message]:
-    """The messages in their order, each line once: a log that is read twice is checked twice."""
+    """The messages in their order, without repetitions, because a log that is read twice is also checked twice."""
     found: dict[str, Message] = {}
     for message in messages:
         found.setdefault(message.line(), message)
@@ -141,7 +140,7 @@ def distinct(messages: Iterable[Message]) -> list[Message]:
 
 
 def as_data(messages: Iterable[Message]) -> list[dict[str, object]]:
-    """Code, values and words of each, for JSON; None for a value that is not finite."""
+    """Code, values and text of each message, for JSON. A value that is not finite becomes None."""
 
     def plain(value: object) -> object:
         return (round(value, 3) if isfinite(value) else None) if isinstance(value, float) else value

@@ -18,7 +18,7 @@ def check_output(path: Path, inputs: list[Path]) -> None:
     _resolved(path)
     if path.is_dir():
         raise InputError(f"{path} is a directory: give --out the name of a file")
-    if _is_open_here(path):  # it would replace a file that the shell has opened, with its content
+    if _is_open_here(path):  # the shell has opened this file, and replacing it would lose its content
         raise InputError(f"{path} is this command's own input or output: give --out the name of another file")
     if path.exists() and not path.is_file():
         raise InputError(f"{path} is not an ordinary file: give --out the name of one")
@@ -34,11 +34,11 @@ def _resolved(path: Path) -> Path:
     try:
         return path.resolve()
     except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle, before Python 3.13
-        raise InputError(f"{path} cannot be followed: its links lead in a circle: give --out another place") from error
+        raise InputError(f"{path} cannot be followed: its links form a circle: give --out another place") from error
 
 
 def _is_open_here(path: Path) -> bool:
-    """True for standard input, output and error under any name, and for the names of open files, as /dev/fd/3."""
+    """True for standard input, output and error under any name, and for names of open files, such as /dev/fd/3."""
     with contextlib.suppress(OSError):
         there = path.stat()
         for number in (0, 1, 2):
@@ -64,7 +64,7 @@ def check_directory(path: Path) -> None:
 
 @contextlib.contextmanager
 def new_directory(path: Path) -> Iterator[None]:
-    """Make a directory and its parents. Those that are empty at the end of the `with` are removed."""
+    """Make a directory and its parents. At the end of the `with`, those that are still empty are removed."""
     made: list[Path] = []
     try:
         try:
@@ -89,12 +89,12 @@ def make_directory(path: Path) -> None:
 
 @contextlib.contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """A context with a temporary path to write to. At its end the file is renamed to path, and is on the disk even
-    after a power loss. If writing fails, an earlier file at path stays. Raises InputError.
+    """A context with a temporary path to write to. At its end, the file is renamed to path, and survives a power
+    loss. If writing fails, an earlier file at path stays. Raises InputError.
 
     The temporary name has the ending of path, because libraries choose the format by it.
     """
-    path = _resolved(path)  # keep a symbolic link
+    path = _resolved(path)  # replace the file that a symbolic link leads to, not the link
     temporary = path.with_name(f".{os.getpid()}-{path.name}")
     try:
         yield temporary
@@ -104,31 +104,32 @@ def whole_file(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise InputError(f"{path} cannot be written: {cause(error)}; choose another place") from error
     finally:
-        with contextlib.suppress(OSError):  # on a read-only file system this error would hide the reason
+        with contextlib.suppress(OSError):  # on a read-only file system, this second error would hide the first
             temporary.unlink(missing_ok=True)
 
 
 def flush_to_disk(path: Path) -> None:
     """Wait until a file, or the entries of a directory, are on the disk. Raises OSError.
 
-    Without it a file system may store the new name before the content. A power loss then leaves neither the old content
-    nor the new (fsync(2)).
+    Otherwise a file system may store the new name before the content, and a power loss would leave neither the old
+    content nor the new (fsync(2)).
     """
     directory = path.is_dir()
-    if sys.platform == "emscripten" or (directory and os.name == "nt"):  # no disk; cannot open directories
+    # a browser has no disk; Windows cannot open directories
+    if sys.platform == "emscripten" or (directory and os.name == "nt"):
         return
     number = os.open(path, os.O_RDONLY if directory else os.O_RDWR)
     try:
         os.fsync(number)
     except OSError as error:
-        if not (directory and error.errno in (errno.EINVAL, errno.ENOTSUP)):  # some network disks
+        if not (directory and error.errno in (errno.EINVAL, errno.ENOTSUP)):  # some network disks cannot do this
             raise
     finally:
         os.close(number)
 
 
 def write_packed(path: Path, parts: Iterable[bytes]) -> None:
-    """Write a file of these parts, gzipped if its name ends in .gz, whole or not at all. Raises InputError."""
+    """Write these parts to a file, whole or not at all. Gzip it if its name ends in .gz. Raises InputError."""
     opened = gzip.open if path.suffix == ".gz" else open
     with whole_file(path) as temporary, opened(temporary, "wb") as file:
         file.writelines(parts)

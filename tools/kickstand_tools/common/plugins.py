@@ -1,7 +1,7 @@
 """Finds parts that other packages add to the tools by entry points.
 
-The leaves of this project, kickstand_fleet and kickstand_emulator, add theirs in pyproject.toml. The core works without
-them and does not import them.
+This project's kickstand_fleet and kickstand_emulator add their parts in pyproject.toml. kickstand_tools works without
+these packages and never imports them.
 """
 
 from importlib.metadata import EntryPoint, distributions
@@ -10,12 +10,12 @@ from typing import Any
 from .errors import DISTRIBUTION, InputError
 
 ENGINES = "kickstand.engines"  # see replay.Engine
-SIMULATIONS = "kickstand.simulations"  # simulation.files.simulate's siblings, for more than one ride
+SIMULATIONS = "kickstand.simulations"  # functions like simulation.files.simulate, for more than one ride
 
 
 def entry_points(group: str) -> dict[str, EntryPoint]:
-    """The entry points of a group, by name. If two have the same name, this project's is used, otherwise the first
-    one."""
+    """The entry points of a group, by name. If two have the same name, this project's entry point is preferred,
+    then the first."""
     found: dict[str, EntryPoint] = {}
     for distribution in distributions():
         try:

@@ -1,6 +1,6 @@
-"""A progress bar or a spinner on standard error for work that takes over a second; only if that is a terminal.
+"""Shows a progress bar or a spinner for work that takes over a second, if standard error is a terminal.
 
-Otherwise work that takes minutes prints its progress in lines: see Bar's lines_s.
+Otherwise, work that takes minutes can print its progress in lines (see lines_s of Bar).
 """
 
 import contextlib
@@ -15,10 +15,11 @@ PATIENCE_S = 1.0
 
 
 class Bar:
-    """with Bar("replaying", total) as bar: bar.advance(n). The first call after patience_s shows it.
+    """A progress bar: with Bar("replaying", total) as bar: bar.advance(n). It appears at the first call after
+    patience_s.
 
-    For a function that reports (done, total), pass it bar.reach and leave out total.
-    lines_s: time between two lines if standard error is not a terminal, s; None for no lines.
+    If a function reports (done, total), pass bar.reach to it and leave out total.
+    lines_s: seconds between two lines if standard error is not a terminal; None for no lines.
     """
 
     def __init__(

@@ -1,5 +1,5 @@
-"""Writes SVG drawings for the pages and the READMEs. The elements are written directly because it is fast: a fleet has
-thousands of pictures, at a millisecond each."""
+"""Writes SVG drawings for the pages and the READMEs. It writes the elements directly, for speed: a fleet has thousands
+of pictures, and each takes a millisecond."""
 
 from markupsafe import Markup, escape
 

@@ -1,6 +1,6 @@
 """Makes HTML, CSS and SVG from Jinja templates.
 
-A template is a file beside the module that fills it. It names others by their paths in kickstand_tools, as in
+A template is a file beside the module that fills it. A template includes another by its path in kickstand_tools:
 `{% include "common/theme.css" %}`.
 """
 
@@ -23,11 +23,11 @@ _ENVIRONMENT.policies["json.dumps_kwargs"] = {"allow_nan": False, "ensure_ascii"
 
 
 def filled(template: Path, **values: Any) -> str:
-    """Fill a template with these values. Each is escaped unless the template says `| safe`; `| tojson` makes JSON for
-    an HTML element. Raises jinja2.UndefinedError for a missing value."""
+    """Fill a template with values. A value is escaped unless the template says `| safe`. `| tojson` writes JSON for an
+    HTML element. Raises jinja2.UndefinedError for a missing value."""
     return _ENVIRONMENT.from_string(template.read_text(encoding="utf-8")).render(values)
 
 
 def source_hash(script: str) -> str:
-    """The hash of a script for a content security policy, which then allows no other script."""
+    """The hash of a script, for a content security policy that allows only scripts with this hash."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"

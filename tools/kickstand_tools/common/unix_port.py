@@ -14,7 +14,7 @@ def available() -> bool:
 
 def command(script: str, *arguments: str) -> list[str]:
     """The command line that runs a script under MicroPython."""
-    # because `python -m micropython_unix` does not pass the exit status on
+    # because `python -m micropython_unix` does not return the exit status
     start = "import sys, micropython_unix; sys.exit(micropython_unix.main())"
     return [sys.executable, "-c", start, script, *arguments]
 

@@ -1,4 +1,4 @@
-"""kickstand demo: the firmware on the simulated board, drawn in a terminal or printed frame by frame."""
+"""Runs `kickstand demo`: the firmware on the simulated board, drawn in a terminal or printed frame by frame."""
 
 import contextlib
 import io
@@ -17,7 +17,7 @@ from .score import Score, table
 from .screen import lcd_lines, lean_text, oled_lines, screen
 
 SCRIPT_SPEED, HAND_SPEED = 1.5, 1.0  # simulated seconds per second when drawn in a terminal
-FRAME_S = 0.25  # when printed: shortest time between two frames of the same page
+FRAME_S = 0.25  # shortest time between two printed frames of the same page
 _KEYS = {"b": "short", "B": "long", " ": "long", "p": "pause", "q": "quit"}
 _HELP = "b button  B long press  p pause  q quit"
 _HAND_HELP = "b button  B long press  a/d lean  k kickstand  u upright  p pause  q quit"
@@ -59,7 +59,7 @@ def _print(device: DeviceProcess, score: Score, console: bool) -> None:
             live_page = state["lcd"][0][:4] == said[0][:4]
             if state["lcd"] == said or (live_page and state["t_s"] - said_s < FRAME_S):
                 continue
-            between = state["lcd"][0].startswith("?")  # an OLED, perhaps in the middle of a new picture
+            between = state["lcd"][0].startswith("?")  # an OLED, whose new picture may be incomplete
             if between and state["t_s"] - said_s < FRAME_S:
                 continue
             said, said_s = state["lcd"], state["t_s"]
@@ -71,13 +71,13 @@ def demo(hand: bool = False, cpython: bool = False, display: str = "lcd", user: 
     """Run the demo until it ends or the user quits, then print the score.
 
     hand: the user steers the bike with keys. cpython: run on CPython, not on MicroPython. display: "lcd", "ssd1306" or
-    "sh1106". user: the user's code for the board; then its console is printed, too.
-    Raises InputError without a terminal for steering and for user code that is not a program, DeviceStopped if the
+    "sh1106". user: the user's code for the board; with it, the board's console is printed too.
+    Raises InputError if steering has no terminal, and if the user's code is not a program. Raises DeviceStopped if the
     device ended early.
     """
     watched = sys.stdin.isatty() and sys.stdout.isatty()
     if hand and not watched:
-        raise InputError("the bike is steered with keys: run kickstand demo --hand in a terminal")
+        raise InputError("you steer the bike with keys: run kickstand demo --hand in a terminal")
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # for a terminal that cannot show block characters
     engine = "CPython" if cpython or not unix_port.available() else "MicroPython"

@@ -1,8 +1,8 @@
-"""The firmware on the simulated board, on a simulated bike. Runs under MicroPython's unix port or CPython.
+"""Runs the firmware on the simulated board, on a simulated bike, with MicroPython's unix port or CPython.
 
     device.py script|hand SPEED DISPLAY
 
-SPEED: simulated seconds per second, 0 for as fast as possible. DISPLAY: "lcd", "ssd1306" or "sh1106". Every 50
+SPEED: simulated seconds per second; 0 means as fast as possible. DISPLAY: "lcd", "ssd1306" or "sh1106". Every 50
 simulated ms it prints a line of JSON (see score.State); other lines are the firmware's console. It reads commands from
 standard input, one per line: short, long (presses of the button), left, right, kickstand, upright (to steer the bike by
 hand), pause, quit.
@@ -22,9 +22,9 @@ from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 
 TICK_S = 0.05
 PART_SEED = 1
-PART_SHARE = 0.5  # the sensor's errors over the data sheet's limits: an ordinary sensor
+PART_SHARE = 0.5  # the sensor's errors as a share of the data sheet's limits: an ordinary sensor
 HAND_LIMIT_S = 3600.0
-BATTERY_V = 12.6 / 11  # at GPIO 26, behind the divider of firmware/examples/user_battery.py
+BATTERY_V = 12.6 / 11  # voltage at GPIO 26, after the divider in firmware/examples/user_battery.py
 LONG_PRESS_S = 1.2
 
 # The rider presses the button once on the kickstand and once upright, and switches to two other pages after the ride.
@@ -87,7 +87,7 @@ class Commands:
 
 
 def seen(board, bike, of_s=None):
-    """The fields of score.State, except an OLED's pixels."""
+    """A dictionary with the fields of score.State, except an OLED's pixels."""
     t_s = board.clock.now_us / 1e6
     lean_deg, speed_mps, _, phase = bike.truth(t_s)
     return {
@@ -118,7 +118,7 @@ class Demo:
         sensor = Sensor(seed=PART_SEED, share=PART_SHARE)
         self.board = Board(sensor.world(self.bike.motion), clock=Clock(speed), display=display)
         self.board.volts[26] = BATTERY_V
-        self._pixels, self._seen = "", -1  # an OLED's pixels, and its count of changes at that time
+        self._pixels, self._seen = "", -1  # an OLED's pixels, and its count of changes when they were read
         if not by_hand:
             self.board.press(KICKSTAND_PRESS_S)
             self.board.press(UPRIGHT_PRESS_S)
@@ -127,10 +127,10 @@ class Demo:
         self.board.every(TICK_S, self._tick)
 
     def run(self):
-        """Power on, and restart after every reset, until time is up or "quit" arrives."""
+        """Switch on, and restart after every reset, until the time is over or "quit" arrives."""
         self.board.install()
         from kickstand.start import main  # after install(), which replaces `machine` and `time`
-        from kickstand.ui.page_ring import MOTORCYCLE  # the owner's pages are behind these
+        from kickstand.ui.page_ring import MOTORCYCLE  # the pages of user.py come after these
 
         if not self._steer and "user.py" in os.listdir():
             for k in range(len(MOTORCYCLE)):
@@ -176,7 +176,7 @@ class Demo:
 
 
 def run(kind, speed, display="lcd"):
-    """Run the demo's device. kind: "script" or "hand"; speed, display: see above."""
+    """Run the demo's device. kind: "script" or "hand". speed, display: see the module."""
     Demo(kind == "hand", float(speed), display).run()
 
 

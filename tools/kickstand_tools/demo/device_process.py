@@ -17,14 +17,15 @@ from .score import State
 class DeviceProcess:
     """The firmware on the simulated board. Use it in a `with` statement and call ticks() until ended.
 
-    engine: "micropython" or "cpython". kind, speed, display: the arguments of device.py. user: its user.py.
+    engine: "micropython" or "cpython". kind, speed, display: the arguments of device.py. user: the file that becomes
+    the board's user.py.
     """
 
     def __init__(self, engine: str, kind: str, speed: float, display: str = "lcd", user: Path | None = None) -> None:
         self._lines: queue.Queue[str | None] = queue.Queue()
         self.ended = False
         self._outcome = ""
-        self.console: list[str] = []  # lines of the device's console, without its ticks
+        self.console: list[str] = []  # lines of the device's console, without the JSON lines
         self._directory = tempfile.TemporaryDirectory()  # the board's flash
         if user:
             Path(self._directory.name, "user.py").write_bytes(user.read_bytes())
@@ -48,7 +49,7 @@ class DeviceProcess:
             text=True,
             encoding="utf-8",
             errors="replace",
-            start_new_session=True,  # Ctrl-C is only for this process
+            start_new_session=True,  # Ctrl-C must reach only this process
         )
         threading.Thread(target=self._read, daemon=True).start()
 
@@ -71,7 +72,7 @@ class DeviceProcess:
         self._lines.put(None)
 
     def hang_up(self) -> None:
-        """Close the device's standard input: then it quits."""
+        """Close the device's standard input, which makes it quit."""
         assert self._process.stdin
         with contextlib.suppress(OSError):
             self._process.stdin.close()
@@ -85,11 +86,11 @@ class DeviceProcess:
 
     @property
     def failed(self) -> bool:
-        """True if it ended too early."""
+        """True if the device ended too early."""
         return self.ended and self._outcome != "off"
 
     def ticks(self, wait_s: float) -> list[State]:
-        """The ticks that have arrived; waits up to wait_s for the first. Sets `ended` after the last one."""
+        """The ticks that have arrived. Waits up to wait_s for the first. Sets `ended` after the last tick."""
         ticks = []
         with contextlib.suppress(queue.Empty):
             line = self._lines.get(timeout=wait_s)

@@ -1,4 +1,4 @@
-"""A simulated bike steered by hand, with keys or in the browser. Plain Python for CPython and MicroPython.
+"""Simulates a bike that you steer with keys or in the browser. Runs on CPython and MicroPython.
 
 Its motion follows the same equations as simulation/scripted/script.py.
 """
@@ -22,15 +22,15 @@ LEAN_STEP_DEG = 5.0
 MAX_LEAN_DEG = 50.0
 
 _STEP_S = 0.005
-_ROLL_RATE = 4.0  # rad/s: natural frequency with which the lean follows the commanded one, critically damped
-_SPEED_RATE = 1.5  # 1/s: the speed approaches the commanded one at this rate
+_ROLL_RATE = 4.0  # rad/s: the lean follows the commanded lean with this natural frequency, critically damped
+_SPEED_RATE = 1.5  # 1/s: the speed approaches the commanded speed at this rate
 _MAX_ACCELERATION, _MAX_BRAKING = 3.0, 5.0  # m/s2
 _SWAY_RADPS = 2.0 * pi * 0.4
 
 
 class HandBike:
-    """Starts on the kickstand; command(), or stand(), ride() and lean_to(), steer it. motion() and truth() are those of
-    script.Ride, but t_s must not go back."""
+    """A bike that starts on the kickstand. Steer it with command(), or with stand(), ride() and lean_to(). motion() and
+    truth() return the same values as those of script.Ride, but t_s must not decrease."""
 
     def __init__(self, vibration_g=0.05):
         self._vibration_g = vibration_g
@@ -43,7 +43,8 @@ class HandBike:
         self._sway = 0.0  # amplitude, rad
 
     def command(self, name):
-        """left, right: set off, then lean 5 degrees further; upright, kickstand: stop and stand in this pose."""
+        """Carry out a command. left, right: set off, then lean 5 degrees further. upright, kickstand: stop, and stand
+        in this pose."""
         if name in ("kickstand", "upright"):
             self.stand(name)
         elif name in ("left", "right") and self._pose != "kickstand":
@@ -58,13 +59,13 @@ class HandBike:
         self._lean_wish = 0.0
 
     def ride(self, speed_mps):
-        """Set off, or change speed, to this speed in m/s. It must be over script.RIDING_MPS, or the bike would not
-        lean."""
+        """Set off, or change speed, to this speed in m/s. It must be over script.RIDING_MPS; at lower speeds
+        the bike does not lean."""
         self._pose = "riding"
         self._cruise = speed_mps
 
     def lean_to(self, lean_deg):
-        """Lean to this angle, > 0 to the right, in degrees; 50 at most. The bike stays upright while it stands or sets
+        """Lean to this angle in degrees, > 0 to the right, at most 50. The bike stays upright while it stands or sets
         off."""
         self._lean_wish = max(-MAX_LEAN_DEG, min(MAX_LEAN_DEG, lean_deg))
 
@@ -98,7 +99,7 @@ class HandBike:
         return lean, lean_rate, yaw_rate_in_balance(lean, STANDARD_GRAVITY, self._speed)
 
     def motion(self, t_s):
-        """Specific force (g) along, and rates (deg/s) about left, up, forward, including vibration."""
+        """Specific force (g) along left, up, forward, and rates (deg/s) about these, including vibration."""
         lean, lean_rate, yaw_rate = self._attitude(t_s)
         clean = body_motion(lean, lean_rate, self._speed, self._acceleration, yaw_rate)
         engine = min(1.0, self._speed / 2.0)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 # Key for steering a bike, and the command of hand_bike.HandBike
 BIKE_KEYS = {"a": "left", "left": "left", "d": "right", "right": "right", "k": "kickstand", "u": "upright"}
 
-_LEFT, _RIGHT = ("\x1b[D", "\x1bOD", "\xe0K"), ("\x1b[C", "\x1bOC", "\xe0M")  # the last of each: on Windows
+_LEFT, _RIGHT = ("\x1b[D", "\x1bOD", "\xe0K"), ("\x1b[C", "\x1bOC", "\xe0M")  # the last of each is from Windows
 
 
 def split(text: str) -> list[str]:

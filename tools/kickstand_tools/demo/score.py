@@ -1,4 +1,4 @@
-"""Compares the lean on the LCD with the true one."""
+"""Compares the lean on the LCD with the true lean."""
 
 from math import sqrt
 from typing import NamedTuple, NotRequired, TypedDict
@@ -12,9 +12,9 @@ _STANDING = ("kickstand", "upright", "moving", "wait")
 
 
 class State(TypedDict):
-    """One tick of the device. of_s: duration of the run, None if steered by hand; lcd: both lines; lean_deg: the true
-    lean, > 0 to the right; phase: the bike's action; pressed: True while the button is pressed. pixels: of an OLED, 64
-    rows of 128, 8 pixels per byte, the leftmost in bit 7, as hex."""
+    """One tick of the device. of_s: duration of the run, None if steered by hand. lcd: both lines. lean_deg: the true
+    lean, > 0 to the right. phase: what the bike is doing. pressed: True while the button is pressed. pixels: the pixels
+    of an OLED as hex, 64 rows of 128, 8 pixels per byte, the leftmost in bit 7."""
 
     t_s: float
     of_s: float | None
@@ -37,8 +37,8 @@ class Figures(NamedTuple):
 
 
 class Score:
-    """Collects true and shown lean (degrees, > 0 to the right) of the ticks that show the lean page, by part of the
-    ride. figures() summarises them."""
+    """Collects the true and the shown lean (degrees, > 0 to the right) while the page of the lean is shown, by part of
+    the ride. figures() summarises them."""
 
     def __init__(self) -> None:
         self._pairs: dict[str, list[tuple[float, float]]] = {}  # part of the ride: (true, shown) in degrees
@@ -62,7 +62,8 @@ class Score:
         return "standing" if phase in _STANDING else "straight on"
 
     def figures(self) -> dict[str, Figures]:
-        """By part of the ride, held turns first, then of the whole ride as "all". Empty if no lean was shown."""
+        """The Figures of each part of the ride, held turns first, and of the whole ride as "all". Empty if no lean was
+        shown."""
         names = sorted(self._pairs, key=lambda name: not name.startswith("held"))
         if not names:
             return {}
@@ -71,13 +72,13 @@ class Score:
 
 
 def table(figures: dict[str, Figures]) -> Table | str:
-    """Score.figures() for a terminal: one row per part of the ride, then the whole."""
+    """Show the result of Score.figures() in a terminal: one row per part of the ride, then a row for the whole ride."""
     if not figures:
         return "The lean was not shown yet."
     table = Table(
-        title="Lean in degrees, > 0 to the right: shown on the LCD against true",
-        caption="The LCD has whole degrees, about 0.1 s old: in a quick roll that is most of the error. "
-        "The README's figures are of the lean filter, sample by sample.",
+        title="Lean in degrees, > 0 to the right: shown on the LCD, and true",
+        caption="The LCD shows whole degrees, about 0.1 s late, which is most of the error in a quick roll. "
+        "The README's figures compare the lean filter's own values, sample by sample.",
     )
     table.add_column("")
     for name in Figures._fields:

@@ -1,4 +1,4 @@
-"""The demo's picture in a terminal, 78 columns wide: the LCD, the bike from behind, true and shown lean."""
+"""Draws the demo in a terminal, 78 columns wide: the LCD, the bike from behind, true and shown lean."""
 
 from itertools import groupby
 from math import cos, radians, sin
@@ -20,7 +20,7 @@ _LEFT_COLUMNS = 34
 _DOTS_PER_M = 23.0
 _LCD_STYLE = "bold bright_white on blue"
 _TRUE, _SHOWN = "cyan", "yellow"
-_BRAILLE = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # bit of row, column within a cell
+_BRAILLE = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # the bit of each row and column within a cell
 
 
 def lean_text(lean_deg: float, digits: int = 1) -> str:
@@ -64,7 +64,7 @@ def _oled(pixels: str) -> RenderableType:
 
 
 def _on_bike(x: float, y: float) -> bool:
-    """True if a point is on bike or rider seen from behind. x to the right of and y above the contact point, m."""
+    """True if a point is on the bike or the rider, seen from behind. x, y: right of and above the contact point, m."""
     return (
         (abs(x) < 0.08 and 0.0 <= y < 0.62)  # tyre
         or (abs(x) < 0.17 and 0.5 <= y < 0.85)  # tail
@@ -77,7 +77,7 @@ def _on_bike(x: float, y: float) -> bool:
 def bike(lean_deg: float, shown_deg: float | None) -> Text:
     """The bike from behind at its true lean, with a dashed line at the shown lean."""
     picture = Text(no_wrap=True)
-    middle, ground = _BIKE_COLUMNS, 4 * _BIKE_ROWS - 3  # in dots
+    middle, ground = _BIKE_COLUMNS, 4 * _BIKE_ROWS - 3  # in dots of braille
     c, s = cos(radians(lean_deg)), sin(radians(lean_deg))
     line = {
         (int(middle + r * sin(radians(shown_deg))), round(ground - r * cos(radians(shown_deg))))
@@ -129,7 +129,7 @@ def screen(state: State, title: str, keys: str, paused: bool) -> RenderableType:
     clock = f"{state['t_s']:.1f} s" if of_s is None else f"{state['t_s']:.1f} of {of_s:.0f} s"
     head.add_row(Text(title, style="bold"), "paused" if paused else clock)
     body: RenderableType = _beside_the_bike(state)
-    if "pixels" in state:  # there is no room for the bike
+    if "pixels" in state:  # an OLED leaves no room for the bike
         body = Group(_oled(state["pixels"]), Align.center(_figures(state)))
     frame = Table.grid()
     frame.add_column(width=WIDTH)

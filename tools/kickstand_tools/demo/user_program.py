@@ -1,4 +1,4 @@
-"""Checks that the user's code for the simulated board is a program, before a ride of a minute begins with it."""
+"""Checks that the user's code for the simulated board is a program, before the ride of a minute starts."""
 
 import subprocess
 import warnings
@@ -7,7 +7,7 @@ from pathlib import Path
 from ..common import unix_port
 from ..common.errors import InputError
 
-# For MicroPython, which has fewer statements than CPython. Prints nothing, or "line: what is wrong" of the program
+# MicroPython has fewer statements than CPython, so MicroPython checks the program: prints nothing, or "line: fault"
 _COMPILE = """
 import io, sys
 try:
@@ -22,8 +22,8 @@ except Exception as error:
 
 
 def check(program: Path, engine: str) -> None:
-    """Raises InputError if a file is not a program for this engine, "CPython" or "MicroPython", and OSError if it is
-    not readable."""
+    """Raise InputError if a file is not a program for this engine, "CPython" or "MicroPython". Raise OSError if it
+    cannot be read."""
     source = program.read_bytes()
     wrong = _by_micropython(program) if engine == "MicroPython" else _by_cpython(source)
     if wrong:
@@ -43,6 +43,6 @@ def _by_cpython(source: bytes) -> str:
             compile(source, "user.py", "exec", dont_inherit=True)
     except SyntaxError as error:
         return f"{error.lineno or ''}:{error.msg}"
-    except ValueError as error:  # of characters that no source has
+    except ValueError as error:  # raised for characters that no source has
         return f":{error}"
     return ""

@@ -1,5 +1,5 @@
-"""Reads the output of a program on the board line by line while it runs: mpremote only reads byte by byte, or at the
-end."""
+"""Reads the output of a program on the board line by line while it runs. mpremote reads only single bytes, or
+everything at the end."""
 
 import math
 import threading
@@ -10,17 +10,17 @@ from typing import Any
 from .connection import ConnectedBoard
 
 _CTRL_A, _CTRL_C = b"\x01", b"\x03"
-_END = b"\x04"  # ends the program's output, and its error
-_PROMPT = b">"  # follows both
+_END = b"\x04"  # follows the program's output, and again its error
+_PROMPT = b">"  # follows output and error
 _LAST_S = 10.0  # longest time for the program's output after Ctrl-C
 _POLL_S = 0.01
-_LONGEST_LINE = 100_000  # bytes of the longest line; those of rides have 2,000
-_AWAY_S = 1.0  # after a longer pause (this computer slept, or was too busy) a streaming board has stopped on its own
+_LONGEST_LINE = 100_000  # bytes of the longest line; the lines of rides have 2,000
+_AWAY_S = 1.0  # a streaming board stops if the computer pauses for longer, because it slept or was too busy
 _AWAY_SILENT_S = 5.0  # longest silence of the board after such a pause
 
 
 class BrokenOff(Exception):
-    """The program has ended with an error, or has stopped printing. The text says which."""
+    """The program has ended with an error, or has stopped printing. The text gives the reason."""
 
 
 def lines(
@@ -30,17 +30,17 @@ def lines(
     stopped: threading.Event | None = None,
     most_bytes: float = math.inf,
 ) -> Iterator[bytes]:
-    """Run code on the board; yield each line that it prints, without the line's end. Raises BrokenOff, OSError.
+    """Run code on the board and yield each printed line, without its line end. Raises BrokenOff, OSError.
 
-    silent_s: longest silence of the program.  stopped: once set, the program gets a Ctrl-C.  most_bytes: limit of its
-    output.
+    silent_s: longest silence of the program. stopped: once set, the program gets a Ctrl-C. most_bytes: limit of the
+    program's output.
     """
     transport.exec_raw_no_follow(code)
     serial: Any = transport.serial
     said, count = b"", 0
     asked_s = None
     heard_s = time.monotonic()
-    away_s, polled_s = 0.0, time.time()  # unlike the monotonic clock it continues while the computer sleeps
+    away_s, polled_s = 0.0, time.time()  # unlike the monotonic clock, time.time() continues while the computer sleeps
     while said.count(_END) < 2 or not said.endswith(_PROMPT):
         if stopped and stopped.is_set() and asked_s is None:
             asked_s = time.monotonic()
@@ -51,7 +51,7 @@ def lines(
             got = serial.read(waiting)
             said, count = said + got, count + len(got)
             if count > most_bytes or len(said) > _LONGEST_LINE + len(got):
-                raise BrokenOff("the board does not come to an end")
+                raise BrokenOff("the program on the board does not end")
         elif time.monotonic() - heard_s > silent_s:
             raise BrokenOff("the board says nothing any more")
         elif away_s > _AWAY_S and time.monotonic() - heard_s > min(silent_s, _AWAY_SILENT_S):
@@ -65,7 +65,7 @@ def lines(
         said = output + end + error
         for line in whole:
             yield line.strip()
-    serial.write(_CTRL_A)  # the prompt has been read with the rest, but mpremote waits for one: this prints it again
+    serial.write(_CTRL_A)  # print the prompt again: mpremote waits for a prompt, but this function has read it
     error = said.split(_END)[1].decode(errors="replace").strip()
     if error and asked_s is None:
         raise BrokenOff(f"the board reports {error.rpartition(chr(10))[2].strip()}")

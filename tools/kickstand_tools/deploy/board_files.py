@@ -1,4 +1,4 @@
-"""Lists a board's flash: its files with their hashes, its folders, its free flash blocks."""
+"""Lists the files on a board's flash with their hashes, its folders, and its free flash blocks."""
 
 import hashlib
 from dataclasses import dataclass
@@ -8,9 +8,9 @@ from mpremote.transport_serial import SerialTransport
 from .connection import literal
 from .firmware_files import PACKAGE
 
-# Prints (path, size, SHA-256) of each file in the root and below the package's folder, (path, None, None) of each
-# folder below the package's folder, that folder itself included; the folder of rides if it has any; and (bytes of a
-# block, free blocks) of the flash.
+# Prints one line each: (path, size, SHA-256) for every file in the root and below the package's folder; (path, None,
+# None) for the package's folder and every folder below it; the folder of rides, if it has rides; (bytes of a block,
+# free blocks) of the flash.
 _SURVEY = """
 import hashlib, os
 def survey(directory):
@@ -43,9 +43,9 @@ Fingerprint = tuple[int, bytes]
 
 @dataclass(frozen=True)
 class BoardFiles:
-    """files: (bytes, SHA-256) by path, those in the root and in the package.  folders: the package's folder and those
-    below it.  block: bytes of a flash block.  free_blocks: number of free ones.  has_rides: True if rides are in
-    flash."""
+    """files: (bytes, SHA-256) by path, of files in the root and in the package.  folders: the package's folder and the
+    folders below it.  block: bytes of a flash block.  free_blocks: number of free blocks.  has_rides: True if the
+    flash has rides."""
 
     files: dict[str, Fingerprint]
     folders: frozenset[str]
@@ -71,5 +71,5 @@ def survey(transport: SerialTransport) -> BoardFiles:
 
 
 def fingerprint(data: bytes) -> Fingerprint:
-    """Number of bytes and SHA-256, as in BoardFiles.files."""
+    """The number of bytes and the SHA-256, as in BoardFiles.files."""
     return len(data), hashlib.sha256(data).digest()

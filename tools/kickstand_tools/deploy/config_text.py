@@ -9,10 +9,10 @@ from ..common.messages import Remedy
 
 
 def cleaned(data: bytes) -> bytes:
-    """Convert a config.py to the form that MicroPython reads: UTF-8 without a byte order mark. Raises InputError for
-    other text.
+    """Convert a config.py to UTF-8 without a byte order mark, because MicroPython reads nothing else. Raises InputError
+    for other encodings.
 
-    Notepad and PowerShell write such marks and UTF-16.
+    Notepad and PowerShell write byte order marks and UTF-16.
 
     >>> cleaned("\ufeffSIDE = 1".encode("utf-16")), cleaned(b"\xef\xbb\xbfSIDE = 1")
     (b'SIDE = 1', b'SIDE = 1')
@@ -33,14 +33,14 @@ def decoded(data: bytes) -> str:
 
 
 def lines(text: str) -> list[str]:
-    """The lines as Python counts them. str.splitlines() would also split at a form feed or U+2028."""
+    """Split the text into lines as Python counts them. str.splitlines() would also split at a form feed or U+2028."""
     found = re.split(r"\r\n|\r|\n", text)
     return found if found[-1] else found[:-1]
 
 
 def values(text: str) -> dict[str, str]:
-    """{name: its value as written} of the settings in a config.py. Raises InputError if a form cannot show the file: it
-    may only have lines NAME = VALUE with literal values and different names.
+    """The settings in a config.py as {name: value as written}. Raises InputError if a form cannot show the file. A form
+    can show only lines NAME = VALUE with literal values and different names.
 
     >>> values('SIDE = "right"  # mine\\n# RECORD = False\\n')
     {'SIDE': '"right"'}
@@ -49,8 +49,8 @@ def values(text: str) -> dict[str, str]:
 
 
 def with_values(text: str, wanted: dict[str, str | None]) -> str:
-    """The file with these values, None for a default. Everything else in it is kept. Raises InputError like values(),
-    and for an invalid value.
+    """Write these values into the text of a config.py; None restores a default. The rest of the text is kept. Raises
+    InputError like values(), and for an invalid value.
 
     >>> before = '# SIDE = "left"   # or "right"\\nRECORD = True\\n'
     >>> print(with_values(before, {"SIDE": '"right"', "RECORD": None}), end="")
@@ -85,7 +85,7 @@ def with_values(text: str, wanted: dict[str, str | None]) -> str:
 
 
 def _assignments(text: str) -> dict[str, ast.Assign]:
-    """The assignment to each name. The file is not executed, because a page reads the file of any board."""
+    """The assignment to each name. The file is not executed, because it may come from any board."""
     try:
         body = ast.parse(text).body
     except (SyntaxError, ValueError) as error:
@@ -96,7 +96,7 @@ def _assignments(text: str) -> dict[str, ast.Assign]:
             continue  # the file's docstring
         target = node.targets[0] if isinstance(node, ast.Assign) and len(node.targets) == 1 else None
         if not (isinstance(node, ast.Assign) and isinstance(target, ast.Name)) or node.col_offset:
-            raise InputError(f"config.py, line {node.lineno} is no setting NAME = VALUE: change this file by hand")
+            raise InputError(f"config.py, line {node.lineno} is not a setting NAME = VALUE: change this file by hand")
         if target.id in found:
             raise InputError(f"config.py, line {node.lineno} sets {target.id} again: change this file by hand")
         try:

@@ -1,4 +1,4 @@
-"""Connects to a board at its raw prompt with mpremote, and puts errors into words."""
+"""Connects to the raw prompt of a board with mpremote, and explains errors."""
 
 import ast
 import contextlib
@@ -18,18 +18,18 @@ from serial.tools import list_ports
 from ..common.errors import InputError, cause
 from ..common.messages import Message, Remedy
 
-# Called with the current action, the bytes done and the total bytes.
+# A function that is called with the current action, the bytes done and the total bytes
 Progress = Callable[[str, int, int], None]
 
-MOST_BYTES = 1_000_000  # longest answer in bytes; the list of a board's files has a hundredth of that
+MOST_BYTES = 1_000_000  # longest answer in bytes, a hundred times the list of a board's files
 _HEARD_BYTES = 3000
 ANSWER_S = 10
-_STARTING_S = 3  # longest time in which a starting board ignores input
+_STARTING_S = 3  # a starting board ignores input for up to this time
 _POLL_S = 0.01
-_PROGRAM_S = 60  # longest time of a program: an emulated board takes a while to compile the modules
-_EMULATED = "socket:"  # start of the name of an emulated board's port
-_SLOWER = 12  # factor on times for an emulated board, whose seconds last longer on a busy host
-_RESTART_S = 2  # time until the board's USB port is back: the next command may follow at once
+_PROGRAM_S = 60  # longest time of a program; an emulated board compiles the modules slowly
+_EMULATED = "socket:"  # the name of an emulated board's port starts with this
+_SLOWER = 12  # factor on times for an emulated board, which is slow on a busy computer
+_RESTART_S = 2  # time until the board's USB port is back, because the next command may follow at once
 
 # USB vendors of the boards themselves and of the serial chips on ESP32 boards
 VENDORS = {
@@ -40,7 +40,7 @@ VENDORS = {
     0x1A86: "WCH CH340",
     0x0403: "FTDI",
 }
-_DEBUG_PROBE = (0x2E8A, 0x000C)  # a device of the same vendor that is not a board
+_DEBUG_PROBE = (0x2E8A, 0x000C)  # Raspberry Pi's Debug Probe is not a board
 
 
 UPDATE = Remedy("kickstand flash brings it up to date", "the page Install brings it up to date")
@@ -48,7 +48,8 @@ UPDATE = Remedy("kickstand flash brings it up to date", "the page Install brings
 
 @dataclass(frozen=True)
 class ConnectionLost(Message):
-    """The port of that name gave this error. A page has one port, and its browser gives no cause."""
+    """The connection to a port was lost. On a page, the message has no name and no cause: a page has only one port, and
+    the browser gives no cause."""
 
     name: str
     cause: str
@@ -63,18 +64,18 @@ class ConnectionLost(Message):
 
 @dataclass(frozen=True)
 class NotInstalled(Message):
-    """There is no Kickstand on the board at the port of that name."""
+    """Kickstand is not on the board. name: the name of its port."""
 
     name: str
 
     text = "Kickstand is not on the board at {name}"
-    todo = Remedy("kickstand flash puts it there", "the page Install puts it there")
+    todo = Remedy("install it with kickstand flash", "install it with the page Install")
 
 
 @dataclass(frozen=True)
 class UnfitFirmware(Message):
-    """The firmware on the board at the port of that name lacks a module. An update that was broken off lacks modules
-    too."""
+    """The firmware on the board lacks a module: it has another version, or an update was interrupted. name: the name of
+    the board's port."""
 
     name: str
     missing: str
@@ -85,7 +86,7 @@ class UnfitFirmware(Message):
 
 @dataclass(frozen=True)
 class NoAnswer(Message):
-    """A program that uses the firmware has failed on the board at the port of that name. what: its result."""
+    """A program that uses the firmware failed on the board. name: the name of its port. what: the missing result."""
 
     name: str
     what: str
@@ -96,24 +97,24 @@ class NoAnswer(Message):
 
 
 class ConnectedBoard(SerialTransport):
-    """A board with a limit on the length of answers, because mpremote reads as long as bytes arrive. slower: factor on
-    mpremote's limits of silence, for a board that runs slower than real time."""
+    """A connection that limits the length of answers; mpremote alone would read as long as bytes arrive. slower: factor
+    on mpremote's timeouts, for a board that runs slower than real time."""
 
     slower = 1
-    heard = b""  # the end of the board's output
+    heard = b""  # the last bytes of the board's output
 
     def wait(self, seconds: float) -> None:
         """Sleep. A program that must not sleep overrides this in a subclass."""
         time.sleep(seconds)
 
     def read_until(self, min_num_bytes, ending, timeout=10, data_consumer=None, timeout_overall=None):
-        """See SerialTransport. Raises TransportError for an answer of over MOST_BYTES."""
+        """Override of SerialTransport. Raises TransportError for an answer of over MOST_BYTES."""
         said, serial = bytearray(), cast(Any, self.serial)
         began_s = heard_s = time.monotonic()
         limits: list[Any] = [math.inf if limit is None else limit * self.slower for limit in (timeout, timeout_overall)]
         while not said.endswith(ending):
             now_s = time.monotonic()
-            # An emulator's pseudo-terminal may not report waiting bytes. Older versions of mpremote do not have is_pty.
+            # An emulator's pseudo-terminal may not report waiting bytes. Older versions of mpremote lack is_pty.
             if piece := serial.read(1) if getattr(self, "is_pty", False) or serial.inWaiting() > 0 else b"":
                 said += piece
                 self.heard = (self.heard + piece)[-_HEARD_BYTES:]
@@ -133,13 +134,13 @@ class _EmulatedBoard(ConnectedBoard):
     slower = _SLOWER
 
 
-# The name of a board's port, a board at an open port, or None for the only board that is plugged in
+# The name of a port, an open connection to a board, or None for the only board that is plugged in
 Port = str | ConnectedBoard | None
 
 
 @contextlib.contextmanager
 def connected(port: Port) -> Iterator[tuple[ConnectedBoard, str]]:
-    """A context with a board at its raw prompt, its program interrupted, and the name of its port.
+    """A context with a board at its raw prompt and the name of its port. The board's program is interrupted.
 
     Raises InputError, also for errors of the connection inside the with block.
     """
@@ -161,16 +162,16 @@ def connected(port: Port) -> Iterator[tuple[ConnectedBoard, str]]:
     except TransportError as error:
         raise InputError(f"{name}: the board stopped answering: plug it in again, then repeat this") from error
     except OSError as error:
-        if error.filename is not None:  # a file of this computer
+        if error.filename is not None:  # the error is about a file on this computer
             raise InputError(f"{error.filename}: {cause(error)}: check the disk or the file, then repeat") from error
         if error.errno == errno.ENOSPC:
             raise InputError(f"the board at {name} is full: remove files of your own from it") from error
-        if error.errno in (errno.EILSEQ, 84, 52):  # an error on the board, which mpremote raises here
+        if error.errno in (errno.EILSEQ, 84, 52):  # an error on the board, which mpremote raises on this computer
             raise InputError(f"{name}: the board's file system is damaged: erase its flash: {_NUKE}") from error
         raise InputError(ConnectionLost(name, cause(error))) from error
     finally:
         with contextlib.suppress(OSError):
-            transport.close()  # its port may be gone or restarting
+            transport.close()  # the port may have disappeared, or be restarting
 
 
 def _open_board(name: str) -> ConnectedBoard:
@@ -182,7 +183,7 @@ def _open_board(name: str) -> ConnectedBoard:
 
 
 def find_port() -> str:
-    """The port of the only board that is plugged in. Raises InputError for none, or more than one."""
+    """The port of the only board that is plugged in. Raises InputError for no board, and for several boards."""
     found = [p for p in list_ports.comports() if p.vid in VENDORS and (p.vid, p.pid) != _DEBUG_PROBE]
     if not found:
         plug_in = "plug it in with a USB cable that carries data, put MicroPython on it if it is new, or name its port "
@@ -194,43 +195,44 @@ def find_port() -> str:
 
 
 def why_closed(port: str) -> InputError:
-    """The error with the reason why a port cannot be opened, found by another attempt."""
+    """The error that explains why a port cannot be opened. The reason is found by opening it again."""
     try:
         serial.serial_for_url(port, timeout=1, exclusive=True).close()
     except ValueError as error:
-        return InputError(f"{port} is no port: {cause(error)}")
+        return InputError(f"{port} is not a port: {cause(error)}")
     except OSError as error:
         text = str(error)
-        if error.errno in (errno.EBUSY, errno.EAGAIN) or "PermissionError" in text:  # the latter on Windows
+        # PermissionError is the text on Windows
+        if error.errno in (errno.EBUSY, errno.EAGAIN) or "PermissionError" in text:
             return InputError(f"{port} is in use", Remedy("close the other program that has it open"))
         if error.errno in (errno.EACCES, errno.EPERM):
             return InputError(f"no permission for {port}: on Linux join the group dialout and log in again")
         if error.errno == errno.ENOENT or "FileNotFoundError" in text:
             return InputError(
-                f"there is no port {port}", Remedy("plug the board in, or leave --port out to have it found")
+                f"there is no port {port}", Remedy("plug the board in, or leave out --port to find it automatically")
             )
         if port.startswith("socket:") and "refused" in text:
             return InputError(f"nothing listens at {port}", Remedy("is kickstand emulate running?"))
         return InputError(f"{port} cannot be opened: {text}: check the name and the cable")
-    return InputError(f"{port} could not be opened at first, and now can: try again")
+    return InputError(f"{port} could not be opened at first, but now it can: try again")
 
 
 def restart(transport: ConnectedBoard) -> None:
-    """Reset the board: it starts as after power-on. Its USB port disappears for a moment."""
+    """Reset the board, which then starts as after power-on. Its USB port disappears for a moment."""
     transport.exec_raw_no_follow("import time, machine\ntime.sleep_ms(100)\nmachine.reset()")
     transport.wait(_RESTART_S)
 
 
 def ask(transport: SerialTransport, expression: str, *shapes: Any) -> Any:
-    """The value of a Python expression on the board. shapes: see literal(). Raises InputError."""
+    """Evaluate a Python expression on the board. shapes: see literal(). Raises InputError."""
     return literal(transport.exec(f"print(repr({expression}))"), *shapes)
 
 
 def literal(text: bytes, *shapes: Any) -> Any:
-    """The Python value that a line of a board's output represents.
+    """Convert a line of a board's output to the Python value that it represents.
 
-    shapes: the allowed types: a type, or a tuple of the types of a tuple's values; numbers are integers >= 0, and None
-    means None. Raises InputError for other values: the board may be another device.
+    shapes: the allowed types. Each is a type, a tuple of the types of a tuple's values, or None for None. Numbers are
+    integers >= 0. Raises InputError for other values, which can come from another device.
 
     >>> literal(b"('/rides', 3)", (str, int))
     ('/rides', 3)
@@ -238,7 +240,7 @@ def literal(text: bytes, *shapes: Any) -> Any:
     try:
         value = ast.literal_eval(text.decode().strip())
     except (SyntaxError, ValueError, TypeError, MemoryError, RecursionError):
-        value = literal  # of no shape
+        value = literal  # has none of the shapes
     if any(_fits(value, shape) for shape in shapes):
         return value
     shown = ascii(text[:40].decode(errors="replace").strip())
@@ -252,7 +254,7 @@ def _fits(value: Any, shape: Any) -> bool:
 
 
 def describe(transport: SerialTransport, name: str) -> str:
-    """The board's name and its version of MicroPython. Raises InputError for another Python."""
+    """The board's name and its version of MicroPython. Raises InputError if the board runs another Python."""
     implementation, version, machine = ask(
         transport,
         "(lambda i: (i.name, '.'.join(str(n) for n in i.version[:3]), getattr(i, '_machine', 'board')))"
@@ -265,8 +267,8 @@ def describe(transport: SerialTransport, name: str) -> str:
 
 
 def printed(transport: SerialTransport, name: str, code: str, what: str) -> bytes:
-    """The output of a program that uses the firmware. name: the port's.  what: names the output in messages.  Raises
-    InputError."""
+    """Run a program that uses the firmware, and return its output. name: the port's name.  what: the name of the output
+    in messages.  Raises InputError."""
     output, error = transport.exec_raw(code, timeout=_PROGRAM_S)
     if error:
         reason = last_line(error.decode(errors="replace"))
@@ -280,8 +282,8 @@ def printed(transport: SerialTransport, name: str, code: str, what: str) -> byte
 
 
 def status(port: Port, wirings: bool = False) -> str:
-    """The output of kickstand.status() on the board, which then restarts. wirings: also show each wiring of a backpack
-    on its display. Raises InputError."""
+    """Run kickstand.status() on the board, return its output, and restart the board. wirings: also try each wiring of
+    an LCD backpack on the display. Raises InputError."""
     with connected(port) as (transport, name):
         describe(transport, name)
         try:
@@ -292,9 +294,9 @@ def status(port: Port, wirings: bool = False) -> str:
 
 
 def refuse_unfit_firmware(reason: str, name: str) -> None:
-    """Raise InputError if this error of the board at port `name` means that Kickstand is not on it, or lacks a module.
+    """Raise InputError if this error of the board at port `name` means that Kickstand, or a module of it, is missing.
 
-    After an interrupted update, modules are missing too.
+    An interrupted update can also leave modules missing.
     """
     if "no module named 'kickstand'" in reason:
         raise InputError(NotInstalled(name))
@@ -309,10 +311,10 @@ def last_line(text: str) -> str:
 
 
 def _enter_raw_prompt(transport: SerialTransport, name: str) -> None:
-    """Ctrl-C, then a soft reset into the raw prompt, which does not start main.py."""
-    for limit_s in (_STARTING_S, ANSWER_S):  # a board may reset when its port is opened: it is starting
+    """Send Ctrl-C, then a soft reset into the raw prompt, which does not start main.py."""
+    for limit_s in (_STARTING_S, ANSWER_S):  # a board may reset when its port is opened, and then needs time to start
         try:
-            with contextlib.redirect_stdout(io.StringIO()):  # mpremote prints input that it did not understand
+            with contextlib.redirect_stdout(io.StringIO()):  # mpremote prints what it cannot interpret
                 transport.enter_raw_repl(timeout_overall=limit_s)
             return
         except TransportError:
@@ -327,11 +329,11 @@ _NUKE = (
 _CORRUPT = ("filesystem appears to be corrupted", "EILSEQ", "] EIO", "Errno 84", "Errno 52")
 _WATCHDOG = ("wdt", "watchdog", "rst:0x")
 _CRASHES = ("guru meditation", "fatal python error", "abort() was called", "fatal error", "panic", "stack smashing")
-_LONGEST_WORDS = 60  # most letters of the board's output in a message
+_LONGEST_WORDS = 60  # longest part of the board's output in a message, characters
 
 
 def _why_silent(name: str, heard: bytes) -> InputError:
-    """The error for a board that does not show its prompt. heard: the end of its output."""
+    """The error for a board that does not show its prompt. heard: the last bytes of its output."""
     text = heard.decode(errors="replace")
     if damaged(text):
         return InputError(f"{name}: the board says that its file system is damaged: erase its flash: {_NUKE}")
@@ -339,7 +341,7 @@ def _why_silent(name: str, heard: bytes) -> InputError:
     said = next((line.strip() for line in reversed(text.splitlines()) if line.strip().strip("\0\ufffd>")), "")
     words = f"the board prints {said[:_LONGEST_WORDS]!a}: " if said else ""
     if any(mark in lower for mark in _CRASHES):
-        return InputError(f"{name}: {words}its MicroPython crashes: erase its flash: {_NUKE}")
+        return InputError(f"{name}: {words}MicroPython on the board crashes: erase its flash: {_NUKE}")
     if any(mark in lower for mark in _WATCHDOG):
         return InputError(
             f"{name}: {words}a watchdog of the program on it restarts it again and again: try again at once, and if "
@@ -358,6 +360,6 @@ def _why_silent(name: str, heard: bytes) -> InputError:
 
 
 def damaged(text: str) -> bool:
-    """True if a board's message means that its file system is damaged: MicroPython's own message (inisetup.py of the
-    ESP32), or the errors of littlefs and the flash (EILSEQ and LFS_ERR_CORRUPT are 84)."""
+    """True if a board's message means that its file system is damaged. The message can be MicroPython's own
+    (inisetup.py of the ESP32), or an error of littlefs or of the flash (EILSEQ and LFS_ERR_CORRUPT are 84)."""
     return any(mark in text for mark in _CORRUPT)

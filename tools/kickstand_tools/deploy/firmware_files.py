@@ -1,6 +1,6 @@
 """Lists the files of the firmware, for `kickstand flash` and mip.
 
-python -m kickstand_tools.deploy.firmware_files rewrites mip's list, firmware/package.json.
+`python -m kickstand_tools.deploy.firmware_files` rewrites mip's list, firmware/package.json.
 """
 
 import json
@@ -13,12 +13,12 @@ from . import bytecode
 
 PACKAGE = "/kickstand"
 MAIN = "/main.py"
-CONFIG = "/config.py"  # belongs to the rider once it is on the board
+CONFIG = "/config.py"  # once it is on the board, it belongs to the user
 MODULE_ENDINGS = (".py", ".mpy")
 
 
 def firmware_files() -> dict[str, Path]:
-    """Path on the board -> source file, in the order of copying: main.py, which starts the rest, is the last."""
+    """{path on the board: source file}, in the order of copying. main.py is the last, because it starts the rest."""
     root = firmware_path.directory()
     package = firmware_path.PACKAGE
     files = {f"{PACKAGE}/{path.relative_to(package).as_posix()}": path for path in sorted(package.rglob("*.py"))}
@@ -26,10 +26,10 @@ def firmware_files() -> dict[str, Path]:
 
 
 def contents(mpy: int | None, compiler: bytecode.Compiler | None = None) -> dict[str, bytes]:
-    """Path on the board -> content, in the order of firmware_files().
+    """{path on the board: content}, in the order of firmware_files().
 
-    mpy: the board's sys.implementation._mpy: the package is compiled to .mpy files for it. None: the package stays .py.
-    main.py and config.py are always .py, because MicroPython does not start a main.mpy and the rider edits config.py.
+    mpy: the board's sys.implementation._mpy, for which the package is compiled to .mpy files; None: the package stays
+    .py. main.py and config.py are always .py, because MicroPython does not start a main.mpy and users edit config.py.
     compiler: see bytecode.compiled(). Raises CannotCompile.
     """
     files = firmware_files()
@@ -41,13 +41,13 @@ def contents(mpy: int | None, compiler: bytecode.Compiler | None = None) -> dict
 
 
 def unfinished(path: str) -> str:
-    """The name of a file until it is verified. An incomplete main.py must not start, and an incomplete config.py must
-    not be kept as the rider's own."""
+    """The name that a file has on the board until it is verified. Otherwise an incomplete main.py could start, or an
+    incomplete config.py could be kept as the user's own."""
     return path.removesuffix(".py") + ".new" if path in (CONFIG, MAIN) else path
 
 
 def mip_package() -> dict[str, object]:
-    """The content of package.json. The URLs are relative: mip loads the modules from the place of the list."""
+    """The content of package.json. The URLs are relative, so mip loads the modules from the place of the list."""
     modules = [path.lstrip("/") for path in firmware_files() if path.startswith(PACKAGE + "/")]
     return {"urls": [[module, module] for module in modules], "deps": [], "version": __version__}
 

@@ -1,4 +1,4 @@
-"""Updates the firmware on a board: copies and verifies files that differ, removes files of older versions."""
+"""Updates the firmware on a board: copies and verifies changed files, and removes files of older versions."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -15,8 +15,8 @@ from .connection import ConnectedBoard, Port, Progress, ask, connected, describe
 from .firmware_files import CONFIG, contents, unfinished
 from .update import Update, plan, refuse_without_room
 
-_TRIES = 3  # attempts to copy a file: a cable may lose a byte
-_CHUNK = 2048  # bytes per exchange; with mpremote's 256, copying takes 1.5 times as long
+_TRIES = 3  # attempts to copy a file, because a cable may lose a byte
+_CHUNK = 2048  # bytes per transfer; with mpremote's 256, copying takes 1.5 times as long
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class InstallResult:
     """Paths on the board.
 
     copied: files that were copied and verified. copied_bytes: their size. kept: files that were not changed. removed:
-    files of older versions. config_differs: True if the rider's config.py, which is kept, is not this version's.
+    files of older versions. config_differs: True if the user's config.py, which is kept, is not this version's.
     """
 
     copied: list[str]
@@ -36,10 +36,10 @@ class InstallResult:
 
 @dataclass(frozen=True)
 class FlashResult:
-    """board: its name and version of MicroPython. port: its name. config: the config.py that was checked before
-    copying, or None. others: one line per file of another project that was kept under another name. unused: settings in
-    the rider's config.py that are behind a '#'. why_sources: the reason why the firmware was not compiled, or None.
-    installed: the files."""
+    """board: the board's name and its version of MicroPython. port: the port's name. config: the config.py that was
+    checked before copying, or None. others: one line per file of another project, kept under another name. unused:
+    settings in the user's config.py that are behind a '#'. why_sources: the reason why the firmware was not compiled,
+    or None. installed: the files."""
 
     board: str
     port: str
@@ -61,10 +61,10 @@ def flash(
 ) -> FlashResult:
     """Bring a board's files up to date, verify them and restart it.
 
-    replace_config: update the rider's config.py too. describe: returns the board's name, and refuses other devices.
-    compiler, judge: replacements if mpy-cross or another process cannot run; None: bytecode.cross_compiled() and
+    replace_config: also update the user's config.py. describe: returns the board's name, and refuses other devices.
+    compiler, judge: functions to use where mpy-cross or another process cannot run; None: bytecode.cross_compiled() and
     config_check.judge(). agree: called with one line per file of another project that will be renamed; may raise
-    InputError. Raises InputError; for lack of room it does so before any change.
+    InputError. Raises InputError. If the board has too little room, nothing is changed.
     """
     with connected(port) as (transport, name):
         board = describe(transport, name)
@@ -89,7 +89,7 @@ def flash(
             if there.moves and agree:
                 agree(there.words())
         except InputError:
-            restart(transport)  # the board's program starts again
+            restart(transport)  # start the interrupted program again
             raise
         installed = install(transport, update, progress)
         restart(transport)
@@ -102,8 +102,8 @@ def prepare(
     replace_config: bool = False,
     there: others.Others | None = None,
 ) -> Update:
-    """The Update for install(). Changes nothing. wanted: see contents(). there: the files of other projects. Raises
-    InputError."""
+    """Plan the Update for install(), without changing the board. wanted: see contents(). there: the files of other
+    projects. Raises InputError."""
     present = there.files if there else survey(transport)
     update = plan(wanted, present, replace_config)
     if there and there.moves:
@@ -113,10 +113,10 @@ def prepare(
 
 
 def install(transport: SerialTransport, update: Update, progress: Progress | None = None) -> InstallResult:
-    """Carry out an update. Raises InputError if a file reads back differently, OSError, TransportError.
+    """Carry out an update. Raises InputError if a file reads back differently; also OSError and TransportError.
 
-    main.py is removed first, and copied after the rest is verified. So an interruption leaves a board that starts
-    nothing and can be flashed again, never a mixture of versions.
+    main.py is removed first, and copied after the other files are verified. After an interruption, the board therefore
+    starts nothing and can be flashed again. It never runs a mixture of versions.
     """
     for path, to in update.moves.items():
         transport.exec(f"import os\nos.rename({path!r}, {to!r})")
@@ -142,8 +142,8 @@ def install(transport: SerialTransport, update: Update, progress: Progress | Non
             break
         if attempt == _TRIES - 1:
             raise InputError(
-                f"{next(iter(left))[1:]} reads back differently, {_TRIES} times: the connection loses bytes, take "
-                "another USB cable or port and try again; if it stays so, the flash is worn out"
+                f"{next(iter(left))[1:]} reads back differently, {_TRIES} times: the connection loses bytes, use "
+                "another USB cable or port and try again; if that does not help, the flash is worn out"
             )
     for path in update.copy:
         if unfinished(path) != path:
@@ -152,8 +152,9 @@ def install(transport: SerialTransport, update: Update, progress: Progress | Non
 
 
 def _contents(transport: SerialTransport, compiler: bytecode.Compiler | None) -> tuple[dict[str, bytes], str | None]:
-    """The firmware for this board, and the reason why it is not compiled."""
-    mpy = ask(transport, "getattr(__import__('sys').implementation, '_mpy', 0)", int)  # 0: accepts no compiled files
+    """The firmware for this board, and the reason why it is not compiled, or None."""
+    # 0: the board accepts no compiled files
+    mpy = ask(transport, "getattr(__import__('sys').implementation, '_mpy', 0)", int)
     try:
         return contents(mpy, compiler), None
     except bytecode.CannotCompile as reason:
@@ -161,6 +162,6 @@ def _contents(transport: SerialTransport, compiler: bytecode.Compiler | None) ->
 
 
 def _differing(transport: SerialTransport, copied: dict[str, bytes]) -> dict[str, bytes]:
-    """The files whose content on the board differs from the sent content."""
+    """The files that read back from the board with another content than sent."""
     found = survey(transport).files if copied else {}
     return {path: data for path, data in copied.items() if found.get(unfinished(path)) != fingerprint(data)}

@@ -1,4 +1,4 @@
-"""Finds another project's main.py, boot.py and config.py on a used board. They are renamed and kept."""
+"""Finds another project's main.py, boot.py and config.py on a used board, to rename and keep them."""
 
 import ast
 import hashlib
@@ -20,9 +20,9 @@ from .firmware_files import CONFIG, MAIN, PACKAGE
 
 BOOT = "/boot.py"
 _KEPT = "-before-kickstand"
-_MANY = 3  # no other project's file has so many of Kickstand's settings; others may also have a DISPLAY
+_MANY = 3  # a file with this many of Kickstand's settings is Kickstand's; one alone, such as DISPLAY, proves nothing
 _ON_THE_BOARD = "config.py on the board"
-# The first digits of the SHA-256 of every main.py that Kickstand has had, with \n as the line's end
+# The first digits of the SHA-256 of every released main.py of Kickstand, with \n as line end
 _OWN_MAIN = {
     "390e716171ec58a6",
     "863631249d4a19b6",
@@ -47,9 +47,9 @@ _CORRECT_OR_REPLACE = Remedy(
 
 @dataclass(frozen=True)
 class Others:
-    """What was on a board. files: its files and folders. moves: the new name of each file to rename, by its path.
-    config: the content that the board's own config.py should have; None without one, or if it is renamed. mended: True
-    if config differs from the board's current one."""
+    """The files that were on a board. files: its files and folders. moves: the new name of each file to rename, by
+    path. config: the content that the user's config.py on the board should have; None without one, or if it is renamed.
+    mended: True if config differs from the current content."""
 
     files: BoardFiles
     moves: dict[str, str]
@@ -63,22 +63,22 @@ class Others:
 
 @dataclass(frozen=True)
 class Contents:
-    """files: the board's files and folders. texts: content of MAIN, BOOT and CONFIG, if they exist."""
+    """files: the board's files and folders. texts: the content of MAIN, BOOT and CONFIG, if they exist."""
 
     files: BoardFiles
     texts: dict[str, bytes]
 
 
 def read(transport: SerialTransport) -> Contents:
-    """Read the board's files. Changes nothing."""
+    """Read the board's files, without changing anything."""
     files = survey(transport)
     there = [path for path in (MAIN, BOOT, CONFIG) if path in files.files]
     return Contents(files, {path: bytes(transport.fs_readfile(path)) for path in there})
 
 
 def find(there: Contents, judge: Callable[[Path], Judged], replace_config: bool) -> Others:
-    """Decide which files to rename. judge: checks a config.py for this board. replace_config: True if the rider's
-    config.py will be replaced. Raises InputError for a config.py of the rider's that would stop the firmware."""
+    """Decide which files to rename. judge: checks a config.py for this board. replace_config: True if the user's
+    config.py will be replaced. Raises InputError if the user's config.py would stop the firmware."""
     installed = PACKAGE in there.files.folders
     leave = []
     if MAIN in there.texts and not _is_own_main(there.texts[MAIN]):
@@ -109,7 +109,7 @@ def find(there: Contents, judge: Callable[[Path], Judged], replace_config: bool)
 
 
 def _check_config(content: bytes, judge: Callable[[Path], Judged]) -> tuple[bytes, str | None]:
-    """The content as MicroPython reads it, and its fault."""
+    """The content in the encoding that MicroPython reads, and its fault or None."""
     try:
         content = cleaned(content)
     except InputError as error:
@@ -128,7 +128,7 @@ def _is_own_main(content: bytes) -> bool:
 
 
 def _settings_named(content: bytes) -> int:
-    """Number of Kickstand's settings that a config.py sets, also behind a '#'."""
+    """The number of Kickstand's settings in a config.py, including those behind a '#'."""
     shipped = (firmware_path.directory() / "config.py").read_text(encoding="utf-8")
     setting = r"^(?:# )?([A-Z][A-Z_0-9]+) = "
     text = content.decode("utf-8", "replace").replace("\r\n", "\n")
@@ -136,7 +136,7 @@ def _settings_named(content: bytes) -> int:
 
 
 def _does_something(content: bytes) -> bool:
-    """True if the file has more than comments and texts. MicroPython's own boot.py on an ESP32 has only these."""
+    """True if the file has more than comments and strings. MicroPython's own boot.py on an ESP32 has only these."""
     try:
         body = ast.parse(content).body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -145,7 +145,7 @@ def _does_something(content: bytes) -> bool:
 
 
 def _free_name(path: str, taken: set[str]) -> str:
-    """A name that no file has: main-before-kickstand.py, main-before-kickstand-2.py ..."""
+    """The first unused name of main-before-kickstand.py, main-before-kickstand-2.py and so on."""
     stem = path.removesuffix(".py") + _KEPT
     names = [f"{stem}.py", *(f"{stem}-{n}.py" for n in range(2, len(taken) + 3))]
     return next(name for name in names if name not in taken)

@@ -1,9 +1,9 @@
-"""Plans an update of a board: the files and folders to remove and to create, and checks the free space.
+"""Plans an update of a board: which files and folders to remove and to create. Also checks the free space.
 
-A file takes whole flash blocks. They are freed when it is removed, or when its replacement is closed. Each block after
-the first begins with pointers of 4 bytes to earlier blocks (littlefs, DESIGN.md, "CTZ skip-lists"). A small file may be
-stored within its folder instead: up to an eighth of a block, less on some boards. A folder takes two blocks, and two
-more when its entries outgrow them.
+A file takes whole flash blocks. The blocks are freed when the file is removed, or when its replacement is closed. Each
+block after the first begins with pointers of 4 bytes to earlier blocks (littlefs, DESIGN.md, "CTZ skip-lists"). A small
+file, of up to an eighth of a block or less on some boards, may be stored in the blocks of its folder. A folder takes
+two blocks, and two more if its entries do not fit.
 """
 
 from dataclasses import dataclass, field
@@ -15,12 +15,12 @@ from .board_files import BoardFiles, fingerprint
 from .firmware_files import CONFIG, MAIN, MODULE_ENDINGS, PACKAGE, unfinished
 
 FOLDER_BLOCKS = 2
-SPARE_BLOCKS = 4  # a folder may outgrow its two blocks, and littlefs writes a new block before it frees a worn one
+SPARE_BLOCKS = 4  # a folder may need more than two blocks, and littlefs writes a new block before it frees a worn block
 _POINTER = 4
 
 
 def most_blocks(size: int, block: int) -> int:
-    """Most flash blocks that a file of this many bytes may take."""
+    """The largest number of flash blocks that a file of this many bytes can take."""
     count = 1
     while size > block * count - _POINTER * (2 * (count - 1) - (count - 1).bit_count()):
         count += 1
@@ -28,18 +28,18 @@ def most_blocks(size: int, block: int) -> int:
 
 
 def least_blocks(size: int, block: int) -> int:
-    """Flash blocks that are freed for certain when a file of this many bytes is removed."""
+    """The number of flash blocks that are certainly freed when a file of this many bytes is removed."""
     return most_blocks(size, block) if size > block // 8 else 0
 
 
 @dataclass(frozen=True)
 class Update:
-    """The steps of an update, in this order. A board that is up to date needs none.
+    """The steps of an update, in this order. For a board that is up to date, there are no steps.
 
-    remove: files, main.py first.  remove_folders: already empty by then.  make_folders: folders to create.
+    remove: files, main.py first.  remove_folders: folders, then empty.  make_folders: folders to create.
     copy: contents by path, main.py last.  obsolete: files in `remove` that belong to no module of this version.
     keep: files that stay unchanged. moves: the new names of files of another project, by their paths; they are renamed
-    first. config_differs: True if the rider's config.py, which is kept, is not this version's.
+    first. config_differs: True if the user's config.py, which is kept, is not this version's.
     """
 
     remove: list[str]
@@ -53,10 +53,10 @@ class Update:
 
 
 def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> Update:
-    """Plan the Update that gives the board the wanted files. The rider's own files are kept.
+    """Plan the Update that gives the board the wanted files. The user's own files are kept.
 
-    Replaced files are removed first, which frees their blocks. Nothing is lost: without main.py the board starts
-    nothing, and the firmware can be copied again. Raises InputError for a file in the way.
+    Files to replace are removed first, which frees their blocks. An interruption is harmless, because a board without
+    main.py starts nothing and can be flashed again. Raises InputError if a file of the user's is in the way.
     """
     copy = {path: data for path, data in wanted.items() if board.files.get(path) != fingerprint(data)}
     config_differs = CONFIG in copy and CONFIG in board.files and not replace_config
@@ -73,8 +73,8 @@ def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> U
     in_order = dict.fromkeys([MAIN, *stale, *copy] if copy else [])
     modules = {_module(path) for path in wanted}
     return Update(
-        remove=[path for path in in_order if path in board.files and path != CONFIG],  # config.py belongs to the rider
-        remove_folders=sorted(empty, reverse=True),  # the inner ones first
+        remove=[path for path in in_order if path in board.files and path != CONFIG],  # config.py belongs to the user
+        remove_folders=sorted(empty, reverse=True),  # inner folders first
         make_folders=sorted(folders - board.folders),
         copy=copy,
         obsolete=[path for path in stale if _module(path) not in modules],
@@ -84,7 +84,7 @@ def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> U
 
 
 def needed_blocks(update: Update, board: BoardFiles) -> int:
-    """Number of flash blocks that must be free for an update."""
+    """The number of flash blocks that must be free for an update."""
     if not update.copy:
         return 0
     takes = sum(most_blocks(len(data), board.block) for data in update.copy.values())
@@ -94,12 +94,12 @@ def needed_blocks(update: Update, board: BoardFiles) -> int:
 
 
 def refuse_without_room(update: Update, board: BoardFiles) -> None:
-    """Raise InputError for an update that would fill the flash."""
+    """Raise InputError if the flash has not enough room for an update."""
     blocks = needed_blocks(update, board)
     if blocks <= board.free_blocks:
         return
     remedy = Remedy("remove files of your own from it")
-    if board.has_rides and f"{PACKAGE}/rides" in board.folders:  # firmware up to 0.4 must be updated before that
+    if board.has_rides and f"{PACKAGE}/rides" in board.folders:  # older firmware, up to 0.4, cannot be pulled from
         remedy = Remedy(
             "pull the rides with kickstand pull --delete, then flash again",
             "save the rides with the page Live, delete them on the board by its menu, then install again",
@@ -122,8 +122,8 @@ def _folders(path: str) -> list[str]:
 
 
 def _refuse_in_the_way(wanted: dict[str, bytes], folders: set[str], kept: set[str]) -> None:
-    """Raise InputError for a rider's file that MicroPython would import instead of a wanted one: a folder lean/ instead
-    of lean.py, and lean.py instead of lean.mpy."""
+    """Raise InputError if MicroPython would import a user's file instead of a wanted file: a folder lean/ instead of
+    lean.py, or lean.py instead of lean.mpy."""
     modules = {_module(path) for path in wanted}
     for path in sorted(kept):
         if path in folders or modules.intersection(_folders(path)):

@@ -1,14 +1,14 @@
-"""Estimates a motorcycle's whole ride at once: Gauss-Newton over all of its readings, with the model of equations.py.
+"""Estimates a motorcycle's ride from all of its readings at once, by Gauss-Newton steps with the model of equations.py.
 
     windows.py        readings -> means over 0.2 s
-    first_guess.py    where the bike stands, its lean and speed, roughly; for an alignment also the axes
-    unknowns.py       the states, the parameters, and the prior of these
+    first_guess.py    when the bike stands, rough lean and speed; for an alignment also rough axes
+    unknowns.py       the states, the parameters, and their prior
     equations.py      process model, measurement model and their Jacobian
     noise.py          process noise and measurement noise
-    hypotheses.py     other changes possible in a ride, and the posterior weight of each such hypothesis
-    solver.py         the linear least squares of one step: states by Schur complement, then the chain of blocks
-    least_squares.py  the steps: states and parameters with their covariance
+    hypotheses.py     what else may change during a ride; the posterior weight of each hypothesis
+    solver.py         linear least squares of one step: Schur complement over states, then the chain of blocks
+    least_squares.py  all steps; gives states and parameters with their covariance
 
-Two results: the alignment with its covariance (alignment.py, `kickstand calibrate ride`), and the smoothed lean with
-its standard deviation (smooth.py, `kickstand smooth`).
+There are two results: the alignment with its covariance (alignment.py, `kickstand calibrate ride`), and the smoothed
+lean with its standard deviation (smooth.py, `kickstand smooth`).
 """

@@ -1,11 +1,11 @@
-"""Finds the alignment of a motorcycle's sensor, with its covariance, from an ordinary ride without poses.
+"""Finds the alignment of a motorcycle's sensor, with its covariance, from an ordinary ride. It needs no poses.
 
 The readings are rotated by a first guess of the axes (first_guess.py). Then the misalignment is estimated together with
-the motion, the gyro's bias and the errors of sensor and bike. The prior is too wide to contain information about the
-misalignment. The lean follows the gyro through the bends. Its mean on straights is the bike's own up, because the bike
-is balanced there; the residual force across the bike is then the bias of the accelerometer. A lateral offset of the
-centre of mass cannot be distinguished from a roll misalignment. Errors between the sensor's axes cannot be
-distinguished from the misalignment either: they are the larger part of its standard deviation.
+the motion, the gyro's bias and the errors of sensor and bike. The prior of the misalignment
+is so wide that it adds no information. The lean follows the gyro through the bends. On straights the bike is balanced,
+so the mean lean there shows the bike's own up; the residual force across the bike is the bias of the accelerometer. A
+lateral offset of the centre of mass cannot be distinguished from a roll misalignment. Errors between the sensor's axes
+cannot be distinguished from the misalignment either. They cause most of the alignment's standard deviation.
 """
 
 from dataclasses import dataclass
@@ -30,37 +30,37 @@ from .unknowns import ACCEL, BESIDE, BIAS, BIAS_PER_C, DELAY, LEAN, MEAN, OFFSET
 from .windows import WINDOW_S, Windows, windows_of
 
 SLOWEST_HZ = 20.0
-LONGEST_S = 1800.0  # more than half an hour of a ride adds nothing
+LONGEST_S = 1800.0  # a longer part of a ride does not improve the result
 # Standard deviations of the prior
 ROTATION_SIGMA = 10.0  # rad: misalignment, which is unknown
 AXES_SIGMA = 0.012  # ratio: scale and cross-axis errors of the accelerometer
-BESIDE_SIGMA_G = 0.005  # force to the side on straights, by luggage or camber
-UNSETTLED = np.radians(0.5)  # if the last step changed an angle by more, the estimate has not converged
-# An estimated error of the sensor over ODD_SIGMAS of its prior enlarges the standard errors. Over ABSURD_SIGMAS the
-# ride is refused
+BESIDE_SIGMA_G = 0.005  # force to the side on straights, caused by luggage or camber
+UNSETTLED = np.radians(0.5)  # the estimate has not converged if the last step changed an angle by more
+# If an estimated error of the sensor is over ODD_SIGMAS of its prior, the standard errors are enlarged. If it is over
+# ABSURD_SIGMAS, the ride is refused
 ODD_SIGMAS, ABSURD_SIGMAS = 4.0, 20.0
 MAX_DEG = np.array([5.0, 5.0, 3.5])  # pitch, yaw, roll: an alignment with a larger standard error is refused
-MOVED_DEG = 8.0  # so is one if the two halves of the ride differ by more
+MOVED_DEG = 8.0  # an alignment is also refused if the two halves of the ride differ by more
 CONSTANT = Hypotheses(*np.array([[1e-5], [1e-5], [1e-4], [0.0], [1.0]]))  # nothing changes in the ride
 
-# The mountings of a phone that its user can name: a check of the ride's result, and a hint if the ride shows little. A
-# phone's axes, seen by someone who looks at its screen: x to the right, y to the top, z out of the screen (W3C Device
-# Orientation; Android and iOS have the same).
+# The mountings of a phone that its user can name. They check the ride's result, and help if the ride shows little.
+# A phone's axes, as seen by a person looking at the screen, are: x to the right, y to the top, z out of the screen (W3C
+# Device Orientation; the same on Android and iOS).
 X, Y, Z = np.eye(3)
 
-# Rows left, up, forward. A screen that faces the rider looks backward; landscape: turned to either side.
+# Rows: left, up, forward. A screen that faces the rider faces backward. landscape: turned to either side.
 PHONES = {
     "portrait": [np.array([-X, Y, -Z])],
     "landscape": [np.array([Y, X, -Z]), np.array([-Y, -X, -Z])],
     "flat": [np.array([-X, Z, Y])],
 }
 PHONE_SIGMA_DEG = 20.0  # a holder may be tilted towards the rider's eyes
-PHONE_MAX_DEG = 45.0  # the mountings are at least 90 degrees apart
+PHONE_MAX_DEG = 45.0  # half the angle between two mountings, which differ by at least 90 degrees
 
 
 @dataclass(frozen=True)
 class RideHalves(Message):
-    """Two halves of the ride give two alignments."""
+    """The two halves of the ride give different alignments."""
 
     differ_deg: float
 
@@ -87,7 +87,7 @@ class RideUncertain(Message):
 
 @dataclass(frozen=True)
 class PhoneOtherwise(Message):
-    """The phone is not mounted as its user says."""
+    """The phone is not mounted as the user says."""
 
     phone: str
     off_deg: float
@@ -99,7 +99,7 @@ class PhoneOtherwise(Message):
 
 @dataclass(frozen=True)
 class PhoneUpsideDown(Message):
-    """With accelerations of the opposite sign the phone would be mounted as its user says."""
+    """The phone is mounted as the user says only if all accelerations have the opposite sign."""
 
     phone: str
 
@@ -112,13 +112,14 @@ class PhoneUpsideDown(Message):
 class RideFit:
     """The alignment from a ride, with its quality. Angles in degrees.
 
-    roll_deg, pitch_deg, yaw_deg: standard errors of the alignment about forward, left and up. Most of them comes from
-    errors of the sensor that a ride does not show. Upright is the balanced position on straights. halves_deg: second
-    half of the ride minus first half, in these three. offset_g (3): bias of the accelerometer along left, up and
-    forward, which the calibration subtracts; offset_sigma_g (3): standard errors. used_s: first and last second of the
-    log in which the sensor was mounted. riding_s, standing_s: seconds of that time. lean_deg: rms of the ride's lean.
-    lag_s: delay of the log's speed, None without a speed. phone_deg: angle between the mounting found and the one named
-    by `phone`, None if `phone` was None. notices: remarks about the log.
+    roll_deg, pitch_deg, yaw_deg: standard errors of the alignment about forward, left and up. They come mostly from
+    errors of the sensor that a ride does not show. Upright is the balanced position on straights. halves_deg: roll,
+    pitch and yaw from the second half of the ride minus those from the first half. offset_g (3): bias of the
+    accelerometer along left, up and forward, which the calibration subtracts; offset_sigma_g (3): standard errors.
+    used_s: begin and end of the time in the log, s, during which the sensor was mounted. riding_s, standing_s: seconds
+    of that time. lean_deg: rms of the ride's lean. lag_s: delay of the log's speed, None without a speed. phone_deg:
+    angle between the mounting found and the mounting named by `phone`, None if `phone` was None. notices: remarks about
+    the log.
     """
 
     calibration: CalibrationFile
@@ -140,11 +141,11 @@ class RideFit:
 def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = None) -> RideFit:
     """Find the alignment of a sensor on a motorcycle from a ride with bends, without poses.
 
-    log: see read_log; a speed helps and is optional. phone: None, or its mounting: "portrait", "landscape" or "flat"
-    (see PHONES). progress: called with (steps done, all steps). Up is where the bike is balanced on
-    straights, forward is the axis about which it leans into its bends and along which it speeds up; leaning into bends
-    separates left from right. Scale errors of the accelerometer are not observable from a ride. Raises InputError;
-    RefusedInput, a subclass with a Message, if the ride does not determine the sensor's mounting.
+    log: see read_log; a speed helps and is optional. phone: None, or the phone's mounting: "portrait", "landscape" or
+    "flat" (see PHONES). progress: called with (steps done, all steps). Up is the direction in which the bike is
+    balanced on straights. Forward is the axis about which the bike leans into bends, and along which it speeds up. The
+    lean in bends distinguishes left from right. Scale errors of the accelerometer are not observable from a ride.
+    Raises InputError; RefusedInput, a subclass with a Message, if the ride does not determine the sensor's mounting.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("city", seed=3, seconds=240.0)
@@ -176,11 +177,11 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
 
 
 def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) -> Estimate:
-    """Estimate the misalignment against a first guess, with the motion.
+    """Estimate the motion, and the misalignment relative to a first guess.
 
-    windows: along the sensor's axes. expected: vehicle from sensor (3, 3) as named by the user, None if unknown. The
-    alignment is the result's matrix times that of the guess. The result's parameters are the same in each block.
-    Raises RefusedInput if no alignment fits.
+    windows: along the sensor's axes. expected: the matrix (3, 3), vehicle from sensor, of the mounting that the user
+    named; None if unknown. Alignment = the result's matrix times the guess's matrix. All blocks of the result have the
+    same parameters. Raises RefusedInput if no alignment fits.
     """
     sigma, mean = Prior.of_pose(six_done=False).sigma, MEAN.copy()
     sigma[ROTATION], sigma[ACCEL], sigma[BESIDE] = ROTATION_SIGMA, AXES_SIGMA, BESIDE_SIGMA_G
@@ -198,8 +199,8 @@ def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) ->
 
 def mounted_windows(log: Log) -> Windows:
     """The windows, along the sensor's axes, of the longest stretch of a log in which the mean force keeps its
-    direction: before and after, a hand held the sensor. Readings beyond MOST_G and MOST_DPS are left out. Raises
-    RefusedInput."""
+    direction. Before and after this stretch, a hand held the sensor. Readings beyond MOST_G and MOST_DPS are left out.
+    Raises RefusedInput."""
     log = log.part(np.all(np.abs(log.accel_g) < MOST_G, axis=1) & np.all(np.abs(log.gyro_dps) < MOST_DPS, axis=1))
     windows = _windows(log)
     mean = averaged(windows.force, MOUNTED_S)
@@ -210,7 +211,7 @@ def mounted_windows(log: Log) -> Windows:
     if not len(mounted):
         raise RefusedInput(RideShort(0.0, MIN_RIDING_S))
     begin, end = mounted[np.argmax(np.diff(mounted, axis=1))]
-    margin = round(MOUNTED_S / WINDOW_S)  # after this number of windows the mean contains only the ride
+    margin = round(MOUNTED_S / WINDOW_S)  # this many windows from the edge, the mean contains only the ride
     first = windows.edges[begin + margin * (begin > 0)]
     last = windows.edges[end - margin * (end < len(windows))]
     return _windows(log, (log.t_s >= first) & (log.t_s < min(last, first + LONGEST_S)))
@@ -233,12 +234,12 @@ def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | N
     odd = float(np.max(np.abs(parameters[SENSOR] / prior.sigma[SENSOR])))
     if odd > ABSURD_SIGMAS:
         raise RefusedInput(RideContradicts())
-    # if the halves differ by more than the standard error, there was a disturbance that the model lacks
+    # if the halves differ by more than the standard error, there was a disturbance outside the model
     error = np.hypot(np.degrees(sigma[ROTATION]), 0.5 * halves) * max(1.0, odd / ODD_SIGMAS)
     if np.any(error > MAX_DEG):
         raise RefusedInput(RideUncertain(*(float(error[i]) for i in (2, 0, 1))))
     pitch, yaw, roll = (float(angle) for angle in error)
-    # then the calibrated force on a level, upright bike is 1 g up for any scale errors
+    # with this offset, the calibrated force on a level, upright bike is 1 g up despite scale errors
     offset = parameters[OFFSET] + parameters[ACCEL].reshape(3, 3)[:, 1]
     matrix, states = found.matrix @ guess.matrix, found.states[: len(windows) + 1]
     bias = guess.bias + np.median(states[:, BIAS], axis=0) @ matrix
@@ -274,8 +275,8 @@ def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | N
 
 
 def _mounting(phone: str, found: Array) -> Array:
-    """The matrix (3, 3) of PHONES[phone] that is nearest to `found`. Raises RefusedInput if `found` differs by over
-    PHONE_MAX_DEG from it."""
+    """The matrix (3, 3) of PHONES[phone] that is nearest to `found`. Raises RefusedInput if the two differ by over
+    PHONE_MAX_DEG."""
     off, nearest = min(((_off_deg(found, matrix), i) for i, matrix in enumerate(PHONES[phone])))
     if off > PHONE_MAX_DEG:
         mirrored = found * [[1.0], [-1.0], [-1.0]]  # the result if the accelerations have the opposite sign

@@ -1,25 +1,25 @@
 """The process model and the measurement model of a motorcycle, and their Jacobian.
 
-Lean t, pitch q, velocity of the sensor to the left, up and forward (l, u, v), in level axes that yaw with the bike at
-the rate p. Rates w and forces f are the readings without the sensor's errors:
+The states are lean t, pitch q, and the sensor's velocity to the left, up and forward (l, u, v), in level axes that yaw
+with the bike at the rate p. Rates w and forces f are the readings without the sensor's errors:
 
     w = R w_m + GYRO w_m - bias        f = R f_m + ACCEL f_m + offset        R: ROTATION, to second order
     p = (w_x sin t + w_y cos t) / cos q        t' = w_z - p sin q        q' = w_y sin t - w_x cos t
     l' = a_l - p v        v' = a_f + p l        u' = a_u        a: the force in level axes, less 1 g upwards
 
-These are the equations of the firmware's kickstand.lean.bike_model, without its assumption of no motion sideways or up.
-Here that is a measurement with noise: an error of velocity is brief, while every bump causes errors of acceleration.
-The wheels' velocity is the sensor's minus the rates times the sensor's place (rigid body). The measurements are
-differences that should be 0:
+These are the equations of the firmware's kickstand.lean.bike_model, which assumes no motion sideways or up. Here, no
+motion is a measurement with noise instead: an error of velocity is brief, while every bump causes errors of
+acceleration. The wheels' velocity is the sensor's velocity minus the rates times the sensor's position (rigid body).
+The measurements are differences that should be 0:
 
-    SLIDING      the wheels' velocity sideways: they do not slide
-    CLIMBING     their velocity up less that along the chassis: it points along the road, but for its dive in braking,
-                 (8) of the firmware's kickstand.lean.dive: the springs' pitch is no motion of the wheels
-    SLOPING      their velocity up: roads are level on average
-    BALANCED     the force to the side, less TYRES, CAMBER and BESIDE (see unknowns.py): a bike that rides is balanced
-    ANY_SPEED    the speed less USUAL_MPS        MEASURED_SPEED    the speed less the log's, which is late
-    RESTING      the velocity, and RESTING_RATE the rates, of a bike that stands (zero-velocity update)
-    BACKWARD     the speed where it is under 0
+    SLIDING      the wheels' velocity sideways, because wheels do not slide
+    CLIMBING     the wheels' velocity up minus the part due to the chassis' pitch: the chassis points along the road,
+                 except for dive in braking, (8) in the firmware's kickstand.lean.dive, which moves no wheel
+    SLOPING      the wheels' velocity up, because roads are level on average
+    BALANCED     the force to the side minus TYRES, CAMBER and BESIDE (see unknowns.py): a moving bike is balanced
+    ANY_SPEED    the speed minus USUAL_MPS        MEASURED_SPEED    the speed minus the log's, delayed
+    RESTING      the velocity, and RESTING_RATE the rates, of a standing bike (zero-velocity update)
+    BACKWARD     a speed under 0
 """
 
 import numpy as np
@@ -30,13 +30,13 @@ from . import unknowns as of
 from .unknowns import BIAS, FORWARD, LEAN, LEFT, PITCH, STATES, UP
 from .windows import Windows
 
-# Rows of the measurements, after those of the process model
+# Rows of the measurements, after the rows of the process model
 SLIDING, CLIMBING, SLOPING, BALANCED, ANY_SPEED, MEASURED_SPEED = range(STATES, STATES + 6)
 RESTING, RESTING_RATE, BACKWARD = slice(14, 17), slice(17, 20), 20
 ROWS = 21
 USUAL_MPS = 15.0  # mean of the speed's prior
 STRAIGHT = 0.1  # rad: up to this lean a road is cambered; in bends with more lean it is banked into the bend
-STEP = 1e-6  # of finite differences, in the unknowns' units
+STEP = 1e-6  # step of the finite differences, in the unknowns' units
 
 
 def process_and_measurements(windows: Windows, x: Array) -> Array:
@@ -89,17 +89,18 @@ def jacobian(windows: Windows, x: Array, unknown: Ints) -> Array:
 
 
 def corrected_rates(rate: Array, x: Array, warm: Array) -> Array:
-    """(3, n): rates about left, up, forward (rad/s) without the gyro's errors. rate (3, n): as measured. x (STATES +
-    PARAMETERS, n): states and parameters. warm (n): see Windows."""
+    """(3, n): rates about left, up, forward (rad/s) without the gyro's errors. rate (3, n): the measured rates. x
+    (STATES + PARAMETERS, n): states and parameters. warm (n): see Windows."""
     return _corrected(rate, x[STATES:], of.GYRO) - x[BIAS] - x[STATES:][of.BIAS_PER_C] * warm
 
 
 def _corrected(readings: Array, p: Array, errors: slice) -> Array:
-    """readings (3, n), turned by the rotation, + errors readings."""
+    """Turn readings (3, n) by the rotation, and add the matrix of errors times the readings."""
     x, y, z = readings
     a, b, c = p[of.ROTATION]
     e = p[errors]
-    # to second order: without it a yaw of 7 degrees lengthens the readings by 0.8 %, as an error of scale would
+    # second order is needed: to first order, a yaw of 7 degrees would lengthen the readings by 0.8 %, like a scale
+    # error
     u, v, w = 0.5 * (b * z - c * y), 0.5 * (c * x - a * z), 0.5 * (a * y - b * x)
     return np.array(
         (

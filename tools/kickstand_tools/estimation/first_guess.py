@@ -1,5 +1,5 @@
-"""Finds the starting point of the estimation: when the bike stands, its lean and speed, and for an alignment its
-axes."""
+"""Finds the starting point of the estimation: when the bike stands, its rough lean and speed and, for an alignment,
+rough axes."""
 
 import itertools
 from dataclasses import dataclass, replace
@@ -16,21 +16,22 @@ from ..signals.leaning import WINDOW_S, Leaning, averaged, leaning_of, speed_in_
 from .windows import Windows
 
 STILL_S = 1.6  # shorter standstills look like smooth riding
-STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # a standing bike's windows differ by less over STILL_S (1 sigma)
+STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # 1 sigma over STILL_S; the windows of a standing bike differ by less
 BIAS_RADPS = np.radians(4.0)  # limit of the gyro's bias since its calibration: a higher mean rate is a bend
 MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # while the sensor is mounted, its mean force over MOUNTED_S is this close to up
-BETWEEN_S = 20.0  # a shorter time between two movements in a hand counts as in the hand too
-SURELY_S = 4.0  # surely in a hand if it seems so for this long: otherwise the bike may ride or fall
+BETWEEN_S = 20.0  # a shorter time between two movements in a hand also counts as in the hand
+SURELY_S = 4.0  # a longer movement is certainly in a hand; a shorter one may be riding or a fall
 SLOW_S = 4.0  # slower changes of lean are computed from the yaw rate, faster ones from the roll rate
-TURNS_S = 40.0  # the speed is computed from the bends within this time
-CALM_S = 1.0  # without a standstill, the gyro's bias is the mean over almost calm stretches of this length
+TURNS_S = 40.0  # the speed is computed from the bends in this time
+CALM_S = 1.0  # without a standstill, the gyro's bias is the mean over calm stretches of this length
 MIN_RIDING_S = 30.0
 MIN_LEAN = np.radians(3.0)  # rms: a ride with less lean does not show forward
-MIN_LIKENESS = 0.5  # correlation between leaning and turning; bikes have over 0.75
-MAX_PUSHED = 0.5  # force to the side over the lean in bends; bikes have 0.1 to 0.2, because of their tyres' width
-CAR_G, CAR_LEAN = 0.045, np.radians(5.0)  # rms of a car: the force to the side is larger, the lean smaller
-STUCK_MPS = 0.5  # a log's speed that changes by less is stuck
-MAX_SPEED_FACTOR = 1.8  # limit of the ratio of the log's speed to that from the bends, and of its inverse
+MIN_LIKENESS = 0.5  # least correlation between leaning and turning; bikes have over 0.75
+# largest force to the side, divided by the lean in bends; bikes have 0.1 to 0.2, due to the tyres' width
+MAX_PUSHED = 0.5
+CAR_G, CAR_LEAN = 0.045, np.radians(5.0)  # rms limits of a car: its force to the side is larger, and its lean smaller
+STUCK_MPS = 0.5  # a log's speed is stuck if it changes by less
+MAX_SPEED_FACTOR = 1.8  # limit of the ratio between the log's speed and the speed from the bends, either way
 # Prior of the speed from the bends: this speed, with the weight of bends of this yaw rate
 USUAL_MPS, USUAL_RADPS = 10.0, 0.14
 
@@ -49,7 +50,7 @@ class RideShort(Message):
 
 @dataclass(frozen=True)
 class NoBends(Message):
-    """It leans too little to show forward. lean_deg: rms."""
+    """The bike leans too little to show forward. lean_deg: rms of the lean."""
 
     lean_deg: float
 
@@ -91,16 +92,18 @@ def _calm(w: Windows, over_s: float) -> Bools:
 
 
 def in_hand(w: Windows) -> tuple[Bools, Bools]:
-    """Two arrays (n). True where the sensor is surely moved in a hand, or is on a fallen bike, because up is far from
-    its usual direction. True in these windows and the seconds around them, which may not be riding either.
+    """Two arrays (n). The first is True where a hand certainly moves the sensor, or the bike has fallen: up is far from
+    its usual direction. The second is also True in the seconds around these windows, which may not be riding either.
 
-    On a bike in balance the force is along its own up at any lean.
+    On a balanced bike, the force points along the bike's own up at any lean.
     """
     there = ~w.gap
     mean = averaged(w.force * there[:, None], MOUNTED_S)
     off = there & (mean[:, 1] < np.cos(np.radians(MOUNTED_DEG)) * np.linalg.norm(mean, axis=1))
     places = np.flatnonzero(off)
-    if len(places):  # between two of them, and between one and an end of the log, the sensor may not be mounted
+    if len(
+        places
+    ):  # between two such movements, or between a movement and an end of the log, the sensor may not be mounted
         ends = np.concatenate(([0], places, [len(w) - 1]))
         for begin, end in itertools.pairwise(ends):
             if w.edges[end + 1] - w.edges[begin] < BETWEEN_S:
@@ -112,8 +115,8 @@ def in_hand(w: Windows) -> tuple[Bools, Bools]:
 def lean_and_speed(w: Windows, still: Bools) -> tuple[Array, Array]:
     """Approximate lean (n, rad) and speed (n, m/s). still (n): see standing().
 
-    Without a speed in the log, it is computed from the force in bends: in balance the force is 1 / cos(lean), and speed
-    x yaw rate = g tan(lean).
+    If the log has no speed, the force in bends gives the speed: in balance, the force is 1 / cos(lean), and speed x yaw
+    rate = g tan(lean).
     """
     known, yaw = w.known_speed, w.rate[:, 1]
     force = averaged(np.linalg.norm(w.force[:, :2], axis=1), 2.0)
@@ -130,7 +133,8 @@ def lean_and_speed(w: Windows, still: Bools) -> tuple[Array, Array]:
 
 @dataclass
 class Axes:
-    """matrix (3, 3): vehicle from sensor, rows left, up, forward. bias (3, rad/s): the gyro's, in the sensor's axes."""
+    """matrix (3, 3): vehicle from sensor, rows left, up, forward. bias (3, rad/s): the gyro's bias, in the sensor's
+    axes."""
 
     matrix: Array
     bias: Array
@@ -139,9 +143,9 @@ class Axes:
 def axes(w: Windows) -> Axes:
     """The vehicle's axes, within some degrees, and the gyro's bias. w: windows along the sensor's axes.
 
-    In balance the specific force has the direction of the bike's own up, so its mean while riding is up. For forward
-    and the handedness see signals/leaning.py. Raises RefusedInput if the ride is not a motorcycle's,
-    or has too little lean.
+    In balance, the specific force points along the bike's own up, so the mean force while riding shows "up". For
+    forward and the handedness see signals/leaning.py. Raises RefusedInput if the ride is not a motorcycle's, or has too
+    little lean.
     """
     bias = _bias(w)
     w = replace(w, rate=w.rate - bias)
@@ -156,8 +160,8 @@ def axes(w: Windows) -> Axes:
 
 
 def _bias(w: Windows) -> Array:
-    """(3, rad/s) the gyro's bias: the median rate at rest; without a standstill, that in calm riding; without that, in
-    the whole ride, because most of a ride is nearly straight."""
+    """(3, rad/s) the gyro's bias: the median rate at rest. Without a standstill, the median rate in calm riding;
+    without calm riding, in the whole ride, because most of a ride is nearly straight."""
     for over_s in (STILL_S, CALM_S):
         places = _calm(w, over_s)
         if np.any(places):
@@ -166,8 +170,8 @@ def _bias(w: Windows) -> Array:
 
 
 def _refuse_no_motorcycle(found: Leaning, sideways: Array, riding: Bools) -> None:
-    """Raise RefusedInput unless the ride is a motorcycle's with enough leaning and right-handed rates. sideways (n):
-    force to the left, g, without its slow changes."""
+    """Raise RefusedInput if the ride is not a motorcycle's, leans too little, or has rates that are not right-handed.
+    sideways (n): force to the left, g, without its slow changes."""
     in_radians_mps = speed_in_radians(found)
     if in_radians_mps is not None:
         raise RefusedInput(RatesInRadians(in_radians_mps))
@@ -180,14 +184,14 @@ def _refuse_no_motorcycle(found: Leaning, sideways: Array, riding: Bools) -> Non
         raise RefusedInput(NoBends(float(np.degrees(lean))))
     if pushed > MAX_PUSHED or found.likeness < MIN_LIKENESS:
         raise RefusedInput(RideContradicts())
-    # a leaned bike that turns also turns about its own left
+    # a leaning bike that turns also rotates about its own left
     if found.share < 0.0:
         raise RefusedInput(LeftHanded())
 
 
 def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array) -> None:
     """Raise RefusedInput if the log's speed is stuck or not in m/s: compare it with the speed at which yaw rate and
-    lean in bends balance. known: the log's speed, NaN if it has none."""
+    lean in bends are in balance. known: the log's speed, NaN without one."""
     if not len(known) or np.isnan(known[0]):
         return
     if np.ptp(known) < STUCK_MPS:

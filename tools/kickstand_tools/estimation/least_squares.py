@@ -1,7 +1,7 @@
 """Robust nonlinear least squares for the states and parameters of a stretch of a ride, by Gauss-Newton steps.
 
-Residuals are the states' changes from window to window minus those of the process model, and the measurements, each
-divided by its standard deviation. Outliers of both are down-weighted (Cauchy).
+The residuals are the measurements, and the states' changes from window to window minus the changes predicted by the
+process model. Each is divided by its standard deviation. Outliers of both are down-weighted (Cauchy).
 """
 
 import numpy as np
@@ -16,32 +16,32 @@ from .unknowns import BIAS, CAMBER, FORWARD, LEAN, LEFT, PARAMETERS, PITCH, ROTA
 from .windows import Windows
 
 BLOCK = 50  # windows of a block; see solver.py
-ROUNDS, PLAIN_ROUNDS = 20, 2  # most steps; the first PLAIN_ROUNDS of them do not down-weight outliers
-# rad, a step's largest change of an angle: under NEAR the hypotheses are weighted, under CONVERGED the steps end
+ROUNDS, PLAIN_ROUNDS = 20, 2  # largest number of steps; the first PLAIN_ROUNDS do not down-weight outliers
+# rad, a step's largest change of an angle. Under NEAR, the hypotheses are weighted; under CONVERGED, the steps end
 NEAR, CONVERGED = np.radians([3.0, 0.02])
 WEIGHING_ROUNDS = 2  # number of steps that recompute the weights of the hypotheses
-CAMBERED = 0.5  # unbalance on roads with camber. A smaller value shows roads with less camber, because camber changes.
-MAX_LEAN = 0.5  # rad: largest change of an angle in one step, because beyond it the equations are not linear
+CAMBERED = 0.5  # unbalance on roads with camber; camber changes, so a smaller unbalance shows roads with less camber
+MAX_LEAN = 0.5  # rad: largest change of an angle in one step; the equations are not linear over a larger change
 MAX_PITCH = 1.2  # rad: as in the firmware
 START = np.array([1.0, 0.3, 1.0, 1.0, 20.0, 0.03, 0.03, 0.03])  # standard deviations of the first state's prior
-# A steady ride on a straight may seem to stand for as long as BRIEF. Then a residual within AROUND windows is over
-# CONTRADICTED sigmas; at real standstills these are under 2.
+# A steady ride on a straight may look like a standstill for up to BRIEF. Then a residual within AROUND windows is over
+# CONTRADICTED sigmas; at real standstills it is under 2.
 BRIEF, AROUND, CONTRADICTED = 15, 25, 4.0
 CONTRADICTING = [PITCH, LEFT, UP, FORWARD, SLIDING, *range(RESTING.start, RESTING_RATE.stop)]
-DRAWN = [PITCH, LEFT, UP, *range(STATES)[BIAS]]  # components of a state whose prior has mean 0
+DRAWN = [PITCH, LEFT, UP, *range(STATES)[BIAS]]  # the components of a state whose prior has mean 0
 
 
 class Estimate:
     """Estimates the motion at the edges of n windows, and the errors of sensor and bike.
 
-    states (n + 1, STATES). parameters (B, PARAMETERS): of each block of BLOCK windows. matrix (3, 3): the rotation that
-    was applied to the windows, unless the prior is that of a pose. noise: of these windows. change: the last step's
-    largest change of an angle, rad.
+    states (n + 1, STATES). parameters (B, PARAMETERS): parameters of each block of BLOCK windows. matrix (3, 3): the
+    rotation that was applied to the windows, unless the prior comes from a pose. noise: the windows' Noise. change: the
+    last step's largest change of an angle, rad.
     """
 
     def __init__(self, windows: Windows, prior: Prior, hypotheses: Hypotheses) -> None:
-        """Run the estimation. hypotheses: see hypotheses.py; the first steps use only the first one. Raises LinAlgError
-        if the equations have no solution."""
+        """Run the estimation. hypotheses: see hypotheses.py; the first steps use only the first hypothesis. Raises
+        LinAlgError if the equations have no solution."""
         self._length = min(BLOCK, len(windows))
         self._windows = windows = windows.padded(self._length)
         self.prior, self._hypotheses, self.matrix = prior, hypotheses, np.eye(3)
@@ -55,8 +55,8 @@ class Estimate:
         self._use_own_noise()
 
     def unknowns(self, number: Ints, states: Array) -> Array:
-        """(STATES + PARAMETERS, k): states and parameters in the form of equations.py. number (k): index of the window
-        of each of states (k, STATES)."""
+        """(STATES + PARAMETERS, k): states and parameters in the form of equations.py. number (k): the window's index
+        for each row of states (k, STATES)."""
         return np.concatenate((states.T, self.parameters[number // self._length].T))
 
     def sigma(self) -> Array:
@@ -77,7 +77,8 @@ class Estimate:
         return found
 
     def split(self) -> Array:
-        """(3, rad): misalignment in the second half of the ride minus that in the first, if they may differ."""
+        """(3, rad): misalignment in the second half of the ride minus that in the first half, if the prior lets it
+        change."""
         walks = self._likely.random_walks(self.prior, self.parameters)
         middle = len(self.parameters) // 2
         walks.variance[:, middle - 1 : middle, ROTATION] = 1.0
@@ -92,12 +93,12 @@ class Estimate:
         self.states = np.zeros((len(self._windows) + 1, STATES))
         self.states[:, LEAN], self.states[:, FORWARD] = _at_edges(lean), _at_edges(speed)
         self.parameters = np.tile(self.prior.mean, (len(self._windows) // self._length, 1))
-        self.parameters[:, ROTATION] = 0.0  # second start: the windows are already rotated by the first result
+        self.parameters[:, ROTATION] = 0.0  # at a second start, the windows are already rotated by the first result
         self.change = np.inf
         self._converge()
 
     def _false_standstill(self, still: Bools) -> Bools:
-        """(n) True in brief standstills that the motion around them contradicts."""
+        """(n) True in brief standstills that are contradicted by the motion around them."""
         contradicted = np.max(np.abs(self._residuals() / self.noise.sigma())[:, CONTRADICTING], axis=1) > CONTRADICTED
         false = np.zeros_like(still)
         for begin, end in stretches(still):
@@ -117,15 +118,15 @@ class Estimate:
                 break
 
     def _learn_misfit(self) -> bool:
-        """Learn the misfit of accelerations. True if some accelerations in the ride are not the bike's."""
+        """Estimate the misfit of accelerations. Returns True if some accelerations in the ride are not the bike's."""
         self.noise.estimate_misfit(self._residuals())
         return bool(np.max(self.noise.misfit) > 1.0)
 
     def _use_own_noise(self) -> None:
-        """Set the noise to that of this ride's residuals.
+        """Set the noise from this ride's residuals.
 
-        Only the covariance uses this. The states are kept: they were found with the larger noise of a rough ride, which
-        gives less weight to lasting errors outside the model.
+        Only the covariance uses this noise. The states are kept. They were found with the larger noise of a rough ride,
+        which gives less weight to lasting errors outside the model.
         """
         off = self._residuals()
         self.noise.count_own_misfit()
@@ -134,8 +135,8 @@ class Estimate:
         self.prior.sigma[CAMBER] *= min(1.0, self.noise.unbalance / CAMBERED)
 
     def _step(self, robust: bool, weigh: bool) -> None:
-        """One Gauss-Newton step. robust: down-weight outliers. weigh: first compute the hypotheses' posterior weights.
-        Raises LinAlgError."""
+        """Do one Gauss-Newton step. robust: down-weight outliers. weigh: first compute the hypotheses' posterior
+        weights. Raises LinAlgError."""
         blocks = self._reduced(robust)
         if weigh:
             self._likely = self._hypotheses.weighted(blocks, self.prior, self.parameters, self.noise.unbalance)
@@ -154,7 +155,8 @@ class Estimate:
             self._turn_axes()
 
     def _turn_axes(self) -> None:
-        """Apply the rotation found so far to the readings and set it to 0, because equations.py is linear in it."""
+        """Rotate the readings by the rotation found so far, then set it to 0, because equations.py is valid for small
+        rotations only."""
         rotation = self.parameters[0, ROTATION].copy()
         self.parameters[:, ROTATION] -= rotation
         self.prior.mean[ROTATION] -= rotation
@@ -166,7 +168,7 @@ class Estimate:
         return self.unknowns(np.arange(len(self._windows)), 0.5 * (self.states[1:] + self.states[:-1]))
 
     def _residuals(self) -> Array:
-        """(n, ROWS): the states' changes over each window minus those of the process model, and the measurements."""
+        """(n, ROWS): the states' changes over each window minus the process model's, and the measurements."""
         x = self._middle()
         self.noise.lean, self.noise.pitch, self.noise.speed = x[LEAN], x[PITCH], x[FORWARD]
         found = process_and_measurements(self._windows, x).T
@@ -181,7 +183,8 @@ class Estimate:
         derivatives[:, :s] *= -windows.covered
         derivatives = derivatives.transpose(2, 1, 0) / sigma[..., None]
         found = np.empty((len(windows), ROWS, 2 * s + len(unknown) + 1))
-        found[..., :s] = found[..., s : 2 * s] = 0.5 * derivatives[..., :s]  # the middle is the mean of both edges
+        # the state in the middle is the mean of the states at both edges
+        found[..., :s] = found[..., s : 2 * s] = 0.5 * derivatives[..., :s]
         step = np.arange(s)
         found[:, step, step] -= 1.0 / sigma[:, :s]
         found[:, step, s + step] += 1.0 / sigma[:, :s]

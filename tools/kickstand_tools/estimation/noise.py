@@ -1,9 +1,9 @@
 """Process noise and measurement noise for equations.py, with all their parameters. The random walk of the mount and of
 the sensor's errors is in hypotheses.py.
 
-Form of the lines: symbol = default # unit: meaning. Standard deviations are 1 sigma. A disturbance that lasts tau
-seconds, measured in each window of T seconds, gets the variance sigma^2 2 tau / T, because measurements that share an
-error must not count as independent.
+Each line has the form: symbol = default # unit: meaning. Standard deviations are 1 sigma. A disturbance that lasts tau
+seconds is measured in each window of T seconds. Its variance is sigma^2 2 tau / T, because measurements that share an
+error are not independent.
 """
 
 import numpy as np
@@ -16,65 +16,68 @@ from .unknowns import BIAS, FORWARD, LEAN, LEFT, PITCH, UP
 from .windows import Windows
 
 # Process noise, per square root of a second
-ANGLE_ROOT = np.radians(0.2)  # rad: lean and pitch, by vibration of the gyro
-VELOCITY_ROOT = (0.05, 0.05, 0.10)  # m/s: left, up, forward, by vibration of the accelerometer
-BIAS_ROOT = np.radians(0.005)  # rad/s: the gyro's bias where the log has a temperature
-WARMING_ROOT = np.radians(0.01)  # rad/s: the same without a temperature; 0.6 deg/s in five minutes of warming up
-# Without readings, and in the hand: lean and pitch (rad), velocity left, up, forward (m/s), per square root of a
-# second; also their limit over a long time
+ANGLE_ROOT = np.radians(0.2)  # rad: lean and pitch, due to vibration of the gyro
+VELOCITY_ROOT = (0.05, 0.05, 0.10)  # m/s: left, up, forward, due to vibration of the accelerometer
+BIAS_ROOT = np.radians(0.005)  # rad/s: the gyro's bias if the log has a temperature
+# rad/s: the gyro's bias without a temperature; a gyro that warms up changes by 0.6 deg/s in five minutes
+WARMING_ROOT = np.radians(0.01)
+# Without readings, and in the hand, per square root of a second: lean and pitch (rad), velocity left, up, forward
+# (m/s). The same values limit the noise over a long time
 LOST_ROOT = np.array([np.radians(30.0), np.radians(5.0), 3.0, 1.0, 4.0])
 LOST_MOST = np.array([np.radians(60.0), np.radians(8.0), 20.0, 2.0, 20.0])
-# A jolt falsifies the angles by JOLTED_S times the excess over JOLTED_RADPS of a rate's difference from its window's
-# mean
+# After a jolt, the angles are wrong by JOLTED_S times (difference of a rate from the window's mean - JOLTED_RADPS)
 JOLTED_RADPS, JOLTED_S = np.radians(150.0), 0.06
 JOLT = 4.0  # sigmas: a larger residual of the process model is a jolt to the sensor, and down-weighted (Cauchy)
 
-# Measurement noise, 1 sigma, each with the duration of such an error (..._S)
-SLIDE_MPS, SLIDE_SHARE, SLIDE_S = 0.15, 0.01, 0.5  # wheels' sideways velocity: m/s, and times speed x tan(lean)
-DIVE_MPS, DIVE_RAD, DIVE_S = 0.1, np.radians(2.5), 0.5  # their upward velocity: m/s, and chassis pitch against the road
-SLOPE_MPS, SLOPE_RAD, SLOPE_S = 0.1, np.radians(2.0), 4.0  # the same for the road's slope against the horizontal
-STEEP = np.radians(10.0)  # at this pitch both standard deviations double: roads are less steep, wheelies steeper
-BALANCE_G, BALANCE_S = 0.011, 3.0  # force to the side, by wind, camber and the rider
-# Further noise of that force: g, times sin(lean), and g s2/rad, times the roll acceleration
+# Measurement noise, 1 sigma, each with the time (..._S) that such an error lasts
+SLIDE_MPS, SLIDE_SHARE, SLIDE_S = 0.15, 0.01, 0.5  # wheels' sideways velocity: m/s, and share of speed x tan(lean)
+# wheels' upward velocity: m/s, and pitch of the chassis relative to the road
+DIVE_MPS, DIVE_RAD, DIVE_S = 0.1, np.radians(2.5), 0.5
+# wheels' upward velocity due to slopes: m/s, and the road's slope
+SLOPE_MPS, SLOPE_RAD, SLOPE_S = 0.1, np.radians(2.0), 4.0
+STEEP = np.radians(10.0)  # at this pitch DIVE_RAD and SLOPE_RAD double: roads are less steep, wheelies steeper
+BALANCE_G, BALANCE_S = 0.011, 3.0  # force to the side, due to wind, camber and the rider
+# Further noise of the force to the side: g, times sin(lean), and g s2/rad, times the roll acceleration
 BALANCE_LEANED_G, BALANCE_ROLLING = 0.045, 0.05
-BALANCE_MIN_MPS = 4.0  # at lower speeds, steering and feet matter
-ANY_MPS, ANY_S = 20.0, 60.0  # deviation of the speed from USUAL_MPS, used if nothing else shows the speed
-SPEED_MPS = 1.0  # the log's speed, in each second: a receiver's error lasts for some seconds
+BALANCE_MIN_MPS = 4.0  # at lower speeds, steering and feet also balance the bike
+ANY_MPS, ANY_S = 20.0, 60.0  # difference of the speed from USUAL_MPS, for a ride in which nothing else shows the speed
+SPEED_MPS = 1.0  # the log's speed, per second, because a receiver's error lasts for some seconds
 REST_MPS, REST_RADPS = 0.05, np.radians(0.15)  # velocity and rates of a bike that stands
-HAND_MPS = 0.5  # velocity of a sensor that is moved about by hand, over a window
+HAND_MPS = 0.5  # velocity over a window of a sensor that a hand moves
 BACKWARD_MPS = 0.3  # speed below 0: bikes hardly roll backwards
 OUTLIER = 2.0  # sigmas: larger residuals of measurements are down-weighted (Cauchy)
 LASTING_S = {eq.SLIDING: SLIDE_S, eq.CLIMBING: DIVE_S, eq.SLOPING: SLOPE_S, eq.BALANCED: BALANCE_S, eq.ANY_SPEED: ANY_S}
 
-# A ride's roughness is estimated from the rms of these residuals over those expected in a rough ride
+# A ride's roughness is estimated from the rms of these residuals, divided by the rms expected in a rough ride
 ROUGH = [LEAN, PITCH, LEFT, UP, FORWARD, eq.SLIDING, eq.CLIMBING]
 EXPECTED = np.array([0.38, 0.38, 0.38, 0.38, 0.38, 0.5, 0.5])
 ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
-# Accelerations that are not the bike's, such as those of a resonating mount, are white noise only if they are brief.
-# Their size and correlation time show in CLIMBING: the upward velocities from integrated forces and from pitch and
-# speed differ for seconds. The velocities' standard deviation grows with the square of this residual's rms, in means
-# over LASTING_MISFIT_S and times the root of their number of windows, divided by that of an ordinary ride,
-# USUAL_MISFIT. At any speed its unit is CLIMBING's standard deviation at MISFIT_MPS: a mount's error in m/s is the same
-# in town as on a motorway.
+# Accelerations that are not the bike's, for example in a resonating mount, are white noise only if they are brief.
+# The residual CLIMBING shows their size and correlation time: it is the difference between the upward velocity from
+# integrated forces and the one from pitch and speed, and lasts for seconds. The misfit is the factor on the velocities'
+# standard deviation. It is the square of a ratio: the rms of this residual in means over LASTING_MISFIT_S, times the
+# root of the number of windows in a mean, divided by the same value of an ordinary ride, USUAL_MISFIT. At any speed,
+# the unit of the residual is CLIMBING's standard deviation at MISFIT_MPS, because a mount's error in m/s is the same in
+# town as on a motorway.
 LASTING_MISFIT_S, MISFIT_MPS, USUAL_MISFIT, MOST_MISFIT = 2.0, 25.0, 0.25, 6.0
-# If the misfit is over 1, roughness is at least this factor times the misfit, because residuals of lasting errors are
-# small
+# If the misfit is over 1, roughness is at least this factor times the misfit, because lasting errors have small
+# residuals
 MISFIT_ROUGHNESS = 0.14
 # A ride's unbalance is estimated in the same way: from the rms of BALANCED in means over some seconds, minus its mean
 # over LASTS_S (which is unknowns.BESIDE), divided by its standard deviation. Longer means average out errors that
-# change sign, such as a rider's corrections. BRIEF_S overestimates the noise to be cautious, LONG_S does not.
+# change sign, such as a rider's corrections. BRIEF_S overestimates the noise for caution; LONG_S does not.
 BRIEF_S, LONG_S, LASTS_S = 3.0, 10.0, 40.0
 LEAST_UNBALANCE, MOST_UNBALANCE = 0.12, 6.0
-LEAST_WINDOWS = 50  # with fewer windows of balanced riding unbalance stays 1
+LEAST_WINDOWS = 50  # with fewer windows of balanced riding, unbalance stays 1
 
 
 class Noise:
     """The standard deviations of n windows. still (n): True where the bike stands.
 
-    lean, pitch (n, rad), speed (n, m/s): estimates, which must be set before sigma(). riding (n): True where the bike
-    is riding, or may be. roughness (n): 1 for a rough ride; multiplies the noise of vibration. misfit (n): factor on
+    lean, pitch (n, rad), speed (n, m/s): estimates, which must be set before sigma() is called. riding (n): True where
+    the bike may be riding. roughness (n): factor on the noise of vibration, 1 for a rough ride. misfit (n): factor on
     the velocities' noise, 1 if the accelerations are the bike's. doubtful (n): True where the bike is riding and the
-    misfit is at its limit. unbalance: 1 for an average ride; multiplies the noise of BALANCED.
+    misfit is at its limit. unbalance: factor on the noise of BALANCED, 1 for an average ride.
     """
 
     def __init__(self, windows: Windows, still: Bools) -> None:
@@ -87,7 +90,8 @@ class Noise:
         self._own_misfit, self.doubtful = self.misfit, np.zeros(len(windows), dtype=bool)
         seconds = np.maximum(windows.seconds, 1e-4)
         self._root = np.sqrt(seconds)[:, None]
-        self._lasting = np.ones((len(windows), eq.ROWS))  # factor on a window's sigma for an error that lasts longer
+        # factor on a window's sigma, for errors that last longer than the window
+        self._lasting = np.ones((len(windows), eq.ROWS))
         for row, over_s in LASTING_S.items():
             self._lasting[:, row] = np.sqrt(np.maximum(1.0, 2.0 * over_s / seconds))
 
@@ -123,12 +127,12 @@ class Noise:
 
     def robust(self, sigma: Array, off: Array) -> Array:
         """sigma (n, ROWS), enlarged where the residual off (n, ROWS) is an outlier (Cauchy)."""
-        limit = OUTLIER / self._lasting  # in sigmas of the disturbance itself, not in those enlarged by its duration
+        limit = OUTLIER / self._lasting  # in sigmas of the disturbance, without the factor for its duration
         limit[:, : BIAS.start], limit[:, BIAS] = JOLT, np.inf
         return sigma * np.hypot(1.0, off / sigma / limit)
 
     def estimate_roughness(self, residual: Array) -> None:
-        """Set roughness from the mean square, around each window, of the residuals over their standard deviations
+        """Set roughness from the mean square, around each window, of the residuals divided by their standard deviations
         (n, ROWS)."""
         squares = np.mean((residual[:, ROUGH] / EXPECTED) ** 2, axis=1) * self.roughness**2
         share = averaged(self.riding.astype(float), ROUGHNESS_S)
@@ -137,10 +141,10 @@ class Noise:
         self.roughness = np.where(share > 0.02, np.clip(np.sqrt(found), least, MOST_ROUGHNESS), 1.0)
 
     def estimate_misfit(self, off: Array) -> None:
-        """Estimate the difference of accelerations from the bike's, from the residuals off (n, ROWS).
+        """Estimate from the residuals off (n, ROWS) how much the accelerations differ from a bike's.
 
-        For the states the unit is CLIMBING's standard deviation, which grows with speed: slow rides get too little
-        weight, at little cost. For the covariance, after count_own_misfit(), the unit is m/s.
+        For the states, the unit is CLIMBING's standard deviation, which grows with speed. Slow rides get too little
+        weight, which costs little. For the covariance, after count_own_misfit(), the unit is m/s.
         """
         limit = OUTLIER / self._lasting[:, eq.CLIMBING]
 
@@ -154,11 +158,11 @@ class Noise:
         self.doubtful = self.riding & (self.misfit >= MOST_MISFIT)
 
     def count_own_misfit(self) -> None:
-        """From now on use the misfit in m/s in sigma()."""
+        """Make sigma() use the misfit in m/s from now on."""
         self.misfit = self._own_misfit
 
     def _misfit(self, residual: Array) -> Array:
-        """(n) misfit from the residual of CLIMBING in its unit (n)."""
+        """(n) the misfit, from the residual of CLIMBING in its unit (n)."""
         count = round(LASTING_MISFIT_S / WINDOW_S)
         lasting = np.where(self.riding, residual, 0.0)
         # limited, because in a wheelie the residual is large but brief
@@ -177,15 +181,15 @@ class Noise:
             return
         off = force - averaged(np.where(counted, force, 0.0), LASTS_S) / np.maximum(share, 1e-9)
         mean = averaged(np.where(counted, off / self._of_balance(), 0.0), over_s)[whole]
-        # a mean over over_s keeps this share of the variance of an error that lasts BALANCE_S
+        # the share of the variance that is left in a mean over over_s, for an error that lasts BALANCE_S
         ratio = over_s / BALANCE_S
         left = 2.0 * (ratio - 1.0 + np.exp(-ratio)) / ratio**2
         self.unbalance = float(np.clip(np.sqrt(np.mean(mean**2) / left), LEAST_UNBALANCE, MOST_UNBALANCE))
 
     @property
     def _wheelie_factor(self) -> Array:
-        """(n) factor on the noise of the wheels' upward motion: in a wheelie the chassis does not point along the
-        road."""
+        """(n) factor on the noise of the wheels' upward motion, because in a wheelie the chassis does not point along
+        the road."""
         return 1.0 + (self.pitch / STEEP) ** 4
 
     @property
@@ -198,5 +202,5 @@ class Noise:
 
 
 def jolted(windows: Windows) -> Array:
-    """(n) rad: possible error of the angles in each window, caused by a jolt or a gyro at the end of its range."""
+    """(n) rad: possible error of the angles in each window, due to a jolt or a gyro at the end of its range."""
     return JOLTED_S * np.maximum(windows.jolt - JOLTED_RADPS, 0.0)

@@ -23,26 +23,25 @@ from .windows import Windows, windows_of
 
 SLOWEST_HZ = 10.0
 SEGMENT_S = 120.0  # a log is cut into segments of this length
-TOGETHER = 8  # this many segments are estimated together, with one before and one after them
-# Further standard deviations of the lean. LEANED_SHARE: times the lean, for errors outside the model, such as the
-# gyro's sensitivity to acceleration. TIMING_S: times the roll rate, for the delay of the gyro's low-pass and errors of
-# the samples' times
+TOGETHER = 8  # number of segments estimated together, with one more before and one after
+# Two more parts of the lean's standard deviation. LEANED_SHARE times the lean: errors outside the model, such as the
+# gyro's sensitivity to acceleration. TIMING_S times the roll rate: the delay of the gyro's low-pass filter, and errors
+# of the samples' times
 LEANED_SHARE = 0.001
 TIMING_S = 0.002  # s
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps", "doubtful")
 DIGITS = 3, 3, 3, 3, 0
-DOUBTFUL = 0.2  # share of the riding; a larger share gives a remark
-# Largest lean at which a bike is in balance on straights, if the upright pose was right and there is no luggage on one
-# side
+DOUBTFUL = 0.2  # a larger share of doubtful riding gives a remark
+# On straights, a bike balances within this lean if the upright pose was right and no luggage is on one side
 POSE_DEG = 1.8
-# An estimated error of the gyro over this many standard deviations of its prior means a faulty gyro: no sound one was
-# over 2.6 on good and bad mounts. Then the lean's standard deviation grows by that factor.
+# A gyro is faulty if an estimated error is over this many standard deviations of its prior; good gyros stayed under
+# 2.6, on good and bad mounts. The error in standard deviations then multiplies the lean's standard deviation
 ODD_SIGMAS = 4.0
 
 
 @dataclass(frozen=True)
 class SensorOdd(Message):
-    """The gyro's errors are larger than any sound gyro's."""
+    """The gyro's errors are larger than those of any working gyro."""
 
     sigmas: float
 
@@ -56,7 +55,7 @@ class SensorOdd(Message):
 
 @dataclass(frozen=True)
 class NotTheBikes(Message):
-    """In so many percent of the riding the accelerations are not a bike's."""
+    """The accelerations are not a bike's. percent: share of the riding."""
 
     percent: float
 
@@ -70,7 +69,8 @@ class NotTheBikes(Message):
 
 @dataclass(frozen=True)
 class PoseOff(Message):
-    """The upright pose was not upright. angle_deg: where the bike is in balance, > 0 to the right of it."""
+    """The upright pose was not upright. angle_deg: the lean at which the bike is in balance, relative to that
+    pose, > 0 to the right."""
 
     angle_deg: float
 
@@ -91,8 +91,9 @@ class SmoothedRide(Table):
     """The motion of a motorcycle on a ride: n samples, NaN where the readings froze.
 
     t_s: seconds since the log's first sample. lean_deg: > 0 to the right. lean_sigma_deg: its standard deviation.
-    pitch_deg: of road and suspension, > 0 nose up. speed_mps: of the sensor, forward. doubtful: 1 where accelerations
-    differ so much from a bike's that the lean is less exact, otherwise 0. notices: remarks about the ride.
+    pitch_deg: pitch by road and suspension, > 0 nose up. speed_mps: the sensor's forward speed. doubtful: 1 where the
+    accelerations differ so much from a bike's that the lean is less exact, otherwise 0. notices: remarks about the
+    ride.
     """
 
     t_s: Array
@@ -126,7 +127,7 @@ def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None 
 def smooth_to_csv(
     log: Source, calibration: CalibrationFile, out: Path, progress: Progress | None = None
 ) -> tuple[int, list[Message]]:
-    """Write LEAN.csv: the log's own times, then COLUMNS. Returns the number of samples and the notices.
+    """Write LEAN.csv with the log's own times and COLUMNS. Returns the number of samples and the notices.
 
     Memory does not grow with the log. Raises InputError.
     """
@@ -137,7 +138,8 @@ def smooth_to_csv(
 def _checked_blocks(
     log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Message]
 ) -> Iterator[tuple[Block, Array]]:
-    """smooth_blocks() of the stretch in `log`. Raises InputError, also for under SLOWEST_HZ samples per second."""
+    """Yield from smooth_blocks() for the stretch in `log`. Raises InputError, also for under SLOWEST_HZ samples per
+    second."""
     whole, stretch = split_stretch(log)
     for block, found in smooth_blocks(whole, calibration, progress, notices):
         if found is None:
@@ -152,8 +154,8 @@ def smooth_blocks(
     notices: list[Message] | None = None,
     lines: bool = True,
 ) -> Iterator[tuple[Block, Array | None]]:
-    """Yield each segment of the log with its values (n, COLUMNS), None for too few samples per second. notices, lines:
-    see read_blocks(). Raises InputError."""
+    """Yield each segment of the log with its values (n, COLUMNS), or None if it has too few samples per second.
+    notices, lines: see read_blocks(). Raises InputError."""
     if calibration.vehicle == "car":
         raise InputError(f"{name_of(log)}: a car does not lean, and its calibration is a car's")
     if not calibration.aligned:
@@ -166,14 +168,14 @@ def smooth_blocks(
         if len(waiting) > TOGETHER:
             past, waiting, before = waiting[:TOGETHER], waiting[TOGETHER:], past[-1:]
             yield from smoother.together(before, past, waiting)
-    # the end of a ride may be short: earlier segments are estimated with it, up to TOGETHER
+    # the end of a ride may be short, so up to TOGETHER segments are estimated with it
     yield from smoother.together(past[-max(1, TOGETHER - len(waiting)) :], waiting, [])
     if notices is not None:
         notices.extend(smoother.remarks(notices))
 
 
 def _segments(blocks: Iterator[Block]) -> Iterator[Block]:
-    """The blocks cut into segments, none over SEGMENT_S."""
+    """Cut the blocks into segments of at most SEGMENT_S."""
     for block in blocks:
         number = np.floor(block.t_s / SEGMENT_S)
         cuts = np.flatnonzero(np.diff(number)) + 1
@@ -182,8 +184,7 @@ def _segments(blocks: Iterator[Block]) -> Iterator[Block]:
 
 
 class Smoother:
-    """Smooths a ride segment by segment, and collects remarks about errors that the standard deviation does not fully
-    contain."""
+    """Smooths a ride segment by segment. Collects remarks about errors that the standard deviation does not include."""
 
     def __init__(self, calibration: CalibrationFile) -> None:
         self._calibration = calibration
@@ -193,7 +194,8 @@ class Smoother:
     def together(
         self, before: list[Block], own: list[Block], after: list[Block]
     ) -> Iterator[tuple[Block, Array | None]]:
-        """Yield each of the segments `own` with its values, estimated together with those before and after them."""
+        """Yield the segments `own` with their values. The segments before and after them are estimated together with
+        them."""
         measured = [segment.measured for segment in (*before, *own, *after)]
         ends = np.cumsum([0, *(len(segment.time_us) for segment in measured)])
         first = int(ends[len(before)])
@@ -210,8 +212,9 @@ class Smoother:
             yield segment, found
 
     def estimated(self, segments: list[Block], own: slice) -> Array | None:
-        """(samples, COLUMNS), NaN where the readings are not a ride's; None for under SLOWEST_HZ samples per second.
-        own: the samples whose lean is wanted; the others only help to find it. Remarks count only these."""
+        """The values (samples, COLUMNS), NaN where the readings are not from riding; None for under SLOWEST_HZ samples
+        per second. own: the samples that need a lean. The other samples only improve the estimate. Remarks count
+        only the samples in own."""
         t_s = np.concatenate([segment.t_s for segment in segments])
         readings = np.concatenate([segment.readings for segment in segments])
         speed = np.concatenate([segment.speed_mps for segment in segments])
@@ -231,7 +234,7 @@ class Smoother:
             prior = Prior.of_pose(self._calibration.six_done, self._calibration.gyro_sigma_in_vehicle())
             estimate = Estimate(windows, prior, ALL)
         except np.linalg.LinAlgError:
-            return nothing  # readings that are not a ride's
+            return nothing  # the readings are not from riding
         noise, mine = estimate.noise, np.unique(windows.number[own])
         roll = float(np.mean(estimate.parameters[:, ROLL]))
         self.add(windows.seconds[mine], noise.riding[mine], noise.doubtful[mine], roll)
@@ -245,15 +248,16 @@ class Smoother:
         return found
 
     def add(self, seconds: Array, riding: Bools, doubtful: Bools, pose_rad: float) -> None:
-        """Count n windows. seconds: their durations. doubtful: True where accelerations are not the bike's. pose_rad:
-        lean to the right, relative to the upright pose, at which the bike is in balance on straights."""
+        """Count n windows for the remarks. seconds: the windows' durations. doubtful: True where accelerations are not
+        the bike's. pose_rad: lean to the right, relative to the upright pose, at which the bike is in balance on
+        straights."""
         riding_s = float(np.sum(seconds[riding]))
         self._riding_s += riding_s
         self._doubtful_s += float(np.sum(seconds[riding & doubtful]))
         self._leaned += riding_s * float(np.degrees(pose_rad))
 
     def remarks(self, known: Iterable[Message]) -> list[Message]:
-        """The remarks about the whole ride. known: existing remarks about it."""
+        """The remarks about the whole ride. known: remarks that exist already."""
         if not self._riding_s or is_explained(known):
             return []
         if self._odd:
@@ -269,10 +273,10 @@ def oddness(found: Estimate) -> float:
 
 
 def at_samples(windows: Windows, rate: Array, found: Estimate, delay_s: float) -> Array:
-    """(samples, 4): lean, its standard deviation, pitch (rad) and speed (m/s). Between the edges of the windows the
-    corrected gyro gives the lean.
+    """(samples, 4): lean, its standard deviation, pitch (rad) and speed (m/s). Between the edges of the windows, the
+    lean follows the corrected gyro.
 
-    rate (samples, 3): rad/s, the one passed to windows_of(). delay_s: delay of the gyro's low-pass.
+    rate (samples, 3): rad/s, as passed to windows_of(). delay_s: delay of the gyro's low-pass filter.
     """
     number, sigma = windows.number, found.sigma()[:, LEAN]
     duration = windows.before + windows.after

@@ -2,10 +2,10 @@
 
 The windows of a ride are arranged as B blocks of K windows. A link holds the normal equations of two successive states,
 with columns for the parameters of the block and for the right-hand side. Every second state is eliminated by its Schur
-complement, in all blocks at the same time, until one link per block is left (cyclic reduction). The blocks then form a
-chain, whose states are a block's first state together with its parameters. The same elimination solves this chain, for
-G hypotheses about the random walk at the same time, and gives the likelihood of each. The result equals that of one
-least-squares solution over the whole chain.
+complement, in all blocks at the same time, until one link per block remains (cyclic reduction). The blocks then form a
+chain. Each state of the chain is a block's first state together with the block's parameters. The same elimination
+solves this chain for G hypotheses about the random walk at the same time, and gives the likelihood of each. The result
+equals one least-squares solution over the whole chain.
 """
 
 from dataclasses import dataclass
@@ -19,11 +19,11 @@ from ..signals import Array
 class Reduced:
     """B chains whose inner states are eliminated. s: number of values of a state; m: number of a chain's parameters.
 
-    One array per level of the elimination, the first level first: gains (B, states, s, s + s + m + 1): a state's change
-    is minus this times (the previous state, the next state, the parameters, 1); covariances (B, states, s, s): the
-    covariance of a state, given these. left (B, s + s + m, s + s + m + 1): the normal equations of the first state, the
-    last one and the parameters; the last column is the gradient. log_determinant (B): that of the information matrix of
-    the eliminated states. residual (B): the sum of squares at their optimum.
+    gains and covariances have one array per level of the elimination, in order. gains (B, states, s, s + s + m + 1): a
+    state's change is minus this, times (the previous state, the next state, the parameters, 1). covariances (B, states,
+    s, s): the covariance of a state if these are fixed. left (B, s + s + m, s + s + m + 1): the normal equations of the
+    first state, the last one and the parameters; the last column is the gradient. log_determinant (B): the logarithm of
+    the determinant of the eliminated states' information matrix. residual (B): the sum of squares at their optimum.
     """
 
     s: int
@@ -44,8 +44,9 @@ def reduce_windows(jacobian: Array, states: int) -> Reduced:
 
 
 def _reduced(links: Array, common: Array) -> Reduced:
-    """Cyclic reduction. links (B, K, s + s, s + s + m + 1): normal equations of both states of each link. common
-    (B, m + 1, m + 1): those of the parameters, bordered by their gradient and the residual's sum of squares."""
+    """Do the cyclic reduction. links (B, K, s + s, s + s + m + 1): normal equations of both states of each link. common
+    (B, m + 1, m + 1): normal equations of the parameters, with their gradient and the residual's sum of squares in the
+    last row and column."""
     s = links.shape[2] // 2
     gains, covariances = [], []
     common, log_determinant = common.copy(), np.zeros(len(links))
@@ -77,8 +78,8 @@ def _in_rows(values: Array) -> Array:
 
 
 def back(reduced: Reduced, ends: Array, parameters: Array) -> Array:
-    """Back substitution. (B, K + 1, s): the changes of all states, from those of the first and the last state, `ends`
-    (B, 2, s), and of the parameters (B, m)."""
+    """Do the back substitution. Returns (B, K + 1, s): the changes of all states. ends (B, 2, s): changes of the first
+    and the last state. parameters (B, m): changes of the parameters."""
     states = ends
     for gain in reversed(reduced.gains):
         count = gain.shape[1]
@@ -91,7 +92,7 @@ def back(reduced: Reduced, ends: Array, parameters: Array) -> Array:
 
 def covariances(reduced: Reduced, joint: Array) -> Array:
     """(B, K, s + s, s + s + m): covariance of the states at both ends of each link, with each other and with the
-    parameters. joint (B, s + s + m, s + s + m): that of the first state, the last one and the parameters."""
+    parameters. joint (B, s + s + m, s + s + m): covariance of the first state, the last state and the parameters."""
     s, width = reduced.s, joint.shape[1]
     ends = np.r_[:s, 2 * s : 3 * s]  # rows of the two outer states of two links, which have three states
     all_but_inner = np.r_[ends, 3 * s : width + s]
@@ -116,11 +117,11 @@ def covariances(reduced: Reduced, joint: Array) -> Array:
 
 @dataclass
 class RandomWalks:
-    """The parameters' random walk by each of G hypotheses.
+    """The parameters' random walks under G hypotheses.
 
     prior (G, m, m + 1): normal equations of the first block's parameters. variance (G, B - 1, m): process noise, the
-    variance of their change from block to block. between (B - 1, m): that change in the values at which the equations
-    were linearised.
+    variance of the parameters' change from block to block. between (B - 1, m): the change from block to block in the
+    values at which the equations were linearised.
     """
 
     prior: Array
@@ -129,11 +130,11 @@ class RandomWalks:
 
 
 def _chains(blocks: Reduced, walks: RandomWalks) -> tuple[Reduced, Array, Array]:
-    """G chains of blocks. The n = s + m values of a state are a block's first state and its parameters; the values
-    after the last block are a copy.
+    """Build G chains of blocks. The n = s + m values of a state are a block's first state and its parameters. The
+    values after the last block are a copy.
 
-    Returns the chains, the normal equations (G, 2 n, 2 n + 1) of both ends of each, and minus twice the log-likelihood
-    (G), up to a constant common to all hypotheses.
+    Returns the chains, the normal equations (G, 2 n, 2 n + 1) of both ends of each chain, and minus twice the
+    log-likelihood (G), up to a constant common to all hypotheses.
     """
     (count, width), s = blocks.left.shape[:2], blocks.s
     hypotheses, n = len(walks.prior), width - s
@@ -176,8 +177,8 @@ def solve(blocks: Reduced, walks: RandomWalks, weight: Array) -> tuple[Array, Ar
 
 
 def posterior_covariance(blocks: Reduced, walks: RandomWalks, weight: Array) -> Array:
-    """(B, s + s + m, s + s + m): covariance of each block's first state, its last one and its parameters: the
-    covariance within the hypotheses plus that between their means."""
+    """(B, s + s + m, s + s + m): covariance of each block's first state, its last state and its parameters. It is
+    the covariance within the hypotheses plus the covariance between their means."""
     reduced, ends, _ = _chains(blocks, walks)
     s, n = blocks.s, reduced.s
     states = _first_states(reduced, ends)

@@ -1,6 +1,7 @@
-"""The unknowns: states at both edges of each window, and parameters, the errors of sensor and bike, with their prior.
+"""The unknowns: states at the edges of the windows, and parameters, which are errors of sensor and bike, with their
+prior.
 
-Parameters are constant within a block of windows and follow a random walk from block to block (see hypotheses.py).
+Parameters are constant within a block of windows. From block to block, they follow a random walk (see hypotheses.py).
 """
 
 from dataclasses import dataclass
@@ -9,21 +10,21 @@ import numpy as np
 
 from ..signals import Array, Ints
 
-# lean and pitch (rad), velocity of the sensor to the left, up and forward (m/s), bias of the gyro (rad/s)
+# The states: lean and pitch (rad), velocity of the sensor to the left, up and forward (m/s), bias of the gyro (rad/s)
 LEAN, PITCH, LEFT, UP, FORWARD, BIAS = 0, 1, 2, 3, 4, slice(5, 8)
 STATES = 8
 
-ROTATION = slice(0, 3)  # rad: misalignment about left, up, forward
+ROTATION = slice(0, 3)  # rad: misalignment of the sensor about left, up, forward
 GYRO = slice(3, 12)  # ratio: scale and cross-axis errors of the gyro, 3 x 3
 ACCEL = slice(12, 21)  # ratio: scale and cross-axis errors of the accelerometer, 3 x 3
 OFFSET = slice(21, 24)  # g: bias of the accelerometer
 HEIGHT, AHEAD = 24, 25  # m: the sensor's height above the roll axis, and its distance in front of the rear wheel
-TYRES = 26  # ratio: force to the side over (sin(lean) force up): in a lean, tyres touch the road beside their middle
-BESIDE = 27  # g: lasting level force to the side, by wind; see hypotheses.py
+TYRES = 26  # ratio: force to the side / (sin(lean) force up); at a lean, tyres touch the road beside their middle
+BESIDE = 27  # g: lasting level force to the side, due to wind; see hypotheses.py
 DELAY = 28  # s: delay of the log's speed
 DIVE = 29  # rad per g: pitch of the nose in braking, the share of (8) in the firmware's kickstand.lean.dive
 CAMBER = 30  # g: force to the side on straights, where a cambered road meets the tyres beside their middle
-# temperature coefficients of the accelerometer's bias (g per C) and the gyro's (rad/s per C), see Windows.warm
+# Temperature coefficients of the accelerometer's bias (g per C) and of the gyro's bias (rad/s per C): see Windows.warm
 OFFSET_PER_C, BIAS_PER_C = slice(31, 34), slice(34, 37)
 PARAMETERS = 37
 UP_SCALE = ACCEL.start + 4  # scale error of the accelerometer along up
@@ -34,8 +35,9 @@ SENSOR = slice(GYRO.start, OFFSET.stop)
 MEAN, SIGMA = np.zeros(PARAMETERS), np.zeros(PARAMETERS)
 SIGMA[ROTATION], SIGMA[GYRO] = np.radians([1.5, 5.0, 2.0]), 0.012
 SIGMA[OFFSET], SIGMA[UP_SCALE] = (0.001, 0.003, 0.003), 0.004
-SIGMA[OFFSET_PER_C], SIGMA[BIAS_PER_C] = 0.0003, np.radians(0.06)  # ordinary; the sheet allows three times that
-# ratio: change of the gyro's errors with temperature after the six positions measured them, as in the firmware
+# usual values; the data sheet allows three times as much
+SIGMA[OFFSET_PER_C], SIGMA[BIAS_PER_C] = 0.0003, np.radians(0.06)
+# ratio: change of the gyro's errors with temperature since the six positions measured them, as in the firmware
 GYRO_DRIFT = 0.002
 # Sigmas of OFFSET and UP_SCALE without the six positions
 WITHOUT_SIX_G, WITHOUT_SIX_SCALE = 0.04, 0.015
@@ -43,9 +45,9 @@ MEAN[HEIGHT], SIGMA[HEIGHT] = 0.5, 0.3
 MEAN[AHEAD], SIGMA[AHEAD] = 0.6, 0.5
 MEAN[TYRES], SIGMA[TYRES] = 0.07, 0.06
 SIGMA[BESIDE] = 0.001
-SIGMA[CAMBER] = 0.0035  # ordinary tyres, whose TYRES is 0.12, on a road that falls to the side by 3 %
+SIGMA[CAMBER] = 0.0035  # usual tyres, with TYRES 0.12, on a road that falls to the side by 3 %
 MEAN[DELAY], SIGMA[DELAY] = 0.4, 0.4
-MEAN[DIVE], SIGMA[DIVE] = 0.026, 0.035  # from none, or below 0 with anti-dive forks, to 6 degrees per g
+MEAN[DIVE], SIGMA[DIVE] = 0.026, 0.035  # from 0, or less with anti-dive forks, to 6 degrees per g
 
 
 @dataclass
@@ -61,8 +63,8 @@ class Prior:
     def of_pose(cls, six_done: bool, gyro_sigma: Array | None = None) -> "Prior":
         """The prior for a sensor that was aligned by poses.
 
-        six_done: its accelerometer was calibrated by six positions. gyro_sigma (3, 3): standard errors that they left
-        in the gyro's scale and axes, along left, up, forward; None or zeros where the gyro was not measured.
+        six_done: the accelerometer was calibrated by six positions. gyro_sigma (3, 3): standard errors of the gyro's
+        scale and axes after the six positions, along left, up, forward; None or zeros if the gyro was not measured.
         """
         sigma = SIGMA.copy()
         if gyro_sigma is not None and np.any(gyro_sigma):
@@ -78,10 +80,10 @@ class Prior:
 
     def information(self, sigma: Array) -> Array:
         """(m, m): information matrix (inverse covariance) of the prior with the standard deviations sigma (PARAMETERS).
-        A hypothesis may have enlarged them.
+        A hypothesis may have enlarged these.
 
-        The upright pose was measured with a biased accelerometer. So the prior holds for the sum of misalignment and
-        bias (the lean and pitch that the sensor reads in that pose), not for the misalignment alone.
+                The upright pose was measured with a biased accelerometer. Therefore the prior is about the sum of
+                        misalignment and bias, which is the lean and pitch that the sensor reads in that pose.
         """
         found = np.diag(np.divide(1.0, sigma**2, out=np.zeros(PARAMETERS), where=sigma > 0.0))
         if self.posed:

@@ -1,4 +1,4 @@
-"""A stretch of a ride as means over a fifth of a second, which average out the vibration of the engine."""
+"""Averages a stretch of a ride over windows of a fifth of a second, which removes the vibration of the engine."""
 
 from dataclasses import dataclass, replace
 
@@ -12,12 +12,13 @@ GAP_S = 0.17  # after a longer step between two samples, readings are missing
 
 @dataclass
 class Windows:
-    """n windows without gaps between them: one window with `gap` True spans a time of missing readings.
+    """n successive windows. A time of missing readings is one window with `gap` True.
 
-    edges (n + 1, s): times of their starts and ends. rate (n, 3, rad/s), force (n, 3, g): means, along the vehicle's
-    axes. jolt (n, rad/s): largest difference of a sample's rate from that mean. speed (n, m/s): NaN for none. warm (n,
-    C): temperature minus that at the start of the log, 0 if unknown. gap (n): True without readings. Per sample:
-    number, the index of its window; before and after (s): the time that it represents.
+    edges (n + 1, s): times of the windows' starts and ends. rate (n, 3, rad/s), force (n, 3, g): means, along the
+    vehicle's axes. jolt (n, rad/s): largest difference of a sample's rate from its window's mean. speed (n, m/s): NaN
+    if unknown. warm (n, C): temperature minus that at the start of the log, 0 if unknown. gap (n): True without
+    readings. Per sample: number, the index of its window; before and after (s): the time before and after it that the
+    sample represents.
     """
 
     edges: Array
@@ -41,7 +42,7 @@ class Windows:
 
     @property
     def covered(self) -> Array:
-        """(n) duration of the readings in each window, s: 0 in gaps."""
+        """(n) duration of the readings in each window, s; 0 in gaps."""
         return np.where(self.gap, 0.0, self.seconds)
 
     @property
@@ -79,11 +80,11 @@ class Windows:
 
 def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array, aligned: bool = False) -> Windows:
     """The Windows of samples: t_s (s), force (samples, 3, g), rate (samples, 3, rad/s), speed (m/s, NaN for no new
-    one), warm (C, see Windows).
+    value), warm (C, see Windows).
 
-    Each sample represents the time until half way to its neighbours. So the sum over a window is the integral.
-    aligned: the axes are left, up, forward. Then each sample is expressed along the axes that left and up have in the
-    middle of its window. If a bike rolls by 20 degrees in a window, means along axes that roll are 0.5 % small.
+    Each sample represents the time up to half way to its neighbours, so the sum over a window is the integral. aligned:
+    the axes are left, up, forward. Then each sample is expressed in the axes that the bike has in the middle of the
+    window. If a bike rolls by 20 degrees in a window, means along rolling axes would be 0.5 % too small.
     """
     step = np.diff(t_s)
     usual = float(np.median(step)) if len(step) else WINDOW_S
@@ -110,7 +111,7 @@ def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array,
     in_window[place[there]] = speed[there]
     mean_rate = mean(rate)
     jolt = np.maximum.reduceat(np.linalg.norm(rate - mean_rate[place], axis=1), starts)
-    at = np.flatnonzero(begins[starts])[1:]  # windows before which readings are missing
+    at = np.flatnonzero(begins[starts])[1:]  # indices of the windows after missing readings
     ends = np.append(starts[1:], len(t_s)) - 1
     edges = np.insert((t_s - before)[starts], at, (t_s + after)[ends[at - 1]])
     return Windows(
@@ -128,7 +129,7 @@ def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array,
 
 
 def _rolled_back(vectors: Array, roll: Array) -> Array:
-    """vectors (samples, 3: left, up, forward) along the axes before the bike rolled to the right by roll (samples,
+    """Express vectors (samples, 3: left, up, forward) in the axes before the bike rolled to the right by roll (samples,
     rad)."""
     (left, up, forward), c, s = vectors.T, np.cos(roll), np.sin(roll)
     return np.column_stack((c * left - s * up, s * left + c * up, forward))

@@ -12,17 +12,17 @@ from typing import IO
 from ..common.errors import InputError, printable
 from ..logs.source import SUFFIXES, errors_of, open_input
 
-_EXCEL = b"\xd0\xcf\x11\xe0"  # first bytes of Excel's older files; newer ones are zips
-# Largest recording as text: some hours at 100 Hz. Reading it takes at most ten times its memory.
+_EXCEL = b"\xd0\xcf\x11\xe0"  # first bytes of older Excel files; newer Excel files are zips
+# Largest recording as text: some hours at 100 Hz. Reading takes at most ten times this memory.
 MOST_BYTES = 250_000_000
-MOST_FILES = 10_000  # most files in a folder or a zip
-LONGEST_LINE = 1_000_000  # characters of the longest line; a table of a thousand columns needs a tenth of this
+MOST_FILES = 10_000  # largest number of files in a folder or a zip
+LONGEST_LINE = 1_000_000  # characters in the longest line, ten times as many as a thousand columns need
 _BOMS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
 
 
 @dataclass
 class RecordingFile:
-    """One file of a recording. name: its path below the given folder or zip, with /. content: its bytes, unpacked.
+    """One file of a recording. name: its path below the given folder or zip, with "/". content: its unpacked bytes.
     text: the decoded content; lines end in a line feed.
     """
 
@@ -32,7 +32,7 @@ class RecordingFile:
 
     @property
     def folder(self) -> str:
-        """The folder part of its name, "" for none."""
+        """The folder part of the name, or ""."""
         return str(PurePosixPath(self.name).parent).removeprefix(".")
 
     @property
@@ -46,10 +46,10 @@ class RecordingFile:
 
 
 def read_files(source: Path | str) -> list[RecordingFile]:
-    """Read a file, a folder or a zip. Of the last two only files of SUFFIXES are read, or a zip that is their only
+    """Read a file, a folder or a zip. In a folder or a zip, only files of SUFFIXES are read, or a zip if it is the only
     content.
 
-    Raises InputError for a source that is missing, damaged, empty, not text, or over MOST_BYTES when unpacked.
+        Raises InputError for a source that is missing, damaged, empty, not text, or over MOST_BYTES when unpacked.
     """
     path = Path(source)
     with errors_of(str(path)):
@@ -57,7 +57,7 @@ def read_files(source: Path | str) -> list[RecordingFile]:
         files = [file for file in files if file is not None] or _no_text(path)
     files = [file for file in files if file.text.strip() or file.name.endswith(".parquet")]
     if not files:
-        raise InputError(f"{path} holds no recording: give the file, the folder or the zip that an app has exported")
+        raise InputError(f"{path} contains no recording: give the file, the folder or the zip that an app has exported")
     return files
 
 
@@ -72,7 +72,7 @@ def _bounded(path: Path) -> Iterator[tuple[str, bytes]]:
 
 
 def _read(file: IO[bytes]) -> bytes:
-    """The content of a file, cut one byte after the limit: this byte shows that it is too large."""
+    """The content of a file, cut one byte after the limit. The extra byte shows that the file is too large."""
     return file.read(MOST_BYTES + 1)
 
 
@@ -83,7 +83,7 @@ def _contents(path: Path) -> Iterator[tuple[str, bytes]]:
         yield from _unzipped(path) if zipped else [(path.name, _unpacked_file(path))]
         return
     whole = path.resolve()
-    # without files outside the folder that a link leads to
+    # skip links that lead out of the folder
     names = (file for file in path.rglob("*") if file.is_file() and file.resolve().is_relative_to(whole))
     names = sorted(itertools.islice(names, MOST_FILES + 1))
     if len(names) > MOST_FILES:
@@ -111,7 +111,7 @@ def _without_gzip(name: str, file: IO[bytes]) -> bytes:
 
 
 def _check_directory(file: IO[bytes], path: Path) -> None:
-    """Refuse a zip with a directory larger than that of MOST_FILES files, because zipfile reads it whole."""
+    """Refuse a zip whose directory lists over MOST_FILES files, because zipfile reads the whole directory."""
     size = file.seek(0, 2)
     file.seek(max(0, size - 65_557))
     _, mark, last = file.read().rpartition(b"PK\5\6")
@@ -133,19 +133,19 @@ def _unzipped(path: Path) -> Iterator[tuple[str, bytes]]:
 
 def _unpacked(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, path: Path) -> bytes:
     try:
-        # bzip2 and LZMA are unpacked whole, even if only a part is read
+        # bzip2 and LZMA would be unpacked whole, even if only a part is read
         if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             raise NotImplementedError
         with archive.open(entry) as file:
             return _without_gzip(entry.filename, file)
-    except RuntimeError as error:  # NotImplementedError is one, too
+    except RuntimeError as error:  # includes NotImplementedError
         raise InputError(f"{path} is packed with a password, or in another way: unpack it first") from error
-    except (OSError, ValueError) as error:  # an entry that points out of the file
+    except (OSError, ValueError) as error:  # an entry that points outside the file
         raise zipfile.BadZipFile(str(error)) from error
 
 
 def _wanted(name: str) -> bool:
-    """True for a table by its name: neither hidden nor one of macOS's companion files."""
+    """True if the name is that of a table, and neither hidden nor a companion file of macOS."""
     path = PurePosixPath(name)
     hidden = any(part.startswith((".", "__MACOSX")) for part in path.parts)
     return not hidden and name.lower().removesuffix(".gz").endswith(SUFFIXES)
@@ -174,9 +174,9 @@ def _recording_file(name: str, content: bytes) -> RecordingFile | None:
 def _decoded(content: bytes) -> str:
     encoding = next((encoding for bom, encoding in _BOMS if content.startswith(bom)), "")
     sample = content[:1000]
-    if not encoding and sample.count(0) > len(sample) // 4:  # UTF-16 without its mark: every other byte is 0
+    if not encoding and sample.count(0) > len(sample) // 4:  # UTF-16 without a byte order mark: every other byte is 0
         encoding = "utf-16-le" if sample[1::2].count(0) > sample[::2].count(0) else "utf-16-be"
     try:
         return content.decode(encoding or "utf-8")
     except UnicodeDecodeError:
-        return content.decode("cp1252", errors="replace")  # for a degree sign from Windows
+        return content.decode("cp1252", errors="replace")  # Windows may write a degree sign in this encoding

@@ -1,12 +1,12 @@
-"""Finds the time, the accelerometer and the gyro in an unknown table, and their units, from the columns' names and
-mainly from their values.
+"""Finds the time, the accelerometer and the gyro in an unknown table, and their units. It uses the columns' names, and
+mainly their values.
 
 * Three columns belong together if their names differ only in the axis, or if they are side by side without names.
-* The length of the acceleration is the same whenever the sensor is calm: that of gravity, in some unit.
-* The gyro's unit is the one in which its rates turn gravity's direction in the sensor (rate_fit.py).
-* The time's unit is the one that gives a usual number of samples per second.
+* Whenever the sensor is calm, the length of the acceleration is that of gravity, in some unit.
+* In the gyro's unit, the rates explain how the direction of gravity turns in the sensor's axes (rate_fit.py).
+* In the time's unit, the number of samples per second is usual.
 
-A finding contains the reason, and whether it is certain. An uncertain finding is proposed to the user, who must confirm
+Each finding has a reason, and is certain or uncertain. An uncertain finding is proposed to the user, who must confirm
 it.
 """
 
@@ -38,7 +38,7 @@ from .units import (
 ACCEL, GYRO = ("ax", "ay", "az"), ("gx", "gy", "gz")
 REQUIRED = ("t", *ACCEL, *GYRO)
 OPTIONAL = ("speed", "lat", "lon", "temp")
-_KINDS = {  # of sensors, by the words in their columns' names
+_KINDS = {  # kinds of sensors, by the words in their columns' names
     "linear": r"lin|user|withoutgravity|nograv",
     "gravity": r"grav",
     "other": r"mag|compass|orient|euler|quat|angle|roll|pitch|yaw|azimuth|^[bmqh]$|^mg?$|press|baro",
@@ -49,12 +49,12 @@ _KINDS = {  # of sensors, by the words in their columns' names
 _TIME = re.compile(r"time|milli|micro|^(t|ts|ms|us|ns|s|sec|secs|seconds|elapsed\w*)$|epoch|utc|clock|stamp|^monitors$")
 _CLOCK = re.compile(r"\s*(\d{4}-\d\d-\d\d.)?\d{1,2}:\d\d")
 _COUNTER = re.compile(r"^(no|nr|n|i|index|count|counter|record|sample|frame|id|row)$")
-CALM_S = 0.5  # duration over which a length is calm
+CALM_S = 0.5  # a sensor is judged calm over this duration
 CALMEST = 0.2  # share of the samples that count as calm
-NEAR = 1.3  # largest factor between a calm length and gravity in a unit: clones and rough rides differ so much
-NOISE_DPS = 0.1  # of a gyro at rest, standard deviation
-LINEAR = 0.35  # without gravity the mean vector is a smaller share of the mean length
-_SLOWEST_S, _QUICKEST_S = 1.0, 1e-4  # between samples of a recording
+NEAR = 1.3  # largest factor between a calm length and gravity in a unit; clones and rough rides differ by up to this
+NOISE_DPS = 0.1  # standard deviation of a gyro at rest
+LINEAR = 0.35  # without gravity, the mean vector's length is a smaller share of the vectors' mean length
+_SLOWEST_S, _QUICKEST_S = 1.0, 1e-4  # limits of the time between samples
 
 
 @dataclass
@@ -71,8 +71,8 @@ class ColumnFinding:
 @dataclass
 class Findings:
     """The finding of each quantity that was found: "t", "a", "g", "speed", "lat", "lon". lacking: the required
-    quantities that are missing, in words. single: columns of single axes, by the keys of REQUIRED, of a sensor that
-    lacks another axis. remarks: problems of the existing columns."""
+    quantities that are missing, in words. single: columns of single axes of an incomplete sensor, by the keys of
+    REQUIRED. remarks: problems of the existing columns."""
 
     found: dict[str, ColumnFinding] = field(default_factory=dict)
     lacking: list[str] = field(default_factory=list)
@@ -134,7 +134,8 @@ def find(sheet: Sheet) -> Findings:
 
 
 def _time(sheet: Sheet) -> ColumnFinding | None:
-    """The column of the time: an increasing one. Of several, the ones with such a name count; of these, the finest."""
+    """The column of the time, which must increase. Of several such columns, those named like a time are preferred, then
+    the one with the finest steps."""
     usable = []
     for place, name in enumerate(sheet.columns):
         named = bool(_TIME.search(plain(name.rpartition(":")[2])))
@@ -151,7 +152,7 @@ def _time(sheet: Sheet) -> ColumnFinding | None:
         if len(steps) < 2 or np.mean(steps >= 0.0) < 0.95 or good[-1] <= good[0]:
             continue
         if not named and (_COUNTER.match(plain(name)) or np.all(np.diff(sheet.numbers(place)) == 1.0)):
-            continue  # this column numbers the rows
+            continue  # the column only numbers the rows
         usable.append((named, len(np.unique(good)) > 0.5 * len(good), not text, -place))
     if not usable:
         return None
@@ -165,7 +166,7 @@ def _time(sheet: Sheet) -> ColumnFinding | None:
     if found == DATES:
         return ColumnFinding([name], "", "dates or times of day")
     hz = 1.0 / max(_mean_step(numbers) * _SECONDS[found], 1e-9)
-    return ColumnFinding([name], found, f"in {found} it is {hz:.3g} samples per second")
+    return ColumnFinding([name], found, f"in {found} there are {hz:.3g} samples per second")
 
 
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -233,7 +234,7 @@ def _numeric(sheet: Sheet, places: Sequence[int]) -> bool:
 
 
 def _numbered(axes: dict[str, int]) -> list[list[str]]:
-    """Groups of three axes that are numbered: data1 to data3, data4 to data6."""
+    """Groups of three columns with successive numbers: data1 to data3, data4 to data6."""
     numbers = sorted((axis for axis in axes if axis.isdigit()), key=int)
     if len(numbers) % 3 or not numbers or int(numbers[-1]) - int(numbers[0]) != len(numbers) - 1:
         return []
@@ -241,7 +242,7 @@ def _numbered(axes: dict[str, int]) -> list[list[str]]:
 
 
 def _side_by_side(sheet: Sheet) -> list[_Triple]:
-    """Two groups without meaningful names: the first six columns side by side that are not a time."""
+    """Two groups for columns without meaningful names: the first six adjacent columns that are not a time."""
     numeric = [
         place
         for place in range(len(sheet.columns))
@@ -258,7 +259,7 @@ def _increasing(sheet: Sheet, place: int) -> bool:
 
 
 def _split_axis(name: str) -> Iterable[tuple[str, str]]:
-    """(name without its axis, axis) for each way to read an axis in a name."""
+    """Yield (name without its axis, axis) for each way to find an axis in a name."""
     bare = _without_unit(name)
     sensor, colon, bare = bare.rpartition(":")
     words = re.sub(r"axis|[^a-z0-9]+", " ", bare.lower()).split()
@@ -277,7 +278,7 @@ def _split_axis(name: str) -> Iterable[tuple[str, str]]:
 
 
 def _without_unit(name: str) -> str:
-    """A name without its unit, which is in brackets at its end or after the last _."""
+    """A name without its unit. The unit is in brackets at the end, or after the last _."""
     bare = re.sub(r"[(\[]([^)\]]*)[)\]]\s*$", lambda found: "" if _is_unit(found[1]) else " " + found[1], name)
     head, mark, last = bare.rpartition("_")
     return head if mark and _is_unit(last) and len(head) > 1 else bare
@@ -289,7 +290,7 @@ def _is_unit(text: str) -> bool:
 
 
 def stated_unit(name: str) -> str:
-    """The unit that a column's name states, "" for none."""
+    """The unit in a column's name, or ""."""
     in_brackets, last = unit(unit_in(name)), unit(name.rpartition("_")[2])
     bare = plain(name)
     if in_brackets and _is_unit(in_brackets):
@@ -317,7 +318,7 @@ def _kind(stem: str) -> str:
 
 
 def _accel_and_gyro(sheet: Sheet, seconds: Array | None, findings: Findings) -> None:
-    """Add both to findings, and note what is missing."""
+    """Add the accelerometer and the gyro to findings, and note what is missing."""
     threes = _find_triples(sheet)
     kinds = {kind: [three for three in threes if three.kind == kind] for kind in (*_KINDS, "")}
     unnamed = [*kinds["either"], *kinds[""]]
@@ -351,7 +352,8 @@ def _names(sheet: Sheet, three: _Triple) -> list[str]:
 
 
 def _first_with_gravity(threes: Sequence[_Triple], seconds: Array | None) -> _Triple | None:
-    """The first group whose length is that of gravity in some unit, otherwise the first that keeps its length."""
+    """The first group whose length is that of gravity in some unit; otherwise the first group with a constant
+    length."""
     return next(
         (three for three in threes if _has_gravity(three, seconds, near=True)),
         next((three for three in threes if _has_gravity(three, seconds, near=False)), None),
@@ -359,8 +361,8 @@ def _first_with_gravity(threes: Sequence[_Triple], seconds: Array | None) -> _Tr
 
 
 def _has_gravity(three: _Triple, seconds: Array | None, near: bool) -> bool:
-    """True if these values contain gravity: their length is constant while they are calm, and hardly ever near 0. near:
-    the length is that of gravity in some unit; otherwise it must be more constant."""
+    """True if the values contain gravity: their length is constant in calm stretches, and hardly ever near 0. near: the
+    length must be that of gravity in some unit; if False, the length must be more constant instead."""
     values = three.values[np.all(np.isfinite(three.values), axis=1)]
     if len(values) < 3:
         return False
@@ -374,7 +376,7 @@ def _has_gravity(three: _Triple, seconds: Array | None, near: bool) -> bool:
 
 
 def _rows_in(span_s: float, seconds: Array | None, count: int) -> int:
-    """Number of rows in span_s; without a time column, a fiftieth of all rows."""
+    """The number of rows in span_s. Without a time column, a fiftieth of all rows."""
     if seconds is None or not np.any(np.isfinite(seconds)):
         return max(1, min(25, count // 10))
     span = float(np.nanmax(seconds) - np.nanmin(seconds))
@@ -382,7 +384,7 @@ def _rows_in(span_s: float, seconds: Array | None, count: int) -> int:
 
 
 def calm_length(values: Array, seconds: Array | None) -> float:
-    """Median length of vectors (n, 3) while they are calm, which means while their length changes least."""
+    """The median length of vectors (n, 3) in calm stretches, in which their length changes least."""
     values = values[np.all(np.isfinite(values), axis=1)]
     lengths = np.linalg.norm(values, axis=1)
     spread = moving_spread(lengths, _rows_in(CALM_S, seconds, len(values)))
@@ -417,8 +419,8 @@ def _are_whole(values: Array) -> bool:
 
 
 def gyro(force: Array, rates: Array, accel: ColumnFinding, seconds: Array | None, stated: str = "") -> ColumnFinding:
-    """Find the unit of rates (n, 3): from the turns of gravity, from their names, otherwise from their size. accel: the
-    finding of the accelerometer. The finding's columns are empty."""
+    """Find the unit of rates (n, 3) from the turns of gravity or from the columns' names, otherwise from their size.
+    accel: the finding of the accelerometer. The finding's columns are empty."""
     fit = RateFit() if seconds is None else fit_rates(seconds, force, rates)
     candidates = gyro_units(rates, accel)
     by_fit = fit.unit_among(candidates)
@@ -445,19 +447,20 @@ def gyro_units(rates: Array, accel: ColumnFinding) -> dict[str, float]:
 
 
 def _usual_counts(accel: ColumnFinding) -> float:
-    """Counts per deg/s of an MPU6050 whose accelerometer has this unit: usually both ranges have the same setting."""
+    """Counts per deg/s of an MPU6050 whose accelerometer has this unit, because both ranges usually have the same
+    setting."""
     size = counts_per(accel.unit)
     return COUNTS_PER_DPS[COUNTS_PER_G.index(size)] if size in COUNTS_PER_G else COUNTS_PER_DPS[0]
 
 
 def _by_size(rates: Array, force: Array) -> tuple[str, str]:
-    """A likely unit and the reason: from the largest rates of a ride, or from the noise of a sensor at rest."""
+    """A likely unit and the reason, from the largest rates of a ride or from the noise of a sensor at rest."""
     good = rates[np.all(np.isfinite(rates), axis=1)]
     length = np.linalg.norm(good - np.median(good, axis=0), axis=1)
     most, noise = float(np.percentile(length, 90.0)), float(np.median(np.std(good, axis=0)))
     whole = float(np.median(np.linalg.norm(force[np.all(np.isfinite(force), axis=1)], axis=1)))
     moved = float(np.max(np.std(force[np.all(np.isfinite(force), axis=1)], axis=0))) / max(whole, 1e-9)
-    if moved < 0.02:  # at rest
+    if moved < 0.02:  # the sensor is at rest
         near = min(RATES, key=lambda name: abs(np.log(max(noise, 1e-9) * RATES[name] / NOISE_DPS)))
         return near, f"its noise at rest is {noise:.2g}"
     if most > 1000.0:

@@ -1,5 +1,5 @@
-"""Imports a recording of another app or logger: finds its format, joins its sensors on one clock, checks it and writes
-it."""
+"""Imports a recording of another app or logger. Finds its format, joins its sensors on one clock, checks the result and
+writes a log."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -24,19 +24,19 @@ from .join import GAP_NS, join
 from .recording import AppRecording, Taken
 from .units import ACCELERATIONS, factor
 
-# Each is a module with NAME, the app's name; find_recordings(files), which returns one list of files per recording of
-# this app; and read(files, name), which returns the AppRecording of such a list (see recording.py) or raises
-# InputError.
-# If the module has ASKS, the quantities whose unit the user may give, its function is read(files, name, units). Each
-# module gets the files that no earlier module has claimed. phyphox is last, because it only looks at names of columns.
+# Each module has NAME, the app's name, and two functions. find_recordings(files) returns one list of files per
+# recording of this app. read(files, name) returns the AppRecording of such a list (see recording.py) or raises
+# InputError. If the module has ASKS, the quantities whose unit the user may give, the function is read(files, name,
+# units). Each module gets the files that no earlier module has claimed. phyphox is last, because it only looks at names
+# of columns.
 _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
-LEAST_HZ = 19.5  # samples per second required for a lean: 20, minus the error of a phone's clock
+LEAST_HZ = 19.5  # a lean needs this many samples per second: 20, minus the error of a phone's clock
 NAMES = [app.NAME for app in reversed(_APPS)]
 
 
 @dataclass(frozen=True)
 class ImportSlow(Message):
-    """It has too few samples per second."""
+    """The recording has too few samples per second."""
 
     rate_hz: float
 
@@ -47,7 +47,7 @@ class ImportSlow(Message):
 
 @dataclass(frozen=True)
 class ImportShort(Message):
-    """It is too short to be aligned by it."""
+    """The recording is too short for an alignment."""
 
     lasts_s: float
     least_s: float
@@ -65,13 +65,13 @@ class ImportDamaged(Message):
     code = "import-damaged"
     text = (
         "damaged rows that are left out: {rows}; a cell or a time is not a number, a time is out of order, a row has "
-        "too many cells, or a reading is out of any sensor's range"
+        "too many cells, or a reading is outside every sensor's range"
     )
 
 
 @dataclass(frozen=True)
 class ImportSign(Message):
-    """It is not certain whether up is +1 g or -1 g in the files of this app."""
+    """In this app's files, the sign of accelerations is uncertain: up may read +1 g or -1 g."""
 
     app: str
 
@@ -106,7 +106,7 @@ class Imported:
 
     @property
     def shortfalls(self) -> list[Message]:
-        """The reasons why it gives no alignment: too few samples per second, too short."""
+        """The reasons why the recording gives no alignment: too few samples per second, or too short."""
         found: list[Message] = [ImportSlow(self.rate_hz)] if self.rate_hz < LEAST_HZ else []
         lasts_s = float(self.log.t_s[-1])
         return found + ([ImportShort(lasts_s, MIN_RIDING_S)] if lasts_s < MIN_RIDING_S else [])
@@ -128,10 +128,10 @@ def import_recording(
     """Read a recording of another app or logger: a file, a folder or a zip.
 
     `kickstand import --help` names the apps whose exports are known. For any other table, columns and units are found
-    from its values if these are certain. Otherwise pass them. columns: {"t": "time", "ax": "accX", ...}, with the keys
-    t, ax, ay, az, gx, gy, gz, and optionally speed, lat, lon, temp. units: {"a": "m/s2", "g": "rad/s", "speed":
-    "km/h"}; a - before a unit reverses the sign. start_s, end_s: the stretch to import, s from the recording's own
-    start. Raises InputError.
+    from the values. If the values do not show them, pass columns and units. columns: {"t": "time", "ax": "accX", ...},
+    with the keys t, ax, ay, az, gx, gy, gz, and optionally speed, lat, lon, temp. units: {"a": "m/s2", "g": "rad/s",
+    "speed": "km/h"}; a - before a unit reverses the sign. start_s, end_s: the stretch to import, s from the recording's
+    own start. Raises InputError.
 
     >>> import pathlib, tempfile
     >>> rows = [f"{10 * k},0.0,9.81,0.0,0.0,0.0,0.1" for k in range(300)]
@@ -148,8 +148,8 @@ def import_recording(
 
 
 def import_of_app(source: Path) -> Imported | None:
-    """Import a recording of a known app; None if source is not one. Raises InputError for a folder or a zip that cannot
-    be read, and like import_recording()."""
+    """Import a recording of a known app. Returns None if source is something else. Raises InputError for a folder or a
+    zip that cannot be read, and like import_recording()."""
     try:
         files = read_files(source)
         of_apps = recordings(files)
@@ -175,7 +175,7 @@ def _imported(recording: AppRecording, name: str, start_s: float | None = None, 
 def write_imported(path: Path | str, imported: Imported) -> None:
     """Write the log, gzipped if its name ends in .gz, whole or not at all. Raises InputError.
 
-    It has the columns of a log. Optional columns without any value are left out. t_s counts from the recording's own
+    The file has the columns of a log. Optional columns without values are left out. t_s counts from the recording's own
     start.
 
     >>> import tempfile
@@ -220,7 +220,8 @@ def _recording(
 
 
 def recordings(files: list[RecordingFile]) -> list[tuple[Any, list[RecordingFile]]]:
-    """The recordings among some files: (module in apps/, its files) for each. The module's NAME is the app's."""
+    """The recordings among some files, as (module in apps/, files of the recording). The module's NAME is the app's
+    name."""
     found, left = [], files
     for app in _APPS:
         for group in app.find_recordings(left):
@@ -233,7 +234,7 @@ def recordings(files: list[RecordingFile]) -> list[tuple[Any, list[RecordingFile
 def _check_sign(recording: AppRecording, log: Log) -> None:
     """Change the sign of an accelerometer if it was uncertain and the track shows that it is mirrored.
 
-    A known sign is kept: reading the log gives a remark about it.
+    A known sign is kept, because reading the log gives a remark if it seems wrong.
     """
     if recording.sign_known:
         return

@@ -1,4 +1,4 @@
-"""Joins the sensors of a recording, each with its own clock and rate, on the accelerometer's clock."""
+"""Joins the sensors of a recording on the accelerometer's clock. Each sensor may have its own clock and rate."""
 
 from collections.abc import Callable, Container
 from dataclasses import replace
@@ -18,16 +18,17 @@ MOST_MPS = 200.0  # largest speed, and largest degrees of a position
 GAP_NS = LOST_US * 1000  # no interpolation between samples that are further apart
 FASTER = 1.5  # a gyro with over FASTER times the accelerometer's rate is averaged over each accelerometer sample
 MANY = 0.02  # a larger share of readings over MOST_G or MOST_DPS means another unit, not damaged cells
-SHUFFLED_NS = 500_000_000  # samples that come after later ones are sorted if the delay is shorter
-LATE_STEPS, MOST_LATE = 4.0, 0.02  # and if at most this share is late by over LATE_STEPS median steps
-MOST_HZ = 10_000.0  # highest rate of an inertial sensor; the fastest have 8,000
+SHUFFLED_NS = 500_000_000  # samples in the wrong order are sorted if they are less late than this
+# samples are sorted only if at most the share MOST_LATE is late by over LATE_STEPS median steps
+LATE_STEPS, MOST_LATE = 4.0, 0.02
+MOST_HZ = 10_000.0  # highest rate of an inertial sensor; the fastest have 8,000 Hz
 
 
 def join(recording: AppRecording, name: str) -> tuple[Log, int]:
-    """Return the log on the accelerometer's clock, from its first sample, and the number of damaged rows that are left
-    out.
+    """Return the log on the accelerometer's clock, beginning at the first sample, and the number of damaged rows that
+    are left out.
 
-    name: the recording's, for messages. Raises InputError if the sensors have no time in common.
+    name: the recording's name in messages. Raises InputError if the sensors have no time in common.
     """
     accel = in_order(recording.accel, name)
     gyro = in_order(recording.gyro, name)
@@ -38,7 +39,8 @@ def join(recording: AppRecording, name: str) -> tuple[Log, int]:
         raise InputError(f"{name}: its readings are past any sensor's, {_most(accel.values, rates)}: check their units")
     there &= ~past
     lost = int(np.count_nonzero(past)) + len(recording.accel.time_ns) - len(accel.time_ns)
-    lost += max(recording.accel.damaged, recording.gyro.damaged)  # both sensors may be in the same rows
+    # not the sum, because the same rows may contain both sensors
+    lost += max(recording.accel.damaged, recording.gyro.damaged)
     if np.count_nonzero(there) < 2:
         raise InputError(f"{name}: accelerometer and gyro have no time in common: were they recorded together?")
     temp_c = recording.temp_c
@@ -52,7 +54,7 @@ def join(recording: AppRecording, name: str) -> tuple[Log, int]:
 
 
 def in_order(sensor: RecordedSensor, name: str) -> RecordedSensor:
-    """Return the sensor with increasing times; rounded ones are spread evenly. Raises InputError if that is
+    """Return the sensor with increasing times. Rounded times are spread evenly. Raises InputError if that is
     impossible."""
     if len(sensor.time_ns) < 2:
         raise InputError(f"{name}: {sensor.name} has {len(sensor.time_ns)} samples: was it recorded?")
@@ -97,7 +99,7 @@ def _damaged(time_ns: Ints) -> Bools:
 
 
 def on_clock(sensor: RecordedSensor, clock_ns: Ints, period_ns: float) -> Array:
-    """A sensor's values (n, 3) at the times of another clock (n); NaN outside its own and in its gaps.
+    """A sensor's values (n, 3) at the times of another clock (n). NaN outside the sensor's own times and in its gaps.
 
     Values are interpolated along straight lines. If the sensor is faster than the clock, they are averaged over
     period_ns.
@@ -116,7 +118,8 @@ def on_clock(sensor: RecordedSensor, clock_ns: Ints, period_ns: float) -> Array:
 
 
 def _between(at: Array, since: Array, values: Array) -> Array:
-    """Values (n) at other times, along straight lines between those that are not NaN; NaN outside."""
+    """Interpolate values (n) at other times, along straight lines between values that are not NaN. NaN outside
+    these."""
     there = ~np.isnan(values)
     if not np.any(there):
         return np.full(len(at), np.nan)
@@ -124,7 +127,7 @@ def _between(at: Array, since: Array, values: Array) -> Array:
 
 
 def _averaged(sensor: RecordedSensor, over_ns: float) -> Array:
-    """A sensor's values (n, 3) averaged over over_ns around each."""
+    """A sensor's values (n, 3), each averaged over over_ns around it."""
     half = round(over_ns / 2.0)
     begin, end = (np.searchsorted(sensor.time_ns, sensor.time_ns + side, side="right") for side in (-half, half))
     sums = np.cumsum(np.vstack((np.zeros(3), np.nan_to_num(sensor.values))), axis=0)
@@ -136,11 +139,11 @@ def _averaged(sensor: RecordedSensor, over_ns: float) -> Array:
 def with_gravity(
     there: Container[str], sensor: Callable[[str], RecordedSensor], name: str, whose: str, remedy: str, none: str
 ) -> RecordedSensor:
-    """The accelerometer, with gravity. there: the existing ones of "total" (with gravity), "user" (without) and
-    "gravity".
+    """The accelerometer with gravity. there: which of "total" (with gravity), "user" (without gravity) and "gravity"
+    exist.
 
-    sensor: called with one of these, returns it. Raises InputError if there is only acceleration without gravity
-    (whose: its name; remedy: what to do), or no acceleration at all (none: the message).
+    sensor: a function that returns the sensor of one of these names. Raises InputError if only the acceleration without
+    gravity exists (whose: its name; remedy: what to do), or no acceleration at all (none: the message).
     """
     if "total" in there:
         return sensor("total")
@@ -164,7 +167,7 @@ def _period_ns(sensor: RecordedSensor) -> float:
 
 
 def _on_rows(track: ReceiverTrack | None, time_ns: Ints, utc_ns: int | None) -> dict[str, Any]:
-    """Speed, latitude, longitude and UTC (n each): each value of the track is in the row nearest in time."""
+    """Speed, latitude, longitude and UTC (n each). Each value of the track is in the row that is nearest in time."""
     found = {name: np.full(len(time_ns), np.nan) for name in TRACK}
     if utc_ns is not None:
         found["utc_s"][0] = (time_ns[0] + utc_ns) * 1e-9

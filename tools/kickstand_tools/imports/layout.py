@@ -1,8 +1,9 @@
-"""Finds the layout of a table of an unknown app: where its rows are, and to which sensor each cell belongs.
+"""Finds the layout of a table of an unknown app: where the rows are, and to which sensor each cell belongs.
 
-It accepts cells between commas, semicolons, tabs or blanks, with a decimal point or comma; any lines before the rows;
-names above the rows, with or without units in a line below, or no names; `label: value` texts of a serial monitor, with
-or without its time stamps, in one or several lines per sample; one row per event of a sensor; one file per sensor.
+Cells may be separated by commas, semicolons, tabs or blanks, with a decimal point or comma. Any lines may come before
+the rows. Names above the rows are optional, and so is a line of units below the names. The table may also be `label:
+value` texts of a serial monitor, with or without time stamps, in one or several lines per sample. It may have one row
+per event of a sensor, or one file per sensor.
 """
 
 import csv
@@ -21,10 +22,10 @@ from .recording import Sheet, decimal_points
 from .units import ACCELERATIONS, RATES, SPEEDS, TIMES, unit
 
 LOOKED_AT = 400  # lines used to find the layout
-SEPARATORS = "\t;, "  # if two split the same lines into equally many cells, the first is used
-FEWEST_CELLS = 4  # least numbers in a row of a table of sensors: a time and three axes
-MOST_KINDS = 20  # names of sensors or events in one column
-EVENT = ":"  # between a sensor's name and a column's
+SEPARATORS = "\t;, "  # if two of these split the same lines into equally many cells, the first is used
+FEWEST_CELLS = 4  # least count of numbers in a row of a table of sensors: a time and three axes
+MOST_KINDS = 20  # largest number of names of sensors or events in one column
+EVENT = ":"  # separates a sensor's name from a column's name
 _UNITS = {**ACCELERATIONS, **RATES, **SPEEDS, **TIMES}
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _COMMA_NUMBER = re.compile(r"[+-]?\d+(?:,\d+)?(?:[eE][+-]?\d+)?")
@@ -42,8 +43,8 @@ _SEVERAL = re.compile(r"([A-Za-z][\w/ ]*?)\s*[:=]\s*((?:[+-]?\d+(?:\.\d+)?[\s,;]
 
 @dataclass(frozen=True)
 class Grid:
-    """Rows of cells. names: number of the line of names, None without one. first: number of the line of the first row.
-    separator: of the cells, " " for any blanks. comma: True for decimal commas. width: cells in a row."""
+    """Rows of cells. names: number of the line of names, None without such a line. first: number of the first row's
+    line. separator: separates the cells, " " for any blanks. comma: True for decimal commas. width: cells in a row."""
 
     names: int | None
     first: int
@@ -53,8 +54,8 @@ class Grid:
 
 
 def sheet_in(file: RecordingFile, wanted: Collection[str] = ()) -> Sheet | None:
-    """The table in a file; None if there is none. wanted: names that its line of names must have. Raises InputError for
-    a table that is too large."""
+    """The table in a file; None without a table. wanted: names that the table's line of names must have. Raises
+    InputError for a table that is too large."""
     text = without_stamps(file.text)
     labelled = _labelled(file.name, text)
     if labelled is not None:
@@ -65,10 +66,11 @@ def sheet_in(file: RecordingFile, wanted: Collection[str] = ()) -> Sheet | None:
 
 
 def joined_sheet(files: list[RecordingFile]) -> Sheet | None:
-    """The tables of several files, one per sensor, joined to one. None if fewer than two files are tables, or if two
-    have the same name.
+    """Join the tables of several files, one per sensor. None if fewer than two files are tables, or if two have the
+    same name.
 
-    Its columns are FILE:NAME, and each row is from one file. The first column of each file is its time."""
+    The columns of the result are FILE:NAME, and each row comes from one file. The first column of each file is its
+    time."""
     sheets = [(PurePosixPath(file.name).name.partition(".")[0], sheet_in(file)) for file in files]
     if len({name for name, _ in sheets}) < len(sheets):
         return None
@@ -89,7 +91,7 @@ def joined_sheet(files: list[RecordingFile]) -> Sheet | None:
 
 
 def without_stamps(text: str) -> str:
-    """Turn the time stamps of a serial monitor, `12:30:05.250 -> `, into a first cell, or into a first label if the
+    """Convert the time stamps of a serial monitor, `12:30:05.250 -> `, to a first cell, or to a first label if the
     lines have labels."""
     head = [line for line in text[:20_000].split("\n") if line.strip()]
     if not head or sum(bool(_STAMP.match(line)) for line in head) < 0.8 * len(head):
@@ -106,7 +108,7 @@ def _clock_s(clock: str) -> float:
 
 
 def split_row(line: str, separator: str) -> list[str]:
-    """The cells of a line, without blanks around them; none if the line is not CSV."""
+    """The cells of a line, without blanks around them. An empty list if the line is not CSV."""
     if separator == " ":
         return line.split()
     try:
@@ -119,7 +121,7 @@ def find_grid(lines: Sequence[str]) -> Grid | None:
     """Find the layout that fits most of these lines; None if hardly any line has numbers."""
     best: tuple[int, int, Grid] | None = None
     for separator in SEPARATORS:
-        for comma in (True, False):  # whole numbers beside a time with a decimal comma fit both
+        for comma in (True, False):  # whole numbers after a time with a decimal comma fit both
             if comma and separator == ",":
                 continue
             found = _rows(lines, separator, comma)
@@ -129,7 +131,7 @@ def find_grid(lines: Sequence[str]) -> Grid | None:
 
 
 def _rows(lines: Sequence[str], separator: str, comma: bool) -> tuple[int, int, Grid] | None:
-    """(number of rows, number of numbers, the grid) if the cells are separated in this way."""
+    """(number of rows, number of numbers, the grid) for cells that are separated in this way; None if they are not."""
     number = _COMMA_NUMBER if comma else _NUMBER
     split = [split_row(line, separator) for line in lines]
     counts = [sum(bool(number.fullmatch(cell) or _WHEN.fullmatch(cell)) for cell in cells) for cells in split]
@@ -155,12 +157,12 @@ def _rows(lines: Sequence[str], separator: str, comma: bool) -> tuple[int, int, 
 
 
 def _names_by_commas(lines: Sequence[str], at: int, width: int) -> int | None:
-    """The line of names above the rows, if it has another separator than the rows."""
+    """The line of names above the rows, if the names are separated by commas and the rows are not."""
     return at if any(_is_names(split_row(lines[at].lstrip(_MARKS), mark), width) for mark in SEPARATORS) else None
 
 
 def _is_names(cells: list[str], width: int) -> bool:
-    """True for cells that can be the names of `width` columns: hardly any of them is a number."""
+    """True if the cells can be the names of `width` columns, because hardly any cell is a number."""
     there = [cell for cell in cells if cell]
     numbers = sum(bool(_NUMBER.fullmatch(cell)) or bool(re.search(r"[{}=]|:$", cell)) for cell in there)
     return max(2, width - 3) <= len(there) <= width + 1 and numbers <= len(there) / 4
@@ -203,7 +205,7 @@ def _read(name: str, text: str, lines: Sequence[str], grid: Grid) -> Sheet:
 
 
 def _names(lines: Sequence[str], grid: Grid) -> list[str]:
-    """The columns' names, with units from a line below them in brackets; "" for a column without a name."""
+    """The columns' names; "" for a column without a name. Units from a line below are added in brackets."""
     if grid.names is None:
         return [f"#{k + 1}" for k in range(grid.width)]
     line = lines[grid.names]
@@ -223,7 +225,7 @@ def _names(lines: Sequence[str], grid: Grid) -> list[str]:
 
 
 def _by_sensor(sheet: Sheet) -> Sheet:
-    """Give each sensor its own columns, if one column names the sensor of each row."""
+    """If one column names the sensor of each row, give each sensor its own columns."""
     place = _sensor_column(sheet)
     if place is None:
         return sheet
@@ -246,8 +248,8 @@ def _by_sensor(sheet: Sheet) -> Sheet:
 
 
 def _sensor_column(sheet: Sheet) -> int | None:
-    """The column that names the sensor of each row: a few texts, or numbers under such a name, that change
-    repeatedly."""
+    """The column that names the sensor of each row. It has few different texts, or numbers under a suitable name, which
+    change repeatedly."""
     for place, (name, values) in enumerate(zip(sheet.columns, sheet.cells)):
         if values.dtype.kind == "f" or (values.dtype.kind != "O" and not _SENSOR_ID.search(name.lower())):
             continue
@@ -261,7 +263,7 @@ def _sensor_column(sheet: Sheet) -> int | None:
 
 
 def _increases(numbers: Cells) -> bool:
-    """True for a column that can be a time: it increases, and hardly ever decreases."""
+    """True if a column can be a time, because it increases and hardly ever decreases."""
     good = numbers[np.isfinite(numbers.astype(float))].astype(float)
     steps = np.diff(good)
     return len(steps) > 2 and bool(np.mean(steps < 0.0) < 0.02 and np.mean(steps > 0.0) > 0.01 and good[-1] > good[0])
@@ -271,7 +273,7 @@ def _increases(numbers: Cells) -> bool:
 
 
 def _labelled(name: str, text: str) -> Sheet | None:
-    """The table in lines of `label: value`; None without such lines."""
+    """Read a table from lines of `label: value`. None without such lines."""
     head = [line for line in text[:20_000].split("\n") if line.strip()]
     pairs = [len(list(_labelled_values(line))) for line in head]
     if sum(count > 0 for count in pairs) < 0.7 * len(head) or sum(pairs) < max(FEWEST_CELLS, 1.5 * len(head)):
@@ -281,7 +283,7 @@ def _labelled(name: str, text: str) -> Sheet | None:
     stamp = ""
     for line in text.split("\n"):
         for label, value in sorted(_labelled_values(line), key=lambda pair: pair[0] != _STAMPED):
-            if label in row and label != _STAMPED:  # a sample ends where its first label returns
+            if label in row and label != _STAMPED:  # a label that returns begins a new sample
                 rows.append(row)
                 row = {_STAMPED: stamp} if stamp else {}
             if label == _STAMPED:
@@ -298,8 +300,8 @@ def _labelled(name: str, text: str) -> Sheet | None:
 
 
 def _labelled_values(line: str) -> Iterator[tuple[str, str]]:
-    """(label, value) of each value in a line. A label of one letter is prefixed by an earlier word, as in "Acceleration
-    X: 0.1, Y: 0.2". A unit after a value is added to the label in brackets."""
+    """Yield (label, value) for each value in a line. A label of one letter is prefixed by an earlier word, as in
+    "Acceleration X: 0.1, Y: 0.2". A unit after a value is added to the label in brackets."""
     for several in _SEVERAL.finditer(line):
         values = re.split(r"[\s,;]+", several[2])
         for axis, value in zip("xyz" if len(values) == 3 else map(str, range(1, 10)), values):

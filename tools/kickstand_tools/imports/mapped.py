@@ -1,4 +1,4 @@
-"""Reads a table of an unknown app. Its columns are found from their values (findings.py) or named by the user."""
+"""Reads a table of an unknown app. Its columns are found from the values (findings.py), or named by the user."""
 
 import re
 import shlex
@@ -40,13 +40,13 @@ WORDS |= {f"g{axis}": f"rate about {axis}" for axis in "xyz"}
 WORDS |= {"speed": "speed", "lat": "latitude", "lon": "longitude", "temp": "temperature"}
 UNIT_KEYS = {"t": TIMES, "a": ACCELERATIONS, "g": RATES, "speed": SPEEDS, "lat": ANGLES, "lon": ANGLES}
 UNIT_KEYS |= dict.fromkeys(ACCEL, ACCELERATIONS) | dict.fromkeys(GYRO, RATES)
-COUNTS = "counts"  # raw counts whose number per g or per deg/s is found from the values
-_TIMES_OFF = 3.0  # a unit is refused if the turns of gravity show another unit that differs by this factor
+COUNTS = "counts"  # raw counts; the number per g or per deg/s is found from the values
+_TIMES_OFF = 3.0  # a unit is refused if the turns of gravity show a unit that differs by more than this factor
 
 
 @dataclass
 class MappedTable:
-    """A table of sensors of an unknown app, with its probable columns. joined: True if made of several files."""
+    """A table of sensors of an unknown app, with its probable columns. joined: True if joined from several files."""
 
     name: str
     sheet: Sheet
@@ -73,8 +73,8 @@ class MappedTable:
         return [key for key in REQUIRED if key not in self.found]
 
     def first_seconds(self, seconds: float = 10.0, points: int = 300) -> dict[str, list[float] | list[list[float]]]:
-        """The first seconds of the time (t, s), the accelerometer (a) and the gyro (g) found, thinned out, in the
-        table's units. Empty without a time."""
+        """The first seconds of the found time (t, s), accelerometer (a) and gyro (g), reduced to `points` points, in
+        the table's units. Empty without a time."""
         found = self.findings.found
         if "t" not in found:
             return {}
@@ -91,7 +91,7 @@ class MappedTable:
 
     @property
     def lacking(self) -> str:
-        """The missing columns in words, "" for none."""
+        """The missing columns in words, or ""."""
         lacking = self.findings.lacking
         return f", and no {', no '.join(lacking)} found in it" if lacking else ""
 
@@ -99,11 +99,11 @@ class MappedTable:
 def read_mapped(
     sheet: Sheet, columns: Mapping[str, str], units: Mapping[str, str], why: Findings | None = None
 ) -> AppRecording:
-    """Read a table with given columns: t, ax to az, gx to gz and optionally speed, lat, lon and temp.
+    """Read a table whose columns are known: t, ax to az, gx to gz and optionally speed, lat, lon and temp.
 
-    columns: for each of these keys the column's name in the file, or its number as #1, #2 ... units: keys t, a (for ax
-    to az) or ax, ay, az, g (for gx to gz) or gx, gy, gz, speed, lat, lon; a - before a unit reverses the sign. A
-    missing unit is read from the brackets in the column's name. why: the findings that gave the columns. Raises
+    columns: for each of these keys, the column's name in the file or its number as #1, #2 ... units: by the keys t, a
+    (for ax to az) or ax, ay, az, g (for gx to gz) or gx, gy, gz, speed, lat, lon; a - before a unit reverses the sign.
+    A missing unit is read from the brackets in the column's name. why: the findings that gave the columns. Raises
     InputError, also for units in which the rates do not turn gravity.
     """
     check_keys(columns, units)
@@ -132,8 +132,8 @@ def read_mapped(
 
 
 def table_in(files: list[RecordingFile]) -> MappedTable | None:
-    """The table in these files; of several that do not belong together, the largest. None if it is not a table of
-    sensors."""
+    """The table in these files. If the tables of several files do not belong together, the largest. None without a
+    table of sensors."""
     largest = max(files, key=lambda file: len(file.text))
     sheet = sheet_in(largest)
     found = None if sheet is None else findings.find(sheet)
@@ -159,7 +159,7 @@ def sheet_of(files: list[RecordingFile], name: str, columns: Mapping[str, str]) 
 
 
 def read_table(table: MappedTable, units: Mapping[str, str]) -> AppRecording | None:
-    """The recording of a table whose columns and units are certain, or given in units; otherwise None.
+    """The recording of a table, or None if a column or unit is uncertain. units: units given by the user.
 
     Raises InputError.
     """
@@ -171,7 +171,8 @@ def read_table(table: MappedTable, units: Mapping[str, str]) -> AppRecording | N
 
 
 def unknown(files: list[RecordingFile], source: str, table: MappedTable | None = None) -> InputError:
-    """The error for a file of an unknown app: missing columns, its columns, and the command line to type."""
+    """The error for a file of an unknown app. It names the missing columns, the file's columns, and the command to
+    type."""
     table = table or table_in(files)
     if table is None:
         shown = next((line for file in files for line in file.first_lines(1)), "")[:60]
@@ -199,7 +200,7 @@ def unknown(files: list[RecordingFile], source: str, table: MappedTable | None =
     ]
     units = ",".join(f"{key}={name}" for key, name in table.units.items())
     where = source if len(files) == 1 or table.joined else f"{source}/{table.name}"
-    ask = "Put in what the ? stand for" if table.missing else "Put in what is not right"
+    ask = "Replace each ?" if table.missing else "Correct what is wrong"
     reasons = f" ({found.reasons})" if found.reasons else ""
     return InputError(
         f"{source}: not a file of an app that is known{several}{table.lacking}",
@@ -212,7 +213,7 @@ def unknown(files: list[RecordingFile], source: str, table: MappedTable | None =
 
 
 def _column_as_typed(table: MappedTable, key: str) -> str:
-    """The column of a key as the user types it: its number if its name would be misread, ? for none."""
+    """The column of a key, as the user types it: the name, the number if the name would be misread, or ? if unknown."""
     name = table.found.get(key, "?")
     if name != "?" and (any(mark in name for mark in ",=") or table.columns.count(name) > 1):
         return f"#{table.columns.index(name) + 1}"
@@ -237,7 +238,7 @@ def check_units(units: Mapping[str, str]) -> None:
         raise InputError(f"--units: {strange[0]!a} is not one of {', '.join(UNIT_KEYS)}")
     for key, text in units.items():
         if not (_is_counts(text) and key[0] in "ag"):
-            factor(text, UNIT_KEYS[key], key)  # raises InputError for another unit
+            factor(text, UNIT_KEYS[key], key)  # raises InputError for an unknown unit
 
 
 def _is_counts(text: str) -> bool:
@@ -245,7 +246,7 @@ def _is_counts(text: str) -> bool:
 
 
 def _check_apart(places: Mapping[str, int], columns: Mapping[str, str]) -> None:
-    """Refuse one column for two axes."""
+    """Raise InputError if two axes have the same column."""
     for key, place in places.items():
         other = next((k for k in places if k != key and places[k] == place), None)
         if other is not None:
@@ -255,7 +256,7 @@ def _check_apart(places: Mapping[str, int], columns: Mapping[str, str]) -> None:
 def _with_counts(
     sheet: Sheet, time_ns: Nanoseconds, places: Mapping[str, int], units: dict[str, str]
 ) -> dict[str, str]:
-    """Replace a bare "counts" in units by counts/N. Raises InputError if nothing shows N."""
+    """Replace "counts" without a number in units by counts/N. Raises InputError if the values do not show N."""
     if not any(map(_is_counts, units.values())):
         return units
     force, rates = (sheet.table([places[axis] for axis in axes]) for axes in (ACCEL, GYRO))
@@ -280,8 +281,8 @@ def _seconds(time_ns: Nanoseconds) -> Array:
 
 
 def _check_rates(name: str, seconds: Array, force: Array, rates: Array) -> None:
-    """Refuse rates that do not fit the turns of gravity: another unit fits, or they would turn it while it is
-    constant."""
+    """Raise InputError if rates do not fit the turns of gravity: another unit fits, or the rates would turn gravity
+    while its direction is constant."""
     fit = fit_rates(seconds, force, rates)
     shown = float(np.degrees(fit.factor))
     if fit.decides and not 1.0 / _TIMES_OFF < shown < _TIMES_OFF:
@@ -301,8 +302,8 @@ def _speed(
     units: Mapping[str, str],
     degrees: tuple[float, float],
 ) -> tuple[int | None, str, list[Message]]:
-    """(column of the speed, its unit, notices). A missing unit is found from the positions; otherwise the speed is left
-    out."""
+    """(column of the speed, its unit, notices). A missing unit is found from the positions. If they do not show it, the
+    speed is left out."""
     place = places.get("speed")
     if place is None:
         return None, "m/s", []
@@ -357,7 +358,7 @@ def _sensor(
 
 
 def _check_units(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, str]) -> None:
-    """Raise InputError naming every column whose unit is neither given nor in its name."""
+    """Raise InputError if the unit of a column is neither given nor in its name. The error names all such columns."""
     unknown: dict[str, list[str]] = {}
     for key in (*ACCEL, *GYRO, "speed"):
         if key in places:
@@ -378,5 +379,5 @@ def _unit(units: Mapping[str, str], keys: tuple[str, ...], column: str) -> str:
 
 
 def _sign_changed(units: Mapping[str, str]) -> bool:
-    """True if the user has asked for a change of sign. It is then not checked."""
+    """True if the user has asked for a change of sign. The sign is then not checked."""
     return any(units.get(key, "").startswith("-") for key in ("a", *ACCEL))

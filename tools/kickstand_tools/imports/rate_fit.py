@@ -1,10 +1,10 @@
 """Finds the unit of a gyro's rates from the turns of gravity, by least squares.
 
-At rest, and in a hand, the direction u of gravity turns in the sensor's axes as du/dt = u x rate. So over windows of
-WINDOW_S its change is the integral of u x reading, times the unit's factor, plus the effect of a constant bias. In a
-vehicle the force is not only gravity, and the rates explain it less: then the factor is too small, or is not found. All
-48 signed permutations of the gyro's axes are tried, because exchanged axes are a different mistake, which is checked
-later.
+At rest, and in a hand, the direction u of gravity turns in the sensor's axes by du/dt = u x rate. Over a window of
+WINDOW_S, the change of u is the integral of u x reading, times the unit's factor, plus the effect of a constant bias.
+In a vehicle, the force is not only gravity, so the rates explain it less well, and the factor is too small or not
+found. All 48 signed permutations of the gyro's axes are tried, because exchanged axes are another mistake, which is
+checked later.
 """
 
 from collections.abc import Mapping
@@ -18,21 +18,22 @@ from ..signals import Array
 CELL_S = 0.05  # readings are averaged over cells of this length
 MOST_CELLS = 12_000  # ten minutes are enough for a unit
 WINDOW_S = 0.4
-LEAST_TURN = 0.03  # rad, rms: a smaller turn of gravity in the windows shows nothing
-STRAIGHT = 0.25  # a cell's force is gravity's if its length is this close to the median
-EXPLAINED = 0.5  # share of the turns' variance that the rates explain: a smaller one decides nothing
-CLEARLY = 0.9  # with this share, units that differ by a factor of 2 can be distinguished: the ranges of raw counts
-FEWEST = 8  # windows
-# Over TURNED_S gravity keeps its direction if the mean of its unit vectors is at least KEPT_DIRECTION long.
-# MOST_TURNED: the largest turn in degrees by the mean rate across it in that case; the largest bias of the data sheet,
-# 20 deg/s, makes 80
+LEAST_TURN = 0.03  # rad, rms: with a smaller turn of gravity in the windows, no unit is found
+STRAIGHT = 0.25  # the force in a cell counts as gravity if its length is this close to the median
+EXPLAINED = 0.5  # least share of the turns' variance that the rates must explain
+# with this share, units that differ by a factor of 2 can be distinguished, as the ranges of raw counts do
+CLEARLY = 0.9
+FEWEST = 8  # least number of windows
+# Gravity keeps its direction over TURNED_S if the mean of its unit vectors is at least KEPT_DIRECTION long. In that
+# case, the mean rate across gravity may be a turn of at most MOST_TURNED degrees; the largest bias of the data sheet,
+# 20 deg/s, makes 80 degrees
 TURNED_S, KEPT_DIRECTION, MOST_TURNED = 2.0, 0.97, 120.0
 
 
 @dataclass
 class RateFit:
-    """factor: rad/s in one unit of the readings. explained: share of the turns' variance. turn: rad, rms of gravity's
-    turn in a window. unturned: rad, rms of the turn if the readings were in rad/s."""
+    """factor: rad/s in one unit of the readings. explained: explained share of the turns' variance. turn: rad, rms
+    of gravity's turn in a window. unturned: rad, rms of the turn if the readings were in rad/s."""
 
     factor: float = 0.0
     explained: float = 0.0
@@ -41,7 +42,7 @@ class RateFit:
 
     @property
     def decides(self) -> bool:
-        """True if the factor is certain within a few times."""
+        """True if the factor is exact enough to choose between very different units."""
         return self.explained >= EXPLAINED and self.turn >= LEAST_TURN and self.factor > 0.0
 
     def unit_among(self, units: Mapping[str, float]) -> str:
@@ -57,8 +58,8 @@ class RateFit:
 
 
 def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
-    """Fit rates to forces. seconds (n), force (n, 3, any unit), rates (n, 3, any unit); rows with NaN are interpolated
-    per sensor, so each sensor may have separate rows."""
+    """Fit rates to forces. seconds (n), force (n, 3, any unit), rates (n, 3, any unit); NaN is interpolated per sensor,
+    so each sensor may have its own rows."""
     cells = _in_cells(seconds, force, rates)
     if cells is None:
         return RateFit()
@@ -81,7 +82,7 @@ def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
     best = RateFit(turn=turn)
     if turn < 1e-6:
         return best
-    # integral of u x (reading's axis j as axis i), for each pair: (windows, 3, 3, 3)
+    # for each pair of axes i, j: the integral of u x (reading of axis j, used as axis i), (windows, 3, 3, 3)
     turned = np.einsum("ila,wnl,wnj->waij", _LEVI_CIVITA, mid, rate) * CELL_S
     bias = np.einsum("ila,wnl->wai", _LEVI_CIVITA, mid) * CELL_S
     flat = bias.reshape(-1, 3)
@@ -104,7 +105,7 @@ def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
 
 
 def turns_too_far(seconds: Array, force: Array, rates: Array) -> bool:
-    """True if rates (n, 3, deg/s) would turn gravity all the way round repeatedly while it keeps its direction."""
+    """True if rates (n, 3, deg/s) would turn gravity round and round although its direction is constant."""
     cells = _in_cells(seconds, force, rates)
     if cells is None:
         return False
@@ -126,12 +127,12 @@ def turns_too_far(seconds: Array, force: Array, rates: Array) -> bool:
 
 
 def _steady(u: Array) -> bool:
-    """True if gravity keeps its direction: then the mean of the rates is bias."""
+    """True if gravity keeps its direction. The mean of the rates is then their bias."""
     return float(np.max(np.std(u, axis=0))) < 0.02
 
 
 def _in_cells(seconds: Array, force: Array, rates: Array) -> tuple[Array, Array] | None:
-    """Force and rates (m, 3 each) in even cells; None if they are too short."""
+    """Average force and rates over even cells, (m, 3) each. None if they are too short."""
     there = np.isfinite(seconds)
     seconds, force, rates = seconds[there], force[there], rates[there]
     if len(seconds) < 4:

@@ -1,5 +1,5 @@
-"""The content of an app's files: a table as columns of numbers (Sheet), whose separator, decimal mark and names are
-found; and the sensors, each on its own clock, in a log's units and signs (Recording)."""
+"""The content of an app's files. A Sheet is a table as columns of numbers; its separator, decimal mark and names are
+found. An AppRecording has the sensors, each on its own clock, in a log's units and signs."""
 
 import csv
 import os
@@ -15,7 +15,7 @@ from ..signals import Array, Bools
 from .files import RecordingFile
 from .units import ACCELERATIONS, NO_TIME, RATES, REPEATED, SPEEDS, Nanoseconds, factor, times_ns
 
-LONG = 6  # a common beginning of several names is not repeated if it is this long
+LONG = 6  # characters: a common beginning of several names is not repeated from this length on
 _DECIMAL_COMMA = re.compile(r"(?:^|[;\t\"])\s*[+-]?\d+,\d")
 SECOND_NS = 10**9
 _ABSURD = 1e6  # g or deg/s: a larger value is a damaged cell
@@ -23,8 +23,8 @@ _ABSURD = 1e6  # g or deg/s: a larger value is a damaged cell
 
 @dataclass
 class Sheet:
-    """name: the file's, for messages. columns: their names in the file; a name may occur twice. cells: the cells of
-    each column. left_out: number of damaged rows."""
+    """name: the file's name in messages. columns: the columns' names in the file; a name may occur twice. cells: the
+    cells of each column. left_out: number of damaged rows."""
 
     name: str
     columns: list[str]
@@ -38,18 +38,20 @@ class Sheet:
         return next((found.index(name) for name in wanted if name in found), None)
 
     def axes(self, *names: str | tuple[str, ...]) -> tuple[list[int], list[str]]:
-        """place() of each name, or of one of several alternative names; and the (first) names of the missing ones."""
+        """place() for each name, or for the first that exists of several alternatives. Also returns the (first) names
+        of missing columns."""
         each = [name if isinstance(name, tuple) else (name,) for name in names]
         found = {one[0]: self.place(*one) for one in each}
         places = [place for place in found.values() if place is not None]
         return places, [name for name, place in found.items() if place is None]
 
     def times(self, place: int, unit: str = "s") -> Nanoseconds:
-        """A column as times (n). unit: of numbers, "" to find it from them. Raises InputError."""
+        """A column as times (n). unit: the unit of numbers, "" to find the unit from the numbers. Raises InputError."""
         return times_ns(self.cells[place], unit, self.name)
 
     def named(self, places: list[int]) -> str:
-        """The names of the file and of some columns, for messages: without units, a common beginning only once."""
+        """The names of the file and of some columns, for messages. Units are left out, and a common beginning is not
+        repeated."""
         names = [re.sub(r"[(\[].*?[)\]]", "", self.columns[place]).strip(" ,;") for place in places]
         same = len(os.path.commonprefix(names)) if len(names) > 2 else 0  # noqa: RUF071 - letters, no path
         if same > LONG:
@@ -73,13 +75,13 @@ def plain(name: str) -> str:
 
 
 def unit_in(name: str) -> str:
-    """The unit in brackets in a column's name, "" for none."""
+    """The unit in brackets in a column's name, or ""."""
     found = re.search(r"[(\[]([^)\]]*)[)\]]\s*$", name)
     return found[1].strip() if found else ""
 
 
 def names_in(line: str) -> list[str]:
-    """The cells of a line of names; none if it is blank or not CSV."""
+    """The cells of a line of names. An empty list if the line is blank or not CSV."""
     try:
         return [] if not line.strip() else [cell.strip() for cell in cells_of(line, separator_of(line))]
     except csv.Error:
@@ -103,7 +105,7 @@ def read_sheet(file: RecordingFile, header: int = 0, skipped: int = 0) -> Sheet:
 
 
 def decimal_points(text: str) -> str:
-    """Replace decimal commas by decimal points in text whose cells are not separated by commas."""
+    """Replace decimal commas by decimal points. The text's cells must not be separated by commas."""
     return text.replace(",", ".")
 
 
@@ -111,7 +113,7 @@ def decimal_points(text: str) -> str:
 class Taken:
     """The source of a quantity: the file and the columns, their unit, and the change of sign.
 
-    rate_hz: samples per second, 0 for none. why: the reason for this choice, "" if the app's format defines it.
+    rate_hz: samples per second, 0 if unknown. why: the reason for this choice, "" if the app's format defines it.
     """
 
     quantity: str
@@ -133,10 +135,10 @@ def rate_hz(time_ns: Nanoseconds) -> float:
 
 @dataclass
 class RecordedSensor:
-    """n samples: time_ns (n) of the recorder's clock, values (n, 3): g, +1 where the axis points up at rest, or deg/s,
-    right-handed. name: for messages. damaged: number of rows of its file that are left out, because they have too many
-    cells, or a time or value that cannot be read. A row without any value belongs to another sensor. taken: its
-    source."""
+    """n samples. time_ns (n): the recorder's clock. values (n, 3): g, +1 along the axis that points up at rest, or
+    deg/s, right-handed. name: name in messages. damaged: number of rows of the file that are left out, because they
+    have too many cells, or a time or value that cannot be read. A row without values belongs to another sensor. taken:
+    the source."""
 
     name: str
     time_ns: Nanoseconds
@@ -146,7 +148,7 @@ class RecordedSensor:
 
     def __post_init__(self) -> None:
         without = (self.time_ns == REPEATED) | np.all(np.isnan(self.values), axis=1)
-        good = (self.time_ns > REPEATED) & np.all(np.abs(self.values) < _ABSURD, axis=1)  # NaN is not less
+        good = (self.time_ns > REPEATED) & np.all(np.abs(self.values) < _ABSURD, axis=1)  # False for NaN
         self.damaged += int(np.count_nonzero(~good & ~without))
         self.time_ns, self.values = self.time_ns[good], self.values[good]
 
@@ -160,8 +162,9 @@ def sensor_of(
     sign: str,
     turn: float | Array = 1.0,
 ) -> RecordedSensor:
-    """Three columns of a sheet. quantity: "accelerometer" or "gyro"; sign: their sign, in words. turn: -1 if a log has
-    the opposite sign, one number or one per axis. Raises InputError for an unknown unit."""
+    """Make a sensor of three columns of a sheet. quantity: "accelerometer" or "gyro". sign: the columns' sign, in
+    words. turn: -1 if a log has the opposite sign; one number, or one per axis. Raises InputError for an unknown
+    unit."""
     scale = turn * factor(unit, ACCELERATIONS if quantity == "accelerometer" else RATES, sheet.name)
     taken = Taken(quantity, sheet.named(places), unit, rate_hz(time_ns), sign)
     return RecordedSensor(quantity, time_ns, sheet.table(places) * scale, sheet.left_out, [taken])
@@ -169,7 +172,7 @@ def sensor_of(
 
 @dataclass
 class ReceiverTrack:
-    """A satellite receiver's m values on the same clock: speed in m/s, degrees north and east; NaN for none."""
+    """A satellite receiver's m values on the recorder's clock: speed in m/s, degrees north and east; NaN if missing."""
 
     time_ns: Nanoseconds
     speed_mps: Array
@@ -187,11 +190,11 @@ class ReceiverTrack:
         there = (self.time_ns != NO_TIME) & ~np.all(np.isnan(rows), axis=1)
         self.keep(there)
         same = np.all((rows[there][1:] == rows[there][:-1]) | np.isnan(rows[there][1:]), axis=1)
-        same &= np.diff(self.time_ns // SECOND_NS) == 0  # repeated values of a standstill are kept once per second
+        same &= np.diff(self.time_ns // SECOND_NS) == 0  # at a standstill, repeated values are kept once per second
         self.keep(np.concatenate(([True], ~same)) if len(self.time_ns) else np.zeros(0, dtype=bool))
 
     def keep(self, which: Bools) -> None:
-        """Drop the other rows."""
+        """Keep only these rows."""
         for name in ("time_ns", "speed_mps", "lat_deg", "lon_deg"):
             setattr(self, name, getattr(self, name)[which])
 
@@ -205,9 +208,9 @@ def track_of(
     speed_unit: str = "m/s",
     per_degree: tuple[float, float] = (1.0, 1.0),
 ) -> ReceiverTrack | None:
-    """Speed and position of a sheet, by the numbers of their columns; None if it has neither.
+    """Speed and position from the columns of a sheet with these numbers. None without either.
 
-    per_degree: factors on latitude and longitude.
+    per_degree: factors from the columns to degrees of latitude and longitude.
     """
     if speed is None and (lat is None or lon is None):
         return None
@@ -226,7 +229,7 @@ class AppRecording:
     """app: the app's name. utc_ns: UTC minus the recorder's clock, ns since 1970; None if unknown.
 
     vehicle_axes: True if x already points left, y up and z forward on the vehicle, provided that the logger was mounted
-    as its maker requires. sign_known: True if the app's maker or its files show that up reads +1 g at rest; otherwise
+    as its maker requires. sign_known: True if the app's maker or its files show that up reads +1 g at rest. False if
     this is only likely.
     """
 

@@ -1,4 +1,4 @@
-"""Finds the unit of a speed without a stated unit, from the positions beside it."""
+"""Finds the unit of a speed from the positions in the same recording."""
 
 from dataclasses import dataclass
 
@@ -9,12 +9,12 @@ from ..signals import Array, distance_m
 from .recording import SECOND_NS, Sheet
 from .units import SPEEDS, Nanoseconds, factor
 
-_NEAR = 1.25  # largest factor between the speed and that from positions: units differ by 1.6 or more
+_NEAR = 1.25  # largest factor between the speed and the speed from positions; units differ by 1.6 or more
 
 
 @dataclass(frozen=True)
 class ImportSpeedUnit(Message):
-    """The speed has no unit: it is left out."""
+    """The speed is left out because its unit is unknown."""
 
     column: str
 
@@ -34,8 +34,8 @@ def unit_by_positions(
     lon: int | None,
     per_degree: tuple[float, float] = (1.0, 1.0),
 ) -> str:
-    """The unit in which the speeds fit the changes of position; "" if that is not clear. speed, lat, lon: numbers of
-    columns; per_degree: factors on latitude and longitude."""
+    """The unit in which the speeds fit the changes of position; "" if several units or none fit. speed, lat, lon:
+    numbers of columns. per_degree: factors from the columns to degrees of latitude and longitude."""
     if lat is None or lon is None:
         return ""
     moved = _moved_mps(time_ns, sheet.numbers(lat) * per_degree[0], sheet.numbers(lon) * per_degree[1])

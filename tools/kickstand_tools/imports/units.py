@@ -1,5 +1,5 @@
-"""Converts the units of apps to those of a log (g, deg/s, m/s, degrees), and their times to nanoseconds: numbers in s,
-ms, us or ns, from any start or from 1970, dates, clocks."""
+"""Converts the units of apps to the units of a log (g, deg/s, m/s, degrees). Converts times to nanoseconds. Times may
+be dates, clocks, or numbers in s, ms, us or ns, since any start or since 1970."""
 
 import math
 import re
@@ -46,9 +46,9 @@ Nanoseconds = Ints
 NO_TIME = np.iinfo(np.int64).min  # value for a cell without a time
 REPEATED = NO_TIME + 1  # value for a row that repeats the sample of an earlier row
 DATES = "date or clock"
-EPOCH_NS = 10**17  # 1973: a later time counts from 1970
+EPOCH_NS = 10**17  # 1973; larger times count from 1970
 DAY_NS = 86400 * 10**9
-_LATEST_NS = 4.0e18  # the year 2096; twice as much still fits into 64 bits
+_LATEST_NS = 4.0e18  # the year 2096; twice this value still fits into 64 bits
 _WRAP = 2**32  # micros() of a microcontroller restarts from 0 after 71.6 minutes, millis() after 49.7 days
 _DAY = re.compile(r"^(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})(?=[T ])")
 _THOUSANDTHS = re.compile(r"(:\d\d)[:,](\d{3})$")
@@ -58,7 +58,7 @@ _CLOCK = re.compile(r"^\s*(?:(\d+):)?(\d{1,2}):(\d{1,2}(?:\.\d+)?)\s*$")
 
 
 def unit(text: str) -> str:
-    """A unit in the spelling of the tables above, if they have it: "m/s^2" becomes "m/s2"."""
+    """A unit in the spelling of the tables above: "m/s^2" becomes "m/s2". Other units are unchanged."""
     short = re.sub(r"[\s^*·]", "", text.strip().lower()).replace("²", "2").replace("s-2", "/s2").replace("//", "/")
     return _SAME.get(short, short)
 
@@ -83,7 +83,7 @@ def factor(text: str, kinds: dict[str, float], where: str) -> float:
 
 
 def counts_per(text: str) -> float:
-    """N of the unit counts/N; 0 for another unit."""
+    """The number N of the unit counts/N; 0 for another unit."""
     found = _COUNTS.fullmatch(text.strip().lower().lstrip("-"))
     return float(found[1]) if found and float(found[1]) > 0.0 else 0.0
 
@@ -91,8 +91,8 @@ def counts_per(text: str) -> float:
 def times_ns(cells: Cells, unit_name: str = "", where: str = "the recording") -> Nanoseconds:
     """Times (n) in ns, NO_TIME for a cell without a time.
 
-    unit_name: unit of numbers, "" to find it from their size and steps. where: their name in messages. Raises
-    InputError if few cells are times.
+    unit_name: unit of numbers, "" to find the unit from their size and steps. where: name of the times in messages.
+    Raises InputError if few cells are times.
     """
     numbers = numbers_of(cells)
     count = int(np.count_nonzero(filled(cells)))
@@ -111,7 +111,7 @@ def times_ns(cells: Cells, unit_name: str = "", where: str = "the recording") ->
 
 
 def _date_ns(text: str) -> int:
-    """Nanoseconds since 1970 of a date in ISO 8601, in UTC without a zone; a blank before the zone is allowed."""
+    """Nanoseconds since 1970 of a date in ISO 8601, in UTC without a zone; a blank before the zone is accepted."""
     try:
         plain = _DAY.sub(lambda day: f"{day[1]}-{int(day[2]):02d}-{int(day[3]):02d}", text.strip())
         plain = _THOUSANDTHS.sub(r"\1.\2", plain)
@@ -163,7 +163,7 @@ def _of_numbers(values: NDArray[Any], unit_name: str, where: str) -> Nanoseconds
 
 
 def unwrapped(values: NDArray[Any]) -> NDArray[Any]:
-    """Continue the counts (n) of a 32-bit clock that has restarted from 0."""
+    """Continue the counts (n) of a 32-bit clock after it restarts from 0."""
     steps = np.diff(values)
     back = steps < -0.9 * _WRAP
     if not np.any(back) or np.nanmax(values) >= _WRAP or np.nanmin(values) < 0:
@@ -179,12 +179,13 @@ def _scaled(values: Array, scale: int) -> Nanoseconds:
 
 
 def _guessed(values: Array) -> str:
-    """Guess the unit of times: of those since 1970 by their size, of others by their steps."""
+    """Guess the unit of times: by their size if they count from 1970, otherwise by their steps."""
     good = unwrapped(values[np.isfinite(values)])
     size = float(np.median(np.abs(good)))
     steps = np.diff(good)
     step = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
-    if size > 1e8 and size < 1e10 and step < 100.0:  # otherwise a clock of microseconds that has run for minutes
+    # with larger steps, it is a clock of microseconds that has run for minutes
+    if size > 1e8 and size < 1e10 and step < 100.0:
         return "s"
     for name, from_1970 in (("ns", 1e17), ("us", 1e14), ("ms", 1e11)):
         if size > from_1970:

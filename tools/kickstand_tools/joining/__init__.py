@@ -1,1 +1,1 @@
-"""Joins a phone's or watch's track to a ride: matched by the yaw of both, at an unknown offset of their clocks."""
+"""Joins a phone's or watch's track to a ride. The yaw of both shows the unknown offset between their clocks."""

@@ -1,8 +1,8 @@
-"""Compares the leans of two devices on one bike. This tests a lean meter without a reference.
+"""Compares the leans of two devices on one bike, to test a lean meter without a reference.
 
-It does not show errors that both share, such as those of the bike's model. It shows the separate errors of each device:
-of its sensor, its mount and its calibration. If both devices are equally good, the error of each is the difference
-divided by the square root of two.
+The comparison does not show errors that both devices share, such as errors of the bike's model. It shows the separate
+errors of each device, of its sensor, its mount and its calibration. If both devices are equally good, the error of each
+is the difference divided by the square root of two.
 """
 
 from collections.abc import Iterator
@@ -27,17 +27,18 @@ from .motion import motion
 
 STEP_S = 0.02
 _RIDING_MPS = 3.0
-_GAP_S = 0.2  # between samples further apart than this the lean is unknown
-_LEAST_S = 20.0  # least time of riding that is compared
-_LEANED_DEG = 3.0  # with a smaller rms of the lean neither delay nor slope is computed
+_GAP_S = 0.2  # the lean is unknown between samples that are further apart
+_LEAST_S = 20.0  # least time of riding to compare
+_LEANED_DEG = 3.0  # delay and slope are computed only for a larger rms of the lean
 
 
 @dataclass
 class Difference:
-    """B's lean minus A's, in degrees. constant_deg: its mean, caused by poses and mounts. moving_deg: rms of the
-    difference without its mean; 95 % of it are under p95_deg and all under worst_deg. slope: B's lean over A's.
-    delay_s: delay of B's lean, s. The last two are None if the ride leans too little. expected_deg: the rms predicted
-    by both standard deviations. within_1, within_2: shares of the differences within one and two of these."""
+    """B's lean minus A's, in degrees. constant_deg: the mean, caused by poses and mounts. moving_deg: rms of the
+    difference without its mean; 95 % of the values are under p95_deg, and all under worst_deg. slope: B's lean / A's.
+    delay_s: delay of B's lean, s. slope and delay_s are None if the ride leans too little. expected_deg: the rms
+    predicted by both standard deviations. within_1, within_2: shares of the differences within one and two standard
+    deviations."""
 
     seconds: float
     rms_deg: float
@@ -54,9 +55,9 @@ class Difference:
 
 @dataclass
 class Agreement:
-    """The agreement of rides A and B. live: Difference of the displayed leans, where both show one; None if there is no
-    such time. smoothed: Difference of the smoothed leans. t_s (n): s since A's first sample. The leans (n, degrees) at
-    these times, NaN if unknown. names: of A's and B's logs."""
+    """The agreement of rides A and B. live: Difference of the displayed leans while both devices show one; None without
+    such a time. smoothed: Difference of the smoothed leans. t_s (n): s since A's first sample. The leans (n, degrees)
+    at these times, NaN if unknown. names: the names of A's and B's logs."""
 
     clocks: Clocks
     live: Difference | None
@@ -80,7 +81,7 @@ def compare_rides(
     calibration_b: CalibrationFile,
     progress: Progress | None = None,
 ) -> Agreement:
-    """Compare two recordings of one ride by two devices. Their clocks may differ by any time.
+    """Compare two recordings of one ride by two devices. The clocks of the devices may differ by any time.
 
     a, b: see read_log. progress: called with (done, total) of the first reading. Raises InputError, also if the
     recordings are of different rides.
@@ -158,7 +159,7 @@ def check_picture(path: Path) -> None:
     if not find_spec("matplotlib"):
         raise InputError(f"a picture needs matplotlib: {extra('rides')}")
     if path.suffix != ".png":
-        raise InputError(f"{path}: the picture is a .png")
+        raise InputError(f"{path}: the name of the picture must end in .png")
 
 
 def draw(path: Path, found: Agreement) -> None:
@@ -186,14 +187,14 @@ def draw(path: Path, found: Agreement) -> None:
 
 
 def _interpolated(t_s: Array, values: Array, at_s: Array) -> Array:
-    """Interpolate values at other times; NaN outside, in gaps, and beside values that are NaN."""
+    """Interpolate values at other times. NaN outside the known times, in gaps, and beside values that are NaN."""
     after = np.clip(np.searchsorted(t_s, at_s), 1, len(t_s) - 1)
     near = (at_s >= t_s[0]) & (at_s <= t_s[-1]) & (t_s[after] - t_s[after - 1] < _GAP_S)
     return np.where(near, np.interp(at_s, t_s, values), np.nan)
 
 
 def _lean_while_riding(ride: SmoothedRide | Any, at_s: Array, riding: Bools) -> tuple[Array, Array]:
-    """Lean and its standard deviation (n, degrees); NaN if one is unknown or the bike is not riding."""
+    """Lean and its standard deviation (n, degrees). NaN if one of them is unknown, or the bike is not riding."""
     lean, sigma = (_interpolated(ride.t_s, values, at_s) for values in (ride.lean_deg, ride.lean_sigma_deg))
     known = riding & ~np.isnan(sigma)
     return np.where(known, lean, np.nan), np.where(known, sigma, np.nan)
@@ -225,8 +226,8 @@ def _difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Difference | 
 
 
 def _slope_and_delay(a: Array, b: Array, both: Bools) -> tuple[float | None, float | None]:
-    """Slope and delay of B's lean against A's. Both are treated as equally exact: the slope is that of the principal
-    axis, and the delay is fitted to the mean of both roll rates."""
+    """Slope and delay of B's lean relative to A's. Both leans are treated as equally exact: the slope is the slope of
+    the principal axis, and the delay is fitted to the mean of both roll rates."""
     one, other = a[both] - a[both].mean(), b[both] - b[both].mean()
     if _rms(one) < _LEANED_DEG or _rms(other) < _LEANED_DEG:
         return None, None

@@ -1,8 +1,8 @@
 """Finds the shift and the drift between the clocks of two sensors on one bike.
 
-First every shift is tried on the magnitude of the rates, which does not depend on the sensors' mounting. Then shift and
-drift are fitted by least squares to the rates about A's axes. The rotation of B against A also follows from the rates.
-All results are in the time and the axes of A; B is the other sensor.
+First, every shift is tried with the magnitude of the rates, which does not depend on the sensors' mounting. Then shift
+and drift are fitted by least squares to the rates about A's axes. The rates also give the rotation of B relative to A.
+All results are in the time and the axes of sensor A; B is the other sensor.
 """
 
 from dataclasses import dataclass
@@ -17,19 +17,20 @@ from .match import LEAST_EVIDENCE, LEAST_LEAD, LEAST_S, MOST_DRIFT
 from .motion import STEP_S, CellMotion
 
 _SMOOTH = 5  # rates are averaged over this many cells, to find their derivatives
-_MOST_DPS = 60.0  # higher rates, caused by jolts, are cut to this
+_MOST_DPS = 60.0  # higher rates are due to jolts, and are limited to this
 _APART_S, _CANDIDATES = 3.0, 6
-_INDEPENDENT_S = 1.0  # rates further apart in time are treated as independent
+_INDEPENDENT_S = 1.0  # rates that are further apart in time are treated as independent
 _LEAST_CORRELATION = 0.8  # least correlation of the rates: two sensors on one bike have over 0.9
-_MOST_APART_DEG = 15.0  # largest contradiction between the calibrations: each is good to a few degrees
+_MOST_APART_DEG = 15.0  # largest contradiction between the calibrations, which are exact to a few degrees
 _ROUNDS = 8
 
 
 @dataclass
 class Clocks:
-    """later_s: time of B's first sample minus that of A's, s. drift: seconds per second that B's clock loses against
-    A's. correlation: that of the rates. common_s: time for which both have samples, without gaps and frozen readings,
-    s. apart_deg: angle between B's rotation relative to A from the calibrations and from the gyros."""
+    """later_s: time of B's first sample minus the time of A's first sample, s. drift: seconds per second that B's clock
+    loses against A's. correlation: correlation of the rates. common_s: time for which both have samples, without gaps
+    and frozen readings, s. apart_deg: B's rotation relative to A, once from the calibrations and once from the gyros:
+    the angle between the two."""
 
     later_s: float
     drift: float
@@ -38,13 +39,13 @@ class Clocks:
     apart_deg: float = 0.0
 
     def of_b(self, a_s: Array) -> Array:
-        """Seconds since B's first sample at seconds since A's."""
+        """Convert seconds since A's first sample to seconds since B's first sample."""
         return (a_s - self.later_s) * (1.0 - self.drift)
 
 
 def clocks(a: CellMotion, b: CellMotion, axes_a: CalibrationFile, axes_b: CalibrationFile) -> Clocks:
-    """The Clocks of two recordings. Raises InputError if they are not of one ride, or if that cannot be shown. Callers
-    put both names in front of its text."""
+    """The Clocks of two recordings. Raises InputError if they are from different rides, or if the ride cannot be proved
+    to be the same. Callers put both names in front of the error's text."""
     size = [_size(one) for one in (a, b)]
     found, count = correlations(size[0], a.there, size[1], b.there)
     found = np.where(count * STEP_S >= LEAST_S, found, 0.0)
@@ -58,12 +59,12 @@ def clocks(a: CellMotion, b: CellMotion, axes_a: CalibrationFile, axes_b: Calibr
         tried.append((float(ratio), alike, shift_s))
     tried.sort(reverse=True)
     if not tried or tried[0][0] < LEAST_EVIDENCE or tried[0][1] < _LEAST_CORRELATION:
-        raise InputError("nowhere do they turn alike for a minute: are they of one ride, and both on the bike?")
+        raise InputError("at no time do they turn alike for a minute: are they of one ride, and both on the bike?")
     if len(tried) > 1 and tried[1][0] > tried[0][0] - LEAST_LEAD:
         raise InputError("they fit at two times: a longer ride with more bends is needed")
     turn = _rotation(a, b, tried[0][2])
     made = _fitted(a, b, _along(a, np.eye(3)), _along(b, turn), tried[0][2])
-    # B's axes in A's, once from the rates and once from both calibrations
+    # B's axes relative to A's, once from the rates and once from both calibrations
     turn = _rotation(a, b, made.later_s)
     said = np.asarray(axes_a.vehicle_from_sensor).T @ np.asarray(axes_b.vehicle_from_sensor)
     apart = float(np.degrees(np.linalg.norm(rotation_vector(said @ turn.T))))
@@ -88,7 +89,7 @@ def _along(motion: CellMotion, axes: Array) -> Array:
 
 
 def _rotation(a: CellMotion, b: CellMotion, later_s: float) -> Array:
-    """(3, 3): A's axes from B's: the rotation that brings B's rates nearest to A's (Kabsch's algorithm)."""
+    """(3, 3): the rotation from B's axes to A's that brings B's rates nearest to A's rates (Kabsch's algorithm)."""
     both = _valid_at(b, a.t_s - later_s) & a.there
     one, other = _along(a, np.eye(3))[both], _interpolated_at(b.t_s, _along(b, np.eye(3)), a.t_s[both] - later_s)
     left, _, right = np.linalg.svd((one - one.mean(axis=0)).T @ (other - other.mean(axis=0)))
@@ -116,7 +117,7 @@ def _fitted(a: CellMotion, b: CellMotion, of_a: Array, of_b: Array, later_s: flo
         normal[1, 1] += float(np.mean(weight @ error**2)) / len(error) / USUAL_DRIFT**2
         step = np.linalg.solve(normal, gradient) if k > 0 else np.array([gradient[0] / max(normal[0, 0], 1e-9), 0.0])
         step[0] = np.clip(step[0], -0.5, 0.5)
-        # The step changes the shift in the middle of the compared part; the shift at the start follows
+        # The step changes the shift in the middle of the compared part; compute the shift at the start from it
         drift, middle = drift + step[1], at_s[both].mean()
         later_s += step[0] - step[1] * (middle - later_s)
     if abs(drift) > MOST_DRIFT:

@@ -7,11 +7,12 @@ from ..signals import Array, moving_mean
 from .motion import STEP_S, CellMotion
 from .track import Course, Segments, without_trend
 
-_MOST_SINE = 0.87  # largest sine of the lean; over 60 degrees the speed or the rate is wrong
+_MOST_SINE = 0.87  # largest sine of the lean; over 60 degrees, the speed or the rate is wrong
 
 
 class Comparison:
-    """A ride beside a track. A shift is the track's time at the ride's first sample, s since the track's first point.
+    """Compares a ride with a track. A shift is the track's time at the ride's first sample, s since the track's first
+    point.
 
     given: the segments of the track that are within the ride for every shift within margin_s.
     """
@@ -50,10 +51,10 @@ class Comparison:
 
 def _double_sums(motion: CellMotion, course: Course, shift_s: float) -> Array:
     """(n + 1, 6): integrals over time of the rotation (degrees; about up and two axes across it) and of the integrated
-    force (m/s; the sensor's axes): their differences are means between two times.
+    force (m/s; the sensor's axes). Differences of these integrals give means between two times.
 
-    The rate about up is the yaw rate times the cosine of the lean, and the lean follows from the track's speed and the
-    yaw rate, by balance.
+    The rate about up is the yaw rate times the cosine of the lean. The lean of a balanced bike follows from the track's
+    speed and the yaw rate.
     """
     up = motion.up
     across = np.asarray(np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))]), dtype=float)
@@ -66,11 +67,12 @@ def _double_sums(motion: CellMotion, course: Course, shift_s: float) -> Array:
     cosine = np.asarray(np.sqrt(1.0 - sine * sine), dtype=float)
     turned = _sums(rates / cosine[:, None])
     sped_up = _sums(motion.force_g * STANDARD_GRAVITY)
-    sped_up -= np.linspace(0.0, 1.0, len(sped_up))[:, None] * sped_up[-1]  # subtract gravity, which would cost digits
+    # subtract gravity, whose large sums would cost digits
+    sped_up -= np.linspace(0.0, 1.0, len(sped_up))[:, None] * sped_up[-1]
     once = np.hstack((turned, sped_up))
     return _sums((once[1:] + once[:-1]) / 2.0)
 
 
 def _sums(values: Array) -> Array:
-    """(n + 1, k) integrals of values (n, k) from the first edge to each."""
+    """(n + 1, k) integrals of values (n, k) from the first edge to each edge."""
     return np.vstack((np.zeros(values.shape[1]), np.cumsum(values * STEP_S, axis=0)))

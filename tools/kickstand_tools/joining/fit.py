@@ -1,7 +1,7 @@
 """Finds the shift between the clocks of a ride and a track to hundredths of a second, with its standard deviation.
 
-First it tries the shifts around a rough one. Then it fits all unknowns by least squares: shift, drift, a tilt of the
-ride's up and the sensor's forward axis.
+First it tries the shifts around a rough shift. Then it fits all unknowns by least squares: shift, drift, the tilt of
+the ride's up, and the sensor's forward axis.
 """
 
 from dataclasses import dataclass
@@ -13,29 +13,29 @@ from .compare import Comparison
 from .motion import CellMotion
 from .track import Course, Segments
 
-AROUND_S = 6.0  # largest distance of the shift from the rough one, including the drift at the ends of the ride
-_TRIED_S = 0.1  # step between the shifts that are tried
+AROUND_S = 6.0  # largest distance from the rough shift, including the drift at the ends of the ride
+_TRIED_S = 0.1  # step between the tried shifts
 _SHIFTS = np.arange(-AROUND_S, AROUND_S + _TRIED_S / 2.0, _TRIED_S)
 _DRIFTS = np.arange(-300e-6, 301e-6, 20e-6)
-USUAL_DRIFT = 100e-6  # prior of the drift, 1 sigma: two crystals, one of them hot
-_USUAL_TILT = 0.05  # prior of the tilt of up by an accelerometer's offset, 1 sigma, rad
+USUAL_DRIFT = 100e-6  # prior of the drift between two crystals, one of them hot, 1 sigma
+_USUAL_TILT = 0.05  # prior of the tilt of up due to an accelerometer's offset, 1 sigma, rad
 _PRIOR = 1.0 / np.array([np.inf, USUAL_DRIFT, _USUAL_TILT, _USUAL_TILT, np.inf, np.inf, np.inf]) ** 2
-_SAME_TRACK_S = 0.05  # 1 sigma of the shift, because receivers smooth more in bends than on straights
+_SAME_TRACK_S = 0.05  # 1 sigma of the shift; receivers smooth more in bends than on straights
 _FREEDOM = 4.0  # degrees of freedom of Student's distribution, which down-weights errors over two sigma
-_LEAST_ERROR = 0.5  # least error over its sigma: even with a better receiver the gyro's scale factor is inexact
+_LEAST_ERROR = 0.5  # least error divided by its sigma: the gyro's scale factor is inexact, even with a better receiver
 _LEAST_COST = 0.5 * (_FREEDOM + 1.0) * np.log1p(_LEAST_ERROR**2 / _FREEDOM)  # least cost of a step
 _ROUNDS = 8
 _FEWEST = 2  # least number of segments to compare
-_STEPS_ALIKE = 4.0  # number of neighbouring steps with the same error, because courses are smooth
+_STEPS_ALIKE = 4.0  # number of neighbouring steps that share an error, because courses are smooth
 
 
 @dataclass
 class TrackFit:
     """shift_s: the track's time at the ride's first sample, s since the track's first point. drift: seconds per second
-    that the ride's clock loses. sigma_s: standard deviation of the time of a track point in the ride, at the end of the
-    ride where it is larger. correlation: that of the courses' changes. evidence: natural logarithm of the ratio of the
-    courses' likelihoods with and without the ride's yaw. tilt (2): tilt of the ride's up, rad. segments: number of
-    segments that were compared."""
+    that the ride's clock loses. sigma_s: standard deviation of a track point's time in the ride, at the end of the ride
+    where it is larger. correlation: correlation of the courses' changes. evidence: natural logarithm of the ratio of
+    the courses' likelihoods with and without the ride's yaw. tilt (2): tilt of the ride's up, rad. segments: number of
+    compared segments."""
 
     shift_s: float
     drift: float
@@ -47,7 +47,7 @@ class TrackFit:
 
 
 def fitted(motion: CellMotion, course: Course, segments: Segments, rough_s: float) -> TrackFit | None:
-    """The best fit within AROUND_S of a rough shift. None if the two hardly overlap there."""
+    """The best fit within AROUND_S of a rough shift. None if ride and track hardly overlap there."""
     compared = Comparison(motion, course, segments, rough_s, AROUND_S + 1.0)
     if len(compared.given.begin_s) < _FEWEST:
         return None
@@ -58,7 +58,7 @@ def fitted(motion: CellMotion, course: Course, segments: Segments, rough_s: floa
 def cost_of_one_shift(motion: CellMotion, course: Course, segments: Segments, fit: TrackFit) -> float:
     """The reduction of the cost per segment if each segment gets its own shift, in units of an error's cost.
 
-    It is under 2 if the track belongs to the ride, and over 4 for the same road at another time.
+    The result is under 2 if the track belongs to the ride, and over 4 for the same road at another time.
     """
     compared = Comparison(motion, course, segments, fit.shift_s, AROUND_S + 1.0)
     given = compared.given
@@ -70,13 +70,13 @@ def cost_of_one_shift(motion: CellMotion, course: Course, segments: Segments, fi
 
 
 def _try_shifts(compared: Comparison, rough_s: float) -> tuple[float, float, float]:
-    """The best of the tried shifts and drifts, and its evidence; see Fit."""
+    """The best of the tried shifts and drifts, and its evidence (see TrackFit)."""
     given, middle_s = compared.given, compared.middle_s
     costs = _costs(compared, rough_s, 0.0, np.ones(1))
     since_s = given.middle_s.mean(axis=1) - middle_s
     best = (np.inf, 0.0, 0.0)
     for drift in _DRIFTS:
-        # the cost of each segment at its own shift, for every shift in the middle of the ride
+        # for every shift in the middle of the ride: the cost of each segment at the segment's own shift
         at = np.clip((_SHIFTS[:, None] + drift * since_s + AROUND_S) / _TRIED_S, 0.0, len(_SHIFTS) - 1.001)
         low = at.astype(int)
         column = np.arange(len(since_s))
@@ -122,7 +122,7 @@ class _Step:
 
 
 def _refine(compared: Comparison, shift_s: float, drift: float, evidence: float) -> TrackFit:
-    """The best fit by Gauss-Newton steps, in each of which outliers are down-weighted."""
+    """The best fit by Gauss-Newton steps. Each step down-weights outliers."""
     given = compared.given
     forward = _least(compared.sped_up(shift_s, drift), given.speed_mps, given.speed_weight)
     now = np.array([shift_s, drift, 0.0, 0.0, *forward])
@@ -159,8 +159,8 @@ def _step(compared: Comparison, now: Array) -> _Step:
 
 
 def _with_sigma(compared: Comparison, evidence: float, now: Array, step: _Step) -> TrackFit:
-    """The Fit with its standard deviation. Errors within a segment may be correlated. So the variance comes from the
-    scatter of the segments' gradients at the solution."""
+    """The TrackFit with its standard deviation. Errors within a segment may be correlated, so the variance is computed
+    from the scatter of the segments' gradients at the solution."""
     given, count, drift = compared.given, len(step.pulls), float(now[1])
     spread = step.pulls.T @ step.pulls * count / max(count - 2, 1) + np.diag(_PRIOR)
     covariance = (step.inverse @ spread @ step.inverse)[:2, :2]

@@ -37,18 +37,18 @@ class Joined:
 
     @property
     def columns(self) -> dict[str, Array]:
-        """(m, the points of the track) by the names of the log's columns."""
+        """The track's values, (m) points each, by the names of the log's columns."""
         track = self.track
         values = {SPEED: track.speeds_mps(), "lat_deg": track.lat_deg, "lon_deg": track.lon_deg, "utc_s": track.utc_s}
         return {name: value for name, value in values.items() if name != SPEED or not self.own_speed}
 
 
 def join_track(ride: Source, track: Path | str | Track, progress: Progress | None = None) -> Joined:
-    """Find the place of a phone's or watch's track in a ride from the yaw and the acceleration of both.
+    """Find the time of a phone's or watch's track in a ride, from the yaw and the acceleration of both.
 
-    ride: see read_log; it needs neither a calibration nor a speed. track: a .gpx or .fit file. Their clocks may differ
-    by any time and drift. progress: called with (done, total) of the ride's bytes. Raises InputError if the track is
-    another ride's, or if the match is not certain.
+    ride: see read_log; it needs neither a calibration nor a speed. track: a .gpx or .fit file. The clocks of ride and
+    track may differ by any time, and drift. progress: called with (done, total) of the ride's bytes. Raises InputError
+    if the track is another ride's, or if the match is not certain.
 
     >>> from kickstand_tools.api import simulate_ride
     >>> ride = simulate_ride("hills", seed=1, seconds=120.0)
@@ -65,7 +65,7 @@ def join_track(ride: Source, track: Path | str | Track, progress: Progress | Non
     notices: list[Message] = []
     moved = motion(ride, progress, notices)
     if moved.positions:
-        raise InputError(f"{name_of(ride)} has positions already: join puts them to a ride that has none")
+        raise InputError(f"{name_of(ride)} has positions already: join adds positions to a ride without any")
     try:
         found = match(moved, given)
     except InputError as error:
@@ -74,10 +74,11 @@ def join_track(ride: Source, track: Path | str | Track, progress: Progress | Non
 
 
 def write_joined(out: Path | str, joined: Joined, progress: Progress | None = None) -> int:
-    """Write the lines of the ride, with the track's values in the nearest rows, whole or not at all.
+    """Write the lines of the ride, with the track's values in the nearest rows. The file is written whole or not at
+    all.
 
-    Gzipped if the name ends in .gz. Returns the number of positions written. progress: called with (done, total) of the
-    ride. Raises InputError.
+    It is gzipped if its name ends in .gz. Returns the number of positions written. progress: called with (done, total)
+    of the ride. Raises InputError.
 
     >>> import tempfile
     >>> log = Log([0.0, 0.01], [[0.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 0.0]] * 2)
@@ -119,14 +120,14 @@ def write_joined(out: Path | str, joined: Joined, progress: Progress | None = No
 
 
 def _nearest(time_us: Ints, at_us: Ints) -> tuple[Ints, Ints]:
-    """Rows, and the indices of the points for them: points within the rows' time and not in a gap of the log."""
+    """Rows, and the index of the point for each. Only points within the log's time, and not in a gap, are used."""
     points = np.flatnonzero((at_us >= time_us[0]) & (at_us <= time_us[-1]))
     after = np.clip(np.searchsorted(time_us, at_us[points]), 1, max(len(time_us) - 1, 1))
     if len(time_us) < 2:
         return np.zeros(len(points), dtype=int), points
     rows = after - (at_us[points] - time_us[after - 1] < time_us[after] - at_us[points])
     near = np.abs(time_us[rows] - at_us[points]) <= LOST_US
-    rows, last = np.unique(rows[near][::-1], return_index=True)  # if a row has two points, the later one
+    rows, last = np.unique(rows[near][::-1], return_index=True)  # if a row has two points, use the later point
     return rows, points[near][::-1][last]
 
 
@@ -137,7 +138,7 @@ def _placed(values: Array, rows: Ints, count: int) -> Array:
 
 
 def _with_columns(block: Block, kept: list[str]) -> list[str]:
-    """The lines with these columns."""
+    """The block's lines with only these columns."""
     places = [block.names.index(name) for name in kept]
     rows = (next(csv.reader([line])) if '"' in line else line.split(",") for line in block.lines)
     return [",".join([cells[place] for place in places]) for cells in rows]

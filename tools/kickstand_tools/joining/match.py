@@ -1,4 +1,4 @@
-"""Finds the place of a track in a ride: the best of all shifts, or the reason why none fits."""
+"""Finds the time of a track in a ride: the best of all shifts between their clocks, or the reason why none fits."""
 
 from dataclasses import dataclass
 
@@ -13,26 +13,27 @@ from .motion import STEP_S, CellMotion
 from .track import LONGEST_S, SLOWEST_MPS, STEPS, Course, Track, course, segments
 
 _GRID_S = 0.5
-_SPAN_S = 4.0  # rough shifts are found by changes of course over this time
-_APART_S = 10.0  # least distance of two rough shifts
+_SPAN_S = 4.0  # rough shifts are found from changes of course over this time
+_APART_S = 10.0  # least distance between two rough shifts
 _CANDIDATES = 5
-_WORTH = 0.1  # a rough shift is tried if its evidence is at least this share of the largest evidence
-LEAST_S = 60.0  # least time of riding in both
+_WORTH = 0.1  # a rough shift is tried if it has at least this share of the largest evidence
+LEAST_S = 60.0  # least time of riding in common
 _LEAST_TURN_DEG = 360.0  # least sum of the changes of course
-LEAST_EVIDENCE = 15.0  # least evidence of a match; other rides' tracks reach 9
-LEAST_LEAD = 6.0  # least difference between the evidence of the best shift and of another one
+LEAST_EVIDENCE = 15.0  # least evidence of a match; tracks of other rides reach 9
+LEAST_LEAD = 6.0  # least lead in evidence of the best shift over any other
 _MOST_APART = 3.0
-MOST_DRIFT = 400e-6  # largest drift; that of a crystal in the heat of an engine is 100e-6
-_ALIKE = 0.9  # a higher correlation is not by chance, but may come from another, similar bend
+MOST_DRIFT = 400e-6  # largest drift; a crystal in the heat of an engine has 100e-6
+_ALIKE = 0.9  # a higher correlation is not due to chance, but may come from another, similar bend
 _LEAST_CORRELATION = 0.6
 _MOST_SIGMA_S = 0.3
 
 
 @dataclass
 class Match:
-    """start_utc_s: the track's time at the ride's first sample, s since 1970. It includes the receiver's delay: with
-    it, positions are where the bike is. drift: seconds per second that the ride's clock loses. sigma_s: standard
-    deviation of the match. correlation: that of the changes of course, 0 to 1. common_s: time covered by both, s."""
+    """start_utc_s: the track's time at the ride's first sample, s since 1970. It includes the receiver's
+    delay, so that positions are where the bike is. drift: seconds per second that the ride's clock loses. sigma_s:
+    standard deviation of the match. correlation: correlation of the changes of course, 0 to 1. common_s: time covered
+    by both, s."""
 
     start_utc_s: float
     drift: float
@@ -41,13 +42,13 @@ class Match:
     common_s: float
 
     def ride_s(self, utc_s: Array) -> Array:
-        """Seconds since the ride's first sample at these times."""
+        """Convert Universal Times to seconds since the ride's first sample."""
         return (utc_s - self.start_utc_s) * (1.0 - self.drift)
 
 
 def match(motion: CellMotion, track: Track) -> Match:
-    """The Match of a track with a ride. Raises InputError if the track does not belong to the ride, or if that cannot
-    be shown. Callers put both names in front of its text."""
+    """The Match of a track with a ride. Raises InputError if the track does not belong to the ride, or if this is
+    uncertain. Callers put both names in front of the error's text."""
     track = track.once_a_second()
     steps = course(track)
     parts = segments(steps)
@@ -68,18 +69,18 @@ def match(motion: CellMotion, track: Track) -> Match:
         if best.correlation > _ALIKE:
             common_s = best.segments * STEPS
             raise InputError(f"they have {common_s} s with too few bends in common to be sure: {_LONGER}")
-        raise InputError(f"nowhere does the ride turn as the track does: {_OTHER}")
+        raise InputError(f"at no time does the ride turn like the track: {_OTHER}")
     others = [fit for fit in found if abs(fit.shift_s - best.shift_s) > AROUND_S]
     if others and others[0].evidence > best.evidence - LEAST_LEAD:
         far_s = abs(others[0].shift_s - best.shift_s)
         raise InputError(f"the track fits at two times, {far_s:.0f} s apart, as its bends are alike: {_LONGER}")
     if abs(best.drift) > MOST_DRIFT or cost_of_one_shift(motion, steps, parts, best) > _MOST_APART:
         raise InputError(
-            "the ride turns as the track does, but at other times: it is the same road on another day, or other bends "
+            "the ride turns like the track, but at other times: it is the same road on another day, or other bends "
             "that are alike"
         )
     if best.sigma_s > _MOST_SIGMA_S:
-        raise InputError(f"the track fits to {best.sigma_s:.1f} s only, not to {_MOST_SIGMA_S} s: {_LONGER}")
+        raise InputError(f"the track fits only to {best.sigma_s:.1f} s, not to {_MOST_SIGMA_S} s: {_LONGER}")
     start_utc_s = float(track.utc_s[0]) + best.shift_s
     made = Match(start_utc_s, best.drift, best.sigma_s, best.correlation, 0.0)
     begin_s, end_s = made.ride_s(track.utc_s[[0, -1]])
@@ -103,11 +104,11 @@ def _check_turns(motion: CellMotion, steps: Course) -> None:
     yaw_dps = moving_mean(motion.rate_dps @ motion.up, round(1.0 / STEP_S))
     turned_deg = float(np.abs(yaw_dps[np.abs(yaw_dps) > 3.0]).sum()) * STEP_S
     if turned_deg < _LEAST_TURN_DEG:
-        raise InputError(f"the ride turns by {turned_deg:.0f} degrees in all: too few bends to tell where it was when")
+        raise InputError(f"the ride turns by {turned_deg:.0f} degrees in all: too few bends to match a track")
 
 
 def _rough_shifts(motion: CellMotion, steps: Course) -> tuple[bool, list[float]]:
-    """True if the ride would fit better with the opposite sign of yaw; and the shifts that fit best."""
+    """(True if the ride would fit better with the opposite sign of yaw, the shifts that fit best)."""
     of_track, track_good = _changes_of_track(steps)
     of_ride, ride_good = _changes_of_ride(motion)
     found, count = correlations(of_track, track_good, of_ride, ride_good)
@@ -134,7 +135,8 @@ def _changes_of_track(steps: Course) -> tuple[Array, Bools]:
 
 
 def _changes_of_ride(motion: CellMotion) -> tuple[Array, Bools]:
-    """The same for the ride: its rotation about its up within _SPAN_S, degrees, and True where it is known."""
+    """Like _changes_of_track() for the ride: the rotation about its up within _SPAN_S, degrees, and True where it is
+    known."""
     at_s, half = np.arange(0.0, motion.seconds, _GRID_S), _SPAN_S / 2.0
     edges_s = np.arange(len(motion.there) + 1) * STEP_S
     turned = np.append(0.0, np.cumsum(motion.rate_dps @ motion.up)) * STEP_S

@@ -1,7 +1,7 @@
-"""Finds the yaw of a ride from the sensor alone, without a calibration: the sensor may be mounted at any angle.
+"""Finds the yaw of a ride from the sensor alone. It needs no calibration, and the sensor may be mounted at any angle.
 
-Up is the mean direction of the force in bends, because a motorcycle leans until the force is along its own up. The rate
-about it is the yaw rate times the cosine of the lean.
+Up is the mean direction of the force in bends, because a motorcycle leans until the force points along its own up. The
+rate about up is the yaw rate times the cosine of the lean.
 """
 
 from dataclasses import dataclass
@@ -15,8 +15,8 @@ from ..logs.source import Progress, name_of
 from ..signals import Array, Bools, Cells
 
 STEP_S = 0.05
-_MOST_DPS = 20.0  # cells with higher rates have no more weight in the direction of up
-_LONGEST_S = 100 * 3600.0  # longest ride, limited by memory
+_MOST_DPS = 20.0  # higher rates do not increase a cell's weight in the direction of up
+_LONGEST_S = 100 * 3600.0  # longest ride; memory limits it
 
 
 @dataclass
@@ -24,7 +24,7 @@ class CellMotion:
     """A ride in n cells of STEP_S from its first sample.
 
     force_g, rate_dps (n, 3): means in the sensor's axes, rates minus the gyro's bias. there (n): False without samples
-    or with frozen readings; force and rate are then 0. speed, positions: True if the log has any.
+    or with frozen readings; force and rate are then 0. speed, positions: True if the log has them.
     """
 
     force_g: Array
@@ -45,14 +45,15 @@ class CellMotion:
 
     @property
     def up(self) -> Array:
-        """(3) the bike's up in the sensor's axes, exact to some degrees: it contains the accelerometer's bias."""
+        """(3) the bike's up in the sensor's axes. It is exact to a few degrees, because it includes the accelerometer's
+        bias."""
         turning = np.minimum(np.linalg.norm(self.rate_dps, axis=1), _MOST_DPS)
         up: Array = turning @ self.force_g
         return up / max(float(np.linalg.norm(up)), 1e-9)
 
 
 def motion(ride: Source, progress: Progress | None = None, notices: list[Message] | None = None) -> CellMotion:
-    """The Motion of a log (see read_log). progress, notices: see read_blocks(). Raises InputError."""
+    """The CellMotion of a log (see read_log). progress, notices: see read_blocks(). Raises InputError."""
     table, speed, positions = Cells(STEP_S), False, False
     for block in read_blocks(ride, 2, progress, notices):
         speed |= bool(np.any(np.isfinite(block.speed_mps)))
@@ -65,7 +66,7 @@ def motion(ride: Source, progress: Progress | None = None, notices: list[Message
     cells = table.evenly(round(_LONGEST_S / STEP_S) + 1)
     if cells is None:
         raise InputError(f"{name_of(ride)}: all readings are frozen: check the sensor")
-    missing = np.zeros((cells.first, 6))  # frozen from the beginning
+    missing = np.zeros((cells.first, 6))  # stays 0 if the readings are frozen from the beginning
     means = np.vstack((missing, cells.means - np.append(np.zeros(3), np.nanmedian(cells.means[:, 3:], axis=0))))
     there = np.append(missing[:, 0], cells.count) > 0
     means[~there] = 0.0

@@ -1,7 +1,7 @@
-"""The track of a phone or a watch: positions and times. Its course: the direction of each step, if known.
+"""The track of a phone or a watch (positions and times), and its course (the direction of each step, if known).
 
-Course and speed are compared with a ride's in segments of half a minute. Within a segment only changes count: its mean
-and its trend are subtracted. This removes the gyro's residual bias, the initial direction of the ride, and hills.
+Course and speed are compared with a ride in segments of half a minute. Within a segment, only changes count: the mean
+and the trend are subtracted. This removes the gyro's residual bias, the initial direction of the ride, and hills.
 """
 
 from dataclasses import dataclass
@@ -11,23 +11,23 @@ import numpy as np
 from ..logs.log import Table
 from ..signals import Array, Bools, distance_m, stretches
 
-LONGEST_S = 6.0  # longest time between two points of a course: on straights watches write points so rarely
-SLOWEST_MPS = 2.5  # slowest step that exceeds the errors of the positions
-FASTEST_MPS = 100.0  # a faster step is a jump of the receiver
-STEP_ERROR_M = 1.0  # 1 sigma of a step across its direction: the error of phones' receivers from second to second
-COURSE_ERROR_DEG = 4.0  # 1 sigma of other errors: the gyro's scale factor, and how positions are smoothed
+LONGEST_S = 6.0  # longest time between two points of a course, as watches write them on straights
+SLOWEST_MPS = 2.5  # in slower steps, the errors of the positions dominate
+FASTEST_MPS = 100.0  # a faster step is a jump of the receiver's position
+STEP_ERROR_M = 1.0  # 1 sigma of a step across its direction, as of phones' receivers from second to second
+COURSE_ERROR_DEG = 4.0  # 1 sigma of other errors: the gyro's scale factor, and the smoothing of positions
 _OFTEN_S = 0.7
-_AROUND = 2  # number of points on each side that are used for a speed
-STEPS = 30  # most steps of a segment
-_FEWEST = 8  # least number of steps of a segment
+_AROUND = 2  # number of points on each side from which a speed is computed
+STEPS = 30  # largest number of steps in a segment
+_FEWEST = 8  # least number of steps in a segment
 
 
 @dataclass(eq=False)
 class Track(Table):
     """n points in chronological order.
 
-    utc_s: s since 1970, increasing. lat_deg, lon_deg: north and east. speed_mps: from the file, NaN for none. name: the
-    file's.
+    utc_s: s since 1970, increasing. lat_deg, lon_deg: north and east. speed_mps: from the file, NaN if missing. name:
+    the file's name.
     """
 
     utc_s: Array
@@ -37,8 +37,8 @@ class Track(Table):
     name: str
 
     def speeds_mps(self) -> Array:
-        """(n) the file's speeds. If it has none, the mean speed over the neighbouring points: NaN if it is within the
-        positions' errors, or over a jump or a gap."""
+        """(n) the file's speeds. If the file has none, the mean speeds over the neighbouring points; NaN if a speed is
+        within the positions' errors, or over a jump or a gap."""
         if np.any(np.isfinite(self.speed_mps)):
             return self.speed_mps
         speed = np.full(len(self.utc_s), np.nan)
@@ -52,8 +52,8 @@ class Track(Table):
         return speed
 
     def once_a_second(self) -> "Track":
-        """The track with at most one point per second. Between closer points the error is larger than the change of the
-        course."""
+        """The track with at most one point per second. Between closer points, the errors exceed the change of
+        the course."""
         if len(self.utc_s) < 2 or np.median(np.diff(self.utc_s)) > _OFTEN_S:
             return self
         first = np.unique(np.floor(self.utc_s - self.utc_s[0]), return_index=True)[1]
@@ -70,7 +70,7 @@ class Course:
 
     begin_s, end_s (m): times of each step, s since the track's first point. sigma_deg (m): standard deviation of the
     course of a good step. speed_mps (m): length over duration. good (m): False for a step that is too slow, a gap or a
-    jump. turn_deg (m): change of the course from the previous step, > 0 to the left; 0 unless both are good.
+    jump. turn_deg (m): change of the course from the previous step, > 0 to the left; 0 unless both steps are good.
     """
 
     begin_s: Array
@@ -97,12 +97,12 @@ def course(track: Track) -> Course:
 
 @dataclass
 class Segments(Table):
-    """p segments of up to STEPS successive good steps, all (p, STEPS). Weights are 0 beyond the end of a shorter
-    segment.
+    """p segments of up to STEPS successive good steps. All arrays are (p, STEPS). Weights are 0 beyond the end of a
+    shorter segment.
 
-    begin_s, end_s: times of each step, s since the track's first point. turned_deg: course of each step minus that of
-    the segment's first step, > 0 to the left. course_weight: 1/deg2. speed_mps; speed_weight: 1 or 0. Mean and trend of
-    turned_deg and speed_mps are subtracted.
+    begin_s, end_s: times of each step, s since the track's first point. turned_deg: course of each step minus the
+    course of the segment's first step, > 0 to the left. course_weight: 1/deg2. speed_mps; speed_weight: 1 or 0. Mean
+    and trend of turned_deg and speed_mps are subtracted.
     """
 
     begin_s: Array
@@ -140,7 +140,7 @@ def segments(course: Course) -> Segments:
 
 
 def without_trend(values: Array, weight: Array, at_s: Array) -> Array:
-    """(p, STEPS) values minus the straight line that fits each row best."""
+    """Subtract from values (p, STEPS) the straight line that fits each row best."""
     total = np.maximum(weight.sum(axis=1, keepdims=True), 1e-12)
     since = at_s - (weight * at_s).sum(axis=1, keepdims=True) / total
     mean = (weight * values).sum(axis=1, keepdims=True) / total

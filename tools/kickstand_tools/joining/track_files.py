@@ -12,17 +12,18 @@ from ..common.errors import InputError, cause, extra
 from ..logs.source import Progress, open_input
 from .track import FASTEST_MPS, Track
 
-_DEGREES = 180.0 / 2**31  # degrees of one unit ("semicircle") in a FIT file
+_DEGREES = 180.0 / 2**31  # one unit of a FIT file ("semicircle"), in degrees
 _FEWEST = 30  # least number of points of a track
-_MOST_BYTES = 50_000_000  # largest file: a day with a fix per second has 20 million; parsing takes ten times the memory
+# largest file; a day with a fix per second has 20 million, and parsing takes ten times as much memory
+_MOST_BYTES = 50_000_000
 
 Point = tuple[float, float, float, float]  # s since 1970, latitude and longitude in degrees, m/s or NaN
 
 
 def read_track(path: Path | str, progress: Progress | None = None) -> Track:
-    """Read a .gpx or .fit file. progress: called with the bytes read and those of the file. Raises InputError.
+    """Read a .gpx or .fit file. progress: called with the bytes read and the bytes of the file. Raises InputError.
 
-    Points without a time or a position are left out. Of points with the same time the first is kept.
+    Points without a time or a position are left out. If several points have the same time, the first is kept.
 
     >>> import tempfile
     >>> point = '<trkpt lat="48.1" lon="11.{0:02}"><time>2026-05-17T09:30:{0:02}Z</time></trkpt>'
@@ -49,8 +50,8 @@ def read_track(path: Path | str, progress: Progress | None = None) -> Track:
         raise
     except OSError as error:
         raise InputError(f"{path} cannot be read: {cause(error)}") from error
-    except Exception as error:  # the libraries raise many kinds of errors for damaged files
-        raise InputError(f"{path} is damaged, or not of the format that its name says: {_words(error)}") from error
+    except Exception as error:  # for damaged files, the libraries raise many kinds of errors
+        raise InputError(f"{path} is damaged, or in another format than its name says: {_words(error)}") from error
     table = np.array(points, dtype=float).reshape(-1, 4)
     on_earth = (np.abs(table[:, 1]) <= 90.0) & (np.abs(table[:, 2]) <= 180.0)
     table = table[np.all(np.isfinite(table[:, :3]), axis=1) & on_earth]
@@ -74,7 +75,7 @@ def _gpx(path: Path, progress: Progress | None) -> Iterator[Point]:
     try:
         document = gpxpy.parse(content)
     except (gpxpy.gpx.GPXException, ValueError, LookupError) as error:
-        raise InputError(f"{path} is no GPX file, or its copy is not whole: {_words(error)}") from error
+        raise InputError(f"{path} is not a GPX file, or its copy is incomplete: {_words(error)}") from error
     for track in document.tracks:
         for segment in track.segments:
             for point in segment.points:
@@ -85,7 +86,8 @@ def _gpx(path: Path, progress: Progress | None) -> Iterator[Point]:
 
 
 def _gpx_speed(point: Any) -> float:
-    """The speed of a point, m/s. GPX 1.0 has an element for it; in GPX 1.1 it is an extension, Garmin's or another."""
+    """The speed of a point, m/s. GPX 1.0 has an element for the speed; in GPX 1.1 it is in an extension of Garmin's or
+    others."""
     if point.speed is not None:
         return float(point.speed)
     for extension in point.extensions:
@@ -117,11 +119,11 @@ def _fit(path: Path, progress: Progress | None) -> Iterator[Point]:
                 if progress:
                     progress(min(file.tell(), total), total)
     except (fitdecode.FitError, TypeError, ValueError) as error:
-        raise InputError(f"{path} is no FIT file, or a damaged one: {_words(error)}") from error
+        raise InputError(f"{path} is not a FIT file, or it is damaged: {_words(error)}") from error
 
 
 def _words(error: Exception) -> str:
-    """The beginning of a library's message: it may quote a whole file."""
+    """The beginning of a library's message, which may quote a whole file."""
     return ascii(" ".join(str(error).split())[:60])[1:-1] or type(error).__name__
 
 

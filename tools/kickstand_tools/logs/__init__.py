@@ -1,1 +1,1 @@
-"""Reads, checks, writes and cuts recorded logs; corrects uneven times and marks frozen readings."""
+"""Reads, checks, writes and cuts recorded logs. Corrects uneven times and marks frozen readings."""

@@ -12,10 +12,11 @@ from ..signals import Array
 from .csv_reader import cells_of
 
 COLUMNS = ("t_s", "ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps")
-TRACK = ("speed_mps", "lat_deg", "lon_deg", "utc_s")  # columns of a satellite receiver, with values in some rows
-OPTIONAL = (*TRACK, "temp_c")  # may be empty in a row
+# columns from a satellite receiver, which have values in some rows only
+TRACK = ("speed_mps", "lat_deg", "lon_deg", "utc_s")
+OPTIONAL = (*TRACK, "temp_c")  # cells of these columns may be empty
 
-# A larger value is in another unit (m/s2, counts): the sensor's widest ranges are 16 g and 2000 deg/s.
+# The sensor's widest ranges are 16 g and 2000 deg/s. Larger values are in another unit (m/s2, counts).
 MOST_G, MOST_DPS = 20.0, 2500.0
 _LIMITS = {"t_s": 1e10, "ax_g": MOST_G, "ay_g": MOST_G, "az_g": MOST_G, "temp_c": 200.0, "speed_mps": 200.0}
 _LIMITS |= {"gx_dps": MOST_DPS, "gy_dps": MOST_DPS, "gz_dps": MOST_DPS}
@@ -29,7 +30,7 @@ _AS_EXPORTED = "give it as the app has exported it"
 
 
 def check_text(log: str, content: bytes, lines_before: int) -> None:
-    """Raise InputError if the bytes are not UTF-8. log: its name for messages."""
+    """Raise InputError if the bytes are not UTF-8. log: the log's name in messages."""
     try:
         content.decode()
     except UnicodeDecodeError as error:
@@ -48,14 +49,14 @@ def header(log: str, line: str) -> list[str]:
         raise InputError(f"{log}, line 1: not CSV ({error}): is it a log?") from error
     missing = [name for name in COLUMNS if name not in names]
     if missing and log.lower().endswith((".gpx", ".fit")):
-        raise InputError(f"{log} is a track: kickstand join puts it to a ride")
+        raise InputError(f"{log} is a track: kickstand join adds it to a ride")
     if missing and log.lower().endswith(".json"):
-        raise InputError(f"{log} is no log: give the ride, and a calibration with --calibration")
+        raise InputError(f"{log} is not a log: give the ride, and a calibration with --calibration")
     if missing and "lean_deg" in names:
-        what = f"{log} holds a lean, no readings"
+        what = f"{log} contains a lean but no readings"
         raise InputError(f"{what}: give the log that it was made from{_made_from(log)}")
     if missing and any(mark in "".join(names) for mark in ";\t"):
-        raise InputError(f"{log}, line 1: values stand apart by ; or tab: save it with commas between them")
+        raise InputError(f"{log}, line 1: values are separated by ; or tab: save it with commas between them")
     if missing:
         raise InputError(
             f"{log}, line 1: no column {', '.join(missing)}, and a log starts with {','.join(COLUMNS)}",
@@ -63,12 +64,12 @@ def header(log: str, line: str) -> list[str]:
         )
     for name in COLUMNS + OPTIONAL:
         if names.count(name) > 1:
-            raise InputError(f"{log}, line 1: column {name} is there twice: leave one")
+            raise InputError(f"{log}, line 1: column {name} exists twice: remove one")
     return names
 
 
 def _made_from(log: str) -> str:
-    """ ", RIDE.csv" if that is the only ride beside the log that has a calibration."""
+    """ ", RIDE.csv" if only one ride with a calibration is beside the log, otherwise ""."""
     rides = [
         path.with_name(path.name.removesuffix(".cal.json") + ending)
         for path in Path(log).parent.glob("*.cal.json")
@@ -89,7 +90,7 @@ def plausible(table: Array, names: list[str], before_us: int | None) -> bool:
 
 
 def read(log: str, text: str, width: int, places: dict[str, int], lines_before: int, before_us: int | None) -> Array:
-    """Convert text to numbers (n, columns in the order of places), NaN for an empty optional cell.
+    """Convert text to numbers (n, columns in the order of places). An empty optional cell becomes NaN.
 
     Raises InputError for the first mistake, naming its line.
     """
@@ -97,7 +98,7 @@ def read(log: str, text: str, width: int, places: dict[str, int], lines_before: 
     values = []
     for number, line in enumerate(text.split("\n"), lines_before + 1):
         if not line.strip():
-            continue  # often the last
+            continue  # often the last line
         try:
             cells = cells_of(line)
             if len(cells) != width:
@@ -106,7 +107,7 @@ def read(log: str, text: str, width: int, places: dict[str, int], lines_before: 
             now = round(value[0] * 1e6)
             if before_us is not None and now < before_us:
                 at = cells[places["t_s"]].strip()
-                raise _Mistake(f"time goes back from {before_us / 1e6:.6f} at {at} s: it has to increase")
+                raise _Mistake(f"time goes back from {before_us / 1e6:.6f} at {at} s: it must increase")
         except csv.Error as error:
             raise InputError(f"{log}, line {number}: not CSV ({error}): is it a log?") from error
         except _Mistake as mistake:
@@ -121,7 +122,7 @@ class _Mistake(Exception):
 
 
 def _number(cell: str, name: str, limit: float) -> float:
-    """The value of a cell; NaN for an empty one in a column of OPTIONAL. Raises _Mistake."""
+    """The value of a cell; NaN for an empty cell in a column of OPTIONAL. Raises _Mistake."""
     try:
         value = float(cell)
         if abs(value) <= limit and "_" not in cell:  # Python would read 1_0 as 10

@@ -1,7 +1,6 @@
-"""Writes tables of numbers as CSV, quickly; writes a log in memory, or a stretch of a log, to a file.
+"""Writes tables of numbers as CSV, fast. Writes a log in memory, or a stretch of a log, to a file.
 
-The texts are the same as those of Python's own formatting. Formatting a whole column at once takes a seventh of the
-time.
+The texts equal those of Python's own formatting. Formatting a whole column at once takes a seventh of the time.
 """
 
 import itertools
@@ -20,8 +19,8 @@ from .reader import read_blocks
 from .source import File, Progress
 
 _DIGITS = {"speed_mps": 3, "temp_c": 2, "lat_deg": 7, "lon_deg": 7, "utc_s": 3}
-_ROWS = 15_000  # rows written at a time: their letters fit into a processor's cache
-_MOST = 2.0**53  # in units of the last digit: larger doubles are more than one unit apart
+_ROWS = 15_000  # rows written at a time; their letters fit into a processor's cache
+_MOST = 2.0**53  # in units of the last digit; neighbouring doubles above this are more than one unit apart
 _POINT, _MINUS, _ZERO, _COMMA, _END = b".-0,\n"
 
 Letters = NDArray[np.uint8]  # (m, n): the ASCII letters of n texts, one text per column; 0 means no letter
@@ -44,7 +43,7 @@ def joined_cells(columns: Sequence[Letters]) -> bytes:
 
 
 def text_cells(texts: Sequence[str]) -> Letters:
-    """The letters of ASCII texts. Raises UnicodeEncodeError for others."""
+    """The letters of ASCII texts. Raises UnicodeEncodeError for other texts."""
     packed = np.array(texts, dtype=np.bytes_)
     return np.ascontiguousarray(packed.view(np.uint8).reshape(len(texts), packed.itemsize).T)
 
@@ -54,10 +53,10 @@ def number_cells(values: Array, digits: int, nan: str = "nan") -> Letters:
     scaled = np.abs(values) * 10.0**digits
     missing = np.isnan(scaled)
     scaled = np.where(missing, 0.0, scaled)
-    if not np.all(scaled < _MOST):  # infinity, too
+    if not np.all(scaled < _MOST):  # also for infinity
         return text_cells([nan if value != value else f"{value:.{digits}f}" for value in values.tolist()])
     whole = np.rint(scaled)
-    # The product was rounded. Near the middle between two texts it may give the wrong one.
+    # The product was rounded, so near the middle between two texts it may give the wrong text.
     for k in np.flatnonzero(np.abs(np.abs(scaled - whole) - 0.5) <= scaled * 2.0**-52).tolist():
         whole[k] = int(f"{abs(values[k]):.{digits}f}".replace(".", ""))
     most = int(np.max(whole, initial=0.0))
@@ -69,8 +68,8 @@ def number_cells(values: Array, digits: int, nan: str = "nan") -> Letters:
 
 
 def _letters(number: NDArray[np.unsignedinteger], digits: int, most: int, least_rows: int) -> Letters:
-    """The letters of integers (n) of up to `most` digits, with a point before the last `digits` digits and a free first
-    row."""
+    """The letters of integers (n) of up to `most` digits, with a point before the last `digits` digits. The first row
+    stays free."""
     places = max(most, digits + 1)
     letters = np.zeros((max(places + 2, least_rows), len(number)), dtype=np.uint8)
     row = len(letters) - 1
@@ -80,7 +79,7 @@ def _letters(number: NDArray[np.unsignedinteger], digits: int, most: int, least_
             row -= 1
         rest = number // 10
         letter = (number - 10 * rest).astype(np.uint8) + np.uint8(_ZERO)
-        letters[row] = letter if place <= digits else np.where(number > 0, letter, 0)  # no zeros in front
+        letters[row] = letter if place <= digits else np.where(number > 0, letter, 0)  # no leading zeros
         number, row = rest, row - 1
     return letters
 
@@ -133,9 +132,9 @@ def cut_log(
     progress: Progress | None = None,
     notices: list[Message] | None = None,
 ) -> tuple[int, float]:
-    """Copy the lines of a log from from_s to to_s to out, gzipped if its name ends in .gz, whole or not at all.
+    """Copy the lines of a log between from_s and to_s to out, whole or not at all. Gzip out if its name ends in .gz.
 
-    from_s, to_s: seconds since the log's first sample; negative: before its last one; None: the log's start or end.
+    from_s, to_s: seconds since the log's first sample; negative: before its last sample; None: the log's start or end.
     Returns the number of samples and their duration, s. progress, notices: see read_blocks(). Raises InputError.
 
     >>> import tempfile

@@ -1,10 +1,11 @@
 """Reads all CSV: logs and the tables of other apps.
 
-Each line is one row: an unclosed quotation mark does not swallow the following lines. In a log the first mistake raises
-an error with its line (cells.read()). In another app's table damaged rows are left out and counted (columns_of_text()).
+Each line is one row, so an unclosed quotation mark does not affect the following lines. In a log, the first mistake
+raises an error that names the line (cells.read()). In another app's table, damaged rows are left out and counted
+(columns_of_text()).
 Memory is bounded: a log comes in blocks (source.chunks()), and the cells of a table are limited.
 
-numbers_in() reads a log whose numbers are all plain, as Kickstand writes them: 0.7 s for an hour at 200 Hz.
+numbers_in() reads logs with plain numbers only, as Kickstand writes them, in 0.7 s for an hour at 200 Hz.
 cells.read() reads all other logs, in 1.7 s.
 """
 
@@ -21,20 +22,21 @@ from numpy.typing import NDArray
 from ..common.errors import InputError
 from ..signals import Array, Bools
 
-Cells = NDArray[Any]  # (n): int64; float64, NaN for no number; or str as objects, "" for an empty cell
+# (n) cells of one column: int64, or float64 with NaN for no number, or str as objects with "" for an empty cell
+Cells = NDArray[Any]
 
-ROWS = 50_000  # rows converted at once: text takes ten times the memory of numbers
-LONGEST = 40  # characters of the longest number
-LONGEST_LINE = 100_000  # characters of the longest line: Python's csv refuses cells that are not much longer
-# Limits of a table: seven hours of twelve columns at 100 Hz. A number takes 8 bytes, and 8 more while parts are joined;
-# a text 60.
+ROWS = 50_000  # rows converted at once, because text takes ten times the memory of numbers
+LONGEST = 40  # most characters in a number
+LONGEST_LINE = 100_000  # most characters in a line; Python's csv refuses cells a little longer than this
+# Limits of a table: seven hours of twelve columns at 100 Hz. A number takes 8 bytes, and 8 more while parts are joined.
+# A text takes 60 bytes.
 MOST_CELLS, MOST_TEXTS = 30_000_000, 3_000_000
 _NOTHING = {"", "-", "na", "n/a", "nan", "nil", "none", "null", "#n/a"}
 _PLAIN = b"0123456789.-,\n"
 
 
 def separator_of(line: str) -> str:
-    """The separator of a line's cells, one of , ; and tab: the most frequent one outside quotation marks."""
+    """The separator of a line's cells, comma, semicolon or tab, whichever is most frequent outside quotation marks."""
     bare = re.sub(r'"[^"]*"', "", line)
     return max(",;\t", key=bare.count)
 
@@ -43,7 +45,7 @@ def cells_of(line: str, separator: str = ",") -> list[str]:
     """The cells of one line. Raises csv.Error for a line of over LONGEST_LINE characters."""
     if len(line) > LONGEST_LINE:
         raise csv.Error(f"a line of over {LONGEST_LINE} characters")
-    if '"' not in line:  # this takes half the time
+    if '"' not in line:  # much faster than csv: half the time
         return line.split(separator)
     return next(csv.reader((line,), delimiter=separator, skipinitialspace=True), [])
 
@@ -51,7 +53,7 @@ def cells_of(line: str, separator: str = ",") -> list[str]:
 def numbers_in(text: bytes, count: int) -> Array | None:
     """(n, count) the numbers in n lines of `count` cells, NaN for an empty cell. The values equal those of float().
 
-    None if the text is not n lines of `count` plain numbers. The caller then falls back to another reader.
+    None if the text is not n lines of `count` plain numbers. The caller must then use another reader.
     """
     if text.translate(None, _PLAIN) or not text.strip(b"\n"):
         return None
@@ -59,7 +61,7 @@ def numbers_in(text: bytes, count: int) -> Array | None:
         return None
     text = text if text.endswith(b"\n") else text + b"\n"
     filled_up = b"\n" + text
-    for empty in (b",,", b",,", b",\n", b"\n,"):  # twice, because two empty cells share a comma
+    for empty in (b",,", b",,", b",\n", b"\n,"):  # b",,": twice, because adjacent empty cells share a comma
         filled_up = filled_up.replace(empty, empty[:1] + b"nan" + empty[1:])
     try:
         found = np.loadtxt(io.BytesIO(filled_up[1:]), delimiter=",", comments=None, ndmin=2)
@@ -71,8 +73,8 @@ def numbers_in(text: bytes, count: int) -> Array | None:
 def columns_of_text(text: str, separator: str, width: int) -> tuple[list[Cells], int]:
     """The columns of CSV without a header, and the number of rows left out.
 
-    A row is damaged if it has more cells than there are names or than the first row has, or if its line is too long.
-    The missing cells of a short row are empty. Raises InputError for a table that is too large.
+    A row is damaged if it has more cells than the names and the first row, or if its line is too long. The missing
+    cells of a short row are empty. Raises InputError for a table that is too large.
     """
     most, left_out = 0, 0
 
@@ -93,7 +95,7 @@ def columns_of_text(text: str, separator: str, width: int) -> tuple[list[Cells],
 
 
 def _lines(text: str) -> Iterator[str]:
-    """Yield the lines that are not blank. A list of them would take several times the memory of the text."""
+    """Yield the lines that are not blank. A list of all lines would take several times the memory of the text."""
     begin = 0
     while begin < len(text):
         end = text.find("\n", begin)

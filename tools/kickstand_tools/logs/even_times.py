@@ -1,8 +1,8 @@
-"""Spreads times that a recorder has rounded evenly, within the limits of the rounding.
+"""Spreads rounded times of a recorder evenly, within the limits of the rounding.
 
-Some recorders write times in whole hundredths or thousandths of a second, or give several samples the time at which
-they were handed over. Steps are then uneven, and some are 0. But a sensor samples evenly. So each time is replaced by
-the mean of the recorded times around it, within the tick of the recorder's clock.
+Some recorders write times in whole hundredths or thousandths of a second, or write the same time for several samples
+that they received together. Steps are then uneven, and some are 0, although a sensor samples evenly. Each time is
+therefore replaced by the mean of the recorded times around it, within the tick of the recorder's clock.
 """
 
 from collections.abc import Callable, Iterator
@@ -16,17 +16,17 @@ from ..common.messages import Message
 from ..signals import Array, Ints, window_means
 from .log import Block
 
-COARSE = 0.05  # times with ticks under this share of the time between samples stay as they are
+COARSE = 0.05  # times with a smaller tick, as a share of the time between samples, are not changed
 OFTEN = 0.05  # a larger share of repeated times means that the recorder stamps several samples at once
-EXACT = 0.98  # with a larger share of equal steps the times are a grid with some lost samples
-GAP = 1.5  # a step longer than 1.5 median steps plus a tick is a gap
+EXACT = 0.98  # with a larger share of equal steps, the times are a grid with some lost samples
+GAP = 1.5  # a step is a gap if it is longer than 1.5 median steps plus a tick
 # The mean is taken over at least AROUND samples and at least TICKS ticks
 AROUND = 64
 TICKS = 8
 # A clock has stopped if over CROWD samples, and over CROWDED times the usual number per tick, have the same time
 CROWDED = 10.0
 CROWD = 50
-# Largest shift of a time, in ticks: half a tick, and a margin for the ends, where the mean is less exact
+# Largest shift of a time, in ticks: half a tick, plus a margin for the ends, where the mean is less exact
 ALLOWED = 0.6
 SHORTEST_S = 2e-6  # shortest step, because times become whole microseconds
 CONTEXT = 2000  # samples before and after a block that are used for its times
@@ -35,8 +35,8 @@ REPORTED_S = 0.002  # a larger shift of the times is reported in a notice
 
 @dataclass(frozen=True)
 class TimesSpread(Message):
-    """The recorder rounded the times. repeated: times equal to the one before, of so many samples. shift_s: the
-    largest."""
+    """The recorder rounded the times. repeated: number of times that equal the previous time. samples: number of all
+    times. shift_s: the largest shift."""
 
     repeated: int
     samples: int
@@ -44,7 +44,7 @@ class TimesSpread(Message):
 
     code = "times-spread"
     text = (
-        "the times are rounded ({repeated} of {samples} repeat the one before): they are spread evenly, by up to "
+        "the times are rounded ({repeated} of {samples} repeat the previous one): they are spread evenly, by up to "
         "{shift_s:.3f} s"
     )
 
@@ -52,8 +52,9 @@ class TimesSpread(Message):
 def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
     """Spread the times of samples (n, s) evenly if rounding has made them uneven or equal. Returns (n, s).
 
-    Each stays within 0.6 ticks of the recorded time. All times are multiples of the tick; if many are repeated, it is
-    the usual step between different times. Steps are over 0. Gaps stay, and times that are fine enough are not changed.
+    Each result is within 0.6 ticks of the recorded time. All recorded times are multiples of the tick. If many times
+    are repeated, the tick is the usual step between different times. All steps of the result are over 0. Gaps are kept,
+    and sufficiently fine times are not changed.
     Raises InputError for a time that decreases or is not a number, and for a clock that has stopped. name: the log's
     name in messages.
 
@@ -66,15 +67,15 @@ def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
     if len(recorded) < 2:
         return recorded
     if not np.all(np.isfinite(recorded)):
-        raise InputError(f"{name}: some times are no numbers")
+        raise InputError(f"{name}: some times are not numbers")
     time_us = np.rint(recorded * 1e6).astype(np.int64)
     steps_us = np.diff(time_us)
     if np.any(steps_us < 0):
         at = recorded[int(np.argmax(steps_us < 0)) + 1]
-        raise InputError(f"{name}: time goes back at {at:g} s: it has to increase")
+        raise InputError(f"{name}: time goes back at {at:g} s: it must increase")
     starts = np.flatnonzero(np.diff(time_us, prepend=time_us[0] - 1))  # first sample of each time
     if len(starts) == 1:
-        raise InputError(f"{name}: the time is the same in all samples: it has to increase")
+        raise InputError(f"{name}: the time is the same in all samples: it must increase")
     counts = np.diff(np.append(starts, len(recorded)))
     between_us = np.diff(time_us[starts])
     usual_us = float(np.median(between_us))
@@ -86,7 +87,7 @@ def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
         tick_us = max(tick_us, usual_us)
     if np.any((counts > CROWD) & (counts > CROWDED * max(1.0, tick_us / period_us))):
         at = recorded[starts[int(np.argmax(counts))]]
-        raise InputError(f"{name}: time stands still at {at:g} s, in {np.max(counts)} samples: it has to increase")
+        raise InputError(f"{name}: time stands still at {at:g} s, in {np.max(counts)} samples: it must increase")
     if not repeated and (tick_us < COARSE * period_us or _one_step(between_us)):
         return recorded
     times = _spread_repeated(recorded, starts, counts, period_us * 1e-6)
@@ -109,7 +110,7 @@ def _spread_repeated(recorded: Array, starts: Ints, counts: Ints, period_s: floa
 
 
 def _smooth(recorded: Array, times: Array, tick_s: float, period_s: float) -> Array:
-    """The mean recorded time around each sample, between two gaps, at most ALLOWED ticks from the recorded time."""
+    """The mean recorded time around each sample between two gaps, limited to ALLOWED ticks from the recorded time."""
     half = max(AROUND, round(TICKS * tick_s / period_s)) // 2
     cuts = np.flatnonzero(np.diff(recorded) > GAP * period_s + tick_s) + 1
     found = times.copy()
@@ -130,7 +131,7 @@ def _mean(values: Array, half: int) -> Array:
     if n <= 2 * half:
         return first(k)
     before, after = first(np.arange(-half, 0.0)), last(np.arange(n, n + half, dtype=float))
-    base = values[0]  # sums of small numbers are exact enough
+    base = values[0]  # subtracted first, because sums of small numbers are more exact
     return base + window_means(np.concatenate((before, values, after)) - base, 2 * half + 1)
 
 
@@ -143,10 +144,10 @@ def _line(k: Array, values: Array) -> Callable[[Array], Array]:
 
 
 def even_blocks(blocks: Iterator[Block], name: str, remarks: list[Message]) -> Iterator[Block]:
-    """Yield the blocks with increasing times, see even_times(). name: the log's. remarks: a notice of the changes is
-    appended.
+    """Yield the blocks with increasing times (see even_times()). name: the log's name. remarks: a notice about the
+    changes is appended.
 
-    Blocks whose times are even or fine are not changed. The last samples of other blocks come with the next block.
+    Blocks with even or fine times are not changed. The last samples of other blocks are moved to the next block.
     """
     spread = _Spread(name)
     held: Block | None = None
@@ -161,7 +162,7 @@ def even_blocks(blocks: Iterator[Block], name: str, remarks: list[Message]) -> I
 
 
 def _joined(first: Block, second: Block) -> Block:
-    """Two successive blocks as one."""
+    """Join two successive blocks."""
     return replace(
         second,
         lines=first.lines + second.lines,
@@ -171,11 +172,11 @@ def _joined(first: Block, second: Block) -> Block:
 
 
 class _Spread:
-    """name: of the log, for messages."""
+    """Spreads the times of a log block by block. name: the log's name in messages."""
 
     def __init__(self, name: str) -> None:
         self._name = name
-        self._before_s = np.zeros(0)  # recorded times of the samples returned last
+        self._before_s = np.zeros(0)  # recorded times of the last returned samples
         self._from_us: int | None = None  # time of the first sample, after spreading
         self._last_us = -1
         self._samples = self._repeated = 0

@@ -1,8 +1,10 @@
-"""Finds stretches of a log with frozen readings, from a sensor that hangs or a phone that repeats its last reading.
+"""Finds stretches of a log with frozen readings, caused by a sensor that hangs or a phone that repeats its last
+reading.
 
-Noise changes the readings of a working sensor from sample to sample, even at rest. If all six stay the same to the last
-digit for half a second, they were not measured. But in a log with few digits, rounding may hide the noise of a vehicle
-at rest. There the readings are kept if those before or after continue at the same values, and left out if they jump.
+Noise changes the readings of a working sensor from sample to sample, even at rest. If all six axes stay the same to the
+last digit for half a second, they were not measured. In a log with few digits, however, rounding may hide the noise of
+a vehicle at rest. There, equal readings are kept if the readings before or after continue at the same values, and left
+out if these jump.
 """
 
 from dataclasses import dataclass
@@ -14,16 +16,17 @@ from ..signals import Array, Bools, Ints
 from .log import Log
 
 FROZEN_S, FROZEN_SAMPLES = 0.5, 10  # least duration and number of equal readings
-COARSE_G, COARSE_DPS = 0.002, 0.05  # from these last digits, rounding may hide the noise of a phone's sensor
-BESIDE_S = 0.5  # time before and after a stretch that is compared with it
-NEAR_G, NEAR_DPS = 0.02, 0.5  # largest difference of these means from the stretch, at standstill
+COARSE_G, COARSE_DPS = 0.002, 0.05  # with last digits this large, rounding may hide the noise of a phone's sensor
+BESIDE_S = 0.5  # a stretch is compared with this time before and after it
+# at a standstill, the means before and after a stretch differ from the stretch by at most this
+NEAR_G, NEAR_DPS = 0.02, 0.5
 
-_MOTION = [0, 1, 2, 4, 5, 6]  # indices in the chip's order, without the temperature
+_MOTION = [0, 1, 2, 4, 5, 6]  # columns in the chip's order, without the temperature
 
 
 @dataclass(frozen=True)
 class FrozenReadings(Message):
-    """The readings froze. seconds: of all stretches; begin_s, end_s: of the first."""
+    """The readings froze. seconds: total time. begin_s, end_s: limits of the first stretch."""
 
     stretches: int
     seconds: float
@@ -44,16 +47,17 @@ class FrozenFinder:
     """Finds frozen readings. Call mark() with one block after another."""
 
     def __init__(self) -> None:
-        self._last = np.zeros((0, 6))  # reading at the end of the previous block
+        self._last = np.zeros((0, 6))  # last reading of the previous block
         self._last_s = 0.0
-        self._since_s = 0.0  # time from which it has been the same
+        self._since_s = 0.0  # time since which the reading has not changed
         self._since_samples = 1
         self._was_frozen = False
-        self._step = np.full(6, np.inf)  # smallest change seen on each axis: the last digit
+        self._step = np.full(6, np.inf)  # smallest change seen on each axis, which is its last digit
         self._stretches: list[tuple[float, float]] = []
 
     def mark(self, time_us: Ints, readings: Array) -> Bools:
-        """(n) True where readings (n, 7), as in a Block, are frozen. The first of equal readings counts as measured."""
+        """(n) True where readings (n, 7), as in a Block, are frozen. The first of several equal readings counts as
+        measured."""
         n = len(time_us)
         values, time_s = np.vstack((self._last, readings[:, _MOTION])), time_us.astype(float) * 1e-6
         time_s = np.concatenate(([self._last_s], time_s)) if len(self._last) else time_s
@@ -90,10 +94,10 @@ class FrozenFinder:
         return [FrozenReadings(len(self._stretches), seconds, first, last)]
 
     def _doubtful(self, values: Array, time_s: Array, begin: int, end: int) -> bool:
-        """True if the equal readings from begin to end are surely frozen, not a standstill with noise hidden by
+        """True if the equal readings from begin to end are certainly frozen, not a standstill whose noise is hidden by
         rounding."""
         if not np.any(np.isfinite(self._step)):
-            return False  # nothing ever changed: nothing to compare with
+            return False  # no change was seen yet, so there is nothing to compare with
         if np.any(self._step[:3] < COARSE_G) or np.any(self._step[3:] < COARSE_DPS):
             return True
         near = 0.5 * np.where(np.isfinite(self._step), self._step, 0.0) + np.repeat([NEAR_G, NEAR_DPS], 3)
@@ -103,12 +107,12 @@ class FrozenFinder:
         return not any(np.all(np.abs(mean - values[begin]) <= near) for mean in means)
 
     def _add(self, begin_s: float, end_s: float) -> None:
-        if self._stretches and self._stretches[-1][1] == begin_s:  # it continues from the previous block
+        if self._stretches and self._stretches[-1][1] == begin_s:  # the stretch continues from the previous block
             begin_s = self._stretches.pop()[0]
         self._stretches.append((begin_s, end_s))
 
 
 def without_frozen(log: Log) -> Log:
-    """The log without frozen readings, which become gaps. The same log if it has none."""
+    """The log without frozen readings, which become gaps. Returns the same log if it has no frozen readings."""
     kept = ~FrozenFinder().mark(log.time_us, log.readings)
     return log if np.all(kept) else log.part(kept)

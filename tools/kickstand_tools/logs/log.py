@@ -1,4 +1,5 @@
-"""A recorded log in memory, some successive rows of one, and a stretch of one between two times."""
+"""Defines a log in memory (Log), some successive rows of a log (Block), and a part of a log between two times
+(Stretch)."""
 
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from pyarrow import Schema
 
-ROOM_TEMP_C = 25.0  # temperature for the firmware's modules if a log has none
+ROOM_TEMP_C = 25.0  # temperature for the firmware's modules if a log has no temperature
 
 FirmwareRow = tuple[int, list[float], float]
 
@@ -34,9 +35,9 @@ class Table:
         return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
 
     def part(self, which: slice | Bools) -> Self:
-        """The samples of a slice, or those where an array of n is True. The arrays of a slice are views of this
-        table's. Other fields are shared."""
-        # Table's columns are the fields; a Log's are named as in a CSV
+        """The samples of a slice, or the samples for which an array of n is True. A slice gives views of this table's
+        arrays. Other fields are shared."""
+        # use the fields, because the columns of a Log are named as in a CSV
         return replace(self, **{name: values[which] for name, values in Table.columns(self).items()})
 
     def to_pandas(self) -> "DataFrame":
@@ -50,7 +51,7 @@ class Table:
 
 def float_schema(units: Mapping[str, str], fine: Container[str], about: dict[str, str]) -> "Schema":
     """The schema of a Parquet file: columns with their units. Columns in fine are 64-bit floats, the rest 32-bit
-    floats. about: its metadata."""
+    floats. about: the metadata."""
     import pyarrow
 
     return pyarrow.schema(
@@ -63,8 +64,8 @@ def float_schema(units: Mapping[str, str], fine: Container[str], about: dict[str
 
 
 def firmware_rows(time_us: Ints, readings: Array, speed_mps: Array) -> Iterator[FirmwareRow]:
-    """Each sample for a replay by the firmware's modules: time (us), reading (7, the chip's order: g, deg C, deg/s),
-    speed (m/s, NaN for none). A missing temperature is ROOM_TEMP_C."""
+    """Yield each sample for a replay by the firmware's modules: time (us), reading (7, the chip's order: g, deg C,
+    deg/s), speed (m/s, NaN if missing). A missing temperature is ROOM_TEMP_C."""
     readings = np.column_stack((readings[:, :3], np.nan_to_num(readings[:, 3], nan=ROOM_TEMP_C), readings[:, 4:]))
     return zip(time_us.tolist(), readings.tolist(), speed_mps.tolist())
 
@@ -77,9 +78,9 @@ class Log(Table):
     rate, deg/s. speed_mps (n): m/s. temperature_c (n). lat_deg, lon_deg (n): the position, degrees north and east.
     utc_s (n): Universal Time, s since 1970. The fields from speed_mps to utc_s are optional, and NaN without a new
     value. start_s: the recorder's own time at the first sample, s. name: the log's name in messages. notices: remarks
-    about it.
+    about the log.
 
-    t_s may start at any value: its first value is added to start_s and subtracted from t_s. Raises InputError for
+    You can pass t_s with any start: its first value is added to start_s and subtracted from t_s. Raises InputError for
     shapes that do not fit and for a time that does not increase.
 
     >>> import numpy as np
@@ -110,16 +111,16 @@ class Log(Table):
         shapes = {"t_s": (n,), "accel_g": (n, 3), "gyro_dps": (n, 3)} | dict.fromkeys((*TRACK, "temperature_c"), (n,))
         for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
-                raise InputError(f"{self.name}: {name} has the shape {getattr(self, name).shape}, it has to be {shape}")
+                raise InputError(f"{self.name}: {name} has the shape {getattr(self, name).shape}, it must be {shape}")
         if n and not np.all(np.diff(np.rint(self.t_s * 1e6)) > 0):
-            raise InputError(f"{self.name}: the time t_s has to increase from sample to sample")
+            raise InputError(f"{self.name}: the time t_s must increase from sample to sample")
         if n and self.t_s[0] != 0.0:
             self.start_s += float(self.t_s[0])
             self.t_s = self.t_s - self.t_s[0]
 
     @classmethod
     def from_readings(cls, readings: ArrayLike, rate_hz: float, name: str = "the log") -> "Log":
-        """readings (n, 7): acceleration (3, g), temperature (C), rate (3, deg/s), in the chip's order.
+        """Make a log from readings (n, 7): acceleration (3, g), temperature (C), rate (3, deg/s), in the chip's order.
 
         rate_hz: samples per second.
         """
@@ -138,8 +139,8 @@ class Log(Table):
 
     @property
     def start_utc_s(self) -> float | None:
-        """Universal Time at the first sample, s; None if unknown. It is the median over the rows, because some values
-        come late."""
+        """Universal Time at the first sample, s; None if unknown. The median over the rows is used, because some
+        values come late."""
         starts = (self.utc_s - self.t_s)[np.isfinite(self.utc_s)]
         return float(np.median(starts)) if len(starts) else None
 
@@ -177,8 +178,8 @@ class Block(Table):
     frozen: Bools
     has_temp: bool
     start_s: float
-    done: int  # bytes of the (packed) file that have been read; samples of a log in memory
-    lines: list[str] = field(default_factory=list)  # the rows as CSV, none for a log in memory
+    done: int  # bytes read of the (packed) file; for a log in memory, samples
+    lines: list[str] = field(default_factory=list)  # the rows as CSV; empty for a log in memory
     names: tuple[str, ...] = ()  # names of the columns in lines
     own_times: bool = True  # False if the times were changed (see even_times.py) and differ from those in lines
 
@@ -193,14 +194,14 @@ class Block(Table):
 
     @property
     def time_text(self) -> list[str]:
-        """The times as texts: those of the file, or the changed ones."""
+        """The times as texts, from the file or as changed."""
         if not self.lines or not self.own_times:
             return [f"{self.start_s + t:.6f}" for t in self.t_s.tolist()]
         place = self.names.index("t_s")
         return [cells_of(line)[place].strip() for line in self.lines]
 
     def part(self, which: slice | Bools) -> "Block":
-        """The rows of a slice, or those where an array of n is True."""
+        """The rows of a slice, or the rows for which an array of n is True."""
         if isinstance(which, slice):
             lines = self.lines[which]
         else:
@@ -215,10 +216,10 @@ class Block(Table):
 
 @dataclass
 class Stretch:
-    """A log from from_s to to_s, seconds since its first sample; negative: before its last one. None: the log's start
-    or end.
+    """The part of a log between from_s and to_s, seconds since the log's first sample. Negative: before its last
+    sample. None: the log's start or end.
 
-    It can be used like a log. When it is read as a log, its times count from its own first sample. Functions that
+    A Stretch can be used like a log. If it is read as a log, its times count from its own first sample. Functions that
     compute the lean read the whole log, because the lean depends on earlier readings. They return the stretch in the
     log's times.
 
@@ -244,8 +245,8 @@ class Stretch:
         return Stretch(self.source, *times)
 
     def holds(self, block: Block) -> Bools:
-        """(n) True for the samples of a block of the whole log that are in the stretch. Its times must count from the
-        log's start."""
+        """(n) True for the samples of a block of the whole log that are in the stretch. Both times of the stretch must
+        count from the log's start."""
         begin_us, end_us = self._ends_us()
         return (block.time_us >= begin_us) & (block.time_us <= end_us)
 
@@ -253,7 +254,7 @@ class Stretch:
         return round(1e6 * (self.from_s or 0.0)), float("inf") if self.to_s is None else round(1e6 * self.to_s)
 
     def cut(self, blocks: Iterator[Block]) -> Iterator[Block]:
-        """The blocks of the whole log, cut to the stretch. Raises InputError if it holds no sample."""
+        """The blocks of the whole log, cut to the stretch. Raises InputError if the stretch has no sample."""
         begin_us, end_us = self._ends_us()
         if end_us <= begin_us:
             raise InputError(f"{self.name}: the stretch ends before it begins: give --from the smaller time")
@@ -273,8 +274,8 @@ class Stretch:
 
 
 def within(stretch: Stretch | None, block: Block, values: Array) -> Iterator[tuple[Block, Array]]:
-    """Yield the rows of a block of the whole log that are in the stretch, with their values (n, ...). None: all
-    rows."""
+    """Yield the rows of a block of the whole log that are in the stretch, with their values (n, ...). If stretch is
+    None, all rows."""
     if stretch is None:
         yield block, values
     elif (which := stretch.holds(block)).any():

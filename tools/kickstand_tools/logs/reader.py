@@ -25,15 +25,15 @@ from .source import File, Progress, chunks, name_of, total_bytes
 
 BLOCK_BYTES = 1 << 20  # bytes of text in a block, some 15000 samples
 BLOCK_SAMPLES = 60_000  # samples in a block of a log in memory
-MOST_SAMPLES = 10_000_000  # most samples of a log read as a whole: 14 hours at 200 Hz take 1 GB of memory
+MOST_SAMPLES = 10_000_000  # largest log that is read as a whole: 14 hours at 200 Hz take 1 GB of memory
 _READINGS = ("ax_g", "ay_g", "az_g", "temp_c", "gx_dps", "gy_dps", "gz_dps")  # in the order of Block.readings
 
-Source = File | Log | Stretch  # what can be read as a log
+Source = File | Log | Stretch  # everything that can be read as a log
 
 
 @dataclass(frozen=True)
 class CutLine(Message):
-    """The last line has no end."""
+    """The last line was cut, as in an interrupted recording."""
 
     line_number: int
 
@@ -46,10 +46,10 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None,
     speed_mps,lat_deg,lon_deg,utc_s,temp_c.
 
     source: a path (gzipped if it ends in .gz), an open file of text or bytes, a Log, which is checked, or a Stretch of
-    one of these. minimum: the least number of samples. progress: called with the bytes read and those of the file.
+    one of these. minimum: the least number of samples. progress: called with the bytes read and the bytes of the file.
     axes: check whether rates and accelerations fit each other, which takes most of the time. Repeated times are spread,
-    a cut end is left out. Raises InputError with the file, and the line of a mistake, also for common wrong units
-    (m/s2, milliseconds, km/h).
+    and a cut end is left out. Raises InputError that names the file and the line of a mistake, also for common wrong
+    units (m/s2, milliseconds, km/h).
 
     >>> import io
     >>> log = read_log(io.StringIO("t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\\n0.00,0,1,0,0,0,0\\n0.01,0,1,0,0,0,0\\n"))
@@ -84,7 +84,7 @@ def read_blocks(
 ) -> Iterator[Block]:
     """Read a log of any length block by block. Frozen readings are marked in each block. notices: at the end, notices
     about the log and about contradictions to `calibration` are appended. lines: also keep the rows as CSV, which takes
-    the most memory. For the rest see read_log()."""
+    the most memory. For the other arguments see read_log()."""
     name, count = name_of(source), 0
     remarks: list[Message] = []
     checks, frozen, health = Checks(name), FrozenFinder(), SensorHealth()
@@ -96,7 +96,7 @@ def read_blocks(
         count += len(block.time_us)
         if count > MOST_SAMPLES:
             raise InputError(
-                f"{name} has over {MOST_SAMPLES / 1e6:.0f} million samples: kickstand cut makes a part of it"
+                f"{name} has over {MOST_SAMPLES / 1e6:.0f} million samples: kickstand cut writes a part of it"
             )
         block.lines = block.lines if lines else []
         block.frozen = frozen.mark(block.time_us, block.readings) | health.mark(block.time_us, block.readings)
@@ -120,7 +120,7 @@ def check_first_line(log: Path) -> None:
 
 
 def is_log(path: Path) -> bool:
-    """True if the first line of a file is that of a log."""
+    """True if a file begins with the first line of a log."""
     try:
         check_first_line(path)
         return True
@@ -129,7 +129,7 @@ def is_log(path: Path) -> bool:
 
 
 def read_twice(source: Source) -> Source:
-    """A source that can be read twice: a Log for an open file, otherwise the same source."""
+    """Return a source that can be read twice: a Log for an open file, otherwise the same source."""
     if isinstance(source, Stretch):
         return replace(source, source=_rereadable(source.source))
     return _rereadable(source)
@@ -146,7 +146,7 @@ def split_stretch(source: Source) -> tuple[File | Log, Stretch | None]:
 
 
 def _from_beginning(stretch: Stretch) -> Stretch:
-    """The stretch with both times from the log's start. If one counts from the end, the log is read to find its
+    """The stretch with both times from the log's start. If a time counts from the end, the log is read to find its
     length."""
     if min(stretch.from_s or 0.0, stretch.to_s or 0.0) >= 0.0:
         return stretch
@@ -160,7 +160,7 @@ def _rereadable(source: File | Log) -> File | Log:
 
 
 def _unchecked(source: Source, remarks: list[Message]) -> Iterator[Block]:
-    """The blocks, before units and number of samples are checked. remarks: notices about the file are appended."""
+    """The blocks, with units and number of samples not yet checked. remarks: notices about the file are appended."""
     if isinstance(source, Log):
         return _blocks_of(source)
     if not isinstance(source, Stretch):
@@ -240,7 +240,7 @@ def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], rema
 def _numbers(
     name: str, text: bytes, names: list[str], places: dict[str, int], line: int, before_us: int | None
 ) -> Array:
-    """(n, columns in the order of places) the numbers in a text. line: number of lines before the text."""
+    """The numbers in a text (n, columns in the order of places). line: number of lines before the text."""
     table = numbers_in(text, len(names))
     if table is not None and cells.plausible(table[:, list(places.values())], list(places), before_us):
         return table[:, list(places.values())]
@@ -249,7 +249,7 @@ def _numbers(
 
 
 def _last_marked(parts: Iterator[tuple[bytes, int]]) -> Iterator[tuple[bytes, int, bool]]:
-    """Yield each part with True if it is the last one."""
+    """Yield each part, with True added for the last part."""
     before = next(parts, None)
     for part in parts:
         if before:
@@ -262,9 +262,9 @@ def _last_marked(parts: Iterator[tuple[bytes, int]]) -> Iterator[tuple[bytes, in
 def _without_cut_line(text: bytes, names: list[str], places: dict[str, int]) -> tuple[bytes, bytes]:
     """Remove the last line from the end of a log if it was cut. Returns the text and the cut line, empty if not cut.
 
-    text: whole lines; the last one may have no line end. It was cut if it has fewer cells than there are columns.
-    Without a line end it was also cut if it cannot be read, or if its last number has fewer decimals than in the
-    previous line: half a number is a number too.
+    text: whole lines; the last line may have no line end. The last line was cut if it has fewer cells than there are
+    columns. Without a line end, it was also cut if it cannot be read, or if its last number has fewer decimals than in
+    the previous line, because half a number also looks like a number.
     """
     kept = text.rstrip()
     before, _, last = kept.rpartition(b"\n")
@@ -286,5 +286,5 @@ def _readable(line: bytes, names: list[str], places: dict[str, int]) -> bool:
 
 
 def _digits(line: bytes) -> int:
-    """Number of decimals in the last cell; 0 for an empty one."""
+    """The number of decimals in the last cell; 0 for an empty cell."""
     return len(line.rpartition(b",")[2].strip().partition(b".")[2])

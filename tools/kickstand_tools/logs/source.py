@@ -14,16 +14,16 @@ from typing import IO, Any, cast
 from ..common.errors import InputError, cause
 from ..common.messages import Message, Remedy
 
-# Most bytes of a line, and most NUL bytes at the end: a file system may leave these in a file that was not closed
+# Most bytes in a line, and most NUL bytes at the end, which a file system may leave in a file that was not closed
 LONGEST_LINE = 16_000_000
-SUFFIXES = (".csv", ".txt", ".tsv", ".vbo", ".parquet")  # of logs and of the tables of other apps
+SUFFIXES = (".csv", ".txt", ".tsv", ".vbo", ".parquet")  # suffixes of logs and of other apps' tables
 File = Path | str | IO[bytes] | IO[str]
-Progress = Callable[[int, int], None]  # called with (done, total) in one unit; total is 0 where it is not known
+Progress = Callable[[int, int], None]  # called with (done, total) in the same unit; total is 0 if unknown
 
 
 @dataclass(frozen=True)
 class NulEnd(Message):
-    """The file ends in NUL bytes. count: how many."""
+    """The file ends in NUL bytes. count: their number."""
 
     count: int
 
@@ -33,7 +33,7 @@ class NulEnd(Message):
 
 @dataclass(frozen=True)
 class CutGzip(Message):
-    """A gzip file has no end."""
+    """The end of a gzip file is missing."""
 
     code = "cut-gzip"
     text = "the file was cut: the readings at its end are lost"
@@ -41,7 +41,7 @@ class CutGzip(Message):
 
 
 def open_input(path: Path | str) -> IO[bytes]:
-    """Open an ordinary file for reading. Raises InputError for anything else: a device or a pipe may never end."""
+    """Open an ordinary file for reading. Raises InputError for a device or a pipe, because it may never end."""
     try:
         # Do not wait for a writer to a pipe
         file = open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)), "rb")
@@ -65,7 +65,7 @@ def name_of(source: object) -> str:
 
 def log_stem(name: str) -> str:
     """The name of a log, or of an export, without path and suffixes."""
-    name = Path(os.path.abspath(name)).name.removesuffix(".gz")  # the folder's name if it is "."
+    name = Path(os.path.abspath(name)).name.removesuffix(".gz")  # abspath gives the folder's name for "."
     ending = next((suffix for suffix in (*SUFFIXES, ".zip") if name.lower().endswith(suffix)), "")
     return name[: len(name) - len(ending)]
 
@@ -74,9 +74,9 @@ def chunks(source: File, size: int, remarks: list[Message] | None = None) -> Ite
     """Yield the text, unpacked, in chunks of about `size` bytes of whole lines, each with the number of bytes read so
     far.
 
-    All lines end in a line feed, whatever the file uses; the last one may have no end. remarks: notices about the end
-    of the file are appended: NUL bytes, which are left out, and a cut gzip file. Without remarks a cut file is refused.
-    Raises InputError with the file's name.
+    All lines end in a line feed, whatever the file uses; the last line may have no end. remarks: notices about the end
+    of the file are appended, about NUL bytes, which are left out, and about a cut gzip file. If remarks is None, a cut
+    file is refused. Raises InputError with the file's name.
     """
     name = name_of(source)
     if isinstance(source, (Path, str)) and Path(source).is_dir():
@@ -115,13 +115,14 @@ def total_bytes(source: object) -> int:
 
 
 def _pieces(name: str, file: Any, packed: Any, size: int, remarks: list[Message] | None) -> Iterator[tuple[bytes, int]]:
-    """See chunks(). packed: the file below `file`, whose position is the number of bytes read; `file` if not packed."""
+    """See chunks(). packed: the packed file below `file`, or `file` itself; its position is the number of bytes
+    read."""
     pending, read = b"", 0
     for data in _data(file, size, remarks):
         read += len(data)
         pending += data
         if len(pending) > LONGEST_LINE + size:
-            raise InputError(f"{name}: {LONGEST_LINE / 1e6:.0f} MB without the end of a line: it is no log")
+            raise InputError(f"{name}: {LONGEST_LINE / 1e6:.0f} MB without the end of a line: it is not a log")
         if len(pending) >= size:
             cut = pending.rfind(b"\n") + 1 or pending.rfind(b"\r") + 1
             if cut:
@@ -140,7 +141,7 @@ def _data(file: Any, size: int, remarks: list[Message] | None) -> Iterator[bytes
     packed, there = isinstance(file, gzip.GzipFile), False
     while True:
         try:
-            # read() would not return the data before the cut
+            # read1(), because read() would not return the data before the cut
             data = file.read1(size) if packed else file.read(size)
         except EOFError:
             if remarks is None or not there:
@@ -154,7 +155,7 @@ def _data(file: Any, size: int, remarks: list[Message] | None) -> Iterator[bytes
 
 
 def _with_line_feeds(text: bytes) -> bytes:
-    if b"\r" not in text:  # finding one letter is fifty times as fast as finding two
+    if b"\r" not in text:  # searching one letter is fifty times as fast as searching two
         return text
     text = text.replace(b"\r\n", b"\n")
     return text if b"\n" in text else text.replace(b"\r", b"\n")

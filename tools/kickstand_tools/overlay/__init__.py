@@ -1,1 +1,1 @@
-"""Draws a ride's lean, forces and speed over a video of it, or as a transparent clip."""
+"""Draws the lean, forces and speed of a ride over a video, or as a transparent clip."""

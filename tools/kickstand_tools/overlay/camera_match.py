@@ -1,5 +1,7 @@
-"""Finds the time of a video in a ride: the magnitude of the camera's rate is the bike's, in whichever direction the
-camera points."""
+"""Finds the time of a video in a ride by comparing the magnitudes of the rates of camera and bike.
+
+The magnitude does not depend on the direction in which the camera points.
+"""
 
 import numpy as np
 
@@ -10,7 +12,7 @@ from .gpmf import Telemetry
 
 _SLOW_S = 5.0  # slower changes are removed, because they may be the gyros' bias
 _QUICK_S = 0.2  # faster changes are vibration, which differs between two places
-_ALIKE_S = 0.5  # readings closer to each other are not independent
+_ALIKE_S = 0.5  # readings closer together than this are not independent
 _LEAST_S = 8.0  # least time of the video within the ride
 _LEAST_EVIDENCE, _LEAST_LEAD, _LEAST_CORRELATION = 15.0, 6.0, 0.5
 _APART_S = 2.0
@@ -19,8 +21,8 @@ _APART_S = 2.0
 def camera_offset_s(ride: CellMotion, camera: Telemetry) -> tuple[float, float]:
     """The ride's time at the video's first picture, s since the ride's first sample, and the correlation there.
 
-    A camera on the bike turns with the bike. A camera on a helmet also turns with the head, and may not match: then
-    InputError is raised.
+    A camera on the bike turns with the bike. A camera on a helmet also turns with the head, and may not match. Raises
+    InputError without a match.
     """
     cell = np.floor((camera.t_s - camera.t_s[0]) / STEP_S).astype(int)
     count = np.bincount(cell)
@@ -31,9 +33,9 @@ def camera_offset_s(ride: CellMotion, camera: Telemetry) -> tuple[float, float]:
     likely = log_likelihood_ratio(found, common, STEP_S / _ALIKE_S)
     best = peaks(likely, round(_APART_S / STEP_S), 2)
     if not best or likely[best[0]] < _LEAST_EVIDENCE or found[best[0]] < _LEAST_CORRELATION:
-        raise InputError("nowhere does the ride turn as the camera does")
+        raise InputError("at no time does the camera turn like the bike")
     if len(best) > 1 and likely[best[1]] > likely[best[0]] - _LEAST_LEAD:
-        raise InputError("the camera turns as the ride does at two times or more")
+        raise InputError("the camera turns like the bike at several times")
     at = best[0]
     between = peak_offset(found[at - 1 : at + 2]) if 0 < at < len(found) - 1 else 0.0
     shift = at - (len(filmed) - 1) + between

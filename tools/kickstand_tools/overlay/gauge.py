@@ -1,7 +1,7 @@
 """Draws the gauge: a picture of one moment of a ride, with a transparent background.
 
-It has a dial from 60 degrees left to 60 degrees right, with a motorcycle seen from behind that leans as the rider's
-does. Beside it are the speed and the forces. Text has an outline to be legible on snow and in a tunnel.
+The gauge has a dial from 60 degrees left to 60 degrees right, and a motorcycle seen from behind that leans like the
+rider's. Speed and forces are beside the dial. Text has an outline, so it is legible on snow and in a tunnel.
 """
 
 import math
@@ -14,8 +14,8 @@ from .parts import ACCENT, DIM, PANEL, WHITE
 MOST_DEG = 60.0  # end of the dial
 MOST_G = 1.2  # edge of the circle of forces
 SHARE = 0.3  # height of the gauge over that of the video
-LEGIBLE_PX, MOST_SHARE = 216.0, 0.45  # least height for legible text, but at most this share of a small video's height
-UPRIGHT_DEG = 0.5  # a smaller lean is to neither side
+LEGIBLE_PX, MOST_SHARE = 216.0, 0.45  # least height for legible text; largest share of the video's height
+UPRIGHT_DEG = 0.5  # a smaller lean counts as upright
 _WIDTH = 1.72  # width over height
 _SPREAD = 1.5  # degrees in the picture per degree of lean
 _MIDDLE, _SIDE = 60.0, 146.0  # x of the middle of the dial, and of speed and forces

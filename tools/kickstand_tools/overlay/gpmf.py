@@ -1,7 +1,7 @@
 """Reads the gyro of a GoPro from its video file.
 
-The format is GPMF, described at github.com/gopro/gpmf-parser: nested items of a four-letter key, a type, a size and a
-number of values, big-endian. There is a packet about every second.
+The format GPMF is described at github.com/gopro/gpmf-parser. It consists of nested items: a four-letter key, a type, a
+size, the number of values, and the values, big-endian. There is about one packet per second.
 """
 
 import struct
@@ -20,20 +20,21 @@ _NESTED = b"\0"
 
 @dataclass
 class Telemetry:
-    """The camera's gyro: t_s (n): since the video's first picture. rate_dps (n, 3): in the camera's axes."""
+    """Readings of the camera's gyro. t_s (n): time since the video's first picture. rate_dps (n, 3): in the camera's
+    axes."""
 
     t_s: Array
     rate_dps: Array
 
 
 def telemetry(video: Video) -> Telemetry | None:
-    """The Telemetry of a video; None if it has no readable one."""
+    """The Telemetry of a video; None if it has none that can be read."""
     if video.telemetry is None:
         return None
     times, rates = [], []
     try:
         found = packets(video, video.telemetry)
-    except ValueError:  # ffmpeg printed something else than a packet's numbers
+    except ValueError:  # ffmpeg's output is not a packet's numbers
         return None
     for at_s, lasts_s, packet in found:
         samples = [values for values in streams(packet, b"GYRO") if len(values)]
@@ -47,14 +48,14 @@ def telemetry(video: Video) -> Telemetry | None:
 
 
 def streams(packet: bytes, key: bytes) -> Iterator[Array]:
-    """The values (n, axes) of each stream with this key, in the format's unit for it."""
+    """Yield the values (n, axes) of each stream with this key, in the unit that GPMF defines for the key."""
     for name, kind, _, body in _items(packet):
         if kind == _NESTED and name in (b"DEVC", b"STRM"):
             yield from _of_stream(body, key) if name == b"STRM" else streams(body, key)
 
 
 def _of_stream(body: bytes, key: bytes) -> Iterator[Array]:
-    """Yield the scaled values of one stream. SCAL comes before the values that it divides."""
+    """Yield the scaled values of one stream. An item SCAL, the divisor, comes before the values."""
     scale = np.ones(1)
     for name, kind, size, values in _items(body):
         if kind not in _NUMBERS or name not in (b"SCAL", key):
@@ -70,7 +71,7 @@ def _of_stream(body: bytes, key: bytes) -> Iterator[Array]:
 
 
 def _items(data: bytes) -> Iterator[tuple[bytes, bytes, int, bytes]]:
-    """Key, type, size of a sample and the bytes of all its samples, which are padded to four."""
+    """Yield (key, type, size of a sample, bytes of all samples) of each item. Items are padded to four bytes."""
     place = 0
     while place + 8 <= len(data):
         name, kind, size, count = struct.unpack_from(">4scBH", data, place)

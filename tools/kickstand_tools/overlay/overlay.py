@@ -20,7 +20,7 @@ from .shown import Shown, shown
 from .video import Video, ffmpeg, input_of, open_video, write_video
 
 MARGIN = 0.03  # distance from the video's edges to the gauge, over the video's height
-_BEYOND_S = 1.0  # a video may begin before the ride, or end after it, by this time
+_BEYOND_S = 1.0  # a video may begin this long before the ride, or end this long after it
 _FPS = 30.0
 _CLIP_HEIGHT = 1080
 _TRANSPARENT = {
@@ -35,9 +35,9 @@ _SOLID = ("-c:v", "libx264", "-preset", "fast", "-crf", "18", "-pix_fmt", "yuv42
 
 @dataclass
 class Overlaid:
-    """pictures: their number. fps: pictures per second. begin_s, end_s: the part of the ride. offset_s: the ride's time
-    at the video's first picture, None without a video. correlation: of camera and ride, if the offset was found by it,
-    otherwise None. notices: remarks about the ride."""
+    """A written overlay. pictures: number of pictures. fps: pictures per second. begin_s, end_s: the drawn part of the
+    ride. offset_s: the ride's time at the video's first picture, None without a video. correlation: of camera and ride
+    if the offset was found from it, otherwise None. notices: remarks about the ride."""
 
     pictures: int
     fps: float
@@ -116,18 +116,18 @@ def overlay(
 
 
 def _check(out: Path, video: Path | str | None, offset_s: float | None, height: int | None) -> Video | None:
-    """Raise InputError for files that cannot be written or read. Call it before any work is done."""
+    """Raise InputError if a file cannot be written or read. Call this before any other work."""
     if video is None:
         if out.suffix.lower() not in _TRANSPARENT:
             raise InputError(f"{out}: the name of a transparent clip ends in .mov or .webm; an .mp4 needs --video")
         if offset_s is not None:
-            raise InputError("an offset is that of a video: give --video, or --from and --to")
+            raise InputError("an offset needs a video: give --video, or --from and --to")
         ffmpeg()
         return None
     if out.suffix.lower() != ".mp4":
-        raise InputError(f"{out}: over a video the name has to end in .mp4")
+        raise InputError(f"{out}: over a video the name must end in .mp4")
     if height is not None:
-        raise InputError("a height is that of a clip: over a video the gauge goes by the video's own")
+        raise InputError("a height is only for a clip: over a video the gauge follows the video's height")
     return open_video(Path(video))
 
 
@@ -135,7 +135,7 @@ def _found_offset(log: Source, video: Video, progress: Progress | None) -> tuple
     todo = "give --offset, the ride's time in seconds at the video's first picture"
     measured = telemetry(video)
     if measured is None:
-        raise InputError(f"{video.path}: no readings of a GoPro's gyro in it show when it was filmed: {todo}")
+        raise InputError(f"{video.path}: it has no gyro readings of a GoPro that show when it was filmed: {todo}")
     try:
         return camera_offset_s(motion(log, progress), measured)
     except InputError as error:
@@ -156,7 +156,7 @@ def _part(
         if begin_s is None and end_s is None and (first < -_BEYOND_S or last > last_s + _BEYOND_S):
             within = f"--from {max(first, 0.0):.1f} --to {min(last, last_s):.1f}"
             raise InputError(f"{where}: check --offset, or take what they have in common with {within}")
-        if begin_s is not None or end_s is not None:  # a missing limit is that of the part that both cover
+        if begin_s is not None or end_s is not None:  # replace a missing limit by the end of the common part
             begin_s, end_s = begin_s or 0.0, last_s if end_s is None else min(end_s, last_s)
         begin_s = first if begin_s is None else max(first, begin_s)
         end_s = last if end_s is None else min(last, end_s)

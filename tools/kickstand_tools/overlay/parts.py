@@ -10,7 +10,7 @@ Point = tuple[float, float]
 WHITE: Colour = (255, 255, 255, 255)
 DARK: Colour = (12, 14, 18, 255)
 DIM: Colour = (150, 156, 166, 255)
-ACCENT: Colour = (255, 176, 0, 255)  # amber: colour-blind people can also distinguish it from white and grey
+ACCENT: Colour = (255, 176, 0, 255)  # amber, which colour-blind people can distinguish from white and grey
 PANEL: Colour = (12, 14, 18, 120)
 CLEAR: Colour = (0, 0, 0, 0)
 _LAMP: Colour = (214, 40, 40, 255)
@@ -18,8 +18,8 @@ _FINER = 4  # shapes are drawn larger by this factor and then reduced, which smo
 
 
 def smooth_mask(size: tuple[int, int], draw, finer: int = _FINER) -> Image.Image:
-    """A mask, 0 to 255. draw: called with an ImageDraw and its scale: the number of its pixels per pixel of the
-    mask."""
+    """A mask with smooth edges, 0 to 255. draw: called with an ImageDraw, and with the number of its pixels per pixel
+    of the mask."""
     mask = Image.new("L", (size[0] * finer, size[1] * finer), 0)
     draw(ImageDraw.Draw(mask), finer)
     return mask.resize(size, Image.Resampling.BOX)
@@ -37,11 +37,11 @@ def outlined(mask: Image.Image, colour: Colour, width: int) -> Image.Image:
 
 @lru_cache(maxsize=2000)
 def text(words: str, height: float, colour: Colour) -> Image.Image:
-    """Words with a dark outline; the picture is as high as the letters need. height: of the font, pixels."""
+    """Words with a dark outline, in a picture that fits the letters. height: of the font, pixels."""
     stroke = max(1, round(height * 0.09))
     font = ImageFont.load_default(height)
     left, top, right, bottom = font.getbbox(words, stroke_width=stroke)
-    ascent = font.getbbox("0", stroke_width=stroke)  # the same baseline for all texts
+    ascent = font.getbbox("0", stroke_width=stroke)  # gives all texts the same baseline
     top, bottom = min(top, ascent[1]), max(bottom, ascent[3])
     picture = Image.new("RGBA", (int(right - left) + 2, int(bottom - top) + 2), DARK[:3] + (0,))
     ImageDraw.Draw(picture).text(
@@ -75,7 +75,8 @@ def arrow(size: float, to_the_right: bool, colour: Colour) -> Image.Image:
 
 @lru_cache(maxsize=8)
 def bike(height: float) -> Image.Image:
-    """A motorcycle and its rider from behind, upright; the tyre stands on the middle of the square picture."""
+    """A motorcycle and its rider from behind, upright. The tyre touches the ground in the middle of the square
+    picture."""
     side = 2 * round(height * 1.12)
     unit = height / 36.0
 

@@ -11,13 +11,13 @@ from ..logs.source import Progress
 from ..signals import Array, Ints, smoothed
 
 _FORCE_S = 0.3  # forces are averaged over this time, because engine and road shake the sensor
-_GAP_S = 0.2  # older readings are not shown
-_SPEED_S = 3.0  # nor older speeds, which mostly come once per second
+_GAP_S = 0.2  # readings older than this are not shown
+_SPEED_S = 3.0  # speeds older than this are not shown; most receivers send one per second
 
 
 @dataclass
 class Shown:
-    """n moments of a ride. t_s: since its first sample. NaN for a value that is unknown or not trusted.
+    """n moments of a ride. t_s: since the ride's first sample. Values that are unknown or not trusted are NaN.
 
     lean_deg: > 0 to the right. forward_g: > 0 when speeding up. left_g: acceleration to the left along the road.
     speed_mps. left_deg, right_deg: the largest lean to each side until then, 0 for none.
@@ -38,7 +38,7 @@ class Shown:
 
     @property
     def values(self) -> tuple[Array, ...]:
-        """All values but the times, (n) each."""
+        """All values except the times, (n) each."""
         return self.lean_deg, self.forward_g, self.left_g, self.speed_mps, self.left_deg, self.right_deg
 
     def at(self, t_s: Array) -> "Shown":
@@ -59,8 +59,8 @@ class Shown:
 
 
 def shown(ride: Ride, progress: Progress | None = None, notices: list[Message] | None = None) -> Shown:
-    """The values of a whole ride, with the lean chosen in open_ride(). progress, notices: see Ride.blocks(). Raises
-    InputError."""
+    """Compute the values of a whole ride, with the lean chosen in open_ride(). progress, notices: see Ride.blocks().
+    Raises InputError."""
     columns: list[Array] = []
     for block in ride.blocks(progress, notices):
         lean = np.where(block.trusted, block.lean_deg, np.nan)

@@ -1,4 +1,4 @@
-"""Reads and writes videos with ffmpeg, which the package imageio-ffmpeg contains."""
+"""Reads and writes videos with ffmpeg, which is part of the package imageio-ffmpeg."""
 
 import re
 import subprocess
@@ -10,13 +10,13 @@ from pathlib import Path
 from ..common.errors import InputError, extra
 
 _QUIET = ("-hide_banner", "-loglevel", "error", "-nostdin", "-y")
-_LARGEST, _FASTEST = 16_384, 1000.0  # limits of a side in pixels, and of pictures per second: beyond any camera's
+_LARGEST, _FASTEST = 16_384, 1000.0  # limits of a side, pixels, and of pictures per second, which no camera exceeds
 
 
 @dataclass
 class Video:
-    """width, height: as shown, pixels. fps: pictures per second. seconds: its duration. telemetry: the number of the
-    stream of a GoPro's sensors, None if there is none."""
+    """A video file. width, height: as shown, pixels. fps: pictures per second. seconds: duration. telemetry: number of
+    the stream of a GoPro's sensors, None without one."""
 
     path: Path
     width: int
@@ -40,19 +40,19 @@ def ffmpeg() -> str:
 
 
 def input_of(path: Path) -> list[str]:
-    """ffmpeg's arguments to read a file. By its name alone ffmpeg would treat 12:30.mp4 as a protocol, and a file that
-    poses as a video could make it read from the network."""
+    """ffmpeg's arguments to read a file safely. With only a name, ffmpeg would take 12:30.mp4 for a protocol, and a
+    file that poses as a video could make ffmpeg read from the network."""
     return ["-protocol_whitelist", "file,pipe", "-i", f"file:{path}"]
 
 
 def open_video(path: Path) -> Video:
     """Read the properties of a video file. Raises InputError if the file is not a video."""
     if not path.is_file():
-        raise InputError(f"{path}: there is no such file" if not path.is_dir() else f"{path} is a directory, no video")
+        raise InputError(f"{path} is a directory, not a video" if path.is_dir() else f"{path}: there is no such file")
     output = _run(["-hide_banner", "-nostdin", *input_of(path)]).stderr.decode(errors="replace")
     stream = re.search(r"Stream #0:\d+.*: Video: (.*)", output)
     if "Input #0" not in output:
-        raise InputError(f"{path} is no video that ffmpeg can read, or its copy is not whole")
+        raise InputError(f"{path} is not a video that ffmpeg can read, or its copy is incomplete")
     if not stream or "attached pic" in stream[0]:
         raise InputError(f"{path} has no pictures: give a video")
     size = re.search(r"\b(\d{2,5})x(\d{2,5})\b", stream[1])
@@ -64,7 +64,7 @@ def open_video(path: Path) -> Video:
     fps = float(rate[1]) * (1000.0 if rate[2] else 1.0)
     width, height = int(size[1]), int(size[2])
     if max(width, height) > _LARGEST or not 0.0 < fps <= _FASTEST:
-        raise InputError(f"{path} is no camera's video: {width}x{height} pixels, {fps:g} pictures a second")
+        raise InputError(f"{path} is not a camera's video: {width}x{height} pixels, {fps:g} pictures per second")
     turned = re.search(r"rotation of (-?[\d.]+) degrees", output)
     if turned and round(float(turned[1])) % 180 == 90:
         width, height = height, width

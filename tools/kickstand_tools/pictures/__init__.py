@@ -1,1 +1,1 @@
-"""Draws display and wiring as SVG, from the settings and the character ROM, for the web page and the READMEs."""
+"""Draws the display and the wiring as SVG for the web page and the READMEs, from settings and character ROM."""

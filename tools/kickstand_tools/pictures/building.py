@@ -1,5 +1,5 @@
-"""Draws what a rider builds, as SVG: a 5 V display behind its level shifter, the supply on the bike, the six positions,
-and the places of all parts on the bike."""
+"""Draws pictures for a rider who builds the device, as SVG: a 5 V display with its level shifter, the supply on the
+bike, the six positions, and the places of all parts on the bike."""
 
 from math import cos, radians, sin
 
@@ -13,8 +13,8 @@ _WHITE, _PAD = "#ffffff", "#f2c94c"
 
 
 def drawings(display: str, shifted: str) -> dict[str, str]:
-    """{file name: SVG}: wiring of both boards, and the other drawings. display, shifted: SVGs of the display at a
-    board, and of the one behind the level shifter."""
+    """{file name: SVG}: the wiring of both boards, and the other drawings. display: SVG of the display at a board.
+    shifted: SVG of the display behind the level shifter."""
     return {
         "wiring_pico.svg": wiring.draw(wiring.PICO, display),
         "wiring_esp32.svg": wiring.draw(wiring.ESP32, display),
@@ -26,7 +26,7 @@ def drawings(display: str, shifted: str) -> dict[str, str]:
 
 
 def shifter(board: wiring.DrawnBoard, display: str) -> str:
-    """A 5 V display at a board: the level shifter in SDA and SCL, VCC at 5 V. display: an SVG of one."""
+    """A 5 V display at a board, with the level shifter in SDA and SCL, and VCC at 5 V. display: an SVG of a display."""
     pins = wiring.pin_names(board)
     five = pins["5V"]
     page = Drawing(900, 330)
@@ -103,8 +103,8 @@ _HALF = (44.0, 34.0, 6.0)  # of the board along its axes, pixels
 
 
 def six_positions(columns: int = 7) -> str:
-    """The six sides of the sensor, with the display's names, and the slanted pose that checks them. columns: number of
-    poses side by side."""
+    """The six positions of the sensor, with their names on the display, and the slanted pose that checks them. columns:
+    number of poses side by side."""
     poses = [*_POSITIONS.items(), ("", _SLANTED)]
     page = Drawing(140 * columns, 215 * -(-len(poses) // columns))
     for k, (name, axes) in enumerate(poses):
@@ -155,8 +155,7 @@ def _lay(page: Drawing, x: float, y: float, axes: tuple[Vector, Vector, Vector])
 
 
 def _seen(x: float, y: float, place: Vector) -> tuple[float, float]:
-    """The drawn position of a point given as right, up and towards the viewer, seen from the right, above and in
-    front."""
+    """Project a point (right, up, towards the viewer) to the drawing, seen from the right, above and in front."""
     right, up, near = place
     return x + 0.71 * (right - near), y - 0.78 * up + 0.36 * (right + near)
 

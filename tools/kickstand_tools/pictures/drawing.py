@@ -4,13 +4,13 @@ from markupsafe import Markup
 
 from ..common.svg import drawing, element, path
 
-RED, BLACK, BLUE, AMBER = "#d1302a", "#2b2b2b", "#2460d8", "#d99000"  # of wires: supply, ground, SDA, SCL
+RED, BLACK, BLUE, AMBER = "#d1302a", "#2b2b2b", "#2460d8", "#d99000"  # wires: supply, ground, SDA, SCL
 _FONT = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif"
 _MIRRORED = {"start": "end", "end": "start", "middle": "middle"}
 
 
 class Drawing:
-    """Width and height in pixels, x to the right, y down. mirrored: x is counted from the right; text stays legible."""
+    """A drawing. Sizes are in pixels, x to the right, y down. mirrored: x counts from the right; text stays legible."""
 
     def __init__(self, width: int, height: int, mirrored: bool = False) -> None:
         self._width, self._height, self._mirrored = width, height, mirrored
@@ -25,7 +25,7 @@ class Drawing:
         self._elements.append(element("rect", **place, rx=round_by, fill=fill))
 
     def disc(self, x: float, y: float, radius: float, fill: str) -> None:
-        """A filled circle: a pin, a joint of wires, the cap of a button."""
+        """A filled circle, for a pin, a joint of wires, or the cap of a button."""
         self._elements.append(element("circle", cx=self._x(x), cy=y, r=radius, fill=fill))
 
     def shape(self, fill: str, *corners: tuple[float, float]) -> None:
@@ -48,13 +48,13 @@ class Drawing:
         colour: str = "#1d1f24",
         bold: bool = False,
     ) -> None:
-        """Words around the height y. anchor: the part of them that is at x, "start", "middle" or "end"."""
+        """Words, vertically centred at y. anchor: the part of the text at x: "start", "middle" or "end"."""
         style = {"font_size": size, "font_weight": "bold" if bold else None}
         style["text_anchor"] = _MIRRORED[anchor] if self._mirrored else anchor
         self._elements.append(element("text", words, x=self._x(x), y=y + 0.35 * size, **style, fill=colour))
 
     def picture(self, x: float, y: float, width: float, height: float, svg: str) -> None:
-        """Another SVG, fitted into a rectangle."""
+        """Another SVG, scaled to fit into a rectangle."""
         place = f'<svg x="{self._x(x, width)}" y="{y}" width="{width}" height="{height}"'
         self._elements.append(Markup(str(svg).strip().replace("<svg", place, 1)))
 

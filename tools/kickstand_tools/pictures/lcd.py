@@ -1,15 +1,15 @@
-"""Draws a 16x2 character display dot by dot as SVG, from its controller's memories."""
+"""Draws a 16x2 character display dot by dot as SVG, from the controller's display and character memory."""
 
 from ..common.svg import drawing, element
 from .lcd_font import ROM
 
 # In units of 0.1 mm, as on the usual module of 80 x 36 mm
 _DOT = (5, 6)  # width, height
-_PITCH = (6, 7)  # from dot to dot
-_CELL = (36, 62)  # from character to character
+_PITCH = (6, 7)  # distance between dots
+_CELL = (36, 62)  # distance between characters
 _COLUMNS, _LINES = 16, 2
-_MARGIN = 34  # of glass around the characters
-_FRAME = 22  # of black metal around the glass
+_MARGIN = 34  # glass around the characters
+_FRAME = 22  # black metal around the glass
 _GLASS = (_COLUMNS * _CELL[0] + 2 * _MARGIN, _LINES * _CELL[1] + 2 * _MARGIN)
 _SIZE = (_GLASS[0] + 2 * _FRAME, _GLASS[1] + 2 * _FRAME)
 

@@ -1,6 +1,6 @@
 """The characters of the HD44780's ROM A00 (data sheet ADE-207-272, table 4) as dots."""
 
-# Codes 0x20 to 0x7F, sixteen in a band, each 5 dots wide and 7 high; the eighth row, of the cursor, is empty.
+# Codes 0x20 to 0x7F, sixteen per band, each 5 dots wide and 7 high. The eighth row, for the cursor, is empty.
 _BANDS = """
 ..... ..#.. .#.#. .#.#. ..#.. ##... .##.. .##.. ...#. .#... ..... ..... ..... ..... ..... .....
 ..... ..#.. .#.#. .#.#. .#### ##..# #..#. ..#.. ..#.. ..#.. ..#.. ..#.. ..... ..... ..... ....#
@@ -69,4 +69,4 @@ def _table():
     return table
 
 
-ROM: dict[int, bytes] = _table()  # code: eight rows, bits 4 (left) to 0 (right)
+ROM: dict[int, bytes] = _table()  # code -> eight rows, bits 4 (left) to 0 (right)

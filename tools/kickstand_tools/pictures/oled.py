@@ -5,7 +5,7 @@ from itertools import groupby
 from ..common.svg import drawing, element
 from ..simulated_board.oled import HEIGHT, WIDTH
 
-# In pixels of the panel; the usual module is 27 mm wide, its panel 22
+# In pixels of the panel. The usual module is 27 mm wide, its panel 22 mm
 _MARGIN, _FRAME = 4, 6
 _SIZE = (WIDTH + 2 * (_MARGIN + _FRAME), HEIGHT + 2 * (_MARGIN + _FRAME))
 

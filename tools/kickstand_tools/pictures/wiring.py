@@ -9,8 +9,7 @@ from .drawing import AMBER, BLACK, BLUE, RED, Drawing
 
 
 class DrawnBoard(NamedTuple):
-    """A board seen from above. near, far: its pins from the top down, on the side that faces the modules and on the
-    other."""
+    """A board seen from above. near, far: pins from the top down. The near side faces the modules."""
 
     title: str
     machine: str  # in simulated_board.fakes.chips.MACHINES
@@ -41,7 +40,7 @@ ESP32 = DrawnBoard(
 )
 
 _GREEN = "#2b8a4b"
-_PAD = "#f2c94c"  # of a pin in use
+_PAD = "#f2c94c"  # colour of a pin in use
 _COLOURS = {"SDA": BLUE, "SCL": AMBER, "signal": _GREEN}
 _WIDTH, _HEIGHT = 900, 570
 _LEFT, _RIGHT = 76, 256  # edges of the board
@@ -56,7 +55,7 @@ _GROUND_X, _SUPPLY_X, _OUTSIDE_X, _TOP_Y = 380, 866, 36, 36
 
 
 def connections(board: DrawnBoard) -> list[tuple[str, dict[str, str]]]:
-    """[(module, {its pin: the board's pin})] of the drawing."""
+    """The connections in the drawing: [(module, {pin of the module: pin of the board})]."""
     near, far = ({name: row + 1 for row, name in enumerate(side)} for side in (board.near, board.far))
 
     def pin(name: str) -> str:
@@ -74,12 +73,12 @@ def connections(board: DrawnBoard) -> list[tuple[str, dict[str, str]]]:
 
 
 def pin_names(board: DrawnBoard) -> dict[str, str]:
-    """The names of the board's pins for SDA and SCL of a display, and of the pin with USB's 5 V."""
+    """The names of the board's pins for SDA and SCL of a display, and of the pin with 5 V from USB."""
     return _default_pins(board)["display"] | {"5V": board.far[0] if board.far[0] == "VBUS" else board.far[-1]}
 
 
 def draw(board: DrawnBoard, display: str) -> str:
-    """The drawing of a board with its modules. display: an SVG of a display, for decoration."""
+    """Draw a board with its modules. display: an SVG of a display, shown in its module."""
     page = Drawing(_WIDTH, _HEIGHT, mirrored=board.near_is_left)
     pins = _default_pins(board)
     row = {module: [board.near.index(name) for name in names.values()] for module, names in pins.items()}
@@ -132,8 +131,8 @@ def _draw_signals(
 
 
 def _default_pins(board: DrawnBoard) -> dict[str, dict[str, str]]:
-    """{module: {pin of the module: name of the board's pin}}, from port.py for this board. Do not call it while another
-    simulated board is installed, because it replaces that."""
+    """{module: {pin of the module: name of the board's pin}}, from port.py for this board. This installs a simulated
+    board, so do not call it while another one is installed."""
     with simulator.Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=board.machine):
         port = runpy.run_path(str(firmware_path.PACKAGE / "board" / "port.py"))
 
@@ -152,7 +151,7 @@ def _pin_y(row: int) -> int:
 
 
 def _draw_supply(page: Drawing, pin_y: int) -> None:
-    """Draw 3.3 V around the outside to the far edge of both modules."""
+    """Draw the 3.3 V wire around the outside to the far edge of both modules."""
     around = ((_OUTSIDE_X, pin_y), (_OUTSIDE_X, _TOP_Y), (_SUPPLY_X, _TOP_Y), (_SUPPLY_X, _DISPLAY_SUPPLY_Y))
     page.wire(RED, (_LEFT, pin_y), *around, (_MODULE_RIGHT, _DISPLAY_SUPPLY_Y))
     page.wire(RED, (_SUPPLY_X, _SENSOR_SUPPLY_Y), (_MODULE_RIGHT, _SENSOR_SUPPLY_Y))
@@ -160,7 +159,7 @@ def _draw_supply(page: Drawing, pin_y: int) -> None:
 
 
 def _draw_ground(page: Drawing, pin_y: int) -> None:
-    """Draw ground from one pin to the sensor above and the display below."""
+    """Draw the ground wire from one pin to the sensor above and the display below."""
     for y in (_SENSOR_PINS_Y[2], _DISPLAY_PINS_Y[0]):
         page.wire(BLACK, (_RIGHT, pin_y), (_GROUND_X, pin_y), (_GROUND_X, y), (_MODULE_LEFT, y))
     page.disc(_GROUND_X, pin_y, 6, BLACK)
@@ -180,7 +179,7 @@ def _draw_board(page: Drawing, board: DrawnBoard, used_near: set[int], used_far:
             page.disc(edge, _pin_y(row), 7, _PAD if taken else "#8f8a70")
             if not board.numbered:
                 words = name
-            else:  # the number at the edge
+            else:  # write the number next to the edge
                 words = f"{row + 1}  {name}" if side == "near" else f"{name}  {2 * rows - row}"
             size, colour = (14, "#ffffff") if taken else (13, "#b9cbc1")
             page.text(edge + 14 * inwards, _pin_y(row), words, size, anchor, colour, taken)
@@ -189,7 +188,8 @@ def _draw_board(page: Drawing, board: DrawnBoard, used_near: set[int], used_far:
 def _draw_module(
     page: Drawing, top: int, height: int, title: str, pins: list[str], places: tuple[int, ...], supply_y: int = 0
 ) -> None:
-    """pins: names, on the edge that faces the board; places: their heights; supply_y: of VCC on the other edge."""
+    """Draw a module. pins: names of the pins on the edge that faces the board. places: heights of these pins. supply_y:
+    height of VCC on the other edge."""
     colour = "#2a4f9e" if supply_y else "#5b6270"
     page.box(_MODULE_LEFT, top, _MODULE_RIGHT - _MODULE_LEFT, height, colour)
     page.text(_MODULE_MIDDLE, top + 18, title, 14, "middle", "#ffffff", True)

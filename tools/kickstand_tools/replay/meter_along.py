@@ -1,7 +1,7 @@
 """Replays blocks of a log on this Python, and computes Nicolae's formula on arrays.
 
-numpy computes values that do not depend on earlier samples for a whole block. An hour at 200 Hz takes 4.0 s instead of
-7.2 s with Replay.step(). A test compares both.
+Values that do not depend on earlier samples are computed for a whole block with numpy. An hour at 200 Hz takes 4.0 s,
+with Replay.step() 7.2 s. A test compares both.
 """
 
 from collections.abc import Iterable, Iterator
@@ -20,7 +20,7 @@ TOO_SMALL = 0.01  # g2, as in kickstand.lean: in free fall the force has no dire
 
 
 class MeterAlong(Replay):
-    """A Replay of whole blocks. Pass a ride's blocks to columns() or after_each(), one after the other."""
+    """A Replay of whole blocks. Pass all blocks of a ride in order to columns() or to after_each()."""
 
     def __init__(self, calibration: CalibrationFile) -> None:
         super().__init__(calibration.to_firmware(), delay_s=calibration.delay_s())
@@ -60,47 +60,48 @@ class MeterAlong(Replay):
 
 @dataclass(frozen=True)
 class ReadingsMisfit(Message):
-    """The meter named the sensor. seconds: in all. first_s: of the first time."""
+    """The meter repeatedly reported readings that contradict each other. first_s: time of the first report. seconds:
+    total duration."""
 
     seconds: float
     first_s: float
 
     code = "readings-misfit"
     text = (
-        "the readings do not fit together again and again, first at {first_s:.0f} s, {seconds:.0f} s in all; the board "
+        "the readings repeatedly contradict each other, first at {first_s:.0f} s, {seconds:.0f} s in all; the board "
         "shows no lean there"
     )
-    todo = Remedy("is the sensor's mount loose, or the sensor ill?")
+    todo = Remedy("is the sensor's mount loose, or the sensor faulty?")
 
 
 @dataclass
 class Misfit:
-    """Where the meter named the sensor, because its readings do not fit again and again: first at first_s, for seconds
-    in all."""
+    """Adds up the time in which the meter reports contradicting readings. first_s: time of the first report. seconds:
+    total duration."""
 
     first_s: float = 0.0
     seconds: float = 0.0
 
     def add(self, t_s: Array, odd: Bools) -> None:
-        """Take a part of the ride: time (n, s), and where it was named (n)."""
+        """Add a part of the ride. t_s (n): times, s. odd (n): True where the meter reports contradicting readings."""
         if np.any(odd):
             self.first_s = self.first_s if self.seconds else float(t_s[np.argmax(odd)])
             self.seconds += float(np.sum(np.diff(t_s, prepend=t_s[0])[odd])) or 1e-6
 
     def remarks(self, known: Iterable[Message]) -> list[Message]:
-        """The notice of it, unless `known` has the reason."""
+        """The notice about contradicting readings. It is left out if `known` contains the reason."""
         if not self.seconds or is_explained(known):
             return []
         return [ReadingsMisfit(self.seconds, self.first_s)]
 
 
 def static_lean_deg(left: Array, up: Array) -> Array:
-    """The lean of a standing bike by Nicolae's equation (21) with a sign, degrees, > 0 to the right."""
+    """The lean of a standing bike, degrees, > 0 to the right: Nicolae's equation (21) with a sign."""
     return np.degrees(np.arctan2(left, up))
 
 
 def formula_lean_deg(left: Array, up: Array, yaw_rate: Array) -> Array:
-    """Nicolae's equations (25)-(26): the lean of each single reading, degrees, > 0 to the right; the same as
+    """The lean from each single reading, degrees, > 0 to the right: Nicolae's equations (25)-(26), as in
     kickstand.lean.formula."""
     square = left * left + up * up
     size = np.sqrt(np.maximum(0.0, square - 1.0))

@@ -23,7 +23,7 @@ from ..signals import Array
 from . import replay_engine
 from .meter_along import MeterAlong, Misfit
 
-_LONG_BYTES = 20 << 20  # a quarter of an hour at 200 Hz: for a smaller file a second process costs more than it saves
+_LONG_BYTES = 20 << 20  # a quarter of an hour at 200 Hz; below this size a second process costs more than it saves
 
 _RESULT_BYTES = struct.calcsize(replay_engine.RESULT)
 
@@ -61,12 +61,12 @@ class LeanTable(Table):
 
 @dataclass(frozen=True)
 class CarReplayed(Message):
-    """A car's log is replayed, and a car does not lean."""
+    """The log is a car's, and a car does not lean."""
 
     code = "car-replayed"
     text = (
-        "the calibration is a car's, whose display shows no lean: lean_deg is that of a motorcycle which would feel "
-        "the same, and lean_sigma_deg is nan"
+        "the calibration is a car's, whose display shows no lean: lean_deg is that of a motorcycle with the same "
+        "readings, and lean_sigma_deg is nan"
     )
 
 
@@ -103,7 +103,7 @@ def replay_to_csv(
     """
     notices: list[Message] = []
     whole = log.source if isinstance(log, Stretch) else log
-    # only for the command: a second process imports the main program again, which other programs may not allow
+    # Only the command uses a second process, which imports the main program again: other programs may not allow that
     long = not isinstance(whole, Log) and total_bytes(whole) > _LONG_BYTES
     run = "two processes" if engine == "cpython" and long else engine
     rows = replay_blocks(log, calibration, run, progress, notices)
@@ -140,7 +140,7 @@ def _replayed(
         meter = MeterAlong(calibration)
         return ((block, meter.columns(block.measured)) for block in blocks)
     if engine == "two processes":
-        from . import second_process  # a browser's Python cannot import it
+        from . import second_process  # Python in a browser cannot import it
 
         return second_process.columns_of(blocks, calibration)
     run = _BY_RECORDS[engine] or plugins.part(plugins.ENGINES, engine)
@@ -148,7 +148,7 @@ def _replayed(
 
 
 def _with_frozen(block: Block, results: Array) -> Array:
-    """(n, COLUMNS) results for all rows, NaN for frozen ones."""
+    """(n, COLUMNS) results for all rows of the block, NaN for frozen rows."""
     found = np.full((len(block.time_us), len(replay_engine.COLUMNS)), np.nan)
     found[~block.frozen] = results
     sigma = found[:, _SIGMA]
@@ -159,7 +159,7 @@ def _with_frozen(block: Block, results: Array) -> Array:
 def _by_records(
     run: contextlib.AbstractContextManager[IO[bytes]], blocks: Iterator[Block]
 ) -> Iterator[tuple[Block, Array]]:
-    """Replay by replay_engine.run() on another Python, which reads records and writes results."""
+    """Replay with replay_engine.run() on another Python, which reads records and writes results."""
     with run as results:
         for block in blocks:
             wanted = _RESULT_BYTES * int(np.count_nonzero(~block.frozen))
@@ -184,8 +184,7 @@ def micropython(records: Iterator[bytes], _progress: Progress | None) -> Iterato
             yield process.stdout
 
 
-# Engines on another Python. rp2040, a board's own interpreter on an emulated Pico, is in a leaf package: see
-# pyproject.toml
+# Engines on another Python. rp2040, an emulated Pico, is in the package kickstand_emulator: see pyproject.toml
 _BY_RECORDS: dict[str, Engine | None] = {"micropython": micropython, "rp2040": None}
 
 

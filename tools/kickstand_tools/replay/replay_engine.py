@@ -1,4 +1,4 @@
-"""The firmware's LeanMeter over a recording, on CPython or MicroPython: records in, results out.
+"""Runs the firmware's LeanMeter over a recording, on CPython or MicroPython: reads records, writes results.
 
     micropython replay_engine.py RECORDS > RESULTS
 
@@ -32,7 +32,7 @@ COLUMNS = (
 CALIBRATION = "<47d"
 RECORD = "<q8d"
 RESULT = "<9d"
-# lean_sigma_deg if the display shows no lean, and if it names a sensor whose readings do not fit again and again
+# lean_sigma_deg if the display shows no lean, and if it also reports that readings repeatedly contradict each other
 NOT_SHOWN, ODD = -1.0, -2.0
 NO_SPEED = -1.0  # not NaN, because a board's struct does not read NaN as NaN
 
@@ -75,7 +75,7 @@ class ReplayMeter(LeanMeter):
 
 
 class Replay:
-    """Runs the meter over one recording. Every engine uses this loop, and so does a streamed ride.
+    """Runs the meter over one recording. All engines and streamed rides use this loop.
 
     calibration: the firmware's own, for readings in g and deg/s.  delay_s: delay of the gyro's low-pass.
     leans: False for a car. since_us: time of the sample before the first one, if any.

@@ -1,1 +1,1 @@
-"""Fetches recorded rides from a board, or streams them over USB, and converts their blocks to logs."""
+"""Fetches recorded rides from a board, or streams a ride over USB, and converts the rides' blocks to logs."""

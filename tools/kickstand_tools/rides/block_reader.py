@@ -1,4 +1,4 @@
-"""Reads the blocks of a recorded ride. The format is firmware/kickstand/rides/block.py's."""
+"""Reads the blocks of a recorded ride. firmware/kickstand/rides/block.py defines their format."""
 
 import struct
 from binascii import crc32
@@ -15,20 +15,20 @@ _HEAD_LENGTH = struct.calcsize(block_format.HEAD)
 _TAIL_LENGTH = struct.calcsize(block_format.TAIL)
 _START = _HEAD_LENGTH + store.BODY_LENGTH  # start of the entries if the calibration has no matrices
 _PLACE_LENGTH = struct.calcsize(block_format.PLACE)
-_LATE_PERIODS = 2  # a turn that is late by more sample periods has lost samples, as in kickstand.imu.sensor
+_LATE_PERIODS = 2  # if a turn is late by more sample periods, samples were lost, as in kickstand.imu.sensor
 _DEGREE = 60 * 100_000  # in the unit of positions, 0.00001 minutes
 _MOST = 1e4  # largest parameter of a calibration, far beyond those that a board stores
-CUT_SHORT = "cut short"  # the last block of a ride often is: the power was switched off while it was written
+CUT_SHORT = "cut short"  # common for the last block of a ride, because the ignition cuts the power during the write
 
 
 class BadBlock(Exception):
-    """These bytes are not a whole block. The text gives the reason in a few words."""
+    """These bytes are not a complete, valid block. The text gives the reason in a few words."""
 
 
 @dataclass
 class Place:
-    """A position that came with a turn of the loop. lat_deg, lon_deg: north and east; utc_s: its Universal Time, s
-    since 1970, None if the receiver did not know the date."""
+    """A position that arrived in a turn of the board's loop. lat_deg, lon_deg: north and east. utc_s: Universal Time,
+    s since 1970, None if the receiver did not know the date."""
 
     lat_deg: float
     lon_deg: float
@@ -37,7 +37,7 @@ class Place:
 
 @dataclass
 class StoredTurn:
-    """One turn of the board's loop: sums of n samples' counts (ax ay az gx gy gz), and the time of the last one."""
+    """One turn of the board's loop: sums of the counts of n samples (ax ay az gx gy gz), and the last sample's time."""
 
     time_us: int
     n: int
@@ -48,10 +48,11 @@ class StoredTurn:
 
 @dataclass
 class StoredBlock:
-    """One ride block: the fields of its head, and its turns. time_us: time of the last sample before it, since
-    power-on. centidegrees: the temperature. delay_tenths_ms: delay of the gyro's low-pass, 0 if the firmware did not
-    store it. body: the calibration's bytes. vehicle: that of the board's config.py, "" if unknown; blocks do not
-    contain it."""
+    """One block of a ride: the fields of its head, and its turns.
+
+    time_us: time of the last sample before the block, since power-on. centidegrees: temperature in 0.01 C.
+    delay_tenths_ms: delay of the gyro's low-pass, 0 if the firmware did not store it. body: the calibration's bytes.
+    vehicle: from the board's config.py, "" if unknown; blocks do not contain it."""
 
     ride: int
     sequence: int
@@ -82,8 +83,8 @@ class StoredBlock:
         return calibration.parameters() + calibration.matrices()
 
     def missing_s(self) -> list[float]:
-        """The durations of all gaps in the readings, s. A gap is a turn of the loop that came later than its samples
-        explain."""
+        """The durations of all gaps in the readings, s. A gap is the excess of the time between two turns of the loop
+        over the duration of the second turn's samples."""
         period_us, before_us, found = 1_000_000 // self.sample_hz, self.time_us, []
         for turn in self.turns:
             late_us = turn.time_us - before_us - turn.n * period_us
@@ -94,9 +95,9 @@ class StoredBlock:
 
 
 def read(content: bytes) -> tuple[list[StoredBlock], list[str]]:
-    """The whole blocks of a file, and a text about each place without a whole block.
+    """Read the complete blocks of a file. Also returns one text per damaged place.
 
-    CUT_SHORT, for an incomplete last block, is not damage.
+    The text CUT_SHORT means that the last block is incomplete, which is not damage.
     """
     blocks, problems = [], []
     at = 0
@@ -114,7 +115,7 @@ def read(content: bytes) -> tuple[list[StoredBlock], list[str]]:
 
 
 def parse(data: bytes) -> StoredBlock:
-    """One whole block. Raises BadBlock."""
+    """Parse one complete block. Raises BadBlock."""
     if not data.startswith(block_format.MAGIC[: len(data)]):
         raise BadBlock("not of a ride")
     if len(data) < _START + _TAIL_LENGTH:
@@ -138,7 +139,7 @@ def parse(data: bytes) -> StoredBlock:
         end = len(data) - _TAIL_LENGTH - places * _PLACE_LENGTH
         found = dict(_places(data[end : len(data) - _TAIL_LENGTH]))
         block.turns = list(_turns(block, data[start:end], count, found))
-    except (ValueError, ZeroDivisionError) as error:  # the check sum is right: the block was written like this
+    except (ValueError, ZeroDivisionError) as error:  # the check sum is right, so the board wrote invalid values
         raise BadBlock("not decodable") from error
     return block
 
@@ -147,7 +148,7 @@ def _places(data: bytes) -> Iterator[tuple[int, Place]]:
     """Yield each position with the number of its entry."""
     for entry, date, day_ms, lat, lon in struct.iter_unpack(block_format.PLACE, data):
         if abs(lat) > 90 * _DEGREE or abs(lon) > 180 * _DEGREE:
-            continue  # an error of the receiver: a log with such a position would be refused
+            continue  # a receiver's error, which would make the log invalid
         try:
             midnight_s = datetime(2000 + (date >> 9), date >> 5 & 15, date & 31, tzinfo=UTC).timestamp()
         except ValueError:
@@ -156,7 +157,7 @@ def _places(data: bytes) -> Iterator[tuple[int, Place]]:
 
 
 def _turns(block: StoredBlock, data: bytes, count: int, places: dict[int, Place]) -> Iterator[StoredTurn]:
-    """Undo block_format.encode_python. places: by the number of their entry."""
+    """Decode the entries that block_format.encode_python writes. places: positions by the number of their entry."""
     bits = bin(int.from_bytes(b"\x01" + data, "big"))[3:]
     before = [1] + [0] * (block_format.FIELDS - 1)
     means = [block_format.START_MEAN] * block_format.FIELDS
@@ -190,7 +191,7 @@ def _turns(block: StoredBlock, data: bytes, count: int, places: dict[int, Place]
         for i in range(2, 8):
             before[i] = (before[i] if n == n_before else before[i] * n // n_before) + difference(i)
         if n < 0 or dt_us < 0 or max(map(abs, before[2:8])) > n << 15:
-            raise ValueError  # time increases, and counts have 16 bits
+            raise ValueError  # the time must increase, and counts have 16 bits
         now += dt_us
         before[0] = n
         yield StoredTurn(now, n, tuple(before[2:8]), speed, places.get(entry))
@@ -198,7 +199,7 @@ def _turns(block: StoredBlock, data: bytes, count: int, places: dict[int, Place]
 
 
 def missing_note(missing_s: list[float]) -> str:
-    """A line about these times without readings."""
+    """A line about gaps with these durations."""
     times = "once" if len(missing_s) == 1 else f"{len(missing_s)} times"
     return (
         f"readings are missing {times}, {sum(missing_s):.1f} s in all: the sensor was set up again, "

@@ -1,4 +1,4 @@
-"""Copies rides from the board's flash or SD card to logs on the host with mpremote."""
+"""Copies rides with mpremote from the board's flash or SD card to logs on the host."""
 
 import binascii
 import contextlib
@@ -19,7 +19,7 @@ from ..deploy.connection import UPDATE, ConnectedBoard, Port, Progress, connecte
 from . import ride_log
 from .block_reader import CUT_SHORT, StoredBlock, missing_note, read
 
-_SILENT_S = 60  # longest wait for an answer: an emulated board takes a while
+_SILENT_S = 60  # longest wait for an answer; an emulated board is slow
 
 # Prints the directory and the vehicle, and (ride, part, bytes, path) of each part in it
 _LIST = """
@@ -37,7 +37,7 @@ else:
     for ride, part, size in ride_paths.parts(directory):
         print((ride, part, size, ride_paths.part_path(directory, ride, part)))
 """
-# Prints a file, and at the end its length and CRC-32 as read by the board
+# Prints a file, then its length and CRC-32 as the board read them
 _READ = """
 from binascii import b2a_base64, crc32
 count, crc = 0, 0
@@ -67,9 +67,11 @@ class _Part(NamedTuple):
 
 @dataclass
 class PulledRide:
-    """log: the file it was written to, with its calibration beside it, or None if nothing in it can be read. seconds,
-    readings: its length. problems: one line per fault. whole: True if everything was copied, except an end lost in a
-    power cut. deleted: True if it was removed from the board."""
+    """A ride that was copied from the board.
+
+    log: the written file, with its calibration beside it, or None if the ride cannot be read. seconds, readings: length
+    of the log. problems: one line per fault. whole: True if everything was copied, except an end lost in a power cut.
+    deleted: True if the ride was removed from the board."""
 
     number: int
     log: Path | None = None
@@ -82,7 +84,7 @@ class PulledRide:
 
 @dataclass(frozen=True)
 class PullResult:
-    """port: its name. rides: sorted by their numbers."""
+    """port: name of the board's port. rides: the copied rides, sorted by number."""
 
     port: str
     rides: list[PulledRide]
@@ -95,7 +97,7 @@ def pull(
     progress: Progress | None = None,
     pulled: Callable[[PulledRide], None] | None = None,
 ) -> PullResult:
-    """Write every ride on the board to a log in the directory out, then restart the board.
+    """Write every ride on the board to a log in the directory `out`, then restart the board.
 
     delete: remove each completely copied ride from the board.
     pulled: called with each finished ride. Raises InputError.
@@ -131,7 +133,7 @@ def pull(
 
 
 def _list(transport: ConnectedBoard, name: str) -> tuple[str, str, dict[int, list[_Part]]]:
-    """The directory of the rides, the vehicle in the board's config.py, and the parts of each ride by its number."""
+    """The directory of the rides, the vehicle from the board's config.py, and the parts of each ride by ride number."""
     first, *lines = printed(transport, name, _LIST, "its rides").splitlines() or [b""]
     directory, vehicle = literal(first, (str, str))
     in_order = sorted(_Part(*literal(line, (int, int, int, str))) for line in lines)
@@ -144,17 +146,17 @@ def _list(transport: ConnectedBoard, name: str) -> tuple[str, str, dict[int, lis
 def _pull_ride(
     transport: ConnectedBoard, number: int, parts: list[_Part], vehicle: str, out: Path, came: _Came
 ) -> PulledRide:
-    """Copy a ride and write its log. vehicle: that of the board's config.py. A ride aligned by two poses was a
-    motorcycle's."""
+    """Copy a ride and write its log. vehicle: from the board's config.py. A ride with an alignment by two poses is
+    always a motorcycle's."""
     ride = PulledRide(number)
     blocks: list[StoredBlock] = []
     for part in parts:
         title = f"ride {number}, part {part.part}"
         content, whole = _read(transport, part, title, came)
         if not whole:
-            short = f"only {len(content)} of its {part.size} bytes came over"
-            wrong = short if len(content) < part.size else "other bytes came over than the board has"
-            ride.problems.append(f"{title}: {wrong}: try another cable, else its flash or card is damaged")
+            short = f"only {len(content)} of its {part.size} bytes arrived"
+            wrong = short if len(content) < part.size else "some bytes arrived with errors"
+            ride.problems.append(f"{title}: {wrong}: try another cable; if that fails, the flash or card is damaged")
             ride.whole = False
         found, problems = read(content)
         blocks += found
@@ -196,14 +198,14 @@ def _delete(transport: ConnectedBoard, directory: str, parts: list[_Part]) -> No
     for part in parts:
         transport.fs_rmfile(part.path)
     emptied = PurePosixPath(parts[0].path).parent
-    with contextlib.suppress(OSError, TransportExecError):  # something else is in it
+    with contextlib.suppress(OSError, TransportExecError):  # the directory contains other files
         while str(emptied) != directory:
             transport.fs_rmdir(str(emptied))
             emptied = emptied.parent
 
 
 def _readings(log: Path) -> int:
-    """Number of readings in a log that was pulled earlier; 0 without a readable log."""
+    """Number of readings in an earlier log, 0 if it does not exist or cannot be read."""
     try:
         with gzip.open(log) as file:
             return sum(1 for _ in file) - 1
@@ -218,7 +220,7 @@ def _free_name(log: Path) -> Path:
 
 
 def _read(transport: ConnectedBoard, part: _Part, title: str, came: _Came) -> tuple[bytes, bool]:
-    """A file of the board, and True if all announced bytes arrived as the board read them."""
+    """Read a file of the board. Also returns True if all announced bytes arrived unchanged."""
     content, whole = b"", False
     for attempt in range(_TRIES):
         again, whole = _try_to_copy(transport, part, title, came if attempt == 0 else _no_progress)
@@ -229,7 +231,7 @@ def _read(transport: ConnectedBoard, part: _Part, title: str, came: _Came) -> tu
 
 
 def _no_progress(_what: str, _count: int) -> None:
-    """The progress function of a second try, which is not shown."""
+    """A progress function that shows nothing, for the second attempt."""
 
 
 def _try_to_copy(transport: ConnectedBoard, part: _Part, title: str, came: _Came) -> tuple[bytes, bool]:
@@ -238,17 +240,17 @@ def _try_to_copy(transport: ConnectedBoard, part: _Part, title: str, came: _Came
     there = None
     came(f"pulling {title}", 0)
     try:
-        # four characters are three bytes, and a line ends in two more; a ride that is being recorded may have grown
+        # base64 needs four characters for three bytes, plus two per line end; a ride still being recorded may grow
         for line in lines(
             transport, _READ.replace("PATH", repr(part.path)), _SILENT_S, most_bytes=2 * part.size + 9999
         ):
             if line.startswith(b"("):
                 there = literal(line, (int, int))
                 continue
-            with contextlib.suppress(binascii.Error):  # a byte was lost: the sum shows it
+            with contextlib.suppress(binascii.Error):  # a byte was lost, which the check sum will show
                 piece = binascii.a2b_base64(line)
                 content += piece
                 came(f"pulling {title}", len(piece))
     except BrokenOff as error:
-        raise InputError(f"{part.path} did not come over whole ({error}): try again, with another cable") from error
+        raise InputError(f"{part.path} did not arrive completely ({error}): try again, with another cable") from error
     return bytes(content), len(content) >= part.size and there == (len(content), binascii.crc32(content))

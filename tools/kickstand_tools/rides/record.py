@@ -24,7 +24,8 @@ from .stream import LiveReading, StreamLog, blocks
 
 @dataclass(frozen=True)
 class RecordResult:
-    """log, calibration: the files. seconds, readings: length of the recording. notes: one line per gap or fault."""
+    """log, calibration: the written files. seconds, readings: length of the recording. notes: one line per gap or
+    fault."""
 
     log: Path
     calibration: Path
@@ -50,7 +51,7 @@ def record(
     beside = ride_log.calibration_path(out)
     for path in (out, beside):
         if path.exists():
-            raise InputError(f"{path} is there already: give --out another name")
+            raise InputError(f"{path} exists already: give --out another name")
     with connected(port) as (transport, name):
         try:
             if begin:
@@ -58,13 +59,13 @@ def record(
             stopped = threading.Event()
             recorded = StreamLog(stopped, live)
             notes: list[str] = []
-            # The calibration first: if the disk is full at the end, there would be no room for it
+            # Write the calibration first, because the disk may be full at the end
             with whole_file(out) as temporary, whole_file(beside) as calibration, _signals(stopped):
                 with _GrowingFile(temporary, out.suffix == ".gz") as file:
                     made = _save_first_calibration(blocks(transport, name, notes, stopped), calibration)
                     recorded.write(file, made, notes)
         finally:
-            with contextlib.suppress(Exception):  # the cable may be out
+            with contextlib.suppress(Exception):  # the cable may be unplugged
                 restart(transport)
     return RecordResult(out, beside, recorded.seconds, recorded.count, notes)
 
@@ -78,16 +79,16 @@ def _save_first_calibration(blocks: Iterator[StoredBlock], calibration: Path) ->
 
 
 class _GrowingFile(io.TextIOBase):
-    """A text file that contains only complete writes: a write that fails, on a full disk, leaves the earlier content.
+    """A text file that contains only complete writes. If a write fails on a full disk, the earlier content stays.
 
-    packed: each write becomes a separate gzip member, because a gzip file cut inside a member is damaged.
+    packed: compress with gzip, each write as a separate member, because a gzip file cut inside a member is damaged.
     """
 
     def __init__(self, path: Path, packed: bool) -> None:
         self._file, self._packed, self._length = open(path, "wb", buffering=0), packed, 0
 
     def write(self, text: str) -> int:
-        """Raises OSError if not all of it could be written."""
+        """Write all of the text, or nothing. Raises OSError if the write fails."""
         data = memoryview(gzip.compress(text.encode("ascii"), mtime=0) if self._packed else text.encode("ascii"))
         at = 0
         try:
@@ -107,9 +108,9 @@ class _GrowingFile(io.TextIOBase):
 
 @contextlib.contextmanager
 def live_line() -> Iterator[Callable[[str], None]]:
-    """A context with a function that redraws a line on standard error, if that is a terminal.
+    """A context with a function that redraws a line on standard error, if standard error is a terminal.
 
-    If the terminal is closed meanwhile, the work continues without an error.
+    If the terminal is closed, the work continues without an error.
     """
     console = Console(stderr=True) if sys.stderr.isatty() else Console(quiet=True)
     line = Live(console=console, auto_refresh=False, transient=True)

@@ -12,15 +12,16 @@ from .block_reader import StoredBlock, StoredTurn
 
 
 def header(track: Sequence[str]) -> tuple[str, ...]:
-    """The log's column names. track: the columns of TRACK that it has."""
+    """The log's column names. track: the columns of TRACK in this log."""
     return (*COLUMNS, *track, "temp_c")
 
 
 def rows(blocks: Iterable[StoredBlock], track: Sequence[str], from_us: int = 0) -> Iterator[list[str]]:
-    """One row per turn of the board's loop: the mean of its samples at the time of the last one, in s since from_us.
+    """Yield one row per turn of the board's loop: the time of its last sample, s since from_us, and the mean of its
+    samples.
 
-    Values have enough digits to distinguish single counts of the chip. The temperature is in the first row of each
-    block. track: as for header().
+    Values have enough digits to distinguish single counts of the chip. Only the first row of each block has the
+    temperature. track: as for header().
     """
     for block in blocks:
         lsb, gyro_lsb = block.accel_lsb_per_g, block.gyro_lsb_tenths / 10
@@ -38,7 +39,7 @@ def rows(blocks: Iterable[StoredBlock], track: Sequence[str], from_us: int = 0) 
 
 
 def _track_cells(turn: StoredTurn) -> dict[str, str]:
-    """The cells of TRACK: the values of the speed source in this turn."""
+    """The cells of the columns TRACK: the values from the speed source in this turn."""
     cells: dict[str, str] = dict.fromkeys(TRACK, "")
     if turn.speed_mps is not None:
         cells["speed_mps"] = f"{turn.speed_mps:.2f}"
@@ -49,7 +50,7 @@ def _track_cells(turn: StoredTurn) -> dict[str, str]:
 
 
 def calibration(block: StoredBlock) -> CalibrationFile:
-    """The calibration used for the lean on the display, with notes on board and chip."""
+    """The calibration that the board used for its display, with notes on board and chip."""
     c = block.calibration()
     notes = {"firmware": block.firmware, "who_am_i": f"{block.who_am_i:#04x}", "sample_hz": block.sample_hz}
     return CalibrationFile(
@@ -70,7 +71,7 @@ def calibration(block: StoredBlock) -> CalibrationFile:
 
 
 def write(path: Path, blocks: list[StoredBlock]) -> Path:
-    """Write NAME.csv.gz (or .csv) and NAME.cal.json beside it, whose path is returned."""
+    """Write NAME.csv.gz (or .csv), and NAME.cal.json beside it. Returns the path of the latter."""
     turns = [turn for block in blocks for turn in block.turns]
     there = {
         "speed_mps": any(turn.speed_mps is not None for turn in turns),

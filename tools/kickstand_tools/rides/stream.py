@@ -1,5 +1,4 @@
-"""Reads a ride that a board streams: writes its blocks to a log as they arrive, and computes the lean at each
-moment."""
+"""Reads a ride that a board streams: writes the arriving blocks to a log, and computes the lean."""
 
 import binascii
 import contextlib
@@ -33,7 +32,7 @@ except KeyboardInterrupt:
     port.rest_watchdog()
 """
 _VEHICLE = b"vehicle "  # start of the line that _START prints; base64 has no space
-_SILENT_S = 60.0  # longest wait: an emulated board starts slowly; a board without a sensor sends nothing either
+_SILENT_S = 60.0  # longest wait for data: an emulated board starts slowly, and without its sensor a board sends nothing
 CHANGED = "the board's calibration has changed: the log ends here"
 
 
@@ -42,13 +41,13 @@ class LiveReading:
     """The readings of half a second. aligned: True if the sensor is aligned. car: True if the board is set to a vehicle
     that does not lean.
 
-    moments: at each turn of the board's loop (s since the recording began, lean in degrees > 0 to the right, specific
-    force forward in g, and to the left in g). Unknown values are None: all three before the sensor is aligned, and a
-    lean that is too uncertain to be shown. A car has no lean. A motorcycle's force to the left is left out, because it
-    is near 0 in a bend.
+    moments: one tuple per turn of the board's loop: (s since the start of the recording, lean in degrees > 0 to the
+    right, specific force forward in g, specific force to the left in g). The last three are None before the sensor is
+    aligned. The lean is also None for a car, or if it is too uncertain to be shown. The force to the left is None for
+    a motorcycle, because it is near 0 in a bend.
 
-    max_left_deg, max_right_deg, max_accel_g, max_brake_g: as on the display, since the recording began; 0 without a
-    value. rate_hz: turns per second. seconds: since the recording began."""
+    max_left_deg, max_right_deg, max_accel_g, max_brake_g: maxima as on the display, since the start of the recording; 0
+    without a value. rate_hz: turns per second. seconds: time since the start of the recording."""
 
     aligned: bool
     car: bool
@@ -62,11 +61,11 @@ class LiveReading:
 
 
 class StreamLog:
-    """Writes blocks to a log. stopped: an event that is set if the log must end, which ends the stream. live: called
-    with each block's LiveReading. A log that can no longer be written ends there, with a note.
+    """Writes blocks to a log. If a write fails, the log ends there, with a note.
 
-    first: the first block; seconds, count: duration and number of readings so far; written: True once the log has a
-    block."""
+    stopped: an event that ends the stream; it is set if the log must end. live: called with each block's LiveReading.
+    first: the first block. seconds, count: duration and number of readings so far. written: True once the log contains
+    a block."""
 
     def __init__(self, stopped: threading.Event, live: Callable[[LiveReading], None] | None = None) -> None:
         self._stopped = stopped
@@ -85,7 +84,7 @@ class StreamLog:
         aligned = car = ended = False
         head = ",".join(ride_log.header(TRACK)) + "\n"
         for block in blocks:
-            if ended:  # until the board has stopped
+            if ended:  # ignore what the board still sends
                 continue
             if self.first is None or block.body != self.first.body:
                 if self.first:
@@ -99,10 +98,10 @@ class StreamLog:
                 replay = Replay(calibration.to_firmware(), calibration.delay_s(), not car, block.time_us)
                 aligned = calibration.aligned
             rows = list(ride_log.rows([block], TRACK, self.first.time_us))
-            try:  # write a whole block: a line that is cut could not be read
+            try:  # write a whole block, because an incomplete line cannot be read
                 file.write(head + "".join(",".join(row) + "\n" for row in rows))
             except OSError as error:
-                notes.append(f"the log cannot be written any further ({cause(error)}): what came until then is kept")
+                notes.append(f"writing the log failed ({cause(error)}): the log up to there is kept")
                 self._stopped.set()
                 ended = True
                 continue
@@ -142,8 +141,8 @@ class StreamLog:
 
 
 def blocks(transport: ConnectedBoard, name: str, notes: list[str], stopped: threading.Event) -> Iterator[StoredBlock]:
-    """Yield the whole blocks that the board sends, until `stopped` is set or the connection is lost. name: the port's;
-    "" on a page, which has one port. notes: a line with the reason for the end is appended. Raises InputError."""
+    """Yield the complete blocks that the board sends, until `stopped` is set or the connection is lost. name: of the
+    port, "" on a page. notes: a line with the reason for the end is appended. Raises InputError."""
     parts: list[bytes] = []
     vehicle = ""
     for line in _lines(transport, name, notes, stopped):
@@ -153,7 +152,7 @@ def blocks(transport: ConnectedBoard, name: str, notes: list[str], stopped: thre
         if line != b".":
             parts.append(line)
             continue
-        with contextlib.suppress(BadBlock, binascii.Error):  # its number will be missing
+        with contextlib.suppress(BadBlock, binascii.Error):  # a missing block number shows the loss
             block = parse(b"".join(binascii.a2b_base64(part) for part in parts))
             block.vehicle = vehicle
             yield block
@@ -166,10 +165,10 @@ def _lines(transport: ConnectedBoard, name: str, notes: list[str], stopped: thre
     try:
         yield from lines(transport, _START, _SILENT_S, stopped)
         if not stopped.is_set():
-            notes.append(f"{at}the board stopped by itself: what came until then is kept")
+            notes.append(f"{at}the board stopped on its own: the log up to there is kept")
     except OSError as error:
         why = f" ({cause(error)})" if name else ""  # a browser gives no cause
-        notes.append(f"{at}connection lost{why}: what came until then is kept")
+        notes.append(f"{at}connection lost{why}: the log up to there is kept")
     except BrokenOff as error:
         refuse_unfit_firmware(str(error), name or "this port")
-        notes.append(f"{at}{error}: what came until then is kept")
+        notes.append(f"{at}{error}: the log up to there is kept")

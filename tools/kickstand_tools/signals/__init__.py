@@ -1,7 +1,7 @@
-"""Functions on arrays of samples, used everywhere: numpy only, no logs and no files.
+"""Functions on arrays of samples, for all other packages. They use only numpy, neither logs nor files.
 
-Moving means, standard deviations and integrals; means over cells of time; one signal against another; rotation vectors
-and matrices; standstill; distances. leaning.py: the relation of a motorcycle's lean and yaw rate.
+Moving means, standard deviations and integrals; means over cells of time; lag and correlation of two signals; rotation
+vectors and matrices; standstill; distances. leaning.py relates a motorcycle's lean to its yaw rate.
 """
 
 from collections.abc import Callable, Iterable
@@ -38,18 +38,18 @@ def window_spreads(values: Array, n: int) -> Array:
 
 
 def moving_mean(values: Array, n: int) -> Array:
-    """(m, ...) for each of m values (m, ...) the mean of n values, of which the first is n // 2 before it. Beyond the
-    ends the first and the last value are repeated."""
+    """(m, ...) the moving mean of m values (m, ...) over n values, from n // 2 before each value on. Beyond the ends,
+    the first and the last value are repeated."""
     return values if n < 2 or not len(values) else window_means(_padded(values, n), n)
 
 
 def moving_spread(values: Array, n: int) -> Array:
-    """(m, ...) for each value the standard deviation of the n values that moving_mean() takes."""
+    """(m, ...) the moving standard deviation over the same n values as in moving_mean()."""
     return np.zeros(values.shape) if n < 2 or not len(values) else window_spreads(_padded(values, n), n)
 
 
 def smoothed(values: Array, time_s: Array, over_s: float) -> Array:
-    """(m) moving mean over an odd number of samples that last about over_s seconds. time_s (m): the samples' times."""
+    """(m) moving mean over about over_s seconds, an odd number of samples. time_s (m): the samples' times."""
     if len(values) < 2:
         return values
     return moving_mean(values, 2 * round(0.5 * over_s / float(np.median(np.diff(time_s)))) + 1)
@@ -69,8 +69,8 @@ def _padded(values: Array, n: int) -> Array:
 
 
 def cell_numbers(time_s: Array, cell_s: float) -> Ints:
-    """(n) the number of the cell of each time. A time on the edge of two cells, within rounding, belongs to the later
-    one."""
+    """(n) the number of the cell that contains each time. A time on the edge of two cells, within rounding, belongs to
+    the later cell."""
     return np.floor(time_s / cell_s + 1e-6).astype(np.int64)
 
 
@@ -162,15 +162,15 @@ class Cells:
         return EvenCells(int(table[0, 0]), even[:, 0], means, even[:, 1 + self._means :])
 
 
-# The lag of one signal behind another, such as that of a satellite receiver's speed behind the force. Either some lags
-# are tried, and the one with the largest correlation is used (cross-correlation). Or, if any shift is possible, all are
-# tried at once by Fourier transforms.
+# The lag of one signal behind another, such as a satellite receiver's speed behind the force. best_lag() tries some
+# lags and uses the one with the largest correlation (cross-correlation). correlations() tries all shifts at once by
+# Fourier transforms.
 
 
 @dataclass
 class Correlation:
-    """value: correlation, 0 to 1. direction (k): unit vector along which the cause's covariance with the effect is
-    largest."""
+    """value: correlation, 0 to 1. direction (k): unit vector along which the cause has the largest covariance with the
+    effect."""
 
     value: float
     direction: Array
@@ -202,7 +202,7 @@ class Lag(Correlation):
 def best_lag(
     lags_s: Iterable[float], pair_at: Callable[[float], tuple[Array, Array] | None], whole: bool = False
 ) -> Lag | None:
-    """The lag of the largest correlation, interpolated by a parabola through its square and the two beside it.
+    """The lag of the largest correlation, interpolated by a parabola through three neighbouring squared correlations.
 
     lags_s: evenly spaced, increasing. pair_at: called with a lag, returns the effect (n) and the cause (n, k) earlier
     by this lag, or None if there are too few values. whole: see correlation(). Returns None if pair_at always does.
@@ -249,15 +249,14 @@ def correlations(first: Array, first_good: Bools, second: Array, second_good: Bo
 
 
 def log_likelihood_ratio(correlation: Array, count: Array, per_sample: float) -> Array:
-    """Natural logarithm of the ratio of two normal signals' likelihoods with this correlation and without any; 0 for a
-    negative correlation. correlation, count: see correlations(). per_sample: independent values per sample."""
+    """Natural logarithm of a likelihood ratio: two normal signals with this correlation against two independent ones.
+    0 for a negative correlation. correlation, count: see correlations(). per_sample: independent values per sample."""
     r = np.clip(correlation, 0.0, 0.999)
     return -0.5 * per_sample * count * np.log1p(-r * r)
 
 
 def peaks(values: Array, apart: int, most: int) -> list[int]:
-    """Indices of the largest values over 0, at most `most`, the largest first, each more than `apart` from the
-    others."""
+    """Indices of at most `most` maxima over 0, the largest first. Any two are more than `apart` indices apart."""
     left, found = values.copy(), []
     while len(found) < most and np.max(left) > 0.0:
         place = int(np.argmax(left))
@@ -302,18 +301,18 @@ def rotation_vector(matrix: Array) -> Array:
 
 # Standstill, detected by small changes of the readings: for zero-velocity updates and for the gyro's bias.
 
-STANDING_MPS = 0.3  # a lower speed counts as standing: a receiver's speed is never quite 0
-STANDS = 4.0  # factor on the limits of the changes at such a speed
+STANDING_MPS = 0.3  # a lower speed counts as standing, because a receiver's speed is never quite 0
+STANDS = 4.0  # at such a speed the limits of the changes are larger by this factor
 
 
 def motionless(
     rate: Array, force: Array, n: int, most_rate: float, most_force: float, speed_mps: Array | None = None
 ) -> Bools:
-    """(m) True where, over n of the m samples around each, no component of rate (m, 3) has a standard deviation over
-    most_rate, and none of force (m, 3) one over most_force.
+    """(m) True where the bike seems to stand still: over n samples around each of the m samples, the standard deviation
+    of each component is at most most_rate for rate (m, 3), and most_force for force (m, 3).
 
-    Samples: means over a fifth of a second, which averages out an idling engine. speed_mps (m): NaN for none. A
-    constant rate passes, from a bias or a steady bend: check its mean in addition.
+    Each sample is a mean over a fifth of a second, which averages out an idling engine. speed_mps (m): NaN for none.
+    A constant rate passes, because it may be a bias. In a steady bend it is not, so check the mean rate too.
     """
     speed = np.full(len(rate), np.nan) if speed_mps is None else speed_mps
     allowed = np.where(speed < STANDING_MPS, STANDS, 1.0)

@@ -1,9 +1,8 @@
-"""Relates a motorcycle's lean and yaw rate, from its rates alone: shows forward, handedness and the unit of the rates.
+"""Relates a motorcycle's lean to its yaw rate, to find forward, the handedness and the unit of the rates.
 
 A bike that begins to turn leans: tan(lean) = -speed x yaw rate / g. So the rate about forward, which changes the lean,
 correlates with minus the change of the yaw rate. The sign distinguishes forward from backward. A leaning bike's rate
-about its own left is yaw rate x sin(lean). As a product of two quantities it shows handedness and the unit of the
-rates.
+about its own left is yaw rate x sin(lean). This product shows the handedness and the unit of the rates.
 """
 
 from dataclasses import dataclass
@@ -72,8 +71,8 @@ def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
 
 
 def speed_in_radians(found: Leaning) -> float | None:
-    """If the rates are surely in rad/s, not in deg/s (so 57 times too small), the impossible speed in bends, m/s, that
-    deg/s would mean. Otherwise None."""
+    """Detect rates in rad/s that are labelled deg/s, and are thus 57 times too small. Returns the impossible speed in
+    bends, m/s, that deg/s would mean; None if the rates are not surely in rad/s."""
     wrong = found.share > SHARE and found.sigmas > SIGMAS and found.likeness > LIKENESS
     return float(np.degrees(found.speed)) if wrong and leans(found) else None
 
@@ -84,8 +83,8 @@ def leans(found: Leaning) -> bool:
 
 
 def leaned(rolled: Array, yaw: Array, speed: Array | float) -> Array:
-    """(n, rad): lean whose quick changes are those of `rolled` and whose slow ones (slower than SLOW_S) are those of
-    the lean that balances the yaw rate at this speed."""
+    """(n, rad): the lean. Its quick changes come from `rolled`; its slow changes (slower than SLOW_S) come from the
+    lean that balances the yaw rate at this speed."""
     balanced = np.arctan(-speed * yaw / STANDARD_GRAVITY)
     return rolled + balanced - without_drift(balanced)
 
@@ -101,8 +100,7 @@ def without_drift(values: Array) -> Array:
 
 
 def unrest(values: Array, over_s: float) -> Array:
-    """(n): for each window of values (n, 3) the standard deviation over over_s seconds, the largest of the three
-    components."""
+    """(n): moving standard deviation of values (n, 3) over over_s seconds, the largest of the three components."""
     return moving_spread(values, _windows(over_s)).max(axis=1, initial=0.0)
 
 

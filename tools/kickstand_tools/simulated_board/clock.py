@@ -3,11 +3,11 @@
 import time as _host_time
 from heapq import heappop, heappush
 
-# Kept here because Board.install() later replaces `time` under MicroPython
+# Saved, because under MicroPython Board.install() later replaces `time`
 _host_ns, _host_sleep = _host_time.time_ns, _host_time.sleep
 
 NEVER_US = 1 << 60  # later than the end of any run
-_PACE_STEP_US = 5000  # time between two comparisons of a paced clock with the host's
+_PACE_STEP_US = 5000  # time between two comparisons of a paced clock with the host's clock
 
 
 def _host_us():
@@ -15,7 +15,7 @@ def _host_us():
 
 
 class PowerOff(BaseException):
-    """The power is off: ends the program on the board. A BaseException, because firmware may catch Exception."""
+    """The power is off: end the program on the board. A BaseException, because firmware may catch Exception."""
 
 
 class Reset(BaseException):
@@ -28,16 +28,16 @@ def to_us(seconds):
 
 
 class Clock:
-    """now_us: the time since the clock was made. Models read it and schedule calls with at(). Operations that take time
-    call advance(). next_us: the next time at which advance() has more to do, for a deadline, an event or a comparison
-    with the host's clock.
+    """The board's clock. Models read now_us and schedule calls with at(). Operations that take time call advance().
 
-    pace: simulated seconds per second of the host: 1.0 for real time, 0 for as fast as the host can.
+    now_us: the time since the clock was created. next_us: time of the next deadline, event or comparison with the
+    host's clock; until then advance() only adds to now_us.
+    pace: simulated seconds per second of the host: 1.0 for real time, 0 for as fast as possible.
     """
 
     def __init__(self, pace=0.0):
         self.now_us = 0
-        self._events = []  # heap of (due, number, callable): the number keeps equal times in order
+        self._events = []  # heap of (due, number, callable); the number orders events of the same time
         self._number = 0
         self._deadline_us = NEVER_US
         self._reset = False
@@ -56,7 +56,7 @@ class Clock:
             self._advance_to(target)
 
     def at(self, due_us, function):
-        """Call function() at due_us; if that time has passed, at the next advance()."""
+        """Call function() at due_us, or at the next advance() if that time has passed."""
         self._number += 1
         heappush(self._events, (due_us, self._number, function))
         self._plan()
@@ -77,19 +77,19 @@ class Clock:
         self._plan()
 
     def reset(self):
-        """Raise Reset now, and at each later advance() until the next set_deadline(), because firmware may catch it."""
+        """Raise Reset now, and again at each advance() until the next set_deadline(), because firmware may catch it."""
         self._reset = True
         self._plan()
         raise Reset
 
     def power_off(self):
-        """Raise PowerOff now, and at each later advance() until the next set_deadline(), because firmware may catch
+        """Raise PowerOff now, and again at each advance() until the next set_deadline(), because firmware may catch
         it."""
         self.set_deadline(self.now_us)
         raise PowerOff
 
     def set_pace(self, pace):
-        """Set the pace from now on, see the class."""
+        """Change the pace, see the class."""
         self._pace = pace
         self._pace_us = self.now_us if pace else NEVER_US
         self._host_lead_us = _host_us() - self._host_due_us() if pace else 0
@@ -124,7 +124,7 @@ class Clock:
     def _keep_pace(self):
         late = _host_us() - self._host_lead_us - self._host_due_us()
         if late < 0:
-            _host_sleep(min(-late, 4 * _PACE_STEP_US) / 1e6)  # a short sleep, in case the host's clock is set meanwhile
+            _host_sleep(min(-late, 4 * _PACE_STEP_US) / 1e6)  # a short sleep, because the host's clock may be set
         else:  # after a slow phase of the host, do not run faster to catch up
             self._host_lead_us += late
         self._pace_us = self.now_us + _PACE_STEP_US
@@ -132,16 +132,16 @@ class Clock:
 
 
 class Watchdog:
-    """Raises Reset if it is not fed in time, from the call that advances the time. clock: a Clock."""
+    """A watchdog: if it is not fed in time, the call that advances the time raises Reset. clock: a Clock."""
 
     def __init__(self, clock):
         self._clock = clock
         self._timeout_us = 0
         self._due_us = 0
-        self._round = 0  # counts start() and stop(): checks scheduled by an earlier start() do nothing
+        self._round = 0  # counts start() and stop(), to ignore checks that an earlier start() has scheduled
 
     def start(self, timeout_us):
-        """Start the watchdog: from now on feed() must be called within each timeout_us."""
+        """Start the watchdog. From now on feed() must be called at least every timeout_us."""
         self._timeout_us = timeout_us
         self._round += 1
         self.feed()
@@ -152,7 +152,7 @@ class Watchdog:
         self._round += 1
 
     def feed(self):
-        """Start the time-out again."""
+        """Restart the time-out."""
         self._due_us = self._clock.now_us + self._timeout_us
 
     def _check_later(self, number):

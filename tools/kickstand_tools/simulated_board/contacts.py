@@ -2,17 +2,17 @@
 
 from .clock import NEVER_US
 
-BOUNCE_US = 4000  # of the button
+BOUNCE_US = 4000  # time for which the button bounces
 RELEASED_US = 150_000  # least time between two presses
 _BOUNCES = 3  # short openings (or closings) after each edge of the button
 
-_CLOSED_SHARE = 0.1  # share of the way between two pulses in which the magnet is near
-_LOOK_US = 20_000  # the model of the wheel reads the speed at least this often
+_CLOSED_SHARE = 0.1  # the magnet is near for this share of the way between two pulses
+_LOOK_US = 20_000  # longest time between two readings of the speed by the wheel's model
 _CREEP_MPS = 0.02  # a lower speed counts as standing
 
 
 class Contact:
-    """A contact between a pin and ground. closed: True while it connects them. broken_us: time at which its wire
+    """A contact between a pin and ground. closed: True while the contact is closed. broken_us: time at which its wire
     breaks."""
 
     def __init__(self, clock, broken_us=NEVER_US):
@@ -22,7 +22,7 @@ class Contact:
         self._edge = None
 
     def connect(self, edge):
-        """From now on call edge(level of the pin) at each change. None: no calls."""
+        """Call edge(level of the pin) at each change from now on. None ends the calls."""
         self._edge = edge
 
     def _set_at(self, at_us, closed):
@@ -37,9 +37,9 @@ class Contact:
 
 
 class Button(Contact):
-    """seed: determines the random moments at which it bounces.
+    """A push button. seed: determines the random moments at which it bounces.
 
-    charge_us: time in which the pin's pull-up charges a capacitor at the contacts, 0 for none.
+    charge_us: time in which the pin's pull-up charges a capacitor at the contacts; 0 without a capacitor.
     """
 
     def __init__(self, clock, seed=1):
@@ -49,12 +49,12 @@ class Button(Contact):
         self._random = seed & 0x7FFFFFFF or 1
 
     def low(self, pulled_us):
-        """True if its pin is low. pulled_us: the time at which the pin got a pull-up."""
+        """True if the button's pin is low. pulled_us: the time at which the pin's pull-up was switched on."""
         return self.closed or self._clock.now_us < pulled_us + self.charge_us
 
     def press(self, at_us, for_us):
-        """Press it from at_us for for_us. at_us: None for now, or for the end of the last such press, because a finger
-        cannot press a pressed button."""
+        """Press the button at at_us for for_us. at_us: None for now or, if a press is still scheduled, for its end,
+        because a finger cannot press a pressed button."""
         if at_us is None:
             at_us = max(self._clock.now_us, self._free_us)
             self._free_us = at_us + for_us + RELEASED_US
@@ -62,7 +62,7 @@ class Button(Contact):
         self.turn(False, at_us + for_us)
 
     def turn(self, closed, at_us):
-        """Press (True) or release it (False) at at_us; it bounces for BOUNCE_US."""
+        """Press (True) or release (False) the button at at_us. It bounces for BOUNCE_US."""
         self._set_at(at_us, closed)
         step = BOUNCE_US // (2 * _BOUNCES)
         for i in range(1, 2 * _BOUNCES + 1):
@@ -74,7 +74,7 @@ class Button(Contact):
 
 
 class Wheel(Contact):
-    """A contact that closes at each passing magnet.
+    """A wheel contact that closes when a magnet passes.
 
     speed(t_s): speed of the vehicle, m/s.  bounce_us: time for which the contact bounces at each edge, 0 for none.
     until_s: time at which its wire breaks.
@@ -93,12 +93,12 @@ class Wheel(Contact):
         clock.at(clock.now_us, self._add_distance)
 
     def _add_distance(self):
-        """Add the distance since the last call. At a pulse schedule closing and opening. Schedule the next call."""
+        """Add the distance since the last call. At a pulse, schedule closing and opening. Schedule the next call."""
         now_us = self._clock.now_us
         speed = self._speed(now_us / 1e6)
         rate = speed * self._pulses_per_metre / 1e6 if speed > _CREEP_MPS else 0.0  # pulses per us
         if self.noise_hz:
-            rate = self.noise_hz / 1e6 if self._edge else 0.0  # save the time if nobody listens
+            rate = self.noise_hz / 1e6 if self._edge else 0.0  # without a listener, save the time
         self._turned += rate * (now_us - self._look_us)
         self._look_us = now_us
         if self._turned >= 0.999:

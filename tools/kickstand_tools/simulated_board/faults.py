@@ -1,6 +1,6 @@
 """The fault script: faults on the simulated board, with their times.
 
-Times are in seconds of the board's clock, I2C addresses have 7 bits.
+Times are in seconds of the board's clock. I2C addresses have 7 bits.
 """
 
 import builtins
@@ -12,15 +12,15 @@ from .i2c import TransferFault
 
 _FOREVER = 1 << 60  # a number of transfers
 _BLOCK = 4096  # bytes of flash that are erased at once
-_STALL_S = 0.5  # a print waits this long for a host that reads nothing (shared/tinyusb/mp_usbd_cdc.h of MicroPython)
+_STALL_S = 0.5  # time-out of a print if the host reads nothing (shared/tinyusb/mp_usbd_cdc.h of MicroPython)
 
 
 class Faults:
-    """The faults of one board. Each method adds one to the script; several may act at the same time."""
+    """The faults of one board. Each method adds a fault to the script. Several may act at the same time."""
 
     def __init__(self, board):
         self._board = board
-        self._real = {}  # by name: the builtin functions that are replaced
+        self._real = {}  # the replaced builtin functions by name
         self.files_cut = 0
 
     # On the wires
@@ -30,7 +30,7 @@ class Faults:
         self._transfers("nack", address, nth, count)
 
     def nack_for(self, address, at_s, for_s):
-        """No transfer to address is acknowledged for for_s."""
+        """From at_s on, no transfer to address is acknowledged for for_s."""
         self._during("nack", address, at_s, for_s)
 
     def timeout(self, address, nth=1, count=1):
@@ -38,30 +38,30 @@ class Faults:
         self._transfers("timeout", address, nth, count)
 
     def timeout_for(self, address, at_s, for_s):
-        """Every transfer to address hangs until the controller gives up, for for_s."""
+        """From at_s on, every transfer to address hangs until the controller gives up. This lasts for for_s."""
         self._during("timeout", address, at_s, for_s)
 
     def corrupt(self, address, nth=1, byte=0, mask=0x01):
-        """In the nth transfer from now the bits of mask are inverted in one byte that is read."""
+        """Invert the bits of mask in byte number `byte` that the nth transfer from now reads."""
         self._transfers("corrupt", address, nth, 1, byte, mask)
 
     def cut(self, address, at_s, byte):
-        """The first transfer to address after at_s that is long enough breaks off at byte `byte`."""
+        """Interrupt a transfer to address at byte number `byte`: the first long enough transfer after at_s."""
 
         self._board.at(at_s, lambda: self._transfers("cut", address, 1, _FOREVER, byte))
 
     def stuck_sda(self, at_s, bits=8, lcd=False):
-        """A device on the sensor's bus (lcd: on the display's) holds SDA low until SCL was clocked `bits` times."""
+        """A device on the sensor's bus (lcd: on the display's bus) holds SDA low for `bits` clocks of SCL."""
         bus = self._board.lcd_bus if lcd else self._board.sensor_bus
         self._board.at(at_s, lambda: bus.hang(bits))
 
     # In the devices
 
     def supply_dip(self, at_s, leaves="asleep"):
-        """The sensor's supply drops for a moment, and its configuration is lost.
+        """The sensor's supply drops for a moment, and the sensor loses its configuration.
 
-        leaves: "asleep" (data 0), "frozen" (asleep, the last data), "default_ranges" (awake, other scales) or "torn"
-        (asleep, and the frame that was being read ends in garbage).
+        leaves: the state after the dip: "asleep" (data 0), "frozen" (asleep, the last data), "default_ranges" (awake,
+        other scales) or "torn" (asleep, and the frame that is being read ends in garbage).
         """
         self._board.at(at_s, lambda: self._board.sensor.supply_dip(leaves))
 
@@ -78,11 +78,11 @@ class Faults:
         self._override(at_s, for_s, 0xFF)
 
     def unplug_sensor(self, at_s, for_s=None):
-        """The sensor is disconnected, for good or for for_s; then it starts as after power-on."""
+        """Disconnect the sensor for for_s, or for ever. When reconnected, it starts as after power-on."""
         self._between(at_s, for_s, self._board.remove_sensor, self._board.fit_sensor)
 
     def unplug_lcd(self, at_s, for_s=None):
-        """The display is disconnected, for good or for for_s; then it starts as after power-on."""
+        """Disconnect the display for for_s, or for ever. When reconnected, it starts as after power-on."""
         self._between(at_s, for_s, self._board.remove_lcd, self._board.fit_lcd)
 
     def lcd_slip(self, at_s):
@@ -98,7 +98,7 @@ class Faults:
         self._between(at_s, for_s, lambda: set_to(pulses_per_s), lambda: set_to(0))
 
     def busy(self, at_s, for_s, times=1):
-        """Other work takes all of the processor's time for for_s, `times` times with 30 ms between."""
+        """Other work occupies the processor for for_s. This happens `times` times, 30 ms apart."""
 
         def begin(left):
             self._board.clock.advance(to_us(for_s))
@@ -110,13 +110,13 @@ class Faults:
     # In the file system
 
     def disk_full(self, at_s, for_s):
-        """Nothing can be written to a file."""
+        """Writing to any file fails."""
 
         full = self._writing(lambda file, path: _FailingFile(file, 0, OSError(errno.ENOSPC)))
         self._replaced("open", full, at_s, for_s)
 
     def cut_file(self, ending, length):
-        """The power is cut after `length` bytes of the next file with this ending. Then files_cut is 1."""
+        """Cut the power after `length` bytes of the next file with this ending are written. Then files_cut is 1."""
 
         def wrap(file, path):
             if not path.endswith(ending):
@@ -135,7 +135,7 @@ class Faults:
         self._files(ending, at_s, for_s, True)
 
     def slow_flash(self, at_s, for_s, erase_s):
-        """Each block of a written file is erased for erase_s, during which the program is blocked."""
+        """Erasing each flash block of a written file takes erase_s, during which the program is blocked."""
 
         def erase():
             self._board.clock.advance(to_us(erase_s))
@@ -144,7 +144,7 @@ class Faults:
         self._replaced("open", slow, at_s, for_s)
 
     def restore(self, *names):
-        """End the faults that replace these builtin functions: open for the file system, print for USB."""
+        """End the faults that replace these builtin functions: `open` for the file system, `print` for USB."""
         for name in names:
             if name in self._real:
                 setattr(builtins, name, self._real.pop(name))
@@ -156,11 +156,11 @@ class Faults:
         setattr(builtins, name, lambda *arguments, **named: function(real, *arguments, **named))
 
     def _replaced(self, name, function, at_s, for_s):
-        """_replace() it for for_s."""
+        """Call _replace() at at_s, and restore the builtin for_s later."""
         self._between(at_s, for_s, lambda: self._replace(name, function), lambda: self.restore(name))
 
     def _writing(self, wrap):
-        """For _replace("open"): files opened for writing become wrap(file, path)."""
+        """The function for _replace("open") that wraps files opened for writing: wrap(file, path)."""
 
         def opened(real, path, mode="r", *more, **named):
             file = real(path, mode, *more, **named)
@@ -206,7 +206,7 @@ class Faults:
 
 
 class _Wrapped:
-    """The base of the two classes below: passes everything else on to the file."""
+    """The base of the two classes below. Attributes that they do not define are those of the file."""
 
     def __init__(self, file):
         self._file = file
@@ -222,7 +222,7 @@ class _Wrapped:
 
 
 class _ErasedFile(_Wrapped):
-    """A file in flash: erase() is called for each block that a write begins."""
+    """A file in flash. It calls erase() whenever a write begins a new block."""
 
     def __init__(self, file, erase):
         super().__init__(file)

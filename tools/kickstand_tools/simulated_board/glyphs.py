@@ -1,4 +1,4 @@
-"""The HD44780's characters as Unicode text: those of ROM A00, and patterns written to its character memory."""
+"""Converts the HD44780's characters to Unicode: the characters of ROM A00, and patterns in its character memory."""
 
 # Codes of ROM A00 that differ from ASCII and have a counterpart in Unicode (HD44780U data sheet, table 4)
 _ROM_A00 = {
@@ -18,9 +18,9 @@ _ROM_A00 = {
     0xFF: "\u2588",  # full block
 }
 
-# The nearest block by number of filled columns or rows. Unicode's blocks are eighths wide; a character has five columns
+# The nearest Unicode block by number of filled columns or rows. Blocks are in eighths; a character has five columns
 _FROM_LEFT = " \u258e\u258d\u258b\u258a\u2588"
-_FROM_RIGHT = " \u2595\u2590\u2590\u2590\u2588"  # from the right Unicode has only one eighth and one half
+_FROM_RIGHT = " \u2595\u2590\u2590\u2590\u2588"  # at the right edge Unicode has only an eighth and a half block
 _FROM_BELOW = " \u2581\u2582\u2583\u2584\u2585\u2586\u2587\u2588"
 
 

@@ -1,8 +1,8 @@
-"""Model of a GPS receiver: it sends NMEA sentences on a serial line, some time after the fix."""
+"""Models a GPS receiver that sends NMEA sentences on a serial line, some time after each fix."""
 
 _KNOTS = 3600.0 / 1852.0
 _PIECE = 8  # bytes delivered at once
-_START_S = 12 * 3600 - 20  # UTC time of day when the clock is 0, on 21 November 2026
+_START_S = 12 * 3600 - 20  # UTC time of day, s, when the board's clock is 0, on 21 November 2026
 _HOME = 48.1173, 11.5166667  # degrees north and east
 
 
@@ -23,12 +23,12 @@ def sentence(body):
 
 
 class Gps:
-    """It transmits on clock events.
+    """A GPS receiver, which transmits on clock events.
 
     speed(t_s): of the vehicle, m/s. hz: fixes per second. latency_s: time from a fix to its first byte. place(t_s):
-    latitude and longitude, degrees north and east; None: it does not move.
+    latitude and longitude, degrees north and east; None: a fixed position.
 
-    kinds: the sentences with a speed that it sends. talker: their first letters, the satellite system.
+    kinds: the sentences to send, each of which contains a speed. talker: their first letters, the satellite system.
     faults: [[kind, from_s, until_s], ...] where kind is "unplugged", "garbled" (occasional wrong bits), "void" (no fix)
     or "stuck" (it repeats the last sentence).
     """
@@ -50,7 +50,7 @@ class Gps:
         clock.every(1_000_000 // hz, self._fix)
 
     def connect(self, receive):
-        """From now on call receive(bytes) with the bytes sent. None: they are lost."""
+        """Call receive(bytes) with the bytes sent from now on. None: the bytes are lost."""
         self._receive = receive
 
     def _has(self, kind):
@@ -63,7 +63,7 @@ class Gps:
         data = bytearray(self._last)
         if self._has("garbled"):
             for i in range(self._sent % 13, len(data), 13):
-                data[i] ^= 1 << (self._sent + i // 13) % 7  # two errors in the same bit would leave the checksum right
+                data[i] ^= 1 << (self._sent + i // 13) % 7  # different bits: equal ones would not change the checksum
         self._sent += 1
         start_us = self._clock.now_us + self._latency_us
         for i in range(0, len(data), _PIECE):

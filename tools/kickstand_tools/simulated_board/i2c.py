@@ -1,4 +1,4 @@
-"""A pair of I2C wires with devices on them, and faults of the wires.
+"""Models a pair of I2C wires with devices on them, and faults of the wires.
 
 A controller (the fake machine.I2C or that of an emulated chip) calls start, write_byte, read_byte and stop, and
 advances the time for the bits. Pins that drive the wires directly call set_scl and set_sda.
@@ -8,10 +8,10 @@ from .clock import NEVER_US
 
 
 class TransferFault:
-    """A fault in the transfers `first` to `last` to one address, if they begin between from_us and until_us.
+    """A fault in the transfers number `first` to `last` to one address, if they begin between from_us and until_us.
 
-    kind: "nack"; "timeout"; "cut": once, no byte from number `byte` on is acknowledged; "corrupt": the bits of mask are
-    inverted in read byte number `byte`.
+    kind: "nack"; "timeout"; "cut": in one transfer no byte from number `byte` on is acknowledged; "corrupt": the bits
+    of mask are inverted in read byte number `byte`.
     """
 
     def __init__(self, kind, address, first, last, from_us=0, until_us=NEVER_US, byte=0, mask=0):
@@ -35,8 +35,8 @@ class TransferFault:
         return {"nack": False, "timeout": None}.get(self.kind, True)
 
     def on_write(self, value):
-        """The byte that arrives when the controller sends value, None if it is not acknowledged. Byte 0 is the first,
-        usually the register address."""
+        """The byte that the device receives when the controller sends value; None if the device does not acknowledge.
+        Byte 0 is the first one, usually the register address."""
         self._count += 1
         if self.kind != "cut" or self._count <= self._byte:
             return value
@@ -44,17 +44,18 @@ class TransferFault:
         return None
 
     def on_read(self, value):
-        """The byte that arrives when a device sends value."""
+        """The byte that the controller receives when a device sends value."""
         number = self._count
         self._count += 1
         return value ^ self.mask if self.kind == "corrupt" and number == self._byte else value
 
 
-GOOD, OPEN, LOW = "good", "open", "low"  # states of a wire: good; not pulled up; touching ground
+GOOD, OPEN, LOW = "good", "open", "low"  # states of a wire: good; without pull-up; touching ground
 
 
 class Bus:
-    """sda, scl: numbers of the microcontroller's pins. open: True during a transfer. sda_wire, scl_wire: see above."""
+    """A bus. sda, scl: numbers of the microcontroller's pins. open: True during a transfer. sda_wire, scl_wire: GOOD,
+    OPEN or LOW."""
 
     def __init__(self, clock, sda, scl):
         self.clock = clock
@@ -62,14 +63,14 @@ class Bus:
         self.scl = scl
         self.sda_wire = self.scl_wire = GOOD
         self.devices = {}  # by address
-        self.transfers = {}  # by address: number of transfers begun
+        self.transfers = {}  # by address: number of transfers so far
         self.faults = []  # a list of TransferFault
         self._fault = None  # the fault of the current transfer
         self._device = None
         self.open = False
         self._driven_scl = 1
         self._driven_sda = 1
-        self._stuck_bits = -1  # zero bits left to send for a hung device; 0: it waits for ACK; -1: none hangs
+        self._stuck_bits = -1  # zero bits that a hung device still sends; 0: it waits for ACK; -1: no device hangs
 
     def attach(self, device):
         """Connect a device."""
@@ -82,7 +83,7 @@ class Bus:
             self._device = None
 
     def max_hz(self):
-        """The highest clock that every device allows."""
+        """The highest clock frequency that all devices allow."""
         return min([400_000] + [getattr(d, "max_hz", 400_000) for d in self.devices.values()])
 
     # For a controller
@@ -92,8 +93,8 @@ class Bus:
         return self._stuck_bits > 0
 
     def start(self, address, read):
-        """START or repeated START, and address. True: acknowledged. False: not acknowledged. None: a device holds SDA
-        low."""
+        """Send START or repeated START, and the address. Returns True if a device acknowledges, False if none does,
+        None if a device holds SDA low."""
         if self._stuck_bits > 0 or not self.sda_wire == self.scl_wire == GOOD:
             return None
         self._stuck_bits = -1  # START frees a device that waits for ACK
@@ -111,7 +112,7 @@ class Bus:
         return self._device.start(address, read) if self._device else False
 
     def write_byte(self, value):
-        """Send a byte. True: acknowledged."""
+        """Send a byte. Returns True if a device acknowledges."""
         if self._device is None:
             return False
         if self._fault is not None:
@@ -121,7 +122,7 @@ class Bus:
         return self._device.write_byte(value)
 
     def read_byte(self):
-        """Receive a byte: 0xFF if no device pulls the wire low."""
+        """Receive a byte. The result is 0xFF if no device pulls the wire low."""
         if self._device is None:
             return 0xFF
         value = self._device.read_byte()
@@ -136,17 +137,17 @@ class Bus:
             buf[i] = self.read_byte()
 
     def stop(self):
-        """STOP: the transfer is over."""
+        """Send STOP, which ends the transfer."""
         self._device = self._fault = None
         self.open = False
 
     def hang(self, bits=8):
-        """The controller stops in the middle of a read: the device holds SDA low for `bits` more clocks."""
+        """Interrupt a read: the controller stops, and the device holds SDA low for `bits` more clocks."""
         self.stop()
         self._stuck_bits = bits
 
     def power_off(self):
-        """The power is off: no transfer, and no device hangs."""
+        """Switch the power off: end the transfer and free a hung device."""
         self.stop()
         self._stuck_bits = -1
 
@@ -159,11 +160,12 @@ class Bus:
     # For pins
 
     def scl_level(self, pulled_up=False):
-        """0 or 1. pulled_up: True if the pin's own pull-up is on, which a wire without other pull-ups needs."""
+        """The level of SCL, 0 or 1. pulled_up: True if the pin's own pull-up is on, which a wire without other pull-ups
+        needs."""
         return self._level(self._driven_scl, self.scl_wire, pulled_up)
 
     def sda_level(self, pulled_up=False):
-        """0 or 1: low if the controller or a device pulls it low. pulled_up: see scl_level()."""
+        """The level of SDA: 0 if the controller or a device pulls it low, otherwise 1. pulled_up: see scl_level()."""
         return self._level(0 if self._stuck_bits > 0 else self._driven_sda, self.sda_wire, pulled_up)
 
     @staticmethod

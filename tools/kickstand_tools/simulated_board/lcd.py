@@ -1,7 +1,7 @@
-"""Model of a 16x2 HD44780 character display on a PCF8574 backpack (HD44780U data sheet ADE-207-272).
+"""Models a 16x2 HD44780 character display on a PCF8574 backpack (HD44780U data sheet ADE-207-272).
 
-Wiring of the usual backpack: P0 RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7; see WIRINGS. D0..D3 are not connected:
-the controller reads them as ones. Data sent while it is busy is lost, as on the chip.
+Wiring of the usual backpack: P0 RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7; for others see WIRINGS. D0..D3 are not
+connected, so the controller reads them as ones. Data sent while the controller is busy is lost, as on the chip.
 """
 
 import re
@@ -11,12 +11,12 @@ from .glyphs import drawn, rom
 _RS, _RW, _E, _LIGHT = 0x01, 0x02, 0x04, 0x08
 
 POWER_UP_US = 40_000  # at 3.3 V; 15 ms at 5 V
-WAKE_US = (4100, 100)  # busy after the first and after the second "function set, 8 bit" since power-up (figures 23, 24)
+WAKE_US = (4100, 100)  # busy time after the first and second "function set, 8 bit" since power-up (figures 23, 24)
 CLEAR_US = 1520  # "clear display" and "return home"
 COMMAND_US = 37
-DATA_US = 41  # 37 us, and 4 us for the address counter
+DATA_US = 41  # 37 us, plus 4 us for the address counter
 
-# The pins of other backpacks: of RS, R/W, E and backlight, the level that lights it, and of D4
+# Other backpacks: the pins of RS, R/W, E and backlight, the level that switches the backlight on, the pin of D4
 WIRINGS = {2: (6, 5, 4, 7, 0, 0), 3: (4, 5, 6, 7, 1, 0), 4: (0, 1, 2, 3, 0, 4)}
 
 COLUMNS = 16
@@ -29,7 +29,7 @@ _LEAN_PAGE = re.compile("Lean +([0-9]+)° (left|right)?[ *]*$")
 
 
 def shown_lean(lines):
-    """The lean shown on the firmware's lean page, degrees, > 0 to the right; None if the two lines show another
+    """The lean that the firmware's lean page shows, degrees, > 0 to the right. None if the two lines are another
     page."""
     found = _LEAN_PAGE.match(lines[0])
     return found and float(found.group(1)) * (-1.0 if found.group(2) == "left" else 1.0)
@@ -39,7 +39,7 @@ class Lcd:
     """One display. address: 0x20..0x27 (PCF8574) or 0x38..0x3F (PCF8574A).
 
     wiring: of the backpack, 1 for the usual one, otherwise a key of WIRINGS.
-    changes: counts visible changes. lost: counts nibbles (bytes in 8-bit mode) sent while it was busy.
+    changes: counts visible changes. lost: counts nibbles (bytes in 8-bit mode) that were sent while it was busy.
     """
 
     max_hz = 100_000  # the PCF8574 is a standard-mode part
@@ -48,7 +48,7 @@ class Lcd:
         self.address = address
         self.clock = clock
         self.wiring = 1
-        self._raw = 0xFF  # the actual pins, for another wiring
+        self._raw = 0xFF  # levels of P0..P7; they differ from _port if the wiring is not the usual one
         self.changes = 0
         self.power_on()
 
@@ -63,7 +63,7 @@ class Lcd:
         self._port = self._raw = 0xFF  # the outputs of a PCF8574 are high after power-on
         self._eight_bit = True
         self._high = -1  # the first nibble of a byte until the second arrives, otherwise -1
-        self._low_next = False  # when reading: the low nibble comes next
+        self._low_next = False  # True if the next read returns the low nibble
         self._in_cgram = False
         self._ac = 0  # address counter
         self._step = 1
@@ -74,19 +74,19 @@ class Lcd:
         self.changes += 1
 
     def power_off(self):
-        """The power is off: nothing is visible."""
+        """Switch the power off. Nothing is visible then."""
         self.on = False
         self._port = 0
         self.changes += 1
 
     def slip(self):
-        """Shift the pairing of nibbles by one, as a spike on E does."""
+        """Shift the pairing of nibbles to bytes by one nibble, as a spike on E does."""
         if not self._eight_bit:
             self._high = 0 if self._high < 0 else -1
 
     @property
     def backlight(self):
-        """True while it is lit."""
+        """True while the backlight is on."""
         return bool(self._port & _LIGHT)
 
     def codes(self):
@@ -125,8 +125,8 @@ class Lcd:
         return True
 
     def read_byte(self):
-        """Read the eight pins. While R/W and E are high, D7..D4 are busy flag and address counter, high nibble
-        first."""
+        """Read the eight pins. While R/W and E are high, D7..D4 carry the busy flag and the address counter, high
+        nibble first."""
         port = self._port
         if self.wiring != 1:
             return self._raw
@@ -186,7 +186,7 @@ class Lcd:
             self._shift_by(self._step)
 
     def _move(self, step):
-        """Move the address counter in display memory: after the end of a line comes the start of the other."""
+        """Move the address counter in display memory. After the end of a line comes the start of the other line."""
         ac = self._ac + step
         wraps = _TWO_LINE_WRAPS if self.two_lines else _ONE_LINE_WRAPS
         for beyond, wrapped in wraps:
@@ -199,7 +199,7 @@ class Lcd:
         self.changes += 1
 
     def _command(self, value):
-        """Execute a command; return its duration in us."""
+        """Execute a command. Returns its duration in us."""
         if value & 0x80:
             self._ac = value & 0x7F
             self._in_cgram = False

@@ -1,9 +1,9 @@
-"""Register-level model of the InvenSense MPU6050 and of the chips sold under its name: RM-MPU-6000A rev 4.2,
-PS-MPU-6000A rev 3.4; MPU-6500 RM rev 2.1; ICM-20689 and MPU-6886 data sheets.
+"""Models the registers of the InvenSense MPU6050 and of other chips sold under its name.
 
-If these leave a choice, the model is strict: a status bit appears only if INT_ENABLE enables it, and writes during
-start-up are lost. Only the delay of the low-pass is modelled: world() returns filtered values. Only the MPU6050 has a
-self-test here. Not modelled: DMP, auxiliary I2C.
+Sources: RM-MPU-6000A rev 4.2, PS-MPU-6000A rev 3.4; MPU-6500 RM rev 2.1; ICM-20689 and MPU-6886 data sheets. If these
+are ambiguous, the model is strict: a status bit appears only if INT_ENABLE enables it, and writes during start-up are
+lost. The low-pass only delays, because world() returns filtered values. Only the MPU6050 has a self-test here. Not
+modelled: DMP, auxiliary I2C.
 """
 
 from collections import namedtuple
@@ -11,7 +11,7 @@ from collections import namedtuple
 from .clock import NEVER_US
 
 SMPLRT_DIV, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, ACCEL_CONFIG2 = 0x19, 0x1A, 0x1B, 0x1C, 0x1D
-SELF_TEST_X, SELF_TEST_A = 0x0D, 0x10  # and those of y and z between them
+SELF_TEST_X, SELF_TEST_A = 0x0D, 0x10  # the registers of y and z are between them
 FIFO_EN, INT_ENABLE, INT_STATUS = 0x23, 0x38, 0x3A
 ACCEL_XOUT_H, GYRO_ZOUT_L = 0x3B, 0x48
 SIGNAL_PATH_RESET, USER_CTRL, PWR_MGMT_1 = 0x68, 0x6A, 0x6B
@@ -22,7 +22,7 @@ RESET, SLEEP = 0x80, 0x40  # PWR_MGMT_1
 FIFO_ENABLED, FIFO_RESET, SIG_COND_RESET = 0x40, 0x04, 0x01  # USER_CTRL
 DATA_RDY, FIFO_OFLOW = 0x01, 0x10  # INT_STATUS
 
-START_UP_US = 90_000  # after power-on and reset: the sheet's worst case is 100 ms
+START_UP_US = 90_000  # after power-on and reset; the data sheet's worst case is 100 ms
 WAKE_US = 30_000  # from sleep to the first sample: gyro start-up time, PS 6.1
 GYRO_LSB_PER_DPS = (131.0, 65.5, 32.8, 16.4)  # by range, GYRO_CONFIG bits 4 and 3
 DLPF_DELAY_US = (980, 1900, 2800, 4800, 8300, 13400, 18600, 980)  # delay of the gyro's low-pass, by DLPF_CFG
@@ -30,12 +30,12 @@ DLPF_DELAY_US = (980, 1900, 2800, 4800, 8300, 13400, 18600, 980)  # delay of the
 ACCEL_TRIMS, GYRO_TRIMS = (13, 17, 22), (9, 14, 11)  # factory trim codes of x, y, z (RM pp. 9 to 11)
 
 # temperature in degrees C = counts / counts_per_c + zero_c.
-# temperature_in_fifo: it is stored in the FIFO with accelerometer and gyro for any FIFO_EN.
+# temperature_in_fifo: True if the FIFO stores the temperature with accelerometer and gyro for any FIFO_EN.
 Variant = namedtuple(
     "Variant",
     ("power_after_reset", "counts_per_c", "zero_c", "has_accel_config2", "fifo_bytes", "temperature_in_fifo"),
 )
-VARIANTS = {  # by WHO_AM_I, the same ones as in CHIPS of firmware/kickstand/imu/mpu6050.py
+VARIANTS = {  # by WHO_AM_I, for the same chips as CHIPS in firmware/kickstand/imu/mpu6050.py
     0x68: Variant(0x40, 340.0, 36.53, False, 1024, False),  # MPU6050
     0x70: Variant(0x01, 333.87, 21.0, True, 512, False),  # MPU6500
     0x71: Variant(0x01, 333.87, 21.0, True, 512, False),  # MPU9250
@@ -49,7 +49,7 @@ VARIANTS = {  # by WHO_AM_I, the same ones as in CHIPS of firmware/kickstand/imu
 
 
 class Fifo:
-    """The chip's FIFO. It has no marks between frames. size: its capacity in bytes."""
+    """The chip's FIFO, which does not separate frames. size: its capacity in bytes."""
 
     def __init__(self, size):
         self.size = size
@@ -62,11 +62,12 @@ class Fifo:
         return len(self._waiting)
 
     def clear(self):
-        """Make it empty."""
+        """Empty the FIFO."""
         self._waiting = b""
 
     def push(self, data, keep_old=False):
-        """Add bytes. True if it was full: then the oldest bytes are lost, or with keep_old the new ones."""
+        """Add bytes. Returns True if the FIFO was full: then the oldest bytes are lost, or with keep_old the new
+        bytes."""
         waiting = self._waiting + data
         self._waiting = waiting[: self.size] if keep_old else waiting[-self.size :]
         return len(waiting) > self.size
@@ -86,8 +87,8 @@ class Mpu6050:
     world(t_s): (fx, fy, fz in g, wx, wy, wz in deg/s[, temp_c]) along the chip's axes, including its offset and scale
     errors.
     self_test: result of each axis's self-test as a share of its factory trim: three of the accelerometer, then three of
-    the gyro. 1.0 is right, 0.0 an axis that does not respond.
-    clock_error: relative error of the chip's sample rate, > 0 for a faster one (0.01 = 1 %).
+    the gyro. 1.0 is correct; at 0.0 the axis does not respond.
+    clock_error: relative error of the chip's sample rate, > 0 if it is too fast (0.01 = 1 %).
     """
 
     def __init__(self, clock, world, who_am_i=0x68, address=0x68):
@@ -98,7 +99,7 @@ class Mpu6050:
         self.self_test = [1.0] * 6
         self._override = None
         self.who_am_i = who_am_i
-        self._variant = VARIANTS.get(who_am_i, VARIANTS[0x68])  # also for a chip unknown to the driver
+        self._variant = VARIANTS.get(who_am_i, VARIANTS[0x68])  # tests also use chips unknown to the driver
         self.fifo = Fifo(self._variant.fifo_bytes)
         self._regs = bytearray(128)
         self._pointer = 0
@@ -106,7 +107,7 @@ class Mpu6050:
         self.power_on()
 
     def power_on(self):
-        """Set every register as after power-on and after a reset; writes are lost for START_UP_US."""
+        """Set every register as after power-on or reset. Writes are lost for START_UP_US."""
         regs = self._regs
         regs[:] = bytes(128)
         regs[PWR_MGMT_1] = self._variant.power_after_reset
@@ -126,8 +127,8 @@ class Mpu6050:
             self._start_sampling(self._busy_us + WAKE_US)
 
     def supply_dip(self, leaves="asleep"):
-        """A short power loss. It leaves the chip "asleep" (data 0), "frozen" (asleep, the last data), awake with
-        "default_ranges", or "torn": asleep, and the rates of the frame being read are garbage."""
+        """A short power loss. leaves: the state after it: "asleep" (data 0), "frozen" (asleep, the last data),
+        "default_ranges" (awake) or "torn" (asleep, and the rates of the frame being read are garbage)."""
         self._update()
         data = bytes(self._regs[ACCEL_XOUT_H : GYRO_ZOUT_L + 1])
         self.power_on()
@@ -141,7 +142,7 @@ class Mpu6050:
             self._start_sampling(self._busy_us)
 
     def override(self, value):
-        """Begin a fault: "freeze" (no new data), or the value of every data byte. None ends it."""
+        """Begin a fault. value: "freeze" for no new data, or the value of every data byte. None ends the fault."""
         self._update()
         self._override = value
 
@@ -153,7 +154,7 @@ class Mpu6050:
     # The I2C side
 
     def start(self, address, read):
-        """START and address. Data read until the next START is from one sample. True: ACK."""
+        """START and address. Data read until the next START comes from one sample. True: ACK."""
         self._update()
         self._expect_pointer = not read
         return True
@@ -247,7 +248,7 @@ class Mpu6050:
     # Sampling
 
     def _fast(self):
-        return self._regs[CONFIG] & 7 in (0, 7)  # no low-pass: the gyro runs at 8 kHz
+        return self._regs[CONFIG] & 7 in (0, 7)  # without low-pass the gyro runs at 8 kHz
 
     def _rate_ns(self):
         base = 125_000 if self._fast() else 1_000_000
@@ -269,7 +270,7 @@ class Mpu6050:
             return
         last = (now - self._first_us) * 1000 // self._period_ns
         if self._fifo_registers and self._regs[USER_CTRL] & FIFO_ENABLED:
-            # Samples that later ones would push out of the FIFO are skipped: the final content is the same
+            # Skip samples that later samples would push out of the FIFO: its final content is the same
             kept = self.fifo.size // len(self._fifo_registers) + 2
             for number in range(max(self._next, last + 1 - kept), last + 1):
                 self._sample(number)
@@ -291,7 +292,7 @@ class Mpu6050:
 
     def _measure(self, t_us):
         values = force = self.world(t_us / 1e6)
-        if self._fast():  # the accelerometer stays at 1 kHz
+        if self._fast():  # the accelerometer always runs at 1 kHz
             force = self.world((t_us - t_us % 1000) / 1e6)
         temp_c = values[6] if len(values) > 6 else 25.0
         if (self._regs[GYRO_CONFIG] | self._regs[ACCEL_CONFIG]) & 0xE0 and self.who_am_i == 0x68:
@@ -323,7 +324,7 @@ class Mpu6050:
     def _queue(self):
         if self._override == "freeze":
             return
-        # FIFO_MODE, which the MPU6500 family has
+        # FIFO_MODE exists in the MPU6500 family
         keep_old = self._variant.has_accel_config2 and bool(self._regs[CONFIG] & 0x40)
         frame = bytes([self._regs[register] for register in self._fifo_registers])
         if self.fifo.push(frame, keep_old):

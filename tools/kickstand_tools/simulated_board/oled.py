@@ -1,20 +1,20 @@
-"""Models of two OLED controllers on I2C with a panel of 128x64 pixels: Solomon Systech SSD1306 (data sheet rev 1.1) and
+"""Models two OLED controllers on I2C with a panel of 128x64 pixels: Solomon Systech SSD1306 (data sheet rev 1.1) and
 Sino Wealth SH1106 (V2.3).
 
-A transfer begins with control bytes: Co (bit 7) shows whether one byte follows or the rest is a stream, D/C (bit 6)
-whether they are data. The SSD1306 has 128 columns and three addressing modes, the SH1106 132 columns, of which the
-panel shows 2 to 129, and page addressing only.
+A transfer begins with control bytes. Co (bit 7) is 1 if only one byte follows, 0 if the rest is a stream. D/C (bit 6)
+is 1 for data. The SSD1306 has 128 columns and three addressing modes. The SH1106 has only page addressing and 132
+columns, of which the panel shows columns 2 to 129.
 """
 
 from . import oled_text
 
 WIDTH, HEIGHT = 128, 64
 PAGES = HEIGHT // 8
-# By kind: columns of RAM, first visible one, low half of the status (as found on chips: no data sheet gives it)
+# By kind: columns of RAM, first visible column, low half of the status (measured on chips, in no data sheet)
 _KINDS = {"ssd1306": (128, 0, 0x03), "sh1106": (132, 2, 0x08)}
-# The other controller's supply commands, which it ignores, except those that it uses for something else
+# The other controller's supply commands, which this one ignores. Commands with another meaning here are not listed
 _IGNORED = {"ssd1306": (0xAD, 0x8B), "sh1106": (0x8D, 0x20, 0x2E)}
-# Commands with arguments, and their number
+# Number of arguments by command
 _ARGUMENTS = {0x81: 1, 0xA8: 1, 0xD3: 1, 0xD5: 1, 0xD9: 1, 0xDA: 1, 0xDB: 1}
 _OWN_ARGUMENTS = {
     "ssd1306": {0x20: 1, 0x21: 2, 0x22: 2, 0x8D: 1, 0x26: 6, 0x27: 6, 0x29: 5, 0x2A: 5, 0xA3: 2},
@@ -27,9 +27,9 @@ _OFF = 0x40  # bit of the status
 class Oled:
     """One display. kind: "ssd1306" or "sh1106".
 
-    identity: low half of the status. alternate: rows alternate as on a panel of 64 rows; otherwise they are in sequence
-    as on one of 32.
-    on: switched on. pumped: has the voltage for the pixels. inverted, contrast, start_line: as set.
+    identity: low half of the status. alternate: True if rows alternate, as on a panel of 64 rows; on a panel of 32 rows
+    they are in sequence.
+    on: True if switched on. pumped: True if the pixels have their voltage. inverted, contrast, start_line: settings.
     changes: counts visible changes.  unknown: counts commands that the controller does not have.
     """
 
@@ -44,11 +44,11 @@ class Oled:
         self._arguments.update(_OWN_ARGUMENTS[kind])
         self.changes = 0
         self._power = 0
-        self._read, self._lines = -1, []  # the text, and the number of changes when it was read
+        self._read, self._lines = -1, []  # number of changes when the text was read, and the text
         self.power_on()
 
     def power_on(self):
-        """The state after its reset: off, with arbitrary content in RAM."""
+        """Set the state after a reset: off, with arbitrary content in RAM."""
         self._power += 1
         self.ram = bytearray([(37 * i + 91 * self._power) & 0xFF for i in range(self._columns * PAGES)])
         self.on = self.pumped = self.inverted = self._all_on = False
@@ -66,7 +66,7 @@ class Oled:
         self.changes += 1
 
     def power_off(self):
-        """The power is off: nothing is lit."""
+        """Switch the power off. No pixel is lit then."""
         self.on = False
         self.changes += 1
 
@@ -76,8 +76,8 @@ class Oled:
         return self.on and self.pumped
 
     def pixels(self):
-        """The visible pixels, row after row from the top: 8 pixels per byte, the leftmost in bit 7. Modules are mounted
-        with the cable's edge at the top, so columns and rows are both reversed."""
+        """The visible pixels, row by row from the top: 8 pixels per byte, the leftmost in bit 7. Columns and rows are
+        both reversed, because modules are mounted with the cable's edge at the top."""
         seen = bytearray(WIDTH // 8 * HEIGHT)
         if not self.backlight:
             return seen
@@ -140,7 +140,7 @@ class Oled:
             self.ram[at] = value
             self.changes += 1
         first, last, top, bottom = self._window
-        if self._mode == 2:  # within the page; an SH1106 stops at its last column
+        if self._mode == 2:  # stay within the page; an SH1106 stops at its last column
             if self._column < self._columns - 1:
                 self._column += 1
             elif self.kind == "ssd1306":
@@ -190,7 +190,7 @@ class Oled:
 
     def _of_ssd1306(self, command):
         code = command[0]
-        if code == 0x8D:  # the charge pump takes effect when it is next switched on
+        if code == 0x8D:  # the charge pump starts when the display is next switched on
             self.pumped = bool(command[1] & 0x04)
         elif code == 0x20:
             self._mode = command[1] & 3
@@ -205,7 +205,7 @@ class Oled:
         return True
 
     def _of_sh1106(self, command):
-        if command[0] == 0xAD:  # its DC-DC converter
+        if command[0] == 0xAD:  # the DC-DC converter
             self.pumped = bool(command[1] & 1)
             return True
         return 0x30 <= command[0] < 0x34 or command[0] in (0xE0, 0xEE)

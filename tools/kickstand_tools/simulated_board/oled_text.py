@@ -1,6 +1,6 @@
 """Reads an OLED's pixels as the two lines that a character display would show.
 
-So code that reads a device's display works with each kind of display. Letters are recognised by their shapes, pictures
+So the same code can read every kind of display. Letters are recognised by their shapes, pictures
 (firmware/kickstand/ui/glance.py) by their digits and words.
 """
 
@@ -19,7 +19,7 @@ _LETTERS[b"\xff" * 8] = "\u2588"
 for _columns in range(1, 5):
     _LETTERS[b"\xff" * (2 * _columns) + bytes(8 - 2 * _columns)] = "\u258e\u258d\u258b\u258a"[_columns - 1]
     _LETTERS[bytes(8 - 2 * _columns) + b"\xff" * (2 * _columns)] = "\u2595\u2590\u2590\u2590"[_columns - 1]
-# The same at twice the height: upper and lower half of each column in turn
+# The same letters at twice the height: upper and lower half of each column in turn
 _TALL = {
     bytes([half for column in shape for half in (_SPREAD[column & 15], _SPREAD[column >> 4])]): letter
     for shape, letter in _LETTERS.items()
@@ -27,7 +27,8 @@ _TALL = {
 
 
 def lines(oled):
-    """Two strings of 16 characters. oled: an Oled. Dark: blank. Not one of the firmware's pages: "?"."""
+    """Two strings of 16 characters. They are blank if the display is dark, and contain "?" if it does not show one of
+    the firmware's pages. oled: an Oled."""
     if not oled.backlight:
         return [_BLANK, _BLANK]
     pages = oled.pages()
@@ -41,7 +42,7 @@ def lines(oled):
 
 
 def _padded(line, length):
-    # not with %-16s: MicroPython counts the two bytes of a degree sign
+    # %-16s would be wrong, because MicroPython counts the two bytes of a degree sign
     return line + " " * (length - len(line))
 
 
@@ -56,7 +57,7 @@ def _small(pages, page):
 
 
 def _tall(pages, page, inverted=0):
-    """The letters of 8x16 pixels in a page and the next one, or None."""
+    """The letters of 8x16 pixels in this page and the next, or None."""
     letters = []
     for i in range(16):
         halves = [pages[page + k][8 * i + x] ^ inverted for x in range(8) for k in (0, 1)]
@@ -65,7 +66,7 @@ def _tall(pages, page, inverted=0):
 
 
 def _digit(pages, page, x):
-    """The large digit at column x from this page on, or None."""
+    """The large digit at column x whose top is in this page, or None."""
     from kickstand.ui.glance import DIGITS
 
     seen = b"".join([bytes(pages[page + row][x : x + _DIGIT_COLUMNS]) for row in range(_DIGIT_ROWS)])
@@ -84,7 +85,7 @@ def _number(pages, page, *columns):
 
 
 def _picture(pages, below):
-    """The lines for one of the pictures, or None. below: its last line."""
+    """The two lines for a picture, or None. below: the line of text below the picture."""
     reason = _tall(pages, 5, 0xFF)
     if reason is not None:
         return "Lean  --", reason.strip()

@@ -1,10 +1,10 @@
-"""Models of other devices on the sensor's bus, instead of the sensor or beside it."""
+"""Models other devices on the sensor's bus, in place of the sensor or beside it."""
 
 
 class Registers:
-    """A device with registers and an advancing pointer. It stores only writes to writable registers.
+    """A device with registers and an advancing pointer.
 
-    contents: {register: value}, others read 0.  writable: the registers that keep what is written.
+    contents: {register: value}, others read 0.  writable: the registers that store written values.
     """
 
     SIZE = 128  # number of registers, after which the pointer restarts
@@ -15,7 +15,7 @@ class Registers:
         for register, value in dict(contents).items():
             self.registers[register] = value
         self.writable = set(writable)
-        self.written = []  # the registers that were written to
+        self.written = []  # the registers written so far
         self._pointer, self._first = 0, False
 
     def start(self, address, read):
@@ -42,7 +42,7 @@ class Registers:
 
 
 class Ds3231(Registers):
-    """A clock with the MPU6050's address. clock: a Clock."""
+    """A real-time clock that has the MPU6050's address. clock: a Clock."""
 
     SIZE = 19
 

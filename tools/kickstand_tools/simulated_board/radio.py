@@ -1,6 +1,6 @@
-"""The board's Bluetooth LE radio, and one phone that may be connected to it. Plain Python, on the board's clock.
+"""Models the board's Bluetooth LE radio and its connection to one phone, in plain Python, on the board's clock.
 
-A phone is any object with heard(handle, data) and dropped(). It uses connect() and disconnect(), write(), read() and
+A phone is any object with heard(handle, data) and dropped(). It calls connect() and disconnect(), write(), read() and
 give_pin().
 """
 
@@ -13,14 +13,17 @@ CONNECTED, DISCONNECTED, WRITTEN, GET_SECRET, SET_SECRET, PASSKEY = 1, 2, 3, 29,
 READ, WRITE, NOTIFY = 0x02, 0x08, 0x10
 READ_PAIRED, WRITE_PAIRED = 0x0600, 0x3000
 _DISPLAY = 3
-_BOND = 2  # the kind of secret
+_BOND = 2  # the type of the secret that pairing stores
 
 
 class Radio:
-    """pairs: its MicroPython can ask for a PIN, as on an ESP32; then it also has little room for notifications. found,
-    named: what it advertises, or None. services: [(uuid, [(uuid, flags, handle), ...]), ...]. values: {handle: bytes}.
-    phone: the connected one, or None. away: the phone is temporarily out of reach.
-    fails: active(True) raises OSError."""
+    """The radio of a board.
+
+    pairs: True if its MicroPython can ask for a PIN, as on an ESP32; then there is also little room for notifications.
+    found, named: the advertised data, or None. services: [(uuid, [(uuid, flags, handle), ...]), ...]. values: {handle:
+    bytes}.
+    phone: the connected phone, or None. away: True while the phone is out of reach. fails: True if active(True) raises
+    OSError."""
 
     def __init__(self, clock, pairs=False, address=b"\x28\xcd\xc1\x0a\x1a\x2b"):
         self._clock = clock
@@ -44,7 +47,7 @@ class Radio:
     # Called by the fake `bluetooth`
 
     def register(self, services):
-        """Give each characteristic a handle; return the handles by service."""
+        """Assign a handle to each characteristic. Returns the handles by service."""
         handle = 8
         self.services = []
         for uuid, characteristics in services:
@@ -57,7 +60,7 @@ class Radio:
         return [[handle for _, _, handle in made] for _, made in self.services]
 
     def notify(self, handle, data):
-        """Send it in the next connection event. False: there is no room."""
+        """Queue a notification for the next connection event. Returns False if there is no room."""
         if self.pairs and len(self._waiting) >= ROOM:
             return False
         self._waiting.append((handle, data))
@@ -68,7 +71,7 @@ class Radio:
         self._passkey = passkey
 
     def drop(self):
-        """End the connection from this side."""
+        """End the connection from the board's side."""
         phone = self.phone
         self.disconnect()
         if phone is not None:
@@ -97,8 +100,8 @@ class Radio:
     # Called by a phone
 
     def connect(self, phone, address=b"\x01\x02\x03\x04\x05\x06"):
-        """Connect a phone. False: the board does not advertise. A phone that has already paired is recognised by its
-        address."""
+        """Connect a phone. Returns False if the board does not advertise. The address identifies a phone that has
+        already paired."""
         if self.found is None or self.phone is not None:
             return False
         self.found = self.named = None
@@ -111,7 +114,7 @@ class Radio:
         return True
 
     def disconnect(self):
-        """Disconnect the phone, or note that it is gone."""
+        """End the connection from the phone's side, or because the phone is gone."""
         self.phone = None
         self._waiting = []
         self.paired = self.away = False
@@ -132,15 +135,15 @@ class Radio:
         self._tell(SET_SECRET, _BOND, self.peer, b"\x00key")
 
     def write(self, handle, data):
-        """Write a value. False: not allowed, or only for a paired phone."""
+        """Write a value. Returns False if this is not allowed, or only after pairing."""
         flags = self.flags[handle]
         if not flags & WRITE or (flags & WRITE_PAIRED and not self.paired):
             return False
-        self.values[handle] = bytes(data[:20])  # MicroPython keeps values of this length
+        self.values[handle] = bytes(data[:20])  # MicroPython stores at most 20 bytes
         self._tell(WRITTEN, 0, handle)
         return True
 
     def read(self, handle):
-        """The value, or None: not allowed, or only for a paired phone."""
+        """The value. None if reading is not allowed, or only after pairing."""
         flags = self.flags[handle]
         return self.values[handle] if flags & READ and (self.paired or not flags & READ_PAIRED) else None

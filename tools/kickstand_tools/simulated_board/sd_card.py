@@ -1,4 +1,4 @@
-"""An SD card on SPI (SD Physical Layer Simplified Specification, chapter 7)."""
+"""Models an SD card on SPI (SD Physical Layer Simplified Specification, chapter 7)."""
 
 SECTOR = 512
 _EMPTY = bytes(SECTOR)
@@ -8,13 +8,15 @@ _DATA, _MULTIPLE, _STOP = 0xFE, 0xFC, 0xFD  # tokens
 
 
 class SdCard:
-    """sectors: their number.  cs: the pin that selects it.  init_s: time to get ready after CMD0; None: for ever.
-    read_s: time from the command to the data.  busy_s: time for which it is busy after each sector written.
+    """An SD card.
+
+    sectors: number of sectors.  cs: the pin that selects the card.  init_s: time to get ready after CMD0; None: never.
+    read_s: time from the command to the data.  busy_s: time for which the card is busy after each written sector.
 
     driver: False if the board lacks the driver.
 
-    Faults that can be set at any time: rejects: number of the next writes to reject. busy_next_s: time for which it is
-    busy after the next sector only. stuck: once busy, it stays busy. removed: nothing answers.
+    Faults that can be set at any time: rejects: number of the next writes to reject. busy_next_s: time for which the
+    card is busy after the next sector only. stuck: if True, a busy card stays busy. removed: if True, nothing answers.
 
     data: the written sectors by number, except sectors of zeros. most_hz: the highest clock rate so far.
     """
@@ -38,20 +40,20 @@ class SdCard:
         self._command = b""
         self._answer = b""
         self._at = 0
-        self._writing = 0  # the first token of a sector to be written, 0: none is expected
-        self._taking = 0  # missing bytes of a sector, with the check sum
+        self._writing = 0  # the start token of the expected sector, 0 if no sector is expected
+        self._taking = 0  # bytes of a sector still to receive, including the check sum
         self._sector = 0
         self._selected = False
 
     def select(self, level):
-        """The level of the pin CS."""
+        """Set the level of the pin CS."""
         self._selected = not level
         self._command = b""
         if level:
             self._answer = b""
 
     def exchange(self, data):
-        """Exchange bytes: returns those that the card sends while it receives `data`."""
+        """Receive data, and return the bytes that the card sends at the same time."""
         if not self._selected or self.removed:
             return b"\xff" * len(data)
         if self._taking == SECTOR + 2 and len(data) == SECTOR:
@@ -93,7 +95,7 @@ class SdCard:
         return 0xFF
 
     def _obey(self, number, argument):
-        """The answer to a command."""
+        """Execute a command. Returns the answer."""
         now_us = self._clock.now_us
         if number == 0:
             self._ready_us = None if self._init_s is None else now_us + int(self._init_s * 1e6)
@@ -140,7 +142,7 @@ class SdCard:
     # For a computer's card reader: a block device for os.VfsFat
 
     def readblocks(self, number, buf):
-        """Read into buf."""
+        """Fill buf with the sectors from this number on."""
         for i in range(len(buf) // SECTOR):
             buf[i * SECTOR : (i + 1) * SECTOR] = self.data.get(number + i, _EMPTY)
 
@@ -150,5 +152,5 @@ class SdCard:
             self._keep(number + i, bytes(buf[i * SECTOR : (i + 1) * SECTOR]))
 
     def ioctl(self, op, argument):
-        """The number of sectors, and their size."""
+        """Answer the queries for the number of sectors and for their size."""
         return {4: self._sectors, 5: SECTOR}.get(op, 0)

@@ -1,11 +1,11 @@
-"""The simulated board: microcontroller pins, MPU6050, display and button, wired together on one clock.
+"""The simulated board: pins of a microcontroller, MPU6050, display and button, wired together on one clock.
 
     with Board(world) as board:
         board.press(2.0)
         board.run(main, until_s=10)    # "off", "reset" or "returned"
         board.lcd.text()
 
-Within the `with` statement `machine`, `time` and `os` are the board's. Import the firmware there.
+Within the `with` statement, `machine`, `time` and `os` act on this board. Import the firmware there.
 """
 
 from .clock import Clock, PowerOff, Reset, Watchdog, to_us
@@ -23,24 +23,24 @@ from .sd_card import SdCard
 
 __all__ = ["Board", "PowerOff", "Reset"]
 
-# The firmware's default pins: (SDA, SCL) of the sensor's bus and of the display's, button, GPS (RX), wheel
+# The firmware's default pins: (SDA, SCL) of the sensor, (SDA, SCL) of the display, button, GPS (RX), wheel
 WIRING = {"rp2": ((4, 5), (6, 7), 15, 9, 14), "esp32": ((21, 22), (18, 19), 4, 16, 27)}
 
 
 class Board:
-    """A board, initially switched off; run() switches it on.
+    """A board. It is off until run() switches it on.
 
-    world(t_s): (fx, fy, fz, wx, wy, wz[, temp_c]) in g and deg/s along the chip's own axes, with the chip's errors.
+    world(t_s): (fx, fy, fz, wx, wy, wz[, temp_c]) in g and deg/s along the chip's axes, including the chip's errors.
     who_am_i: the fitted chip. display: "lcd", "ssd1306" or "sh1106". sensor_address, lcd_address: None if not fitted; 0
     for the display's usual address.
-    one_bus: the display is on the sensor's wires. port: "rp2" or "esp32". clock: None for a new one, which runs as fast
-    as the host can.
-    machine: a name in chips.MACHINES, which gives the port. Firmware that is first imported after install() runs on
-    this board. Without `machine` the firmware runs on the board that it was imported for, usually a Pico.
-    i2c_driver: of MicroPython on an ESP32, "new" or (up to 1.28) "legacy". sensor_pins, lcd_pins: (SDA, SCL), if not
-    those of WIRING. touched: the pins that the firmware has used so far. volts: at the pins of an ADC, by number. sent:
-    the bytes written to UARTs.
-    Times in seconds are those of the board's clock, which continues through resets and power cycles.
+    one_bus: True if the display is on the sensor's wires. port: "rp2" or "esp32". clock: None for a new Clock, which
+    runs as fast as possible.
+    machine: a name in chips.MACHINES, which determines the port. Firmware first imported after install() sees this
+    board. Without `machine`, it sees the board that it was imported for, usually a Pico.
+    i2c_driver: of MicroPython on an ESP32, "new" or (up to 1.28) "legacy". sensor_pins, lcd_pins: (SDA, SCL); None for
+    those of WIRING. touched: the pins that the firmware has used so far. volts: voltages at the pins of an ADC, by pin
+    number. sent: the bytes written to UARTs.
+    Times in seconds refer to the board's clock, which continues through resets and power cycles.
     """
 
     def __init__(
@@ -81,10 +81,10 @@ class Board:
         self.sensor_bus = Bus(self.clock, *(sensor_pins or usual_sensor))
         self.lcd_bus = self.sensor_bus if one_bus else Bus(self.clock, *(lcd_pins or usual_lcd))
         self.buses = [self.sensor_bus] if one_bus else [self.sensor_bus, self.lcd_bus]
-        self.too_fast = False  # True after a bus was clocked faster than a device on it allows
+        self.too_fast = False  # True after a bus was clocked faster than one of its devices allows
         self.faults = Faults(self)
         self.boots = 0
-        self.ticks_at_boot_us = 0  # first value of ticks_us(); one near 1 << 30 makes ticks wrap soon
+        self.ticks_at_boot_us = 0  # first value of ticks_us(); a value near 1 << 30 makes ticks wrap soon
         self.reset_cause = fake_machine.PWRON_RESET
         self._off = True
         self._pins = {}  # number: [mode, pull, driven level, time of first use]
@@ -95,7 +95,7 @@ class Board:
             self.fit_lcd()
 
     def install(self):
-        """Replace `machine`, `time` and `os` by this board's for all imported code."""
+        """Make `machine`, `time` and `os` act on this board, for all imported code."""
         self._fakes.install(self)
 
     def uninstall(self):
@@ -113,7 +113,7 @@ class Board:
     def run(self, function, until_s):
         """Call function(). Returns "returned", "reset", or "off" if the power was cut at until_s.
 
-        After "off" the next run() starts everything from power-on; after "reset" only the microcontroller.
+        After "off", the next run() starts everything from power-on. After "reset", only the microcontroller restarts.
         """
         if self._off:
             self.reset_cause = fake_machine.PWRON_RESET
@@ -165,7 +165,7 @@ class Board:
         self.clock.every(to_us(period_s), function)
 
     def press(self, at_s=None, for_s=0.15):
-        """Press the button at at_s for for_s. None: now, or at the end of the last such press."""
+        """Press the button at at_s for for_s. at_s: None for now or, if a press is still scheduled, for its end."""
         self.button.press(None if at_s is None else to_us(at_s), to_us(for_s))
 
     # Parts that are connected and disconnected
@@ -190,13 +190,13 @@ class Board:
         return Oled(self.clock, address or 0x3C, kind)
 
     def change_display(self, kind):
-        """Replace it by another one: "lcd", "ssd1306" or "sh1106"."""
+        """Replace the display. kind: "lcd", "ssd1306" or "sh1106"."""
         self.remove_lcd()
         self.lcd = self._display(kind)
         self.fit_lcd()
 
     def remove_lcd(self):
-        """Disconnect it; it goes dark."""
+        """Disconnect the display, which then goes dark."""
         self.lcd_bus.detach(self.lcd)
         self.lcd.power_off()
 
@@ -209,27 +209,27 @@ class Board:
         self.wheel = Wheel(self.clock, speed, **kind)
 
     def fit_card(self, **kind):
-        """Connect an SD card; with its driver on the board, if done before install(). kind: arguments of SdCard."""
+        """Connect an SD card. Call it before install() to have the driver on the board. kind: arguments of SdCard."""
         self.card = SdCard(self.clock, **kind)
 
     # Called by the fake `machine`
 
     def connect_uart(self, pin, baud, receive):
-        """Call receive(bytes) with the bytes that arrive on this pin: noise, if the GPS receiver sends at another
-        rate."""
+        """Call receive(bytes) with the bytes that arrive on this pin. They are noise if the GPS receiver sends at
+        another rate."""
         if self.gps and pin == self._gps_pin:
             same = baud == self.gps.baud
             self.gps.connect(receive if same else lambda data: receive(bytes([b & 0xE6 for b in data])))
 
     def watch_pin(self, number, edge):
-        """Call edge(level) when the part wired to this pin changes its level. None: no more calls."""
+        """Call edge(level) when the part wired to this pin changes its level. None ends the calls."""
         if number == self.button_pin:
             self.button.connect(edge)
         if self.wheel and number == self.wheel_pin:
             self.wheel.connect(edge)
 
     def bus_on(self, sda, scl, hz):
-        """The bus on these pins, clocked at hz from now on. It has no devices if none is wired."""
+        """The bus on these pins, clocked at hz from now on. A bus on pins without wires has no devices."""
         self.touched.update((sda, scl))
         for bus in self.buses:
             if (bus.sda, bus.scl) == (sda, scl):
@@ -247,7 +247,8 @@ class Board:
         self._drive_wire(number, 1 if mode == fake_machine.Pin.IN else level or 0)
 
     def drive_pin(self, number, level):
-        """Pin.value(level). A pin in mode IN drives the level once its mode is OUT, as on the chip."""
+        """Execute Pin.value(level). A pin in mode IN drives this level only after its mode becomes OUT, as on the
+        chip."""
         pin = self._pins.setdefault(number, [fake_machine.Pin.IN, -1, 0, 0])
         pin[2] = level
         if pin[0] != fake_machine.Pin.IN:

@@ -1,4 +1,4 @@
-"""Converts a rider's actions, given as legs, to signals over time."""
+"""Converts the legs of a ride, which contain the rider's actions, to signals over time."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ _SPEED_SMOOTHING_S = 0.15  # time in which a hand changes throttle or brake
 
 @dataclass
 class Leg:
-    """A part of a ride. None: the value of the previous leg.
+    """A part of a ride. None keeps the value of the previous leg.
 
     speed_mps: reached at the end, at constant acceleration. lean_deg: lean of the centre of mass, > 0 to the right,
     reached within roll_s of the start, then held. slope_percent: slope of the road at the end of the leg. hang_m:
@@ -63,7 +63,7 @@ def commands(legs: list[Leg], rate_hz: float) -> RiderCommands:
     distance = integral(speed, rate_hz)
 
     def stepped(name: str, settle_s: float | None = 1.0) -> Signal:
-        """The signal of a value that each leg reaches within settle_s of its start (None: its roll_s), then holds."""
+        """The signal of a value that each leg reaches within settle_s, then holds. None: within the leg's roll_s."""
         values = _fill_in(legs, name)
         result = np.full_like(time, values[0])
         for leg, start, before, after in zip(legs[1:], starts[1:], values, values[1:]):
@@ -93,7 +93,7 @@ def commands(legs: list[Leg], rate_hz: float) -> RiderCommands:
 
 
 def _fill_in(legs: list[Leg], name: str) -> list[float]:
-    """One value per leg: None is replaced by the previous leg's value, in the first leg by 0."""
+    """One value per leg. The previous leg's value replaces None; in the first leg 0 does."""
     kept, now = [], 0.0
     for leg in legs:
         value = getattr(leg, name)
@@ -103,8 +103,8 @@ def _fill_in(legs: list[Leg], name: str) -> list[float]:
 
 
 def _slope(distance: Signal, ends: Signal, percent: list[float]) -> Signal:
-    """The road's slope, rad, smooth between the ends of legs. It is a function of distance, so it is constant at a
-    stop."""
+    """The road's slope, rad, smooth between the ends of legs. The slope depends on distance, so it stays constant while
+    the bike stands."""
     knots, values = [0.0], [percent[0]]
     for end, value in zip(ends, percent):
         if end > knots[-1] + 1.0:

@@ -43,7 +43,7 @@ def simulate(
     made = _cut(ride(profile, seed, seconds, exact=True, **conditions), seconds)
     try:
         make_directory(directory)
-        # It belongs to an earlier ride and another sensor, but report, plot and export would use it for this one
+        # An old calibration belongs to another sensor, but report, plot and export would use it for this ride
         (directory / "RIDE.cal.json").unlink(missing_ok=True)
         write_poses(directory, made)
         _write_readings(directory / "SIX.csv", made.procedure, made.rate_hz)
@@ -62,7 +62,7 @@ def _cut(made: SimulatedRide, seconds: float) -> SimulatedRide:
 
 
 def write_poses(directory: Path, made: SimulatedRide) -> tuple[list[Path], Path, Path]:
-    """Write the seven poses, the kickstand pose and the upright one. Returns their paths in this order."""
+    """Write the seven poses, the kickstand pose and the upright pose. Returns their paths in this order."""
     seven = [directory / f"POSE_{k}.csv" for k in range(1, 8)]
     pair = directory / "KICKSTAND.csv", directory / "UPRIGHT.csv"
     for path, readings in zip([*seven, *pair], [*made.poses, made.kickstand, made.upright]):
@@ -89,7 +89,7 @@ def _log(time: NDArray, readings: NDArray) -> NDArray:
 
 
 def _write(path: Path, names: Iterable[str], formats: list[str], table: NDArray, *texts: list[str]) -> None:
-    """Write a CSV file with the table's columns, then one column per list of texts."""
+    """Write a CSV file with the columns of the table, followed by one column per list of texts."""
     form = ",".join(formats)
     with whole_file(path) as temporary, temporary.open("w", encoding="ascii") as file:
         print(*names, sep=",", file=file)
@@ -98,7 +98,7 @@ def _write(path: Path, names: Iterable[str], formats: list[str], table: NDArray,
 
 
 def write_ride(path: Path, made: SimulatedRide, speed: bool) -> None:
-    """Write its log. speed: with a speed and a position once per second."""
+    """Write the log of a ride. speed: add a speed and a position once per second."""
     log = _log(made.time, made.readings)
     if not speed:
         _write(path, _LOG, _FORMATS, log)

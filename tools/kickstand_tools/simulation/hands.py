@@ -1,4 +1,4 @@
-"""Simulates the six positions in one recording: a hand puts a sensor on its sides and turns it in between."""
+"""Simulates one recording of the six positions: a hand puts a sensor on each side and turns it in between."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -12,9 +12,11 @@ from .physics.signals import band_noise, smoothstep
 
 @dataclass(frozen=True)
 class Hand:
-    """How a hand turns a sensor. still_s, turn_s: (least, most) time for holding still and for a turn by 90 degrees; a
-    half turn takes 1.6 times as long. heading_deg: largest turn about the vertical during a turn. detour_deg: deviation
-    from the shortest way. push_g: rms acceleration during a turn."""
+    """The movements of a hand that turns a sensor.
+
+    still_s, turn_s: (least, most) time for holding still and for a turn by 90 degrees; a half turn takes 1.6 times as
+    long. heading_deg: largest rotation about the vertical during a turn. detour_deg: deviation from the shortest
+    rotation. push_g: rms acceleration during a turn."""
 
     still_s: tuple[float, float] = (4.5, 6.0)
     turn_s: tuple[float, float] = (0.9, 2.0)
@@ -47,7 +49,7 @@ def procedure(
         turned = np.linalg.norm(way)
         n = max(2, int(chance.uniform(*hand.turn_s) * (0.25 + 0.75 * turned / (np.pi / 2)) ** 0.7 * RATE_HZ))
         u = np.arange(n + 1) / n
-        # slowly at both ends, like a hand
+        # a hand starts and ends slowly
         detour = np.radians(hand.detour_deg) * chance.standard_normal(3) / np.sqrt(3.0)
         share = u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
         stray = np.sin(np.pi * smoothstep(u)) ** 2

@@ -16,10 +16,10 @@ _CLOSING_S = 45.0  # time for the straight and the stop at the end of every ride
 
 @dataclass
 class Conditions:
-    """Road, engine, weather and sensor of a ride. The defaults are those of an ordinary day.
+    """Road, engine, weather and sensor of a ride. The defaults describe an ordinary day.
 
-    slip_deg: rms of the angle between the bike's heading and its motion. bumps: (phase, spacing m, height m, length m):
-    bumps in the road while the ride is in this phase.
+    slip_deg: rms of the angle between the bike's heading and its motion. bumps: (phase, spacing m, height m, length m)
+    of bumps in the road, which are present during this phase of the ride.
     """
 
     roughness: float = CLASS_B  # see road.CLASS_A, m3
@@ -37,7 +37,7 @@ class Conditions:
 
 
 class Plan:
-    """Collects the legs of a ride. chance: source of the random numbers in which rides differ."""
+    """Collects the legs of a ride. chance: source of random numbers, which make rides different."""
 
     def __init__(self, chance: np.random.Generator, seconds: float) -> None:
         self.chance = chance
@@ -59,8 +59,8 @@ class Plan:
         return self._seconds
 
     def fit(self, seconds: float) -> None:
-        """Adjust the ride to this length by changing its longest legs at constant speed. Each keeps at least
-        _SHORTEST_S, so the ride may stay longer."""
+        """Adjust the duration of the ride by changing its longest legs at constant speed. No leg gets shorter than
+        _SHORTEST_S, so the ride may stay longer than `seconds`."""
         steady = [leg for before, leg in pairwise(self.legs) if leg.speed_mps in (None, before.speed_mps)]
         while steady and (over := sum(leg.seconds for leg in self.legs) - seconds):
             longest = max(steady, key=lambda leg: leg.seconds)
@@ -141,7 +141,7 @@ class Plan:
         self.add("trail braking", rolled, speed_mps, lean_deg=0.5 * lean_deg, roll_s=rolled)
 
     def stop(self, seconds: float, mps2: float) -> None:
-        """Brake to a stop and stand on one foot, mostly the left."""
+        """Brake to a stop, then stand on one foot, usually the left one."""
         self.to_speed(0.0, mps2)
         foot = self.uniform(-4.0, -0.5) if self.likely(0.8) else self.uniform(0.5, 3.0)
         self.add("stopped", seconds, 0.0, lean_deg=foot, roll_s=min(1.5, seconds / 2))

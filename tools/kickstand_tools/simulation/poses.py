@@ -1,4 +1,4 @@
-"""Simulates the poses for a calibration as a rider captures them: six sides, a slanted one, kickstand, upright."""
+"""Simulates the poses that a rider captures for a calibration: six sides, a slanted pose, kickstand, upright."""
 
 from collections.abc import Iterator
 
@@ -9,7 +9,7 @@ from .physics.chip import RATE_HZ, Chip
 from .physics.signals import band_noise
 
 POSE_S = 4.0
-_ASKEW_DEG = 4.0  # largest tilt of a box put on its side by hand
+_ASKEW_DEG = 4.0  # largest tilt of a box that a hand puts on its side
 _MOVE_DEG = 0.05  # rms lean of a bike held upright by hand
 
 
@@ -26,8 +26,8 @@ def seven(chance: np.random.Generator, chip: Chip, temp_c: float) -> list[NDArra
 
 
 def ups(chance: np.random.Generator) -> Iterator[NDArray[np.float64]]:
-    """The unit vector upward (3) in the sensor's axes in seven poses: each of the six sides up once, in random order
-    and up to 4 degrees askew, then a slanted pose."""
+    """Yield the upward unit vector (3) in the sensor's axes for seven poses: each of the six sides up once, in random
+    order and up to 4 degrees askew, then a slanted pose."""
     for side in chance.permutation(6):
         up = chance.standard_normal(3)
         axis = np.zeros(3)
@@ -41,7 +41,7 @@ def ups(chance: np.random.Generator) -> Iterator[NDArray[np.float64]]:
 
 
 def up_seen(lean_deg: float | NDArray, pitch_deg: float) -> NDArray[np.float64]:
-    """The unit vector upward along left, up, forward. lean: > 0 to the right; pitch: > 0 nose up; degrees."""
+    """The upward unit vector along left, up, forward. lean_deg: > 0 to the right. pitch_deg: > 0 nose up."""
     lean, pitch = np.radians(lean_deg), np.radians(pitch_deg)
     left, up = np.sin(lean) * np.cos(pitch), np.cos(lean) * np.cos(pitch)
     return np.stack((left, up, np.full_like(np.asarray(left, dtype=float), np.sin(pitch))), axis=-1)
@@ -56,7 +56,7 @@ def standing(
     temp_c: float,
     held: bool,
 ) -> NDArray[np.float64]:
-    """Readings of the bike at rest. held: upright by a rider, whose hands are never quite still."""
+    """Readings of the bike at rest. held: True if a rider, who is never quite still, holds the bike upright."""
     n = int(POSE_S * RATE_HZ)
     lean = np.full(n, lean_deg)
     if held:

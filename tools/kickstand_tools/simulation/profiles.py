@@ -1,4 +1,4 @@
-"""The profiles (kinds of ride): normal ones, and hard ones with one extreme condition each.
+"""The profiles (kinds of ride): normal rides, and hard rides with one extreme condition each.
 
 A profile adds its legs to a plan and returns the conditions of the ride.
 """
@@ -34,7 +34,7 @@ def street(plan: Plan) -> Conditions:
 
 
 def track(plan: Plan) -> Conditions:
-    """A race track: 35 to 55 degrees, from side to side within a second, 0.5 g speeding up, 0.95 g braking."""
+    """A race track: leans of 35 to 55 degrees, from side to side within a second, 0.5 g speeding up, 0.95 g braking."""
     plan.begin()
     plan.slope_percent, plan.roll_dps = 4.0, 100.0
     plan.to_speed(30.0, 4.0)
@@ -141,7 +141,7 @@ def hills(plan: Plan) -> Conditions:
 
 
 def _bends(plan: Plan, lean_deg: float, speeds: tuple[float, float], linked: float) -> None:
-    """Add a bend, and with the probability `linked` another one to the other side, and so on."""
+    """Add a bend, and with the probability `linked` a further bend to the other side, repeatedly."""
     lean, speed = plan.side() * lean_deg, plan.uniform(*speeds)
     if plan.speed > speed + 2.0:
         plan.into_turn(lean, speed, plan.uniform(2.0, 5.0))
@@ -213,7 +213,7 @@ def crosswind(plan: Plan) -> Conditions:
 def weight(plan: Plan) -> Conditions:
     """A rider who hangs off in turns, and luggage on one side.
 
-    Both move the centre of mass: by up to 5 cm, which is 5 degrees of lean, and by 1 to 2 cm.
+    The rider moves the centre of mass by up to 5 cm, which is 5 degrees of lean. The luggage moves it by 1 to 2 cm.
     """
     conditions = street(plan)
     beside = plan.side() * plan.uniform(0.01, 0.02)
@@ -229,14 +229,14 @@ def weight(plan: Plan) -> Conditions:
 def held(plan: Plan) -> Conditions:
     """Turns of 60 s at 38 degrees to alternate sides without a break, by a rider who moves around.
 
-    No straight shows the upright direction, and for a minute the lean depends on the sensor's errors alone.
+    No straight shows the upright direction. For a minute the sensor's errors alone determine the error of the lean.
     """
     plan.begin()
     plan.slope_percent = 1.5
     speed = plan.uniform(18.0, 25.0)
     plan.to_speed(speed, 2.5)
     plan.straight(5.0)
-    lean = plan.side() * 35.0  # lean of the centre of mass: the tyres' width adds 3 degrees for the chassis
+    lean = plan.side() * 35.0  # of the centre of mass; with the tyres' width the chassis leans 3 degrees more
     while plan.going_on:
         plan.turn(lean, speed, seconds=60.0, roll_s=2.0)
         lean = -lean

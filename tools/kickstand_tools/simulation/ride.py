@@ -20,7 +20,7 @@ from .plan import Conditions, Plan
 from .profiles import PROFILES
 
 _WARMING_S = 300.0  # time constant of the chip's temperature
-_SLIP_DEG, _CAMBER_DEG, _SWAY_M = 0.3, 1.5, 0.006  # rms of side slip, camber and rider's sway on a road of --road
+_SLIP_DEG, _CAMBER_DEG, _SWAY_M = 0.3, 1.5, 0.006  # with `road`: rms of side slip, camber and the rider's sway
 _IMPACT_G = 4.0  # peak of the impact at the end of a fall
 
 
@@ -29,9 +29,9 @@ class SimulatedRide:
     """A simulated ride: the sensor's readings and the truth.
 
     poses, kickstand, upright, readings: each (n, 7) at rate_hz, in the chip's order: force (g), temperature (C), rate
-    (deg/s). poses: six sides in random order and a slanted one. time (s), truth (by name) and phase: (n,), one entry
-    per row of readings. vehicle_from_sensor: (3, 3), rows left, up, forward. stand_deg: lean in the pose kickstand; on
-    the stand at the start of the ride it differs.
+    (deg/s). poses: six sides in random order, then a slanted pose. time (s), truth (by name) and phase: (n,), one entry
+    per row of readings. vehicle_from_sensor: (3, 3), rows left, up, forward. stand_deg: lean in the kickstand pose; at
+    the start of the ride the bike stands at another lean.
     """
 
     rate_hz: float
@@ -68,14 +68,14 @@ def ride(
     dive: tuple[float, float] | None = None,
     exact: bool = False,
 ) -> SimulatedRide:
-    """Simulate a ride of about this length; a profile and a seed always give the same one.
+    """Simulate a ride of about this length. The same profile and seed always give the same ride.
 
     upright_error_deg: lean of the bike to the right in the upright pose. pitch_change_deg: pitch on the kickstand minus
     that in the upright pose; None: random within 1 degree. share: factor on the sensor's tolerances.
-    road: a class of ISO 8608 instead of the profile's own road. It is cambered, the rider moves around and the bike
-    slips a little. mount: one of MOUNTS instead of a firm one. dive: (lowering of the nose in braking, rise in
-    acceleration) by the springs, degrees per g; None: random, about 3 and 1.4. exact: exactly this length, if it is
-    enough for setting off and stopping.
+    road: a class of ISO 8608 instead of the profile's own road; such a road is cambered, the rider moves around and the
+    bike slips a little. mount: one of MOUNTS instead of a firm mount. dive: pitch on the springs, (nose down in
+    braking, nose up in acceleration), degrees per g; None: random, about 3 and 1.4. exact: make the ride exactly this
+    long if there is enough time to set off and stop.
 
     >>> made = ride("parked", seed=1, seconds=20.0)
     >>> made.rate_hz, len(made.poses), made.readings.shape == (len(made.time), 7)
@@ -90,8 +90,7 @@ def ride(
     mounting = random_rotation(chance)
     if dive is not None:
         bike = replace(bike, dive_deg_per_g=dive[0], squat_deg_per_g=dive[1])
-    # A separate random source: without these options a profile and a seed still give the same ride as in earlier
-    # versions
+    # The options use a separate random source, so that without them a seed gives the same ride as in earlier versions
     more = np.random.default_rng([seed, *profile.encode(), 1])
     if road is not None:
         _rough(more, plan, conditions, CLASSES[road])
@@ -102,7 +101,7 @@ def ride(
     command = commands(plan.legs, RATE_HZ)
     slip = _slip(more, command, conditions)
     motion, extra = _motion(chance, command, bike, conditions)
-    # An hour at 1 kHz takes 29 MB per column. Arrays are freed early, so none may be a view of another.
+    # An hour at 1 kHz takes 29 MB per column. To free arrays early, no array may be a view of another.
     temp = conditions.start_c + conditions.rise_c * (1.0 - np.exp(-command.time / _WARMING_S))
     time, phase = command.time[::DIVIDER].copy(), np.array(command.phases)[command.phase[::DIVIDER]]
     del command
@@ -170,7 +169,7 @@ def _motion(
 ) -> tuple[Motion, Shaking]:
     n, rate = len(command.time), command.rate_hz
     command.crosswind += conditions.gust_mps2 * band_noise(chance, n, 0.05, 0.5, rate)
-    # A rider who moves around leans a moving bike, not one on its stand or on the rider's feet.
+    # A rider who moves around makes a riding bike lean, but not a bike that stands
     command.hang += conditions.sway_m * band_noise(chance, n, 0.02, 0.3, rate) * smoothstep(command.speed / 5.0)
     rolled = roll(command, bike, weave(chance, command, conditions.unrest_deg))
     surface = profile_slope(chance, float(command.distance[-1]) + 10.0, conditions.roughness)
@@ -194,7 +193,7 @@ def _motion(
 
 
 def _rough(chance: np.random.Generator, plan: Plan, conditions: Conditions, roughness: float) -> None:
-    """Make the road realistic: cambered or tilted to either side from leg to leg, with a rider who moves around."""
+    """Make road and rider realistic: each leg is cambered or tilted to a random side, and the rider moves around."""
     conditions.roughness, conditions.slip_deg = roughness, _SLIP_DEG
     conditions.sway_m = max(conditions.sway_m, _SWAY_M)
     for leg in plan.legs:
@@ -202,7 +201,7 @@ def _rough(chance: np.random.Generator, plan: Plan, conditions: Conditions, roug
 
 
 def _slip(chance: np.random.Generator, command: RiderCommands, conditions: Conditions) -> NDArray[np.float64]:
-    """(n) m/s^2 to the left: the tyres slip and grip again, so the bike does not move exactly where it points."""
+    """(n) acceleration to the left, m/s^2, caused by side slip: a bike does not move exactly where it points."""
     if not conditions.slip_deg:
         return np.zeros(len(command.time))
     angle = np.radians(conditions.slip_deg) * band_noise(chance, len(command.time), 0.05, 1.0, command.rate_hz)
@@ -210,7 +209,7 @@ def _slip(chance: np.random.Generator, command: RiderCommands, conditions: Condi
 
 
 def _sideways(lean: NDArray[np.float64], left: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n, 3) level accelerations to the left, along left, up, forward of a leaning bike."""
+    """(n, 3) a horizontal acceleration to the left, expressed along left, up, forward of a leaning bike."""
     return np.column_stack((left * np.cos(lean), -left * np.sin(lean), np.zeros_like(left)))
 
 
@@ -235,7 +234,7 @@ def _impact(chance: np.random.Generator, command: RiderCommands) -> NDArray[np.f
 
 
 def _creep(chance: np.random.Generator, n: int, degrees: float) -> NDArray[np.float64]:
-    """The rotation of a mount that yields: rotation vectors (n, 3), rad. Most of it is slow, the rest sudden."""
+    """The rotation of a yielding mount: rotation vectors (n, 3), rad. Most of the rotation is slow, the rest sudden."""
     axis = chance.standard_normal(3)
     at_once = np.zeros(n)
     at_once[int(n * chance.uniform(0.3, 0.7)) :] = 1.0
@@ -244,8 +243,8 @@ def _creep(chance: np.random.Generator, n: int, degrees: float) -> NDArray[np.fl
 
 
 def _to_sensor(vectors: NDArray, mounting: NDArray, turned: NDArray) -> NDArray[np.float64]:
-    """vectors (n, 3) in the sensor's axes, from the vehicle's. turned: small rotations of the mount (n, 3), applied to
-    second order."""
+    """Rotate vectors (n, 3) from the vehicle's axes to the sensor's. turned: small rotations of the mount (n, 3),
+    applied to second order."""
     if turned.any():
         first = np.cross(turned, vectors)
         vectors = vectors + first + 0.5 * np.cross(turned, first)

@@ -30,7 +30,7 @@ _WRITE: dict[str, Callable[[Path, Iterator[Channels], float], None]] = {
 }
 _NEEDS = {"gpx": ("GPX", "gpxpy"), "parquet": ("Parquet", "pyarrow")}  # format's name, and its library
 _DATED = ("gpx", "racechrono", "vbo")
-_CLOCK_S = 1e8  # March 1973: a log that starts later uses Unix time
+_CLOCK_S = 1e8  # March 1973: larger times in a log are Unix time
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ def export(
     total) of the log. notices: remarks about the log are appended.
 
     gpx needs positions. gpx, racechrono and vbo need date and time, which come with positions. A board without a
-    satellite receiver has no clock. So its ride is assumed to end when its file was last written: recorded live, or
-    pulled.
+    satellite receiver has no clock. Its ride, recorded live or pulled, is therefore assumed to end when the file was
+    last written.
 
     >>> import tempfile
     >>> import numpy as np
@@ -83,7 +83,7 @@ def export(
         written_s = Path(log).stat().st_mtime if isinstance(log, (Path, str)) else time.time()
         start_s = float(max(0, int(written_s - whole.seconds)))
     step_s = STEP_S[form]
-    if step_s:  # different times stay different when the start is added
+    if step_s:  # rounded before the start is added: different times stay different
         start_s = round(start_s / step_s) * step_s
     count = given = 0
 
@@ -99,7 +99,8 @@ def export(
             if form == "gpx":
                 block = block.part(np.isfinite(block.lat_deg) & np.isfinite(block.lon_deg))
             if form in ("gpx", "vbo") and len(whole.speeds):
-                # every row of a VBO file has a speed: without this, rows between two values would have speed 0
+                # every row of a VBO file needs a speed: without interpolation, rows between two values would have speed
+                # 0
                 block.speed_mps = np.interp(block.t_s, *whole.speeds.T)
             if form == "vbo":
                 block.lat_deg, block.lon_deg = whole.places.at(block.t_s)
@@ -118,9 +119,9 @@ def export(
 
 @dataclass
 class _Whole:
-    """A whole log. start_s: its own time at the first sample. seconds: its length. speeds (n, 2): s since then and m/s.
-    places: its positions. utc_s: Universal Time at the first sample; None if unknown. It is the median over the rows,
-    because some values come late."""
+    """What the first pass finds in a log. start_s: the log's time at the first sample. seconds: duration. speeds (n,
+    2): s since the first sample, and m/s. places: the positions. utc_s: Universal Time at the first sample, None if
+    unknown; it is the median over the rows because some values come late."""
 
     start_s: float
     seconds: float

@@ -1,7 +1,7 @@
 """Writes Kickstand's own columns: the log, calibrated and in the vehicle's axes, and the lean that the display shows.
 
-As CSV, or as Apache Parquet for data frames, with each field's unit in its metadata:
-https://arrow.apache.org/docs/python/parquet.html; pandas.read_parquet and others open it.
+The file is CSV, or Apache Parquet with each field's unit in its metadata, which pandas.read_parquet opens:
+https://arrow.apache.org/docs/python/parquet.html
 """
 
 import gzip
@@ -36,7 +36,7 @@ COLUMNS = {
 }
 
 
-_FINE = ("t_s", "lat_deg", "lon_deg", "utc_s")  # a 32-bit float has positions only to 1 m
+_FINE = ("t_s", "lat_deg", "lon_deg", "utc_s")  # a 32-bit float resolves positions only to 1 m
 
 
 def write_csv(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
@@ -51,8 +51,8 @@ def write_csv(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
 
 
 def write_parquet(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """Write one row group per block. Times and positions are 64-bit floats, the rest 32-bit floats. NaN for no
-    value."""
+    """Write one row group per block. Times and positions are 64-bit floats, the rest 32-bit floats. A missing value
+    is NaN."""
     import pyarrow
     from pyarrow.parquet import ParquetWriter
 

@@ -1,8 +1,8 @@
 """Writes GPX 1.1 for maps, route planners and programs that put data on videos: https://www.topografix.com/GPX/1/1/
 
-A track point for each position of the log. GPX 1.1 has no element for the speed: it is in Garmin's TrackPointExtension,
-https://www8.garmin.com/xmlschemas/TrackPointExtensionv2.xsd. The lean, > 0 to the right, is beside it in an element of
-Kickstand's own, if the meter trusts it.
+Each position of the log becomes a track point. GPX 1.1 has no element for the speed, so the speed is written in
+Garmin's TrackPointExtension, https://www8.garmin.com/xmlschemas/TrackPointExtensionv2.xsd. A lean that the meter
+trusts, > 0 to the right, is written in Kickstand's own element.
 """
 
 from collections.abc import Iterator

@@ -1,9 +1,9 @@
 """Writes CSV v3, the table that RaceChrono exports and related programs read.
 
 Metadata, a blank line, then three heading lines: names, units, sources ("100: gps", "calc", "101: acc", "102:
-gyro"); a cell is empty if its source has no new value. Names and units as in RaceChrono's own files: see
+gyro"); a cell is empty if its source has no new value. Names and units are those of RaceChrono's own files: see
 https://github.com/ClassicMiniDIY/UltraLog/pull/85 and https://apexlog.io/blog/what-to-do-with-racechrono-data;
-acc in G and gyro in deg/s also in https://racechrono.com/article/2572. In those files lateral_acc is positive in
+https://racechrono.com/article/2572 also gives acc in G and gyro in deg/s. In those files lateral_acc is positive in
 a left turn and longitudinal_acc when speeding up, as here. RaceChrono itself imports sessions as .vbo.
 """
 

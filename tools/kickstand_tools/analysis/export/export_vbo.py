@@ -1,13 +1,13 @@
 """Writes Racelogic's VBO, which Circuit Tools opens and RaceChrono imports.
 
 Sections, standard channels, and units (only for other channels) are those of
-https://developers.racelogic.co.uk/Portal/Tutorials/tutorialVBOfilestructure.html; columns and their signs as in
+https://developers.racelogic.co.uk/Portal/Tutorials/tutorialVBOfilestructure.html; columns and signs are those of
 https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format and the VBOX HD Lite's user guide:
 time HHMMSS.SS, velocity in km/h, latitude and longitude in minutes, north and west positive, heading in degrees
 clockwise from north, long accel > 0 forward, lat accel > 0 to the left, others with mantissa and exponent. A log does
-not have the number of satellites. It is written as 4, the least for a position, or as 0 without a position, which is
-then 0 too. Any other column without values is left out, except velocity, which VBO requires: it is then 0, and a
-comment in the file says so.
+not contain the number of satellites, so the file says 4, the fewest that give a position. Without a position, the
+satellites and the position are written as 0. Other columns without values are left out. Only velocity is required by
+VBO: without a speed it is 0, and a comment in the file says so.
 """
 
 import time
@@ -20,7 +20,7 @@ import numpy as np
 from ...signals import Array, distance_m
 from ..channels import Channels
 
-# (title in [header], name in [column names]); of the others (both, unit, channel)
+# standard channels have a title in [header] and a name in [column names]; other channels a title, a unit, a channel
 STANDARD = (
     ("satellites", "sats"),
     ("time", "time"),
@@ -40,12 +40,12 @@ OTHER = (
 )
 _STANDARD_ROW = "%03d %09.2f %+013.6f %+013.6f %07.3f %06.2f +00000.00 %+07.3f %+07.3f"
 _SATELLITES = 4
-_SAME_M = 1e-3  # between rows, a hundredth of a second apart
+_SAME_M = 1e-3  # less movement between two rows, 0.01 s apart, gives no new heading
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """Write the file. Lines end in CR and LF; the date and each row's time are UTC. blocks: with positions in as many
-    rows as possible."""
+    """Write the file. Lines end in CR and LF; the date and each row's time are UTC. blocks: should have positions in
+    as many rows as possible."""
     first = next(blocks)  # a channel that the log does not have is NaN from its first block on
     other = [column for column in OTHER if not np.all(np.isnan(getattr(first, column[2])))]
     lean = "lean-angle in degrees, > 0 to the right; " if OTHER[0] in other else ""
@@ -100,12 +100,14 @@ class _Heading:
         self._last = np.full((3, 1), np.nan)  # latitude, longitude and heading of the last row of the previous block
 
     def of(self, lat_deg: Array, lon_deg: Array) -> Array:
-        """(n) heading, degrees clockwise from north, from the previous row to each row. If both have the same position
-        it is that of the previous row. The first row with a position has the heading of the second."""
+        """(n) heading, degrees clockwise from north, from the previous row to each row. If two rows have the same
+        position, the heading of the previous row is kept. The first row with a position gets the heading of the
+        second."""
         lat, lon = (np.concatenate((last, now)) for last, now in zip(self._last, (lat_deg, lon_deg)))
         east, north = distance_m(lat[:-1], lon[:-1], lat[1:], lon[1:])
         found = np.concatenate((self._last[2], np.degrees(np.arctan2(east, north)) % 360.0))
-        moved = np.concatenate(([True], ~(np.hypot(east, north) <= _SAME_M)))  # also for NaN: a gap ends the track
+        # NaN counts as moved, because a gap ends the track
+        moved = np.concatenate(([True], ~(np.hypot(east, north) <= _SAME_M)))
         found = found[np.maximum.accumulate(np.where(moved, np.arange(len(found)), 0))]
         first = np.flatnonzero(np.isnan(found[:-1]) & np.isfinite(lat[:-1]))
         found[first] = found[first + 1]

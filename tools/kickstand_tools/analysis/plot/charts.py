@@ -21,11 +21,11 @@ GUIDE_COLOUR = "#bbbbbb"
 DOUBT_COLOUR, DOUBT_WIDTH = "#d99a00", 4.0
 SMOOTH_S = 0.3
 GG_BIN_G = 0.025
-GAP_S = 1.0  # lines are interrupted if there is no value for longer
-SPEED_GAP_S = 5.0  # the same for the line of the speed, which has few values
+GAP_S = 1.0  # a line is interrupted after this time without a value
+SPEED_GAP_S = 5.0  # GAP_S for the speed, which has fewer values
 _HIGH, _LOW, _SQUARE = 2.5, 1.5, 3.0  # heights of charts, inches of the picture
-_MARKED = 0.82  # share of a chart's height for the lines of the maxima, which must end below the words in the corner
-_UPRIGHT_DEG = 5.0  # the share of smaller leans may be cut off: it would hide the others
+_MARKED = 0.82  # share of a chart's height: above it, lines of the maxima would cross the words in the corner
+_UPRIGHT_DEG = 5.0  # bars of smaller leans may be cut off, because they would make the others too low
 
 
 @dataclass
@@ -44,7 +44,7 @@ class Line:
 
 @dataclass
 class Sides:
-    """A Line of a lean (n), with the area to zero filled in the colour of its side."""
+    """A Line of n leans. The area between the line and zero is filled in the colour of the side."""
 
     x: Array
     y: Array
@@ -86,7 +86,7 @@ Trace = Line | Sides | Dots | Bars | CellMap
 
 @dataclass
 class Note:
-    """Words at a point. side: their place beside the point: "above", "below", "left" or "right"."""
+    """Words at a point. side: where the words are, as seen from the point: "above", "below", "left" or "right"."""
 
     x: float
     y: float
@@ -96,9 +96,9 @@ class Note:
 
 @dataclass
 class Chart:
-    """One pair of axes. height: inches of the picture. ticks: of the x axis with their words, None for the usual ones.
-    square: True if a unit has the same length on both axes. spans: (from, to, words) in x, grey behind the traces.
-    left, right: words in the upper corners."""
+    """One pair of axes. height: inches of the picture. ticks: positions and words on the x axis, None for the default.
+    square: True if a unit has the same length on both axes. spans: (from, to, words) in x, drawn in grey behind the
+    traces. left, right: words in the upper corners."""
 
     title: str
     traces: list[Trace]
@@ -127,7 +127,7 @@ class Charts:
 
 
 def charts(seen: Overview) -> Charts:
-    """The charts of a ride. A car has no chart of the lean. Without a speed there is no chart of it."""
+    """The charts of a ride. A car has no chart of the lean, and a log without a speed has no chart of the speed."""
     course, car = seen.course, seen.ride.car
     lateral, forward = (smoothed(values, course.t_s, SMOOTH_S) for values in (course.lateral_g, course.forward_g))
     over_time = [] if car else [_lean(seen)]
@@ -161,7 +161,7 @@ def lean_limit(seen: Overview) -> float:
 
 
 def envelope(time: Array, values: Array, points: int, gap_s: float = np.inf) -> tuple[Array, Array]:
-    """Reduce a long line to few points that look the same: the smallest and the largest value of each stretch.
+    """Reduce a long line to the smallest and the largest value of each stretch. The drawn line looks the same.
 
     Returns at most about `points` of the samples, in their order, or all if there are not more. NaNs are left out,
     except one in the middle of each gap of over gap_s, which breaks the line.
@@ -199,7 +199,7 @@ def _lean(seen: Overview) -> Chart:
     traces: list[Trace] = [lean]
     doubtful = seen.course.doubtful >= 0.5
     if np.any(doubtful):
-        words = "Lean, degrees (right up; yellow: less exact)"  # as many words as a phone has room for
+        words = "Lean, degrees (right up; yellow: less exact)"  # a phone has no room for more words
         along = np.where(doubtful, -1.05 * limit, np.nan)
         traces.append(Line(seen.course.t_s, along, DOUBT_COLOUR, gap_s=GAP_S, width=DOUBT_WIDTH))
     made = _over_time(seen, words, traces, _HIGH, ((-1.1 if np.any(doubtful) else -1.0) * limit, limit))
@@ -256,7 +256,7 @@ def _shares(seen: Overview) -> Chart:
     for peak, sign in _maxima(seen):
         at = sign * peak.value
         made.traces.append(Line(np.array([at, at]), np.array([0.0, _MARKED * top]), "#555555", dotted=True))
-        beside = "left" if sign < 0 else "right"  # at small leans, so that the words do not overlap
+        beside = "left" if sign < 0 else "right"  # labels of small leans go to the side, to avoid overlap
         made.notes.append(
             Note(at, _MARKED * top, f"{peak.value:.0f}°", "above" if peak.value > 0.3 * limit else beside)
         )

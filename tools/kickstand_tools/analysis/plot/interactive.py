@@ -1,5 +1,5 @@
 """The charts of a ride for plotly.js, to zoom into: {"data": traces, "layout": of a wide window, "narrow": of a phone}.
-In a wide window the last charts are side by side below those over time."""
+In a wide window, the last charts are side by side, below the charts over time."""
 
 import html
 from typing import Any
@@ -9,16 +9,16 @@ import numpy as np
 from ...signals import Array
 from .charts import LEFT_COLOUR, RIGHT_COLOUR, Bars, Chart, Charts, Dots, Line, Note, Sides, Trace, envelope
 
-POINTS = 40_000  # most points of a line: with more, a browser no longer zooms smoothly
+POINTS = 40_000  # largest number of points in a line; with more, a browser does not zoom smoothly
 _INCH = 86  # pixels per inch of a chart's height
 _GAP, _NARROW_GAP = 62, 96  # pixels between rows of charts; in a narrow window axes have names there
 _MARGIN = {"l": 80, "r": 80, "t": 100, "b": 80}
 _NARROW_MARGIN = {"l": 52, "r": 12, "t": 160, "b": 60}
 _ASIDE = 0.085  # space between charts side by side, over the width of the window
 _SMALL = {"font": {"size": 12}}
-_OWN_WORDS: dict[str, Any] = {"hoverinfo": "none"}  # page.js writes these words, by the name of a trace
+_OWN_WORDS: dict[str, Any] = {"hoverinfo": "none"}  # page.js writes the words for each trace, found by the trace's name
 _INK = "rgb(36,36,36)"
-# From rare to often. The rarest is distinct on white paper and, with the colours inverted, on dark paper too
+# Colours from rare to frequent. The first is visible on white and, with inverted colours, on a dark background
 _OFTEN = [[0.0, "#5aabab"], [0.35, "#2f93b4"], [0.7, "#235fa5"], [1.0, "#0b1f5c"]]
 _AXIS = {
     "automargin": True,
@@ -46,7 +46,7 @@ _SIDES: dict[str, Any] = {  # place of the words beside a point
 
 
 def plain(values: Array, digits: int = 3) -> list[float | None]:
-    """Numbers for JSON: None for NaN, and fewer digits, because a page does not need sixteen."""
+    """Round numbers for JSON, because a page does not need sixteen digits. NaN becomes None."""
     return [None if value != value else value for value in np.round(values, digits).tolist()]
 
 
@@ -81,7 +81,8 @@ def _traces(trace: Trace) -> list[dict[str, Any]]:
         return [{"mode": "lines", "line": line, "x": plain(x), "y": plain(y)} | named]
     if isinstance(trace, Sides):
         x, y = envelope(trace.x, trace.y, POINTS, trace.gap_s)
-        gaps = np.flatnonzero(np.isnan(y))  # at both ends of one it is 0: plotly would fill from one end to the other
+        # at both ends of a gap y becomes 0, because plotly would fill across the gap
+        gaps = np.flatnonzero(np.isnan(y))
         x = np.insert(x, np.concatenate((gaps, gaps + 1)), np.concatenate((x[gaps - 1], x[gaps + 1])))
         y = np.insert(y, np.concatenate((gaps, gaps + 1)), 0.0)
         left = _filled("left", x, np.minimum(y, 0.0), LEFT_COLOUR)
@@ -107,7 +108,7 @@ def _traces(trace: Trace) -> list[dict[str, Any]]:
 
 
 def _filled(name: str, x: Array, y: Array, colour: str) -> dict[str, Any]:
-    """A trace filled from zero to y (n). Of each run of zeros only both ends are kept."""
+    """A trace filled from zero to y (n). Each run of zeros is reduced to its two ends."""
     leans = y != 0.0
     kept = leans.copy()
     kept[1:] |= leans[:-1]
@@ -155,8 +156,8 @@ def _layout(charts: Charts, narrow: bool, linked: bool) -> dict[str, Any]:
 
 
 def _annotations(chart: Chart, x: str, y: str, narrow: bool) -> list[dict[str, Any]]:
-    """All words on a chart: its title with its traces in their colours, those in its corners, at points and of
-    spans."""
+    """All words on a chart: the title, the names of the traces in their colours, and the words in the corners, at
+    points and in spans."""
     within = {"xref": f"{x} domain", "yref": f"{y} domain"}
     names = [
         f"<span style='color:{trace.colour}'>{trace.name}</span>"

@@ -1,4 +1,4 @@
-// The map of a ride, linked with its charts. Both are plotly's; the page gives CHART_AXES, the names of the time axes of
+// The map of a ride, linked with its charts. Plotly draws both. The page gives CHART_AXES, the names of the time axes of
 // the charts, and TILES: null, or where tiles of a map come from and what the map's origin is.
 const { map: MAP, axes: CHART_AXES, tiles: TILES } = JSON.parse(document.getElementById("map-data").textContent);
 if (finger) MAP.layout.dragmode = false;
@@ -49,7 +49,7 @@ Plotly.newPlot("map", MAP.data, MAP.layout, { ...FEW, scrollZoom: true });
   // The bar of the scale: 1, 2 or 5 times a power of ten, at most three tenths of the map's width.
   function scale() {
     const now = [...map.layout.xaxis.range, ...map.layout.yaxis.range, map.clientWidth].join();
-    if (now === scaled) return; // what it changes itself is drawn, too
+    if (now === scaled) return; // the change below causes another draw
     scaled = now;
     const width = map.layout.xaxis.range[1] - map.layout.xaxis.range[0], most = 0.3 * width;
     const ten = Math.pow(10, Math.floor(Math.log10(most)));
@@ -77,6 +77,6 @@ Plotly.newPlot("map", MAP.data, MAP.layout, { ...FEW, scrollZoom: true });
   }
 
   map.on("plotly_afterplot", scale);
-  Plotly.Plots.resize(map); // it was drawn before there was anything below it
+  Plotly.Plots.resize(map); // the text below takes height from the map, which is already drawn
   text.textContent = words(rows[0], rows[0][0]);
 })();

@@ -1,6 +1,5 @@
-"""Writes the ride as one HTML page to zoom into. The file needs no other file.
-
-If the log has positions, a map is beside the charts. Pointing at one shows the same moment in the other.
+"""Writes the ride as one HTML page that you can zoom. The page needs no other file.
+If the log has positions, a map is beside the charts. Pointing at a moment in the map or in a chart marks it in both.
 """
 
 from importlib.resources import files
@@ -16,7 +15,7 @@ from . import interactive, track_map
 from .charts import charts
 
 _HERE = Path(__file__).parent
-# The scripts of the charts and of the map. They contain no data: they are the same on every page.
+# The scripts of the charts and of the map. They contain no data, so they are the same on every page.
 SCRIPTS = tuple((_HERE / name).read_text(encoding="utf-8") for name in ("page.js", "map.js"))
 # OpenStreetMap's own server refuses a page that was opened as a file, because it requires the page's address.
 TILES_HOST = "https://basemaps.cartocdn.com"
@@ -37,8 +36,8 @@ def page(seen: Overview, library: str, allowed: str, tiles: bool = False, warnin
     """The page's HTML. library: the element that loads plotly.js. allowed: its source in the policy. tiles: see draw().
     warnings: show the charts' warnings above them.
 
-    The policy allows the page's own scripts, and loading of the map's tiles only. plotly.js compiles functions from
-    text for charts with many points, and sets styles.
+    The policy allows only the page's own scripts, and images of the map's tiles. It also allows 'unsafe-eval' and
+    inline styles: plotly.js compiles functions from text for charts with many points, and sets styles.
     """
     drawn, points = charts(seen), track_map.map_points(seen)
     beside = None

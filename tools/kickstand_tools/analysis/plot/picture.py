@@ -29,7 +29,7 @@ _STYLE: Any = {
     "xtick.color": "0.35",
     "ytick.color": "0.35",
 }
-_SIDES: dict[str, Any] = {  # of a point: where its words stand
+_SIDES: dict[str, Any] = {  # position of a point's words
     "above": {"xytext": (0, 4), "ha": "center", "va": "bottom"},
     "below": {"xytext": (0, -4), "ha": "center", "va": "top"},
     "left": {"xytext": (-3, 0), "ha": "right"},
@@ -133,5 +133,5 @@ def _draw_trace(axes: Any, trace: charts.Trace) -> None:
         axes.bar(trace.x, trace.y, width=trace.width, color=colours, linewidth=0)
     else:
         shown = np.ma.masked_equal(trace.values, 0.0)
-        scale = LogNorm(0.2 * float(shown.min()), float(shown.max()))  # so that the rarest is not white
+        scale = LogNorm(0.2 * float(shown.min()), float(shown.max()))  # the lowest value must not be white
         axes.pcolormesh(trace.edges, trace.edges, shown, cmap="YlGnBu", norm=scale, rasterized=True)

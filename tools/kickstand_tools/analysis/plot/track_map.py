@@ -1,7 +1,7 @@
 """Draws the map of a ride: its track, coloured by lean, north up, in metres.
 
-The projection is Mercator's, which keeps angles and which map tiles use. Its scale is right at the ride's own latitude;
-50 km further north it is off by one per cent.
+It uses the Mercator projection, as map tiles do. Angles are true. The scale is exact at the ride's own latitude; 50 km
+further north it is off by one per cent.
 """
 
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from .charts import LEFT_COLOUR, RIGHT_COLOUR, SPEED_COLOUR, lean_limit, shown_l
 from .interactive import PAPER, plain
 
 POINTS = 20_000
-SHORTEST_S = 0.2  # between points
-SAME_M = 0.5  # points closer to the previous one are left out: a bike that stands is one point
-MOST_LAT_DEG = 85.0  # beyond it Mercator has no map
+SHORTEST_S = 0.2  # least time between points
+SAME_M = 0.5  # points closer to the previous point are left out, so a standing bike is one point
+MOST_LAT_DEG = 85.0  # the map ends here, because Mercator cannot show the poles
 _SHAPES = (0.6, 2.2)  # width over height
 LEAST_LEAN_DEG = 30.0  # the lean with the full colour is at least this
-# From left to right: colour-blind people can also distinguish blue and orange; upright is grey
+# Colours from left lean to right lean, grey when upright. Colour-blind people can distinguish blue from orange
 _COLOURS = [[0.0, "#0d3a73"], [0.25, LEFT_COLOUR], [0.5, "#c9c9c9"], [0.75, RIGHT_COLOUR], [1.0, "#7a2c05"]]
 
 
@@ -29,8 +29,8 @@ _COLOURS = [[0.0, "#0d3a73"], [0.25, LEFT_COLOUR], [0.5, "#c9c9c9"], [0.75, RIGH
 class MapPoints:
     """m points of a track, sorted by their times t_s (s since the log's first sample).
 
-    east_m, north_m: from the point at lat_deg, lon_deg; one point is NaN in each gap of the positions. lean_deg: NaN if
-    the display shows none. speed_kmh: NaN if the log has none.
+    east_m, north_m: distances from the point at lat_deg, lon_deg; each gap in the positions has one point that is NaN.
+    lean_deg: NaN if the display shows none. speed_kmh: NaN if the log has none.
     """
 
     t_s: Array
@@ -69,8 +69,8 @@ def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
     """The map for plotly.js: {"data": traces, "layout": ...}, in plain numbers, lists and None for NaN.
 
     The first trace is the track as a line: customdata are time (s), lean (degrees) and speed (km/h), None if missing.
-    The second has the points in colour: customdata are their times. The first shape marks a place, the second is the
-    bar of the scale, and the first annotation that bar's length: map.js moves them.
+    The second trace has the coloured points: customdata are their times. The first shape marks a place, the second is
+    the scale bar, and the first annotation names the bar's length. map.js moves all three.
     """
     x, y = plain(points.east_m, 1), plain(points.north_m, 1)
     rows = [plain(row, 1) for row in np.column_stack((points.t_s, points.lean_deg, points.speed_kmh))]
@@ -117,7 +117,7 @@ def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
 
 
 def shape(points: MapPoints) -> float:
-    """The width of a map over its height, so that the track fills it: between a tall one and a wide one."""
+    """The width of the map divided by its height, chosen so that the track fills the map, within _SHAPES."""
     east, north = (float(np.nanmax(metres) - np.nanmin(metres)) for metres in (points.east_m, points.north_m))
     return float(np.clip((east or 1.0) / (north or 1.0), *_SHAPES))
 
@@ -134,8 +134,8 @@ def _mercator(lat_deg: Array) -> Array:
 
 
 def _moved(east: Array, north: Array) -> Ints:
-    """The numbers of the points to keep: those over SAME_M from the last kept one, the first in each gap, and the first
-    after it."""
+    """The indexes of the points to keep: points over SAME_M from the last kept point, the first in each gap, and the
+    first after each gap."""
     kept, (last_x, last_y) = [0], (east[0], north[0])
     for k, (x, y) in enumerate(zip(east.tolist(), north.tolist())):
         begins_or_ends_gap = (x != x) != (last_x != last_x)

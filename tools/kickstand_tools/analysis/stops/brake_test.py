@@ -1,12 +1,11 @@
 """Measures stops as in a brake test: initial speed, distance, mean fully developed deceleration.
 
-UN Regulation No. 13, Annex 4, paragraph 1.1.2: with the initial speed v0 at the start of braking, vb = 0.8 v0 and ve =
-0.1 v0 in km/h, and the distances sb and se in metres from there to vb and ve,
+UN Regulation No. 13, Annex 4, paragraph 1.1.2: braking starts at the speed v0 (km/h). The distances sb and se (m) are
+from that point to the speeds vb = 0.8 v0 and ve = 0.1 v0.
 
     dm = (vb^2 - ve^2) / (25.92 (se - sb))   in m/s2.
-
-At the standstill the force shows the slope of the road, and the gyro's readings are its bias. From there speed and
-pitch are integrated backwards. So the dive of the fork does not look like braking:
+    At the standstill the force shows the slope of the road, and the gyro's readings are its bias. Speed and pitch are
+integrated backwards from there. Because the pitch is known, the dive of the fork does not look like braking:
 
     dq/dt = w_y sin t - w_x cos t,   dv/dt = f_z - g sin q       (as in kickstand.lean.bike_model)
 
@@ -30,14 +29,15 @@ from .standstill import standing
 
 RATE_S = 0.02  # time between samples for the search of stops
 MIN_SPEED_MPS = 10.0 / 3.6
-MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0  # limits of a stop's deceleration: a larger one is a fall or a fault
+MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0  # limits of a stop's deceleration; above them it is a fall or a fault
 LONGEST_S = 60.0
-FEWEST = 10  # a standstill of so few samples shows neither slope nor bias
+FEWEST = 10  # a standstill with fewer samples shows neither slope nor bias
 GAP_S = 0.5  # longest gap in the readings over which speed and pitch are integrated
 REST_S = 2.5  # duration of the standstill that is used
-SETTLE_S = 0.5  # its beginning is not used, because the fork rebounds
-ONSET_SHARE, FAINT_SHARE = 0.15, 0.04  # shares of the full deceleration: above, braking has begun; below, it has not
-ONSET_S = 0.6  # longest time between these two
+SETTLE_S = 0.5  # this first part of a standstill is not used, because the fork rebounds
+# shares of the full deceleration: above the first, braking has begun; below the second, it has not
+ONSET_SHARE, FAINT_SHARE = 0.15, 0.04
+ONSET_S = 0.6  # longest time between these two shares
 
 # Height of the sensor above the point about which a bike pitches, which is as high as the wheels' hubs. When the nose
 # goes down, a sensor under the seat moves forward.
@@ -49,7 +49,7 @@ MAX_SIDE_M, MAX_HEADING_DEG = 15.0, 30.0  # limits of the deviation from a strai
 # between them. A degree of pitch makes 0.17 m/s2, and a gyro's drift adds to it: over more than SHOWING_S the speed
 # proves nothing.
 OPEN_MPS, OPEN_MPS2, SHOWING_S = 3.0, 0.7, 30.0
-SPEED_S, SURELY_MPS2 = 15.0, 1.5  # longest time, least deceleration of a stop that only the speed shows
+SPEED_S, SURELY_MPS2 = 15.0, 1.5  # longest time and least deceleration of a stop that only the log's speed shows
 
 STRAIGHT_S = 0.1  # the mean heading in this first part of the braking is the direction before it
 SMOOTH_S = 0.2  # accelerations and jerks are means over this time
@@ -76,7 +76,7 @@ class Stop:
 
 
 def find_stops(channels: Channels) -> list[Stop]:
-    """Every stop from over 10 km/h with at least 1 m/s2, as UN Regulation No. 13 measures it (see the module).
+    """Find every stop from over 10 km/h with at least 1 m/s2, measured by UN Regulation No. 13 (see the module).
 
     channels: a whole ride, from vehicle_channels(). pandas.DataFrame accepts the returned list.
 
@@ -94,7 +94,7 @@ def find_stops(channels: Channels) -> list[Stop]:
 
 
 def stops_of(ride: Channels, still: NDArray[np.bool_]) -> list[Stop]:
-    """find_stops() for a whole ride in means over RATE_S. still (n): True where it stands still."""
+    """Find the stops of a whole ride averaged over RATE_S. still (n): True where the vehicle stands still."""
     delay_s = speed_delay_s(ride)
     found, after = [], 0
     for start, end in stretches(still):
@@ -111,9 +111,9 @@ def stops_of(ride: Channels, still: NDArray[np.bool_]) -> list[Stop]:
 
 
 def mfdd_mps2(speed_mps: Array, distance_m: Array) -> float:
-    """Mean fully developed deceleration, dm in the module's docstring: for speeds in m/s 25.92 becomes 2.
-
-    speed_mps (n): falling from the initial speed to at most a tenth of it. distance_m (n): from the beginning to each.
+    """Mean fully developed deceleration, dm in the module's docstring. For speeds in m/s the factor 25.92 becomes 2.
+    speed_mps (n): falls from the initial speed to at most a tenth of it. distance_m (n): distances from the start of
+    braking.
     """
     vb, ve = 0.8 * speed_mps[0], 0.1 * speed_mps[0]
     falling = np.minimum.accumulate(speed_mps)
@@ -124,8 +124,8 @@ def mfdd_mps2(speed_mps: Array, distance_m: Array) -> float:
 
 
 def closes(speed_mps: float, seconds: float) -> bool:
-    """True if speed_mps, integrated back from a standstill to the previous one, is as near to 0 as the time between
-    allows."""
+    """True if speed_mps, integrated backwards from a standstill to the previous standstill, is close enough to 0 for
+    the seconds between them."""
     return seconds > SHOWING_S or abs(speed_mps) < OPEN_MPS + OPEN_MPS2 * seconds
 
 
@@ -135,8 +135,8 @@ def plausible(initial_speed_mps: float, side_m: float, heading_deg: float) -> bo
 
 
 def stops_by_speed(ride: Channels) -> bool:
-    """True if the speed in the log alone shows a stop from over 10 km/h that is surely hard enough for a brake test,
-    even if the force does not show it."""
+    """True if the log's speed shows a stop from over 10 km/h that is certainly hard enough for a brake test, even if
+    the force does not show the stop."""
     there = ~np.isnan(ride.speed_mps)
     time, speed = ride.t_s[there], ride.speed_mps[there]
     for end in np.flatnonzero((speed[1:] < STANDING_MPS) & (speed[:-1] >= STANDING_MPS)) + 1:
@@ -148,10 +148,9 @@ def stops_by_speed(ride: Channels) -> bool:
 
 
 def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | None:
-    """The stop that ends in the standstill from index rest on; None if it is not a stop.
-
-    part: the ride up to some time into that standstill. from_rest: True if part begins at the end of the previous
-    standstill.
+    """The stop that ends in the standstill which begins at index rest. None if there was no stop.
+    part: the ride up to some time after the beginning of that standstill. from_rest: True if part begins at the end of
+    the previous standstill.
     """
     time = part.t_s
     acceleration, pitch_rate, yaw_rate = _acceleration(part, rest)
@@ -181,7 +180,7 @@ def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | 
         return None
     heading = integral(t, yaw_rate[braked])
     straight = np.mean(heading[t <= t[0] + STRAIGHT_S])
-    # the fork's rebound hides the last hundredths of the speed, which are assumed to fall evenly to zero
+    # the fork's rebound hides the last hundredths of the braking: assume that the speed falls evenly to zero
     tail = v[-1] / mfdd
     stop = Stop(
         float(t[0]),

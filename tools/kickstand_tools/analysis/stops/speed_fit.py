@@ -1,7 +1,7 @@
 """Corrects a speed integrated from the acceleration by the speed in the log.
 
-If a log has one speed per second, a hard stop has two or three values, which do not show its shape. The acceleration
-shows the shape, but its integral drifts.
+A log with one speed per second has only two or three speeds in a hard stop. They do not show how the speed falls. The
+acceleration shows that, but its integral drifts.
 """
 
 import numpy as np
@@ -10,10 +10,10 @@ from kickstand.units import STANDARD_GRAVITY
 from ...signals import Array, best_lag, integral, smoothed
 from ..channels import Channels
 
-SMOOTH_S = 0.2  # smoothing of the acceleration: delay x acceleration is the error of a late speed
+SMOOTH_S = 0.2  # smoothing of the acceleration, which multiplied by the delay is the error of a late speed
 LEAD_S = 4.0  # time before the braking in which the log's speed is used for the fit
 DELAYS_S = np.arange(-0.5, 1.51, 0.05)  # delays of the speed that are tried
-# A delay is searched in at least this many speeds, a second apart, whose changes have at least this standard deviation
+# The search for a delay needs this many speeds, a second apart, whose changes have at least this standard deviation
 ENOUGH_SPEEDS, ENOUGH_CHANGE_MPS = 30, 0.5
 
 # One standard deviation of each fitted parameter and of a speed
@@ -24,7 +24,7 @@ SIGMA_WALK_MPS2, KNOT_S = 0.1, 0.5  # per square root of a second
 def speed_delay_s(ride: Channels) -> float:
     """The delay at which the changes of the log's speed best match the integrated longitudinal force, s.
 
-    0 if the ride does not show it.
+    0 if the ride does not show a delay.
     """
     there = np.flatnonzero(~np.isnan(ride.speed_mps))
     there = there[np.unique(np.floor(ride.t_s[there]), return_index=True)[1]]  # one a second
@@ -47,17 +47,17 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
     part: the ride up to a standstill; speed, acceleration (n): integrated and measured, m/s and m/s2. begin: index at
     which braking begins. delay_s: delay of the log's speed.
 
-    Least squares with a prior. The log's speed at the time t is
+    The correction is found by least squares with a prior. The log's speed at the time t is
 
         u(t) = (1 + k) v(t) + integral of b from t to the end - d a(t)
 
-    with the arguments v and a, the scale error k, the error b of the acceleration, m/s2, and the error d of the delay,
-    s. b comes from hill and dive that the gyro did not measure: a random walk back in time, from nearly 0 at
-    standstill, linear between knots (its basis are hat functions, the linear B-splines).
+    with the arguments v and a, the scale error k, the acceleration error b (m/s2) and the delay error d (s). The error
+    b comes from slopes and fork dive that the gyro did not measure. It is modelled as a random walk backwards in time,
+    nearly 0 at standstill and linear between knots (the basis are hat functions, the linear B-splines).
     """
     time = part.t_s
     values = np.flatnonzero(~np.isnan(part.speed_mps))
-    # the samples at which these speeds were true
+    # the samples at which the vehicle had these speeds
     wanted = np.minimum(np.searchsorted(time, time[values] - delay_s - 1e-6), len(time) - 1)
     values, wanted = (these[time[wanted] >= time[begin] - LEAD_S] for these in (values, wanted))
     if len(wanted) < 2 or wanted[-1] < begin:
@@ -65,7 +65,7 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
     knots = np.arange(float(time[-1]), float(min(time[wanted[0]], time[begin])) - KNOT_S, -KNOT_S)
     hats = np.column_stack([np.interp(time, knots[::-1], row[::-1]) for row in np.eye(len(knots))])
     pushed = np.column_stack([integral(time, hat) for hat in hats.T])
-    pushed = pushed[-1] - pushed  # from each sample to the end
+    pushed = pushed[-1] - pushed  # integral from each sample to the end
     terms = np.column_stack((speed, pushed, -smoothed(acceleration, time, SMOOTH_S)))[wanted]
     error = part.speed_mps[values] - speed[wanted]
     prior = _prior(len(knots))
@@ -77,8 +77,8 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
 
 
 def _prior(knots: int) -> Array:
-    """(knots + 2, knots + 2): the prior. Its product with the unknowns (k, b at each knot from the end on, d) is
-    expected to be 0, with a standard deviation of 1."""
+    """The matrix of the prior, (knots + 2, knots + 2). The matrix times the unknowns (k; b at each knot, last knot
+    first; d) has mean 0 and standard deviation 1."""
     walk = [SIGMA_WALK_MPS2 * KNOT_S**0.5] * (knots - 1)
     sigma = np.array([SIGMA_SCALE, SIGMA_SLOPE_MPS2, *walk, SIGMA_DELAY_S])
     prior = np.eye(knots + 2)

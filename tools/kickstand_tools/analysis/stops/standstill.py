@@ -1,8 +1,8 @@
 """Detects standstills, for the stops of a ride.
 
-It does not use signals.motionless. Limits relative to the ride's own shaking detect all of the standing time of
-simulated rides on the road; limits in deg/s and g detect 54 to 92 %. Only if an idling engine shakes like the road,
-relative limits detect less (17 to 41 % against 91 %).
+The limits are relative to the shaking of the ride. They find all of the standing time in simulated rides; the fixed
+limits of signals.motionless, in deg/s and g, find 54 to 92 %. Only where an idling engine shakes as much as the road,
+relative limits find less (17 to 41 % instead of 91 %).
 """
 
 import numpy as np
@@ -12,19 +12,19 @@ from ..channels import Channels, spacing_s
 
 STALE_S = 3.0  # an older speed is not used
 
-# Without a speed: a vehicle stands still while, over QUIET_S, it shakes by less than a share of its shaking when moving
+# Without a speed, a vehicle stands still if it shakes over QUIET_S by less than a share of its shaking when moving
 QUIET_S = 1.0
-QUIET_SHARE = 0.15  # that share for pitch and yaw
-QUIET_UP_SHARE = 0.2  # that share for up and down: smooth roads and an idling engine leave more than a standing fork
+QUIET_SHARE = 0.15  # this share, for pitch and yaw
+QUIET_UP_SHARE = 0.2  # this share, for up and down: a fork at a stop shakes less, smooth roads and idling engines more
 RIDING_PERCENTILE = 90.0  # this percentile of the shaking is from moving, even in a ride with long pauses
-ENGINE_S, BEND_S = 0.1, 0.5  # the road shakes slower than an idling engine, faster than bends and the fork's dive
+ENGINE_S, BEND_S = 0.1, 0.5  # shaking by the road is slower than an engine's, and faster than bends and the fork's dive
 STILL_DPS, STILL_G = 1.0, 0.01  # limits at standstill: rate, change of the forward force from beginning to end
-MAX_OFF_G = 0.05  # largest difference of the force from that at rest; in smooth braking and bends it is larger
-UNCALIBRATED_G = 0.12  # largest difference from 1 g, for a ride without rest and a sensor without six positions
+MAX_OFF_G = 0.05  # largest difference from the force at rest; even smooth braking and gentle bends exceed this
+UNCALIBRATED_G = 0.12  # largest difference from 1 g if the ride has no rest and the sensor is not calibrated
 
 
 def standing(ride: Channels) -> Bools:
-    """(n) True where the vehicle stands still: from the log's speed, or without one from its small shaking."""
+    """(n) True where the vehicle stands still. Uses the log's speed or, without a speed, the shaking."""
     still = _quiet(ride)
     if not np.any(still):
         still = _rests_of_filter(ride)
@@ -55,8 +55,8 @@ def _quiet(ride: Channels) -> Bools:
 
 
 def _rests_of_filter(ride: Channels) -> Bools:
-    """The rests that the lean filter found, for a road that is too smooth for the test of shaking. Each is extended
-    back to where the forward force reached that of the rest."""
+    """The rests found by the lean filter, for a road that is too smooth to detect standstills by shaking. Each rest is
+    extended back to the time when the forward force reached its value at rest."""
     still = ride.resting > 0.5
     forward = smoothed(ride.forward_g, ride.t_s, ENGINE_S)
     for start, _ in stretches(still):
@@ -67,20 +67,20 @@ def _rests_of_filter(ride: Channels) -> Bools:
 
 
 def _shaking_by_road(values: Array, time: Array) -> Array:
-    """The shaking caused by the road: values without the engine's shaking, and without bends and braking, which are
-    larger."""
+    """The values without the engine's shaking (faster), and without bends and braking (slower): the road's shaking."""
     slow = smoothed(values, time, ENGINE_S)
     return slow - smoothed(slow, time, BEND_S)
 
 
 def _is_calm(values: Array, n: int, share: float) -> Bools:
-    """True where the standard deviation of n successive samples is under this share of the one while moving."""
+    """True where the standard deviation of n successive samples is under this share of the deviation while moving."""
     spread = window_spreads(values, n)
     return spread < share * np.percentile(spread, RIDING_PERCENTILE)
 
 
 def _has_force_at_rest(ride: Channels, n: int) -> Bools:
-    """True where the force over n successive samples equals that at rest, within the sensor's calibration errors."""
+    """True where the force over n successive samples equals the force at rest, within the sensor's calibration
+    errors."""
     size = np.sqrt(sum(window_means(axis, n) ** 2 for axis in (ride.left_g, ride.up_g, ride.forward_g)))
     rests = size[window_means(ride.resting, n) > 0.99]
     weight = float(np.median(rests)) if len(rests) else 1.0

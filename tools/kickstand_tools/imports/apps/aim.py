@@ -1,9 +1,9 @@
-"""AiM's CSV from RaceStudio: InlineAcc, LateralAcc and VerticalAcc in g, RollRate, PitchRate and YawRate in deg/s.
+"""Reads AiM's CSV from RaceStudio: InlineAcc, LateralAcc, VerticalAcc in g, RollRate, PitchRate, YawRate in deg/s.
 
-Column names and signs were measured on the session tests/test_data/SFJ/*_0101.csv of
+Column names and signs were found from the session tests/test_data/SFJ/*_0101.csv of
 https://github.com/m3rlin45/libxrk: at rest VerticalAcc is -1. LateralAcc and YawRate are positive in a right turn,
-InlineAcc when speeding up. So the axes are forward, right and down. If VerticalAcc is +1 at rest, that channel points
-up and keeps its sign; the others are treated the same.
+InlineAcc when speeding up. The axes are therefore forward, right and down. If VerticalAcc is +1 at rest, that channel
+points up and keeps its sign; the other channels are treated in the same way.
 """
 
 import numpy as np

@@ -1,7 +1,8 @@
-"""Reads Kickstand's own files: a log, also saved by a spreadsheet, and the CSV or Parquet files of `kickstand export`.
+"""Reads Kickstand's own files: logs, also if saved by a spreadsheet, and the CSV or Parquet files of `kickstand
+export`.
 
-racechrono.py reads its exports in RaceChrono's form. Its VBO cannot be read back: it has neither the vertical force nor
-the pitch rate.
+racechrono.py reads exports in RaceChrono's format. An exported VBO cannot be imported, because it has neither the
+vertical force nor the pitch rate.
 """
 
 import io
@@ -18,7 +19,7 @@ from ..units import EPOCH_NS, Nanoseconds
 NAME = "Kickstand"
 _FORCES = ("left_g", "up_g", "forward_g")
 _RATES = ("pitch_rate_dps", "yaw_rate_dps", "roll_rate_dps")
-_RATE_SIGNS = np.array([-1.0, 1.0, 1.0])  # pitch is positive nose up, opposite to the axis to the left
+_RATE_SIGNS = np.array([-1.0, 1.0, 1.0])  # pitch is positive nose up, which is negative about the left axis
 
 
 def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
@@ -27,7 +28,7 @@ def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 
 def read(files: list[RecordingFile], name: str) -> AppRecording:
-    """Read a recording. Raises InputError for a replay's output, which does not contain all readings."""
+    """Read a recording. Raises InputError for the output of a replay, which lacks readings."""
     sheet = _sheet(files[0])
     time_ns = sheet.times(sheet.columns.index("t_s"))
     log, no_log = sheet.axes(*COLUMNS[1:])
@@ -39,7 +40,7 @@ def read(files: list[RecordingFile], name: str) -> AppRecording:
         accel = sensor_of(sheet, time_ns, exported[:3], "accelerometer", "g", "left, up, forward")
         gyro = sensor_of(sheet, time_ns, exported[3:], "gyro", "deg/s", "left, up, forward", _RATE_SIGNS)
     else:
-        raise InputError(f"{name} holds a lean, no readings: give the log that it was made from")
+        raise InputError(f"{name} contains a lean but no readings: give the log that it was made from")
     speed, lat, lon = (sheet.place(column) for column in ("speed_mps", "lat_deg", "lon_deg"))
     track = track_of(sheet, time_ns, speed, lat, lon)
     temp_c = sheet.numbers(sheet.place("temp_c"))

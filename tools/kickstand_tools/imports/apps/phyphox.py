@@ -1,6 +1,6 @@
-"""phyphox: one CSV per sensor in a folder or a zip, or one CSV for all sensors. Signs are Android's on every phone.
+"""Reads phyphox: one CSV per sensor in a folder or a zip, or one CSV for all sensors. Every phone has Android's signs.
 
-Names of files and columns are those of the app's own template,
+Names of files and columns come from the app's own template,
 UI/MainView/CreateExperiment/SimpleExperimentTemplete.swift of https://github.com/phyphox/phyphox-ios, and the "Raw
 Data" of https://github.com/phyphox/phyphox-experiments. On an iPhone the app multiplies Core Motion's acceleration and
 gravity by -9.81 (ExperimentSensorInput.swift).
@@ -32,7 +32,7 @@ from ..units import ACCELERATIONS, EPOCH_NS, RATES, Nanoseconds, of_seconds, uni
 NAME = "phyphox"
 _AXIS = re.compile(r"^(?:(.*\S)\s+)?([xyz])\s*\(([^)]*)\)$", re.IGNORECASE)
 _SIGN = "+1 g up, on every phone"
-_WITHOUT_GRAVITY = "linear"  # is in the name of a sensor without gravity
+_WITHOUT_GRAVITY = "linear"  # part of the name of a sensor without gravity
 
 
 def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
@@ -78,7 +78,7 @@ def _is_ours(file: RecordingFile) -> bool:
 
 
 def _sensors(sheet: Sheet, stem: str, pauses: "_Pauses") -> Iterator[tuple[str, RecordedSensor]]:
-    """Yield the sensors of one file, each with its kind. The time of a sensor is in the column before it."""
+    """Yield (kind, sensor) for each sensor in a file. The column before a sensor is its time."""
     groups: dict[tuple[int, str, str], dict[str, int]] = {}
     time_place = 0
     for place, column in enumerate(sheet.columns):
@@ -114,8 +114,8 @@ def _location(sheet: Sheet, pauses: "_Pauses") -> ReceiverTrack | None:
 
 
 class _Pauses:
-    """Reads meta/time.csv: when the experiment was started and paused. The experiment's time stops in a pause, UTC does
-    not."""
+    """Reads from meta/time.csv when the experiment was started and paused. The experiment's time stops during a pause,
+    but UTC does not."""
 
     def __init__(self, files: list[RecordingFile]) -> None:
         self.utc_ns: int | None = None
@@ -137,7 +137,7 @@ class _Pauses:
             self._resumed = [(at[k], max(0, clock[k] - clock[starts[0]] - (at[k] - at[starts[0]]))) for k in starts[1:]]
 
     def after(self, time_ns: Nanoseconds) -> Nanoseconds:
-        """The experiment's times plus the pauses before them."""
+        """Add to each of the experiment's times the pauses before it."""
         moved = time_ns.copy()
         for at, paused in self._resumed:
             moved = np.where(time_ns >= at, time_ns + paused, moved)

@@ -1,9 +1,9 @@
-"""RaceBox's CSV: GForceX to Z in g, GyroX to Z in deg/s; x forward, y left, z up, at rest GForceZ is +1.
+"""Reads RaceBox's CSV: GForceX to Z in g, GyroX to Z in deg/s; x forward, y left, z up; GForceZ is +1 at rest.
 
-Column names of the presets: docs of https://github.com/beadon/RacePlex. The axes (X forward, Y left, Z up, GyroZ
-positive in a left turn) were measured on the ride in its src/lib/__fixtures__/racebox-session.csv. Quantities:
-https://www.racebox.pro/products/mini-micro-protocol-documentation. The column Speed names no unit; the positions show
-it.
+The column names of the presets are in the docs of https://github.com/beadon/RacePlex. The axes (X forward, Y left, Z
+up, GyroZ positive in a left turn) were found from the ride src/lib/__fixtures__/racebox-session.csv there. The
+quantities are described in https://www.racebox.pro/products/mini-micro-protocol-documentation. The column Speed has no
+unit; the unit is found from the positions.
 """
 
 from collections.abc import Mapping
@@ -26,8 +26,8 @@ def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 
 def read(files: list[RecordingFile], name: str, units: Mapping[str, str] = {}) -> AppRecording:
-    """Read a recording. units: "speed" is the unit of the column Speed; without it the positions show the unit. Raises
-    InputError for a missing column and for a unit that is not one of speed."""
+    """Read a recording. units: "speed" is the unit of the column Speed. Without it, the unit is found from the
+    positions. Raises InputError for a missing column and for a unit that is not a unit of speed."""
     said = units.get("speed", "")
     if said:
         factor(said, SPEEDS, "speed")
@@ -56,7 +56,7 @@ def read(files: list[RecordingFile], name: str, units: Mapping[str, str] = {}) -
 
 
 def _header(file: RecordingFile) -> int | None:
-    """The number of the line of names. Lines about the laps may come before it."""
+    """The number of the line of column names. Lines about the laps may come before it."""
     for number, line in enumerate(file.text.split("\n", 200)[:200]):
         names = {plain(cell) for cell in names_in(line)}
         if {"gforcex", "gforcez", "time"} <= names:

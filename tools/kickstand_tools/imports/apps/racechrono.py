@@ -1,10 +1,10 @@
-"""RaceChrono's CSV, versions 2 and 3: three axes of an accelerometer and a gyro beside the data of a receiver.
+"""Reads RaceChrono's CSV, versions 2 and 3: three axes of an accelerometer and a gyro, and the data of a receiver.
 
-Version 3 has three heading lines (names, units, sources), and some names twice: see
-https://github.com/jLynx/RaceChrono-to-CSV, Short_RaceChrono_Offical_App_Data.csv; with x_acc to z_acc of "101: acc" in
-G and x_rate_of_rotation of "102: gyro" in deg/s https://github.com/ClassicMiniDIY/UltraLog/pull/85. lateral_acc and
-longitudinal_acc are calculated from positions and do not contain gravity. The axes are those of the phone or the box.
-Kickstand's own export has this form, too.
+Version 3 has three heading lines (names, units, sources), and some names twice. Examples:
+Short_RaceChrono_Offical_App_Data.csv of https://github.com/jLynx/RaceChrono-to-CSV, and, with x_acc to z_acc of "101:
+acc" in G and x_rate_of_rotation of "102: gyro" in deg/s, https://github.com/ClassicMiniDIY/UltraLog/pull/85.
+lateral_acc and longitudinal_acc are calculated from positions and do not contain gravity. The axes are those of the
+phone or the box. Kickstand's own export also has this format.
 """
 
 from ...common.errors import InputError
@@ -23,7 +23,7 @@ def find_recordings(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 def read(files: list[RecordingFile], name: str) -> AppRecording:
     """Read a recording. Raises InputError for a missing column or sensor."""
-    lines = files[0].text.split("\n", 60)[:60]  # with blank ones, because line numbers count them
+    lines = files[0].text.split("\n", 60)[:60]  # including blank lines, because line numbers count them
     header = next((k for k, line in enumerate(lines) if _is_header(line)), None)
     if header is None:
         raise InputError(f"{name}: no line with the names of its columns: export it again as CSV v3")
@@ -60,7 +60,7 @@ def _is_header(line: str) -> bool:
 
 
 def _units(lines: list[str], header: int) -> tuple[dict[int, str], int]:
-    """The units by the numbers of their columns, and the number of header lines after the first."""
+    """The units by column number, and the number of header lines after the first."""
     following = [names_in(line) for line in lines[header + 1 : header + 3]]
     if len(following) == 2 and following[0] and following[0][0] == "unix time":
         return {place: cell for place, cell in enumerate(following[0]) if cell}, 2
@@ -69,5 +69,5 @@ def _units(lines: list[str], header: int) -> tuple[dict[int, str], int]:
 
 
 def _is_speed(column: str) -> bool:
-    """Version 2 has the speed in three units; version 3 in m/s."""
+    """True for a column of the speed. Version 2 has the speed in three units, version 3 in m/s."""
     return plain(column) == "speed" and ("(" not in column or "m/s" in column)

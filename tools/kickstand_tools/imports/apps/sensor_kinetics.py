@@ -1,8 +1,9 @@
-"""Sensor Kinetics (Innoventions): NAME_accm.csv, NAME_gyrm.csv and so on, with a rounded time in s from the start.
+"""Reads Sensor Kinetics (Innoventions): NAME_accm.csv, NAME_gyrm.csv and so on, with a rounded time in s from the
+start.
 
-Names of the files: https://rotoview.com/multi-sensor-file-system.html and the recordings in
-https://github.com/Intelligent-Systems-Phystech/MobileSensorData, some of which have semicolons and decimal commas.
-Units are m/s2 and rad/s; at rest with the screen up z is +9.8.
+The names of the files are described in https://rotoview.com/multi-sensor-file-system.html. Example recordings, some
+with semicolons and decimal commas, are in https://github.com/Intelligent-Systems-Phystech/MobileSensorData. Units are
+m/s2 and rad/s. At rest with the screen up, z is +9.8.
 """
 
 import re

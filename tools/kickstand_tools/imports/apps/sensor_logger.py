@@ -1,7 +1,7 @@
-"""Sensor Logger (Kelvin Choi): one CSV per sensor, times in ns since 1970, signs as in the phone's system.
+"""Reads Sensor Logger (Kelvin Choi): one CSV per sensor, times in ns since 1970, signs as in the phone's system.
 
-Files and units: UNITS.md, signs: COORDINATES.md and CROSSPLATFORM.md of
-https://github.com/tszheichoi/awesome-sensor-logger. Accelerometer.csv does not contain gravity. An iPhone's
+In https://github.com/tszheichoi/awesome-sensor-logger, UNITS.md describes files and units, and COORDINATES.md and
+CROSSPLATFORM.md describe the signs. Accelerometer.csv does not contain gravity. An iPhone's
 acceleration and gravity have the opposite sign, and AccelerometerUncalibrated is in g, unless "Standardise Units &
 Frames" was on.
 """

@@ -1,8 +1,10 @@
-"""SensorLog (Bernd Thomas) on an iPhone or a Watch: one wide CSV, each sensor with its own time since the start of iOS.
+"""Reads SensorLog (Bernd Thomas) from an iPhone or a Watch: one wide CSV. Each sensor has a time since the start of
+iOS.
 
-Columns are those of the example logs at http://sensorlog.berndthomas.net. Values are Core Motion's. Accelerations are
-in g and read -1 along the axis that points up at rest (https://developer.apple.com/reference/uikit/uiacceleration),
-they are the sum of gravity and the user's acceleration, which are also given. Rates are in rad/s, right-handed.
+Columns are those of the example logs at http://sensorlog.berndthomas.net. Values come from Core Motion. Accelerations
+are in g, and read -1 along the axis that points up at rest
+(https://developer.apple.com/reference/uikit/uiacceleration). They are the sum of gravity and the user's acceleration,
+which the file also contains. Rates are in rad/s, right-handed.
 """
 
 import numpy as np
@@ -58,7 +60,7 @@ def _is_ours(file: RecordingFile) -> bool:
 
 
 def _axis_columns(sheet: Sheet, names: list[str]) -> list[int]:
-    """The columns of three axes; none if one is missing or empty."""
+    """The columns of three axes; an empty list if one is missing or empty."""
     found, missing = sheet.axes(*names)
     return found if not missing and np.any(np.isfinite(sheet.table(found)).all(axis=1)) else []
 
@@ -99,7 +101,7 @@ def _utc_ns(sheet: Sheet) -> int | None:
 
 
 def _location(sheet: Sheet) -> ReceiverTrack | None:
-    """The positions and speeds. A fix is new in a row if its own time has changed."""
+    """The positions and speeds. A row has a new fix if the fix's own time has changed."""
     row_ns = _times(sheet, "accelerometer" if _axis_columns(sheet, _ACCEL) else "motion")
     fix = sheet.place("locationTimestamp_since1970")
     if fix is not None:

@@ -1,9 +1,10 @@
-"""Racelogic's VBO, with the channels of an inertial unit such as the IMU04.
+"""Reads Racelogic's VBO, with the channels of an inertial unit such as the IMU04.
 
-Sections and standard channels: https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format; latitude
-and longitude in minutes, longitude positive in the west. Signs of the IMU04's channels, "CAN Output - IMU04" at
-en.racelogic.support: acceleration x forward, y to the left, z up, including gravity; yaw rate positive clockwise, pitch
-rate positive nose up. So the rates are about axes forward, right and down.
+Sections and standard channels are those of
+https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format. Latitude and longitude are in minutes, and
+longitude is positive in the west. The signs of the IMU04's channels are in "CAN Output - IMU04" at
+en.racelogic.support. Acceleration is x forward, y to the left, z up, including gravity. The yaw rate is positive
+clockwise, the pitch rate positive nose up, so the rates are about axes forward, right and down.
 """
 
 import re
@@ -18,7 +19,7 @@ from ..recording import AppRecording, Sheet, plain, sensor_of, track_of
 from ..units import ACCELERATIONS, RATES, SPEEDS, of_day, unit
 
 NAME = "VBO"
-_CHANNELS = {  # the vehicle's: along and about left, up, forward
+_CHANNELS = {  # channels along and about the vehicle's left, up, forward
     "Y_Accel": ("yaccel", "yacceleration", "imuyaccel"),
     "Z_Accel": ("zaccel", "zacceleration", "imuzaccel"),
     "X_Accel": ("xaccel", "xacceleration", "imuxaccel"),
@@ -118,7 +119,7 @@ def _sheet(name: str, sections: dict[str, list[str]]) -> Sheet:
 
 
 def _units(sections: dict[str, list[str]], sheet: Sheet) -> dict[int, str]:
-    """The units of the last columns: [channel units] has one line for each non-standard channel."""
+    """The units of the last columns. [channel units] has one line for each non-standard channel."""
     units = sections.get("channel units", [])
     while units and not units[-1]:
         units = units[:-1]
@@ -129,7 +130,7 @@ def _units(sections: dict[str, list[str]], sheet: Sheet) -> dict[int, str]:
 
 
 def _first(sheet: Sheet, name: str) -> int | None:
-    """The first column with this name, also with its source after a hyphen: x_acc-acc."""
+    """The first column with this name. The source may follow after a hyphen, as in x_acc-acc."""
     found = [plain(column.partition("-")[0]) for column in sheet.columns]
     return found.index(name) if name in found else None
 
@@ -141,7 +142,8 @@ def _speed_unit(sections: dict[str, list[str]]) -> str:
 
 
 def _midnight_ns(sections: dict[str, list[str]]) -> int | None:
-    """The start of the day on which the file was created, ns since 1970: the rows' times are UTC of that day."""
+    """The start of the day on which the file was created, ns since 1970. The rows' times are the UTC time of this
+    day."""
     match = re.search(r"(\d{1,2})/(\d{1,2})/(\d{4})", " ".join(sections[""][:3]))
     try:
         day = datetime(int(match[3]), int(match[2]), int(match[1]), tzinfo=UTC) if match else None

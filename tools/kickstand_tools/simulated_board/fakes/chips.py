@@ -1,10 +1,10 @@
-"""The boards that can be simulated: their names in MicroPython, and the pins and I2C controllers of their chips.
+"""Lists the boards that can be simulated: their names in MicroPython, and their chips' pins and I2C controllers.
 
 Sources: data sheets of the chips; mpconfigboard.h of each board in ports/rp2/boards and ports/esp32/boards of
 MicroPython.
 """
 
-# By a short name, the board's sys.implementation._machine
+# short name -> sys.implementation._machine of the board
 MACHINES = {
     "pico": "Raspberry Pi Pico with RP2040",
     "pico w": "Raspberry Pi Pico W with RP2040",
@@ -24,7 +24,7 @@ MACHINES = {
     "c6": "ESP32C6 module with ESP32-C6",
     "h2": "ESP32H2 module with ESP32-H2",
 }
-# (first, last) GPIO numbers that machine.Pin accepts, of the classic ESP32 ("") and of the others by their names' ends
+# (first, last) GPIO numbers that machine.Pin accepts. Keys are the ends of the chips' names, "" for the classic ESP32
 _ESP32_PINS = {
     "": ((0, 23), (25, 27), (32, 39)),
     "S2": ((0, 21), (33, 46)),
@@ -36,7 +36,7 @@ _ESP32_PINS = {
 
 
 def pins_of(machine):
-    """The GPIO numbers that machine.Pin accepts on this board: on a classic ESP32 also those of its flash."""
+    """The GPIO numbers that machine.Pin accepts on this board. On a classic ESP32 these include the flash's pins."""
     ranges = ((0, 29),) if _chip(machine).startswith("RP2") else _ESP32_PINS[_kind(machine)]
     pins = frozenset(pin for first, last in ranges for pin in range(first, last + 1))
     return pins - {16, 17} if "SPIRAM" in machine else pins
@@ -54,11 +54,11 @@ def inputs_only(machine):
 
 def i2c_controllers(machine):
     """Number of I2C controllers that machine.I2C can use."""
-    return 1 if _chip(machine)[:7] in ("ESP32C3", "ESP32C6") else 2  # a C6 also has a low-power one
+    return 1 if _chip(machine)[:7] in ("ESP32C3", "ESP32C6") else 2  # machine.I2C lacks the C6's low-power controller
 
 
 def has_bluetooth(machine):
-    """True if its MicroPython has the module bluetooth."""
+    """True if MicroPython for this board has the module bluetooth."""
     chip = _chip(machine)
     return " W with " in machine if chip.startswith("RP2") else not chip.startswith("ESP32S2")
 

@@ -1,5 +1,5 @@
-"""Adds to CPython what the firmware needs from MicroPython: modules `micropython` and `framebuf`, sys.print_exception,
-and functions of gc."""
+"""Adds MicroPython's features to CPython: the modules `micropython` and `framebuf`, sys.print_exception, and functions
+of gc."""
 
 import gc
 import sys
@@ -10,7 +10,7 @@ from . import framebuf
 
 
 def supplement():
-    """Add them, to import drivers and app. The firmware's mathematics runs without."""
+    """Add the features. Drivers and app need them; the firmware's mathematics does not."""
     sys.modules.setdefault("micropython", _module())
     sys.modules.setdefault("framebuf", framebuf)
     if not hasattr(sys, "print_exception"):
@@ -33,5 +33,6 @@ def _module():
 
 
 def _no_viper(function):
-    """Raise the error that its annotations' types raise until Python 3.13; from 3.14 on they are not evaluated."""
+    """Raise NameError, as the annotations of viper functions do up to Python 3.13. Later Pythons do not evaluate
+    them."""
     raise NameError("CPython has no machine code")

@@ -1,23 +1,23 @@
-"""MicroPython's `bluetooth` on the simulated board: the parts that a peripheral needs, on the radio of the board
-installed last. The errors are those of the ports with NimBLE (ESP32) and btstack (Pico W).
+"""MicroPython's `bluetooth` on the simulated board: the functions of a peripheral, on the radio of the board installed
+last. Errors are the same as in the ports with NimBLE (ESP32) and btstack (Pico W).
 """
 
 import errno
 
 from . import fake_machine
 
-NOTIFY_US = 150  # processor time of a notification; assumed, because no radio was measured
+NOTIFY_US = 150  # processor time of a notification: an assumption, not measured
 
 
 class UUID:
-    """bluetooth.UUID of a number or a text."""
+    """bluetooth.UUID, from a number or a text."""
 
     def __init__(self, value):
         self.value = value
 
 
 def BLE():
-    """bluetooth.BLE(). On boards that cannot pair it has no gap_passkey()."""
+    """bluetooth.BLE(). On boards that cannot pair, the result has no gap_passkey()."""
     radio = fake_machine.board.radio
     return PairingBle(radio) if radio.pairs else Ble(radio)
 
@@ -61,7 +61,7 @@ class Ble:
     def gap_advertise(self, interval_us, adv_data=b"", *, resp_data=b"", connectable=True):
         assert len(adv_data) <= 31 and len(resp_data) <= 31
         if self._on().phone is not None:
-            raise OSError(errno.ENOMEM)  # btstack has room for one connection
+            raise OSError(errno.ENOMEM)  # btstack allows only one connection
         self._radio.found, self._radio.named = adv_data, resp_data
 
     def gap_disconnect(self, conn_handle):
@@ -90,7 +90,7 @@ class Ble:
 
 
 class PairingBle(Ble):
-    """Adds a feature of NimBLE that btstack's build for a Pico W lacks."""
+    """Adds gap_passkey(), which NimBLE has, but not btstack's build for a Pico W."""
 
     _PAIRING = ("bond", "mitm", "io", "le_secure")
 

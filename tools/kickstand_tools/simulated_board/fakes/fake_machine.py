@@ -1,5 +1,5 @@
 """MicroPython's `machine` on the simulated board: the parts that the firmware may use, with the errors of the rp2 and
-esp32 ports. It acts on the board installed last.
+esp32 ports. All calls act on the board installed last.
 """
 
 import errno
@@ -7,15 +7,15 @@ import errno
 from ..clock import Reset
 from . import chips
 
-CALL_US = 2  # duration of a call into `machine`: with it a loop that waits for a pin ends
-IRQ_US = 26  # duration of an interrupt without its calls into `machine` and `time`: 33 in all, as on a Pico
+CALL_US = 2  # duration of a call into `machine`, without which a loop that waits for a pin would never end
+IRQ_US = 26  # duration of an interrupt without its calls into `machine` and `time`; with them 33, as on a Pico
 
 PWRON_RESET = 1
-WDT_RESET = 3  # the rp2 port reports this after machine.reset() too
+WDT_RESET = 3  # the rp2 port reports this cause also after machine.reset()
 
 _TICK_MS = 10  # tick of FreeRTOS on an ESP32
-_LEGACY_MS = 100  # time that an ESP32's legacy driver waits for each byte, and once more at the end
-_SPI_CALL_US = 20  # duration of a call into machine.SPI, with the driver's Python around it
+_LEGACY_MS = 100  # time-out of an ESP32's legacy driver for each byte, and once more at the end
+_SPI_CALL_US = 20  # duration of a call into machine.SPI, including the driver's Python code
 _RP2_MAX_WATCHDOG_MS = 8388
 _ESP32_TICKS = 4  # ticks of its watchdog's second stage per millisecond, counted in 32 bits (ESP-IDF)
 _WATCHDOG_CTRL_CLEAR = 0x40058000 + 0x3000  # RP2040: writing bit 30 here stops the watchdog
@@ -23,14 +23,14 @@ _WATCHDOG_ENABLE = 1 << 30
 
 
 def use(installed):
-    """From now on act on this simulator.Board."""
+    """Make all calls act on this simulator.Board."""
     global board, soft_irqs
     board = installed
     soft_irqs = Irqs(board.clock, Irqs.SCHEDULED)
 
 
 class Pin:
-    """machine.Pin: levels, and interrupts from the part wired to the pin. Handlers run while simulated time
+    """machine.Pin: levels, and interrupts from the part wired to the pin. Handlers run while the simulated time
     advances."""
 
     IN, OUT, OPEN_DRAIN = 0, 1, 2
@@ -93,10 +93,10 @@ class Pin:
 
 
 class Irqs:
-    """Interrupts that wait while a handler runs. Those that do not fit into the queue are lost. On an RP2040 one more
-    edge of a pin is kept. On an ESP32 MicroPython calls the handlers of all pins between two steps of the program;
-    during
-    a transfer of SoftI2C, which is one step, they wait in the queue of its scheduler.
+    """Interrupts that wait while a handler runs. If the queue is full, further interrupts are lost.
+
+    An RP2040 keeps one more edge of a pin. On an ESP32, MicroPython calls the handlers of all pins between two steps of
+    the program. A transfer of SoftI2C is one step; meanwhile interrupts wait in the scheduler's queue.
 
     clock: a Clock.  held: True during such a transfer.
     """
@@ -117,7 +117,7 @@ class Irqs:
         self._run()
 
     def release(self):
-        """Handle the waiting interrupts, because a transfer is over."""
+        """Handle the waiting interrupts after a transfer."""
         self.held = False
         self._clock.at(self._clock.now_us, self._run)
 
@@ -132,7 +132,7 @@ class Irqs:
 
 
 class _Controller:
-    """The common part of I2C and SoftI2C. freq in Hz, timeout in us."""
+    """The base of I2C and SoftI2C. freq in Hz, timeout in us."""
 
     _NO_DEVICE = errno.ENODEV
 
@@ -140,9 +140,9 @@ class _Controller:
         self._bus = board.bus_on(Pin(sda).id, Pin(scl).id, freq)
         self._clock = board.clock
         self._bit_ns = 1_000_000_000 // freq
-        self._ns = 0  # time under a microsecond that has passed but is not yet on the clock
+        self._ns = 0  # elapsed time below one microsecond, not yet added to the clock
         self._timeout_us = timeout
-        self._bytes = 0  # number of bytes in the current transfer, without the address
+        self._bytes = 0  # number of bytes in the current transfer, without the address byte
 
     def readfrom_mem_into(self, addr, memaddr, buf, addrsize=8):
         self._bytes = 1 + len(buf)
@@ -211,7 +211,7 @@ class _Controller:
             raise OSError(self._NO_DEVICE)
 
     def _stall(self):
-        """Wait for held wires as long as the controller does, then raise OSError."""
+        """The wires are held: wait for the controller's time-out, then raise OSError."""
         self._clock.advance(self._timeout_us)
         raise OSError(errno.ETIMEDOUT)
 
@@ -225,13 +225,13 @@ class _Controller:
         try:
             self._spend(9 * len(buf) + 1)  # including the STOP
         except Reset:
-            self._bus.hang()  # the device does not notice the reset and continues to send
+            self._bus.hang()  # the device does not notice the controller's reset and continues to send
             raise
         self._bus.read_into(buf)
 
 
 def _in_one_go(method):
-    """The same transfer of a SoftI2C, without interrupt handlers during it."""
+    """Wrap a transfer of SoftI2C, so that no interrupt handler runs during it."""
 
     def transfer(self, *arguments, **named):
         soft_irqs.held = True
@@ -244,8 +244,8 @@ def _in_one_go(method):
 
 
 class SoftI2C(_Controller):
-    """machine.SoftI2C, in software on any two pins. It does not check whether SDA is held: the clocks of a transfer let
-    the holding device finish its byte, and the zeros that it sends look like answers."""
+    """machine.SoftI2C, in software on any two pins. It does not check whether a device holds SDA. The clocks of a
+    transfer let that device finish its byte, and the zeros that the device sends look like answers."""
 
     def __init__(self, scl, sda, freq=400000, timeout=50000):
         super().__init__(scl, sda, freq, timeout)
@@ -281,7 +281,7 @@ class SoftI2C(_Controller):
             self._clock_byte()
 
     def _clock_byte(self):
-        """Send nine clocks. Raises OSError if SDA is high at the last one, which means no acknowledgement."""
+        """Send nine clocks. Raises OSError if SDA is high at the ninth clock, which means no acknowledgement."""
         for _ in range(9):
             self._bus.set_scl(0)
             self._bus.set_scl(1)
@@ -291,8 +291,8 @@ class SoftI2C(_Controller):
 
 
 class I2C(_Controller):
-    """machine.I2C. On rp2 each controller can use only certain pins. An ESP32 has one of two drivers, see
-    MicroPython's ports/esp32/machine_i2c.c."""
+    """machine.I2C. On rp2, each controller works only with certain pins. MicroPython for the ESP32 has a new and a
+    legacy driver, see its ports/esp32/machine_i2c.c."""
 
     def __init__(self, id, scl=None, sda=None, freq=400000, timeout=50000):
         if board.port == "rp2":
@@ -308,11 +308,11 @@ class I2C(_Controller):
 
     def _start(self, address, read):
         if self._driver == "new" and self._ticks() == 0:
-            raise OSError(errno.ENODEV)  # IDF does not even wait for the address to be sent
+            raise OSError(errno.ENODEV)  # ESP-IDF fails before the address is sent
         super()._start(address, read)
 
     def _stall(self):
-        if self._driver == "legacy":  # the time-out of the constructor is not that of a transfer
+        if self._driver == "legacy":  # this driver ignores the constructor's time-out in transfers
             self._clock.advance(1000 * _LEGACY_MS * (1 + self._bytes))
             raise OSError(errno.ETIMEDOUT)
         if self._driver == "new":
@@ -336,7 +336,7 @@ class ADC:
 
 
 class UART:
-    """machine.UART. Bytes that do not fit into rxbuf are lost, as on the boards."""
+    """machine.UART. If rxbuf is full, further bytes are lost, as on real boards."""
 
     def __init__(self, id, baudrate=115200, tx=None, rx=None, rxbuf=256, timeout=0):
         if board.port == "rp2":
@@ -367,7 +367,7 @@ class UART:
 
 
 class SPI:
-    """machine.SPI with the simulated board's card on it."""
+    """machine.SPI, connected to the simulated board's SD card."""
 
     def __init__(self, id, baudrate=1_000_000, sck=None, mosi=None, miso=None, **mode):
         self.init(baudrate)
@@ -440,7 +440,7 @@ class Timer:
 
 
 class _Mem32:
-    """machine.mem32: memory that only stores words, except for the register that stops the watchdog."""
+    """machine.mem32: stores words. One register has a function: it stops the watchdog."""
 
     def __init__(self):
         self._words = {}

@@ -1,4 +1,4 @@
-"""MicroPython's `os` with an ilistdir() that returns sizes, as on a board, and the free space of a Pico's flash.
+"""MicroPython's `os` with an ilistdir() that also returns sizes, as on a board, and the free space of a Pico's flash.
 
 On MicroPython this module replaces `os`. On CPython the names in ADDED are added to the real one.
 """
@@ -11,7 +11,7 @@ if sys.implementation.name == "micropython":
 
 BLOCK = 4096
 FLASH_BLOCKS = 352
-FIRMWARE_BLOCKS = 80  # compiled
+FIRMWARE_BLOCKS = 80  # flash blocks of the compiled firmware
 
 # Names that CPython's os lacks
 ADDED = ("ilistdir",)
@@ -32,8 +32,8 @@ def ilistdir(path="."):
 
 
 def statvfs(path):
-    """os.statvfs(). For a folder in the current one it returns the values of a Pico's flash with the firmware and this
-    folder, because the real file system may be very large."""
+    """os.statvfs(). For a folder in the current directory, return the values of a Pico's flash that contains the
+    firmware and this folder, because the real file system may be very large."""
     if path.startswith("/"):
         return os.statvfs(path)
     free = FLASH_BLOCKS - FIRMWARE_BLOCKS - _taken(path)
@@ -41,7 +41,7 @@ def statvfs(path):
 
 
 def _taken(folder):
-    """Blocks of all files in a folder and below it."""
+    """Number of flash blocks of all files in a folder and its subfolders."""
     blocks = 0
     for name, kind, *rest in ilistdir(folder):
         if kind & 0x4000:

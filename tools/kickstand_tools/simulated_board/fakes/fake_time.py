@@ -3,8 +3,8 @@
 On MicroPython this module replaces `time`. On CPython the names in ADDED are added to the real one.
 """
 
-CALL_US = 5  # duration of reading the time: with it a loop that waits for a time ends
-_PERIOD = 1 << 30  # ticks_us() and ticks_ms() restart at 0 after this, as on the boards
+CALL_US = 5  # duration of reading the time, without which a loop that waits for a time would never end
+_PERIOD = 1 << 30  # ticks_us() and ticks_ms() restart from 0 after this number, as on real boards
 _HALF = _PERIOD // 2
 
 # Names that CPython's time lacks
@@ -12,7 +12,7 @@ ADDED = ("ticks_us", "ticks_ms", "ticks_cpu", "ticks_add", "ticks_diff", "sleep_
 
 
 def use(board_clock, at_zero_us):
-    """From now on read this clock. Ticks are 0 at its time at_zero_us."""
+    """Use this clock from now on. Ticks are 0 at its time at_zero_us."""
     global clock, zero_us
     clock = board_clock
     zero_us = at_zero_us

@@ -7,8 +7,8 @@ MONO_HLSB = 3
 
 
 class FrameBuffer:
-    """A picture of width x height pixels in a buffer. MONO_VLSB: a byte is eight rows of a column, the topmost in bit
-    0; MONO_HLSB: eight columns of a row, the leftmost in bit 7."""
+    """A picture of width x height pixels in a buffer. In MONO_VLSB a byte holds eight rows of a column, the topmost row
+    in bit 0. In MONO_HLSB it holds eight columns of a row, the leftmost column in bit 7."""
 
     def __init__(self, buffer, width, height, format):
         self._buffer = buffer
@@ -22,7 +22,7 @@ class FrameBuffer:
         return (y >> 3) * self._stride + x, 1 << (y & 7)
 
     def pixel(self, x, y, colour=None):
-        """Set a pixel; without a colour return it."""
+        """Set a pixel to a colour. Without a colour, return the pixel."""
         if not (0 <= x < self._width and 0 <= y < self._height):
             return None
         at, bit = self._place(x, y)

@@ -1,5 +1,7 @@
-"""Replaces `machine`, `time` and `os` by the fakes, and also `sys` if the board differs from the one that the firmware
-was imported for. Restores the real modules."""
+"""Replaces `machine`, `time` and `os` by the fakes, and restores the real modules.
+
+Also replaces `sys` if the board differs from the board that the firmware was imported for.
+"""
 
 import os
 import sys
@@ -11,7 +13,7 @@ _ADDED_TO = ((time, fake_time), (os, fake_os))  # under CPython
 
 
 class Installer:
-    """install() may be called again, for another board. uninstall() undoes everything."""
+    """Installs the fakes. install() may be called again for another board. uninstall() undoes everything."""
 
     def __init__(self):
         self._real = {}  # the replaced modules; None for a module that did not exist
@@ -67,7 +69,7 @@ class _Namespace:
 
 
 class _Esp32:
-    """The module esp32 of a board with free heap."""
+    """MicroPython's module esp32, on a board with enough free heap."""
 
     HEAP_DATA = 4
 
@@ -78,7 +80,7 @@ class _Esp32:
 
 
 def _posing(port, machine):
-    """A module sys. port: its platform.  machine: its implementation._machine, as in chips.MACHINES."""
+    """A module `sys` with platform `port`. machine: its implementation._machine, as in chips.MACHINES."""
     real = {name: getattr(sys, name) for name in dir(sys) if not name.startswith("__")}
     of = sys.implementation
     implementation = _filled(_Namespace(), {"name": of.name, "version": of.version, "_machine": machine})

@@ -1,9 +1,11 @@
-"""Replaces micropython-lib's driver `sdcard`, with the same interface. write() and write_token(), which are faulty in
-that driver, are left out: the firmware has its own (kickstand/board/spi_card.py).
+"""Replaces micropython-lib's driver `sdcard`, with the same interface.
+
+write() and write_token() are left out. They are faulty in that driver, and the firmware has its own
+(kickstand/board/spi_card.py).
 """
 
 # pyright: reportAttributeAccessIssue=false
-# `time` is MicroPython's, and a subclass has the missing methods
+# `time` is MicroPython's module, and a subclass adds the missing methods
 
 import time
 
@@ -19,7 +21,7 @@ class SDCard:
         self.init_card(baudrate)
 
     def init_card(self, baudrate):
-        """Get the card ready. Raises OSError."""
+        """Initialise the card. Raises OSError."""
         self.cs.init(self.cs.OUT, value=1)
         self.spi.init(baudrate=100000, phase=0, polarity=0)
         self.spi.write(b"\xff" * 16)
@@ -44,7 +46,7 @@ class SDCard:
         self.spi.init(baudrate=baudrate, phase=0, polarity=0)
 
     def cmd(self, cmd, arg, final=0, release=True):
-        """Send a command; return the first byte of its answer, -1 for none."""
+        """Send a command. Returns the first byte of the answer, -1 without an answer."""
         self.cs(0)
         self.spi.write(bytes([0x40 | cmd]) + arg.to_bytes(4, "big") + b"\x95")
         for _ in range(_TRIES):
@@ -58,7 +60,7 @@ class SDCard:
         return -1
 
     def readinto(self, buf):
-        """Read the data that follow a command. Raises OSError."""
+        """Read the data that the card sends after a command. Raises OSError."""
         self.cs(0)
         for _ in range(_TRIES):
             if self.spi.read(1, 0xFF)[0] == 0xFE:
@@ -72,7 +74,7 @@ class SDCard:
         self._release()
 
     def readblocks(self, block_num, buf):
-        """For the file system. Raises OSError."""
+        """Read blocks for the file system. Raises OSError."""
         view = memoryview(buf)
         for i in range(len(buf) // 512):  # the real driver reads several blocks with CMD18
             if self.cmd(17, block_num + i, release=False) != 0:
@@ -81,7 +83,7 @@ class SDCard:
             self.readinto(view[i * 512 : (i + 1) * 512])
 
     def writeblocks(self, block_num, buf):
-        """For the file system. Raises OSError."""
+        """Write blocks for the file system. Raises OSError."""
         count = len(buf) // 512
         if self.cmd(24 if count == 1 else 25, block_num) != 0:
             raise OSError(5)
@@ -94,7 +96,7 @@ class SDCard:
         self.write_token(0xFD)
 
     def ioctl(self, op, arg):
-        """For the file system."""
+        """Answer the file system's queries."""
         return self.sectors if op == 4 else 512 if op == 5 else None
 
     def _release(self):

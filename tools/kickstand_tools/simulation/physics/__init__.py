@@ -1,4 +1,4 @@
-"""The physics of a simulated ride, with numpy: bike, balance, road, engine and the sensor on it.
+"""The physics of a simulated ride, with numpy: bike, balance, road, engine and sensor.
 
-../ride.py puts them together.
+../ride.py combines them.
 """

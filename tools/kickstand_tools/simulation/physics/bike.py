@@ -1,8 +1,8 @@
 """A two-wheeler: its dimensions, the place of the sensor, and how it leans and yaws.
 
 The rider commands a lean, and the bike stays in roll balance. Lean > 0 to the right, yaw rate > 0 in a left turn. The
-line from the contact point to the centre of mass leans by the balance lean b. The chassis leans more, because wide
-tyres touch the road beside their middle.
+balance lean b is that of the line from the contact point to the centre of mass. The chassis leans more than b, because
+wide tyres touch the road beside their middle.
 """
 
 from dataclasses import dataclass, replace
@@ -20,9 +20,9 @@ _STANDS_MPS, _RIDES_MPS = 0.4, 1.5  # below the first the feet hold the bike, ab
 
 @dataclass(frozen=True)
 class Bike:
-    """Lengths in m. Values from V. Cossalter, Motorcycle Dynamics, 2nd ed., chapters 3, 4, 6 and 8.
+    """Dimensions of a bike, in m. Source: V. Cossalter, Motorcycle Dynamics, 2nd ed., chapters 3, 4, 6 and 8.
 
-    The defaults are an average naked bike with its rider. random() varies them within the range of real bikes.
+    The defaults describe an average naked bike with its rider. random() varies them within the range of real bikes.
     """
 
     mass_height: float = 0.62  # centre of mass of bike and rider together, above the ground
@@ -58,20 +58,21 @@ class Bike:
         return replace(bike, squat_deg_per_g=0.46 * bike.dive_deg_per_g)
 
     def dive(self, acceleration: Signal, rate_hz: float) -> Signal:
-        """Pitch by the springs at a forward acceleration in m/s^2: rad, > 0 nose up."""
+        """Pitch of the chassis on its springs, rad, > 0 nose up. acceleration: forward, m/s^2."""
         per_g = np.where(acceleration < 0.0, self.dive_deg_per_g, self.squat_deg_per_g)
         pushed = np.radians(per_g) * acceleration / STANDARD_GRAVITY
         return second_order(pushed, self.dive_hz, self.dive_damping, rate_hz)
 
     @property
     def pendulum(self) -> float:
-        """Length of the equivalent pendulum in roll, m. A bike with a longer one falls into a lean more slowly."""
+        """Length of the equivalent pendulum in roll, m. A longer pendulum falls into a lean more slowly."""
         return (self.mass_height**2 + self.roll_gyration**2) / self.mass_height
 
 
 @dataclass
 class Roll:
-    """lean: the chassis' lean, rad; balance: lean of the centre of mass, rad; yaw_rate: about the vertical, rad/s."""
+    """Motion in roll and yaw. lean: of the chassis, rad. balance: lean of the centre of mass, rad. yaw_rate: about the
+    vertical, rad/s."""
 
     lean: Signal
     balance: Signal
@@ -91,8 +92,8 @@ def chassis_lean(balance: Signal, bike: Bike, bank: Signal | float = 0.0, hang: 
 def weave(chance: np.random.Generator, command: RiderCommands, riding_deg: float) -> Signal:
     """Random changes of the lean by the rider, rad.
 
-    riding_deg: rms at speed. The changes are larger at walking pace and small with the feet down. In bends the rider's
-    corrections of the line are added.
+    riding_deg: rms at speed. The changes are larger at walking pace and small with the feet down. In bends they include
+    the rider's corrections of the line.
     """
     n, rate = len(command.time), command.rate_hz
     v = command.speed
@@ -104,7 +105,7 @@ def weave(chance: np.random.Generator, command: RiderCommands, riding_deg: float
 
 
 def roll(command: RiderCommands, bike: Bike, unrest: Signal) -> Roll:
-    """Lean and yaw rate for the commanded lean. The yaw rate p is the one that fulfils the pendulum's roll equation:
+    """Lean and yaw rate for the commanded lean. The yaw rate p follows from the pendulum's roll equation:
 
     pendulum * b'' = g_n sin b + ((1 + wheels) v p + wind) cos b
 

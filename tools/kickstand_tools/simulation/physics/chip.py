@@ -14,7 +14,7 @@ from ..scripted.sensor_errors import MAX_GYRO_BIAS_DPS, MAX_OFFSET_G, MAX_SCALE_
 RATE_HZ = 1000
 DIVIDER = 5  # 200 Hz
 _COUNTS = 32768.0
-_GYRO_COUNTS = 32750.0  # of a range: the sheet has 65.5 counts per deg/s at 500
+_GYRO_COUNTS = 32750.0  # counts at the end of a range: the sheet has 65.5 counts per deg/s at 500 deg/s
 _ACCEL_NOISE_G = 400e-6 * np.sqrt(RATE_HZ / 2)  # rms of a conversion, from 400 ug/sqrt(Hz)
 _GYRO_NOISE_DPS = 0.005 * np.sqrt(RATE_HZ / 2)
 _CROSS_AXIS = 0.02  # sensitivity of an axis to its neighbours
@@ -38,7 +38,7 @@ _DLPF = _dlpf()
 
 @dataclass(frozen=True)
 class Chip:
-    """One sensor: its errors at 25 C, and how they change with temperature. Axes x, y, z; g, deg/s.
+    """One sensor: its errors at 25 C along x, y, z in g and deg/s, and how they change with temperature.
 
     low_pass: False if nothing filters before the sampling.
     """

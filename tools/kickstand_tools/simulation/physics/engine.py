@@ -12,7 +12,7 @@ _IDLE_SHARE = 0.25  # vibration at idle over that at _FULL_RPM
 _IDLE_RPM, _FULL_RPM = 1250.0, 6000.0
 _MAX_G = 0.5
 _BLOCK = 100_000  # rows computed at a time, to limit memory
-_DPS_PER_G = 15.0  # rates (rms) per force (rms) of the vibration
+_DPS_PER_G = 15.0  # rms of the vibration's rates over rms of its force
 
 
 def crank_rpm(speed: Signal, shift_rpm: float, rate_hz: float) -> Signal:
@@ -28,7 +28,8 @@ def vibration(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The vibration: specific force (n, 3) in m/s2 and rates (n, 3) in rad/s along left, up, forward.
 
-    rms_g: along each axis at 6000/min, before the chip's filter. shift_rpm: speed at which the rider changes up.
+    rms_g: rms along each axis at 6000/min, before the chip's filter. shift_rpm: engine speed at which the rider
+    changes up.
     """
     rpm = crank_rpm(speed, shift_rpm, rate_hz)
     turns = integral(rpm / 60.0, rate_hz)

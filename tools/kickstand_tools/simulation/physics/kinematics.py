@@ -40,7 +40,7 @@ def body_rates(motion: Motion) -> NDArray[np.float64]:
     level_yaw = motion.yaw_rate * np.cos(motion.pitch)
     return np.column_stack(
         (
-            level_yaw * s - pitch_rate * c,  # nose up rotates forward towards up: negative about left
+            level_yaw * s - pitch_rate * c,  # nose up is a negative rotation about left
             level_yaw * c + pitch_rate * s,
             lean_rate + motion.yaw_rate * np.sin(motion.pitch),
         )
@@ -66,7 +66,7 @@ def specific_force(motion: Motion, bike: Bike) -> NDArray[np.float64]:
     arm = np.array([bike.sensor_left, bike.sensor_height - bike.tyre_radius, bike.sensor_forward])
     rates = body_rates(motion)
     turning = np.gradient(rates, 1.0 / rate, axis=0)
-    for start in range(0, len(force), _BLOCK):  # np.cross makes many arrays of the size of its arguments
+    for start in range(0, len(force), _BLOCK):  # np.cross needs several times the memory of its arguments
         part = slice(start, start + _BLOCK)
         force[part] += np.cross(turning[part], arm)
         force[part] += np.cross(rates[part], np.cross(rates[part], arm))

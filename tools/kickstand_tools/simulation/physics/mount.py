@@ -1,7 +1,6 @@
-"""Simulates imperfect mounts and loggers: a resonating holder, a logger that aliases, clipped readings, a warming
-sensor.
+"""Simulates imperfect mounts and loggers with random properties in a realistic range.
 
-Each is random, within the range of such devices.
+A holder resonates, a logger aliases, readings are clipped, or a sensor warms up.
 """
 
 from collections.abc import Callable
@@ -13,15 +12,15 @@ from numpy.typing import NDArray
 from .chip import Chip
 from .signals import Signal, derivative, through
 
-_SAG_LIMIT = np.radians(3.0)  # limit of a holder's sagging, because a spring is not linear beyond
+_SAG_LIMIT = np.radians(3.0)  # largest sag of a holder, because a spring is linear only up to here
 
 
 @dataclass(frozen=True)
 class Holder:
     """A soft holder: sensor and holder are a mass on springs along and about each axis.
 
-    hz, damping (3): along left, up, forward; the same springs turn it. sag (3): rad per g: about left by the force
-    forward, about up none, about forward by the force to the left.
+    hz, damping (3): natural frequency and damping ratio along left, up, forward, and the same about these axes. sag
+    (3, rad per g): rotation about left by a forward force, about up (0), about forward by a force to the left.
     """
 
     hz: NDArray[np.float64]
@@ -37,8 +36,8 @@ class Holder:
     def shaken(
         self, force: NDArray[np.float64], rates: NDArray[np.float64], rate_hz: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Force (n, 3, g) and rates (n, 3, deg/s) of the held sensor from those of the bike, along left, up,
-        forward."""
+        """Return force (n, 3, g) and rates (n, 3, deg/s) of the sensor in its holder. The arguments are those of the
+        bike. All are along left, up, forward."""
         held = np.column_stack([self._by_spring(column, k, rate_hz) for k, column in enumerate(force.T)])
         turned = np.zeros_like(held)
         turned[:, 0] = (self.sag[0] * held[:, 2]).clip(-_SAG_LIMIT, _SAG_LIMIT)
@@ -50,7 +49,7 @@ class Holder:
         return held - np.cross(turned, held), turning
 
     def _by_spring(self, x: Signal, axis: int, rate_hz: float) -> Signal:
-        """x, filtered by a mass on a spring that is shaken at its base."""
+        """x, filtered by a mass on a spring whose base is shaken."""
 
         def transfer(f: Signal) -> NDArray:
             damped = 2j * self.damping[axis] * f / self.hz[axis]
@@ -61,7 +60,7 @@ class Holder:
 
 @dataclass(frozen=True)
 class Mount:
-    """The sensor's mount, and the logger that reads it. rise_c: replaces that of Conditions unless None."""
+    """The sensor's mount, and the logger that reads the sensor. rise_c: replaces Conditions.rise_c unless None."""
 
     chip: Chip
     holder: Holder | None = None
@@ -69,8 +68,8 @@ class Mount:
 
 
 def holder(chance: np.random.Generator, chip: Chip) -> Mount:
-    """A resonance at 5 to 40 Hz with a damping of 0.02 to 0.1. It sags by about a fifth of a degree per g, a softer one
-    by more."""
+    """A holder that resonates at 5 to 40 Hz with a damping of 0.02 to 0.1. It sags by about a fifth of a degree per g,
+    a softer holder by more."""
     return Mount(chip, Holder.random(chance))
 
 

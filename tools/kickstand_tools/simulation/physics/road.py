@@ -1,8 +1,8 @@
-"""Road roughness through tyres and suspension.
+"""Simulates how a rough road shakes the bike through tyres and suspension.
 
 The road is a random profile of ISO 8608, whose slope is white noise over distance. So the same road shakes more at
-speed, and the rear wheel follows the front wheel's bumps. Each end of the bike is a quarter-car model: the wheel on its
-tyre, the chassis on its spring.
+higher speed, and the rear wheel meets the same bumps as the front wheel, later. Each end of the bike is a quarter-car
+model: the wheel on its tyre, the chassis on its spring.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .bike import Bike
 from .signals import Signal, band_noise, smoothed, through
 
-# Roughness: PSD of displacement at 0.1 cycles/m, m3, in the middle of the classes of ISO 8608
+# Roughness in the middle of each class of ISO 8608: PSD of displacement at 0.1 cycles/m, m3
 CLASSES = {"A": 16e-6, "B": 64e-6, "C": 256e-6, "D": 1024e-6}
 CLASS_A, CLASS_B, CLASS_C, _ = CLASSES.values()
 _STEP_M = 0.02
@@ -22,7 +22,7 @@ _CONTACT_M = 0.10  # length of a tyre's contact patch, which averages out shorte
 # One end of a motorcycle with half of its rider: kg, kg, N/m, Ns/m, N/m
 _SPRUNG, _UNSPRUNG, _SPRING, _DAMPER, _TYRE = 120.0, 15.0, 17e3, 1100.0, 150e3
 _LATERAL = 0.35  # rms along left and along forward over the vertical rms
-# Rates about left, up, forward, rms per 9.8 m/s^2 of vertical rms. 0 about left, where the pitch is simulated directly
+# rms rates about left, up, forward per 9.8 m/s^2 of vertical rms. 0 about left, because pitch is simulated separately
 _RATE_DPS = np.array([0.0, 8.0, 14.0])
 
 
@@ -30,7 +30,7 @@ _RATE_DPS = np.array([0.0, 8.0, 14.0])
 class Shaking:
     """The motion of the chassis caused by the road. heave: vertical acceleration of the rear, m/s^2; pitch: rad.
 
-    force (n, 3) in m/s^2 and rates (n, 3) in rad/s: to be added to those along and about left, up, forward.
+    force (n, 3) in m/s^2 and rates (n, 3) in rad/s: additional, along and about left, up, forward.
     """
 
     heave: Signal
@@ -68,7 +68,7 @@ def add_bumps(slope: Signal, places_m: list[float], height_m: float, length_m: f
 def shaking(
     chance: np.random.Generator, distance: Signal, speed: Signal, slope: Signal, bike: Bike, rate_hz: float
 ) -> Shaking:
-    """The Shaking caused by driving over a profile. distance: the rear wheel's at each sample, m. slope: see
+    """The Shaking caused by driving over a profile. distance: way of the rear wheel until each sample, m. slope: see
     profile_slope()."""
     height = np.cumsum(slope) * _STEP_M
     at = np.arange(len(slope)) * _STEP_M

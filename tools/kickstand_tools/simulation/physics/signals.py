@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 Signal = NDArray[np.float64]
-_NOISE_MARGIN_S = 10.0  # noise is computed longer by this time at both ends and then cut, because through() pads there
+_NOISE_MARGIN_S = 10.0  # noise is computed with this margin at both ends, which is then cut, because through() pads
 _BLOCK = 100_000  # frequencies computed at a time, to limit memory
-_PAD_S = 4.0  # the first and the last value are held for this time, because an FFT joins the end to the start
+_PAD_S = 4.0  # padding with the first and the last value, because an FFT joins the end to the start
 
 
 def smoothstep(u: Signal) -> Signal:
@@ -36,7 +36,7 @@ def through(x: Signal, transfer: Callable[[Signal], NDArray], rate_hz: float) ->
     spectrum = np.fft.rfft(padded)
     del padded
     frequency = np.linspace(0.0, rate_hz / 2.0, len(spectrum))
-    for start in range(0, len(spectrum), _BLOCK):  # a transfer function makes many arrays of the size of its argument
+    for start in range(0, len(spectrum), _BLOCK):  # a transfer function needs several times the memory of its argument
         part = slice(start, start + _BLOCK)
         spectrum[part] *= transfer(frequency[part])
     del frequency
@@ -49,7 +49,7 @@ def smoothed(x: Signal, seconds: float, rate_hz: float) -> Signal:
 
 
 def second_order(x: Signal, natural_hz: float, damping: float, rate_hz: float) -> Signal:
-    """x filtered by a low-pass of second order with gain 1 at 0 Hz, including that filter's delay."""
+    """x filtered by a low-pass of second order with gain 1 at 0 Hz, including the filter's delay."""
 
     def transfer(f: Signal) -> NDArray:
         s = 1j * f / natural_hz
@@ -59,7 +59,7 @@ def second_order(x: Signal, natural_hz: float, damping: float, rate_hz: float) -
 
 
 def band_noise(chance: np.random.Generator, n: int, low_hz: float, high_hz: float, rate_hz: float) -> Signal:
-    """Normally distributed noise of rms 1 between two frequencies; outside its amplitude falls by second order."""
+    """Normally distributed noise of rms 1 between two frequencies. Outside them its amplitude falls by second order."""
 
     def transfer(f: Signal) -> NDArray:
         low = (f / low_hz) ** 2

@@ -1,6 +1,6 @@
-"""A motorcycle in balance with a known lean at every instant: the measurements of a perfect sensor on it.
+"""Simulates a motorcycle in balance whose lean is known at every instant, and a perfect sensor on it.
 
-Plain Python for CPython and MicroPython, independent of the firmware's mathematics, because it tests them.
+Plain Python for CPython and MicroPython. It does not use the firmware's mathematics, because it tests them.
 
 Vehicle frame: left, up, forward (right-handed). Lean > 0 to the right, yaw rate > 0 in a left turn, slope > 0
 uphill. The attitude is heading about the vertical, then slope about the lateral axis, lean about forward.
@@ -16,11 +16,11 @@ from math import cos, degrees, pi, radians, sin, sqrt, tan
 
 from kickstand.units import STANDARD_GRAVITY
 
-KICKSTAND_DEG = -12.0  # to the left, as most are
+KICKSTAND_DEG = -12.0  # to the left, as on most bikes
 MOVE_S = 2.0  # from the kickstand to upright, or back
 STANDING_SWAY_DEG = 0.1  # amplitude of the lean's changes while the rider holds the bike upright
 RIDING_SWAY_DEG = 0.5  # amplitude of the lean's changes at speed
-WALKING_MPS, RIDING_MPS = 1.0, 4.0  # below the first the feet balance the bike, above the second only steering does
+WALKING_MPS, RIDING_MPS = 1.0, 4.0  # below the first only feet balance the bike, above the second only steering
 
 _SWAY = ((0.31, 0.6, 0.0), (0.73, 0.4, 1.0))  # Hz, share, phase
 _ROAD_HZ = (2.3, 5.9, 11.7, 19.3, 31.1)
@@ -42,7 +42,7 @@ class Segment:
 
 
 def kickstand(seconds, lean_deg=KICKSTAND_DEG, slope_deg=None):
-    """Move onto the kickstand, then stand on it, engine off. lean_deg > 0: a kickstand on the right."""
+    """Lean the bike onto its kickstand and leave it there, engine off. lean_deg > 0: the kickstand is on the right."""
     return (
         Segment("moving", MOVE_S, lean_deg, 0.0, slope_deg, 0.0, 0.0),
         Segment("kickstand", seconds),
@@ -50,7 +50,7 @@ def kickstand(seconds, lean_deg=KICKSTAND_DEG, slope_deg=None):
 
 
 def upright(seconds, lean_deg=0.0, slope_deg=None):
-    """Move upright, then stay there, held by the rider, engine off. lean_deg: error of that pose."""
+    """Bring the bike upright, where the rider holds it, engine off. lean_deg: error of the upright pose."""
     return (
         Segment("moving", MOVE_S, lean_deg, 0.0, slope_deg, STANDING_SWAY_DEG, 0.0),
         Segment("upright", seconds),
@@ -63,7 +63,7 @@ def wait(seconds):
 
 
 def straight(seconds, slope_deg=None):
-    """Ride straight ahead; a new slope is reached at the end."""
+    """Ride straight ahead. slope_deg: slope at the end."""
     return (Segment("straight", seconds, slope_deg=slope_deg),)
 
 
@@ -100,7 +100,7 @@ def yaw_rate_in_balance(lean, lift_mps2, speed_mps):
     """Yaw rate about the road's normal, rad/s, that balances a lean (rad, > 0 to the right): negative in a right turn.
     lift_mps2: specific force perpendicular to the road, m/s2.
 
-    Below RIDING_MPS the feet help: it is less than the rate that balances the lean, and below WALKING_MPS it is 0.
+    Below RIDING_MPS the feet help to balance, so the yaw rate is smaller. Below WALKING_MPS it is 0.
     """
     if speed_mps <= WALKING_MPS:
         return 0.0
@@ -119,7 +119,7 @@ def body_motion(lean, lean_rate, speed, acceleration, yaw_rate, slope=0.0, slope
     left = speed * yaw_rate * cos(slope)
     up = STANDARD_GRAVITY * cos(slope) + speed * slope_rate
     forward = acceleration + STANDARD_GRAVITY * sin(slope)
-    w_left = -slope_rate  # nose up rotates forward towards up: negative about left
+    w_left = -slope_rate  # nose up is a negative rotation about left
     w_up = yaw_rate * cos(slope)
     w_forward = yaw_rate * sin(slope) + lean_rate
     c, s = cos(lean), sin(lean)
@@ -134,9 +134,10 @@ def body_motion(lean, lean_rate, speed, acceleration, yaw_rate, slope=0.0, slope
 
 
 class Ride:
-    """segments: from the functions above, in order from t = 0. The ride starts with the values of the first one.
+    """A scripted ride. segments: from the functions above, in order from t = 0. The ride starts with the values of the
+    first segment.
 
-    vibration_g: rms of road and engine together along the up axis at 10 m/s and more, before the chip's filter.
+    vibration_g: rms of road and engine together along the up axis at 10 m/s or more, before the chip's filter.
     """
 
     def __init__(self, segments, vibration_g=0.05):
@@ -159,7 +160,7 @@ class Ride:
         self._at = 0
 
     def _find(self, t_s):
-        """The segment at t_s; before the start the first, after the end the last."""
+        """The segment at t_s. Before the start this is the first one, after the end the last one."""
         i = self._at
         while i > 0 and t_s < self._segments[i][0]:
             i -= 1
@@ -169,7 +170,8 @@ class Ride:
         return self._segments[i]
 
     def state(self, t_s):
-        """(phase, lean, its rate, speed, acceleration, yaw rate, slope, its rate, distance, engine 0..1), rad and m."""
+        """(phase, lean, lean rate, speed, acceleration, yaw rate, slope, slope rate, distance, engine 0 to 1), in rad,
+        m and s."""
         start, segment, before, after, distance = self._find(t_s)
         seconds = segment.seconds
         u = min(1.0, max(0.0, (t_s - start) / seconds)) if seconds else 1.0
@@ -206,7 +208,7 @@ class Ride:
 
 
 def shaken(motion, t_s, vibration_g, speed_mps, distance_m, engine):
-    """motion plus the vibration of road and engine. engine: 0 (off) to 1 (running)."""
+    """Add the vibration of road and engine to a motion. engine: 0 (off) to 1 (running)."""
     road = vibration_g * min(1.0, speed_mps / 10.0) * sqrt(1.0 - _ENGINE_SHARE * _ENGINE_SHARE)
     firing = vibration_g * engine * _ENGINE_SHARE
     if road == 0.0 and firing == 0.0:

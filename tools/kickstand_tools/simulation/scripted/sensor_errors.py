@@ -1,7 +1,7 @@
 """Simulates the readings of an MPU6050 with factory errors, mounted at any angle, for a given motion.
 
-Plain Python for CPython and MicroPython. All random numbers depend only on the seed and the time. So a seed gives the
-same reading at the same time on both, independent of earlier readings.
+Plain Python for CPython and MicroPython. Random numbers depend only on the seed and the time, not on earlier readings.
+So CPython and MicroPython get the same reading at the same time.
 
     world = Sensor(seed=3).world(ride.motion)
     world(20.0)         # (fx, fy, fz, wx, wy, wz, temp_c): g and deg/s in the sensor's axes, errors included
@@ -62,11 +62,12 @@ def random_mounting(seed):
 
 
 class Sensor:
-    """One sensor: its errors and its mounting. Without a seed it has no error but noise, and its axes are the
+    """The errors and the mounting of one sensor. Without a seed its only error is noise, and its axes are the
     vehicle's.
 
     reading = scale * true + offset for the accelerometer, scale * true + bias for the gyro, each with noise.
-    share: factor on the data sheet's limits of offsets, scale errors and biases. noise: factor on its noise.
+    share: factor on the data sheet's limits of offsets, scale errors and biases. noise: factor on the data sheet's
+    noise.
     """
 
     def __init__(self, seed=None, mounting=None, share=1.0, noise=1.0):
@@ -111,8 +112,7 @@ class Sensor:
 
 
 def resting(sensor, up):
-    """Returns the function world(t_s) of a sensor at rest with `up` (a vector of any length in its own axes) pointing
-    up."""
+    """Returns the function world(t_s) of a sensor at rest. up: the vector up in the sensor's axes, of any length."""
     m = sensor.vehicle_from_sensor
     size = sqrt(up[0] * up[0] + up[1] * up[1] + up[2] * up[2])
     force = [(m[3 * i] * up[0] + m[3 * i + 1] * up[1] + m[3 * i + 2] * up[2]) / size for i in range(3)]
@@ -121,14 +121,14 @@ def resting(sensor, up):
 
 
 def turning(sensor, before, after, begin_s, end_s):
-    """Returns the function world(t_s) of a sensor that a hand turns from one pose to the next on the shortest way,
-    slowly at both ends. before, after: up in its own axes, of any length."""
+    """Returns the function world(t_s) of a sensor that a hand turns from one pose to the next by the shortest rotation,
+    slowly at both ends. before, after: vectors up in the sensor's axes, of any length."""
     m = sensor.vehicle_from_sensor
     a, b = _unit(before), _unit(after)
     n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
     size, along = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]), a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
     angle = atan2(size, along)
-    if size < 1e-6:  # a half turn, about any perpendicular axis
+    if size < 1e-6:  # a half turn has no shortest way: use any perpendicular axis
         n = [a[1] - a[2], a[2] - a[0], a[0] - a[1]]
         if n[0] * n[0] + n[1] * n[1] + n[2] * n[2] < 0.1:
             n = [a[1], -a[0], 0.0]
@@ -140,7 +140,7 @@ def turning(sensor, before, after, begin_s, end_s):
         at = angle * u * u * u * (10.0 + u * (6.0 * u - 15.0))
         rate = angle * 30.0 * u * u * (1.0 - u) * (1.0 - u) / (end_s - begin_s)
         up = [cos(at) * a[i] + sin(at) * across[i] for i in range(3)]
-        turn = [-degrees(rate) * n[i] for i in range(3)]  # in the sensor's axes the world turns the other way
+        turn = [-degrees(rate) * n[i] for i in range(3)]  # in the sensor's axes `up` turns the other way
         return tuple(
             [m[3 * i] * v[0] + m[3 * i + 1] * v[1] + m[3 * i + 2] * v[2] for v in (up, turn) for i in range(3)]
         )
