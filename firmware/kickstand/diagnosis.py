@@ -27,8 +27,8 @@ _PERIODS = 4  # sample periods that the FIFO gets to fill
 
 
 def wire_fault(sda, scl):
-    """None, or a Notice: a wire stays low, or nothing pulls it up. The pull-ups are on the modules: without one a wire
-    is open or the module has no power. The test uses the pins' own weak pull-ups and pull-downs."""
+    """Return a Notice if a wire stays low or nothing pulls it up, else None. The pull-ups are on the modules: without a
+    pull-up a wire is open or the module has no power. The test uses the pins' own weak pull-ups and pull-downs."""
     wires = (("SDA", sda), ("SCL", scl))
     fault = None
     for name, pin in wires:
@@ -36,7 +36,7 @@ def wire_fault(sda, scl):
             fault = fault or Notice("wire-low", name, pin)
     open_wires = [wire for wire in wires if not _level(wire[1], Pin.PULL_DOWN)]
     for _, pin in wires:
-        Pin(pin, Pin.IN, None)  # or an ESP32 would keep the pull-down
+        Pin(pin, Pin.IN, None)  # removes the pull-down, which an ESP32 would keep
     if fault or not open_wires:
         return fault
     return Notice("no-pull-ups", sda, scl) if len(open_wires) == 2 else Notice("no-pull-up", *open_wires[0])
@@ -62,7 +62,7 @@ def answering(i2c, addresses=range(_FIRST, _LAST + 1)):
 
 
 def exchanged(sda, scl, addresses):
-    """True if one of these addresses answers with SDA and SCL exchanged."""
+    """Return True if one of these addresses answers with SDA and SCL exchanged."""
     i2c = SoftI2C(Pin(sda), Pin(scl), freq=_SLOW_HZ, timeout=_TIMEOUT_US)  # its SCL comes first
     return bool(answering(i2c, addresses))
 
