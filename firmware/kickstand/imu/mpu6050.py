@@ -50,7 +50,7 @@ GYRO_DELAY_S = {1: 0.0019, 2: 0.0028, 3: 0.0048, 4: 0.0083, 5: 0.0134, 6: 0.0186
 
 # The chips known to work, by WHO_AM_I: name (at most 12 characters); temperature counts per degree C; degrees C at 0
 # counts; True if the chip has ACCEL_CONFIG2 (0x1D); usable size of its FIFO in bytes; bits of FIFO_EN that must read
-# back. Add a new one also to VARIANTS in tools/kickstand_tools/simulated_board/mpu6050.py and to the parts in the
+# back. Also add a new chip to VARIANTS in tools/kickstand_tools/simulated_board/mpu6050.py and to the parts in the
 # README. A chip with other registers (LSM6DS3, BMI160) needs a driver with the same methods, opened by open_sensor().
 CHIPS = {
     0x68: ("MPU6050", 340.0, 36.53, False, 1024, 0xF8),
