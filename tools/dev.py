@@ -3,7 +3,7 @@
 
     python3 tools/dev.py demo         the firmware on a simulated board, live in the terminal
     python3 tools/dev.py test         ruff, pyright and the tests; further arguments go to pytest
-    python3 tools/dev.py mutants imu  which single changes of a package's code its tests do not notice
+    python3 tools/dev.py mutants imu  lists the single changes of a package's code that its tests do not notice
 
 They create .venv beside pyproject.toml and install the project in it. They install again only if pyproject.toml has
 changed.
@@ -22,8 +22,8 @@ PYTHON = os.path.join(VENV, "Scripts", "python.exe") if os.name == "nt" else os.
 STAMP = os.path.join(VENV, "installed.txt")
 LOG = os.path.join(VENV, "install.log")
 OLDEST = (3, 11)
-EXTRAS = ("", "test", "mutants")  # of pyproject.toml; each contains the earlier ones
-REPORT_S = 5  # a line this often while installing
+EXTRAS = ("", "test", "mutants")  # extras of pyproject.toml; each contains the earlier ones
+REPORT_S = 5  # time between two lines of progress while installing
 COMPILE = "from kickstand_emulator import native; native.build()"  # the emulated Pico is then twice as fast
 
 
@@ -52,7 +52,7 @@ def test(arguments):
     otherwise 1."""
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # otherwise each process started by a test compiles its imports
     compiling = subprocess.Popen([PYTHON, "-c", COMPILE], cwd=ROOT)
-    # at the same time as the others, because it uses only one processor for a minute
+    # pyright runs beside the other checks, because it uses only one processor for a minute
     pyright = subprocess.Popen(
         [PYTHON, "-m", "pyright"], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8"
     )
@@ -121,7 +121,7 @@ def make_venv():
 
 
 def has_pip():
-    """True if .venv exists and its pip runs."""
+    """Return True if .venv exists and its pip runs."""
     if not os.path.exists(PYTHON):
         return False
     command = [PYTHON, "-m", "pip", "--version"]
@@ -170,7 +170,7 @@ def run(*arguments):
 
 
 def read(path):
-    """A text file, empty if it is missing."""
+    """Return the content of a text file, "" if it is missing."""
     if not os.path.exists(path):
         return ""
     with open(path, encoding="utf-8", errors="replace") as file:

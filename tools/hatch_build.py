@@ -7,7 +7,7 @@ from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 
 class Urls(MetadataHookInterface):
-    """project.urls of what is built on GitHub, which knows where the project is at home. Elsewhere it has none."""
+    """Sets project.urls in a build on GitHub, where the repository is known. Other builds have no URLs."""
 
     def update(self, metadata: dict) -> None:
         """Add the addresses."""
@@ -18,7 +18,7 @@ class Urls(MetadataHookInterface):
 
 
 class Workshop(BuildHookInterface):
-    """The workshop's commands, for an editable installation. pyproject.toml lists them in the hook's settings."""
+    """Adds the workshop's commands to an editable installation. pyproject.toml lists them in the hook's settings."""
 
     def initialize(self, version: str, build_data: dict) -> None:
         """Add the entry points. A wheel does not contain their modules and gets none of them."""

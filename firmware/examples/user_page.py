@@ -5,8 +5,8 @@ Copy it to the board as user.py, and restart (the firmware must be on the board;
     mpremote cp firmware/examples/user_page.py :user.py
     mpremote reset
 
-Press the button until the page appears, after the last of the usual pages. Before the bike is aligned choose Own pages
-in the menu. Without a board: kickstand try firmware/examples/user_page.py
+Press the button until the page appears. It follows the last of the usual pages. Before the bike is aligned, choose Own
+pages in the menu. Without a board: kickstand try firmware/examples/user_page.py
 """
 
 from math import cos, radians
@@ -17,7 +17,7 @@ def page(app):
     if not app.trusted:  # there is no reliable lean
         return "Load     --", "not sure yet"
     meter = app.meter
-    times = 1.0 / cos(radians(meter.lean_deg))  # weight and cornering force together, of a turn in balance
+    times = 1.0 / cos(radians(meter.lean_deg))  # weight and cornering force together, in a balanced turn
     line1, line2 = "Load    %5.2f x" % times, "Lean %3d deg" % round(abs(meter.lean_deg))
     return line1, line2, (draw, line1, line2, min(128, round(64 * times)))
 

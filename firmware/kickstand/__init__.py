@@ -8,9 +8,9 @@ from .units import __version__ as __version__
 
 
 def status(wirings=False):
-    """Print what a user needs to know of this board: versions, settings, sensor, display, calibration.
+    """Print the board's status: versions, settings, sensor, display, calibration.
 
-    wirings: show each wiring of a character display's backpack on it for some seconds, with its number."""
+    wirings: if True, show the number of each known backpack wiring on the character display for some seconds."""
     from . import status_report
 
     status_report.report(wirings)

@@ -5,13 +5,14 @@ Imported only when there is something to print: on most boards never.
 
 from .units import const
 
-# a longer print is slow. Most take a few ms, but 500 if the computer on USB sleeps: the chip's FIFO overflows
+# A print that takes longer is slow. Most take a few ms, but 500 ms if the computer on USB sleeps; then the sensor's
+# FIFO overflows.
 _SLOW_MS = const(100)
 _QUIET_MS = const(60_000)  # after a slow print no refusal is printed for this time
 
 _slow_ms = None  # ticks_ms() of the last slow print
 
-# code|sentence; {0}, {1} ... are the refusal's values; for a SettingsError {0} is the setting's name
+# code|sentence. {0}, {1} ... are the refusal's values; for a SettingsError {0} is the setting's name
 _SENTENCES = """
 not-written|calibration not saved: {0}; the old one is kept
 read-back|calibration not saved: it reads back differently; the old one is kept
@@ -67,11 +68,11 @@ no-such-pin|config.py: {0} = {1} is no pin of this board ({2})
 i2c-pins|config.py: {1}_SDA = {2} and {1}_SCL = {3} do not belong to I2C {4} ({5})
 uart-pins|config.py: GPS_TX = {1} and GPS_RX = {2} do not belong to UART {3} ({4})
 """
-_RECORDING_STOPPED = "recording stopped: {0}"  # for all faults of a recording; only the display distinguishes them
+_RECORDING_STOPPED = "recording stopped: {0}"  # for every fault of a recording; only the display tells them apart
 
 
 def sentence(refusal):
-    """The sentence for a Refusal, one line."""
+    """Return the sentence for a Refusal, one line."""
     return refusal.words(_SENTENCES, _RECORDING_STOPPED)
 
 

@@ -11,8 +11,8 @@ from .imu.sensor import Sensor
 
 
 def open_lcd(settings, wiring=None):
-    """Open the Display. wiring: of a character display's backpack; by default that of the settings. Its tick() raises
-    SettingsError for pins that the I2C controller cannot use."""
+    """Open the Display. wiring: the wiring of a character display's backpack; the default is LCD_WIRING. Its tick()
+    raises SettingsError for pins that the I2C controller cannot use."""
     return Display(
         lambda hz: open_bus(settings, "LCD", hz),
         settings.LCD_BUS_HZ,
@@ -37,7 +37,8 @@ def open_sensor(settings):
         said = []
 
         def look():
-            from .diagnosis import explain_sensor, fifo_fault  # 6 KB of heap; most boards never need it
+            # imported late: takes 6 KB of heap, and most boards never need it
+            from .diagnosis import explain_sensor, fifo_fault
 
             if error is None:
                 said.extend((fifo_fault(chip), []))
@@ -67,5 +68,5 @@ def open_bus(settings, name, hz):
     sda, scl = getattr(settings, name + "_SDA"), getattr(settings, name + "_SCL")
     try:
         return i2c_bus.open_i2c(controller, sda, scl, hz)
-    except (ValueError, TypeError) as error:  # a Pico's Pin(None), for a pin that is not set, raises TypeError
+    except (ValueError, TypeError) as error:  # Pin(None), for a pin that is not set, raises TypeError on a Pico
         raise SettingsError("i2c-pins", name + "_SDA / SCL", name, sda, scl, controller, str(error))

@@ -27,8 +27,8 @@ _PERIODS = 4  # sample periods that the FIFO gets to fill
 
 
 def wire_fault(sda, scl):
-    """None, or a Notice: a wire stays low, or nothing pulls it up. The pull-ups are on the modules: without one a wire
-    is open or the module has no power. The test uses the pins' own weak pull-ups and pull-downs."""
+    """Return a Notice if a wire stays low or nothing pulls it up, else None. The pull-ups are on the modules: without a
+    pull-up a wire is open or the module has no power. The test uses the pins' own weak pull-ups and pull-downs."""
     wires = (("SDA", sda), ("SCL", scl))
     fault = None
     for name, pin in wires:
@@ -36,7 +36,7 @@ def wire_fault(sda, scl):
             fault = fault or Notice("wire-low", name, pin)
     open_wires = [wire for wire in wires if not _level(wire[1], Pin.PULL_DOWN)]
     for _, pin in wires:
-        Pin(pin, Pin.IN, None)  # or an ESP32 would keep the pull-down
+        Pin(pin, Pin.IN, None)  # removes the pull-down, which an ESP32 would keep
     if fault or not open_wires:
         return fault
     return Notice("no-pull-ups", sda, scl) if len(open_wires) == 2 else Notice("no-pull-up", *open_wires[0])
@@ -62,14 +62,15 @@ def answering(i2c, addresses=range(_FIRST, _LAST + 1)):
 
 
 def exchanged(sda, scl, addresses):
-    """True if one of these addresses answers with SDA and SCL exchanged."""
+    """Return True if one of these addresses answers with SDA and SCL exchanged."""
     i2c = SoftI2C(Pin(sda), Pin(scl), freq=_SLOW_HZ, timeout=_TIMEOUT_US)  # its SCL comes first
     return bool(answering(i2c, addresses))
 
 
 def scan(sda, scl, reopen, addresses):
-    """Examine a bus. Return (notice, devices): the fault of its wires, a Notice or None; the devices that answer, a
-    list of (address, name, kind), see other_chips.name_of(). addresses: those of the missing device.
+    """Examine a bus. Return (notice, devices). notice: a Notice for a fault of the wires, or None. devices: a list of
+    (address, name, kind) of those that answer, see other_chips.name_of(). addresses: where the missing device may
+    answer.
 
     Takes 0.1 s, and leaves the bus open. Raises what reopen() raises, except OSError."""
     notice = wire_fault(sda, scl)
@@ -90,7 +91,7 @@ def explain_sensor(sda, scl, reopen, chip, error):
     """Explain a failed set-up. Return (notice, addresses): the reason, a Notice, and the I2C addresses that answer on
     the bus.
 
-    error: the OSError or UnknownChip of the attempt. Raises what reopen() raises, except OSError."""
+    error: the OSError or UnknownChip that the set-up raised. Raises what reopen() raises, except OSError."""
     notice, devices = scan(sda, scl, reopen, MOTION_ADDRESSES)
     if not notice:
         kept = not isinstance(error, NotKept)
@@ -101,8 +102,8 @@ def explain_sensor(sda, scl, reopen, chip, error):
 
 
 def _judged(devices, i2c, kept):
-    """The Notice for the devices on the sensor's bus, or None if none of them concerns the sensor. kept: False if a
-    chip was found that does not keep its settings; it is the first of the devices."""
+    """Return a Notice if a device on the sensor's bus explains the fault, else None. kept: False if the first device is
+    a chip that does not keep its settings."""
     if not kept and devices and devices[0][2] != MOTION and devices[0][1] != "clock":
         return Notice("not-kept", devices[0][0])
     for address, name, kind in devices:
@@ -122,9 +123,10 @@ def _judged(devices, i2c, kept):
 
 
 def fifo_fault(chip):
-    """None, or the Notice "sensor-fifo": the chip measures, but its FIFO does not work. values[0]: its fault.
+    """Return the Notice "sensor-fifo" if the chip measures but its FIFO does not work, else None. values[0]: the fault
+    in words.
 
-    It takes up to 0.3 s, and leaves the FIFO empty. Raises OSError from the bus."""
+    The test takes up to 0.3 s and leaves the FIFO empty. Raises OSError from the bus."""
     chip.restart_fifo()
     left = chip.waiting()  # not 0 if a sample arrived meanwhile
     chip.write_register(_INT_ENABLE, 1)
@@ -150,7 +152,7 @@ def _reading(chip):
 
 
 def _repeats(chip):
-    """True if the FIFO repeats the same frame while the data registers change."""
+    """Return True if the FIFO repeats one frame while the data registers change."""
     first = _reading(chip)
     frames = set()
     for _ in range(3):
@@ -162,13 +164,14 @@ def _repeats(chip):
 
 
 def bus_line(name, sda, scl, devices):
-    """The devices found by scan() as a line of text. name: of the bus."""
+    """Return one line of text about the devices that scan() found. name: the name of the bus."""
     words = ", ".join([("0x%02x %s" % (address, found)).strip() for address, found, _ in devices])
     return "%-13sSDA %d, SCL %d: %s" % (name + " bus", sda, scl, words or "nothing answers")
 
 
 def show_wirings(open_lcd, count, show_ms):
-    """Show each wiring's number on a character display, using that wiring: only the right one is readable.
+    """Show the number of each wiring on a character display. Each number is sent with its own wiring, so only the right
+    one is readable.
 
     open_lcd(number): returns a Display."""
     for number in range(1, count + 1):
@@ -177,6 +180,6 @@ def show_wirings(open_lcd, count, show_ms):
         lcd.flush()
         print("%-13sLCD_WIRING = %d is shown for %d s" % ("", number, show_ms // 1000))
         sleep_ms(show_ms)
-        lcd.show("", "")  # the next wiring may not be able to
+        lcd.show("", "")  # blank the display now: with the next wiring it may not react
         lcd.flush()
     print("%-13sput the line that it has shown into config.py; if it has shown none: its contrast, or 5 V" % "")

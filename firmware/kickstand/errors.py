@@ -1,4 +1,4 @@
-"""Errors and notices: a code, and the values that belong to it.
+"""Errors and notices. Each has a code and the values for its sentence.
 
 A code is a name for programs and is never shown. ui/messages.py has its words for the display (2 x 16 characters),
 console.py its sentence for the USB console, and the host's tools have its words for a terminal.
@@ -7,22 +7,22 @@ console.py its sentence for the USB console, and the host's tools have its words
 import gc
 import sys
 
-# The errors of importing machine code that cannot run: on CPython or a port without viper, on an ESP32 without free
-# memory for it, or on a chip that it was not compiled for.
+# Raised when machine code is imported that cannot run: on CPython or a port without viper, on an ESP32 without enough
+# free memory, or on a chip of another kind than it was compiled for.
 NO_MACHINE_CODE = (ImportError, NameError, SyntaxError, MemoryError, ValueError)
 
 
 class Notice:
-    """Something to report. code: see above; values: its numbers and names, in the order of their use in the sentences
-    for this code."""
+    """Something to report. code: a name for programs. values: the numbers and names that the sentences for this code
+    use, in order."""
 
     def __init__(self, code, *values):
         self.code = code
         self.values = values
 
     def words(self, table, other=""):
-        """The words for this code from a table, with the values filled in. table: text with one line code|words per
-        code. other: the words for a code that is not in the table."""
+        """Return the words for this code from a table, with the values filled in. table: text with one line code|words
+        per code. other: the words for a code that is not in the table."""
         start = table.find("\n%s|" % self.code)
         if start >= 0:
             start += len(self.code) + 2
@@ -31,7 +31,7 @@ class Notice:
 
 
 class Refusal(Exception):
-    """A request that cannot be fulfilled. It has a code and values like a Notice."""
+    """A request was refused. The exception has a code and values like a Notice."""
 
     def __init__(self, code, *values):
         super().__init__(code, *values)
@@ -42,8 +42,8 @@ class Refusal(Exception):
 
 
 def report(refusal):
-    """Print a refusal on the console, unless a recent print was slow. It prints the sentence, or only the code if the
-    module with the sentences cannot be loaded (flash or heap has failed)."""
+    """Print a refusal on the console, unless a recent print was slow. Prints only the code if the module with the
+    sentences cannot be loaded (flash or heap has failed)."""
     try:
         from .console import tell
 
@@ -62,7 +62,8 @@ def attempt(function, *arguments):
 
 def tried(function, *arguments):
     """Call a function that may import modules. Return None, or a Notice if memory is short or the firmware is
-    incomplete. After a failure the modules that it began to import are removed: MicroPython would keep half of one."""
+    incomplete. After a failure, remove the modules that the function began to import: MicroPython would keep a
+    half-imported one."""
     before = None
     try:
         before = tuple(sys.modules)
@@ -77,7 +78,8 @@ def tried(function, *arguments):
 
 def checked(machine_code, plain, *arguments):
     """Return the function machine_code if it gives the same results as the function plain for copies of these
-    arguments. Else return plain and report that on the console. MicroPython's compilers had errors on some boards."""
+    arguments. Else return plain, and report the difference on the console. Some boards' MicroPython compilers had
+    bugs."""
     copies = [a if isinstance(a, (int, bytes)) else a[:] for a in arguments]
     same = machine_code(*arguments) == plain(*copies)
     for a, b in zip(arguments, copies):

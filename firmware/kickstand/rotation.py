@@ -14,7 +14,7 @@ def vector(x=0.0, y=0.0, z=0.0):
 
 
 def matrix(values=(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)):
-    """A new matrix of 9 values, by default the identity."""
+    """Return a new matrix of 9 values, by default the identity."""
     return array("f", values)
 
 
@@ -24,7 +24,7 @@ def dot(a, b):
 
 
 def cross(out, a, b):
-    """out = a x b, the cross product (Nicolae's equation 4, which is zero as printed)."""
+    """out = a x b, the cross product (Nicolae's equation 4; as printed it gives zero)."""
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
@@ -38,7 +38,7 @@ def norm(a):
 def normalize(a):
     """Scale a to length 1 in place; return its earlier length. Raises ValueError for a null vector."""
     length = norm(a)
-    if not length > 1e-9:  # also catches not-a-number
+    if not length > 1e-9:  # also catches NaN
         raise ValueError("null vector has no direction")
     a[0] /= length
     a[1] /= length
@@ -70,8 +70,8 @@ def is_identity(m):
 
 
 def frame(out, up, forward):
-    """Fill the matrix out with the rows left, up, forward. up: length 1. The row forward is the part of `forward` at a
-    right angle to up. Raises ValueError if that part is zero."""
+    """Fill the matrix out with the rows left, up, forward. up: length 1. The third row is the part of `forward` that is
+    perpendicular to up, scaled to length 1. Raises ValueError if that part is zero."""
     left, ahead = vector(), vector()
     cross(left, up, forward)
     normalize(left)
@@ -93,7 +93,7 @@ def is_rotation(m, tolerance=1e-4):
     for i in (0, 3, 6):
         for j in (0, 3, 6):
             product = m[i] * m[j] + m[i + 1] * m[j + 1] + m[i + 2] * m[j + 2]
-            if not abs(product - (1.0 if i == j else 0.0)) <= tolerance:  # "not <=" also refuses not-a-number
+            if not abs(product - (1.0 if i == j else 0.0)) <= tolerance:  # "not <=" also rejects NaN
                 return False
     determinant = (
         m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6])

@@ -1,6 +1,7 @@
-"""Each setting of config.py with its default and its check. settings.py imports this only for a moment.
+"""The settings of config.py, each with its default and its check. settings.py removes this module after use, to free
+heap.
 
-To add one, write a line in _TABLE or _PINS here, and a line in config.py with its purpose.
+To add a setting, write a line in _TABLE or _PINS here, and a line in config.py with its purpose.
 """
 
 from .board import port
@@ -38,7 +39,7 @@ _INPUT = _pin, "a number from 0 to 48, no pin of the chip's own USB, flash or co
 # a button needs a pull-up, which input-only pins do not have
 _PIN = (lambda v: _pin(v) and v not in port.INPUT_PINS), _INPUT[1] + ", and none that is an input only"
 _SD_PINS = ("SD_SCK", "SD_MOSI", "SD_MISO", "SD_CS")
-# The settings with pins, for each speed source
+# The pin settings of each speed source
 _SPEED_PINS = {None: (), "gps": ("GPS_TX", "GPS_RX"), "wheel": ("WHEEL_PIN",)}
 
 # name: default, (check, what is allowed in words)
@@ -70,7 +71,7 @@ _TABLE = {
     "GPS_BAUD": (9600, _whole(4800, 115_200)),
     "PULSES_PER_METRE": (0.5, (_pulses, "pulses along a metre of road, from 0.1 to 100")),
 }
-# The same for pins. A wrong pin is replaced by none, because the default pin may be connected to something else
+# The same for pins. A wrong pin is replaced by None, because the default pin may be connected to something else
 _PINS = {
     "SENSOR_SDA": (port.SENSOR_PINS[0], _PIN),
     "SENSOR_SCL": (port.SENSOR_PINS[1], _PIN),
@@ -90,7 +91,7 @@ _NAMES = set(_TABLE) | set(_PINS)
 
 def fill(settings, config, refusal):
     """Check the values of the module config and set them in `settings`, a Settings. A wrong value is replaced by its
-    default, a wrong pin by none. Raises SettingsError, or refusal."""
+    default, a wrong pin by None. Raises SettingsError, or refusal if it is not None."""
     for table in (_TABLE, _PINS):
         for name, (default, (check, allowed)) in table.items():
             value = getattr(config, name, default)
@@ -131,5 +132,5 @@ def _check(settings, config):
     if not settings.leans and settings.SPEED is None:
         raise SettingsError("needs-speed", "SPEED")
     fitting = MIN_DLPF[settings.SAMPLE_HZ]
-    if settings.DLPF < fitting:  # the engine's vibration would alias to a slow motion
+    if settings.DLPF < fitting:  # the engine's vibration would alias and look like a slow motion
         raise SettingsError("aliasing", "DLPF", settings.DLPF, settings.SAMPLE_HZ, fitting)

@@ -1,4 +1,4 @@
-"""Loads and checks the settings of config.py. Their defaults and checks are in setting_table.py."""
+"""Loads and checks the settings in config.py. setting_table.py has their defaults and checks."""
 
 import sys
 from io import StringIO
@@ -7,7 +7,7 @@ from .errors import SettingsError
 
 
 def load():
-    """The Settings of config.py. Without a config.py these are the defaults. Raises SettingsError."""
+    """Return the Settings of config.py, or the defaults without a config.py. Raises SettingsError."""
     config = refusal = None
     try:
         import config
@@ -19,7 +19,7 @@ def load():
 
 
 def _line_of(error):
-    """The place of an error in config.py: "line 3: ", or "" if the traceback does not have it."""
+    """Return the place of an error in config.py: "line 3: ", or "" if the traceback does not have it."""
     text = StringIO()
     # the type checker's stubs have neither a StringIO's type nor its getvalue
     sys.print_exception(error, text)  # type: ignore[arg-type]
@@ -30,7 +30,7 @@ def _line_of(error):
 
 class Settings:
     """The settings, one attribute per name in setting_table.py. config: the module config, or None for the defaults.
-    refusal: why there is no config. Raises SettingsError.
+    refusal: the SettingsError to raise if config.py cannot be read, else None. Raises SettingsError.
 
     one_bus: True if sensor and display share one I2C bus. leans: True if the vehicle leans (a motorcycle).
     """
@@ -43,6 +43,6 @@ class Settings:
         except SettingsError as error:
             error.settings = self
             raise
-        finally:  # it takes 8 KB of heap
+        finally:  # the table takes 8 KB of heap
             if sys.modules.pop("kickstand.setting_table", None):
                 del sys.modules["kickstand"].setting_table  # type: ignore[attr-defined]

@@ -19,8 +19,8 @@ from .units import __version__, const
 
 _CHARGE_MS = const(100)
 
-# The modules that the app imports, in this order. Between two of them the next step of setting up display and chip is
-# done. The list repeats the import statements, because MicroPython has no hook between imports; a test compares both.
+# The modules that the app imports, in this order. Between two imports the set-up of display and chip advances by a
+# step. MicroPython has no hook between imports, so this list repeats the import statements. A test compares both.
 STEPS = (
     "calibration.parameters calibration.store calibration.active calibration.transform lean.bike_model lean.kalman "
     "lean.measurements lean.rest lean.upright_trim lean.dive lean.lean_filter lean.meter ui.messages ui.pages "
@@ -35,8 +35,9 @@ def _show(lcd, line1, line2=""):
 
 
 def _held(button):
-    """True if the button is pressed, now and a moment later. The pin's weak pull-up must first charge any capacitor
-    between pin and ground, such as a debouncing one (1 uF through 80 kOhm takes 75 ms)."""
+    """Return True if the button is pressed now and a moment later. The pin's weak pull-up must first charge any
+    capacitor
+    between pin and ground, such as one for debouncing (1 uF through 80 kOhm takes 75 ms)."""
     if button.held():
         sleep_ms(_CHARGE_MS)
     return button.held()
@@ -56,7 +57,8 @@ def main(loop=None):
         lcd.show("Kickstand", "starting")  # replaces a lean shown before a reset
         run(chosen, lcd, loop)
     except SettingsError as error:
-        port.rest_watchdog()  # it may be running: the app may find wrong pins only when it opens them
+        # the watchdog may be running, because the app finds some wrong pins only when it opens them
+        port.rest_watchdog()
         from .console import sentence
         from .ui.messages import lines
 
@@ -82,14 +84,15 @@ def main(loop=None):
 
 
 def _last_words(lcd, line1, line2):
-    """Show two lines when the firmware ends. lcd: None before it was opened: then the default pins are used."""
+    """Show two lines when the firmware ends. lcd: the Display; None if it is not open yet: then open it on the default
+    pins."""
     try:
         if lcd is None:
-            sys.modules.pop("config", None)  # the memory may be missing because of it
+            sys.modules.pop("config", None)  # config.py itself may have used up the memory
             gc.collect()
             lcd = open_lcd(settings.Settings())
         _show(lcd, line1, line2)
-    except Exception:  # no memory, or no file: the console has said it
+    except Exception:  # no memory, or no file: the console already has the message
         pass
 
 
@@ -125,7 +128,7 @@ def _attach(opened, app):
 def run(chosen, lcd, loop=None):
     """Run the app, or call loop with it: see main()."""
     radio = []
-    # First, because an ESP32-C3 may crash when its radio is switched on after 40 KB are allocated
+    # The radio comes first: an ESP32-C3 may crash if its radio is switched on after 40 KB are allocated
     problem = _live(_open_radio, radio, chosen.LIVE_PIN) if chosen.LIVE else None
     sensor = open_sensor(chosen)
     for name in STEPS + ["app"]:

@@ -1,15 +1,15 @@
-"""What the app shows and knows, as data for other programs, such as a simulation or a test."""
+"""The app's state as data for other programs, such as a simulation or a test."""
 
-STEPS = ("ask", "take", "notice", "refused", "result", "ended", "compute")  # by the states of ui/wizard.py
+STEPS = ("ask", "take", "notice", "refused", "result", "ended", "compute")  # indices: the states of ui/wizard.py
 
 
 def state(app):
-    """A dictionary with plain values. It says what the display was last given, not more than 100 ms ago:
+    """Return a dictionary with plain values. It describes what the display last got, at most 100 ms ago:
 
     view: "notice", "align", "six", "menu", "info", "fault", "question", or the name of a page (see PageRing.name).
-    code: that of the notice, fault, question or refusal in view, or None (see errors.py).
-    step: of an alignment or the six positions, from STEPS; pose: "kickstand" or "upright", of an alignment.
-    entry: the name of the menu's entry.
+    code: the code of the notice, fault, question or refusal in view, or None (see errors.py).
+    step: the step of an alignment or the six positions, from STEPS. pose: the pose of an alignment, "kickstand" or
+    "upright". entry: the name of the menu entry that is shown.
     trusted: True if the lean may be shown; lean_deg: that lean, > 0 to the right, or None.
     aligned, recording: True or False. fault: the code of the sensor's fault, or None.
     """

@@ -17,11 +17,11 @@ from .ui import messages
 from .units import __version__, const
 
 _LISTEN_MS = const(3500)
-# The misfit, by the code of lean/consistency.py
+# By the code of lean/consistency.py: the reading that did not fit
 MEASURED = {"odd-left": "force to the left", "odd-up": "force up", "odd-pitch": "pitch"}
-_WIRINGS = const(4)  # of LCD_WIRING
-_WIRING_MS = const(4000)  # for each wiring
-_WATCH_MS = const(1400)  # for setting the sensor up and two looks at its axes
+_WIRINGS = const(4)  # number of values of LCD_WIRING
+_WIRING_MS = const(4000)  # time for which each wiring is shown
+_WATCH_MS = const(1400)  # time to set the sensor up and judge its axes twice
 _TRIAL = "trial.tmp"  # a file to measure the flash with, removed afterwards
 
 
@@ -30,7 +30,8 @@ def _print(label, words, *values):
 
 
 def report(wirings=False):
-    """Print the whole report. Opens sensor and display itself: the app must not be running. wirings: see status()."""
+    """Print the whole report. Stop the app first, because this function opens sensor and display itself. wirings: as in
+    status()."""
     release = ".".join(str(n) for n in sys.implementation.version[:3])
     machine_name = getattr(sys.implementation, "_machine", sys.platform)
     print("Kickstand %s on %s, MicroPython %s" % (__version__, machine_name, release))
@@ -61,7 +62,7 @@ def report(wirings=False):
 
 
 def _write_ms():
-    """The time in ms to erase and write a flash block. If it is longer than the chip's FIFO lasts, readings are
+    """Return the time in ms to erase and write a flash block. If it is longer than the chip's FIFO lasts, readings are
     lost."""
     begun_ms = ticks_ms()
     with open(_TRIAL, "wb") as file:
@@ -97,7 +98,7 @@ def _sensor(sensor, settings):
 
 
 def _axes(sensor):
-    """Print the faults of the axes of a sensor that answers, from their counts during a second."""
+    """Print the faults of the sensor's axes, found in their counts during a second."""
     for _ in range(_WATCH_MS // 10):
         sensor.fetch(ticks_ms())
         sleep_ms(10)
@@ -150,7 +151,7 @@ def _speed(settings):
 
 
 def _worst(chip):
-    """Print the app's records if it has run since the board was started. chip: an Mpu6050."""
+    """Print the app's worst values if it has run since the board started. chip: an Mpu6050."""
     judge = sys.modules.get("kickstand.lean.consistency")
     if judge and judge.last_odd:
         words = "the readings did not fit, again and again: %s. Sensor, alignment or mount: align again"

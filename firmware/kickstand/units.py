@@ -6,12 +6,12 @@ The sensor's axes are x, y, z as printed on the chip. The vehicle's are left, up
 __version__ = "0.4.0"
 STANDARD_GRAVITY = 9.80665  # m/s^2 in 1 g
 AXES = ("x", "y", "z")  # names of the sensor's axes
-GAP_US = 500_000  # the estimators restart after a longer time without a reading
-# After a longer time between two readings some were lost: the loop takes at most eight at once, 160 ms at 50 per second
+GAP_US = 500_000  # after a longer time without a reading the estimators restart
+# A longer time between two readings means lost ones: the loop takes at most eight at once, 160 ms at 50 per second
 LOST_US = 170_000
 
 
 def const(value):
     """Return value. MicroPython's compiler recognises _NAME = const(value) at a module's top level: it puts the value
-    into the code, and the name takes no heap. It is defined here because CPython has no module micropython."""
+    into the code, and the name takes no heap. This module defines const() because CPython has no module micropython."""
     return value

@@ -1,9 +1,10 @@
-"""Runs the owner's code: the file user.py on the board, which updates leave alone. It may define these functions:
+"""Runs the owner's code, the file user.py on the board. Updates do not touch this file. It may define these functions:
 
 setup(app)                          once, before the lean meter runs
 page(app), page_battery(app) ...    while this page is shown: two lines of 16 characters and, for a display that draws,
-                                    perhaps a picture, see board/display.py. Each name that begins with page is one
-on_lean(lean_deg, trusted, meter)   ten times a second. trusted: False while the lean must not be used
+                                    optionally a picture, see board/display.py. Each name that begins with page is a
+                                    page
+on_lean(lean_deg, trusted, meter)   ten times per second. trusted: False while the lean must not be used
 on_press(event)                     after each press: board.button.SHORT or LONG
 
 A function is disabled, with a notice on display and console, if it raises, takes longer than _TOO_SLOW_MS, or takes
@@ -19,15 +20,16 @@ from time import ticks_diff, ticks_ms
 from .errors import Notice, report
 from .units import const
 
-_SLOW_MS = const(50)  # a slower call is reported, once per function
-_TOO_SLOW_MS = const(300)  # the sensor keeps its samples for no longer
-_MOST_SLOW = const(5)  # calls in a row longer than _SLOW_MS: the loop would never catch up with the samples
-_LEAST_FREE = const(20_000)  # bytes of heap: with less, the lean meter's own work would fail next
+_SLOW_MS = const(50)  # a slower call is reported once per function
+_TOO_SLOW_MS = const(300)  # the sensor does not keep its samples for longer
+_MOST_SLOW = const(5)  # successive calls longer than _SLOW_MS; after more, the loop could not catch up with the samples
+_LEAST_FREE = const(20_000)  # bytes of free heap: with less, the lean meter itself would fail next
 _CALLED = ("setup", "on_lean", "on_press")
 
 
 def _functions_of(name):
-    """The functions of a module to call, by name. A module's own __dir__() or __getattr__() may raise."""
+    """Return the functions of a module that the firmware calls, by name. The module's __dir__() or __getattr__() may
+    raise."""
     module = __import__(name)
     found = {}
     for name in dir(module):
@@ -47,7 +49,8 @@ class UserCode:
         self._functions["import"] = _functions_of  # _call() also guards the import
         self._slow = {}  # number of slow calls in a row, per function
         self._problems = []
-        self._drawn = self._draw  # stored: each access makes a new bound method, and the display compares it
+        # stored once: each access would make a new bound method, and the display compares them
+        self._drawn = self._draw
         sys.modules.pop("user", None)
         self._functions.update(self._call("import", "user") or {})
         pages = sorted([name for name in self._functions if name.startswith("page")])
@@ -55,7 +58,7 @@ class UserCode:
         self._call("setup", app)
 
     def take_problem(self):
-        """A Notice that has not been shown yet, or None."""
+        """Return a Notice that was not shown yet, or None."""
         return self._problems.pop(0) if self._problems else None
 
     def lean(self, trusted):
@@ -122,7 +125,7 @@ class UserCode:
             line1, line2 = [line if isinstance(line, (str, bytes, bytearray)) else str(line) for line in shown[:2]]
             picture = (self._drawn, name) + tuple(shown[2]) if len(shown) > 2 and shown[2] else None
             return line1, line2, picture
-        except Exception:  # its __str__ or __getitem__ may raise anything
+        except Exception:  # the error's own __str__ or __getitem__ may raise anything
             self._leave_out(name, "not two lines")
             return "user.py " + name, "not two lines"
 

@@ -23,10 +23,11 @@ class Button:
         self._pressed = self._raw = self.held()
         self._changed_ms = None
         self._pressed_ms = 0
-        self._long_sent = True  # the long press was reported; also True for a press that began before this object
+        # True once the long press was reported, and for a press that began before this object existed
+        self._long_sent = True
 
     def held(self):
-        """True if the button is pressed now, not debounced."""
+        """Return True if the button is pressed now, without debouncing."""
         return not self._pin.value()
 
     def poll(self, now_ms):

@@ -9,15 +9,16 @@
 A driver (hd44780.Lcd, oled.Oled) has the following members. host_tests/simulated_board/test_board_display.py tests each
 driver.
 
-begin(i2c, address, hz, fresh)  takes a display that has just answered. fresh: it may just have got its power.
-show(line1, line2, picture)     notes what to show. 16 characters a line, a str of codes below 256 or bytes.
-tick(now_ms)                    one step, which takes the bus for 3 ms (OLED) or at most 13 ms (LCD). Raises OSError if
+begin(i2c, address, hz, fresh)  takes a display that has just answered. fresh: True if it may have just been powered.
+show(line1, line2, picture)     stores what to show. 16 characters per line, a str of codes below 256 or bytes.
+tick(now_ms)                    does one step and uses the bus for 3 ms (OLED) or at most 13 ms (LCD). Raises OSError if
                                 the display does not answer.
-busy                            True while something is left to be sent
+busy                            True while something must still be sent
 draws                           True if it shows pictures. A picture is (draw, values...): draw(canvas, values...) is
                                 called with a blank framebuf.FrameBuffer of 128x64 pixels. Others show the two lines.
 
-After a loss of power or a failed transfer the display is set up again. It is dark or crossed out until it is correct.
+After a loss of power or a failed transfer the display is set up again. It stays dark or shows dashes until its content
+is correct.
 """
 
 from time import sleep_ms, ticks_diff, ticks_ms
@@ -34,21 +35,21 @@ LCD_HZ, OLED_HZ = 100_000, 400_000  # the fastest clocks that a PCF8574 and the 
 STOPPED = "Kickstand", "stopped"  # shown after the firmware has ended
 KINDS = ("auto", "lcd", "ssd1306", "sh1106", "ssd1306-32")
 _PROBE_MS = const(200)  # time between two searches for a missing display
-MOST_WAIT_MS = 60_000  # longest such time: it doubles while a driver cannot be loaded
+MOST_WAIT_MS = 60_000  # the longest time between searches: it doubles while a driver cannot be loaded
 _REOPEN_PROBES = const(5)  # without a display the bus is freed once per this many probes
-_POWER_UP_MS = const(40)  # a display found sooner after power-on may have got its power with the board
+_POWER_UP_MS = const(40)  # a display found sooner after power-on may have been powered together with the board
 _FLUSH_STEPS = const(60)
 _STEP_MS = const(5)
 
 
 class Display:
-    """A display that may be absent, or be plugged in and out at any time.
+    """A display that you may plug in or out at any time.
 
-    reopen(hz): frees the bus and returns it as a machine.I2C.  bus_hz: its clock; None: the fastest that the display
-    allows. kind: one of KINDS.  addresses: where to look for the display.  contrast, inverted: see Oled.  wiring: see
-    Lcd.
+    reopen(hz): frees the bus and returns it as a machine.I2C.  bus_hz: the clock of the bus; None selects the fastest
+    that the display allows. kind: one of KINDS.  addresses: where to look for the display.  contrast, inverted: see
+    Oled.  wiring: see Lcd.
 
-    address: where it was found, or None while no display answers.  draws: see above.
+    address: where it was found, or None while no display answers.  draws: as above.
     """
 
     def __init__(self, reopen, bus_hz=None, kind="auto", addresses=ADDRESSES, contrast=255, inverted=False, wiring=1):
@@ -70,8 +71,8 @@ class Display:
         self._fresh = ticks_ms() < _POWER_UP_MS
 
     def show(self, line1, line2, picture=None):
-        """Set the lines and the picture. tick() sends them."""
-        self._wanted = line1, line2, picture  # also for the driver of the next display
+        """Set the lines and the picture that tick() will send."""
+        self._wanted = line1, line2, picture  # kept for a display that is plugged in later
         if self._driver:
             self._driver.show(line1, line2, picture)
 
@@ -112,7 +113,7 @@ class Display:
                 self._fresh = True
                 self.show(line1, line2)
                 self.flush()
-        except Exception:  # pins, drivers, memory: nobody is left to report it to
+        except Exception:  # pins, drivers, memory: the firmware has ended, so nothing can report the error
             pass
         finally:
             if interrupt:
@@ -120,7 +121,7 @@ class Display:
 
     def _probe(self):
         """Look for the display at each address."""
-        if self._probes % _REOPEN_PROBES == 0:  # a stuck bus must be freed, but not each time: that takes too long
+        if self._probes % _REOPEN_PROBES == 0:  # freeing a stuck bus takes too long to do it at every search
             self._i2c = self._reopen(self._bus_hz or LCD_HZ)
         self._probes += 1
         for address in self._addresses:
@@ -129,7 +130,7 @@ class Display:
         other = _FAMILY[self._probes % len(_FAMILY)]
         if self._addresses is ADDRESSES and self._kind in ("auto", "lcd") and self._answers(other):
             return
-        # Not found: a display that answers later has just got its power, and may be another one
+        # Not found: a display that answers later has just been powered and may be a different one
         self._fresh = True
         self._wait_ms = _PROBE_MS
 
@@ -139,7 +140,7 @@ class Display:
         except OSError:
             return False
         self._probes = 0
-        if attempt(self._begin, address):  # its driver is missing, or memory is short
+        if attempt(self._begin, address):  # False if its driver is missing or memory is short
             self._wait_ms = min(2 * self._wait_ms, MOST_WAIT_MS)
         else:
             self.address, self._wait_ms = address, _PROBE_MS

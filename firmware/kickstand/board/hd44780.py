@@ -2,16 +2,17 @@
 display.py finds it and describes its methods.
 
 Sources: data sheets Hitachi HD44780U (ADE-207-272) and NXP PCF8574. The display is driven in 4-bit mode. The changed
-part of a line is sent in two transfers, first dashes, then the text. Each takes 6 ms for a whole line at 100 kHz.
+part of a line is sent in two transfers: first dashes, then the text. A transfer of a whole line takes 6 ms at 100 kHz.
 
-Backpacks connect the pins of the PCF8574 differently: see WIRINGS. R/W, which stays low, is between RS and E.
+Backpacks connect the pins of the PCF8574 differently: see WIRINGS. The bit of R/W is between those of RS and E; it
+stays low.
 """
 
 from time import ticks_diff, ticks_ms
 
 from micropython import const
 
-# By LCD_WIRING - 1: the bits of RS, E and the backlight, and True if D4 to D7 are P0 to P3
+# Index: LCD_WIRING - 1. The bits of RS, E and the backlight, then True if D4 to D7 are P0 to P3
 WIRINGS = (
     (0x01, 0x04, 0x08, False),  # the usual one: P0 RS, P2 E, P3 light
     (0x40, 0x10, 0x00, True),  # MJKDZ, GY-IICLCD: P6 RS, P4 E, P7 light, on while low
@@ -25,27 +26,28 @@ _COLUMNS = const(16)
 _DASHES = b"-" * _COLUMNS
 _NO_TEXT = "\n"
 _NEVER = b"\xfe" * _COLUMNS  # a code that no text uses: marks a line as not yet written
-# Time between initialisations. Only they bring the nibbles back into step after electrical noise.
+# Time between initialisations. After electrical noise the display may pair the nibbles wrongly; only an initialisation
+# repairs that.
 _REINIT_MS = const(10_000)
 _PROBE_MS = const(200)  # time between two checks that the display is connected
 _STEP_MS = const(5)  # time between two steps: the longest wait that the initialisation requires is 4.1 ms
 _POWER_UP = const(-8)  # first step after power-up: the display takes no instruction for 40 ms
 
-# Initialisation by instruction (data sheet, figure 24), one step per tick, _STEP_MS apart: the loop never waits. First
-# single nibbles, which bring the display into 4-bit mode from any state. Then whole bytes: function set (4 bit, 2
-# lines); display on, no cursor; entry mode left to right; return home, which undoes a shift. The first three need 37 us
-# each, less than a transfer takes.
+# Initialisation by instruction (data sheet, figure 24), one step per tick, _STEP_MS apart, so the loop never waits.
+# Single nibbles come first: they bring the display into 4-bit mode from any state. Whole bytes follow: function set (4
+# bit, 2 lines); display on, no cursor; entry mode left to right; return home, which undoes a shift. Each of the first
+# three needs 37 us, less than a transfer.
 _NIBBLES = (0x30, 0x30, 0x30, 0x20)
 _COMMANDS = b"\x28\x0c\x06\x02"
 _GLYPH_PARTS = const(4)  # the 64 bytes of character patterns are sent 16 at a time
-# The memory of a line is longer than 16 characters. A larger display, 20x4 or 20x2, shows the rest: it is blanked, one
-# line per step.
+# A larger display (20x4 or 20x2) shows more than 16 characters of a line. The driver blanks the rest, one line per
+# step.
 _BEHIND = const(24)
 _STEPS = len(_NIBBLES) + 1 + _GLYPH_PARTS + 2
 
 
 def _bar_glyphs():
-    """The patterns of characters 0 to 7, 64 bytes: 1 to 4 of 5 columns filled from the left, then 1 to 4 from the
+    """Return the patterns of characters 0 to 7 (64 bytes): 1 to 4 of 5 columns filled from the left, then from the
     right."""
     rows = bytearray()
     for columns in range(1, 5):
@@ -56,12 +58,12 @@ def _bar_glyphs():
 
 
 class Lcd:
-    """The driver. display.py describes its methods."""
+    """The driver of the character display. display.py describes its methods."""
 
     draws = False
 
     def __init__(self, wiring=1):
-        """wiring: a number from 1 on, see WIRINGS."""
+        """wiring: a number from 1 on, as LCD_WIRING. See WIRINGS."""
         self._rs, self._e, self._light, self._low = WIRINGS[wiring - 1]
         self._wanted = [bytearray(b" " * _COLUMNS), bytearray(b" " * _COLUMNS)]
         self._shown = [bytearray(_COLUMNS), bytearray(_COLUMNS)]
@@ -74,7 +76,7 @@ class Lcd:
     def begin(self, i2c, address, hz, fresh):
         self._i2c = i2c
         self._address = address
-        # step of the initialisation; negative: waiting for the display's own power-up
+        # step of the initialisation; negative while the display powers up
         self._step = _POWER_UP if fresh else 0
         self._acted_ms = ticks_ms()  # when something was last sent
         self._seen_ms = 0  # when the display last answered
@@ -102,7 +104,7 @@ class Lcd:
                 self._initialise(self._step)
             self._step += 1
             self._init_ms = self._seen_ms = now_ms
-        elif self._changed and self._refresh():  # first, because the shown text may be too old
+        elif self._changed and self._refresh():  # before the power check, because the shown text may be too old
             self._seen_ms = self._acted_ms = now_ms
         elif ticks_diff(now_ms, self._seen_ms) >= _PROBE_MS:
             self._seen_ms = self._acted_ms = now_ms
@@ -114,7 +116,7 @@ class Lcd:
     def _put(self, number, text):
         line = self._wanted[number]
         if isinstance(text, str):
-            if text == self._texts[number]:  # the usual case; a conversion takes 0.2 ms
+            if text == self._texts[number]:  # usually unchanged; a conversion takes 0.2 ms
                 return
             self._texts[number] = text
             for i in range(_COLUMNS):
@@ -142,10 +144,11 @@ class Lcd:
             self._changed = True
 
     def _kept_power(self):
-        """False if the display lost its power since the last transfer, however short. Raises OSError if it is gone.
+        """Return False if the display lost its power since the last transfer, however briefly. Raises OSError without
+        an answer.
 
-        The PCF8574's pins are high after power-up, but every transfer leaves E low. So it must be asked before
-        anything is sent."""
+        The PCF8574's pins are high after power-up, but every transfer leaves E low. So this check must run before the
+        next transfer."""
         self._i2c.readfrom_into(self._address, self._port)
         return not self._port[0] & self._e
 
@@ -163,7 +166,7 @@ class Lcd:
                 while shown[last] == wanted[last]:
                     last -= 1
                 at = _LINE_ADDRESSES[i] + first
-                if last > first:  # an interrupted transfer must not leave half a number or the wrong side
+                if last > first:  # dashes first: an interrupted transfer must not leave half a number or the wrong side
                     self._send(at, memoryview(_DASHES)[first : last + 1])
                 self._send(at, memoryview(wanted)[first : last + 1])
                 shown[:] = wanted
@@ -180,7 +183,7 @@ class Lcd:
         self._i2c.writeto(self._address, memoryview(packed)[: 4 * (len(data) + 1)])
 
     def _pack(self, at, value, control):
-        """Put a byte into _packed as two nibbles, each with E high and then low: the falling edge latches it.
+        """Put a byte into _packed as two nibbles, each with E high and then low: the falling edge latches the nibble.
 
         RS changes in the byte that raises E: at 100 kHz that is 90 us before E falls."""
         packed, enable = self._packed, self._e

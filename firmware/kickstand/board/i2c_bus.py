@@ -7,8 +7,8 @@ from machine import Pin
 from . import port
 
 _HALF_PERIOD_US = 5  # half a period of SCL while a bus is freed: 100 kHz
-# Time-out in bit times. On rp2 it is for a whole transfer of at most 136 bytes, on an ESP32 for one bit.
-# The default of 50 ms would stop the loop for too long.
+# Time-out in bit times: on rp2 of a whole transfer of at most 136 bytes, on an ESP32 of one bit. The default of 50 ms
+# would stop the loop for too long.
 _TIMEOUT_BITS = 2000
 
 
@@ -21,7 +21,7 @@ def free(sda_pin, scl_pin):
     """Make a device release SDA. Return True if SDA is high afterwards. Pins: GPIO numbers.
 
     If the microcontroller resets in the middle of a read, the device waits for clocks and holds SDA low forever. Up to
-    nine clocks let it finish its byte; a STOP condition ends the transfer. MicroPython does not do this.
+    nine clocks let the device finish its byte; a STOP condition ends the transfer. MicroPython does not send them.
     """
     scl = Pin(scl_pin, Pin.OPEN_DRAIN, value=1)
     sda = Pin(sda_pin, Pin.OPEN_DRAIN, value=1)
@@ -39,7 +39,8 @@ def free(sda_pin, scl_pin):
 
 
 def open_i2c(controller, sda_pin, scl_pin, frequency):
-    """Free the bus and open it: see port.open_i2c(). controller: its number.  Pins: GPIO numbers.  frequency: in Hz.
+    """Free the bus and open it: see port.open_i2c(). controller: number of the I2C controller.  Pins: GPIO numbers.
+    frequency: in Hz.
 
     Raises OSError if SDA stays low, ValueError for pins that the controller cannot use."""
     if not free(sda_pin, scl_pin):

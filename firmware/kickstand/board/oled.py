@@ -2,7 +2,7 @@
 describes its methods.
 
 Sources: data sheets Solomon Systech SSD1306 rev 1.1 and Sino Wealth SH1106 V2.3. Both are addressed by pages of 8 rows,
-the only way that an SH1106 has. It has 132 columns; the panel shows the middle ones.
+the only way that an SH1106 has. An SH1106 has 132 columns; the panel shows the middle 128.
 """
 
 from time import ticks_add, ticks_diff, ticks_ms
@@ -16,26 +16,27 @@ WIDTH, HEIGHT = 128, 64
 # kHz, 3.5 ms at 100 kHz. One pass of the loop sends _PARTS of them, or _PARTS_SLOW on a bus slower than _SLOW_HZ.
 _PART = 32
 _PARTS, _PARTS_SLOW, _SLOW_HZ = 3, 2, 200_000
-_PROBE_MS = const(200)  # time between two checks that it has kept its power
+_PROBE_MS = const(200)  # time between two checks that the display has kept its power
 _REFRESH_MS = const(10_000)  # time until everything is sent again: this repairs the effects of electrical noise
 _POWER_UP_MS = 40
-_OFF = 0x40  # bit of the status
-_SH1106_STATUS = (0x08, 0x00, 0x0C)  # low half of the status; an SSD1306 has 3 or 6, or a clone's value
-_SH1106_OFFSET = 2  # its first visible column
-# Rows by which the picture is shifted, each for _SHIFT_REFRESHES, to spare the pixels. Rows shifted out at the top
-# return at the bottom, so pictures leave the first two blank.
+_OFF = 0x40  # bit of the status: the panel is off
+_SH1106_STATUS = (0x08, 0x00, 0x0C)  # low half of an SH1106's status; an SSD1306 reads 3 or 6, a clone any value
+_SH1106_OFFSET = 2  # the first visible column of an SH1106
+# Rows by which the picture is shifted, each for _SHIFT_REFRESHES, against burn-in. Rows shifted out at the top return
+# at the bottom, so pictures leave the first two rows blank.
 _SHIFTS = (0, 1, 2, 1)
 _SHIFT_REFRESHES = const(6)
-# A panel of 32 rows has no spare rows: its picture moves down, over the two blank rows below the letters.
+# A panel of 32 rows has no spare rows at the top: its picture moves down over the two blank rows below the letters.
 _SHIFTS_32 = (0, 63, 62, 63)
-# Control byte of a stream of commands, then: clock, rows - 1, no offset, columns and rows from the side opposite to the
-# cable, COM pins alternate (64 rows) or in sequence (32), pre-charge, VCOMH, show the RAM
+# A control byte, which starts a stream of commands, then: clock, rows - 1, no offset, columns and rows from the side
+# opposite to the cable, COM pins alternate (64 rows) or in sequence (32), pre-charge, VCOMH, show the RAM
 _SET_UP = b"\x00\xd5\x80\xa8\x3f\xd3\x00\xa1\xc8\xda\x12\xd9\xf1\xdb\x40\xa4"
 _SET_UP_32 = b"\x00\xd5\x80\xa8\x1f\xd3\x00\xa1\xc8\xda\x02\xd9\xf1\xdb\x40\xa4"
-# The SH1106's DC-DC converter; the SSD1306's charge pump, page addressing, no scrolling. Each ignores the other's
-# commands. A clone's status may be that of either chip, so all are sent: without its own the panel would stay dark.
+# The SH1106's DC-DC converter; the SSD1306's charge pump, page addressing, no scrolling. Each chip ignores the other's
+# commands. A clone may report the status of either chip, so both sets are sent: without its own set a panel stays dark.
 _SUPPLY = b"\xad\x8b\x8d\x14\x20\x02\x2e"
-_SPREAD = bytes((i & 1) * 3 | (i & 2) * 6 | (i & 4) * 12 | (i & 8) * 24 for i in range(16))  # each bit twice
+# each bit of a nibble doubled
+_SPREAD = bytes((i & 1) * 3 | (i & 2) * 6 | (i & 4) * 12 | (i & 8) * 24 for i in range(16))
 
 
 class Canvas(framebuf.FrameBuffer):
@@ -46,7 +47,8 @@ class Canvas(framebuf.FrameBuffer):
         self._pixels = pixels
 
     def tall(self, line, page, inverted=False):
-        """Write up to 16 letters of 8x16 pixels across the display, from row 8 * page on. line: as for show()."""
+        """Write up to 16 letters of 8x16 pixels across the display, from row 8 * page on. line: str or bytes, as in
+        show()."""
         for i in range(min(16, len(line))):
             character(self, line[i] if isinstance(line[i], int) else ord(line[i]), 8 * i, 8 * page)
         pixels = self._pixels
@@ -58,7 +60,7 @@ class Canvas(framebuf.FrameBuffer):
 
 
 class Oled:
-    """The driver. display.py describes its methods.
+    """The driver of the OLED. display.py describes its methods.
 
     kind: "ssd1306", "sh1106", "auto", or "ssd1306-32": a panel of 32 rows, which shows only the two lines. contrast: 0
     to 255.  inverted: dark on bright.
@@ -73,7 +75,7 @@ class Oled:
         self._pixels = bytearray(WIDTH * HEIGHT // 8)
         self._sent = bytearray(WIDTH * HEIGHT // 8)
         self.canvas = Canvas(self._pixels)
-        # the pixels to show and those sent, part by part; parts of the same columns follow each other, so a digit is
+        # the pixels to show and the pixels sent, part by part; parts of the same columns are neighbours, so a digit is
         # sent at once
         self._pages = HEIGHT // 8 if self.draws else HEIGHT // 16
         starts = [page * WIDTH + x for x in range(0, WIDTH, _PART) for page in range(self._pages)]
@@ -94,13 +96,13 @@ class Oled:
         self._restart()
 
     def _restart(self):
-        # check each time: another display may be plugged in
+        # decided at every start, because another display may be plugged in
         self._sh1106 = self._kind == "sh1106" or (self._kind == "auto" and self._state() & 0x0F in _SH1106_STATUS)
         self._set_up = self._lit = False
         self._send_all()
 
     def _send_all(self):
-        self._unsent = len(self._new)  # number of parts to send, changed or not
+        self._unsent = len(self._new)  # number of parts that must be sent even if unchanged
         self._changed = True
 
     @property
@@ -120,7 +122,7 @@ class Oled:
         sent."""
         if ticks_diff(now_ms, self._due_ms) < 0:
             return
-        if not self._set_up:  # dark until its RAM is written
+        if not self._set_up:  # not set up: stay dark until the RAM is written
             self._command(b"\x00\xae")
             self._configure()
             self._draw(self._wanted)
@@ -128,14 +130,14 @@ class Oled:
             self._seen_ms = self._refresh_ms = now_ms
         elif self._lit and ticks_diff(now_ms, self._seen_ms) >= _PROBE_MS:
             self._seen_ms = now_ms
-            if self._state() & _OFF and self._reports_off:  # it has lost its power
+            if self._state() & _OFF and self._reports_off:  # the display has lost its power
                 self._restart()
         elif self._changed:
             self._send()
         elif not self._lit:
             self._command(b"\x00\xaf")
             self._lit = True
-            self._reports_off = not self._state() & _OFF  # some clones never report it
+            self._reports_off = not self._state() & _OFF  # some clones never report "off"
         elif ticks_diff(now_ms, self._refresh_ms) >= _REFRESH_MS:
             self._refresh_ms = now_ms
             self._refreshes += 1
@@ -188,7 +190,8 @@ class Oled:
 
 
 def character(canvas, code, x, y):
-    """Draw a character of 8x8 pixels at x, y. code: of an HD44780's ROM, or one of the patterns of hd44780.py."""
+    """Draw a character of 8x8 pixels at x, y. code: a code of an HD44780's ROM, or of one of the patterns in
+    hd44780.py."""
     if code < 8:
         columns = (code & 3) + 1
         canvas.fill_rect(x if code < 4 else x + 8 - 2 * columns, y, 2 * columns, 8, 1)

@@ -10,8 +10,8 @@ import sys
 import machine
 
 # Collect garbage often while the other modules are loaded. Otherwise lasting objects would be placed behind the
-# garbage, far along the heap, and every later collection would scan all of it. App resets the threshold before its loop
-# begins.
+# garbage, far along the heap. Then every later collection would scan all of that heap. App resets the threshold before
+# its loop begins.
 gc.threshold(80_000)
 
 IS_ESP32 = sys.platform == "esp32"
@@ -22,9 +22,9 @@ if IS_ESP32:
     _KNOWN = MACHINE.startswith("Generic ESP32 module")  # ESP32-DevKitC and similar, with the classic chip
     SENSOR_PINS, LCD_PINS, BUTTON_PIN = (21, 22), (18, 19), 4  # (SDA, SCL)
     GPS_UART, GPS_PINS, WHEEL_PIN = 2, (17, 16), 27  # (TX, RX)
-    if "SPIRAM" in MACHINE:  # MicroPython's image for PSRAM, which takes 16 and 17, has no Pin for these
+    if "SPIRAM" in MACHINE:  # MicroPython's image for PSRAM uses 16 and 17 itself and has no Pin for them
         GPS_PINS = None, None
-    PIN_IRQ = {}  # more arguments of Pin.irq(): this port has only soft interrupts, which wait during SoftI2C transfers
+    PIN_IRQ = {}  # extra arguments of Pin.irq(): this port has only soft interrupts, and SoftI2C transfers delay them
     I2C_NUMBERED = False  # see open_i2c()
     SD_SPI = (2, 3)  # the slots of machine.SDCard that are SPI
     # Pins that the chip itself needs: its own USB (driving one cuts the board off from the computer until BOOT is
@@ -43,13 +43,13 @@ else:  # Raspberry Pi Pico and Pico 2, and other makers' boards with the same pi
     I2C_NUMBERED = True  # two buses need two numbers
     SD_SPI = (0, 1)  # the numbers of machine.SPI
     TAKEN_PINS = INPUT_PINS = ()
-if not _KNOWN:  # these pins may be missing or used otherwise on the board
+if not _KNOWN:  # an unknown board may lack these pins or use them for something else
     SENSOR_PINS = LCD_PINS = GPS_PINS = None, None
     BUTTON_PIN = WHEEL_PIN = None
     GPS_UART = 1
 
 
-_SOFT_I2C_HZ = 250_000  # half a period of 2 us: at 400 kHz SoftI2C has 1 us, but the MPU6050 needs 1.3
+_SOFT_I2C_HZ = 250_000  # gives half a period of 2 us; at 400 kHz SoftI2C has 1 us, but the MPU6050 needs 1.3 us
 _TURN_BYTES = 2000  # bytes of heap used by one pass of the app's loop; 3000 while aligning by driving
 _FEWEST_TURNS = 3
 
@@ -64,8 +64,8 @@ def open_i2c(controller, sda, scl, frequency, timeout_us):
 
     Raises ValueError for pins that the controller cannot use. An ESP32's machine.I2C is not used. Up to MicroPython
     1.28 it ignores the time-out and waits up to 0.1 s for each byte of a stalled transfer: longer than the watchdog
-    allows. Later versions count the time-out in ticks of 10 ms: with 5 ms every transfer fails. And a C3 has only
-    one."""
+    allows. Later versions count the time-out in ticks of 10 ms: with 5 ms every transfer fails. And a C3 has only one
+    I2C controller."""
     if IS_ESP32:
         return machine.SoftI2C(scl, sda, freq=min(frequency, _SOFT_I2C_HZ), timeout=timeout_us)
     return machine.I2C(controller, sda=sda, scl=scl, freq=frequency, timeout=timeout_us)
@@ -80,7 +80,7 @@ def turns_to_collect(most):
         return most
     import esp32  # type: ignore[import-not-found]
 
-    # mem_free() also counts the possible growth as free: the largest block of ESP-IDF's heap
+    # mem_free() also counts the heap's possible growth: the largest block of ESP-IDF's heap
     grow = max(region[2] for region in esp32.idf_heap_info(esp32.HEAP_DATA))
     return max(_FEWEST_TURNS, min(most, (gc.mem_free() - grow) // (2 * _TURN_BYTES)))
 
@@ -95,12 +95,12 @@ def start_watchdog():
 def rest_watchdog():
     """Stop a started watchdog from resetting the board.
 
-    After Ctrl-C nothing feeds it any more, and a reset in the middle of a copy would break an installation. machine.WDT
-    cannot be stopped."""
+    After Ctrl-C nothing feeds the watchdog any more, and a reset in the middle of a copy would break an installation.
+    machine.WDT has no method to stop it."""
     if _watchdog is None:
         return
     if IS_ESP32:
-        machine.WDT(timeout=_WEEK_MS)  # an ESP32 accepts a new time-out and keeps it through a soft reset
+        machine.WDT(timeout=_WEEK_MS)  # an ESP32 accepts a new time-out, and a soft reset keeps it
         return
     # Data sheets RP2040 section 4.7.6 and RP2350 section 12.9.7: ENABLE is bit 30 of the watchdog's CTRL, at its base
     # address. Sections 2.1.2 and 2.1.3: a write to address + 0x3000 clears the bits that are 1.

@@ -13,7 +13,7 @@ MOUNT = "/sd"
 def mount(settings):
     """Mount the card unless it is mounted; return its directory. settings: a Settings. Raises CardError.
 
-    With a card that does not become ready this takes 5 s or more."""
+    If the card does not become ready, this takes 5 s or more."""
     # A mounted card is listed without a size. A folder in flash with the same name has one.
     if any(entry[0] == MOUNT[1:] and len(entry) == 3 for entry in os.ilistdir("/")):
         return MOUNT
@@ -23,6 +23,7 @@ def mount(settings):
         os.mount(card, MOUNT)
     except ImportError:
         raise CardError("no-driver")
-    except Exception as error:  # any error of the driver: otherwise the board would restart again and again
+    # any error of the driver must be caught: otherwise the board would restart again and again
+    except Exception as error:
         raise CardError("no-card", str(error))
     return MOUNT

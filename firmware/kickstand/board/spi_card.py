@@ -32,7 +32,7 @@ class CheckedCard(SDCard):
             raise OSError(self._fault)
 
     def write(self, token, buf):
-        """Write one sector; the driver calls this for each. After a fault the other sectors are skipped."""
+        """Write one sector. The driver calls this for each sector; after a fault the remaining sectors are skipped."""
         if self._fault:
             return
         self._send(token)

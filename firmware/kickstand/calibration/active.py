@@ -1,4 +1,4 @@
-"""The calibration in use: loaded for the chip that runs, saved to flash, and kept up to date while riding."""
+"""Keeps the calibration in use: loads it for the running chip, saves it to flash, and updates it while riding."""
 
 from time import ticks_add, ticks_diff, ticks_ms
 
@@ -6,7 +6,7 @@ from ..errors import StoreError, report
 from ..units import const
 from .store import Store
 
-_TRIM_MS = const(60_000)  # least time between two saves of the roll-misalignment correction, because flash wears
+_TRIM_MS = const(60_000)  # least time between two saves of the trim, because writing wears the flash
 
 
 class ActiveCalibration:
@@ -15,27 +15,29 @@ class ActiveCalibration:
     replaced: True for another alignment, after which maxima and the results of driving are discarded; False for a small
     correction.
 
-    The trim (the roll-misalignment correction, in degrees) is found while riding: see Calibration.
+    The trim (the roll-misalignment correction, in degrees) is estimated while riding: see Calibration.
     """
 
     def __init__(self, meter, changed):
         self._meter = meter
         self._changed = changed
-        self._store = None  # a stored calibration belongs to one chip, which is known once it runs
+        self._store = None  # None until a chip runs, because a stored calibration belongs to one chip
         self._trim_due_ms = ticks_add(ticks_ms(), _TRIM_MS)
 
     @property
     def value(self):
-        """The Calibration in use. Until the first chip has started it is the one that the meter was created with."""
+        """The Calibration in use. Until the first chip has started, this is the Calibration that the meter was created
+        with."""
         return self._meter.calibration
 
     @property
     def aligned(self):
-        """True once there is an alignment."""
+        """True if the sensor is aligned."""
         return self.value.aligned
 
     def chip_started(self, chip):
-        """Load the stored calibration of `chip` (an Mpu6050 that runs), unless it is in use. Return True if loaded."""
+        """Load the stored calibration of `chip` (an Mpu6050 that runs), unless it is already in use. Return True if it
+        was loaded."""
         if self._store and self._store.who_am_i == chip.who_am_i:
             return False
         self._chip = chip
@@ -55,12 +57,13 @@ class ActiveCalibration:
         self._use(calibration, False)
 
     def restart(self):
-        """Save the trim found so far, then restart the meter with the values in flash, as a replay of the ride does."""
+        """Save the current trim, then restart the meter with the values in flash. A replay of the ride starts from the
+        same values."""
         self._save_trim()
         self._meter.use(self.value)
 
     def keep_trim(self, now_ms):
-        """Save the trim found while riding if the bike is at rest and _TRIM_MS have passed. Call it about every 100
+        """Save the trim if the bike is at rest and _TRIM_MS have passed since the last save. Call this about every 100
         ms."""
         if ticks_diff(now_ms, self._trim_due_ms) >= 0:
             saved = self.value.aligned and self._save_trim()
@@ -72,7 +75,7 @@ class ActiveCalibration:
             return False
         try:
             self._store.save(self.value)
-        except StoreError as error:  # the next ride finds it again
+        except StoreError as error:  # not fatal: the next ride estimates the trim again
             report(error)
         return True
 

@@ -1,9 +1,10 @@
-"""The parameters that turn counts into specific force (g) and angular rate (deg/s), and the sensor's axes into the
-vehicle's."""
+"""The parameters that convert counts to specific force (g) and angular rate (deg/s), and sensor axes to vehicle
+axes."""
 
 from ..rotation import is_identity, matrix, product, rotate, vector
 
-# Limits of plausible parameters. The data sheet allows 50 to 80 mg and 3 %; real boards exceed that.
+# Limits of plausible parameters. The data sheet allows an offset of 50 to 80 mg and a scale error of 3 %; real boards
+# exceed both.
 MAX_OFFSET_G = 0.5
 MIN_SLOPE, MAX_SLOPE = 0.8, 1.2
 MAX_MATRIX_ERROR = 0.15  # largest difference of an entry of accel_matrix or gyro_matrix from the identity
@@ -37,8 +38,8 @@ class Calibration:
         self.set_scale(1.0, 1.0)
 
     def with_alignment(self, vehicle_from_sensor, gyro_bias, trim_deg=0.0, by_drive=False):
-        """A new Calibration with this one's offset, slope and matrices, aligned by vehicle_from_sensor (9). gyro_bias:
-        3, deg/s."""
+        """Return a new Calibration with the same offset, slope and matrices, aligned by vehicle_from_sensor (9).
+        gyro_bias: 3, deg/s."""
         new = Calibration()
         new.set_accel(self.accel_offset, self.accel_slope)
         new.set_matrices(self.matrices())
@@ -75,7 +76,7 @@ class Calibration:
 
     @property
     def whole(self):
-        """True if the matrices were measured."""
+        """Return True if the matrices were measured."""
         return any(self.gyro_sigma) or not (is_identity(self.accel_matrix) and is_identity(self.gyro_matrix))
 
     def matrices(self):
@@ -100,15 +101,15 @@ class Calibration:
         return out
 
     def scales(self):
-        """g per count of each accelerometer axis (3), including slope, and deg/s per count of the gyro."""
+        """Return g per count of each accelerometer axis (3), including slope, and deg/s per count of the gyro."""
         return self._scale, self._gyro_scale
 
     def in_vehicle(self):
-        """The whole calibration and alignment as matrices and offsets for raw counts.
+        """Return calibration and alignment together, as matrices and offsets for raw counts.
 
         Four lists: matrix (9) and offset (3) of force = matrix * counts + offset, in g; the same for the rate, in
-        deg/s. They are the product of Nicolae's equations (18)-(20), accel_matrix and gyro_matrix, and (15): 18
-        products per reading."""
+        deg/s. The lists combine Nicolae's equations (18)-(20), accel_matrix and gyro_matrix, and equation (15). A
+        reading then takes 18 multiplications."""
         of_force, of_rate = matrix(), matrix()
         product(of_force, self.vehicle_from_sensor, self.accel_matrix)
         product(of_rate, self.vehicle_from_sensor, self.gyro_matrix)
@@ -134,8 +135,8 @@ class Calibration:
 
 
 def six_position_calibration(offset, slope, gyro_bias, matrices=None):
-    """A new Calibration with the six-position result: offset (3, g), slope (3), gyro_bias (3, deg/s). matrices: the 27
-    numbers of Calibration.matrices(), if the gyro was measured too.
+    """Return a new Calibration with the result of the six positions: offset (3, g), slope (3), gyro_bias (3, deg/s).
+    matrices: the 27 numbers of Calibration.matrices(), if the gyro was measured too.
 
     It is not aligned, because the sensor was not on the vehicle for the six poses.
     """

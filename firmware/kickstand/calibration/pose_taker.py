@@ -9,9 +9,9 @@ _GIVE_UP_MS = const(10_000)  # longest time to wait for stillness
 
 # The states that step() returns
 SETTLING = 0  # waiting for stillness
-SETTLED = 1  # for one sample: it has been still for _SETTLE_MS, and averaging begins
+SETTLED = 1  # for one sample: the sensor has been still for _SETTLE_MS, and averaging begins
 AVERAGING = 2
-DONE = 3  # for one sample: the pose is complete
+DONE = 3  # returned for one sample: the pose is complete
 _ENDED = 4
 
 
@@ -38,8 +38,8 @@ class PoseTaker:
         self.pose = self._new(self._settle_count)
 
     def step(self, counts):
-        """Take one sample (7 counts, the chip's order); return one of the states above. Raises CaptureError, which
-        ends it."""
+        """Take one sample (7 counts, the chip's order); return one of the states above. Raises CaptureError, which ends
+        the pose."""
         if self._state == SETTLING:
             return self._settle(counts)
         if self._state == AVERAGING:
@@ -53,11 +53,11 @@ class PoseTaker:
 
     @property
     def restless(self):
-        """True if waiting for stillness has taken longer than a sensor at rest needs."""
+        """True if the wait for stillness is already longer than a sensor at rest needs."""
         return self._state == SETTLING and self._waited > 2 * self._settle_count
 
     def progress(self):
-        """The number of samples averaged so far, and the number needed."""
+        """Return the number of samples averaged so far, and the number needed."""
         return (self.pose.count, self._take_count) if self._state == AVERAGING else (0, self._take_count)
 
     def _new(self, expected):

@@ -1,10 +1,10 @@
 """Calibrates accelerometer and gyro from still poses and the turns between them: least squares with 18 unknowns.
 
 Accelerometer: force = (I + N) (slope * reading + offset), N symmetric with a diagonal of 0, 9 unknowns. Gyro: rate =
-(I + X) (reading - bias), 9 unknowns. For each pose the force must have a length of 1 g. For each turn the turned force
-of the pose before must equal the force of the pose after. The prior is the data sheet. Five Gauss-Newton steps, in
-32-bit floats and little memory: the lower triangle of the normal equations (171 numbers) is factorised in place (A.-L.
-Cholesky).
+(I + X) (reading - bias), 9 unknowns. For each pose the force must have a length of 1 g. For each turn, the force of the
+pose before, rotated by the turn, must equal the force of the pose after. The priors come from the data sheet. The fit
+takes five Gauss-Newton steps in 32-bit floats. To save memory, the lower triangle of the normal equations (171 numbers)
+is factorised in place (A.-L. Cholesky).
 """
 
 from array import array
@@ -18,8 +18,8 @@ from .turn import rotated
 _UNKNOWNS = const(18)
 _GYRO = 9  # index of the gyro's first unknown, after offset (3), slope (3), N (3: yz, xz, xy)
 _STEPS = const(5)
-_SIGMA_FORCE = const(0.0015)  # g: of a pose's force; 1 sigma, as in the next lines
-_SIGMA_TURN = const(0.0015)  # rad: of a turn, by the poses at its ends
+_SIGMA_FORCE = const(0.0015)  # g: standard deviation of a pose's force
+_SIGMA_TURN = const(0.0015)  # rad: standard deviation of a turn, due to the poses at its ends
 # deg/s per sqrt(s): random walk of the gyro's bias during a turn. The poses at both ends measure the bias, so the
 # angle's variance is walk^2 seconds^3 / 12.
 _BIAS_WALK_DPS = const(0.008)
@@ -27,15 +27,16 @@ _BIAS_WALK_DPS = const(0.008)
 # and 0.02; the accelerometer's axes may also be rotated against the gyro's.
 SIGMA_OFFSET, SIGMA_SLOPE, SIGMA_SKEW = 0.1, 0.1, 0.012
 SIGMA_SCALE, SIGMA_CROSS = 0.03, 0.02
-# Limits of acceptance
-_MAX_SCALE_ERROR = const(0.10)  # of the gyro: no working chip is as far off
-_MAX_CROSS_ERROR = const(0.06)  # of its axes: twice the data sheet's value, or one axis is late
-_MAX_MISFIT = const(0.012)  # rad: of a turn after the fit
-_GROSS_MISFIT = const(0.25)  # rad: of a turn before the fit; the data sheet's errors add up to 0.2 in half a turn
-# readings of an axis at a rate of 1, to find a single wrong axis
+# Limits for accepting the fit
+_MAX_SCALE_ERROR = const(0.10)  # of the gyro: no working chip has a larger error
+_MAX_CROSS_ERROR = const(0.06)  # of the gyro's axes: twice the data sheet's value; more means that one axis is late
+_MAX_MISFIT = const(0.012)  # rad: largest misfit of a turn after the fit
+# rad: largest misfit of a turn before the fit; the errors in the data sheet add up to 0.2 in half a turn
+_GROSS_MISFIT = const(0.25)
+# possible readings of an axis at a rate of 1, tried to find a single wrong axis
 _READS = const((-1.0, 0.25, 0.5, 0.75, 1.3, 2.0, 4.0))
-_DEAD_RAD = const(0.2)  # an axis that saw less than this in all turns is dead
-# largest standard error of a scale: beyond it no turn about this axis has measured the scale
+_DEAD_RAD = const(0.2)  # an axis that measured less than this in every turn is dead
+# largest standard error of a scale: above it, no turn about this axis has measured the scale
 _PROOF_SIGMA = const(0.025)
 
 
@@ -44,8 +45,8 @@ def _triangle(i):
 
 
 class SensorFit:
-    """One fit. poses: mean readings (3, g) in the order in which they were taken. turns: one fewer, each Turn.packed()
-    and its duration in seconds, or None if it cannot be used. offset (g), slope: the first guess.
+    """One fit. poses: mean readings (3, g) in chronological order. turns: the turns between the poses, each as
+    (Turn.packed(), seconds), or None if the turn cannot be used. offset (g), slope: the first guess.
 
     run() computes: offset (3, g), slope (3), accel_matrix (9), gyro_matrix (9), gyro_sigma (9: the standard error of
     each entry of gyro_matrix), unproved (names of axes that no turn has measured).
@@ -61,8 +62,8 @@ class SensorFit:
         self._g = [0.0] * _UNKNOWNS
 
     def run(self):
-        """Fit, as a generator of short steps: on a board the whole fit takes longer than the chip's FIFO lasts. Raises
-        GyroError if a working gyro cannot have measured these turns."""
+        """Fit, as a generator of short steps, because on a board the whole fit takes longer than the chip's FIFO lasts.
+        Raises GyroError if a working gyro cannot have measured these turns."""
         self._check_gross()
         for _ in range(_STEPS):
             yield from self._accumulate()
@@ -95,8 +96,8 @@ class SensorFit:
         return 1.0, xy, xz, xy, 1.0, yz, xz, yz, 1.0
 
     def _misfit(self, k, x):
-        """The misfit of turn k (3, rad): the turned force of the pose before, minus the force of the pose after, in the
-        axes of the pose before. Also the turned force. x: the 9 entries of X, row by row."""
+        """Return the misfit of turn k (3, rad) and the turned force. The misfit is the turned force of the pose before
+        minus the force of the pose after, in the axes of the pose before. x: the 9 entries of X, row by row."""
         turn = self._turns[k][0]
         turned = [0.0] * 3
         for a in range(3):
@@ -192,8 +193,8 @@ class SensorFit:
         return out
 
     def _finish(self):
-        """Set the results. The gyro's unknowns are the last ones, so the last rows of L give their covariance: its
-        diagonal has the squared lengths of the columns of that block's inverse."""
+        """Set the results. The gyro's unknowns come last, so the last rows of L give their covariance. Its diagonal is
+        the squared lengths of the columns of that block's inverse."""
         h, p = self._h, self._p
         self.offset, self.slope = p[0:3], p[3:6]
         self.accel_matrix = matrix(self._accel())
@@ -211,13 +212,14 @@ class SensorFit:
         self.unproved = [AXES[i] for i in range(3) if self.gyro_sigma[4 * i] > _PROOF_SIGMA]
 
     def _check_gross(self):
-        """Raise GyroError if a turn by the gyro is far from the turn by gravity."""
+        """Raise GyroError if the gyro's turn differs much from gravity's turn."""
         worst = self._cost([0.0] * 9)[1]
         if worst > _GROSS_MISFIT**2:
             raise self._ill(worst)
 
     def _ill(self, worst):
-        """The GyroError for turns that do not fit. It names an axis if that axis alone explains them."""
+        """Return the GyroError for turns that do not fit. The error names an axis if that axis alone explains the
+        misfits."""
         x = [0.0] * 9
         best, found = self._cost(x)[0] / 4, None
         for axis in range(3):
@@ -237,7 +239,7 @@ class SensorFit:
         return GyroError("gyro-scale", AXES[axis], 100.0 * (reads - 1.0))
 
     def _turned(self, axis):
-        """The largest rotation about an axis (rad) in all turns, by the gyro."""
+        """Return the largest rotation about an axis (rad) that the gyro measured in any turn."""
         most = 0.0
         for turn in self._turns:
             if turn is not None:

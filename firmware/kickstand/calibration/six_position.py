@@ -1,10 +1,11 @@
-"""Accelerometer offset and slope from six still poses, one on each side (A. Nicolae, section 4).
+"""Computes accelerometer offset and slope from six still poses, one on each side (A. Nicolae, section 4).
 
 The closed form, equations 16-17, assumes that each axis points exactly up or down: a pose that is 10 degrees off causes
-an error of 0.6 degrees of lean. fit() uses the same six mean readings, but only assumes that each calibrated reading is
-1 g long, which holds in any pose. It starts from the closed form and takes a few Gauss-Newton steps. Its error is near
-0.1 degrees.
-Six poses determine six numbers exactly, so their residual proves nothing. A seventh, free pose is a real check.
+an error of 0.6 degrees of lean. fit() uses the same six mean readings, but only assumes that each calibrated reading
+has a length of 1 g. That is true in any pose. The fit starts from the closed form and takes a few Gauss-Newton steps.
+Its error is near 0.1 degrees.
+Six poses determine six numbers exactly, so their residual proves nothing. Only a seventh, free pose can verify the
+result.
 """
 
 from math import acos, degrees
@@ -16,12 +17,12 @@ from .parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE
 SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")  # the axis that points up, in the order of the six poses
 _MAX_TILT_DEG = const(20.0)  # largest angle between a side's axis and the vertical
 FREE_TILT_DEG = 20.0  # a free pose nearer to a side adds little information
-# Largest error of a free pose: six numbers cannot describe the 2 % of cross-axis sensitivity
+# Largest error of a free pose. It is not smaller, because six numbers cannot describe the 2 % of cross-axis sensitivity
 _FREE_MAX_G = const(0.028)
 
 
 def side_of(accel):
-    """The index into SIDES of the side that is up, from a mean reading (3, g)."""
+    """Return the index in SIDES of the side that is up. accel: a mean reading (3, g)."""
     axis = 0
     for i in (1, 2):
         if abs(accel[i]) > abs(accel[axis]):
@@ -30,7 +31,8 @@ def side_of(accel):
 
 
 def tilt_deg(force):
-    """Angle between the vertical and the axis nearest to it, in degrees. force: 3, any unit; a null vector gives 90."""
+    """Return the angle in degrees between the vertical and the axis nearest to it. force: 3, any unit; a null vector
+    gives 90."""
     size = sum(f * f for f in force) ** 0.5
     if not size > 1e-6:
         return 90.0
@@ -38,8 +40,8 @@ def tilt_deg(force):
 
 
 def closed_form(poses):
-    """Offset (3, g) and slope (3) by equations 16-17. poses: six mean readings (3, g) in the order of SIDES. Raises
-    CalibrationError for an axis that does not change."""
+    """Compute offset (3, g) and slope (3) by equations 16-17. poses: six mean readings (3, g) in the order of SIDES.
+    Raises CalibrationError for an axis that does not change."""
     offset, slope = [0.0] * 3, [0.0] * 3
     for i in range(3):
         high, low = poses[2 * i][i], poses[2 * i + 1][i]
@@ -51,8 +53,8 @@ def closed_form(poses):
 
 
 def fit(poses):
-    """Offset (3, g) and slope (3) with which all six calibrated readings are 1 g long. poses: as for closed_form().
-    Raises CalibrationError."""
+    """Compute offset (3, g) and slope (3) so that all six calibrated readings have a length of 1 g. poses: as for
+    closed_form(). Raises CalibrationError."""
     offset, slope = closed_form(poses)
     rows = [[0.0] * 7 for _ in range(6)]
     for _ in range(8):  # 3 to 5 steps are enough

@@ -1,7 +1,7 @@
-"""The mean reading of one still pose, with a check that it was still.
+"""Averages the readings of one pose, and checks that the sensor was still.
 
-A faulty sensor must not pass as a still one. Each axis must change by a count now and then, because a working axis has
-noise, and a gyro axis must not be too noisy.
+A faulty sensor must not pass as a still one. Each axis must change by a count from time to time, because a working axis
+has noise. A gyro axis must not be too noisy.
 
 Sums are kept as integers until the end: 32-bit floats would lose the digits that averaging gains.
 """
@@ -9,12 +9,12 @@ Sums are kept as integers until the end: 32-bit floats would lose the digits tha
 from ..errors import CaptureError, SickSensor
 from ..units import AXES, const
 
-# Largest difference of a sample from the first one: more is a knock. It is ten times the chip's noise with its widest
-# filter.
+# Largest difference of a sample from the first one; a larger one is a knock. This is ten times the chip's noise with
+# its widest filter.
 _PEAK_G = const(0.08)
 _PEAK_DPS = const(5.0)
-# Largest noise of a gyro axis, from the differences between successive samples, which a hand's slow sway does not
-# change. It is fifteen times the chip's noise with its usual filter.
+# Largest noise of a gyro axis, from the differences between successive samples; a slow sway of the hand does not change
+# these. This is fifteen times the chip's noise with its usual filter.
 _NOISE_DPS = const(0.6)
 _SPREAD_G = const(0.02)  # largest standard deviation: stillness matters more than the exact angle
 _DRIFT_G = const(0.007)  # largest difference between the means of the two halves: 0.4 degrees of slow tilt
@@ -28,7 +28,7 @@ class StillPose:
     """Averages the samples of one pose.
 
     accel_lsb_per_g, gyro_lsb_per_dps: counts per unit. accel_limit: |counts| from which an axis is saturated. expected:
-    number of samples to come; the check for drift compares their two halves.
+    number of samples in the pose; the check for drift compares its two halves.
     count: samples taken. Do not use a pose after a CaptureError.
     After finish(): accel (3, g, sensor's axes, uncalibrated), gyro (3, deg/s).
     """

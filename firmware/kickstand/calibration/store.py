@@ -1,9 +1,9 @@
 """Stores the calibration in flash. Two files are written alternately: after a power cut one of them is still valid.
 
-Each holds a record: magic, version, length, sequence number, the chip's WHO_AM_I and range, flags, 19 floats (in
+Each file holds a record: magic, version, length, sequence number, the chip's WHO_AM_I and range, flags, 19 floats (in
 version 2 another 27 for the matrices), and the CRC32 of everything before it. A calibration without matrices is written
-as version 1, which all releases read. load() takes the newest valid record; save() overwrites the other one and reads
-it back. A failed read never causes a write: in a voltage sag a good file can read as empty.
+as version 1, which all releases read. load() uses the newest valid record. save() overwrites the other record and reads
+it back. A failed read never leads to a write, because a good file can read as empty while the voltage sags.
 """
 
 import struct
@@ -21,7 +21,7 @@ _WHOLE_VERSION = const(2)  # with the matrices
 _MAGIC = b"KSTD"
 _HEAD = "<4sHHI"  # magic, version, length of the whole record in bytes, sequence number
 _BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, how aligned; offset, slope, gyro bias, matrix, trim
-_NOT_ALIGNED, _BY_POSES, _BY_DRIVE = 0, 1, 2  # how aligned
+_NOT_ALIGNED, _BY_POSES, _BY_DRIVE = 0, 1, 2  # the values of "how aligned"
 _WHOLE = "<27f"  # accel_matrix, gyro_matrix, gyro_sigma
 BODY_LENGTH = struct.calcsize(_BODY)
 WHOLE_BODY_LENGTH = BODY_LENGTH + struct.calcsize(_WHOLE)
@@ -34,8 +34,8 @@ MAX_TRIM_DEG = 3.6  # the limit in lean/upright_trim.py plus a margin for 32-bit
 class Store:
     """Calibration records of one chip.
 
-    who_am_i, accel_range_g: of the chip in use. Records of another chip are invalid. Records of another range are
-    valid, because offset and slope hardly depend on it.  directory: where the files are, "" for the current one.
+    who_am_i, accel_range_g: those of the chip in use. Records of another chip are invalid. Records of another range are
+    valid, because offset and slope hardly depend on it.  directory: the directory of the files, "" for the current one.
     message: after load(), a few words about the record in use, or why there is none.
     """
 
@@ -45,10 +45,11 @@ class Store:
         self._directory = directory
         self.message = ""
         self._sequence = 0  # sequence number of the record in use, 0 for none
-        self._problems = []  # faults of the other records, in words
+        self._problems = []  # faults of the invalid records, in words
 
     def load(self):
-        """The newest valid Calibration, or a new one if there is none. Raises nothing and writes nothing."""
+        """Return the newest valid Calibration, or a default one if no record is valid. Raises nothing and writes
+        nothing."""
         sequence, calibration, problems = self._newest()
         self._sequence, self._problems = sequence, problems
         if calibration is None:
@@ -58,8 +59,8 @@ class Store:
         return calibration
 
     def unchanged(self):
-        """True if both files read the same as in load() or save(). If not, one was misread, for example in a voltage
-        sag, and the older record may be the loaded one: then the newer one must not be overwritten."""
+        """Return True if both files read the same as in load() or save(). If not, a file was misread, for example in a
+        voltage sag. Then the loaded record may be the older one, and the newer one must not be overwritten."""
         sequence, _, problems = self._newest()
         return sequence == self._sequence and problems == self._problems
 
@@ -81,14 +82,15 @@ class Store:
         self._sequence, _, self._problems = self._newest()
 
     def _newest(self):
-        """(sequence, calibration, problems) of the newest valid record; (0, None, problems) if there is none."""
+        """Return (sequence, calibration, problems) of the newest valid record, or (0, None, problems) if no record is
+        valid."""
         newest, calibration, problems = 0, None, []
         for name in FILES:
             try:
                 with open(self._path(name), "rb") as file:
                     record = file.read(_LENGTHS[_WHOLE_VERSION] + 1)
             except OSError as error:
-                if error.args[0] != ENOENT:  # a missing file is normal: save() makes it
+                if error.args[0] != ENOENT:  # a missing file is normal: save() creates it
                     problems.append("%s unreadable" % name)
                 continue
             sequence, found, problem = self._unpack(record)
@@ -107,7 +109,7 @@ class Store:
         return record + struct.pack("<I", crc32(record))
 
     def _unpack(self, record):
-        """(sequence, calibration, None) of a record's bytes, or (0, None, the fault in words)."""
+        """Return (sequence, calibration, None) for a record's bytes, or (0, None, the fault in words)."""
         if len(record) not in _LENGTHS.values():
             whole = len(record) >= 6 and record[4] == _WHOLE_VERSION
             length = _LENGTHS[_WHOLE_VERSION if whole else _VERSION]
@@ -134,7 +136,7 @@ def pack(who_am_i, accel_range_g, calibration):
 
 
 def unpack(data):
-    """(who_am_i, accel_range_g, Calibration) from the bytes of pack()."""
+    """Return (who_am_i, accel_range_g, Calibration) from the bytes of pack()."""
     fields = struct.unpack_from(_BODY, data, 0)
     calibration = Calibration()
     calibration.six_done, calibration.aligned = bool(fields[2]), fields[3] != _NOT_ALIGNED
@@ -146,9 +148,9 @@ def unpack(data):
 
 
 def plausible(calibration):
-    """True if a real sensor can have every parameter of the Calibration."""
+    """Return True if a real sensor can have every parameter of the Calibration."""
     for i in range(3):
-        if not abs(calibration.accel_offset[i]) < MAX_OFFSET_G:  # "not <" also refuses not-a-number
+        if not abs(calibration.accel_offset[i]) < MAX_OFFSET_G:  # "not <" also rejects NaN
             return False
         if not MIN_SLOPE < calibration.accel_slope[i] < MAX_SLOPE:
             return False

@@ -3,8 +3,8 @@
     force = R A (slope * counts / lsb + offset)        Nicolae's equations (18)-(20), then (15)
     rate  = R G (counts / lsb - bias)                  R: vehicle_from_sensor; A, G: accel_matrix, gyro_matrix
 
-That takes eighteen products per sample instead of twenty-seven. On the board a product of floats takes 12 us and 32
-bytes of heap. There, machine code multiplies integers instead, with an error of at most 0.03 degrees of lean.
+One step takes 18 products per sample instead of 27. On the board a product of floats takes 12 us and 32 bytes of heap.
+So the board's machine code multiplies integers, with an error of at most 0.03 degrees of lean.
 """
 
 from array import array
@@ -40,7 +40,8 @@ else:
 
 
 class Transform:
-    """Applies a Calibration to sums of counts. Call its set_scale() first. Later changes to it have no effect."""
+    """Applies a Calibration to sums of counts. Call the Calibration's set_scale() first. Later changes to the
+    Calibration have no effect."""
 
     def __init__(self, calibration):
         force, force_offset, rate, rate_offset = calibration.in_vehicle()

@@ -1,9 +1,10 @@
-"""Measures by the gyro how a sensor turned between two still poses, and how the gyro's errors change the result.
+"""Computes from the gyro how a sensor turned between two still poses, and how the gyro's errors change the result.
 
-Gravity in the poses before and after shows the same turn, so the poses calibrate the gyro. For a whole turn this keeps
-R (3x3), which rotates vectors from the sensor's axes now to its axes at the start, and S (3x12): a true rate of
-(I + X) rate + c turns the sensor by exp([S x]) R, where x has row i of X, then c_i, in 4 i to 4 i + 3. D. Tedaldi, A.
-Pretto, E. Menegatti, "A robust and easy to implement method for IMU calibration", ICRA 2014, keeps all samples instead.
+Gravity in the poses before and after shows the same turn, so the poses calibrate the gyro. A Turn keeps R (3x3) and S
+(3x12). R rotates vectors from the sensor's axes now to its axes at the start. S gives the effect of errors: a true rate
+of (I + X) rate + c turns the sensor by exp([S x]) R, where x has row i of X, then c_i, in 4 i to 4 i + 3. D. Tedaldi,
+A. Pretto, E. Menegatti, "A robust and easy to implement method for IMU calibration", ICRA 2014, keeps all samples
+instead.
 """
 
 from array import array
@@ -11,8 +12,8 @@ from math import cos, radians, sin
 
 from ..units import const
 
-_STEP_RAD = const(0.02)  # a step ends after a turn by this about one axis. Larger: less exact
-_STEP_US = const(60_000)  # or after this time
+_STEP_RAD = const(0.02)  # a step ends after a rotation by this about one axis; a larger value is less exact
+_STEP_US = const(60_000)  # a step also ends after this time
 # Counts, 0.95 of the gyro's range: the chip's low-pass hides single conversions that reached its end
 _QUICK = const(31_000)
 
@@ -22,8 +23,8 @@ class Turn:
 
     lsb_per_dps: counts per deg/s. period_us: nominal time between two samples. quick: |counts| of a rate that is too
     fast.
-    quick: the rate came near the end of the gyro's range since start(). lost: readings were missing since then.
-    seconds: duration of the turn, after end().
+    quick (attribute): True if the rate came near the end of the gyro's range since start(). lost: True if readings were
+    missing since start(). seconds: duration of the turn, after end().
     """
 
     def __init__(self, lsb_per_dps, period_us, quick=_QUICK):
@@ -31,7 +32,7 @@ class Turn:
         self._lsb = lsb_per_dps
         self._period_us = period_us
         self._quick = quick
-        self._step_counts = int(_STEP_RAD / self._rad / period_us)  # the angle of a step as a sum of counts
+        self._step_counts = int(_STEP_RAD / self._rad / period_us)  # _STEP_RAD as a sum of counts
         self.running = False
 
     def start(self, bias):
@@ -47,8 +48,8 @@ class Turn:
 
     def add(self, sums, n, dt_us, hold=False):
         """Take n samples: their sums (7, counts, the chip's order), and the microseconds since the previous samples.
-        hold: they belong to a still pose that ends the turn; if that pose fails, they are added to the turn after
-        all."""
+        hold: True if the samples belong to a still pose that ends the turn. If that pose fails, they are added to the
+        turn later."""
         if not self.running:
             return
         if hold and not self._held and self._n:
@@ -77,7 +78,8 @@ class Turn:
         self.running = False
 
     def attitude(self, bias, share):
-        """R as a list of 9, for a bias between that of start() (share 0) and this one (3, deg/s; share 1)."""
+        """Return R as a list of 9. Its bias is interpolated between that of start() (share 0) and `bias` (3, deg/s;
+        share 1)."""
         turned, out = [0.0] * 3, self.r[:]
         for i in range(3):
             error = radians(share * (self._bias[i] / self._lsb - bias[i]))
@@ -90,8 +92,8 @@ class Turn:
         return out
 
     def packed(self, bias):
-        """The turn as array('f', 36): R (9), then S (27) without the columns of the bias. bias: 3, deg/s, of the pose
-        at its end. For the turn, the mean of the biases at both ends is used."""
+        """Return the turn as array('f', 36): R (9), then S (27) without the columns of the bias. bias: 3, deg/s, of the
+        pose at the end. The turn uses the mean of the biases at both ends."""
         out = array("f", self.attitude(bias, 0.5))
         for i in range(36):
             if i % 4 != 3:
@@ -99,7 +101,7 @@ class Turn:
         return out
 
     def angle(self):
-        """The size of the turn by the gyro, in rad."""
+        """Return the angle of the turn in rad, as the gyro measured it."""
         total = 0.0
         for a in range(0, 36, 12):
             turned = self.s[a] + self.s[a + 5] + self.s[a + 10]
@@ -107,7 +109,7 @@ class Turn:
         return total**0.5
 
     def _step(self):
-        """Advance R and S by the sums of counts. A row of R times [w] is row x w. The half step makes it
+        """Advance R and S by the sums of counts. A row of R times [w] is row x w. The half step makes the integration
         second-order."""
         share, own, bias, n = self._rad * self._us / self._n, self._sums, self._bias, self._n
         x, y, z = [share * (own[i] - n * bias[i]) for i in range(3)]

@@ -1,8 +1,8 @@
 """Aligns the sensor by two still poses, on the kickstand and upright (A. Nicolae, section 2).
 
-Differences from the paper: (4) is the cross product of the upright and the tilted reading, which as printed is zero.
-(5) takes y from the upright reading and divides it by its own length. If the kickstand is on the right, x and z point
-right and backward, and both signs are changed.
+Differences from the paper: Equation (4) is the cross product of the upright and the tilted reading; as printed it is
+zero. Equation (5) takes y from the upright reading and divides y by its own length. If the kickstand is on the right, x
+and z would point right and backward, so both signs are changed.
 """
 
 from math import atan2, degrees
@@ -11,8 +11,8 @@ from ..errors import AlignmentError, GyroError
 from ..rotation import cross, dot, frame, matrix, norm, normalize, rotate, vector
 from ..units import const
 
-# Least tilt between the poses. At 5 degrees, one degree of pitch between them causes a yaw error of 11 degrees; at 8,
-# of 7.
+# Least tilt between the poses. At a tilt of 5 degrees, one degree of pitch between the poses causes a yaw error of 11
+# degrees; at 8 degrees, of 7.
 _MIN_TILT_DEG = const(5.0)
 WARN_TILT_DEG = 8.0
 _MAX_TILT_DEG = const(60.0)
@@ -21,8 +21,8 @@ _SAME_POSE_DEG = const(1.0)
 # After the six positions only 35 mg of drift over temperature remain.
 _UNCALIBRATED_TOLERANCE_G = const(0.15)
 _CALIBRATED_TOLERANCE_G = const(0.05)
-# Largest difference between the turn by the gyro and the tilt between the poses. It is the sum of: a constant (rad); a
-# share of the tilt, for uncalibrated sensors and the gyro's scale; a share of the whole turn, for cross-axis errors,
+# Largest difference between the gyro's turn and the tilt between the poses. The limit is the sum of: a constant (rad);
+# a share of the tilt, for uncalibrated sensors and the gyro's scale; a share of the whole turn, for cross-axis errors,
 # for example while the bike is pushed about; drift (rad/s) and random walk (rad/s per sqrt(s), 3 sigma) of the gyro's
 # bias
 GYRO_RAD, GYRO_TILT_SHARE, GYRO_TURN_SHARE = 0.02, 0.15, 0.04
@@ -65,10 +65,10 @@ def two_position(out, kickstand, upright, side="left", tolerance_g=_UNCALIBRATED
 
 
 def align(calibration, kickstand, upright, side):
-    """A new Calibration, aligned by two finished poses (StillPose each), and the tilt between them in degrees.
+    """Return a new Calibration, aligned by two finished poses (StillPose each), and the tilt between them in degrees.
 
-    calibration: the one with offset and slope. side: "left" or "right", the side to which the kickstand leans the bike.
-    The gyro's bias is taken from the kickstand pose: a stand holds the bike stiller than a rider does. Raises
+    calibration: a Calibration with offset and slope. side: "left" or "right", the side to which the kickstand leans the
+    bike. The gyro's bias is taken from the kickstand pose: a stand holds the bike stiller than a rider does. Raises
     AlignmentError.
     """
     vehicle_from_sensor = matrix()
@@ -82,8 +82,8 @@ def check_turn(calibration, kickstand, upright, turn):
     """Raise GyroError unless the gyro's turn between the two poses (StillPose each) agrees with the tilt between them.
     turn: the Turn, ended; calibration: as for align().
 
-    The check is weaker after a longer time: after a minute a tilt of 12 degrees is hardly checked. If readings were
-    lost nothing is checked.
+    The longer the turn took, the weaker is the check: after a minute it hardly checks a tilt of 12 degrees. If readings
+    were lost, nothing is checked.
     """
     if turn.lost:
         return
@@ -94,7 +94,9 @@ def check_turn(calibration, kickstand, upright, turn):
     cross(axis, u, v)
     tilt = atan2(norm(axis), dot(u, v))
     misfit = 9.9
-    for share in (0.0, 0.5):  # the upright pose is less still than the stand; but the bias may have drifted evenly
+    # first with the bias of the stand, which is stiller than the upright pose; then with an even drift of the
+    # bias
+    for share in (0.0, 0.5):
         r = turn.attitude(upright.gyro, share)
         rotate(back, r, v)
         misfit = min(misfit, norm([u[i] - back[i] for i in range(3)]))

@@ -1,18 +1,18 @@
-"""Aligns the sensor by driving: the vertical from standing and driving straight, forward from braking (ViriCiti).
+"""Aligns the sensor by driving. Standing and driving straight show the vertical, braking shows forward (ViriCiti).
 
-This is the published method without its weaknesses. Forward comes from a regression of force on change of speed; its
-intercept absorbs forces that are not braking. Bends are excluded, the lag of the speed is estimated, and the result has
-a standard error.
+This improves the published method. Forward comes from a regression of force on change of speed. The intercept of the
+regression absorbs forces that are not braking. Bends are excluded, the lag of the speed is estimated, and the result
+has a standard error.
 
     drive = DriveAlignment("car")                  # or ("motorcycle", up), up from two poses
     drive.update(force, rate, dt_us)               # about 100 times per second, sensor's axes
     drive.measure_speed(speed_mps, age_us)         # each new value of the speed source, 1 to 10 per second
     if drive.ready: drive.matrix(out)
 
-To show the progress, use `state`, `counted` of `needed` and, when REFUSED, `problem`. A problem is a fault of the speed
-or of the mount that more driving cannot resolve. missing() describes the driving that is still needed. `reason` is the
-problem or, without one, the result of missing(). verdict.compare() checks whether an earlier alignment still fits.
-Memory is fixed, and each call does a short step of the work.
+To show the progress, use `state`, `counted`, `needed` and, in the state REFUSED, `problem`. A problem is a fault of the
+speed or of the mount that more driving cannot resolve. missing() describes the driving that is still needed. `reason`
+is the problem or, without one, the result of missing(). verdict.compare() checks whether an earlier alignment still
+fits. Memory is fixed, and each call does a short step of the work.
 """
 
 from ..errors import AlignmentError
@@ -27,23 +27,23 @@ from .vertical import COUNTS_S, MAX_CHANGE_DEG, MOVED_MPS, SETTLE_S, StandingVer
 CAR, MOTORCYCLE = "car", "motorcycle"
 
 # state
-WAITING_FOR_SPEED = 0  # no speed yet, or none for STALE_US
-WAITING_FOR_STOP = 1  # only a car: the vertical and the gyro's bias come from standing
-WAITING_FOR_BRAKING = 2  # in a straight line
+WAITING_FOR_SPEED = 0  # no speed yet, or no new one for STALE_US
+WAITING_FOR_STOP = 1  # only for a car: the vertical and the gyro's bias come from standing
+WAITING_FOR_BRAKING = 2  # braking must be in a straight line
 BRAKING = 3  # during a braking event
-TURNING = 4  # during a braking event in a bend: it will not count
+TURNING = 4  # during a braking event in a bend, which will not count
 READY = 5  # matrix() gives the alignment; more events improve it
 REFUSED = 6  # matrix() raises `problem`
 
 STALE_US = 5_000_000
-STEP_US = 12_000  # an update does one step of work, plus one for each whole STEP_US since the last update
+STEP_US = 12_000  # an update does one step of work, plus one step for each whole STEP_US since the last update
 
 
 class DriveAlignment:
     """One drive. vehicle: CAR or MOTORCYCLE. up: the vertical in the sensor's axes (unit vector) from two poses, for a
-    motorcycle; without it the vertical comes from riding straight. bias: the gyro's (3 values, deg/s), subtracted until
-    a stop gives a newer one; zeros for rates that are already corrected. Without a bias no braking event counts before
-    the first stop.
+    motorcycle. If up is None, the vertical comes from riding straight. bias: the gyro's bias (3 values, deg/s),
+    subtracted until a stop gives a newer bias; zeros for rates that are already corrected. Without a bias no braking
+    event counts before the first stop.
 
     standing: the StandingVertical, which also has the gyro's bias; vertical: the Vertical; events: the DrivingEvents;
     quality: the DrivingQuality; needed: number of counted events required.
@@ -59,14 +59,14 @@ class DriveAlignment:
         self.quality = DrivingQuality(self.events, self.vertical)
         self._speed_check = SpeedCheck()
         self._bias_given = bias is not None
-        self._judged = (0, 0)  # events and stops included in quality
+        self._judged = (0, 0)  # numbers of events and stops that quality includes
         self._sums = [0.0] * 6  # integrals of force and rate over the current bin
         self._sums_us = 0
-        self._speed_mps = -1.0  # none yet
+        self._speed_mps = -1.0  # negative: no speed yet
         self._top_mps = 0.0
         self._silent_us = 0  # time since the last speed
-        self._means = None  # means of the last bin, until they are processed
-        self._work = None  # the generator _follow() while it is not finished
+        self._means = None  # means of the last bin, None after they are processed
+        self._work = None  # the generator _follow(), None when it has finished
 
     @property
     def counted(self):
@@ -80,7 +80,7 @@ class DriveAlignment:
 
     @property
     def quality_deg(self):
-        """The standard error of forward's direction in degrees, 180 until there is one."""
+        """The standard error of forward's direction in degrees; 180 before the first estimate."""
         return self.quality.quality_deg
 
     @property
@@ -118,8 +118,9 @@ class DriveAlignment:
         return self.problem or self.missing(self.counted, self.needed, self.turned)
 
     def missing(self, counted, needed, turned):
-        """The driving still needed by a drive without a problem, as an AlignmentError. counted, needed, turned: the
-        numbers of counted events, of required events, and of braking events that did not count because of a bend."""
+        """Return the driving that is still needed, as an AlignmentError, for a drive without a problem. counted,
+        needed, turned: the numbers of counted events, of required events, and of braking events that did not count
+        because of a bend."""
         if self._speed_mps < 0.0:
             return AlignmentError("no-speed")
         if self._top_mps < MOVED_MPS:
@@ -167,7 +168,8 @@ class DriveAlignment:
             self._do_step()
 
     def measure_speed(self, speed_mps, age_us=0):
-        """Take a new value of the speed source. age_us: its known age; a further delay is estimated from the drive."""
+        """Take a new value of the speed source. age_us: the known age of the value; a further delay is estimated from
+        the drive."""
         self._speed_check.measure(speed_mps)
         if not speed_mps >= 0.0:
             speed_mps = 0.0
@@ -192,7 +194,7 @@ class DriveAlignment:
         if self._means is not None:
             force, rate, seconds = self._means
             self._means = None
-            if self._speed_mps >= 0.0 and self._silent_us <= STALE_US:  # an old speed of 0 is no standstill
+            if self._speed_mps >= 0.0 and self._silent_us <= STALE_US:  # an old speed of 0 does not prove a standstill
                 self.standing.update(force, rate, self._speed_mps, seconds)
         elif self._work is not None:
             if next(self._work, True):

@@ -1,8 +1,8 @@
-"""Aligns by driving in the background: feeds a DriveAlignment and saves its alignment.
+"""Aligns by driving, in the background: feeds a DriveAlignment and saves its result.
 
-It always runs if there is a speed source. Without an alignment, or after a request in the menu, the drive's alignment
-is used as soon as it is ready. Otherwise the drive checks and refines the earlier alignment. Flash is written only at
-standstill.
+This always runs if there is a speed source. If the sensor is not aligned, or after a request in the menu, the drive's
+alignment is used as soon as it is ready. Otherwise the drive checks and refines the earlier alignment. Flash is written
+only at standstill.
 """
 
 from time import ticks_add, ticks_diff
@@ -15,12 +15,12 @@ from .quality import MIN_EVENTS_TO_CHECK_SPEED
 from .verdict import MOVED, REFINED, REVERSED, SAME, compare, turn_round
 
 _FEED_TURNS = const(2)  # passes of the loop whose counts are summed as integers, because floats take time
-_GAP_MS = const(300)  # after a longer time between two readings some are missing
+_GAP_MS = const(300)  # a longer time between two readings means that some are missing
 _LOOK_MS = const(1000)
 _FRESH_MS = const(3000)  # an older speed does not prove a standstill
-_AWAY_MPS = const(2.0)  # a faster vehicle has driven off
+_AWAY_MPS = const(2.0)  # above this speed the vehicle has driven off
 
-_KNOWN_BIAS = (0.0, 0.0, 0.0)  # the gyro's bias was measured with the alignment and is already subtracted
+_KNOWN_BIAS = (0.0, 0.0, 0.0)  # zero, because the bias that was measured with the alignment is already subtracted
 STAND_SIDE, MOUNT_MOVED = "other-side", "mount-moved"
 _QUESTIONS = (STAND_SIDE, MOUNT_MOVED)  # codes of messages that hide the lean until they are answered
 
@@ -29,13 +29,13 @@ class BackgroundAlignment:
     """Runs the alignment by driving. leans: True for a motorcycle, False for a car.  speed: a Speed.  meter: a
     LeanMeter.  calibration: the ActiveCalibration.
 
-    The loop calls poll() and feed() in each turn, and begin() after a change of calibration. The menu calls ask(), a
-    press answer().
+    The loop calls poll() and feed() in each turn, and begin() after a change of calibration. The menu calls ask(), and
+    a press calls answer().
 
     speed: the Speed.  drive: the current DriveAlignment, read-only.  state: the state to show (see alignment.py).
     shown: True if the progress has its own page (ui/drive_page.py).  result: the Notice or AlignmentError at the end of
-    the last drive, or None.  message: None, or an AlignmentError, StoreError or Notice to show before everything else,
-    until answer() or until the vehicle drives off.
+    the last drive, or None.  message: None, or an AlignmentError, StoreError or Notice. It is shown before everything
+    else, until answer() or until the vehicle drives off.
     """
 
     def __init__(self, leans, speed, meter, calibration):
@@ -51,7 +51,7 @@ class BackgroundAlignment:
         self.begin()
 
     def begin(self, asked=False):
-        """Start a new drive after a change of calibration, from flash or from a wizard. The drive checks its alignment
+        """Start a new drive after a change of calibration, from flash or from a wizard. The drive checks the alignment
         or, if `asked`, replaces it."""
         self._asked = asked
         self._answered = []  # codes of messages not to show again
@@ -69,8 +69,8 @@ class BackgroundAlignment:
         self._clear_sums()
 
     def ask(self):
-        """Start a drive that replaces the alignment, on the rider's request (the sensor was remounted). The drive so
-        far is lost."""
+        """Start a drive that replaces the alignment, on the rider's request (the sensor was remounted). The current
+        drive is lost."""
         self.shown = True
         self.begin(True)
 
@@ -92,14 +92,15 @@ class BackgroundAlignment:
             self._look_ms = ticks_add(now_ms, _LOOK_MS)
             self.fresh_speed(now_ms)
             if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > _LOOK_MS:
-                self._begin_again()  # at once: after 6 days without a reading ticks_diff() is negative
+                self._begin_again()  # now, because after 6 days without a reading ticks_diff() is negative
             self._look(now_ms)
         return speed
 
     def fresh_speed(self, now_ms):
         """The last speed (m/s), or None if it is old."""
         if self._speed_ms is not None and ticks_diff(now_ms, self._speed_ms) >= _FRESH_MS:
-            self._speed_ms = None  # after 6 days it would seem fresh again: ticks_diff() is then negative
+            # forget the time: after 6 days ticks_diff() is negative and the speed would seem fresh
+            self._speed_ms = None
         return self._speed_mps if self._speed_ms is not None else None
 
     def _share(self, speed):
@@ -107,7 +108,7 @@ class BackgroundAlignment:
         if it was not passed.
 
         A speed that no braking event has confirmed is not passed, because a wheel may have two magnets. Zero is not
-        passed either, because a broken wire also gives it: the filter detects a standstill on its own.
+        passed either, because a broken wire also reads zero. The filter detects a standstill on its own.
         """
         if not self._leans:
             return speed
@@ -177,8 +178,8 @@ class BackgroundAlignment:
         return self._speed_mps > _AWAY_MPS or (faulty and self._meter.speed_mps > _AWAY_MPS)
 
     def _refuse(self, problem, aligned):
-        """Report a problem and begin a new drive, in which it may be gone. The page shows the problem as the result
-        until an event has counted in the new drive."""
+        """Report a problem and begin a new drive, because the problem may disappear. The page shows the problem as the
+        result until an event has counted in the new drive."""
         if aligned:
             self._say(problem)
         self._restart()
@@ -191,7 +192,8 @@ class BackgroundAlignment:
                 self._meter.distrust(message.code)
 
     def answer(self, agreed):
-        """Clear the message after the rider has read it. agreed: do what it offers: for STAND_SIDE, reverse forward."""
+        """Clear the message after the rider has read it. agreed: True to do what the message offers (for STAND_SIDE:
+        reverse forward)."""
         code, self.message = self.message.code, None
         self._answered.append(code)
         if code in _QUESTIONS:
@@ -205,7 +207,7 @@ class BackgroundAlignment:
                 self._meter.reset_maxima()
 
     def _adopt(self, anew):
-        """Save the drive's alignment. anew: the sensor is mounted differently now, so trim and maxima are reset."""
+        """Save the drive's alignment. anew: True if the sensor was remounted, so trim and maxima are reset."""
         found = matrix()
         self.drive.matrix(found)
         if not self._save(found, 0.0 if anew else self._meter.trim_deg):
@@ -219,7 +221,8 @@ class BackgroundAlignment:
     def _save(self, vehicle_from_sensor, trim_deg):
         """Save this alignment; return True, or False with the reason in `message`."""
         old, used = self._meter.calibration, self._calibration
-        # the drive's rates were reduced by the bias of `used`, so its own bias is the remainder: add both
+        # the bias of `used` was already subtracted from the drive's rates, and the drive measured the remainder: add
+        # both
         bias = [used.gyro_bias[i] + self.drive.standing.bias[i] for i in range(3)]
         try:
             self._active.refine(old.with_alignment(vehicle_from_sensor, bias, trim_deg, True))

@@ -1,6 +1,6 @@
-"""Finds braking and acceleration events, and those of them that were in a straight line.
+"""Finds braking and acceleration events, and decides which of them were in a straight line.
 
-Each change of speed is compared with the force and yaw rate of the same interval, for each lag that the speed may have.
+For each possible lag of the speed, each change of speed is compared with the force and yaw rate of the same interval.
 """
 
 from math import pi
@@ -13,22 +13,23 @@ from .regression import LAG_STEP_US, LAGS, Fit, ForwardRegression
 # An event begins above BEGIN_MPS2, ends below END_MPS2, and changes the speed by at least _CHANGE_MPS.
 BEGIN_MPS2, END_MPS2 = 0.8, 0.4
 _CHANGE_MPS = const(1.5)
-_MAX_ACCELERATION_EVENTS = const(2)  # more do not count, because braking shows forward better
-MIN_INTERVAL_US = 400_000  # a GPS at 10 Hz gives no more information than at 2 Hz, and noisier differences
-MAX_INTERVAL_US = 2_200_000  # one value of a GPS at 1 Hz may be missing
+_MAX_ACCELERATION_EVENTS = const(2)  # further ones do not count, because braking shows forward better
+# shorter intervals only have noisier differences: a GPS at 10 Hz has no more information than at 2 Hz
+MIN_INTERVAL_US = 400_000
+MAX_INTERVAL_US = 2_200_000  # allows one missing value of a GPS at 1 Hz
 _MAX_WAITING = const(4)  # intervals that can wait while an earlier one is processed
-# A larger yaw rate is a bend. At 10 m/s this one causes 0.036 g sideways, a fifth of the force of braking; the
-# regression removes most of it.
+# A larger yaw rate is a bend. At 10 m/s this rate causes a lateral force of 0.036 g, a fifth of the force of braking;
+# the regression removes most of it.
 _STRAIGHT_DPS = const(2.0)
 _MIN_SPEED_MPS = const(1.0)  # at lower speeds steering angles are large, and a stop ends with a jerk
-_MAX_FORCE_G = const(3.0)  # an interval with a larger mean force has a knock
+_MAX_FORCE_G = const(3.0)  # a larger mean force of an interval is a knock
 
 
 class EventFinder:
     """Finds braking and acceleration events from the speed alone.
 
-    going_on: True during an event; change: the change of speed in it, or in the last one (m/s, < 0: braking). The
-    straight part is kept for each lag, because it depends on the lag of the speed.
+    going_on: True during an event. change: the change of speed in the current or else the last event (m/s, < 0:
+    braking). The change that was straight is kept for each lag of the speed, because it depends on the lag.
     """
 
     def __init__(self, lags):
@@ -66,7 +67,7 @@ class EventFinder:
 
 
 class LastEvent:
-    """Estimates forward from the latest event and the vertical: within about 10 degrees, but immediately."""
+    """Estimates forward from the latest event and the vertical: immediately, but only within about 10 degrees."""
 
     def __init__(self):
         self._force = [0.0] * 3
@@ -97,7 +98,7 @@ class DrivingEvents:
     """The events of a drive. history: the ForceHistory of the same drive.
 
     braking_count, acceleration_count: numbers of straight events so far; turning_count: number of braking events that
-    were not straight; lag_s: lag of the speed; lag: index of the nearest of the regression's lags; regression: the
+    were not straight; lag_s: lag of the speed; lag: index of the regression's lag nearest to it; regression: the
     ForwardRegression of all straight driving; last: the LastEvent.
     """
 
@@ -162,8 +163,8 @@ class DrivingEvents:
         return bool(self._waiting) and difference(self._history.now, self._waiting[0][1]) >= 0
 
     def follow(self, use):
-        """Process the next interval, as a generator of short steps. use: the gyro's bias is known, so straight driving
-        and bends can be distinguished."""
+        """Process the next interval, as a generator of short steps. use: True if the gyro's bias is known, because only
+        then straight driving and bends can be distinguished."""
         before, before_us = self._before
         speed, time_us = self._before = self._waiting.pop(0)
         length_us = difference(time_us, before_us)
@@ -198,7 +199,7 @@ class DrivingEvents:
         if self._finder.update(change, seconds, straight):
             yield from self._end_event()
         elif self._finder.going_on:
-            if self._finder.change == change:  # its first interval
+            if self._finder.change == change:  # the first interval of an event
                 self.last.clear()
             if straight[self.lag]:
                 self.last.add(seconds, change_g, best_force)
@@ -226,8 +227,8 @@ class DrivingEvents:
 
 
 def _peak(values, i):
-    """The position, -0.5 to 0.5 from i, of the peak of a parabola through values[i], the largest, and its
-    neighbours."""
+    """Return the position of the peak of a parabola through values[i], the largest, and its neighbours: -0.5 to 0.5
+    from i."""
     if i == 0 or i == len(values) - 1:
         return 0.0
     before, at, after = values[i - 1], values[i], values[i + 1]

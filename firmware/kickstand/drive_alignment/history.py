@@ -1,7 +1,7 @@
 """Keeps force and yaw rate of the last seconds, to compare a late speed with the readings of its own time.
 
-It stores running integrals as integers that wrap. The difference of two is exact however long the drive lasts, while
-float32 sums lose digits as they grow. Integers also need no heap.
+The history stores running integrals as integers that wrap. The difference of two integers stays exact in a long drive,
+while float32 sums lose digits as they grow. Integers also need no heap.
 """
 
 from array import array
@@ -14,7 +14,7 @@ COLUMNS = 4  # integrals of force (3, in 1e-6 g s) and of the yaw rate (in 1e-5 
 
 
 def difference(a, b):
-    """a - b for values that wrap."""
+    """Return a - b for values that wrap."""
     return ((a - b + _HALF) & MASK) - _HALF
 
 
@@ -49,12 +49,12 @@ class ForceHistory:
         self._count = min(SIZE, self._count + 1)
 
     def at(self, out, time_us):
-        """Fill out (COLUMNS integers) with the integrals up to time_us, interpolated within its bin. False if that
-        time is not in the history."""
+        """Fill out (COLUMNS integers) with the integrals up to time_us, interpolated within its bin. Return False if
+        that time is not in the history."""
         behind = difference(self.now, time_us)
         if behind < 0 or behind >= difference(self.now, self._times[(self._newest - self._count + 1) % SIZE]):
             return False
-        # a first guess of the bin: bins may be longer than BIN_US, but hardly twice as long
+        # first guess of the bin: a bin may be longer than BIN_US, but hardly twice as long
         i = self._newest
         step = behind // (2 * BIN_US)
         if step < self._count:

@@ -1,10 +1,10 @@
 """Compares forward and the vertical between two parts of a drive. If they differ, the mount may have moved between
 them.
 
-The time of the move is unknown, so the drive is split in two after each of its blocks in turn. The difference expected
+The time of a move is unknown, so the drive is split in two after each block in turn. The difference expected
 by chance follows from the scatter of forward between the blocks within each part. The variance of a part's forward
 falls with the part's weight, but not below the effect of camber and wind on one long stretch of road. A few blocks give
-a poor sample variance, so a prior of PRIOR_FREEDOM degrees of freedom is blended in.
+a poor sample variance, so it is averaged with a prior of PRIOR_FREEDOM degrees of freedom.
 """
 
 from array import array
@@ -22,22 +22,23 @@ _MIN_BLOCKS = const(4)  # least number of blocks in the drive for a comparison o
 
 
 def angle_between(a, b):
-    """The angle between two directions given as angles: 0 to pi."""
+    """Return the angle between two directions, 0 to pi. a, b: the directions as angles in rad."""
     angle = abs(a - b)
     return min(angle, 2 * pi - angle)
 
 
 def blend_prior(variance, weight, freedom):
-    """The variance (deg^2) of forward: the sample variance, with `freedom` degrees of freedom, averaged with the
-    prior's. weight (g^2 s): of the events that forward was computed from."""
+    """Return the variance (deg^2) of forward: the sample variance, with `freedom` degrees of freedom, averaged with the
+    prior variance. weight (g^2 s): of the events that forward was computed from."""
     return (freedom * variance + PRIOR_FREEDOM * PRIOR_DEG * PRIOR_DEG / weight) / (freedom + PRIOR_FREEDOM)
 
 
 class DriveParts:
     """Call clear(), add() each block in chronological order, and run compare() to its end.
 
-    It then has, for the split with the most significant difference of forward: forward_deg, the difference; sigmas, the
-    same in standard deviations. Over all splits: roll_deg, pitch_deg, the largest differences of the vertical.
+    Results for the split with the most significant difference of forward: forward_deg, the difference; sigmas, the
+    difference in standard deviations. Results over all splits: roll_deg, pitch_deg, the largest differences of the
+    vertical.
     """
 
     def __init__(self):

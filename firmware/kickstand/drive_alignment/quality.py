@@ -15,19 +15,20 @@ from .regression import Fit
 from .speed_check import fit_problem
 from .vertical import MAX_CHANGE_DEG
 
-MIN_EVENTS = 5  # straight braking and acceleration events, for an alignment
+MIN_EVENTS = 5  # number of straight braking and acceleration events needed for an alignment
 MIN_EVENTS_TO_CHECK_SPEED = 2
-# Limits come in pairs with a hysteresis: to become ready, and to stay so. That avoids flicker.
+# Each pair of limits is a hysteresis against flicker: the limit to become ready, and the limit to stay ready.
 READY_DEG, STAY_READY_DEG = 1.5, 2.5  # standard error of forward; one drive in ten is off by twice as much
 AGREE_DEG, STAY_AGREE_DEG = 4.0, 6.0  # largest difference of forward between halves, and between parts
-AGREE_SIGMAS, STAY_AGREE_SIGMAS = 3.0, 4.0  # or, between parts, its largest number of standard deviations
+# the difference between parts may instead be within so many standard deviations
+AGREE_SIGMAS, STAY_AGREE_SIGMAS = 3.0, 4.0
 # A larger difference between two parts means that the mount moved
-_MOVED_DEG = const(30.0)  # forward; a long banked motorway curve, treated as straight, gave 15
-PITCH_DEG = 7.0  # 6 % uphill, then downhill, is within this
-ROLL_DEG = 7.0  # that banked curve gave 6. Not used on a motorcycle, which leans
+_MOVED_DEG = const(30.0)  # difference of forward; a long banked motorway curve, treated as straight, caused 15
+PITCH_DEG = 7.0  # a road of 6 % uphill and then downhill causes less
+ROLL_DEG = 7.0  # the banked curve caused 6. Not used on a motorcycle, because it leans
 # The mount moved if an event's forward differs by over _EVENT_OFF_DEG from the overall one. Only events of at least
 # _MIN_EVENT_WEIGHT are judged, with a force of at least _MIN_EVENT_FORWARD times the one that the change of speed
-# requires. On recorded drives none of these differed by more than 40 degrees.
+# requires. On recorded drives no such event differed by more than 40 degrees.
 _EVENT_OFF_DEG = const(80.0)
 _MIN_EVENT_WEIGHT = const(0.012)  # g^2 s
 _MIN_EVENT_FORWARD = const(0.5)  # g per g
@@ -36,9 +37,10 @@ _MIN_EVENT_FORWARD = const(0.5)  # g per g
 class DrivingQuality:
     """The quality of a drive. events: its DrivingEvents; vertical: its Vertical.
 
-    fit: the Fit of all straight driving so far; quality_deg: standard error of its forward, 180 until there is one;
-    halves_deg: angle between the forwards of the two halves of the drive; parts: the DriveParts; agree: halves and
-    parts agree about forward; good: enough for an alignment; speed_problem, mount_problem: an AlignmentError, or None.
+    fit: the Fit of all straight driving so far; quality_deg: standard error of its forward, 180 before the first
+    estimate; halves_deg: angle between the forwards of the two halves of the drive; parts: the DriveParts; agree: True
+    if halves and parts agree about forward; good: True if the quality is enough for an alignment; speed_problem,
+    mount_problem: an AlignmentError, or None.
     """
 
     def __init__(self, events, vertical):
@@ -85,8 +87,8 @@ class DrivingQuality:
             yield
         if blocks < 2 or weights <= 0.0:
             return
-        # The jackknife: the variance of forward from its changes when each block in turn is left out. The formal error
-        # of the regression is too small early in a drive.
+        # Jackknife: the variance of forward is computed from its changes when each block in turn is left out. The
+        # formal error of the regression is too small early in a drive.
         freedom = blocks - 1
         variance = degrees(degrees(squares)) * freedom / blocks  # rad^2 to deg^2
         self.quality_deg = sqrt(blend_prior(variance, self.fit.weight, freedom))

@@ -1,15 +1,16 @@
-"""Computes forward from driving straight by a regression of the force on dv/dt, for several lags of the speed at once.
+"""Computes forward by a regression of the force on dv/dt while driving straight, for several lags of the speed at once.
 
     f = level + forward a + left c        a = dv/dt / g, c = v (yaw rate) / g
 
-in the sensor's own axes, each interval weighted by its length. The intercept, level, is the vertical of straight
-driving. It is fitted too, so an error of the vertical does not affect forward. c absorbs the lateral force of slight
-bends. On a motorcycle, which leans into them, its coefficient is about zero. |forward| is 1 if the speed is in m/s,
-1/3.6 if it is in km/h. The right lag is the one with which the regression explains most.
+All vectors are in the sensor's own axes, and each interval is weighted by its length. The intercept, level, is the
+vertical of straight driving. It is fitted too, so an error of the vertical does not affect forward. The term of c
+absorbs the lateral force of slight bends. On a motorcycle, which leans into bends, the coefficient of c is about zero.
+|forward| is 1 if the speed is in m/s, 1/3.6 if it is in km/h. With the right lag the regression explains most of the
+force.
 
 A regression block has the sums of a few events (braking or acceleration), so parts of the drive can be compared. When
-all blocks are in use, they are joined in pairs. Memory is therefore fixed, and from then on at least half of the blocks
-are in use.
+all blocks are in use, they are joined in pairs, so memory is fixed. From then on at least half of the blocks are in
+use.
 """
 
 from array import array
@@ -26,9 +27,9 @@ _RIDGE = const(1e-6)  # g^2: keeps the coefficient of c at zero if the drive had
 
 
 class Fit:
-    """A result of the regression. forward (3, g per g), level (3, g); weight (g^2 s): variation of the speed's change,
-    the information about forward; seconds: duration of its straight driving; explained (g^2 s): the part of the force's
-    variation that forward explains; found: False if there was nothing to fit.
+    """A result of the regression. forward (3, g per g), level (3, g); weight (g^2 s): variation of the change of speed,
+    a measure of the information about forward; seconds: duration of the straight driving; explained (g^2 s): the part
+    of the force's variation that forward explains; found: False if there was nothing to fit.
     """
 
     def __init__(self):
@@ -36,7 +37,7 @@ class Fit:
         self.level = [0.0] * 3
         self.weight = self.seconds = self.explained = 0.0
         self.found = False
-        self.total = [0.0] * _TERMS  # each Fit has its own, because two can be computed at the same time
+        self.total = [0.0] * _TERMS  # each Fit has its own sums, because two Fits can be computed at the same time
 
 
 class ForwardRegression:
@@ -96,7 +97,7 @@ class ForwardRegression:
         return out.found
 
     def fitting(self, out, lag, first=0, last=BLOCKS, without=-1):
-        """Like fit(), but a generator of short steps, which returns True or False. without: index of a block to leave
+        """Like fit(), but as a generator of short steps that returns True or False. without: index of a block to leave
         out."""
         sums, total = self._sums[lag], out.total
         out.found = False

@@ -5,13 +5,13 @@ from math import sqrt
 from ..errors import AlignmentError
 from ..units import const
 
-_NEGATIVE_MPS = const(-0.5)  # noise around zero does not count as negative
+_NEGATIVE_MPS = const(-0.5)  # a speed above this is noise around zero, not negative
 # A second is lively if its mean force differs by this much from the previous second. At standstill no second is lively;
 # while driving most are.
 _LIVELY_G = const(0.03)
-_TURNING_DPS = const(5.0)  # seconds in a bend are ignored: they are lively even at constant speed
-# The speed is stuck if it has not changed during at least _STUCK_S lively seconds (the number in the beginnings and
-# ends of four braking events), and these are at least _STUCK_SHARE of all seconds since its last change.
+_TURNING_DPS = const(5.0)  # a second in a bend is ignored, because it is lively even at constant speed
+# The speed is stuck if it has not changed for at least _STUCK_S lively seconds, and these are at least _STUCK_SHARE of
+# all seconds since its last change. Four braking events have so many lively seconds at their beginnings and ends.
 _STUCK_S = const(8)
 _STUCK_SHARE = const(0.15)
 # Limits of the change of force per change of speed, which should be 1. The pitch of a braking vehicle and a coarsely
@@ -21,13 +21,13 @@ MAX_LAG_S = 1.9
 
 
 def speed_unit_problem(force_ratio):
-    """The AlignmentError for changes of speed that do not fit the force. force_ratio: change of force per change of
-    speed."""
+    """Return the AlignmentError for changes of speed that do not fit the force. force_ratio: change of force per change
+    of speed."""
     return AlignmentError("speed-unit", min(1.0 / max(force_ratio, 0.01), 99.9))
 
 
 def fit_problem(lag_s, force_ratio):
-    """The fault of the speed shown by the fit of force on changes of speed: an AlignmentError, or None."""
+    """Return the fault of the speed that the fit of force on changes of speed shows: an AlignmentError, or None."""
     if lag_s >= MAX_LAG_S:
         return AlignmentError("speed-late", lag_s)
     if not MIN_FORCE_RATIO < force_ratio < MAX_FORCE_RATIO:
@@ -53,7 +53,7 @@ class SpeedCheck:
 
     def measure(self, speed_mps):
         """Take a new value of the speed source."""
-        if not speed_mps >= _NEGATIVE_MPS:  # also not-a-number
+        if not speed_mps >= _NEGATIVE_MPS:  # also rejects NaN
             self.problem = AlignmentError("speed-negative", speed_mps)
         if speed_mps != self._speed:
             self._speed = speed_mps

@@ -1,8 +1,8 @@
 """Checks whether an earlier alignment, from two poses or another drive, fits this drive.
 
-If the kickstand is not on the side in the settings, forward and backward are exchanged. The poses cannot show that, but
-the first braking events do. A change of pitch between the poses causes a yaw error of a few degrees, which enough
-braking events correct. Any other difference means that the mount has moved.
+If the kickstand is not on the side in the settings, forward and backward are exchanged. The poses cannot show this
+error, but the first braking events do. A change of pitch between the poses causes a yaw error of a few degrees. Enough
+braking events correct it. Any other difference means that the mount has moved.
 """
 
 from math import atan2, degrees
@@ -14,15 +14,15 @@ from .regression import Fit
 UNKNOWN = 0  # not enough events yet
 SAME = 1
 REFINED = 2  # a yaw error of a few degrees: use the DriveAlignment's matrix()
-REVERSED = 3  # forward is backward: turn_round()
+REVERSED = 3  # forward points backward: use turn_round()
 MOVED = 4  # the mount has moved: align again
 
-_MIN_EVENTS_TO_REVERSE = const(2)  # least number of straight events, which must agree
+_MIN_EVENTS_TO_REVERSE = const(2)  # least number of straight events, all of which must agree
 _SAME_DEG = const(1.0)
 # Largest yaw error: 2 degrees of pitch cause 22 at the smallest allowed tilt between two poses
 _REFINED_DEG = const(30.0)
 _REVERSED_DEG = const(135.0)
-_UPRIGHT_DEG = const(8.0)  # largest difference of up, from an inexact upright pose and the road's camber
+_UPRIGHT_DEG = const(8.0)  # largest difference of up: an inexact upright pose and the road's camber cause less
 
 
 def compare(drive, matrix):

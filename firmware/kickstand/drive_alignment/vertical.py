@@ -1,20 +1,20 @@
-"""Finds the vertical in the sensor's axes: from standing, and from the best source of a drive so far.
+"""Finds the vertical in the sensor's axes: StandingVertical from stops, Vertical from the best source so far.
 
-From standing, it is the mean direction of gravity over many stops, because no city is all uphill (ViriCiti). Each stop
-counts once, however long it was. At a stop the gyro reads only its bias, which is measured too.
+The vertical from standing is the mean direction of gravity over many stops, because no city is all uphill (ViriCiti).
+Each stop counts once, however long it was. At a stop the gyro reads only its bias, which is measured too.
 
-A motorcycle's stops are not level sideways. Its vertical comes from the upright pose, or else from riding straight,
-when balance keeps the lateral force at zero. A car's vertical comes in equal shares from its stops and from driving
-straight: the road's camber and slope tilt both in the same way.
+A motorcycle's stops are not level sideways. Its vertical comes from the upright pose, or else from riding straight: a
+balanced bike has no lateral force. A car's vertical comes in equal shares from its stops and from driving straight,
+because the road's camber and slope tilt both in the same way.
 """
 
 from ..errors import AlignmentError
 from ..rotation import angle_deg, norm, normalize, vector
 from ..units import const
 
-_STANDING_MPS = const(0.5)  # a lower speed is standing: a GPS at rest shows up to this
+_STANDING_MPS = const(0.5)  # a lower speed counts as standing, because a GPS at rest shows up to this speed
 MOVED_MPS = 2.0  # after a higher speed the next stop is a new one
-SETTLE_S = 1.0  # a vehicle rocks back after braking
+SETTLE_S = 1.0  # for this time a vehicle rocks after braking
 COUNTS_S = 2.0  # after settling, a stop must last this long to count
 # Largest difference at a stop between a mean over 0.1 s and a mean with the time constant _AVERAGE_S. An idling diesel,
 # wind and passengers cause less.
@@ -22,21 +22,22 @@ _STILL_G = const(0.06)
 _STILL_DPS = const(3.0)
 _AVERAGE_S = const(0.5)
 _SAME_STOP_DEG = const(1.5)  # doors and passengers tilt a standing vehicle by less
-# a sensor that is still for this long at another angle was rotated: a late speed of zero would have ended by then
+# a sensor that is still at another angle for longer was rotated, because a late speed of zero would have ended earlier
 _TURNED_S = const(6.0)
-# A rate that differs by more from the bias at the last stop is a bend, where a speed of zero is wrong. Warming up
+# A rate that differs by more from the bias at the last stop means a bend, so a speed of zero is wrong. Warming up
 # changes the bias by less.
 TURNING_DPS = 10.0
-_MEAN_S = const(60.0)  # time constant of the mean force, the vertical until there is a better one
-MAX_CHANGE_DEG = 8.0  # largest difference of two verticals due to the road's slope (14 %); above, the mount moved
+_MEAN_S = const(60.0)  # time constant of the mean force, which serves as the vertical until a better one is known
+# largest difference of two verticals due to the road's slope (14 %); a larger one means that the mount moved
+MAX_CHANGE_DEG = 8.0
 
 
 class StandingVertical:
     """Measures the vertical at stops. Call update() with each mean over about 0.1 s.
 
-    stops: their number; up: the vertical in the sensor's axes (unit vector), None before the first one; bias: the
-    gyro's (3, deg/s) at the last stop; standing: True during a stop; moved: True if the verticals of two stops differ
-    so much that the mount must have moved.
+    stops: number of stops; up: the vertical in the sensor's axes (unit vector), None before the first stop; bias: the
+    gyro's bias (3, deg/s) at the last stop; standing: True during a stop; moved: True if the verticals of two stops
+    differ so much that the mount must have moved.
     """
 
     def __init__(self, bias=(0.0, 0.0, 0.0)):

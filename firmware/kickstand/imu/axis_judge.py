@@ -11,7 +11,7 @@ from micropython import const
 from ..errors import Notice
 from ..units import AXES
 
-# Places in the notes. They repeat those of fifo_frames.py, because importing names would take heap.
+# Indices in the notes. They repeat those of fifo_frames.py, because imported names would take heap.
 _ENDS = const(5)
 _CLIPPED = const(6)
 _GYRO_CLIPPED = const(7)
@@ -21,10 +21,10 @@ _SEEN = const(19)
 _HIGH_BYTE = const(0x10000)
 _WRAPPED = const(0x20000)
 
-# The number of looks for which an axis must be quiet to be faulty, for dlpf 1 to 6. The gyro has a row for each range,
-# from 250 deg/s up. With the noise of the quietest chip (accelerometer 100 ug/sqrt(Hz), at 16 g; gyro 0.004
-# deg/s/sqrt(Hz)) a working axis at rest is quiet for so long once in 1e12 looks. 0: the noise is too far below one
-# count to decide.
+# An axis that is quiet for so many looks is faulty. Columns: dlpf 1 to 6. The gyro has a row for each range, from 250
+# deg/s up. With the noise of the quietest chip (accelerometer 100 ug/sqrt(Hz), at 16 g; gyro 0.004 deg/s/sqrt(Hz)) a
+# working axis at rest is quiet for so long only once in 1e12 looks. 0 means that the noise is too far below one count
+# to decide.
 _ACCEL_LOOKS = (1, 1, 1, 4, 15, 80)
 _GYRO_LOOKS = (
     (1, 1, 1, 3, 5, 11),
@@ -32,13 +32,13 @@ _GYRO_LOOKS = (
     (1, 1, 2, 10, 62, 0),
     (1, 2, 14, 0, 0, 0),
 )
-_COLUMNS = (0, 1, 2, 4, 5, 6)  # of the axes
-_WRAP_LOOKS = const(2)  # looks with a wrap until the high byte counts as stuck
-_WELL_LOOKS = const(2)  # successive looks without a fault until it is cleared
-_CLIP_LOOKS = const(2)  # successive looks with half of the samples at the end of the range until it is a fault
-_RAIL_LOOKS = const(5)  # the same with all samples: the axis is the cause, not vibration
+_COLUMNS = (0, 1, 2, 4, 5, 6)  # the axes' columns in a frame
+_WRAP_LOOKS = const(2)  # after so many looks with a wrap the high byte counts as stuck
+_WELL_LOOKS = const(2)  # after so many successive looks without a fault the fault is cleared
+_CLIP_LOOKS = const(2)  # successive looks with half of the samples at the end of the range that make a fault
+_RAIL_LOOKS = const(5)  # the same with all samples at the end: the axis is the cause, not vibration
 _SETUP_LOOKS = const(25)  # looks between two set-ups of a chip with a faulty axis
-_QUIET_LOOKS = const(150)  # looks until the same notice is shown again
+_QUIET_LOOKS = const(150)  # number of looks before the same notice is shown again
 
 
 class AxisJudge:
@@ -51,11 +51,13 @@ class AxisJudge:
         self._limits = _ACCEL_LOOKS[dlpf - 1], _GYRO_LOOKS[gyro_range][dlpf - 1]
         # For each column: successive quiet looks; looks with a wrap since the high byte changed
         self._quiet, self._wrapped = bytearray(7), bytearray(7)
-        self._clips = self._well = self._ill = 0  # successive looks: clipped; without a fault; with a faulty axis
-        self._noticed = {}  # number of the look at which a code was last shown
+        # numbers of successive looks: with clipping; without a fault; with a faulty axis
+        self._clips = self._well = self._ill = 0
+        self._noticed = {}  # by code: the number of the look at which the notice was last shown
 
     def look(self, watch, samples):
-        """Judge so many samples for AxisWatch.look(). Set fault, notice and clipped of watch, an AxisWatch.
+        """Judge the axes for AxisWatch.look(), after this many samples. Set fault, notice and clipped of watch, an
+        AxisWatch.
 
         Return True if the chip should be set up."""
         notes = watch.notes
@@ -88,7 +90,7 @@ class AxisJudge:
         return self._ill % _SETUP_LOOKS == 1
 
     def _ill_axes(self, notes):
-        """A Notice for the faulty axes, or None."""
+        """Return a Notice for the faulty axes, or None."""
         quiet, wrapped = self._quiet, self._wrapped
         dead = equal = 0
         for i in _COLUMNS:
@@ -97,12 +99,12 @@ class AxisJudge:
                 equal |= 1 << i | 1 << (i - 1 if i & 3 else i + 2)
             seen = notes[_SEEN + i]
             values = seen & 0xFFFF
-            more = values & (values - 1)  # without its lowest 1: 0 if there was only one value
+            more = values & (values - 1)  # with the lowest 1 cleared: 0 if there was only one value
             if not (more & (more - 1) and values & 0x5555 and values & 0xAAAA):
                 if quiet[i] < 255:
                     quiet[i] += 1
                 if quiet[i] < limit or not limit:
-                    continue  # collect the values of several looks
+                    continue  # too early to judge: collect the values of more looks
                 dead |= 1 << i
             else:
                 quiet[i] = 0
@@ -123,7 +125,8 @@ class AxisJudge:
 
 
 def _ill(axes, how=None):
-    """The Notice for these axes, one bit per column. It names the gyro's axes; without any, the accelerometer's."""
+    """Return the Notice for these axes, one bit per column. It names the gyro's axes if there are any, else the
+    accelerometer's."""
     gyro = axes >> 4
     names = "".join([AXES[i] for i in range(3) if (gyro or axes) >> i & 1])
     return Notice("axis-ill", "Gyro" if gyro else "Accel", names, how or ("dead" if gyro else "stuck"))

@@ -16,17 +16,17 @@ FRAME = const(14)  # bytes
 SATURATED = const(32700)  # |counts| from which a reading is at the end of its range
 LOOK_MS = const(400)
 
-# Places in array('i', 33), the notes of add_up(). The machine code uses the numbers. The hash of the last frame; how
-# often it was repeated in a row; the repetitions that make a frame dead; the number of frames at the end of the range
-# in this call; the number of such frames in a row until now.
+# Indices in array('i', 33), the notes of add_up(). The machine code uses the numbers. In this order: the hash of the
+# last frame; the number of its repetitions in a row; the repetitions that make a frame dead; the number of frames at
+# the end of the range in this call; the number of such frames in a row until now.
 _HASH = const(0)
 _REPEATS = const(1)
 _LIMIT = const(2)
 LOST = const(3)
 _ROW = const(4)
-# Since the last look: one bit per column that was at the end of its range; the number of frames with such a column; the
-# number of frames with such a column of the gyro; bits for axes that differed: y from x (bits 1 and 5), z from y (2 and
-# 6), z from x (0 and 4). Then the number of samples until the next look.
+# Since the last look, in this order: one bit per column that was at the end of its range; the number of frames with
+# such a column; the number of frames with such a column of the gyro; bits for axes that differed: y from x (bits 1 and
+# 5), z from y (2 and 6), z from x (0 and 4). Then the number of samples until the next look.
 _ENDS = const(5)
 _CLIPPED = const(6)
 _GYRO_CLIPPED = const(7)
@@ -36,8 +36,8 @@ DUE = const(9)
 # look.
 _HARD = const(10)
 _SHAKEN = const(11)
-# Each of these begins seven places, in the frame's order: the counts of the last frame; one bit for each value that
-# their lowest four bits had since the last look; the largest |counts| since power-on.
+# Each of these is the first of seven entries, in the frame's order: the counts of the last frame; one bit for each
+# value that their lowest four bits had since the last look; the largest |counts| since power-on.
 _LAST = const(12)
 _SEEN = const(19)
 _PEAK = const(26)
@@ -45,11 +45,11 @@ _HIGH_BYTE = const(0x10000)  # in _SEEN: the high byte has changed
 _WRAPPED = const(0x20000)  # in _SEEN: the counts jumped by _JUMP or more, but the high byte stayed
 _JUMP = const(192)
 
-# Half of the range of 8 g or 16 g. The low-pass hides most of a vibration. If this much is left after it, the vibration
-# was clipped before it, and the mean of unevenly clipped readings is wrong. A range below 8 g has no such limit,
-# because bends reach half of it.
+# Half of the range of 8 g or 16 g. The low-pass hides most of a vibration. If this much is left, the vibration was
+# clipped before the low-pass, and the mean of unevenly clipped readings is wrong. A range below 8 g has no such limit,
+# because bends reach half of that range.
 _HARD_COUNTS = const(16384)
-_COLUMNS = (0, 1, 2, 4, 5, 6)  # of the axes
+_COLUMNS = (0, 1, 2, 4, 5, 6)  # the axes' columns in a frame
 _ALL_DIFFER = const(0x77)
 
 
@@ -62,10 +62,10 @@ def decode_python(frames, at, counts):
 def add_up_python(frames, n, sums, watch):
     """Add n frames into sums, array('i', 7). Return the number of frames added.
 
-    A frame with an axis at the end of its range is skipped and counted in watch[LOST]. The good frames after it move up
-    in `frames`: the good frames are then the first ones there. The function stops at the first dead frame: the result
-    and watch[LOST] then add up to less than n. A frame is dead if the six bytes of its force are all 0x00 or all 0xFF,
-    or if it repeats too many frames before it. watch: AxisWatch.notes.
+    A frame with an axis at the end of its range is skipped and counted in watch[LOST]. The good frames move to the
+    beginning of `frames`. The function stops at the first dead frame. Then the result and watch[LOST] add up to less
+    than n. A frame is dead if the six bytes of its force are all 0x00 or all 0xFF, or if it is the same as too many
+    frames before it. watch: AxisWatch.notes.
     """
     for i in range(7):
         sums[i] = 0
@@ -74,13 +74,13 @@ def add_up_python(frames, n, sums, watch):
     for k in range(n):
         at = k * FRAME
         first = frames[at]
-        same = 0  # number of bytes of the force that equal the first one
-        mark = 0  # the hash
+        same = 0  # number of bytes of the force that equal its first byte
+        mark = 0  # hash of the frame
         for i in range(FRAME):
             byte = frames[at + i]
             if i < 6 and byte == first:
                 same += 1
-            if i < 6 or i > 7:  # without the temperature: a working chip may repeat it
+            if i < 6 or i > 7:  # all but the temperature, which a working chip may repeat
                 mark = (mark * 31 + byte) & 0xFFFFFF
         if same == 6 and (first == 0 or first == 255):
             return good
@@ -127,22 +127,21 @@ def add_up_python(frames, n, sums, watch):
 
 
 def _int16(frames, at):
-    """The big-endian int16 at byte `at`. struct.unpack_from() would allocate a tuple for each frame."""
+    """Return the big-endian int16 at byte `at`. struct.unpack_from() would allocate a tuple for each frame."""
     value = frames[at] << 8 | frames[at + 1]
     return value - 65536 if value > 32767 else value
 
 
 class AxisWatch:
     """Watches each axis for faults. The noise of a working axis always changes its counts (product specification
-    PS-MPU-6000A rev 3.4, sections 6.1 and 6.2). A suspicious axis is judged by axis_judge.py, which is imported only
-    then.
+    PS-MPU-6000A rev 3.4, sections 6.1 and 6.2). If an axis looks suspicious, axis_judge.py is imported and judges it.
 
     rate_hz: samples per second. accel_range, gyro_range: 0 (2 g, 250 deg/s) to 3 (16 g, 2000 deg/s). dlpf: see Mpu6050.
     repeats: repetitions that make a frame dead.
 
     notes: the notes of add_up(). fault: None, or a Notice: an axis is faulty, or half of the samples are at the end of
-    the range. notice: None, or a Notice to show for a moment; whoever shows it sets it to None. clipped: samples
-    skipped since power-on because an axis was at the end of its range. looks: number of looks.
+    the range. notice: None, or a Notice to show for a moment; the caller that shows it sets it to None. clipped:
+    samples skipped since power-on because an axis was at the end of its range. looks: number of looks.
     """
 
     def __init__(self, rate_hz, accel_range, gyro_range, dlpf, repeats):
@@ -165,19 +164,20 @@ class AxisWatch:
         notes[DUE] = self._look
 
     def clips(self):
-        """A Notice if all samples of the last 0.1 s or more were at the end of the range, else None."""
+        """Return a Notice if all samples of the last 0.1 s or more were at the end of the range, else None."""
         notes = self.notes
         if notes[_ROW] < notes[_LIMIT]:
             return None
         return Notice("clips", "Gyro" if notes[_ENDS] > 7 else "Accel")
 
     def shaken(self):
-        """The largest |counts| of the accelerometer's axes (3) and the share of lost samples, both since power-on."""
+        """Return the largest |counts| of the accelerometer's axes (3) and the share of lost samples, both since
+        power-on."""
         return self.notes[_PEAK : _PEAK + 3], self.clipped / max(1, self.looks * self._look)
 
     def look(self):
         """Judge the samples since the last look. Call it when notes[DUE] is 0 or less. Return True if the chip should
-        be set up, which may repair an axis: once when a fault begins, then from time to time."""
+        be set up, which may repair an axis. That is the case once when a fault begins, then from time to time."""
         samples = self._look - self.notes[DUE]
         self.notes[DUE] = self._look
         self.looks += 1
@@ -206,7 +206,7 @@ class AxisWatch:
         return True
 
     def _load(self):
-        gc.collect()  # or lasting objects would be placed behind garbage
+        gc.collect()  # otherwise lasting objects would be placed behind garbage
         from .axis_judge import AxisJudge
 
         self._judge = AxisJudge(*self._settings)

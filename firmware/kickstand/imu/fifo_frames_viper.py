@@ -53,7 +53,8 @@ def add_up(frames: ptr8, n: int, sums: ptr32, watch: ptr32) -> int:  # noqa: F82
                 ends |= 1 << i
             if value >= watch[10] and i < 3:
                 shaken = 1
-            value = watch[12 + i]  # read again as last: 64-bit computers read it unsigned
+            # written and read again like the last value: on 64-bit computers both are then unsigned
+            value = watch[12 + i]
             seen = 1 << (value & 15)
             if value >> 8 != last >> 8:
                 seen |= 0x10000

@@ -14,7 +14,7 @@ Sources: register map RM-MPU-6000A rev 4.2 (the page numbers below); product spe
         for k in range(chip.fetch()):  # every sample since the last fetch(), oldest first
             chip.take(k)
             print([count / chip.accel_lsb_per_g for count in chip.counts[0:3]], "g")
-        sleep_ms(10)  # up to 0.17 s at 200 samples a second: the chip's FIFO keeps the samples meanwhile
+        sleep_ms(10)  # up to 0.17 s at 200 samples per second; meanwhile the chip's FIFO keeps the samples
 """
 
 from array import array
@@ -37,20 +37,21 @@ _WHO_AM_I = const(0x75)  # p. 45
 
 _RESET = const(0x80)  # bit of PWR_MGMT_1
 _STANDBY = const(0x3F)  # bits of PWR_MGMT_2 (p. 42), which follows PWR_MGMT_1: each turns an axis off
-_CLOCK_PLL_GYRO_X = const(0x01)  # in PWR_MGMT_1: 1 % accurate; after a reset the oscillator is used, off by up to 5 %
+_CLOCK_PLL_GYRO_X = const(0x01)  # in PWR_MGMT_1: accurate to 1 %; the oscillator used after a reset is off by up to 5 %
 _FIFO_ALL = const(0xF8)  # in FIFO_EN: temperature, gyro, accelerometer: the fourteen bytes of a burst
 _FIFO_ENABLE = const(0x40)  # bit of USER_CTRL
 _FIFO_RESET = const(0x04)  # bit of USER_CTRL
 
 ACCEL_LSB_PER_G = {2: 16384, 4: 8192, 8: 4096, 16: 2048}  # counts per g for each range in g (p. 29)
 GYRO_LSB_PER_DPS = {250: 131.0, 500: 65.5, 1000: 32.8, 2000: 16.4}  # counts per deg/s for each range in deg/s (p. 31)
-MIN_DLPF = {50: 4, 100: 3, 125: 3, 200: 2}  # by rate_hz: the widest low-pass (98, 44 or 21 Hz) under half of it (p. 13)
+# by rate_hz: the widest low-pass (98, 44 or 21 Hz) below half of that rate (p. 13)
+MIN_DLPF = {50: 4, 100: 3, 125: 3, 200: 2}
 GYRO_DELAY_S = {1: 0.0019, 2: 0.0028, 3: 0.0048, 4: 0.0083, 5: 0.0134, 6: 0.0186}  # delay by dlpf (p. 13)
 
 # The chips known to work, by WHO_AM_I: name (at most 12 characters); temperature counts per degree C; degrees C at 0
-# counts; True if it has ACCEL_CONFIG2 (0x1D); size of its FIFO in bytes, or less; bits of FIFO_EN that must read back.
-# Add a new one also to VARIANTS in tools/kickstand_tools/simulated_board/mpu6050.py and to the parts in the README. A
-# chip with other registers (LSM6DS3, BMI160) needs a driver with the same methods, opened by open_sensor().
+# counts; True if the chip has ACCEL_CONFIG2 (0x1D); usable size of its FIFO in bytes; bits of FIFO_EN that must read
+# back. Also add a new chip to VARIANTS in tools/kickstand_tools/simulated_board/mpu6050.py and to the parts in the
+# README. A chip with other registers (LSM6DS3, BMI160) needs a driver with the same methods, opened by open_sensor().
 CHIPS = {
     0x68: ("MPU6050", 340.0, 36.53, False, 1024, 0xF8),
     0x70: ("MPU6500", 333.87, 21.0, True, 512, 0xF8),
@@ -60,7 +61,7 @@ CHIPS = {
     0x74: ("MPU6515", 333.87, 21.0, True, 512, 0xF8),
     0x78: ("MPU6500 0x78", 333.87, 21.0, True, 512, 0xF8),
     0x98: ("ICM20689", 326.8, 25.0, True, 512, 0xF8),
-    0x19: ("MPU6886", 326.8, 25.0, True, 512, 0x18),  # always adds the temperature and has no bit for it
+    0x19: ("MPU6886", 326.8, 25.0, True, 512, 0x18),  # always adds the temperature to the FIFO and has no bit for it
 }
 _NAME = const(0)
 _LSB_PER_C = const(1)
@@ -68,15 +69,15 @@ _ZERO_C = const(2)
 _HAS_ACCEL_CONFIG2 = const(3)
 _FIFO_EN_BITS = const(5)
 
-_MAX_FRAMES = const(8)  # most frames in one transfer, to catch up: 3 ms at 400 kHz
-# The limit while fewer than _MAX_FRAMES wait: one slow pass of the loop must not slow the next one
+_MAX_FRAMES = const(8)  # the most frames in one transfer, used to catch up: 3 ms at 400 kHz
+# The limit while fewer than _MAX_FRAMES wait, so one slow pass of the loop does not slow the next pass
 _FEW_FRAMES = const(3)
-# Readings that repeat for longer are a fault: in a working chip, noise changes every sample
+# Readings that stay equal for longer are a fault: in a working chip, noise changes every sample
 _FROZEN_MS = const(100)
 
 
 class UnknownChip(Exception):
-    """A chip answers that is not in CHIPS. args[0]: its WHO_AM_I."""
+    """The chip that answers is not in CHIPS. args[0]: its WHO_AM_I."""
 
 
 class NotKept(OSError):
@@ -88,7 +89,7 @@ class Mpu6050:
 
     i2c: a machine.I2C.  address: where to look first, 0x68, or 0x69 with AD0 high.  accel_range_g: 2, 4, 8 or 16.
     gyro_range_dps: 250, 500, 1000 or 2000 deg/s.  dlpf: DLPF_CFG, the low-pass, from 1 (184 Hz) to 6 (5 Hz). rate_hz:
-    samples per second, 1000 divided by 1 to 256.  accept: an additional WHO_AM_I, treated as an MPU6500.
+    samples per second, 1000 divided by 1 to 256.  accept: a WHO_AM_I that is not in CHIPS, to be treated as an MPU6500.
 
     address: where the chip answers. Until a set-up succeeds, each set-up also tries the other address. who_am_i: the
     chip's answer, 0 before setup().  counts: array('h', 7) of the last read() or take(), ax ay az temperature gx gy gz.
@@ -116,20 +117,20 @@ class Mpu6050:
         self._one, self._two, self._three = bytearray(1), bytearray(2), bytearray(3)
         self._readback = bytearray(_FIFO_EN - _SMPLRT_DIV + 1)
         self._frames = bytearray(FRAME * _MAX_FRAMES)
-        # The first n frames, for each n. Made once, because each slice takes heap.
+        # For each n: the first n frames. Created once, because each slice takes heap.
         self._some_frames = [memoryview(self._frames)[: FRAME * n] for n in range(_MAX_FRAMES + 1)]
         self.frames_left = self.overflows = 0
         self._most = 0  # largest number of bytes found in the FIFO
         self._odd = False  # the last fetch() found an incomplete frame
-        self._settled = False  # a chip was started at this address: do not try the other one
-        self._started = False  # setup() is complete: the FIFO is filling
+        self._settled = False  # True once a chip was started at this address: do not try the other address
+        self._started = False  # True once setup() is complete and the FIFO fills
         self._full = 0  # from this number of bytes on the FIFO may have overflowed
         self.counts, self.sums = array("h", [0] * 7), array("i", [0] * 7)
         self.axes = AxisWatch(rate_hz, accel_bits >> 3, gyro_bits >> 3, dlpf, rate_hz * _FROZEN_MS // 1000)
 
     @property
     def name(self):
-        """The chip's name in CHIPS, or its WHO_AM_I in hexadecimal: at most 12 characters."""
+        """Return the chip's name in CHIPS, or its WHO_AM_I in hexadecimal: at most 12 characters."""
         return self._chip()[_NAME] if self.who_am_i in CHIPS else "WHO 0x%02X" % self.who_am_i
 
     def connect(self, i2c):
@@ -143,7 +144,7 @@ class Mpu6050:
         except (UnknownChip, OSError) as error:
             if self._settled:
                 raise
-            self.address ^= 1  # AD0 may be wired the other way, or a clock may have the usual address
+            self.address ^= 1  # AD0 may be wired the other way, or a clock chip may use the first address
             try:
                 return self._identify()
             except (UnknownChip, OSError) as other:
@@ -152,7 +153,7 @@ class Mpu6050:
 
     def _identify(self):
         self.who_am_i = self.read_register(_WHO_AM_I)
-        # Read twice, because a misread number would choose the calibration of another chip.
+        # Read twice, because with a misread number the calibration of another chip would be used.
         if self.read_register(_WHO_AM_I) != self.who_am_i:
             raise OSError("MPU6050 WHO_AM_I reads differently each time")
         if self.who_am_i not in CHIPS and self.who_am_i != self._accept:
@@ -170,18 +171,18 @@ class Mpu6050:
 
     def configure(self):
         """Do the steps of setup() except start(), as a generator. It yields the milliseconds to wait before the next
-        step: the caller can do other work meanwhile. Raises the same."""
+        step; meanwhile the caller can do other work. Raises the same errors."""
         self._started = False
         self.identify()
         self.write_register(_PWR_MGMT_1, _RESET)
         yield 100
         self.write_register(_PWR_MGMT_1, _CLOCK_PLL_GYRO_X)
-        yield 60  # a write too early after a reset is lost without an error
+        yield 60  # a write too soon after a reset is lost without an error
         for i in range(5 if self._chip()[_HAS_ACCEL_CONFIG2] else 4):
             self.write_register(_SMPLRT_DIV + i, self._configuration[i])
         if not self.configured():
             raise NotKept("MPU6050 configuration does not read back")
-        yield 20  # for the low-pass to settle
+        yield 20  # time for the low-pass to settle
 
     def start(self):
         """Start the FIFO of a configured chip. Raises OSError as restart_fifo() does."""
@@ -190,7 +191,8 @@ class Mpu6050:
         self.axes.restart()
 
     def configured(self):
-        """True if the chip is awake and has the configuration that setup() wrote. Raises OSError from the bus."""
+        """Return True if the chip is awake and has the configuration that setup() wrote. Raises OSError from the
+        bus."""
         self._read_into(_SMPLRT_DIV, self._readback)  # SMPLRT_DIV to FIFO_EN
         self._read_into(_USER_CTRL, self._three)  # USER_CTRL, PWR_MGMT_1 and PWR_MGMT_2
         # An accepted unknown chip is also sent ACCEL_CONFIG2, but it may not have that register.
@@ -211,7 +213,7 @@ class Mpu6050:
         Sets frames_left. Raises OSError from the bus, or as restart_fifo() does.
 
         After an overflow the frames no longer begin at multiples of 14 bytes. This method then empties the FIFO,
-        increments overflows and returns 0. It also returns 0 while the chip is writing a frame: see below.
+        increments overflows and returns 0. It also returns 0 while the chip is writing a frame.
         """
         self._i2c.readfrom_mem_into(self.address, _FIFO_COUNT_H, self._two)
         waiting = self._two[0] << 8 | self._two[1]
@@ -225,7 +227,7 @@ class Mpu6050:
             return 0
         self._odd = odd
         n = waiting // FRAME
-        if odd:  # the chip may be writing a frame; if the next count is also odd, an overflow has cut one
+        if odd:  # the chip may be writing a frame; if the next count is also odd, an overflow has cut a frame
             self.frames_left = n + 1
             return 0
         taken = _MAX_FRAMES if n >= _MAX_FRAMES else _FEW_FRAMES if n > _FEW_FRAMES else n
@@ -235,7 +237,7 @@ class Mpu6050:
         return taken
 
     def least_free_samples(self):
-        """The smallest free space in the FIFO found by a fetch() so far, in samples."""
+        """Return the smallest free space that any fetch() has found in the FIFO, in samples."""
         return max(0, self._full + FRAME - self._most) // FRAME
 
     def take(self, k):
@@ -245,9 +247,9 @@ class Mpu6050:
     def add_up(self, n):
         """Add the first n samples of the last fetch() into sums; return the number added. Takes no heap.
 
-        Samples at the end of the range are skipped and counted in axes.notes[LOST]; take() then finds only the others.
-        The method stops at a sample that only a dead chip sends: a force of all zeros or all ones, or a reading that
-        did not change for _FROZEN_MS."""
+        Samples at the end of the range are skipped and counted in axes.notes[LOST]; take() then returns only the other
+        samples. The method stops at a sample that only a dead chip sends: all bits of the force are 0 or all are 1, or
+        the reading did not change for _FROZEN_MS."""
         return add_up(self._frames, n, self.sums, self.axes.notes)
 
     def restart_fifo(self):
@@ -262,7 +264,7 @@ class Mpu6050:
             raise NotKept("MPU6050 FIFO does not read back")
 
     def _fifo_runs(self, fifo_en, user_ctrl):
-        """True if these values of the two registers mean that the FIFO takes all three sensors."""
+        """Return True if these values of the two registers mean that the FIFO stores all three sensors."""
         bits = self._chip()[_FIFO_EN_BITS]
         return fifo_en & bits == bits and user_ctrl & _FIFO_ENABLE != 0
 
@@ -272,15 +274,15 @@ class Mpu6050:
         return counts / chip[_LSB_PER_C] + chip[_ZERO_C]
 
     def _chip(self):
-        return CHIPS.get(self.who_am_i, CHIPS[0x70])  # a chip accepted by its number is treated as an MPU6500
+        return CHIPS.get(self.who_am_i, CHIPS[0x70])  # an accepted chip that is not in CHIPS is treated as an MPU6500
 
     def waiting(self):
         """The number of bytes in the FIFO. Raises OSError from the bus."""
         self._read_into(_FIFO_COUNT_H, self._two)
         return self._two[0] << 8 | self._two[1]
 
-    # A failed register transfer is tried once more: otherwise a moment of bad contact would cost a whole set-up. A read
-    # of the FIFO is not repeated, because the chip has already dropped the bytes.
+    # A failed register transfer is tried once more. Otherwise a moment of bad contact would require a whole set-up. A
+    # read of the FIFO is not repeated, because the chip has already dropped the bytes.
 
     def read_register(self, register):
         """The content of a register. Raises OSError from the bus."""

@@ -8,11 +8,11 @@ from .mpu6050 import CHIPS
 
 _WHO_AM_I = 0x75
 _PWR_MGMT_1 = 0x6B
-_AS_AN_MPU = (0x40, 0x41, 0x01)  # PWR_MGMT_1 of chips like the MPU6050, after power-on and when set up
+_AS_AN_MPU = (0x40, 0x41, 0x01)  # values of PWR_MGMT_1 in chips like the MPU6050, after power-on and after a set-up
 OTHER, MOTION, SUPPORTED = 0, 1, 2  # kinds of devices: MOTION is a sensor that this firmware does not know
-_TIME_BYTES = 10  # a clock's registers: its time takes seven, from register 0 or 3
+_TIME_BYTES = 10  # registers to read from a clock: its time takes seven, from register 0 or 3 on
 
-# addresses in hexadecimal, register, its content, name: chips that identify themselves
+# chips that identify themselves: addresses in hexadecimal, register, its content, name
 _MOTION = """
 68 69 75 47 ICM-42688
 68 69 75 db ICM-42688-V
@@ -63,9 +63,10 @@ _OTHERS = """
 
 
 def name_of(i2c, address):
-    """(name, kind) of the device that answers at this address; ("", OTHER) for an unknown one. i2c: a machine.I2C."""
+    """Return (name, kind) of the device that answers at this address, or ("", OTHER) if it is unknown. i2c: a
+    machine.I2C."""
     at_mpu = address & 0xFE == 0x68
-    # register 0 of these chips can hold any number
+    # register 0 of a chip like the MPU6050 can hold any number
     skipped = 0x00 if at_mpu and _reads(i2c, address, _PWR_MGMT_1) in _AS_AN_MPU else -1
     mark = " %02x " % address
     for line in _MOTION.split("\n"):
@@ -87,18 +88,19 @@ def name_of(i2c, address):
 
 
 def who_am_i(i2c, address):
-    """The value of the MPU6050's register WHO_AM_I, -1 without an answer."""
+    """Return the value of the MPU6050's register WHO_AM_I, or -1 without an answer."""
     return _reads(i2c, address, _WHO_AM_I)
 
 
 def is_clock(i2c, address):
-    """True if its first registers are those of a clock: a DS1307, DS3231 or PCF8523, which have the sensor's
+    """Return True if the first registers hold a time. The clocks DS1307, DS3231 and PCF8523 have the sensor's
     address."""
     try:
         time = i2c.readfrom_mem(address, 0, _TIME_BYTES)
     except OSError:
         return False
-    # seconds, minutes, hours, then day of the week, date, month; a PCF8523 begins at register 3 and has the date first
+    # seconds, minutes, hours, then day of the week, date, month; a PCF8523 begins at register 3 and has the date before
+    # the day of the week
     return _is_time(time, 0, 4, 3) or _is_time(time, 3, 6, 7)
 
 
@@ -113,7 +115,7 @@ def _is_time(time, at, date_at, day_at):
 
 
 def _reads(i2c, address, register):
-    """The value of a register, -1 without an answer."""
+    """Return the value of a register, or -1 without an answer."""
     try:
         return i2c.readfrom_mem(address, register, 1)[0]
     except OSError:

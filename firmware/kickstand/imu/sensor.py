@@ -9,22 +9,22 @@ from .fifo_frames import DUE, LOST
 from .mpu6050 import UnknownChip
 
 _RETRY_MS = const(50)  # time between two attempts to set the chip up
-_FAILURES = const(3)  # failed transfers in a row that are a fault; one or two NACKs are tolerated
+_FAILURES = const(3)  # so many failed transfers in a row are a fault; one or two NACKs are tolerated
 _SILENT_MS = const(100)  # time without a sample that is a fault
-_STALE_MS = const(500)  # the same if overflows lost all samples, because the board had no time to read
-_SETTLED_MS = const(1000)  # the set-up did not help if a fault returns sooner than this
+_STALE_MS = const(500)  # the same while overflows lose all samples because the board has no time to read
+_SETTLED_MS = const(1000)  # if a fault returns sooner than this, the set-up did not help
 _FRUITLESS = const(3)  # after this many such faults in a row the FIFO is tested
-# Of failed set-ups in a row, the first one to explain, and the number from one explanation to the next, about a second
+# The first explanation follows this many failed set-ups in a row, each further one this many later (about a second)
 EXPLAINED, EXPLAINED_EVERY = 3, 20
 _CORRECTION_SHIFT = const(4)  # SampleClock.emptied() corrects by 1/16 of the difference between the two clocks
 
 
 class Sensor:
-    """Samples of one chip, which may fail at any time. Every failed transfer (NACK or time-out) ends in _missed().
+    """Samples of one chip, which may fail at any time. _missed() handles every failed transfer (NACK or time-out).
 
-    chip: an Mpu6050.  reopen(): frees the bus and returns it as a machine.I2C.  explain(chip, error): returns a Notice,
-    why the chip could not be set up, and the addresses that answer. explain(chip, None) tests the FIFO: the first
-    value is then a Notice if it is broken, else None. explain may be None.
+    chip: an Mpu6050.  reopen(): frees the bus and returns it as a machine.I2C.  explain(chip, error): returns a Notice
+    with the reason for a failed set-up, and the addresses that answer. explain(chip, None) tests the FIFO: the first
+    value is then a Notice if the FIFO is broken, else None. explain may be None.
     found: list of the addresses on the bus at the last explanation.
     fault: the Notice of a fault, or None.  restarts: number of gaps in the samples: after a set-up, after
     _STALE_MS without a sample, after a faulty axis.  clipped: samples that fetch() skipped because an axis was at the
@@ -40,10 +40,10 @@ class Sensor:
         self._fruitless = 0  # set-ups in a row with a fault within _SETTLED_MS after them
         self._started_ms = 0
         self._failures = 0  # transfers that failed in a row
-        self._overflows = 0  # the chip's overflows handled so far
+        self._overflows = 0  # number of the chip's overflows handled so far
         self._due_ms = ticks_ms()  # time of the next step of the set-up
         self._steps = None  # the steps of the set-up, a generator
-        self._ready = False  # the chip is set up, but its FIFO does not fill yet
+        self._ready = False  # True while the chip is set up but its FIFO is not started
         self._sample_ms = 0  # when the last sample was read, or the FIFO was emptied after an overflow
         # _emptied_ms: when the FIFO last overflowed; _read_ms: when the last sample before that overflow was read
         self._emptied_ms = self._read_ms = 0
@@ -60,9 +60,9 @@ class Sensor:
     def fetch(self, now_ms):
         """Read the waiting samples; return their number, at most eight. now_ms: ticks_ms().
 
-        Their sum is in chip.sums; chip.take(k) gives each of them. The number is 0 while an axis is faulty. A chip that
-        does not run is set up first, by calls over 0.2 s. Raises SettingsError for pins that cannot be used, and
-        nothing else."""
+        chip.sums has their sum, chip.take(k) returns each of them. The number is 0 while an axis is faulty. If the chip
+        does not run, the calls of 0.2 s set it up first. Raises SettingsError for pins that cannot be used, and nothing
+        else."""
         if not self._running:
             self.prepare(now_ms)
             if self._ready:
@@ -90,7 +90,7 @@ class Sensor:
     def _judge(self, good, waiting, now_ms):
         """Set the fault. Return the number of usable samples: good, or 0 while an axis is faulty.
 
-        good: number of the waiting samples that are in the sums."""
+        good: number of samples in the sums. waiting: number of samples that were waiting."""
         axes = self.chip.axes
         if good:
             self.fault = None
@@ -120,9 +120,9 @@ class Sensor:
         the FIFO was just emptied."""
         if self._overflows != self.chip.overflows:
             self._overflows = self.chip.overflows
-            if self._sample_ms != self._emptied_ms:  # there were samples since the last overflow
+            if self._sample_ms != self._emptied_ms:  # at least one sample was read since the last overflow
                 self._read_ms = self._sample_ms
-            # now_ms may be from before the long pause that led to the overflow
+            # now_ms may be older than the long pause that led to the overflow
             self._sample_ms = self._emptied_ms = ticks_ms()
             if ticks_diff(self._emptied_ms, self._read_ms) > _STALE_MS:
                 self.fault = self._fifo_fault() or Notice("readings-lost")
@@ -131,7 +131,7 @@ class Sensor:
             self._fail_again("sensor-silent", now_ms)
 
     def _fail_again(self, code, now_ms):
-        """Fail. If set-ups do not help, report a broken FIFO where the test finds one."""
+        """Fail. If set-ups do not help, test the FIFO and report it if it is broken."""
         self._fruitless = self._fruitless + 1 if ticks_diff(now_ms, self._started_ms) < _SETTLED_MS else 1
         fault = self._fifo_fault() if self._fruitless % _FRUITLESS == 0 else self._named_fifo()
         self._fail(code, now_ms)
@@ -139,18 +139,19 @@ class Sensor:
             self.fault = fault
 
     def _named_fifo(self):
-        """The fault, if it is the FIFO's, else None. That fault stays until a sample arrives."""
+        """Return the fault if it is that of a broken FIFO, else None. This fault stays until a sample arrives."""
         return self.fault if self.fault is not None and self.fault.code == "sensor-fifo" else None
 
     def _fifo_fault(self):
-        """None, or a Notice: the chip measures, but its FIFO does not work. The test takes up to 0.3 s, once."""
+        """Return a Notice if the chip measures but its FIFO does not work, else None. The test runs once and takes up
+        to 0.3 s."""
         return self._named_fifo() or (self.explain(self.chip, None)[0] if self.explain else None)
 
     def check(self, now_ms):
         """Check that the chip is still configured. A supply dip during a transfer can corrupt half a sample: call this
         before readings are shown. It takes 0.6 ms. Raises nothing. now_ms: ticks_ms().
 
-        It checks nothing after a failed transfer: a restart of the FIFO may be incomplete."""
+        After a failed transfer nothing is checked, because a restart of the FIFO may be incomplete."""
         if not self._running or self._failures:
             return
         try:
@@ -171,7 +172,7 @@ class Sensor:
         self._due_ms = now_ms
 
     def prepare(self, now_ms):
-        """Do the next step of the set-up if its time has come. The last step, starting the FIFO, is left to fetch().
+        """Do the next step of the set-up if its time has come. Leave the last step, the start of the FIFO, to fetch().
         Raises SettingsError for pins that cannot be used, and nothing else. now_ms: ticks_ms()."""
         if self._ready or ticks_diff(now_ms, self._due_ms) < 0:
             return
@@ -206,7 +207,7 @@ class Sensor:
         except OSError as error:
             self._not_set_up(error)
             return
-        self._running = True  # but the fault stays until there is a good sample
+        self._running = True  # the fault stays until a good sample arrives
         self._refused = 0
         self._started_ms = now_ms
         self.restarts += 1
@@ -215,16 +216,16 @@ class Sensor:
 
 
 class SampleClock:
-    """Computes the times of the samples. The chip samples at a steady rate, whatever the program does. Its clock may be
-    off by 1 %, which is corrected with the board's clock. Times are integers in microseconds: a 32-bit float could no
-    longer hold them after 17 seconds.
+    """Computes the times of the samples. The chip samples at a steady rate, whatever the program does. The chip's clock
+    may be off by 1 %; the board's clock corrects this. Times are integers in microseconds: a 32-bit float would lose
+    microseconds after 17 seconds.
 
     period_us: nominal time from one sample to the next.  lost: samples lost in overflows or skipped, since power-on."""
 
     def __init__(self, period_us):
         self._period_us = period_us
         self.lost = 0
-        self._pending_us = 0  # correction that the next step() adds
+        self._pending_us = 0  # the correction for the next step()
         self._skipped_us = 0  # time of samples that were skipped since the last step()
         self._sample_us = None  # when the last sample was taken, in ticks_us(); None: no sample yet
 
@@ -253,13 +254,14 @@ class SampleClock:
         return dt_us
 
     def emptied(self, now_us):
-        """Correct the clock. At now_us (ticks_us()) the chip's FIFO was empty and all its samples were counted.
+        """Correct the clock. Call this when the chip's FIFO was empty at now_us (ticks_us()) and all its samples were
+        counted.
 
         The last sample was then half a period old on average."""
         if self._sample_us is None:
             return
         late_us = ticks_diff(now_us, self._sample_us) - self._skipped_us - self._period_us // 2
-        if late_us > 2 * self._period_us:  # samples were lost in an overflow: the next step() spans the gap
+        if late_us > 2 * self._period_us:  # an overflow lost samples: the next step() spans the gap
             self.lost += (late_us - self._pending_us) // self._period_us
             self._pending_us = late_us
         else:

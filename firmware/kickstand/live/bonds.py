@@ -18,18 +18,19 @@ class Bonds:
                 kept = json.load(file)
             if kept["pin"] == pin:
                 self._keys = {(kind, unhexlify(key)): unhexlify(value) for kind, key, value in kept["keys"]}
-        except (OSError, ValueError, KeyError, TypeError):  # no file yet, or a damaged one: the phones pair again
+        except (OSError, ValueError, KeyError, TypeError):  # no file yet, or a damaged file: the phones must pair again
             pass
 
     def get(self, kind, index, key):
-        """The value for this key, or without a key the value at this index of its kind; None if it does not exist."""
+        """Return the value for this key, or without a key the value at this index of its kind. Return None without a
+        value."""
         if key is not None:
             return self._keys.get((kind, bytes(key)))
         found = [value for place, value in self._keys.items() if place[0] == kind]
         return found[index] if index < len(found) else None
 
     def put(self, kind, key, value):
-        """Store a value; None deletes the stored one. Return True if it worked."""
+        """Store a value; None deletes the stored value. Return True on success."""
         place = kind, bytes(key)
         if value is None and place not in self._keys:
             return False
@@ -41,7 +42,7 @@ class Bonds:
         return True
 
     def save(self):
-        """Write the changes. If flash cannot be written, the phones only have to enter the PIN again."""
+        """Write the changes. If flash cannot be written, the phones must enter the PIN again, nothing worse."""
         if not self._changed:
             return
         self._changed = False

@@ -10,13 +10,14 @@ from . import packets
 from .packets import LEAN, MOTION, OWN, SPEED
 
 _LOOK_MS = const(1000)
-# A phone that requests nothing for this long is disconnected, to make room for the next. Typing a PIN takes half of it
+# A phone that requests nothing for this long is disconnected, to make room for the next phone. Typing a PIN takes half
+# of this time
 _IDLE_S = const(60)
 _SAMPLES = 8  # the most that Transform takes
 
 
 def attach(radio, app):
-    """Connect an App with a Radio, so that it sends to phones."""
+    """Connect an App with a Radio, so the app sends to phones."""
     app.live = app.screen.pages.live = Live(radio, app, app.settings.leans)
 
 
@@ -79,7 +80,7 @@ class Live:
         if radio.changed:
             self._begin()
             self._look_ms = now_ms
-        inbox = radio.inbox  # the interrupt may replace the list meanwhile
+        inbox = radio.inbox  # keep this list, because the interrupt may replace radio.inbox
         while inbox:
             self._hear(*inbox.pop(0))
         if self.period_ms and ticks_diff(now_ms, self._due_ms) >= 0:
@@ -115,7 +116,7 @@ class Live:
         self._sent += self.radio.send(handle, self._views[size])
 
     def _lean(self):
-        """The lean in degrees, or None if the display shows none either."""
+        """Return the lean in degrees, or None if the display does not show a lean either."""
         app = self._app
         shown = self._leans and app.sensor.fault is None and app.screen.pages.trusted
         return app.meter.lean_deg if shown else None
@@ -130,7 +131,7 @@ class Live:
         """Send the packets whose time has come, from the samples since the last call. Send none without samples."""
         period_ms = self.period_ms
         self._due_ms = ticks_add(self._due_ms, period_ms)
-        if ticks_diff(now_ms, self._due_ms) >= 0:  # late, or the first
+        if ticks_diff(now_ms, self._due_ms) >= 0:  # the time has passed, or this is the first packet
             self._due_ms = ticks_add(now_ms, period_ms)
         if not self._n:
             return
@@ -142,12 +143,12 @@ class Live:
         for packet in range(4):
             interval = intervals[packet]
             late_ms = ticks_diff(now_ms, dues[packet])
-            if interval and 2 * late_ms >= -period_ms:  # the nearest of the times for sending
+            if interval and 2 * late_ms >= -period_ms:  # now is the pass nearest to the time for sending
                 dues[packet] = ticks_add(now_ms, interval - (late_ms if late_ms < period_ms else 0))
                 self._send_one(packet, lean, now_ms)
 
     def _mean(self):
-        """Compute the mean force and rate since the last call. The mean is the low-pass that this rate needs."""
+        """Compute the mean force and rate since the last call. The mean acts as the low-pass for this packet rate."""
         calibration = self._app.meter.calibration
         if calibration is not self._calibration:
             self._calibration, self._transform = calibration, Transform(calibration)
@@ -163,7 +164,7 @@ class Live:
         radio, buffer, sigma, speed = self.radio, self._buffer, self._sigma, self._speed
         aligned = self._app.meter.calibration.aligned
         if packet == OWN:
-            force = self._force if aligned else None  # without an alignment it is in the sensor's axes
+            force = self._force if aligned else None  # without an alignment the force is in the sensor's axes
             state = self._state(lean)
             self._put(radio.now, packets.now(buffer, now_ms, lean, sigma, force, self._rate, speed, state))
         elif packet == LEAN and lean is not None:
@@ -174,11 +175,11 @@ class Live:
             self._put(radio.chrono, packets.speed(buffer, speed))
 
     def lines(self):
-        """The lines of its page: who receives the lean, and the packets per second."""
+        """Return the lines of the page Live: who receives the lean, and the packets per second."""
         who = self.asked or ("a phone" if self.radio.phone is not None else "no phone")
         return "BLE %12s" % who, "%4d packets/s" % self.per_second
 
     def stop(self, now_ms=0):
-        """Switch Live off until the next power-on. Also an entry of the menu."""
+        """Switch Live off until the next power-on. The menu also calls this."""
         self.radio.stop()
         self._app.live = self._app.screen.pages.live = None

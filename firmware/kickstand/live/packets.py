@@ -1,6 +1,6 @@
 """Encodes the packets for a phone, and decodes its requests. The same tables are in firmware/docs/live.md.
 
-An unknown value is never sent as a plausible number: RaceChrono then gets no packet, and our own page gets UNKNOWN.
+An unknown value is never sent as a plausible number. RaceChrono gets no packet instead, and our own page gets UNKNOWN.
 """
 
 from math import floor
@@ -8,7 +8,7 @@ from struct import pack_into, unpack_from
 
 from ..units import const
 
-VERSION = 1  # of our own packets
+VERSION = 1  # version of our own packets
 LEAN, MOTION, SPEED, OWN = range(4)  # indices in a list of intervals; RaceChrono's packet ids are one higher
 _FASTEST_MS = const(40)  # at most 25 packets of each kind per second
 UNKNOWN, UNKNOWN_SPEED, UNKNOWN_SIGMA = -0x8000, 0xFFFF, 0xFF
@@ -26,14 +26,14 @@ def _sigma(sigma_deg):
 
 
 def lean(buffer, lean_deg, sigma_deg):
-    """Write RaceChrono's packet 1; return its length. The other functions return the same."""
+    """Write RaceChrono's packet 1, and return its length. The functions below also return the length."""
     pack_into("<IhB", buffer, 0, LEAN + 1, whole(lean_deg, 10), _sigma(sigma_deg))
     return 7
 
 
 def motion(buffer, force, rate_dps, trusted):
-    """Write RaceChrono's packet 2. force: left, up, forward, in g. rate_dps: about these axes, in deg/s. trusted: the
-    lean can be trusted."""
+    """Write RaceChrono's packet 2. force: left, up, forward, in g. rate_dps: about these axes, in deg/s. trusted: True
+    if the lean can be trusted."""
     pack_into("<I", buffer, 0, MOTION + 1)
     forces = whole(force[2], 1000), whole(force[0], 1000), whole(force[1], 1000)
     pack_into("<5hB", buffer, 4, *forces, whole(rate_dps[1], 10), whole(rate_dps[2], 10), trusted)

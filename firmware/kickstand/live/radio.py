@@ -7,19 +7,20 @@ from ..errors import LiveError
 from ..units import __version__, const
 from . import packets
 
-SERVICE = "7b6f0000-3c1e-4d5a-9a55-6b69636b7374"  # our own; its characteristics have 1 to 4 in place of the 0
+# our own service; its characteristics have 1 to 4 in place of the first 0
+SERVICE = "7b6f0000-3c1e-4d5a-9a55-6b69636b7374"
 _ADVERTISE_US = const(150_000)
-MOST_WRITES = 16  # that wait for the loop; more writes in one turn are ignored
+MOST_WRITES = 16  # the most writes that wait for the loop; more writes in one turn are ignored
 
 _CONNECTED, _DISCONNECTED, _WRITTEN, _GET_SECRET, _SET_SECRET, _PASSKEY = 1, 2, 3, 29, 30, 31
 _READ, _WRITE, _NOTIFY = 0x02, 0x08, 0x10
-_READ_PAIRED, _WRITE_PAIRED = 0x0600, 0x3000  # only over an encrypted link, to a phone that entered the PIN
+_READ_PAIRED, _WRITE_PAIRED = 0x0600, 0x3000  # allowed only over an encrypted link with a phone that entered the PIN
 _DISPLAY_ONLY = 0  # the PIN is on this side (on a sticker or in config.py); the phone asks for it
 
 
 class Radio:
-    """phone: the handle of the connected phone, or None. changed: the phone has changed since the loop last looked.
-    inbox: the phone's writes, [(filter or rate, bytes)]. filter, rate, chrono, now, ride: handles.
+    """phone: the handle of the connected phone, or None. changed: True if the phone has changed since the loop last
+    looked. inbox: the phone's writes, [(filter or rate, bytes)]. filter, rate, chrono, now, ride: handles.
 
     pin: six digits that a phone must enter, or None. Raises LiveError."""
 
@@ -73,7 +74,7 @@ class Radio:
                 self.inbox.append((data[1], self._ble.gatts_read(data[1])))
         elif event == _CONNECTED or event == _DISCONNECTED:
             self.phone = data[0] if event == _CONNECTED else None
-            self.changed = True  # before anything that may run out of memory
+            self.changed = True  # set first, because the next lines may run out of memory
             self.inbox = []
         elif event == _PASSKEY:
             getattr(self._ble, "gap_passkey")(data[0], data[1], self._pin)  # noqa: B009 missing in the stubs of rp2
@@ -100,7 +101,7 @@ class Radio:
         self._attempt(self._ble.gap_disconnect, self.phone)
 
     def save_bonds(self):
-        """Write the keys changed by a pairing to flash. Called in the loop, because it takes long."""
+        """Write the keys that a pairing has changed to flash. Call this in the loop, because a write takes long."""
         if self._bonds:
             self._bonds.save()
 

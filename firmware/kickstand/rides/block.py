@@ -1,17 +1,17 @@
 """The format of a recorded ride: blocks of a few thousand bytes, each readable without the others.
 
-A block is: a head (magic, format version, length, ride, sequence, time in us since power-on, temperature at its end in
-hundredths of a degree Celsius, counts per g, ten times the counts per deg/s, samples per second, firmware version,
-number of positions, delay of the gyro's low-pass in tenths of a millisecond, 0 in rides up to version 0.3.0); the
-calibration as store.pack() writes it, with matrices in blocks of format 2; the entries; zeros; the positions, the last
-one first; a tail (number of entries, CRC32 of everything before it).
+A block has these parts: a head (magic, format version, length, ride, sequence, time in us since power-on, temperature
+at the block's end in hundredths of a degree Celsius, counts per g, ten times the counts per deg/s, samples per second,
+firmware version, number of positions, delay of the gyro's low-pass in tenths of a millisecond, 0 in rides up to version
+0.3.0); the calibration as store.pack() writes it, with matrices in blocks of format 2; the entries; zeros; the
+positions, the last one first; a tail (number of entries, CRC32 of everything before it).
 
-An entry is one pass of the main loop, App.turn(), called "a turn" here: the number of its samples (n), the microseconds
-since the previous turn, and the sums of the samples' six counts (ax ay az gx gy gz). This keeps the exact mean that the
-lean was computed from. An entry can also be a speed: n = 0, then centimetres per second.
+An entry describes one pass of the main loop, App.turn(), called "a turn" here. It has the number of samples (n), the
+microseconds since the previous turn, and the sums of the samples' six counts (ax ay az gx gy gz). This keeps the exact
+mean that the lean was computed from. An entry can also be a speed: n = 0, then centimetres per second.
 
 A position is the number of its entry (a turn) and the four numbers of Gps.place(). Readers up to version 0.4.0 do not
-support positions: they treat these bytes as the zeros and read the rest.
+know positions: they skip these bytes like the zeros and read the rest.
 
 Each number is stored as its difference from a prediction: n sample periods for the time, the values of the previous
 turn for the others. The difference is written in an adaptive Rice code (R. F. Rice, JPL publication 79-22), most
@@ -39,12 +39,12 @@ PLACE = "<HHIii"
 TAIL = "<HI"
 BLOCK = 4096  # bytes in a flash block, the unit of erasing
 FIELDS = 9  # values of an entry: n, dt_us, sums of ax ay az gx gy gz, speed
-_SPEED = 8  # the index of the speed among them
+_SPEED = 8  # index of the speed in an entry
 LIMIT = 12
 RAW_BITS = 31
 MEAN_SHIFT = 4  # a mean covers about the last 16 sizes, and is stored times 16
 START_MEAN = 128 << MEAN_SHIFT
-MAX_SIZE = 1 << 20  # a larger size counts as this in the mean, which must fit in 32 bits
+MAX_SIZE = 1 << 20  # a larger size counts as this in the mean, because the mean must fit in 32 bits
 MAX_DT_US = 1 << 29  # the longest time between two turns that an entry can hold
 _HEAD_LENGTH = struct.calcsize(HEAD)
 _TAIL_LENGTH = struct.calcsize(TAIL)
@@ -57,11 +57,12 @@ _MEANS, _PENDING, _BITS, _AT, _PERIOD = 9, 18, 19, 20, 21
 
 
 def block_length(index):
-    """The number of bytes in ride block `index` of a file: as many as littlefs keeps in its own block of that number.
+    """Return the number of bytes in ride block `index` of a file: as many as the littlefs block with the same number
+    can hold.
 
-    Each block of littlefs except the first begins with 4-byte pointers to earlier blocks: one, plus one for each time
-    that its number can be halved (littlefs, SPEC.md, CTZ skip-lists). A ride block that ends where a block of littlefs
-    ends is never copied when the file grows."""
+    Each block of littlefs except the first begins with 4-byte pointers to earlier blocks: one pointer, plus one for
+    each time that the block's number can be halved (littlefs, SPEC.md, CTZ skip-lists). A ride block that ends where a
+    block of littlefs ends is never copied when the file grows."""
     if index == 0:
         return BLOCK
     length = BLOCK - 4
@@ -72,10 +73,10 @@ def block_length(index):
 
 
 def encode_python(entry, state, out):
-    """Append an entry, array('i', FIELDS), to the buffer out. Updates state, the coder's array('i', 22).
+    """Append an entry, array('i', FIELDS), to the buffer out. Update state, the coder's array('i', 22).
 
-    On the board, encode() is the machine code of block_viper.py; elsewhere it is this function. The bytes are the
-    same."""
+    On the board, encode() is the machine code of block_viper.py; elsewhere it is this function. Both write the same
+    bytes."""
     n, before = entry[0], state[0]
     for i in range(_SPEED) if n else (0, _SPEED):
         value, guess = entry[i], state[i]
@@ -119,7 +120,7 @@ except NO_MACHINE_CODE:
     encode = encode_python
 else:
     _ENTRY = array("i", (2, 9999, -30000, 30000, -1, 0, 255, -256, 0))
-    # the previous entry, means from small to large, and three pending bits
+    # a trial state: the previous entry, means from small to large, and three pending bits
     _STATE = array("i", (3, 1, -1, 29000, 70, -7, 254, 77, 0) + tuple(range(16, 160, 16)) + (5, 3, 0, 5000))
     encode = checked(encode, encode_python, _ENTRY, _STATE, bytearray(40))
 
@@ -136,12 +137,12 @@ class RideBlock:
         self._state[_PERIOD] = period_us
         self._entry = array("i", [0] * FIELDS)
         self._temperature = 0  # temperature of the last turn, in counts
-        self._reserved = 0  # bytes kept free for the next position; 0 before the first one
+        self._reserved = 0  # bytes kept free for the next position; 0 before the first position
 
     def begin(self, length, ride, sequence, time_us, chip, sample_hz, body):
         """Begin an empty block. length: in bytes, with head and tail.  ride, sequence: the numbers of the ride and of
-        the block in it.  time_us: time of the last sample before it, since power-on.  chip: an Mpu6050.  sample_hz: its
-        samples per second.  body: the calibration, from store.pack()."""
+        the block in it.  time_us: time of the last sample before the block, since power-on.  chip: an Mpu6050.
+        sample_hz: samples per second.  body: the calibration, from store.pack()."""
         state = self._state
         for i in range(FIELDS):
             state[i] = 0
@@ -183,12 +184,12 @@ class RideBlock:
         self.count += 1
 
     def add_place(self, place):
-        """Append a position, the result of Gps.place(). It belongs to the next turn."""
+        """Append a position. place: the result of Gps.place(). The position belongs to the next turn."""
         end = self._end - _PLACE_LENGTH
         if not self._reserved:
             self._reserved = _PLACE_LENGTH
             if self._state[_AT] + _WORST > end:
-                return  # drop the first position, because no room was kept for it
+                return  # the first position of a block is dropped, because no room was kept for it
         struct.pack_into(PLACE, self.buffer, end, self.count, place[0], place[1], place[2], place[3])
         self._end = end
         self._places += 1

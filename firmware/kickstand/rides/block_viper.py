@@ -6,7 +6,7 @@ Both must write the same bytes: host_tests/rides/test_ride_file.py compares them
 import micropython
 from micropython import const
 
-# The same as in block.py: the compiler can use a constant in machine code only if it is defined in the same file.
+# Repeated from block.py: in machine code the compiler can only use constants of the same file.
 _FIELDS = const(9)
 _SPEED = const(8)
 _LIMIT = const(12)
@@ -19,7 +19,7 @@ _BITS = const(19)
 _AT = const(20)
 _PERIOD = const(21)
 
-_LOW_BITS = const(16)  # a raw size is written in two parts: with the pending bits it exceeds 32 bits
+_LOW_BITS = const(16)  # a raw size is written in two parts, because with the pending bits it exceeds 32 bits
 
 
 @micropython.viper
@@ -36,7 +36,7 @@ def encode(entry: ptr32, state: ptr32, out: ptr8):  # noqa: F821 the names are v
         if i == 1:
             guess = n * int(state[_PERIOD])
         elif i < _SPEED and i > 1:
-            # sign-extend 24 bits, for an int of 32 or 64 bits
+            # sign-extend 24 bits; works for an int of 32 or 64 bits
             value = ((value & 0xFFFFFF) ^ 0x800000) - 0x800000
             guess = ((guess & 0xFFFFFF) ^ 0x800000) - 0x800000
             if n != before:

@@ -1,8 +1,8 @@
 """Tests the SD card once, before the watchdog runs: mounts it, counts its free space, writes a file.
 
-The test takes a fifth of a second. If a card does not store its free space, all of its FAT is read, which takes half a
-minute. If a card does not become ready the driver waits 5 s. During a ride the lean would freeze for this time, and the
-watchdog would restart the board again and again.
+The test takes a fifth of a second. If a card does not store the size of its free space, its whole FAT is read, which
+takes half a minute. If a card does not become ready, the driver waits 5 s. During a ride the lean would freeze for this
+time, and the watchdog would restart the board again and again.
 """
 
 import os
@@ -21,7 +21,7 @@ def prepare(recorder, settings):
         return
     except CardError as error:
         problem = error
-    except Exception as error:  # any error of driver or file system: the board must not restart
+    except Exception as error:  # any error of driver or file system must be caught, because the board must not restart
         problem = CardError("no-card", str(error))
     recorder.problem = recorder.keeper.refused = problem
     report(problem)
@@ -32,7 +32,7 @@ def _try_out(directory):
     flash_ring.make(directory)
     flash_ring.free_bytes(directory)
     path = directory + "/probe"
-    with open(path, "wb") as file:  # the first file searches for free space, which may read the FAT
+    with open(path, "wb") as file:  # opening the first file searches for free space and may read the FAT
         file.write(_CONTENT)
     with open(path, "rb") as file:
         if file.read() != _CONTENT:

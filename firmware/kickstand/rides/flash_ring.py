@@ -12,11 +12,11 @@ from . import ride_paths
 from .block import BLOCK, block_length
 
 _DIRECTORY = 0x4000  # in the mode of os.stat()
-_ENOSPC = const(28)  # MicroPython's errno does not have it
+_ENOSPC = const(28)  # MicroPython's errno does not define it
 PART_BLOCKS = 16  # ride blocks in a part in flash
 _CARD_PART_BLOCKS = const(256)  # ride blocks in a part on a card: 85 files for a day's ride, not 1300
-FIRMWARE = 103 * BLOCK  # compiled: each of its files takes whole blocks, each folder two
-RESERVE = 61 * BLOCK  # most that an update of compiled firmware needs, plus a margin
+FIRMWARE = 103 * BLOCK  # room for the compiled firmware: each file takes whole blocks, each folder two
+RESERVE = 61 * BLOCK  # the most that an update of compiled firmware needs, plus a margin
 
 
 def free_bytes(path):
@@ -49,7 +49,7 @@ def _exists(path):
 
 
 def _remove_emptied(path):
-    """Remove a directory if it is empty. The board's owner may have put files into it."""
+    """Remove a directory if it is empty. Files of the board's owner keep it."""
     try:
         os.rmdir(path)
     except OSError:
@@ -59,16 +59,17 @@ def _remove_emptied(path):
 class RideRing:
     """Writes the files of the current ride for a Recorder. settings: a Settings.
 
-    Use: begin(); for each block next_length(), ready() until it is True, write() until the block is whole,
-    end_block(); at last end(). stops_interrupts: True if interrupts are off during a write, as they are for flash.
-    needed: bytes that must be free before a part begins.  refused: None, or the CardError that begin() raises.
+    Call begin() first. For each block call next_length(), ready() until it returns True, write() until the block is
+    whole, and end_block(). Call end() last. stops_interrupts: True if interrupts are off during a write, as they are
+    for flash. needed: bytes that must be free before a part begins.  refused: None, or the CardError that begin()
+    raises.
     """
 
     def __init__(self, settings):
         self._settings = settings
         self.stops_interrupts = settings.SD_SPI is None
         self._part_blocks = PART_BLOCKS if settings.SD_SPI is None else _CARD_PART_BLOCKS
-        self.needed = RESERVE + (self._part_blocks + 2) * BLOCK  # two more, because directories grow too
+        self.needed = RESERVE + (self._part_blocks + 2) * BLOCK  # two more blocks, because directories grow too
         self._file = None
         self.refused = None
 
@@ -82,15 +83,16 @@ class RideRing:
         self._part = 0
         self._block = 0  # number of the ride block in its part
         self._free = free_bytes(self._directory)
-        # an estimate of the earlier rides' bytes: adding up hundreds of files would take too long
+        # the earlier rides' bytes, estimated: adding up hundreds of files would take too long
         self._others = max(0, all_bytes(self._directory) - self._free - FIRMWARE)
-        self._wrapped = False  # parts at the beginning of this ride were removed
+        self._wrapped = False  # True once parts at the beginning of this ride were removed
         self._oldest = None  # the ride whose parts are removed next; None: not found yet
         self._passed = -1  # rides up to this one have no parts left
         return self._ride
 
     def _use(self, ride):
-        """Make the directory for the parts of this ride. If a user's file has its name, use a later ride number."""
+        """Make the directory for the parts of this ride. If a user's file already has the directory's name, use a later
+        ride number."""
         while True:
             self._ride = ride
             self._path = ride_paths.ride_path(self._directory, ride)
@@ -110,7 +112,7 @@ class RideRing:
         return length
 
     def room(self):
-        """The bytes that can be recorded until the beginning of this ride itself is removed."""
+        """Return the bytes that can be recorded before the beginning of this ride is removed."""
         return 0 if self._wrapped else max(0, self._free + self._others - self.needed)
 
     def ready(self):
@@ -123,7 +125,7 @@ class RideRing:
         else:
             path = ride_paths.part_path(self._directory, self._ride, self._part)
             self._part += 1
-            if _exists(path):  # it may be a ride, even if the listing does not show it
+            if _exists(path):  # this may be a ride, even if the listing does not show it
                 return False
             self._file = open(path, "wb")
             self._left = self._part_blocks
@@ -153,7 +155,8 @@ class RideRing:
             self._oldest, self._passed = None, ride
 
     def _find_oldest(self):
-        """The number of the oldest ride that may have parts, or None if this step has not found it. Raises OSError."""
+        """Return the number of the oldest ride that may have parts, or None if this step has not found it. Raises
+        OSError."""
         passed, size = self._passed, ride_paths.RIDES_IN_GROUP
         groups = ride_paths.groups(self._directory)
         group = min((group for group in groups if size * (group + 1) - 1 > passed), default=None)
@@ -193,7 +196,7 @@ class RideRing:
             pass
 
     def fault_code(self, error):
-        """The code of the Notice for an OSError or MemoryError that this object raised."""
+        """Return the code of the Notice for an OSError or MemoryError that this object raised."""
         if isinstance(error, MemoryError):
             return "out-of-memory"
         if error.args and error.args[0] == _ENOSPC:

@@ -2,8 +2,8 @@
 step.
 
 A block takes four seconds or more to fill. Meanwhile the previous one is written. One pass of the loop writes a page,
-flushes a file, or removes an old file: no pass waits for more than one erase of the flash
-(45 ms). The chip's FIFO keeps the samples during that time.
+flushes a file, or removes an old file. So no pass waits for more than one erase of the flash (45 ms). The chip's FIFO
+keeps the samples during that time.
 """
 
 from time import ticks_diff, ticks_ms
@@ -14,7 +14,7 @@ from ..units import GAP_US, const
 from .block import MAX_DT_US, RideBlock
 
 _PAGE = const(256)  # bytes in a page of the flash, the unit of writing
-_STALL_MS = const(10)  # a longer write included an erase of the flash: a page alone takes 1 ms
+_STALL_MS = const(10)  # a longer write included an erase of the flash, because a page alone takes 1 ms
 
 
 class Recorder:
@@ -23,8 +23,8 @@ class Recorder:
 
     active: True while a ride is being recorded.
     problem: None, or a CardError or Notice: why the recording stopped; take_problem() clears it.
-    stalled: True if interrupts were off for longer than _STALL_MS: GPS bytes or wheel pulses may be lost. The caller
-    then calls the speed source's after_stall() and sets it to False.
+    stalled: True if interrupts were off for longer than _STALL_MS, so GPS bytes or wheel pulses may be lost. The caller
+    then calls the speed source's after_stall() and sets stalled to False.
     """
 
     def __init__(self, keeper, sample_hz):
@@ -38,7 +38,7 @@ class Recorder:
     def start(self, chip, calibration):
         """End the current ride and begin a new one. chip: a running Mpu6050.  calibration: the Calibration in use.
 
-        A replay begins with a new filter. The caller must therefore restart the meter's filter too, or the replay's
+        A replay begins with a new filter. So the caller must restart the meter's filter too. Otherwise the replay's
         lean will differ. Raises nothing: see active and problem."""
         self.stop()
         begun_ms = ticks_ms()
@@ -64,13 +64,13 @@ class Recorder:
         self._bytes = 0
         self._interrupted = False
         self._speed = self._place = None  # the last speed (cm/s) and position since the previous turn
-        self._waiting = None  # the block being written; _at: number of bytes already written
+        self._waiting = None  # the block being written; _at: number of its bytes already written
         self._at = 0
         self.active = True
         self._begin_block()
 
     def stop(self):
-        """End the ride, if there is one. Writes all added entries, in at most 0.1 s."""
+        """End the ride if one is being recorded. Write all added entries, in at most 0.1 s."""
         if not self.active:
             return
         if self._block.count:
@@ -98,7 +98,7 @@ class Recorder:
         """Add a turn of the loop. sums: sums of the seven counts of n samples.  dt_us: microseconds since the previous
         turn.
 
-        Only while active."""
+        Call it only while active."""
         now_ms = ticks_ms()
         if self._interrupted:  # at a gap the replay restarts its filter, as the board did
             self._interrupted = False
@@ -157,11 +157,11 @@ class Recorder:
             self._fail(error)
 
     def seconds(self):
-        """The duration of this recording so far, in seconds."""
+        """Return the duration of this recording so far, in seconds."""
         return (self._time_us - self._start_us) // 1_000_000
 
     def room_s(self):
-        """The seconds that can still be recorded, or None without a limit."""
+        """Return the seconds that can still be recorded, or None without a limit."""
         room = self.keeper.room()
         if room is None:
             return None
@@ -177,7 +177,8 @@ class Recorder:
 
     def _end_block(self):
         """Close the full block, to be written by tick()."""
-        while self._waiting and self.active:  # the previous block is not written yet: flash was slower than the ride
+        # the previous block is not written yet, because flash was slower than the ride
+        while self._waiting and self.active:
             self.tick()
         self._block.close()
         self._block, self._spare = self._spare, self._block

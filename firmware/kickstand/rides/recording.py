@@ -6,19 +6,19 @@ from ..errors import attempt
 
 
 class NoRecorder:
-    """Replaces the Recorder until there is one."""
+    """Takes the place of the Recorder until that is created."""
 
     active = stalled = False
 
     def take_problem(self):
-        """None: nothing has been recorded."""
+        """Return None, because nothing was recorded."""
 
 
 class Recording:
     """Begins and ends the recording of rides.
 
     settings: a Settings. chip: the Mpu6050. meter, calibration: the LeanMeter and its ActiveCalibration. keeper: see
-    Recorder; None for flash or SD card. With a keeper, recording begins with the first readings.
+    Recorder; None for flash or SD card. If keeper is not None, recording begins with the first readings.
 
     recorder: a Recorder, or a NoRecorder before there is one. on_card: rides are stored on an SD card.
     """
@@ -33,21 +33,21 @@ class Recording:
         self.on_card = settings.SD_SPI is not None and keeper is None
         self._due = settings.RECORD or keeper is not None  # recording begins with the first readings
         self._steps = self._make()
-        self._refused = None  # a Notice: why there is no Recorder
+        self._refused = None  # a Notice with the reason why there is no Recorder
         if self._due or self.on_card:
             self._finish()
         if self._due and not (keeper or self.on_card or self._refused):
-            try:  # make its directory now: an ESP32 is so slow at it that the first readings would be lost
+            try:  # make the ride's directory now: an ESP32 is so slow at it that the first readings would be lost
                 self.recorder.keeper.begin()
             except (OSError, MemoryError):
-                pass  # start() reports it
+                pass  # start() reports this fault
 
     def _make(self):
         """Create the Recorder, as a generator of short steps. Each step imports one of the modules that only recording
         needs."""
         names = ["block", "recorder"] if self._keeper else ["block", "ride_paths", "flash_ring", "recorder"]
         for name in names + ["card_trial"] * self.on_card:
-            gc.collect()  # as before each import while the loop runs: lasting objects must not be placed behind garbage
+            gc.collect()  # before each import while the loop runs: lasting objects must not be placed behind garbage
             __import__("kickstand.rides." + name)
             yield
         from .recorder import Recorder
@@ -63,7 +63,7 @@ class Recording:
         """Do all remaining steps of _make()."""
         while self._steps and not self._refused:
             if self._keeper:
-                self._step()  # an exception goes to the computer that waits for the ride
+                self._step()  # an exception is passed on to the computer that waits for the ride
             else:
                 self.prepare()
 
@@ -72,8 +72,8 @@ class Recording:
             self._steps = None
 
     def prepare(self):
-        """Do one step of creating the Recorder. The open menu calls this repeatedly: the chip's FIFO bridges one import
-        (0.1 s), but not all of them. If a step fails, start() reports it."""
+        """Do one step of creating the Recorder. The open menu calls this repeatedly: the chip's FIFO holds the samples
+        of one import (0.1 s), but not of all imports. If a step fails, start() reports it."""
         if self._steps and not self._refused:
             self._refused = attempt(self._step)
 
@@ -85,7 +85,7 @@ class Recording:
             card_trial.prepare(self.recorder, self._settings)
 
     def start(self):
-        """Begin to record a ride; return None, or a Notice with the reason for a failure.
+        """Begin to record a ride. Return None, or a Notice with the reason for a failure.
 
         If the bike is at rest the lean filter restarts too, and a replay shows the same lean. The filter then estimates
         the gyro's errors again in the first bends. If a recording begins while riding, the replay's filter knows these
@@ -100,14 +100,14 @@ class Recording:
         return self._refused
 
     def start_due(self):
-        """Begin to record with the first readings if the settings or the keeper require it. Returns the same as
+        """Begin to record at the first readings if the settings or the keeper require it. Return the same as
         start()."""
         due, self._due = self._due, False
         return self.start() if due else None
 
     def calibration_changed(self):
-        """End the ride and begin another, because a ride has one calibration. The meter restarts, because a replay of
-        the ride also begins without the poses just taken."""
+        """End the ride and begin another, because a ride has one calibration. The meter restarts too, because a replay
+        of the new ride begins without the poses just taken."""
         if self.recorder.active:
             self._calibration.restart()
             self.recorder.start(self._chip, self._calibration.value)

@@ -7,7 +7,7 @@ its own directory. Names in the form 8.3 take one directory entry each.
 import os
 
 RIDES_IN_GROUP = 100
-RIDES_IN_ALL = 100_000  # a group of four digits would not be found again
+RIDES_IN_ALL = 100_000  # ride numbers stay below this: a group of four digits would not be found again
 _GROUP_DIGITS = 3
 _RIDE_DIGITS = 2
 _PART_DIGITS = 5
@@ -76,8 +76,8 @@ def newest_ride(directory, below=RIDES_IN_ALL):
 def next_ride(directory):
     """The number for a new ride: the newest plus one. Raises OSError.
 
-    A directory may have the largest possible number, which no ring reaches. Then the new ride gets a number below
-    it."""
+    If a directory already has the largest possible number, the new ride gets a number below it. No recording reaches
+    that number."""
     below = RIDES_IN_ALL
     while True:
         newest = newest_ride(directory, below)
@@ -87,7 +87,7 @@ def next_ride(directory):
 
 
 def parts(directory):
-    """(ride, part, bytes) of every part, in any order. Takes 5 ms per ride in flash, 20 ms on a card. Raises
+    """Return (ride, part, bytes) of every part, in any order. Takes 5 ms per ride in flash, 20 ms on a card. Raises
     OSError."""
     for group in groups(directory):
         for ride in rides(directory, group):
@@ -96,8 +96,8 @@ def parts(directory):
 
 
 def _numbers(path, digits, ending=""):
-    """(number, bytes) of each file in path with a name of this many digits and this ending; without an ending, of each
-    such directory. Other files belong to the board's owner and are ignored."""
+    """Return (number, bytes) of each file in path with a name of this many digits and this ending. Without an ending,
+    return those of directories. Other files belong to the board's owner and are ignored."""
     kind = _FILE if ending else _DIRECTORY
     for entry in os.ilistdir(path):
         name = entry[0]

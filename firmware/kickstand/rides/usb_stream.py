@@ -11,7 +11,7 @@ from ..console import say
 from ..units import const
 
 _LENGTH = const(512)  # bytes in a ride block: half a second
-_SLOW_APART_MS = const(60_000)  # a slow print after a longer time counts as the first again
+_SLOW_APART_MS = const(60_000)  # after a longer time the next slow print counts as the first again
 
 
 class RideStream:
@@ -32,7 +32,7 @@ class RideStream:
         """None: unlimited."""
 
     def ready(self):
-        """True: a block can be written at any time."""
+        """Return True, because a block can be written at any time."""
         return True
 
     def write(self, data):

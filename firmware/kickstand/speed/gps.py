@@ -17,21 +17,22 @@ from ..errors import Notice
 from ..units import const
 
 _MAX_SENTENCE = const(100)  # bytes: the standard says 82, but receivers with many decimals exceed it
-_MAX_CHUNK = const(64)  # bytes read per pass of the loop: at 10 ms per pass, twice the need of 10 fixes per second
+_MAX_CHUNK = const(64)  # bytes read per pass of the loop: at 10 ms per pass, twice as many as 10 fixes per second need
 _SILENT_MS = const(3000)  # fault() reports a byte, sentence or fix that is missing for this long
 _LATE_MS = const(2000)  # a fix is dropped if it waited in the receiver for longer
-_LOOK_MS = const(1500)  # after this long without a speed sentence other kinds are examined
-_CARRY_MS = const(60_000)  # older times are moved up to this age: after 6 days ticks_diff() is negative
-_TIME_JUMP_MS = const(5000)  # a larger difference is not a delay: the receiver has corrected its clock
-# The delay of a fix is relative to the reference, a fix that was not late. If at least this many fixes over more than
-# _TIME_JUMP_MS were all late, the receiver has set its clock back: the fix with the smallest delay becomes the
+_LOOK_MS = const(1500)  # after so long without a speed sentence, other kinds of sentences are examined
+# older times are replaced by times of this age, because after 6 days ticks_diff() is negative
+_CARRY_MS = const(60_000)
+_TIME_JUMP_MS = const(5000)  # a larger difference is no delay: the receiver has corrected its clock
+# The delay of a fix is measured against the reference, a fix that was not late. If at least this many fixes over more
+# than _TIME_JUMP_MS were all late, the receiver has set its clock back: the fix with the smallest delay becomes the
 # reference.
 _MIN_FIXES_FOR_NEW_REFERENCE = const(4)
 _KNOT_MPS = const(1852.0 / 3600.0)  # one knot in m/s
 _KMH_MPS = const(1.0 / 3.6)  # one km/h in m/s
 _DAY_MS = 86_401_000  # a day with a leap second
-_YEARS = (25, 79)  # since 2000: an earlier date is a week rollover, or not received yet
-_POSITIONS = (b"GGA", b"GLL", b"GNS")  # of the kinds without a speed these are reported first
+_YEARS = (25, 79)  # since 2000: an earlier date comes from a week rollover, or the receiver does not know the date yet
+_POSITIONS = (b"GGA", b"GLL", b"GNS")  # among the kinds without a speed these are reported first
 _UBX = b"\xb5b"  # begins a u-blox binary message; class, number and a two-byte length follow
 _UBX_CLASSES = b"\x01\x02\x05\x06\x0a\x0b\x0d\x10\x13\x21\x27\x28"
 _DIGITS = 5  # decimals of a minute of arc: 2 cm
@@ -41,7 +42,7 @@ class Gps:
     """A GPS receiver. uart: a machine.UART with a time-out of 0. age_ms: after poll() has returned a speed, the delay
     of its sentence relative to the earliest-arriving one."""
 
-    problem = None  # always None; only a Wheel uses it: see fault()
+    problem = None  # always None here; a Wheel uses this attribute: see fault()
 
     def __init__(self, uart):
         self._uart = uart
@@ -53,14 +54,14 @@ class Gps:
         self._other = b""  # a received kind of sentence or message without a speed
         self._time = b""  # time of day in the last RMC
         # A fix is stored as (ticks_ms() at its arrival, its time of day in ms).
-        self._reference = None  # the fix that delays are counted from
+        self._reference = None  # the reference: delays are counted from this fix
         self._earliest = None  # the fix with the smallest delay since the reference was set, and that delay
         self._earliest_delay_ms = 0
         self._fixes = 0  # fixes with a delay since the reference was set, and the time of that
         self._since_ms = 0
         self.age_ms = 0
         self._fix = None  # fields of the RMC with the last speed, None if it was from a VTG
-        self._day_ms = 0  # its time of day
+        self._day_ms = 0  # the time of day of that fix
         self._place = array("i", (0, 0, 0, 0))
 
     def poll(self, now_ms):
@@ -91,7 +92,7 @@ class Gps:
             end = chunk.find(b"\n")
         self._line += chunk
         beyond = len(self._line) - _MAX_SENTENCE
-        if beyond > 0:  # the end of a line was lost: keep a possible beginning of the next one
+        if beyond > 0:  # the end of a line was lost: keep what may be the beginning of the next line
             self._line = self._line[max(beyond, self._line.rfind(b"$")) :]
         return speed
 
@@ -102,7 +103,7 @@ class Gps:
         self._other = b""
 
     def _carry(self, now_ms):
-        """Move times older than _CARRY_MS up to that age."""
+        """Replace times older than _CARRY_MS by times of that age."""
         self._carried_ms = now_ms
         oldest_ms = ticks_add(now_ms, -_CARRY_MS)
         for name in ("_heard_ms", "_sentence_ms", "_fix_ms", "_rmc_ms"):
@@ -133,7 +134,7 @@ class Gps:
         """Do nothing: if bytes were lost while interrupts were off, the checksum of their sentence is wrong."""
 
     def fault(self, now_ms):
-        """None, or a Notice: why there is no speed."""
+        """Return a Notice with the reason why there is no speed, or None."""
         if self._heard_ms is None:
             return None
         if ticks_diff(now_ms, self._heard_ms) > _SILENT_MS:
@@ -145,8 +146,8 @@ class Gps:
         return None
 
     def _sentence(self, line, now_ms):
-        """The speed in one line, in m/s, or None without a trustworthy one."""
-        start = line.rfind(b"$")  # noise may precede it
+        """Return the speed in one line, in m/s, or None without a trustworthy speed."""
+        start = line.rfind(b"$")  # noise may precede the sentence
         kind = line[start + 3 : start + 6]
         if start < 0 or kind not in (b"RMC", b"VTG"):
             if start >= 0 and ticks_diff(now_ms, self._sentence_ms) > _LOOK_MS:
@@ -173,7 +174,7 @@ class Gps:
             if star < 6 or _checksum(line, 1, star) != int(line[star + 1 : star + 3], 16):
                 return
             name = line[1 : line.find(b",")]
-            kind = name if name[:1] == b"P" else name[2:]  # P: a manufacturer's own, like PUBX
+            kind = name if name[:1] == b"P" else name[2:]  # P: a manufacturer's own sentence, like PUBX
             kind.decode()
         except ValueError:
             return
@@ -207,10 +208,10 @@ class Gps:
         return float(fields[7]) * _KMH_MPS if fields[8] == b"K" and fields[7] else None
 
     def _set_age(self, time, now_ms):
-        """Set age_ms and _day_ms from a fix's time of day, hhmmss.ss, and the reference if the clock has changed.
-        Return age_ms.
+        """Set age_ms and _day_ms from a fix's time of day, hhmmss.ss. If the receiver has set its clock, also set the
+        reference. Return age_ms.
 
-        Receivers do set their clocks back: a NEO-6M by 3 s when it receives the leap seconds. Raises ValueError if the
+        A NEO-6M, for example, sets its clock back by 3 s when it receives the leap seconds. Raises ValueError if the
         field is not a time of day."""
         day_ms = (int(time[0:2]) * 60 + int(time[2:4])) * 60_000 + int(float(time[4:]) * 1000.0 + 0.5)
         if not 0 <= day_ms <= _DAY_MS:

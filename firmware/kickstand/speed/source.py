@@ -13,15 +13,15 @@ from ..errors import SettingsError
 from ..units import const
 
 _MAX_MPS = const(100.0)
-_MAX_CHANGE_MPS2 = const(15.0)  # no tyre has more grip
-_NOISE_MPS = const(2.0)  # a speed may jump beyond that by this much
+_MAX_CHANGE_MPS2 = const(15.0)  # no tyre has enough grip for more
+_NOISE_MPS = const(2.0)  # a speed may exceed that limit by this much
 _GIVE_UP_MS = const(3000)  # after rejecting speeds for this long, the last accepted one is considered wrong
-_RX_BUFFER = const(512)  # bytes, half a second at 9600 baud, for writing flash or setting up the sensor
+_RX_BUFFER = const(512)  # bytes: half a second at 9600 baud, enough while flash is written or the sensor is set up
 
 
 class Speed:
-    """Reads plausible speeds. source: a Gps or a Wheel. Its place() belongs to the last speed read, even if poll() has
-    rejected it. age_us: after poll() has returned a speed, its age."""
+    """Reads plausible speeds. source: a Gps or a Wheel. The source's place() belongs to the last speed read, even if
+    poll() has rejected that speed. age_us: the age of the speed that poll() last returned."""
 
     def __init__(self, source):
         self.source = source
@@ -37,7 +37,8 @@ class Speed:
         speed = self.source.poll(now_ms)
         if self._last is not None:
             waited_ms = ticks_diff(now_ms, self._last_ms)
-            if waited_ms >= _GIVE_UP_MS:  # also without a new speed: after 6 days ticks_diff() is negative
+            # checked without a new speed too, because after 6 days ticks_diff() is negative
+            if waited_ms >= _GIVE_UP_MS:
                 self._last = None
         if speed is None or not 0.0 <= speed <= _MAX_MPS:
             return None
@@ -70,7 +71,7 @@ def open_speed(settings):
 
 def _open_uart(settings):
     pins = settings.GPS_TX, settings.GPS_RX
-    try:  # nothing is sent, but a UART takes two pins: rp2's default is a pin of the sensor
+    try:  # nothing is sent, but a UART takes two pins, and rp2's default TX is a pin of the sensor
         tx, rx = Pin(pins[0]), Pin(pins[1])
         return UART(settings.GPS_UART, settings.GPS_BAUD, tx=tx, rx=rx, rxbuf=_RX_BUFFER, timeout=0)
     except ValueError as error:

@@ -15,18 +15,18 @@ from machine import Pin
 from ..errors import Notice
 from ..units import const
 
-_MAX_MPS = const(100.0)  # pulses that imply a higher speed are disturbances
-# a contact is bouncing if it was open for less than this, or less than a quarter of the shortest period
+_MAX_MPS = const(100.0)  # pulses that imply a higher speed are interference
+# a contact that was open for less than this, or for less than a quarter of the shortest period, is bouncing
 _BOUNCE_US = const(3000)
 _STOPPED_MPS = const(0.5)  # a wheel slower than this counts as standing
-MIN_STOP_MS, MAX_STOP_MS = 500, 1800  # limits of the time without a pulse that counts as standing
+MIN_STOP_MS, MAX_STOP_MS = 500, 1800  # limits of the time without a pulse after which the wheel counts as standing
 _REPORT_MS = const(100)  # least time between two speeds from poll()
-_STANDING_MS = const(200)  # the same between two speeds of zero
+_STANDING_MS = const(200)  # least time between two speeds of zero
 # This many edges in less than STORM_US are a storm: over 8,000 per second. The interrupt takes 33 us on a Pico, so at
-# 30,000 per second nothing else would run. Such a storm ends after 2 ms, less than the time-out of a transfer. 50
-# pulses per metre at 70 m/s are allowed.
+# 30,000 per second nothing else would run. The interrupt ends such a storm after 2 ms, less than the time-out of a
+# transfer. 50 pulses per metre at 70 m/s are no storm.
 STORM_EDGES, STORM_US = 64, 8_000
-_STORM_PAUSE_MS = const(5000)  # the interrupt is off for this long after a storm, and again if the storm lasts
+_STORM_PAUSE_MS = const(5000)  # after a storm the interrupt is off for this long, and again if the storm continues
 _SOFT_PERIOD_US = const(3333)  # at shorter periods soft interrupts, such as an ESP32's, lose over 2 % of the pulses
 # Counts and times wrap at 30 bits. The interrupt subtracts times with this mask, because ticks_diff() would be negative
 # after nine minutes of standing.
@@ -37,8 +37,8 @@ class Wheel:
     """A speed sensor with pulses. pin: a machine.Pin with pull-up.  pulses_per_metre: pulses per metre of road.  irq:
     dict of more arguments of Pin.irq().
 
-    age_ms: after poll() has returned a speed, its age.  problem: None, or a Notice to show once; the caller that shows
-    it sets it to None.
+    age_ms: the age of the speed that poll() last returned.  problem: None, or a Notice to show once; the caller that
+    shows it sets problem to None.
     """
 
     def __init__(self, pin, pulses_per_metre, irq):
@@ -54,13 +54,13 @@ class Wheel:
         self._seen = 0
         self._seen_us = None
         self._report_ms = None  # when poll() last returned a speed
-        self._moved_ms = None  # when it last saw a pulse
+        self._moved_ms = None  # when poll() last saw a pulse
         self.age_ms = 0
         self._pin = pin
         self._irq = irq
-        self._noisy = False  # there was a storm and no speed since
+        self._noisy = False  # True after a storm, until the next speed
         self._soft = not irq.get("hard")
-        self._too_quick = None  # True while pulses are too fast for a soft interrupt; None: not yet
+        self._too_quick = None  # True while pulses are too fast for a soft interrupt; None before the first pulses
         self.problem = None
         self._listen()
 
@@ -84,7 +84,7 @@ class Wheel:
             self._edges = STORM_EDGES
             if (now - self._edges_us) & _TICKS < STORM_US:
                 self._off = True
-                pin.irq(None)  # here, because the loop may get no time at all; takes no heap
+                pin.irq(None)  # done here, because in a storm the loop may get no time at all; takes no heap
             self._edges_us = now
         if pin.value():
             self._opened_us = now
@@ -126,11 +126,12 @@ class Wheel:
         if pulses:
             return self._pulses(pulses, count, pulse_us, now_ms)
         if self._moved_ms is None or ticks_diff(now_ms, self._moved_ms) < self._stop_ms or waited_ms < _STANDING_MS:
-            if waited_ms > MAX_STOP_MS:  # it never moved; kept young, because after 6 days ticks_diff() is negative
+            # never moved: keep the time recent, because after 6 days ticks_diff() is negative
+            if waited_ms > MAX_STOP_MS:
                 self._report_ms = ticks_add(now_ms, -MAX_STOP_MS)
             return None
         self._report_ms = now_ms
-        self._moved_ms = ticks_add(now_ms, -self._stop_ms)  # likewise
+        self._moved_ms = ticks_add(now_ms, -self._stop_ms)  # also kept recent
         self._noisy = False
         self._usual_us = 0
         self._seen_us = None  # the next period begins with the next pulse
@@ -150,7 +151,7 @@ class Wheel:
             self._listen()
 
     def _pulses(self, pulses, count, pulse_us, now_ms):
-        """The speed in m/s from this many new pulses. pulse_us: the time of the last one."""
+        """Return the speed in m/s from this many new pulses. pulse_us: the time of the last pulse."""
         before_us = self._seen_us
         self._seen, self._seen_us = count, pulse_us
         self._report_ms = self._moved_ms = now_ms
@@ -169,7 +170,7 @@ class Wheel:
         return pulses * self._metre_us / period_us
 
     def place(self, now_ms):
-        """None: a wheel has no position."""
+        """Return None, because a wheel has no position."""
 
     def after_stall(self, now_ms):
         """Begin the next period with the next pulse, because pulses may be lost or late after interrupts were off."""
@@ -179,7 +180,7 @@ class Wheel:
         self._seen_us = None
 
     def fault(self, now_ms):
-        """None, or a Notice if no pulse has ever arrived: a wire may be loose."""
+        """Return a Notice if no pulse has ever arrived (a wire may be loose), else None."""
         if self._noisy:
             return Notice("wheel-storm")
         if self._too_quick:

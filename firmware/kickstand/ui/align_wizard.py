@@ -8,7 +8,7 @@ from . import messages, pages
 from .wizard import ASKING, RESULT, Wizard
 
 _RESULT_MS = const(4000)
-# How long the gyro's bias from the kickstand pose stays valid; then it may have drifted
+# For this time the gyro's bias from the kickstand pose is valid; later the bias may have drifted
 _FRESH_MS = const(90_000)
 _ASK = (("On the stand,", "press button"), ("Now upright:", "hold it, press"))
 _TAKING = ("Stand: hold", "Upright: hold")
@@ -30,11 +30,11 @@ class AlignWizard(Wizard):
 
     @property
     def upright(self):
-        """True once the pose on the kickstand is taken: the next one is upright."""
+        """Return True after the kickstand pose: the upright pose is next."""
         return self._kickstand is not None
 
     def _start(self):
-        self._kickstand = None  # the first pose, once it is taken
+        self._kickstand = None  # the kickstand pose, or None until it is taken
         self._show(ASKING, _ASK[0])
 
     def _next_pose(self):
@@ -48,8 +48,8 @@ class AlignWizard(Wizard):
         self._show(ASKING, messages.lines(problem), problem)  # the next press takes the pose again
 
     def _pose_done(self, pose, now_ms):
-        """Keep the first pose. After the second one compute and save the alignment. Raises AlignmentError if the poses
-        do not fit together, GyroError if the gyro does not fit them, StoreError."""
+        """Keep the first pose. After the second pose compute and save the alignment. Raises AlignmentError if the poses
+        do not fit together, GyroError if the gyro does not fit them, StoreError if it cannot be saved."""
         if not self.upright:
             self._kickstand, self._kickstand_ms = pose, now_ms
             self._turn.start(pose.gyro)

@@ -13,8 +13,8 @@ _WAITS = {
 
 
 def lines(background, now_ms):
-    """Return two lines of 16 characters. background: a BackgroundAlignment. This reads its drive, state, result and the
-    fault of its speed."""
+    """Return two lines of 16 characters. background: a BackgroundAlignment. The function reads its drive, state, result
+    and speed fault."""
     drive = background.drive
     if drive.problem is not None:
         return messages.lines(drive.problem)

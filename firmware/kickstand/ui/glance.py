@@ -1,7 +1,7 @@
 """The pages as pictures of 128x64 pixels, for a display that draws. The values to read at a glance are large.
 
-page_ring.py takes the picture of a page from here, if there is one: a tuple, see board/display.py. Rows 0 and 1 stay
-blank, because an OLED shifts its picture.
+page_ring.py looks up the picture of a page here. A picture is a tuple, see board/display.py. Rows 0 and 1 stay blank,
+because an OLED shifts its picture.
 """
 
 from binascii import a2b_base64
@@ -11,12 +11,12 @@ import framebuf
 from . import pages
 
 DIGIT_WIDTH, DIGIT_HEIGHT = 24, 40
-_PITCH = 28  # from digit to digit
+_PITCH = 28  # columns from one digit to the next
 _ARC_RADIUS, _ARC_DEG, _ARC_WIDTH = 100, 60, 7  # one degree is one column wide
 _G_PIXELS = 60  # length of the bar for 1 g
-_SMALL_Y = 56  # of the last line, in letters of 8x8
+_SMALL_Y = 56  # top row of the last line, in letters of 8x8
 
-# The ten digits, drawn for this display: each 5 times 24 bytes, of 8 rows with the topmost in bit 0
+# The ten digits, drawn for this display: each 5 bands of 24 bytes; a byte has 8 rows of a column, the topmost in bit 0
 DIGITS = a2b_base64(
     b"AADA4PD4/Pz+/n5+fn7+/vz8+PDgwAAAAP///////wMAAAAAAAAAAAP///////8AAP///////wAAAAAAAAAAAAD///////8AAP//////"
     b"/8AAAAAAAAAAAMD///////8AAAADBw8fPz9/f35+fn5/fz8/Hw8HAwAAAAAAAICAwODw+Pz8/v7+/PgAAAAAAAAAAAAEHx8/Hx8PB///"
@@ -39,12 +39,12 @@ _GLYPHS = [
     framebuf.FrameBuffer(bytearray(DIGITS[at : at + 120]), DIGIT_WIDTH, DIGIT_HEIGHT, framebuf.MONO_VLSB)
     for at in range(0, 1200, 120)
 ]
-# Row of the arc's upper edge, by columns from the middle
+# The row of the arc's upper edge; index: columns from the middle
 _ARC = bytes(2 + _ARC_RADIUS - int((_ARC_RADIUS**2 - x * x) ** 0.5 + 0.5) for x in range(_ARC_DEG + 1))
 
 
 def _scale():
-    """The arc without a lean, drawn once: drawing it for each page would take 6 ms."""
+    """Return the arc without a lean. It is drawn once: drawing it for each page would take 6 ms."""
     scale = framebuf.FrameBuffer(bytearray(128 * 4), 128, 32, framebuf.MONO_VLSB)
     for x in range(_ARC_DEG + 1):
         for column in (64 + x, 64 - x):
@@ -81,7 +81,7 @@ def _lean(canvas, number, side, deg, recording):
     for x in range(min(_ARC_DEG, abs(deg)) + 1):
         canvas.vline(64 + x if deg > 0 else 64 - x, _ARC[x], _ARC_WIDTH, 1)
     x = _number(canvas, number, 52 if number < 10 else 38, 16)
-    for side_x in (0, 5):  # of the degree sign
+    for side_x in (0, 5):  # the columns of the degree sign's two sides
         canvas.vline(x - 3 + side_x, 17, 4, 1)
         canvas.hline(x - 2, 16 + side_x, 4, 1)
     if side == "left":
@@ -103,7 +103,7 @@ def _unsure(canvas, reason):
     for x in (38, 66):
         canvas.fill_rect(x, 18, DIGIT_WIDTH, 8, 1)
     canvas.tall(" " * ((17 - len(reason)) // 2) + reason, 5, True)
-    for y in (39, 56):  # keep the letters off the edge of the band
+    for y in (39, 56):  # a bright row between the letters and the edge of the band
         canvas.hline(0, y, 128, 1)
 
 

@@ -10,8 +10,8 @@ _TIMEOUT_MS = const(20_000)
 
 
 class Menu:
-    """entries: one (name, function) per entry. name: at most 15 characters. function: called with now_ms if it is
-    chosen."""
+    """The open menu. entries: a list of (name, function). name: at most 15 characters. function: called with now_ms
+    when the rider chooses the entry."""
 
     name = "menu"
 
@@ -23,7 +23,7 @@ class Menu:
 
     @property
     def entry(self):
-        """The name of the entry that is shown."""
+        """Return the name of the entry that is shown."""
         return self._entries[self._at][0]
 
     def lines(self, now_ms):

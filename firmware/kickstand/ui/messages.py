@@ -2,8 +2,8 @@
 
 DEGREE = "\xdf"  # in the display's character ROM
 
-# code|first line|second line; {0}, {1} ... are the refusal's values. As one text this takes 3 KB of heap; a dictionary
-# takes 7.
+# code|first line|second line; {0}, {1} ... are the refusal's values. As one text the words take 3 KB of heap; as a
+# dictionary they would take 7.
 _LINES = """
 moved|Moved!|Hold it still
 vibration|Moved!|Hold it still
@@ -106,7 +106,7 @@ mount-moved|Mount has moved|Align again
 side-fixed|Side corrected|Set SIDE too
 aligned|Aligned by drive|error about {0:.1f}\xdf
 """
-# Shown instead of the lean: by LeanMeter.suppressed_reason while the alignment is in doubt, and by LeanMeter.odd
+# Shown instead of the lean. Keys: LeanMeter.suppressed_reason while the alignment is in doubt, and LeanMeter.odd
 NO_LEAN = {
     "other-side": "side was wrong?",
     "mount-moved": "mount has moved",
@@ -114,9 +114,10 @@ NO_LEAN = {
     "odd-up": "sensor odd: up",
     "odd-pitch": "sensor odd: tilt",
 }
-_OTHER_SETTING = "config.py: wrong|{0}"  # {0}: the setting's name; the console shows its fault
+_OTHER_SETTING = "config.py: wrong|{0}"  # {0}: the setting's name; the console says what is wrong with it
 
 
 def lines(refusal):
-    """The two lines for a Refusal or a Notice, neither padded nor cut. An unknown code belongs to a setting."""
+    """Return the two lines for a Refusal or a Notice, neither padded nor cut. A code without a line belongs to a
+    setting."""
     return tuple(refusal.words(_LINES, _OTHER_SETTING).split("|"))

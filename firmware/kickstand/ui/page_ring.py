@@ -1,5 +1,5 @@
-"""The ring of pages: a short press shows the next one. A page is a function in pages.py. To add one called load, add
-pages.load to MOTORCYCLE or CAR, and a row to the table of pages in firmware/docs/displays.md."""
+"""The ring of pages: a short press shows the next one. A page is a function in pages.py. To add a page called load,
+write pages.load, add it to MOTORCYCLE or CAR, and add a row to the table of pages in firmware/docs/displays.md."""
 
 from ..board.button import SHORT
 from ..errors import attempt
@@ -13,11 +13,11 @@ CAR = (pages.acceleration, pages.cornering, pages.raw)
 class PageRing:
     """The current page, as a view (see screen.py). leans: False for a car. meter, calibration, drive, rides: the
     LeanMeter, the ActiveCalibration, the BackgroundAlignment or None, and the Recording, all read-only. align(): called
-    for a short press without an alignment. That press means that the bike is on its kickstand.
+    for a short press without an alignment; the press means that the bike is on its kickstand.
 
-    name: of the page that is shown: the name of its function in pages.py, "drive", "live" or "own". late: True if the
-    next page must not show a lean because it would be too old. live: a Live, which then has a page, or None. draws:
-    True if the display shows pictures. own: the owner's pages, functions that return two lines each.
+    name: the name of the page that is shown: its function in pages.py, or "drive", "live" or "own". late: True if the
+    lean is too old for the next page. live: None, or a Live, which adds its page. draws: True if the display shows
+    pictures. own: the owner's pages, functions that return two lines each.
     """
 
     def __init__(self, leans, meter, calibration, drive, rides, align):
@@ -29,15 +29,15 @@ class PageRing:
         self._pages = MOTORCYCLE if leans else CAR
         self.first()
         self.late = self.draws = False
-        self._glance = None  # the module, once a display draws
+        self._glance = None  # the module glance, imported once a display draws
         self._glance_tried = False
         self.name = "not_aligned"
         self.live = None
         self.own = []
 
     def show_own(self, now_ms):
-        """Go to the first of the owner's pages. The menu calls this, the only way to these pages without an
-        alignment."""
+        """Go to the first of the owner's pages. The menu calls this function. Without an alignment there is no other
+        way to these pages."""
         self._own_at = 0
 
     def first(self):
@@ -64,7 +64,7 @@ class PageRing:
 
     @property
     def _driving(self):
-        """True while alignment by driving has a page: without an alignment the first page, then the last."""
+        """Return True while alignment by driving has a page: the first one without an alignment, else the last."""
         return self._drive is not None and self._drive.shown
 
     def _drive_lines(self, now_ms):
@@ -89,7 +89,7 @@ class PageRing:
             return pages.not_aligned(self._meter, now_ms // 1000, "drive and brake")
         more = len(self._pages) + self._driving
         count = more + (self.live is not None) + self._rides.recorder.active
-        if self._at >= count:  # the last page was removed; checked here, where the other pages keep their places
+        if self._at >= count:  # the last page was removed; the other pages keep their places
             self._at = 0
             if self.own:
                 self._own_at = 0
@@ -106,7 +106,7 @@ class PageRing:
 
     @property
     def trusted(self):
-        """True if there is a lean to show."""
+        """Return True if the lean may be shown."""
         meter = self._meter
         shown = meter.trusted and not meter.fallen and abs(meter.lean_deg) <= FALLEN_DEG
         return shown and self._calibration.aligned and not self.late
@@ -129,7 +129,7 @@ class PageRing:
 
     @property
     def _pictures(self):
-        """The module glance, only for a display that draws. If it cannot be loaded, lines are shown."""
+        """Return the module glance if the display draws and the module can be loaded, else None."""
         if self.draws and not self._glance_tried:
             self._glance_tried = True
             attempt(self._load)

@@ -7,10 +7,10 @@ from ..rotation import vector
 from . import messages
 from .messages import DEGREE
 
-ARROW = "\x7e"  # in the display's character ROM, as is the full block
+ARROW = "\x7e"  # a code of the display's character ROM
 RECORDING = "*"
 _BLOCK = 0xFF
-_HALF_BAR = 8  # character cells to each side of the middle
+_HALF_BAR = 8  # number of character cells on each side of the middle
 _DEG_PER_COLUMN = 1.5  # 8 cells of 5 dot columns each: the bar ends at 60 degrees
 
 FALLEN = ("Fallen over?", "Lean over 65" + DEGREE)
@@ -19,13 +19,13 @@ _bar = bytearray(16)
 
 
 def unsure(reason):
-    """The two lines instead of a lean that is not trusted. reason: its code, or None."""
+    """Return the two lines that replace a lean that is not trusted. reason: the code of the reason, or None."""
     return "Lean  --", messages.NO_LEAN.get(reason, "not sure yet")
 
 
 def lean_bar(lean_deg):
-    """A bar from the middle to the side of the lean, as 16 character codes. The display's own glyphs 0 to 3 have 1 to 4
-    dot columns filled from the left, 4 to 7 from the right."""
+    """Return a bar from the middle to the side of the lean, as 16 character codes. The glyphs 0 to 3 have 1 to 4 dot
+    columns filled from the left, 4 to 7 from the right."""
     columns = min(5 * _HALF_BAR, int(abs(lean_deg) / _DEG_PER_COLUMN + 0.5))
     right = columns if lean_deg > 0 else 0
     left = columns if lean_deg < 0 else 0
@@ -43,13 +43,13 @@ def _cell(columns, first_glyph):
 
 
 def progress_bar(done, total):
-    """A bar of up to 16 full cells: done of total."""
+    """Return a bar of up to 16 full cells for `done` of `total`."""
     filled = 16 * done // total if total else 0
     return "\xff" * min(16, filled)
 
 
 def side_name(lean_deg):
-    """ "left" or "right"; "" within half a degree of upright."""
+    """Return "left" or "right", or "" within half a degree of upright."""
     return "right" if lean_deg >= 0.5 else "left" if lean_deg <= -0.5 else ""
 
 
@@ -60,7 +60,7 @@ def lean(meter):
 
 
 def recorded(line):
-    """The line with the recording mark in its last column."""
+    """Return the line with the recording mark in its last column."""
     # padded by hand: MicroPython's %-15s counts a degree sign as two bytes
     return line + " " * (15 - len(line)) + RECORDING
 
@@ -113,8 +113,8 @@ def raw(meter):
 
 def not_aligned(meter, seconds, todo="On stand: press"):
     """Before alignment: tilt and g in the sensor's own axes, which are not the bike's (Nicolae's figure 3). todo: the
-    next step, shown in turn with "Not aligned"."""
-    from ..lean.formula import static_lean_deg  # not needed after an alignment
+    next step; the page alternates between it and "Not aligned"."""
+    from ..lean.formula import static_lean_deg  # imported here, because an aligned bike does not need it
 
     tilt = static_lean_deg(meter.smooth_force)
     hint = "Not aligned" if seconds % 4 < 2 else todo

@@ -1,4 +1,4 @@
-"""A stack of views. The display shows the front view, which also gets the presses of the button.
+"""A stack of views. The display shows the front view, and that view gets the presses of the button.
 
 A view has lines(now_ms), which returns two lines of 16 characters, or None while it has nothing to show, and
 press(event, now_ms), which returns True if it used the press. Its name tells programs which view it is.
@@ -17,8 +17,8 @@ _NOTICE_MS = const(2000)
 
 
 class NoticeView:
-    """Shows two lines for two seconds. A press ends it early and is passed to the view below. code: the Notice's, or
-    None."""
+    """Shows two lines for two seconds. A press ends the notice early and is passed to the view below. code: the code of
+    the Notice, or None."""
 
     name = "notice"
 
@@ -53,8 +53,8 @@ class View:
 
 class Screen:
     """The views of the device. settings: a Settings. sensor, clock, meter: the Sensor, its SampleClock and the
-    LeanMeter to show. calibration, drive, rides: the ActiveCalibration, the BackgroundAlignment or None, and the
-    Recording, which the menu can also start.
+    LeanMeter to show. calibration: the ActiveCalibration. drive: the BackgroundAlignment or None. rides: the Recording,
+    which the menu can start and stop.
 
     wizard: the current AlignWizard or SixWizard, which takes every sample, or None. menu: the open Menu, or None.
     pages: the PageRing. front: the view that the display shows.
@@ -70,14 +70,14 @@ class Screen:
         self.wizard = None
         self.menu = None
         self._notice = NoticeView()
-        # the reason for missing readings
+        # says why readings are missing
         self._fault = View(
             "fault", lambda now_ms: sensor.fault and messages.lines(sensor.fault), lambda event, now_ms: False
         )
         self._clock = clock
         self._info_open = False
         self._info = View("info", self._info_lines, self._press_info)
-        # a report or a question of alignment by driving
+        # a report of alignment by driving, or a question to the rider
         self._question = View(
             "question", lambda now_ms: drive and drive.message and messages.lines(drive.message), self._press_question
         )
@@ -90,8 +90,8 @@ class Screen:
         return lines
 
     def press(self, event, now_ms):
-        """React to a press. event: SHORT or LONG. A long press that the front view does not use opens the menu. If
-        modules for it are missing or memory is short, the rider gets a notice and the ride continues."""
+        """React to a press. event: SHORT or LONG. A long press that the front view does not use opens the menu. If the
+        press needs missing modules or too much memory, the rider gets a notice and the ride continues."""
         problem = attempt(self._press, event, now_ms)
         if problem:
             self.notify(problem, now_ms)
@@ -102,7 +102,7 @@ class Screen:
 
     def _press(self, event, now_ms):
         view = self._update_front(now_ms)[0]
-        if view is self._notice:  # the press dismisses the notice and is passed to the view below it,
+        if view is self._notice:  # a press ends the notice and is passed to the view below it,
             self._notice.press(event, now_ms)
             view = self._update_front(now_ms)[0]
             if view is self._question:  # except to a question, which the rider has not seen yet
@@ -135,15 +135,15 @@ class Screen:
             self._notice.show(("Calibration", "stopped: fault"), now_ms, "stopped")
 
     def _update_front(self, now_ms):
-        """Return the view in front and its two lines: the first in this order that has something to show. Drop a
-        wizard or menu that has ended, and go back to the first page when a question is shown."""
+        """Return the view in front and its two lines. The front is the first view in the order below that has something
+        to show. Drop a wizard or menu that has ended. Go back to the first page when a question is shown."""
         for view in (self._notice, self.wizard, self.menu, self._info, self._fault, self._question, self.pages):
             lines = view.lines(now_ms) if view else None
             if lines:
                 break
         self._drop_ended()
         if view is self._question:
-            self.pages.first()  # the page to be shown after the answer
+            self.pages.first()  # shown after the rider's answer
         return view, lines
 
     def _drop_ended(self):
@@ -159,7 +159,7 @@ class Screen:
         self.menu = Menu(self._entries(), now_ms)
 
     def _entries(self):
-        """The entries of the menu: (name, function to call with now_ms)."""
+        """Return the entries of the menu: (name, function to call with now_ms)."""
         align = (("Align the bike", self._align),)
         drive = (("Align by drive", self._align_by_drive),) if self._drive else ()
         rest = (("Six positions", self._six), ("Reset maxima", self._reset), ("Sensor info", self._show_info))
@@ -185,9 +185,9 @@ class Screen:
         """Start the AlignWizard as if the button had been pressed for the kickstand pose."""
         self._begin_align(True)
 
-    # The wizards are imported when needed, because with their own imports they take 12 KB of heap. The import follows a
-    # collection: otherwise lasting objects would be placed at the far end of the heap and make each later collection
-    # longer.
+    # The wizards are imported when needed, because with their own imports they take 12 KB of heap. Garbage is collected
+    # before the import: otherwise lasting objects would be placed at the far end of the heap and make each later
+    # collection longer.
 
     def _begin_align(self, pressed):
         gc.collect()

@@ -1,4 +1,4 @@
-"""Guides the rider through the six positions, each side up once in any order, and a slanted pose that verifies them.
+"""Guides the rider through the six positions (each side up once, in any order) and a slanted pose that verifies them.
 
 The turns of the sensor between the poses calibrate the gyro: see calibration/sensor_fit.py.
 """
@@ -23,12 +23,12 @@ class SixWizard(Wizard):
 
     def _start(self):
         self._sides = [-1] * 6  # the number of each side's pose, -1 until it is taken
-        self._poses, self._turns = [], []  # for SensorFit
+        self._poses, self._turns = [], []  # the input of SensorFit
         self._bias = [0.0] * 3
         self._fitted = None  # offset and slope, after all six poses
-        self._unproved = None  # the axis that needs another turn
+        self._unproved = None  # the axis about which another turn is needed
         self._work = self._fit = None
-        self._told = False  # the rider knows that the current turn cannot be used
+        self._told = False  # True once the rider was told that the current turn cannot be used
         self._turn.running = False
         self._next_pose()
 
@@ -66,16 +66,16 @@ class SixWizard(Wizard):
             self._side_done(now_ms, "Side %s is done")
 
     def _again(self):
-        """True if a side may be repeated as the start of a turn, because the last turn cannot be used."""
+        """Return True if the rider may repeat a side to start a new turn, because the last turn cannot be used."""
         return self._spoilt_turn and len(self._poses) + self._sides.count(-1) + 1 < _MAX_POSES
 
     @property
     def _spoilt_turn(self):
-        """True if the turn since the last pose cannot be used."""
+        """Return True if the turn since the last pose cannot be used."""
         return self._turn.running and (self._turn.quick or self._turn.lost)
 
     def bears(self, fault, now_ms):
-        """Return True for rates at the end of the range: a turn too fast for the gyro is not a defect."""
+        """Return True for rates at the end of the range: turning the sensor too fast is not a defect."""
         if fault is None or fault.code != "clips" or fault.values[0] != "Gyro" or not self._turn.running:
             return False
         self._turn.quick = True
@@ -87,12 +87,12 @@ class SixWizard(Wizard):
             if next(self._work, True):  # a yield gives None, the end gives True
                 self._computed(now_ms)
         elif self._spoilt_turn and not self._told and self.state in (TAKING, NOTICE):
-            self._told = True  # readings at the end of the range are dropped, so lost ones count too
+            self._told = True  # readings at the end of the range were dropped, so they count as lost
             self._notice(now_ms, "Turned too fast:", "turn it slower")
 
     def _pose_done(self, pose, now_ms):
-        """Keep the pose and the turn before it. After the sixth side fit the accelerometer, after the slanted pose the
-        whole sensor. Raises CalibrationError."""
+        """Keep the pose and the turn before it. Fit the accelerometer after the sixth side, and the whole sensor after
+        the slanted pose. Raises CalibrationError."""
         turn, spoilt = self._turn, self._spoilt_turn
         if self._poses:
             turn.end()
@@ -116,7 +116,7 @@ class SixWizard(Wizard):
         self._notice(now_ms, words % six_position.SIDES[self._side], "%d/6, turn it" % done)
 
     def _prove(self, pose):
-        """Begin to fit the whole sensor if the slanted pose confirms the six. Raises CalibrationError."""
+        """Begin to fit the whole sensor if the slanted pose confirms the six positions. Raises CalibrationError."""
         from ..calibration.sensor_fit import SensorFit  # 5 KB of heap
 
         offset, slope = self._fitted

@@ -1,5 +1,5 @@
-"""The base of both wizards: a view that takes one pose after another, with a few named states. Between two poses it
-integrates the gyro's rates, which must match the turn of the sensor."""
+"""The base of both wizards: a view that takes one pose after another, with a few named states. Between two poses the
+wizard integrates the gyro's rates. The result must match the turn of the sensor."""
 
 from time import ticks_add, ticks_diff
 
@@ -17,16 +17,16 @@ NOTICE = 2  # shows a notice for a moment, then asks for the next pose
 _REFUSED = const(3)  # shows the reason until a press, then starts again
 RESULT = 4  # shows the result for some seconds, then ends
 _ENDED = const(5)
-COMPUTING = 6  # one step in each pass of the main loop
+COMPUTING = 6  # computes one step in each pass of the main loop
 
 
 class Wizard:
     """A view (see screen.py) that also takes each sample, until it has ended.
 
-    chip, rate_hz: see PoseTaker. calibration: the ActiveCalibration. A subclass defines which poses it asks for,
-    how it uses each, and how long each takes if not POSE_SECONDS.
+    chip, rate_hz: see PoseTaker. calibration: the ActiveCalibration. A subclass defines which poses it asks for, how it
+    uses them, and how long a pose takes if not POSE_SECONDS.
 
-    state: see above. problem: the Refusal that is shown, or None.
+    state: one of the states above. problem: the Refusal that is shown, or None.
     """
 
     POSE_SECONDS = 2
@@ -39,11 +39,11 @@ class Wizard:
 
     @property
     def ended(self):
-        """True after the end of the wizard."""
+        """Return True after the end of the wizard."""
         return self.state == _ENDED
 
     def sample(self, counts, now_ms):
-        """Take one sample: 7 counts, the chip's order."""
+        """Take one sample of 7 counts, in the chip's order."""
         if self.state != TAKING:
             return
         try:
@@ -62,7 +62,8 @@ class Wizard:
             self._refuse(problem)
 
     def follow(self, sums, n, dt_us, now_ms):
-        """Take the sums of the n samples that sample() has just taken, and the microseconds since the previous ones."""
+        """Take the sums of the n samples that sample() has just taken. dt_us: the microseconds since the previous
+        samples."""
         self._turn.add(sums, n, dt_us, self.state == TAKING and self._taker.averaging)
         try:
             self._followed(now_ms)
@@ -70,7 +71,8 @@ class Wizard:
             self._refuse(problem)
 
     def bears(self, fault, now_ms):
-        """True if the wizard continues despite this fault of the sensor, a Notice. The default is False."""
+        """Return True if the wizard continues despite this fault of the sensor. fault: a Notice. The default is
+        False."""
         return fault is None
 
     def _refuse(self, problem):

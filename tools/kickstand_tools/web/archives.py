@@ -40,7 +40,7 @@ _LICENCES = "info/licenses/"
 
 
 class _ToolsFinder(ModuleFinder):
-    """Finds only modules of kickstand_tools, because other packages are beside an installed one."""
+    """Finds only modules of kickstand_tools, because an installed one has other packages beside it."""
 
     def find_module(self, name: str, path: Any, parent: Any = None) -> Any:
         if path is None and name != "kickstand_tools":
@@ -80,7 +80,7 @@ def install_archive() -> bytes:
 
 
 def firmware() -> bytes:
-    """The firmware as a ZIP file, for a browser that cannot connect to a board: its rider uses mpremote."""
+    """The firmware as a ZIP file, for riders whose browser cannot connect to a board. They copy it with mpremote."""
     return zipped({f"kickstand-firmware{path}": source.read_bytes() for path, source in firmware_files().items()})
 
 

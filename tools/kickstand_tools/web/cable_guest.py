@@ -27,7 +27,7 @@ class LiveStream:
         self._began = datetime.now()
 
     def run(self, line, name, live):
-        """Listen to the board at a SerialLine until stop(), or until nothing more arrives. name: of its port.
+        """Listen to the board at a SerialLine until stop(), or until nothing more arrives. name: name of the port.
         live(reading): called every half second with a LiveReading's fields as JSON.
 
         Returns JSON: {"notes": lines about missing parts, "changed": true if the log ended because of another
@@ -42,7 +42,7 @@ class LiveStream:
                     blocks = stream.blocks(transport, "", notes, self._stopped)
                     self._recording.write(self._log, blocks, notes)
                 finally:
-                    with contextlib.suppress(Exception):  # the cable may be out
+                    with contextlib.suppress(Exception):  # the cable may be unplugged
                         restart(transport)
         except InputError as error:
             return json.dumps({"refused": error.line(page=True)})
@@ -66,7 +66,7 @@ class LiveStream:
 
 
 def pull(line, name, progress):
-    """Fetch the rides from the board at a SerialLine. name: of its port.  progress(what, done, total): in bytes.
+    """Fetch the rides from the board at a SerialLine. name: name of the port.  progress(what, done, total): in bytes.
 
     Returns (JSON, files): {"refused": the reason for an early end, or null, "rides": [a PulledRide's fields, "log" its
     name or null]} and [(name, content)], the logs with their calibrations as written by `kickstand pull`.

@@ -1,10 +1,10 @@
-"""The device of the page: the firmware on the simulated board, on a bike that is steered by hand. Plain Python for
-MicroPython, in the browser and elsewhere, and for CPython.
+"""The device of the page Try: the firmware on the simulated board, on a bike that is steered by hand. The module runs
+on MicroPython (in the browser and elsewhere) and on CPython.
 
     device = PageDevice()
-    device.order("button", True)    # what the page's controls do, see Device.act()
-    device.run_to(0.5)              # s of the board's time
-    device.take()                   # JSON: what was to be seen meanwhile
+    device.order("button", True)    # an action of the page's controls, see Device.act()
+    device.run_to(0.5)              # board time in s
+    device.take()                   # JSON: what the display and the bike showed meanwhile
 """
 
 import json
@@ -17,18 +17,18 @@ from ..simulated_board.simulator import Board
 from ..simulation.scripted.sensor_errors import Sensor
 
 PART_SEED = 1
-PART_SHARE = 0.5  # errors of up to half of the data sheet's limits: an ordinary sensor
+PART_SHARE = 0.5  # an ordinary sensor: its errors are up to half of the data sheet's limits
 TICK_S = 0.02
-REST_US = 10_000  # steps of the time in which no firmware runs
-CUT_AFTER_BYTES = 40  # of a calibration's record
+REST_US = 10_000  # length of a step while no firmware runs
+CUT_AFTER_BYTES = 40  # bytes of a calibration's record written before the supply is cut
 FOREVER_S = 1e9
-SHORTEST_PRESS_US = 100_000  # by the board's clock
+SHORTEST_PRESS_US = 100_000  # in the board's time
 STATE = "view", "code", "step", "pose", "entry", "trusted", "fault"
-WHOLE_TICKS = 10  # the longest that a display that keeps changing is not sent
+WHOLE_TICKS = 10  # a display that keeps changing is sent after so many ticks at the latest
 
 
 class Device:
-    """Board, bike, and what was to be seen of them.
+    """Board and bike, and a record of what they showed.
 
     powered: False while the supply is off.
     """
@@ -39,9 +39,9 @@ class Device:
         self.powered = True
         self._ticks = []
         self._changes = -1  # the display's count of changes at the last tick
-        self._seen = -1  # the same when it was last sent
+        self._seen = -1  # that count when the display was last sent
         self._held = 0  # ticks for which a change has not been sent
-        self._state = None  # the last that was sent
+        self._state = None  # the state that was sent last
         self._plugged = True
         self._pressed_us = 0
         self._text = {}
@@ -49,19 +49,19 @@ class Device:
         self.board.install()
 
     def act(self, name, value):
-        """Do one of these, at this instant of the board's time:
+        """Do one of these actions now, in the board's time:
 
         button True (down) or False; pose "kickstand", "upright" or a speed in m/s to ride at; lean degrees, > 0 to the
-        right; sensor False (its wire is pulled) or True; display "lcd", "ssd1306" or "sh1106"; cut_save True: the
-        supply is cut in the middle of the next save of a calibration, False: it is not; power False or True.
+        right; sensor False (its wire is pulled) or True; display "lcd", "ssd1306" or "sh1106"; cut_save True: cut the
+        supply in the middle of the next save of a calibration, False: do not; power False or True.
         """
         board = self.board
         if name == "button":
             now_us = board.clock.now_us
             if value:
                 self._pressed_us = now_us
-            # board.mjs makes a press last by the page's clock. After a stall both orders come at one instant of the
-            # board's, and no press would be seen
+            # board.mjs times a press by the page's clock. After a stall both orders arrive at the same board time, and
+            # the firmware would not notice the press
             board.button.turn(value, now_us if value else max(now_us, self._pressed_us + SHORTEST_PRESS_US))
         elif name == "pose":
             if value in ("kickstand", "upright"):
@@ -87,17 +87,17 @@ class Device:
             else:
                 board.faults.restore("open")
         elif value:
-            board.faults.restore("open")  # a save is cut once
+            board.faults.restore("open")  # only one save is cut
             self.powered = True
         elif self.powered:
             board.clock.power_off()
 
     def rest(self):
-        """Let a step of time pass in which no firmware runs."""
+        """Advance the time by a step in which no firmware runs."""
         self.board.clock.advance(REST_US)
 
     def resume(self, function):
-        """Board.run() without a start: for a function that goes on with what is under way."""
+        """Like Board.run(), but without a start: for a function that continues a running firmware."""
         try:
             function()
             return "returned"
@@ -130,8 +130,8 @@ class Device:
         self._ticks.append(tick)
 
     def _whole(self):
-        """False while the firmware writes to the display: it would be read half-written. Each turn of the firmware's
-        loop writes some characters, and is shorter than a tick."""
+        """False while the firmware writes to the display, which would then be read half-written. Each turn of the
+        firmware's loop writes some characters and is shorter than a tick."""
         changes = self.board.lcd.changes
         still = changes == self._changes
         self._changes = changes
@@ -143,12 +143,12 @@ class Device:
         return None
 
     def meter(self) -> "list | None":
-        """What the lean meter knows: lean_deg, None where it would not be shown, and forward_g, both None before the
-        alignment. None without a meter."""
+        """Return the lean meter's [lean_deg, forward_g]. lean_deg is None if it would not be shown. Both are None
+        before the alignment. Return None without a meter."""
         return None
 
     def _display(self):
-        """display(), but while an OLED gets a new picture its text stays that of the old one."""
+        """Return display(). While an OLED receives a new picture, the text stays that of the old picture."""
         seen = display(self.board.lcd)
         if not seen["text"][0].startswith("?"):
             self._text = {name: seen[name] for name in ("text", "shown_deg")}
@@ -156,17 +156,17 @@ class Device:
         return seen
 
     def take(self):
-        """What was to be seen every TICK_S since the last call, as JSON: a list of objects with the time t_s, the
-        bike's true lean_deg, speed_mps, yaw_rate_dps and phase, powered, the meter, if there is one, and the display,
-        where it has changed. state() as well, if it has changed."""
+        """Return a record for every TICK_S since the last call, as JSON: a list of objects with the time t_s, the
+        bike's true lean_deg, speed_mps, yaw_rate_dps and phase, powered, and the meter if it exists. The display and
+        state() are included when they have changed."""
         ticks, self._ticks = self._ticks, []
         return json.dumps(ticks)
 
 
 def display(lcd):
-    """What a display shows: the codes of both lines, character memory (8 rows for each of 8 characters), whether it is
-    on and lit, its text, and the lean (deg) if that is what it shows. An OLED: pixels instead, 64 rows of 128, 8 pixels
-    a byte, the leftmost in bit 7."""
+    """Return what a display shows: the codes of both lines, the character memory (8 rows for each of 8 characters),
+    whether it is on and lit, its text, and the lean (deg) if it shows one. For an OLED there are pixels instead: 64
+    rows of 128, 8 pixels per byte, the leftmost in bit 7."""
     text = lcd.text()
     if isinstance(lcd, Oled):
         return {"pixels": list(lcd.pixels()), "lit": lcd.backlight, "text": text, "shown_deg": shown_lean(text)}
@@ -181,13 +181,13 @@ def display(lcd):
 
 
 class PageDevice(Device):
-    """A Device whose firmware runs a while at a time, because a page must get its control back: it calls App.step(),
-    one pass of the firmware's own loop."""
+    """A Device whose firmware runs in short pieces, because the page must regain control. It calls App.step(), one pass
+    of the firmware's own loop."""
 
     def __init__(self):
         super().__init__()
-        self._app = None  # while its loop runs
-        self._stopped = False  # main() has ended by itself: safe mode
+        self._app = None  # the App while its loop runs
+        self._stopped = False  # True if main() has ended, as in safe mode
 
     def order(self, name, value):
         """Do act(name, value). Returns the board's time in s."""
@@ -195,7 +195,7 @@ class PageDevice(Device):
         return self.board.clock.now_us / 1e6
 
     def run_to(self, until_s):
-        """Let the board's time pass up to until_s; a start goes past that."""
+        """Advance the board's time to until_s. A start may go beyond that."""
         until_us = to_us(until_s)
         clock = self.board.clock
         while clock.now_us < until_us:
@@ -222,7 +222,7 @@ class PageDevice(Device):
         return {name: state[name] for name in STATE}
 
     def _hand_over(self, app):
-        """In place of App.run()."""
+        """Replace App.run(): keep the App for step()."""
         self._app = app
 
     def _start(self):

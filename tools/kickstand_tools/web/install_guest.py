@@ -45,7 +45,7 @@ class Installation:
         self._path = firmware_path.config()
         self._template = self._path.read_text(encoding="utf-8")
         for module in [module for module in sys.modules if module.startswith("kickstand.")]:
-            del sys.modules[module]  # of an earlier board: the firmware identifies its board on import
+            del sys.modules[module]  # imported for an earlier board: the firmware identifies its board on import
         settings, self._by_hand, self._own = {}, None, None
         found = others.find(there, lambda path: _judged(path, *self._pose), True)
         own = None if CONFIG in found.moves else there.texts.get(CONFIG)
@@ -146,6 +146,6 @@ def _compiled(source, architecture):
 
 
 def _judged(path, platform, machine):
-    """config_check.judge() in this process."""
+    """Run config_check.judge() in this process."""
     with config_check.posed(platform, machine):
         return config_check.in_words(path, config_check.fault(path), config_check.unused(path, platform))

@@ -57,7 +57,7 @@ def _install(kept: Path) -> None:
 
     try:
         kept.parent.mkdir(parents=True, exist_ok=True)
-        # A renamed directory cannot be removed in the end
+        # ignore_cleanup_errors, because the directory is renamed and cannot be removed at the end
         with tempfile.TemporaryDirectory(dir=kept.parent, ignore_cleanup_errors=True) as directory:
             for name in LISTS:
                 shutil.copy(NPM / name, directory)

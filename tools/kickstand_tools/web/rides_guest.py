@@ -38,7 +38,7 @@ TOO_LONG = "this ride is too long for the memory of a browser: give a part of it
 
 
 def in_json(function: Callable[..., Any]) -> Callable[..., str]:
-    """A decorator: return the result as JSON, or the reason for none."""
+    """A decorator: return the result as JSON, or the reason for a refusal."""
 
     @functools.wraps(function)
     def as_json(*given):

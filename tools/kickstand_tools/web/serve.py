@@ -51,7 +51,8 @@ class Server(ThreadingHTTPServer):
         if not self._free.acquire(blocking=False) and not (
             self._end_silent_connection() or self._free.acquire(timeout=FULL_S)
         ):
-            with contextlib.suppress(OSError, StopIteration, RuntimeError):  # another may end meanwhile
+            # another thread may end the connection meanwhile
+            with contextlib.suppress(OSError, StopIteration, RuntimeError):
                 next(iter(self._open)).shutdown(socket.SHUT_RDWR)
             self._free.acquire()
         self._open[request] = None
@@ -94,7 +95,7 @@ def server(files: dict[str, bytes], port: int = PORT) -> Server:
             self.server.has_asked.add(self.connection)  # pyright: ignore[reportAttributeAccessIssue]
             try:
                 name = unquote(urlsplit(self.path).path).lstrip("/") or "index.html"
-            except ValueError:  # as of http://[::1/
+            except ValueError:  # an address such as http://[::1/
                 self.send_error(400)
                 return
             data = files.get(name)

@@ -20,10 +20,10 @@ PAGE = Path(__file__).resolve().parent / "page"
 # Large, and only for visitors with a board or a ride: fetched on demand
 LATER = ("esptool/", "firmware.zip", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip", "sample/")
 _BOARDS = {"pico": wiring.PICO, "esp32": wiring.ESP32}
-_NARROW = 4  # number of poses side by side on a phone
-_STYLE = "style.css"  # a template too
-_SHOWN = ("Kickstand", "starting")  # on the drawn display
-_NOT_KEPT = ("service_worker.js", "index.html")  # the browser keeps the first automatically, the second as "./"
+_NARROW = 4  # number of drawn poses side by side on a phone
+_STYLE = "style.css"  # the style sheet is a template too
+_SHOWN = ("Kickstand", "starting")  # the text on the drawn display
+_NOT_KEPT = ("service_worker.js", "index.html")  # the browser keeps the first file automatically, the second as "./"
 _WHEN_READ = (*LATER, documents.FOLDER)  # the browser keeps these after they were opened
 
 

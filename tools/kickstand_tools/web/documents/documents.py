@@ -1,4 +1,4 @@
-"""Which documents there are, and the pages made of them."""
+"""Lists the documents, and makes the pages of them."""
 
 import posixpath
 import re
@@ -11,7 +11,7 @@ from .markdown import Document, Heading, converted
 
 FOLDER = "docs/"  # in the site
 ALL = "all.html"
-_BETWEEN = "--"  # the name of a document and an anchor in it, on the page with all of them
+_BETWEEN = "--"  # between a document's name and an anchor in it, on the page with all documents
 _TEMPLATE = Path(__file__).with_name("document.html")
 # In the order in which one reads them: (title of the group, paths in the project)
 GROUPS = (
@@ -52,7 +52,8 @@ GROUPS = (
 PATHS = tuple(path for _, paths in GROUPS for path in paths)
 _PICTURES = "tools/pictures"
 _START = {"README.md": "index", "firmware/README.md": "device", "tools/README.md": "tools"}
-_OUTSIDE = re.compile(r"(?:\.\./){2,}(issues/.*|deployments/github-pages)$")  # of the project's own place on GitHub
+# links to the project's own repository on GitHub
+_OUTSIDE = re.compile(r"(?:\.\./){2,}(issues/.*|deployments/github-pages)$")
 
 
 @dataclass
@@ -91,7 +92,8 @@ def document_files(home: str) -> dict[str, bytes]:
 
 
 def _on_one_page(root: Path, home: str) -> Document:
-    """All documents as one, whose anchors begin with their names: the browser finds a word in any of them."""
+    """Return all documents as one, so the browser can search them together. Each anchor begins with its document's
+    name."""
     made = [(_name_of(path), _converted(root, path, home, together=True)) for path in PATHS]
     headings = [Heading(2, name, document.title) for name, document in made]
     html = "\n".join(f'<section id="{name}">\n{document.html}</section>' for name, document in made)
@@ -104,11 +106,11 @@ def _name_of(path: str) -> str:
 
 
 def _converted(root: Path, path: str, home: str, together: bool = False) -> Document:
-    """together: for the page with all documents."""
+    """Return a document as HTML. together: True for the page with all documents."""
     here = posixpath.dirname(path)
 
     def link(target: str) -> str | None:
-        """In the site, else at the project's home."""
+        """Return the address in the site, or else at the project's home."""
         outside = _OUTSIDE.match(target)
         if outside:
             if not outside[1].startswith("issues"):

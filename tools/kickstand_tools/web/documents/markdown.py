@@ -1,4 +1,5 @@
-"""One document of Markdown as HTML: headings with the names that GitHub gives them, links as a caller wants them."""
+"""Converts a Markdown document to HTML. Headings get the anchors that GitHub gives them; the caller chooses the
+links."""
 
 import re
 from collections.abc import Callable
@@ -10,7 +11,7 @@ from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
 _IMAGE = re.compile(r'(<img [^>]*?src=")([^"]+)(")')
-_SCROLLED = {"tabindex": "0", "role": "region"}  # what is wider than a phone is scrolled, by the keyboard too
+_SCROLLED = {"tabindex": "0", "role": "region"}  # content wider than a phone can be scrolled, by the keyboard too
 
 Link = Callable[[str], str | None]
 
@@ -46,8 +47,8 @@ def anchor(text: str) -> str:
 
 def converted(text: str, link: Link, picture: Callable[[str], str], deeper: int = 1, name: str = "") -> Document:
     """Convert a document. link(target): the address of a link, None to leave out the link and keep its words.
-    picture(source): the address of a picture. deeper: a heading of level n is an <h(n + deeper)>, because the site has
-    its own first heading. name: in front of all anchors, where several documents share a page."""
+    picture(source): the address of a picture. deeper: a heading of level n becomes <h(n + deeper)>, because the site
+    has its own first heading. name: prefix of all anchors if several documents share a page."""
     markdown = MarkdownIt("commonmark", {"html": True}).enable("table")
     tokens = markdown.parse(text)
     headings, about, table = [], "", 0
@@ -55,13 +56,13 @@ def converted(text: str, link: Link, picture: Callable[[str], str], deeper: int 
         inside = tokens[at + 1] if at + 1 < len(tokens) else token
         if token.type == "heading_open":
             words = _words(inside)
-            same = sum(heading.text == words for heading in headings)  # GitHub numbers them
+            same = sum(heading.text == words for heading in headings)  # GitHub numbers equal headings
             headings.append(Heading(int(token.tag[1]), name + anchor(words) + (f"-{same}" if same else ""), words))
             token.attrSet("id", headings[-1].name)
         elif token.type == "paragraph_open" and not about:
             about = _words(inside)
         elif token.type == "th_open" and not inside.content:
-            token.tag = tokens[at + 2].tag = "td"  # an empty cell heads nothing
+            token.tag = tokens[at + 2].tag = "td"  # an empty cell is no header
         elif token.type == "html_block":
             token.content = _with_pictures(token.content, picture)
         elif token.type == "inline":
@@ -92,7 +93,7 @@ def _words(inline: Token) -> str:
 
 
 def _linked(children: list[Token], link: Link, picture: Callable[[str], str]) -> list[Token]:
-    """The tokens with other addresses, without the links that lead nowhere."""
+    """Return the tokens with new addresses, without links that have no target."""
     kept: list[Token] = []
     open_links: list[bool] = []
     for token in children:

@@ -54,7 +54,8 @@ export class Bike {
     this.#shown = svg.querySelector(".shown");
   }
 
-  /** lean, shown: degrees, > 0 to the right; shown null if no lean is. pose: "kickstand", "upright" or "ride". */
+  /** lean, shown: degrees, > 0 to the right. shown is null if the display shows no lean. pose: "kickstand", "upright"
+   * or "ride". */
   draw(lean, shown, pose, speed, braking) {
     this.#body.setAttribute("transform", `rotate(${lean.toFixed(2)})`);
     this.#truth.setAttribute("transform", `rotate(${lean.toFixed(2)})`);

@@ -1,6 +1,7 @@
-// The page's side of worker.mjs: orders go there, what is to be seen comes back.
+// The page's side of worker.mjs: sends orders to the worker, and receives what the board shows.
 
-const SHORTEST_PRESS_MS = 120; // a finger's; the click of a program is shorter than contacts bounce
+// as long as a finger's press; the click of a program is shorter than the bouncing of a contact
+const SHORTEST_PRESS_MS = 120;
 
 export class Board {
   #worker = new Worker(new URL("./worker.mjs", import.meta.url), { type: "module" });
@@ -22,17 +23,18 @@ export class Board {
     document.addEventListener("visibilitychange", () => this.#worker.postMessage({ awake: !document.hidden }));
   }
 
-  /** name, value: as Device.act() in web/device.py takes them. */
+  /** Send an order. name, value: the arguments of Device.act() in web/device.py. */
   order(name, value) {
     this.#worker.postMessage({ order: [name, value] });
   }
 
-  /** Orders at times of the board, [[s, name, value], ...], which it reaches as fast as it can. */
+  /** Send orders for times of the board, [[s, name, value], ...]. The board advances to these times as fast as it can.
+   * */
   ahead(orders) {
     this.#worker.postMessage({ ahead: orders });
   }
 
-  /** The board is gone. */
+  /** Stop the board: its worker has failed. */
   end() {
     this.#worker.terminate();
   }

@@ -1,17 +1,17 @@
-// The rider's hands: button, pose, lean, speed, the phone's tilt. Calls act(name, value) with what is wanted.
+// The rider's controls: button, pose, lean, speed, the phone's tilt. Each change calls act(name, value).
 
 const STEP_DEG = 5;
-const SLOWEST_KMH = 20; // to ride at
-const CRUISE_KMH = 54; // at first
-const DRAG_DEG = 75; // of lean for half the scene's width
+const SLOWEST_KMH = 20; // lowest speed of a ride
+const CRUISE_KMH = 54; // speed at the start of a ride
+const DRAG_DEG = 75; // change of lean for a drag across half of the scene
 const TAP_MS = 150;
-const MOTION_MS = 1500; // in which a device that knows how it is held has said so
+const MOTION_MS = 1500; // a device with an orientation sensor reports within this time
 
 const byId = (id) => document.getElementById(id);
-// On the button of the pose that is chosen already the space bar presses the push button
+// If the chosen pose has the focus, the space bar presses the push button
 const inControl = (target) => target.closest?.("button:not(#pose [aria-pressed=true]), a, summary, select");
 
-/** The push button: mouse, touch, space bar, and the click of a screen reader. press(down) is called. */
+/** The push button, for mouse, touch, space bar, and the click of a screen reader. Calls press(down). */
 export function connectButton(press) {
   const button = byId("press");
   button.addEventListener("pointerdown", (event) => {
@@ -24,10 +24,10 @@ export function connectButton(press) {
   }
   button.addEventListener("contextmenu", (event) => event.preventDefault());
   button.addEventListener("keydown", (event) => {
-    if (event.repeat && event.key === "Enter") event.preventDefault(); // it would press again and again
+    if (event.repeat && event.key === "Enter") event.preventDefault(); // a held key would press again and again
   });
   button.addEventListener("click", (event) => {
-    if (event.detail) return; // a pointer's, which has been seen to
+    if (event.detail) return; // a pointer's click, which is already handled
     press(true);
     setTimeout(() => press(false), TAP_MS);
   });
@@ -45,15 +45,15 @@ export function connectButton(press) {
 }
 
 /**
- * Pose, lean and speed. act(name, value) as for Board.order(). The poses are buttons and no radio buttons, whose arrow keys
- * would change the pose: here they always lean.
+ * Pose, lean and speed. act(name, value) as for Board.order(). The poses are not radio buttons, because there the arrow
+ * keys would change the pose. Here they always lean the bike.
  */
 export class Steering {
   #act;
   #poses = document.querySelectorAll("#pose button");
   #lean = byId("lean");
   #speed = byId("speed");
-  #wanted = CRUISE_KMH; // while riding
+  #wanted = CRUISE_KMH; // the speed to ride at, km/h
   pose = "kickstand";
 
   constructor(act) {
@@ -82,7 +82,7 @@ export class Steering {
     this.#act("lean", 0);
   }
 
-  /** While it stands, or comes to a stop, the sliders show what the motorcycle does. lean: degrees; speed: m/s. */
+  /** Show the motorcycle's state on the sliders while it stands or comes to a stop. lean: degrees; speed: m/s. */
   follow(lean, speed) {
     if (this.pose === "ride") return;
     this.#show(Math.round(lean));
@@ -111,7 +111,7 @@ export class Steering {
     this.#speed.setAttribute("aria-valuetext", text);
   }
 
-  /** kmh: as the slider has it, or beyond its ends. */
+  /** Set the speed. kmh: as on the slider, or beyond its ends. */
   #ride(kmh) {
     this.#speed.value = kmh;
     this.#wanted = this.#speed.valueAsNumber;
@@ -141,7 +141,7 @@ export class Steering {
     for (const name of ["pointerup", "pointercancel"]) scene.addEventListener(name, () => (from = null));
   }
 
-  /** The tilt of the phone, from how it is held when the button is pressed. */
+  /** Lean by the phone's tilt, counted from how it is held when the button is pressed. */
   #tilt(button) {
     if (!("DeviceOrientationEvent" in window) || !isSecureContext || !matchMedia("(pointer: coarse)").matches) return;
     button.hidden = false;
@@ -161,7 +161,7 @@ export class Steering {
     };
     button.addEventListener("click", async () => {
       const on = button.getAttribute("aria-pressed") !== "true";
-      // iOS asks its user, and only after a click
+      // iOS asks the user, and only after a click
       const may = on && DeviceOrientationEvent.requestPermission ? await DeviceOrientationEvent.requestPermission() : "granted";
       clearTimeout(late);
       if (may !== "granted") return end("The browser does not tell this page how the device is held.");

@@ -1,17 +1,17 @@
-// The display, dot by dot from what its controller holds in its memories: 16x2 characters, or an OLED's 128x64 pixels.
+// Draws the display dot by dot from the memory of its controller: 16x2 characters, or an OLED's 128x64 pixels.
 
 // In units of 0.1 mm, as on the usual module
 const DOT = [5, 6];
 const PITCH = [6, 7];
 const CELL = [36, 62];
-const MARGIN = 24; // of glass around the characters
+const MARGIN = 24; // glass around the characters
 const COLUMNS = 16;
 const LINES = 2;
 
 const WIDTH = COLUMNS * CELL[0] + 2 * MARGIN;
 const HEIGHT = LINES * CELL[1] + 2 * MARGIN;
 const OLED = [128, 64];
-const OLED_MARGIN = 5; // in pixels of the OLED
+const OLED_MARGIN = 5; // glass around the OLED's picture, in its pixels
 
 export class Display {
   #canvas;
@@ -20,7 +20,8 @@ export class Display {
   #waiting;
   #last = { codes: [[], []], cgram: [], lit: false };
 
-  /** canvas: what to draw on. said: an element whose text a screen reader speaks. font: {code: eight rows of dots}. */
+  /** canvas: the canvas to draw on. said: the element whose text a screen reader speaks. font: {code: eight rows of
+   * dots}. */
   constructor(canvas, said, font) {
     this.#canvas = canvas;
     this.#said = said;
@@ -28,7 +29,7 @@ export class Display {
     new ResizeObserver(() => this.#draw()).observe(canvas);
   }
 
-  /** display: as display() in web/device.py gives it. */
+  /** display: the result of display() in web/device.py. */
   show(display) {
     this.#last = display;
     this.#draw();
@@ -37,7 +38,7 @@ export class Display {
     this.#speak(words);
   }
 
-  /** What stays for a second is spoken; figures that change all the time are not. */
+  /** Speak a text that stays for a second. Figures that change all the time are not spoken. */
   #speak(words) {
     clearTimeout(this.#waiting);
     this.#waiting = setTimeout(() => (this.#said.textContent = words), 1000);
@@ -53,7 +54,7 @@ export class Display {
   #drawOled(context, pixels) {
     this.#canvas.width = Math.round(this.#canvas.clientWidth * devicePixelRatio);
     this.#canvas.height = Math.round(this.#canvas.clientHeight * devicePixelRatio);
-    // Whole pixels of the screen for each of the OLED's
+    // A whole number of screen pixels for each pixel of the OLED
     const fitting = Math.min(this.#canvas.width / (OLED[0] + 2 * OLED_MARGIN), this.#canvas.height / (OLED[1] + 2 * OLED_MARGIN));
     const scale = Math.max(1, Math.floor(fitting));
     context.fillStyle = "#05070a";
@@ -71,7 +72,7 @@ export class Display {
   }
 
   #drawLcd(context, { codes, cgram, lit }) {
-    // As many pixels as the screen has there: a canvas that is scaled would show dots of different widths
+    // The canvas has exactly the pixels of the screen: a scaled canvas would show dots of different widths
     const scale = (this.#canvas.clientWidth * devicePixelRatio) / WIDTH;
     this.#canvas.width = Math.round(WIDTH * scale);
     this.#canvas.height = Math.round(HEIGHT * scale);
@@ -102,7 +103,7 @@ export class Display {
   }
 }
 
-/** A line of the display without the blocks of its bars. */
+/** Return a line of the display without the blocks of its bars. */
 function spoken(line) {
   return line.replace(/[▁-▐▕]+/g, " ").replace(/\s+/g, " ").trim();
 }

@@ -1,13 +1,13 @@
-// What to do next, from what the firmware shows: the first minute, and what to look at after a fault.
+// Chooses the rider's next step from what the firmware shows: in the first minute, and after a fault.
 
 import { shows } from "./shows.mjs";
 
-const RIDE_S = 3; // that the lean is held before the last step counts as done
+const RIDE_S = 3; // for so long the lean must be held before the last step counts as done
 const WELL_DEG = 15;
-const SURE_S = 7; // that a lean is shown straight on, until a bend does not make the firmware doubt it again
-const STRAIGHT_DEG = 3; // a smaller lean is seen as none
+const SURE_S = 7; // after a lean was shown for so long on a straight, a bend does not make the firmware doubt it again
+const STRAIGHT_DEG = 3; // a smaller lean counts as upright
 
-// The pose that the firmware wants; after a refusal it is still the one before
+// The pose that the firmware asks for; after a refusal it is still the previous pose
 const WANTED = {
   unaligned: "kickstand",
   "ask-stand": "kickstand",
@@ -38,19 +38,19 @@ export class Guide {
   #heldSince = null;
   #ridden = false;
   #shownSince = null;
-  #sure = false; // since the power came on
-  #cut = false; // the power has gone in a save, and since then nothing has been ridden or aligned
+  #sure = false; // true once the firmware was sure of the lean since power-on
+  #cut = false; // true after a power cut during a save, until the next ride or alignment
 
-  /** The power has gone. inSave: in the middle of one. */
+  /** The power was cut. inSave: true if during a save. */
   dark(inSave) {
     this.#cut = inSave;
     this.#sure = false;
   }
 
   /**
-   * The step that fits, or null for the one before. view: as shows() takes it; shown: the lean that it shows, or null.
-   * pose: "kickstand", "upright", "ride"; standing: it has come to rest in it. state: {powered, plugged, armed (a save
-   * will be cut), time (s), lean_deg: the true one}.
+   * Return the step to show, or null to keep the current step. view: as for shows(). shown: the lean on the display, or
+   * null. pose: "kickstand", "upright", "ride". standing: true if the bike has come to rest in its pose. state:
+   * {powered, plugged, armed (the next save will be cut), time (s), lean_deg: the true lean}.
    */
   next(view, shown, pose, standing, state) {
     const { kind } = shows(view) ?? {};
@@ -149,7 +149,7 @@ export class Guide {
     return step(number, "The old alignment is still there: nothing half written is believed. Ride!", RIDE);
   }
 
-  /** How to have the firmware save a calibration, which is to be cut. */
+  /** Return the step that makes the firmware save a calibration, because that save will be cut. */
   #save(kind, view, pose) {
     if (pose !== "kickstand") {
       return step(0, "The power goes in the middle of the next save. Stop for a new alignment.", ON_STAND);
@@ -162,7 +162,7 @@ export class Guide {
   #ride(shown, state) {
     if (!this.#sure && !this.#ridden) return this.#straight(shown, state);
     if (shown === null) {
-      // In a bend that never changes no reading tells a lean from an error of the sensor: riding on is no help there
+      // In a steady bend no reading separates a lean from an error of the sensor, so riding on does not help
       if (Math.abs(state.lean_deg) > STRAIGHT_DEG) {
         return step(4, "Not sure yet, and not in a steady bend: ride straight, or lean the other way.", STRAIGHT);
       }
@@ -175,7 +175,7 @@ export class Guide {
     return step(4, "Lean it: drag the motorcycle or the slider. Compare both figures.");
   }
 
-  /** Until the firmware is sure of the lean. */
+  /** Return the step to show until the firmware is sure of the lean. */
   #straight(shown, state) {
     if (shown === null) this.#shownSince = null;
     else this.#shownSince ??= state.time;

@@ -1,4 +1,4 @@
-// Wires the page: what the board sends is drawn, what the rider does is ordered.
+// Connects the parts of the page: draws what the board sends, and sends the rider's actions as orders.
 
 import { Bike } from "./bike.mjs";
 import { Board } from "./board.mjs";
@@ -11,11 +11,11 @@ import { Road } from "./road.mjs";
 import { shows } from "./shows.mjs";
 
 const byId = (id) => document.getElementById(id);
-const SLOW = 0.9; // of real time
-const MOST_S = 0.1; // that the road moves on from one picture to the next
+const SLOW = 0.9; // a lower pace than this share of real time is reported
+const MOST_S = 0.1; // the most that the road advances between two pictures
 const settled = { kickstand: "kickstand", upright: "upright" };
 const FAULTS = {
-  // what its button says below its name: as it was, and while it is pressed in
+  // the text below the button's name: normally, and while the button is pressed
   wire: ["plugged in", "out"],
   cut: ["not armed", "armed"],
   power: ["on", "off"],
@@ -28,8 +28,8 @@ const state = { powered: true, plugged: true, armed: false, stopped: false, time
 let display;
 let tick = { t_s: 0, lean_deg: -12, speed_mps: 0, yaw_rate_dps: 0, phase: "kickstand" };
 let screen = { text: ["", ""], shown_deg: null };
-let view = { view: "starting" }; // what the firmware shows
-let words = "–"; // in place of a lean that the display does not show
+let view = { view: "starting" }; // the view of the firmware
+let words = "–"; // replaces a lean that the display does not show
 let drawn = { t_s: -1 };
 let shownStep = null;
 
@@ -84,7 +84,7 @@ const actions = {
     board.order("sensor", state.plugged);
   },
   power() {
-    state.armed = false; // this is not the power going in a save
+    state.armed = false; // the rider cuts the power, so this is no cut during a save
     board.order("power", !state.powered);
   },
   cut() {
@@ -99,27 +99,28 @@ byId("do").addEventListener("click", () => {
 });
 for (const id in FAULTS) {
   byId(id).addEventListener("click", (event) => {
-    // The guide tells what this has done, and undoes it: on a phone it may be out of sight
+    // The guide explains and undoes this fault: on a phone the button may be out of sight
     if (event.currentTarget.ariaPressed === "false") byId("todo").parentElement.scrollIntoView({ block: "nearest" });
     actions[id]();
   });
 }
-byId("kind").value = "lcd"; // a browser keeps what was chosen before the page was loaded again
+byId("kind").value = "lcd"; // a browser keeps the earlier choice when the page is loaded again
 byId("kind").addEventListener("change", (event) => {
   board.order("display", event.target.value);
   focusPress();
 });
-// After a click with the mouse the space bar is the board's button again
+// After a mouse click the space bar presses the board's button again
 addEventListener("click", (event) => {
   if (event.detail && event.target.closest("button:not(#press, #do)")) document.activeElement.blur();
 });
 
-/** To where the next step is done, or the arrow keys lean: the guide's own button goes with its step. */
+/** Move the focus to the control of the next step, or to where the arrow keys lean: the guide's button disappears with
+ * its step. */
 function focusPress() {
   byId("press").focus({ preventScroll: true });
 }
 
-/** The guide's step and the faults, where they have changed. */
+/** Show the guide's step and the faults if they have changed. */
 function tell() {
   const standing = tick.phase === settled[steering.pose];
   const step = guide.next(view, screen.shown_deg, steering.pose, standing, state);
@@ -144,7 +145,7 @@ function toggle(id, on) {
   put(`${id}-now`, FAULTS[id][Number(on)]);
 }
 
-/** What the page needs is missing, or has stopped. */
+/** Show that the firmware cannot be loaded or has stopped. */
 function stop(text) {
   state.stopped = true;
   byId("todo").textContent = text;

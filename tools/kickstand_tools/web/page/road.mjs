@@ -1,13 +1,13 @@
-// The road ahead, drawn as a rider sees it: it moves with the speed and bends with the yaw rate.
+// Draws the road ahead as the rider sees it. The road moves with the speed and bends with the yaw rate.
 
-const CAMERA_M = 2.2; // above the road
-const BIKE_M = 6; // from the camera to the bike
+const CAMERA_M = 2.2; // height above the road
+const BIKE_M = 6; // distance from the camera to the bike
 const FAR_M = 160;
-const EDGES_M = [-5.4, 1.8]; // of the road, from the middle of the bike's lane
+const EDGES_M = [-5.4, 1.8]; // edges of the road, from the middle of the bike's lane
 const CENTRE_M = -1.8;
-const DASH_M = [4, 12]; // length, and from one to the next
-const POST_M = 25; // from one post at the roadside to the next
-const HORIZON = 0.4; // of the height
+const DASH_M = [4, 12]; // length of a dash, and distance between the beginnings of two
+const POST_M = 25; // distance between two posts at the roadside
+const HORIZON = 0.4; // share of the picture's height
 
 export class Road {
   #canvas;
@@ -80,7 +80,7 @@ export class Road {
     context.fill();
   }
 
-  /** A strip of the ground between two lines along the road, from near to far. */
+  /** Draw a strip of the ground between two lines along the road, from near to far. */
   #strip(context, place, left, right, near, far, colour) {
     const steps = far - near > 20 ? 28 : 4;
     const places = Array.from({ length: steps + 1 }, (_, i) => near * (far / near) ** (i / steps));

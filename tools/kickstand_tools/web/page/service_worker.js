@@ -1,5 +1,5 @@
-// Keeps the whole site in the browser, so that it opens without a network. The two texts below are filled in when the
-// site is put together (web/site.py). A new version is fetched in the background and shown at the next visit.
+// Keeps the whole site in the browser, so it opens without a network. web/site.py fills in the two texts below when it
+// builds the site. A new version is fetched in the background and shown at the next visit.
 
 const FILES = {{ files | tojson }};
 const VERSION = {{ version | tojson }};
@@ -36,13 +36,14 @@ async function answer(request) {
   if (kept) return kept;
   const fetched = await fetch(request);
   if (fetched.ok) {
-    // What a page loads when it is used is kept from then on, where the browser has space: else it is fetched again each time
+    // A file that a page loads on demand is kept from then on if the browser has space; else it is fetched again each
+    // time
     await cache.put(request, fetched.clone()).catch(() => {});
   }
   return fetched;
 }
 
-/** What a page is kept as: the first one without its name, because some servers forward from that name. */
+/** The address under which a page is kept: the first page without its name, because some servers redirect that name. */
 function named(request) {
   const { pathname } = new URL(request.url);
   return pathname === new URL("./index.html", location).pathname ? "./" : request;

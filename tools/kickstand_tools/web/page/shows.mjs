@@ -1,6 +1,6 @@
-// What the display shows, from the firmware's state: firmware/kickstand/state.py.
+// Describes what the display shows, from the firmware's state (firmware/kickstand/state.py).
 
-// By the name of the view: its kind for the guide; in few words, for beside the true lean
+// By the name of the view: its kind for the guide, and a few words to show beside the true lean
 const VIEWS = {
   off: ["dark", "nothing"],
   starting: ["starting", "starting"],
@@ -17,15 +17,16 @@ const VIEWS = {
   raw: ["readings", "readings"],
   recording: ["recording", "recording"],
 };
-const DOUBTED = ["lean", "maxima", "acceleration", "formula", "raw"]; // while the lean is not trusted they say so instead
+// pages that show a doubt while the lean is not trusted
+const DOUBTED = ["lean", "maxima", "acceleration", "formula", "raw"];
 const ALIGNING = {
   ask: { kickstand: "ask-stand", upright: "ask-upright" },
   take: { kickstand: "take-stand", upright: "take-upright" },
 };
 
 /**
- * {kind, words}, or null for a view that is none of these. state: as Device.state() in web/device.py gives it. Where the
- * lean itself is shown, this is of the kind "lean" too.
+ * Return {kind, words}, or null for an unknown view. state: the result of Device.state() in web/device.py. If the lean
+ * itself is shown, the kind is "lean".
  */
 export function shows(state) {
   if (state.view === "notice" && state.code === "stopped") return { kind: "stopped", words: "a fault" };

@@ -1,4 +1,4 @@
-// A module that cannot be loaded says nothing by itself
+// Reports a module that cannot be loaded, because the browser shows nothing
 addEventListener("error", (event) => {
   if (event.target.tagName !== "SCRIPT") return;
   document.getElementById("todo").textContent =

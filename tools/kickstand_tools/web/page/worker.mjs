@@ -1,23 +1,22 @@
-// The board: firmware and models on MicroPython, kept to real time, away from the page's own thread.
-//
-// Takes {order: [name, value]}, see Device.act() in web/device.py, {ahead: [[s, name, value], ...]}: orders that are
+// Runs the board (firmware and models on MicroPython) in real time, outside the page's own thread.
+// Receives {order: [name, value]}, see Device.act() in web/device.py, {ahead: [[s, name, value], ...]}: orders that are
 // carried out at these times of the board, as fast as it can, and {awake: boolean}.
-// Sends {ready}, {ticks} as Device.take() gives them, {rate}: the board's seconds a second, if not all in time less than
-// 1, {orders} with the board's time of each, for whoever wants to repeat them, and {failed: text}.
+// Sends {ready}, {ticks} from Device.take(), {rate}: the board's seconds per second, below 1 if the browser is too
+// slow, {orders} with the board's time of each order, so they can be repeated, and {failed: text}.
 
 import { fetched } from "./fetched.mjs";
 import { loadMicroPython } from "./micropython/micropython.mjs";
 
-const PAUSE_MS = 8; // between two looks at the time
-const SLICE_S = 0.1; // of the board's time at once: garbage is collected only between two slices
-const LATE_S = 0.2; // a browser that was busy for longer does not race to catch up
-const RATE_MS = 2000; // over which the pace is measured
+const PAUSE_MS = 8; // pause between two steps
+const SLICE_S = 0.1; // the board's time in one slice: garbage is collected only between two slices
+const LATE_S = 0.2; // after a longer delay the board does not catch up
+const RATE_MS = 2000; // the pace is measured over this time
 
-let device; // its functions: each look-up would make a new one
-let boardS = 0; // up to where the board's time has come
-let beganMs; // what performance.now() was, or would have been, when the board's time was 0
+let device; // the device's functions, kept because each look-up would make a new function
+let boardS = 0; // the board's time
+let beganMs; // performance.now() at the board's time 0 (computed)
 let awake = true;
-let waiting = []; // ticks of a start, which is computed at once: they are shown in their own time
+let waiting = []; // ticks of a start: a start is computed at once, but shown in its own time
 let lostS = 0;
 let ratedMs;
 
@@ -36,20 +35,20 @@ async function load() {
     }
     micropython.FS.writeFile(`/lib/${name}`, source);
   }
-  micropython.FS.mkdir("/flash"); // of the board: calibration and rides
+  micropython.FS.mkdir("/flash"); // the board's flash: calibration and rides
   micropython.FS.chdir("/flash");
   micropython.runPython("import sys; sys.path.insert(0, '/lib')");
   const made = micropython.pyimport("kickstand_tools.web.device").PageDevice();
   device = { order: made.order, run_to: made.run_to, take: made.take };
 }
 
-/** MicroPython says in a puzzle that the site does not give its .wasm file. */
+/** Say plainly that the site does not deliver the .wasm file: MicroPython's own message is unclear. */
 async function missing(error) {
   await fetched("./micropython/micropython.wasm");
   throw error;
 }
 
-/** Let the board's time follow ours, and send what is to be seen. */
+/** Advance the board's time to ours, and send what the board shows. */
 function go() {
   try {
     if (awake) follow();
@@ -82,7 +81,7 @@ function follow() {
   if (message.ticks.length || message.rate !== undefined) postMessage(message);
 }
 
-/** Let the board's time run ahead of ours, up to the last of these orders. */
+/** Advance the board's time ahead of ours, up to the last of these orders. */
 function runAhead(orders) {
   for (const [atS, name, value] of orders) {
     while (boardS < atS) {

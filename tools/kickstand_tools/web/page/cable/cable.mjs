@@ -9,7 +9,7 @@ const BACK_MS = 10_000; // longest time until a restarted board is back
 const AGAIN_MS = 300;
 export const ASKING = "Asking the board, which takes up to 15 seconds …"; // time limit for a silent board
 
-/** share: of the work that is done; NaN if unknown, null to hide it. */
+/** Show the share of the work that is done. NaN if unknown, null to hide the bar. */
 export function showShare(bar, share) {
   bar.hidden = share === null;
   if (share >= 0) bar.value = share;
@@ -27,7 +27,7 @@ export class SerialLine {
     this.#port = port;
   }
 
-  /** restarted: the board may be starting, and its port is absent until then. */
+  /** restarted: true if the board may be starting; its port is absent until it has started. */
   async open(restarted = false) {
     const until = performance.now() + (restarted ? BACK_MS : 0);
     for (;;) {
@@ -43,7 +43,7 @@ export class SerialLine {
     try {
       await this.#port.setSignals?.({ dataTerminalReady: true, requestToSend: true });
     } catch (error) {
-      await this.close(); // otherwise it could not be opened again
+      await this.close(); // an open port could not be opened again
       throw error;
     }
     this.#read();

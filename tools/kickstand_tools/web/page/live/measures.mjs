@@ -13,7 +13,7 @@ export const LEAN = {
   digits: 0,
   unit: "°",
   spoken: "degrees",
-  // Beside the acceleration now
+  // The label beside the current acceleration
   furthest: ["Most left", "Most right"],
   most: ({ max_left_deg, max_right_deg }) => [max_left_deg, max_right_deg],
 };
@@ -37,7 +37,7 @@ export function written({ digits, unit }, value) {
   return `${Math.abs(value).toFixed(digits)}${unit}`;
 }
 
-/** With its sign; 0 has none. */
+/** The value with its sign; 0 has no sign. */
 export function signed(value) {
   const size = Math.abs(value).toFixed(2);
   return Number(size) === 0 ? size : `${value < 0 ? "−" : "+"}${size}`;

@@ -66,7 +66,7 @@ export function hideRide() {
   byId("plot").removeAttribute("srcdoc");
 }
 
-/** Offer it to the browser as a file. */
+/** Offer the data to the browser as a file. */
 export function save(name, type, content) {
   const link = element("a");
   link.href = URL.createObjectURL(new Blob([content], { type }));

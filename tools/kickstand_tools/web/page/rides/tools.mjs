@@ -12,7 +12,7 @@ export class Tools {
     this.#tell = tell;
   }
 
-  /** False if there are no files: nothing was opened, or the work was stopped or has failed. */
+  /** False if the worker has no files: none was opened, or the work was stopped or has failed. */
   get open() {
     return this.#worker !== null;
   }

@@ -55,7 +55,7 @@ onmessage = async ({ data }) => {
   try {
     await loaded;
   } catch {
-    return; // which has already been reported
+    return; // the failure was already reported
   }
   try {
     if (data.files) give(data.files);

@@ -21,7 +21,7 @@ export function decodeNow(view) {
     ms: view.getUint16(0, true),
     lean: signed(2, 100),
     force: three(5, 2048), // left, up, forward
-    rate: three(11, 16), // about them
+    rate: three(11, 16), // about the same axes
     speed: speed === 0xffff ? null : speed / 100,
     state: view.getUint8(19),
   };
