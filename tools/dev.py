@@ -37,7 +37,7 @@ def main(arguments):
             "Python 3.11 or newer is needed, this is %d.%d: start it with a newer python3" % sys.version_info[:2]
         )
     if not arguments or arguments[0] not in ("demo", "test", "mutants"):
-        raise SetupStopped("say what to do: %s demo, test or mutants" % sys.argv[0])
+        raise SetupStopped("no task is named: run %s demo, test or mutants" % sys.argv[0])
     name, rest = arguments[0], arguments[1:]
     prepare("" if name == "demo" else name)
     if name == "test":
@@ -85,7 +85,7 @@ def prepare(extra):
     stamp = (read(STAMP) + "\n\n").split("\n")
     if stamp[0] != place and stamp[0].endswith(" in " + ROOT) and has_pip():
         was, now = stamp[0].split(" in ")[0], place.split(" in ")[0]
-        say(".venv has %s, which is used; for %s remove .venv first" % (was, now))
+        say(".venv has %s and is used as it is; for %s remove .venv first" % (was, now))
         place = stamp[0]
     if stamp[0] == place and stamp[1] in [version + " " + e for e in EXTRAS[EXTRAS.index(extra) :]]:
         return
@@ -100,7 +100,7 @@ def prepare(extra):
 
 def make_venv():
     """Create a fresh .venv with pip."""
-    say("making .venv with Python %s" % sys.version.split()[0])
+    say("creating .venv with Python %s" % sys.version.split()[0])
     made = subprocess.run(
         [sys.executable, "-m", "venv", "--clear", VENV],
         stdout=subprocess.PIPE,
@@ -113,7 +113,7 @@ def make_venv():
             "this Python has no venv and pip: on Debian or Ubuntu install python3-venv, then repeat this"
         )
     if made.returncode != 0:
-        raise SetupStopped(".venv cannot be made: %s" % last_line(made.stdout))
+        raise SetupStopped(".venv cannot be created: %s" % last_line(made.stdout))
     if not has_pip():
         raise SetupStopped(
             "there is no pip in the new .venv: on Debian or Ubuntu install python3-venv, then repeat this"
@@ -141,7 +141,7 @@ def install(extra):
     if watched(pip + what) != 0:
         errors = [line[6:].strip() for line in read(LOG).split("\n") if line.startswith("ERROR:")]
         why = errors[-1] if errors else last_line(read(LOG))
-        raise SetupStopped("installing failed: %s (is there a network? all that pip said is in %s)" % (why, LOG))
+        raise SetupStopped("installing failed: %s (is there a network? the whole output of pip is in %s)" % (why, LOG))
 
 
 def own_index():
