@@ -14,7 +14,7 @@ def test_the_loop_and_the_start_stay_within_their_limits():
     pico()  # or skip
     from kickstand_workshop.bench import bench
 
-    result = bench.loop(1)
+    result = bench.loop(2)  # in one second the number of collections varies
     for spread in result["turn_us"], result["collection_pause_us"]:
         assert 0 < spread["median"] <= spread["p99"] <= spread["max"]
     assert result["samples_taken"] == pytest.approx(result["seconds"] * bench.SAMPLE_HZ, abs=2)
