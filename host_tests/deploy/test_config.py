@@ -42,7 +42,7 @@ def test_installed_package_uses_config_of_the_current_folder(board, tmp_path, mo
     monkeypatch.setattr(firmware_path, "TOOLS", package.parent)
     said = command.works("flash", "--config").out
     assert f"config.py is {package / 'firmware' / 'config.py'}\n" in said
-    assert "to change settings, copy that file into a folder of yours" in said
+    assert "to change settings, copy that file to a folder of your own" in said
     (tmp_path / "mine" / "config.py").write_text('SIDE = "right"\n')
     result = command.works("flash", "--config")
     assert f"config.py is {tmp_path / 'mine' / 'config.py'}\n" in result.out

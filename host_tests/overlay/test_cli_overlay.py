@@ -119,7 +119,7 @@ def test_a_gopros_gyro_finds_the_offset(tmp_path):
     other = gopro.with_telemetry(gopro.film(tmp_path / "GX02.mp4", 30.0), walk(30 * 200), 200.0)
     given = "overlay", log, "--video", other, "--out", tmp_path / "2.mp4"
     said = command.refused(tmp_path, *given, words="give --offset")
-    assert "turn as the camera does" in said or "two times" in said
+    assert "turn like the bike" in said or "several times" in said
 
 
 def walk(count: int) -> np.ndarray:
@@ -141,7 +141,7 @@ def test_file_that_is_not_a_video_of_the_ride_is_refused(tmp_path, ride):
         ("half.mp4", ("--offset", 1), "is not a video that ffmpeg can read"),
         ("sound.mp4", ("--offset", 1), "has no pictures"),
         ("no.mp4", ("--offset", 1), "there is no such file"),
-        ("film.mp4", (), "no readings of a GoPro's gyro"),
+        ("film.mp4", (), "it has no gyro readings of a GoPro"),
         ("film.mp4", ("--offset", 500), "they have nothing in common"),
         ("film.mp4", ("--offset", -50), "they have nothing in common"),
         ("film.mp4", ("--offset", 5, "--from", 20), "there is nothing from 20.0 to 8.0 s"),
@@ -150,9 +150,9 @@ def test_file_that_is_not_a_video_of_the_ride_is_refused(tmp_path, ride):
     clip = "--out", tmp_path / "clip.mov"
     command.refused(tmp_path, "overlay", ride, "--video", film, "--offset", 1, *clip, words="must end in .mp4")
     given = "overlay", ride, "--video", film, "--offset", 1
-    command.refused(tmp_path, *given, "--height", 480, *out, words="over a video the gauge goes by the video's own")
+    command.refused(tmp_path, *given, "--height", 480, *out, words="over a video the gauge follows the video's height")
     command.refused(tmp_path, "overlay", ride, *out, words="ends in .mov or .webm")
-    command.refused(tmp_path, "overlay", ride, "--offset", 3, *clip, words="is that of a video")
+    command.refused(tmp_path, "overlay", ride, "--offset", 3, *clip, words="an offset needs a video")
     command.refused(tmp_path, "overlay", ride, "--video", film, "--offset", 1, "--out", film, words="is also an input")
 
 
