@@ -208,7 +208,7 @@ def test_any_address_of_a_backpack_is_found():
 
 
 def test_the_set_kind_is_used():
-    """For controllers without a useful status, and displays at unusual addresses."""
+    """Controllers without a useful status and displays at unusual addresses need the setting."""
     for kind in KINDS:
 
         def run(board, kind=kind):

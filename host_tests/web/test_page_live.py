@@ -160,7 +160,7 @@ def test_pulled_rides_equal_those_of_the_command(line, rider, board, tmp_path, m
     with rider.context.expect_page() as opened:
         rider.page.click("#files li:first-child button")
     rides = opened.value
-    assert "/rides.html" in rides.url  # the page itself takes the #pulled away
+    assert "/rides.html" in rides.url  # the page removes #pulled from its address
     rides.wait_for_selector("#held li:has-text('ride-00004-')", state="attached", timeout=60_000)
     opened.value.close()
 
