@@ -109,7 +109,7 @@ def test_config_with_more_than_settings_stays_with_the_rider(line, board):
 
 
 def test_pulled_cable_leaves_a_board_that_starts_nothing(line, board):
-    """The board can be flashed again."""
+    """The user can flash the board again."""
     line.plug_in(RawPrompt(board))
     line.look()
     line.cut_after = 12_000

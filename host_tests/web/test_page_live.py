@@ -170,7 +170,7 @@ def unpacked(data):
 
 
 def has_firmware(board, monkeypatch):
-    """The modules that list the rides, on this board's flash."""
+    """Make the modules that list the rides read this board's flash."""
     monkeypatch.setattr(ride_paths, "directory", lambda _settings: "rides")
     monkeypatch.setattr(ride_paths, "os", board.modules["os"])
     settings = types.SimpleNamespace(VEHICLE="motorcycle")

@@ -136,7 +136,7 @@ class TestStandstill:
     """The rest after the stop shows the slope and the gyro's reading at rest."""
 
     def disturbed(self, begin_s: float, end_s: float, off_g: float = 0.1) -> float:
-        """Deceleration found where the force is off from begin_s to end_s after the standstill at 18 s."""
+        """Return the deceleration found if the force is wrong from begin_s to end_s after the standstill at 18 s."""
         road = braking(20.0, 5.0)
         ride = road.channels()
         ride.forward_g[(road.t_s > 18.0 + begin_s - 0.01) & (road.t_s < 18.0 + end_s - 0.01)] += off_g
