@@ -68,7 +68,8 @@ def test_lean_to_the_left_is_below_and_on_the_left(seen, panels, drawn):
 
 
 def test_chart_of_g_against_g_has_the_right_sides(seen, panels, drawn):
-    """The turn: 0.7 g for 5 s, and its beginning and end. The stop: 0.5 g for 3 s. Nothing above and on the right."""
+    """The turn shows 0.7 g for 5 s, and its beginning and end. The stop shows 0.5 g for 3 s. Nothing is at the top
+    right."""
     (cells,) = (trace for trace in chart(seen, "g against").traces if isinstance(trace, CellMap))
     middle = (cells.edges[1:] + cells.edges[:-1]) / 2.0
     x, y = np.meshgrid(middle, middle)

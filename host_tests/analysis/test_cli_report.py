@@ -90,7 +90,7 @@ def test_page_shows_the_same_report(ride, monkeypatch):
 
 @pytest.mark.parametrize(("unsure_s", "line"), [(0.9, ""), (1.0, "0:01"), (65.4, "1:05")])
 def test_uncertain_time_is_reported_from_one_second(ride, unsure_s, line):
-    """On the page from one second on, and always in the JSON."""
+    """The page shows it from one second on; the JSON always has it."""
     seen = overview(open_ride(ride, None))
     seen.summary.not_sure_s = unsure_s
     said = [row.split()[3:] for row in printed(seen) if row.startswith("Lean not sure")]

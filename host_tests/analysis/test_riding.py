@@ -13,7 +13,7 @@ from support.recordings import analysis_rides
 
 
 def standing(seconds, shake_g, shake_dps, speed_mps=np.nan, bias_dps=0.0):
-    """A bike on its wheels, with an engine that shakes it by so much, rms."""
+    """A standing bike whose engine shakes it by this much, rms."""
     count = round(100 * seconds)
     random = np.random.default_rng(2)
     force = [0.0, 1.0, 0.0] + random.normal(0.0, shake_g, (count, 3))
@@ -58,7 +58,7 @@ def test_riding_time_excludes_standing(tmp_path):
 
 
 def test_a_speed_that_is_always_0_hides_no_ride(tmp_path):
-    """For example with a broken wheel contact: the riding time is that of a ride without a speed."""
+    """A broken wheel contact gives such a log. Its riding time equals that of a ride without a speed."""
     log = read_log(analysis_rides.short(tmp_path))
     without = words_of(log)
     log.speed_mps[::20] = 0.0

@@ -29,7 +29,7 @@ def test_example_in_each_docstring_runs(name):
 
 
 def test_pydoc_lists_the_promised_functions():
-    """It leaves out what a module without __all__ has only imported."""
+    """The list omits names that a module without __all__ only imports."""
     shown = pydoc.plain(pydoc.render_doc(api))
     for name in ("import_recording", "fit_ride", "open_ride", "export", "simulate_ride"):
         assert re.search(rf"^ +{name}(\(| = )", shown, re.M), name

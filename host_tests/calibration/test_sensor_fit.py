@@ -147,7 +147,7 @@ def fitted(seed=3):
 
 
 def test_the_fit_is_numpys_and_so_is_its_covariance():
-    """The same residuals, minimised by numeric derivatives in double."""
+    """Numpy minimises the same residuals, with numeric derivatives in double precision."""
     fit = fitted()
     start, sigma = np.array(fit._start), np.array(fit._sigma)
 

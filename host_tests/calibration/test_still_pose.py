@@ -11,7 +11,7 @@ LEVEL: tuple[int, ...] = (100, -200, 8192, -521, 65, -131, 655)
 
 
 def samples(count=100):
-    """Samples at rest, with a count of noise in each reading. The noise has no mean in either half."""
+    """Samples at rest, with a count of noise in each reading. The noise has a mean of zero in each half."""
     return [[value + (-1) ** k for value in LEVEL] for k in range(count)]
 
 

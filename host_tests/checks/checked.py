@@ -35,7 +35,7 @@ def made_up(profile: str) -> SimulatedRide:
 
 @functools.cache
 def simulated(profile: str) -> Log:
-    """made_up() at 50 Hz, with a speed once a second."""
+    """made_up() at 50 Hz, with one speed per second."""
     made = made_up(profile)
     readings, mps = made.readings[::4], np.full(len(made.time[::4]), np.nan)
     mps[::50] = made.truth["speed_mps"][::200]

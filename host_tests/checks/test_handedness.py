@@ -1,4 +1,4 @@
-"""Left-handed axes, a gyro of the opposite sign and exchanged axes are remarked on; right logs never are."""
+"""Left-handed axes, a gyro with the opposite sign and exchanged axes give a remark. Correct logs never do."""
 
 import itertools
 

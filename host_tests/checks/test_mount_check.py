@@ -25,7 +25,7 @@ G = 9.80665
 
 
 def turned(matrix, left=0.0, up=0.0, forward=0.0):
-    """A mount's matrix, wrongly turned about the vehicle's axes by so many degrees."""
+    """Return a mount's matrix turned about the vehicle's axes by these errors, degrees."""
     about_left, about_up, about_forward = rotation_matrix(np.diag(np.radians([left, up, forward])))
     return about_forward @ about_up @ about_left @ matrix
 

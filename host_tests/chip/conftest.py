@@ -32,7 +32,7 @@ def at_prompt():
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_pyfunc_call(pyfuncitem):
-    """Run such a test in a fork: the next one gets the board unchanged."""
+    """Run each test that uses a shared board in a fork, so that the next test gets the board unchanged."""
     devices = [pyfuncitem.funcargs[name] for name in COPIED & set(pyfuncitem.fixturenames)]
     if not devices or devices[0].NAME == "ESP32":
         return None

@@ -13,7 +13,7 @@ ESP32 = pytest.param("esp32", marks=pytest.mark.esp32)
 
 
 def checked(chip, world=REST, plant=None, press=True, files=None, **fitted):
-    """{what: line} of the findings that are not good."""
+    """Return {what: line} of the findings that are not good."""
     with CHIPS[chip](world, modules(chip) | (files or {}), **fitted) as device:
         if plant:
             plant(device.board)

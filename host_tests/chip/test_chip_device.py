@@ -83,7 +83,7 @@ def starts_again(device):
     ids=["EIO", "ETIMEDOUT", "SDA held"],
 )
 def test_bus_errors_are_shown_while_they_last(riding, inject, request):
-    """The fault is shown while it lasts. A brief one may fall between two reads of the display."""
+    """The fault is shown while it lasts. A brief fault may fall between two reads of the display."""
     inject(riding.board.faults, riding.time_s + 0.01)
     texts = watch(riding, 0.01 + FAULT_S + RECOVERY_S)
     assert lean_is_right(riding), riding.lcd()

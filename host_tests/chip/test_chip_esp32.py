@@ -102,7 +102,7 @@ def states_of_flash(device, code):
 
 
 def test_old_or_new_wherever_a_save_is_cut(tmp_path):
-    """The power is cut after each write of four saves: a board that starts with that flash has a whole calibration."""
+    """Cut the power after each write of four saves. A board that starts from that flash has a complete calibration."""
     with board(files=modules("esp32")) as device:
         device.exec(_SAVE)
         states, writes = [], 0

@@ -64,7 +64,7 @@ def test_emulate_reports_its_start_at_once(tmp_path, monkeypatch, chip):
 
 
 def test_an_esp32_needs_no_emulator_of_the_pico():
-    """Its modules are imported without rp2040py."""
+    """The ESP32's modules can be imported without rp2040py."""
     script = "import sys; sys.modules['rp2040py'] = None\nfrom kickstand_emulator.emulate import device_class\n"
     script += "import kickstand_workshop.bench.bench\nprint(device_class('esp32').NAME)"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
@@ -72,7 +72,7 @@ def test_an_esp32_needs_no_emulator_of_the_pico():
 
 
 class Emulating(threading.Thread):
-    """`kickstand emulate` beside the test, with these files on its board. It ends at end_s of its own time."""
+    """Run `kickstand emulate` in a thread, with these files on its board. It ends at end_s of emulated time."""
 
     def __init__(self, patch, files, chip):
         super().__init__(daemon=True)

@@ -76,7 +76,7 @@ class LittlefsBoard(fake_board.FakeBoard):
         assert self.free == free
 
     def files(self) -> dict[str, bytes]:
-        """Path and content of everything on it."""
+        """Return {path: content} of all files on the board."""
         found = {}
         for folder, _, names in self.system.walk("/"):
             for name in names:

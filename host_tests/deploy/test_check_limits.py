@@ -1,4 +1,4 @@
-"""The limits of `kickstand check`, each from both sides, and the figures in its words."""
+"""Each limit of `kickstand check` is tested from both sides, and the figures in its messages."""
 
 import pytest
 from kickstand_tools.deploy import check_limits as limits

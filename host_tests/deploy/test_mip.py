@@ -55,7 +55,7 @@ def test_mip_installs_from_a_local_server(package, tmp_path):
 @pytest.mark.nightly  # 500 kB through the console
 @pytest.mark.chip
 def test_mip_installation_starts_on_the_emulated_pico(package, monkeypatch):
-    """With main.py and config.py beside it, as firmware/docs/settings.md says."""
+    """main.py and config.py are beside the package, as firmware/docs/settings.md says."""
     with CHIPS["pico"]() as device:
         emulated_port.plug_in(monkeypatch, device)
         device.run(1.0)

@@ -75,7 +75,7 @@ def fresh(port="rp2", ending=".mpy") -> Any:
 def test_flat_modules_of_old_versions_are_removed(plugged, ending):
     board = plugged(fresh())
     board.put(before("flat " + ending) | NOTES | {"/kickstand/lean/old/older.py": b"pass", "/kickstand/own/a.txt": b""})
-    board.system.makedirs("/kickstand/errors")  # it would be imported instead of errors.mpy
+    board.system.makedirs("/kickstand/errors")  # this folder would be imported instead of errors.mpy
     result = command.works("flash")
     expected = wanted(".mpy") | NOTES | {"/kickstand/own/a.txt": b"", "/config.py": before("flat .py")["/config.py"]}
     assert board.files() == expected

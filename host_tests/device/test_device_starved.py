@@ -62,7 +62,7 @@ def test_no_lean_on_the_display_is_too_old(engine, name, tmp_path):
 
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
 def test_a_storm_of_wheel_pulses_is_reported_and_leaves_the_lean(engine, tmp_path):
-    """50,000 a second leave the loop no time at all, until the interrupt turns itself off."""
+    """50,000 pulses per second leave the loop no time until the interrupt turns itself off."""
     storm = [["wheel_storm", [FROM_S, 3.0, 50_000]]]
     record = run(engine, tmp_path, storm, {"SPEED": "wheel"}, wheel={})
     assert record.ends == ["off"]

@@ -21,7 +21,7 @@ for module, name in PAIRS + ((kalman, "add_products"),):
     plain = getattr(module, name + "_python")
     print(name, "plain" if getattr(module, name) is plain else "quick")
 """
-# One mistake in each viper function, as a compiler might make it: (module, function): what is replaced by what
+# One mistake per viper function, such as a compiler might make. {(module, function): (old text, new text)}
 MISTAKES = {
     ("imu/fifo_frames_viper.py", "decode"): ("frames[at] << 8 |", "frames[at] << 8 &"),
     ("imu/fifo_frames_viper.py", "add_up"): ("value > 32767", "value > 32768"),

@@ -66,7 +66,7 @@ ALIGN, SIX, RECORD = 0, 1, 4  # places in the menu
 
 @pytest.fixture(params=["missing", "no memory"])
 def without(request, monkeypatch):
-    """Call it with the end of a module's name: it can then no longer be imported. Returns the message for that."""
+    """Return a function that takes the end of a module's name, blocks its import, and returns the message for that."""
 
     def take_away(ending):
         real = builtins.__import__
@@ -187,7 +187,7 @@ def test_a_display_without_its_driver_is_probed_less_often(without, board, monke
 
 @pytest.mark.parametrize("missing", [MemoryError, ImportError])
 def test_settings_that_cannot_be_loaded_end_on_the_display(missing, board, monkeypatch, capsys):
-    """It must not keep the lean that it showed before a reset."""
+    """The display must not keep the lean that it showed before a reset."""
     from kickstand import settings, start
 
     def load():

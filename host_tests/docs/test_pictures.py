@@ -42,7 +42,7 @@ def test_no_plot_of_a_ride_is_stale(name, draw):
 
 
 def test_the_picture_of_the_page_is_not_stale():
-    """By the files that decide how the page looks: riding there again would take a minute."""
+    """Compare a hash of the page's files, because recording the picture again would take a minute."""
     with Image.open(PICTURES / page.NAME) as moving:
         assert moving.info["xmp"].decode() == page.looks(), STALE
         assert sum(1 for _ in ImageSequence.Iterator(moving)) > 50

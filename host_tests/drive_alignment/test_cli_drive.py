@@ -109,7 +109,7 @@ def test_notes_in_a_calibration_are_kept(tmp_path):
 
 
 def test_several_logs_of_one_mount_are_combined(tmp_path):
-    """None of them is enough alone."""
+    """No log is enough alone."""
     logs = [record(tmp_path / f"{k}.csv", around(2), MOUNT) for k in range(3)]
     refused(tmp_path, "braking events in a straight line", logs[0])
     command.works("calibrate", "drive", *logs, "--out", tmp_path / "CAL.json")

@@ -85,7 +85,8 @@ def test_camber_at_the_stops_does_not_reach_forward(method, yaw_deg):
 
 
 def test_it_reports_the_missing_step():
-    """For a speed, a stop, a braking event. Then whether the braking event is straight, and that it is ready."""
+    """It waits for a speed, a stop and a braking event. Then it reports whether the braking event is straight, and
+    when it is ready."""
     legs = [[2.0, 1.0, 0.0], [2.0, -1.0, 0.0], *around(2), [8.0, 1.5, 0.0], [4.0, -2.0, 15.0], *around(6, stands=False)]
     states = drive(legs)["states"]
     assert alignment.DriveAlignment("car").state == alignment.WAITING_FOR_SPEED

@@ -176,8 +176,8 @@ def test_a_late_speed_is_no_rotated_sensor():
 
 
 def test_each_vehicle_has_its_source_of_the_vertical():
-    """A car uses its stops, and with a fit the mean of both. A motorcycle uses the upright pose, else straight
-    riding."""
+    """A car uses its stops. If it also has a fit, it uses the mean of both. A motorcycle uses the upright pose, or
+    straight riding without one."""
     standing = types.SimpleNamespace(up=None)
     fit = types.SimpleNamespace(level=[2.0 * part for part in level(4.0)])
 

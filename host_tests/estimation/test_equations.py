@@ -65,7 +65,7 @@ def test_sensor_above_the_roll_axis_moves_with_the_roll(lean):
     [
         (0.1 * np.sin(0.7) * 1.2, 0.7, {of.TYRES: 0.1}),  # wide tyres touch the road beside their middle
         (0.03 * np.cos(0.5), 0.5, {of.BESIDE: 0.03}),  # a side wind is level
-        (0.01, 0.0, {of.CAMBER: 0.01}),  # a cambered road counts on straights
+        (0.01, 0.0, {of.CAMBER: 0.01}),  # a cambered road matters on straights only
         (0.01, 0.02, {of.CAMBER: 0.01}),
         (0.0, 0.5, {of.CAMBER: 0.01}),
     ],

@@ -59,7 +59,7 @@ def test_smoothed_lean_beats_the_display_and_knows_its_error(name):
     off, sigma = (found.lean_deg - ride.lean_deg)[ride.riding], found.lean_sigma_deg[ride.riding]
     assert rms(off) < 0.6 * rms((ride.live() - ride.lean_deg)[ride.riding])
     assert np.max(np.abs(off)) < 2.5
-    assert np.mean(np.abs(off) < sigma) > 0.35  # of one short ride; of many together it is 0.58 or more
+    assert np.mean(np.abs(off) < sigma) > 0.35  # in one short ride; over many rides it is 0.58 or more
     assert np.mean(np.abs(off) < 3.0 * sigma) > 0.95
     assert np.mean(found.lean_sigma_deg) < 1.2
 
@@ -149,7 +149,7 @@ def _turned(vectors, angle):
 
 
 def test_a_mount_that_yields_makes_the_lean_less_sure():
-    """By 2 to 5 degrees in the course of the ride."""
+    """The mount yields by 2 to 5 degrees during the ride."""
     ride = simulated("creep", 10, 150.0)
     found = smooth(ride.log, ride.calibration)
     sigmas = (np.abs(found.lean_deg - ride.lean_deg) / found.lean_sigma_deg)[ride.riding]

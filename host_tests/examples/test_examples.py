@@ -14,7 +14,7 @@ TURN_DEG = 35.0  # of example_run.py's ride
 
 
 def run(flash, name, until, turn_to=()):
-    """What the program printed, and the display's two lines each second. One that is a user.py runs as such."""
+    """What the program printed, and the display's two lines each second. A user.py example runs as user.py."""
     printed, seen = run_all(flash, name, until, turn_to)
     return printed, seen["frames"]
 
@@ -61,7 +61,7 @@ def test_print_lean(tmp_path):
 
 
 def test_user_page(tmp_path):
-    """The usual pages come before it, and the first comes again after it."""
+    """The user's page comes after the usual pages. The first page follows it."""
     _, frames = run(tmp_path, "user_page.py", 12.0, turn_to=[(4, "own")])
     shown = re.fullmatch(r"Load     (\d\.\d\d) x", frames[-1][0].rstrip())
     assert shown and float(shown[1]) == pytest.approx(1.22, abs=0.05)  # 1 / cos(35 degrees)

@@ -7,7 +7,7 @@ from kickstand_fleet import run
 
 @pytest.fixture(scope="session")
 def fleet(tmp_path_factory):
-    """A MadeFleet of nine vehicles, several of which have a trouble."""
+    """A MadeFleet of nine vehicles, several of which have a problem."""
     return made_fleet.make(tmp_path_factory.mktemp("fleet"))
 
 

@@ -26,7 +26,7 @@ from support.recordings import broken_logs
 
 @pytest.fixture(scope="module")
 def cluster():
-    """It ends no task because the machine is busy."""
+    """A cluster with a timeout so long that a busy machine ends no task."""
     with Cluster(None, 2, timeout_s=600.0) as running:
         yield running
 

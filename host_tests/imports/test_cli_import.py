@@ -49,7 +49,7 @@ def test_report_reads_an_export_directly(tmp_path, name):
 
 
 def test_export_of_one_file_is_read(tmp_path):
-    """RaceChrono's CSV is one, too. An unknown file is refused as a log."""
+    """RaceChrono's CSV is such a file, too. An unknown file is refused as a log."""
     (tmp_path / "r.csv").write_text(app_exports.racechrono(riding().every(4)))
     words = "s of riding: at least 30 s with bends are needed"
     assert "r.csv: only" in command.refused(tmp_path, "report", tmp_path / "r.csv", words=words)

@@ -6,7 +6,7 @@ from kickstand_tools import api
 from kickstand_tools.common.errors import InputError
 from support.recordings import app_exports
 
-# m/s in one of each unit: a mile is 1609.344 m, a nautical mile 1852 m
+# one of each unit in m/s: a mile is 1609.344 m, a nautical mile 1852 m
 IN_MPS = {"m/s": 1.0, "km/h": 1000 / 3600, "mph": 1609.344 / 3600, "knots": 1852 / 3600}
 
 PHYPHOX, AIM, VBO, RACEBOX = "Velocity (m/s)", '"s","km/h"', "velocity kmh", "Speed,"

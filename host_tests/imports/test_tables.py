@@ -109,7 +109,7 @@ TIMES = {
 
 
 def column(texts):
-    """These cells, as they are read."""
+    """Read these texts as the cells of one column."""
     return csv_reader.columns_of([[text] for text in texts], 1)[0]
 
 

@@ -47,7 +47,7 @@ def test_a_fit_of_too_little_decides_nothing(fit):
 
 
 def driving(mps, rows=40, period_s=0.5, east=True, per_degree=(1.0, 1.0)):
-    """Columns speed, lat, lon of a straight way from the equator, and times: a degree there is 111 194.9 m."""
+    """Return columns speed, lat, lon of a straight drive from the equator, and times. A degree is 111 194.9 m there."""
     t_s = period_s * np.arange(rows)
     way = mps * t_s / 111_194.9
     lat, lon = (0.0 * way, way) if east else (way, 0.0 * way)

@@ -147,7 +147,8 @@ def test_single_samples_at_the_end_of_the_range_are_no_fault():
 
 @pytest.mark.parametrize(("accel_range", "said"), [(0, 0), (1, 0), (2, 2), (3, 2)])
 def test_hard_vibration_clips_unless_the_range_is_small(accel_range, said):
-    """After the low-pass it still reaches half of 8 g or of 16 g for three seconds. In a range of 2 g bends do."""
+    """After the low-pass the vibration still reaches half of 8 g or of 16 g for three seconds. In a range of 2 g, bends
+    clip too."""
     samples = ride(8)
     samples[400:1000, 1] += 17000 * np.sin(np.arange(600) * 2.2)
     assert [words for _, words in judged(samples, accel_range=accel_range)] == ["Accel", None][:said]

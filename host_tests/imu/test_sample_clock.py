@@ -54,7 +54,8 @@ def test_a_chip_that_is_1_percent_off_keeps_the_boards_time(error):
 
 @pytest.mark.parametrize(("late_us", "counted"), [(2 * PERIOD_US, False), (2 * PERIOD_US + 1, True)])
 def test_a_gap_of_lost_samples_is_spanned(late_us, counted):
-    """Samples were lost if the last one is over two periods late. Up to that the clocks differ and are adjusted."""
+    """Samples were lost if the last one is over two periods late. A smaller delay is a clock difference and is
+    adjusted."""
     own = clock()
     own.step(1, 0)
     own.emptied(PERIOD_US // 2 + late_us)

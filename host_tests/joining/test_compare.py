@@ -1,4 +1,4 @@
-"""kickstand compare: two devices on one bike, on one clock, and how their leans agree."""
+"""Tests of `kickstand compare`, which puts the logs of two devices on one clock and compares their leans."""
 
 import json
 from dataclasses import replace

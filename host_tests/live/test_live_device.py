@@ -182,7 +182,7 @@ def test_a_board_without_radio_says_so_and_shows_the_lean(run, machine, config, 
 
 
 def test_the_pin_is_required_once_per_phone(run):
-    """Also after power-off; another PIN makes the same phone a stranger."""
+    """This also holds after power-off. With another PIN the same phone is unknown."""
     stranger = [[20.0, "connect", 1], [20.1, "write", "rate", [40, 0]], [20.2, "read", "ride"], [20.3, "read", "board"]]
     stranger += [[20.4, "give_pin", 314159], [20.5, "write", "filter", [1, 0, 40]], [22, "leave"]]
     owner = [[24.0, "connect", 2], [24.1, "give_pin", 271828], [24.2, "write", "rate", [40, 0]], [28.0, "leave"]]

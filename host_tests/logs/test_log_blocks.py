@@ -44,7 +44,7 @@ def test_blocks_add_up_to_the_log(tmp_path, monkeypatch, name, block_bytes):
 
 
 def test_the_readers_of_numbers_agree(tmp_path):
-    """A block with an exponent or a text column is read by the reader of cells: the numbers are the same."""
+    """The cell reader reads a block with an exponent or a text column, and finds the same numbers."""
     quick = write(tmp_path / "quick.csv", [HEADER, *[row.replace("1e0", "1") for row in rows(800)]])
     plain = write(tmp_path / "plain.csv", [HEADER, *rows(800)])
     noted = write(tmp_path / "noted.csv", [HEADER + ",note", *[row + ',"a, ""b"""' for row in rows(800)]])

@@ -39,7 +39,7 @@ def left_s(lean) -> float:
 
 
 def filled(pictures: np.ndarray, gauge: Gauge) -> np.ndarray:
-    """(n) share of the dial that is filled, < 0 on the left, of pictures of the gauge alone."""
+    """Return the filled share of the dial (n), < 0 on the left. pictures: the gauge alone."""
     colour = pictures[..., :3].astype(int)
     amber = (colour[..., 0] > 180) & (np.abs(colour[..., 1] - 160) < 60) & (colour[..., 2] < 110)
     dial = amber[:, : round(0.55 * gauge.height), : round(1.15 * gauge.height)]

@@ -127,7 +127,7 @@ def test_the_trim_that_riding_found_is_used(tmp_path):
 
 
 def test_times_of_the_log_are_kept_exactly(tmp_path):
-    """A log that starts at a Unix time keeps it, and its microseconds are not lost on the way."""
+    """A log that starts at a Unix time keeps that time, exact to the microsecond."""
     cal = command.write_cal(tmp_path / "CAL.json")
     tables = []
     for start_s in 1_700_000_000.0, 0.0:

@@ -22,7 +22,7 @@ from support.watched_stderr import Watched, watched
 
 
 class Clocks:
-    """`time` of a computer where only waiting takes time. It may sleep; its monotonic clock then stops."""
+    """Replace `time`: only waiting takes time. While the computer sleeps its monotonic clock stops."""
 
     waited_s = asleep_s = 0.0
 

@@ -10,7 +10,7 @@ from kickstand.rides.flash_ring import RideRing
 from support.recordings import ride_writer
 
 PAGE = Path(__file__).resolve().parents[2] / "firmware" / "docs" / "rides.md"
-BYTES_S = 1024  # what the recorder assumes until a block is measured
+BYTES_S = 1024  # the recorder assumes this rate until it has measured a block
 # Bytes of the file system that MicroPython's images make: ports/rp2/boards/*/mpconfigboard.cmake,
 # ports/esp32/partitions-4MiBplus.csv
 FLASH_KB = {"Pico": 1408, "Pico W": 848, "Pico 2": 3072, "Pico 2 W": 2560, "ESP32 with 4 MB of flash": 2048}

@@ -15,7 +15,7 @@ RIDE = {"lean": [[0, 0], [8, 20]], "until": 35, "config": PINS}
 
 
 def run(flash, card=None, **plan):
-    """A ride with this card, on a board that is aligned if the plan says so."""
+    """Run a ride with this card. The plan says whether the board is aligned."""
     return device_plans.run("micropython", flash, {**RIDE, "card": card or {}, **plan})
 
 

@@ -43,7 +43,7 @@ def blocks(flash):
 
 @pytest.fixture(scope="module", params=PARTS)
 def run(request, tmp_path_factory):
-    """(the display, the turns, the ride's blocks, erase_s, fifo_s) of a recorded ride."""
+    """Record a ride; return (the display, the turns, the ride's blocks, erase_s, fifo_s)."""
     who_am_i, erase_s, fifo_s = PARTS[request.param]
     flash = tmp_path_factory.mktemp("flash")
     plan = {"seed": 2, "board": {"who_am_i": who_am_i}}

@@ -113,7 +113,7 @@ def test_after_any_unplug_it_returns_and_shows_nothing_old(board, display):
         display.show(*OLD)
         turns(board, display, 40)
         display.show(*NEW)
-        turns(board, display, gap_turns % 7)  # possibly during a transfer of the new lines
+        turns(board, display, gap_turns % 7)  # the display may be removed during a transfer of the new lines
         for begun in (0, 12) if isinstance(board.lcd, Lcd) else (0,):  # once more while it is initialised
             turns(board, display, begun)
             board.remove_lcd()
@@ -208,7 +208,7 @@ def test_any_address_of_a_backpack_is_found():
 
 
 def test_the_set_kind_is_used():
-    """For controllers without a useful status, and displays at unusual addresses."""
+    """Controllers without a useful status and displays at unusual addresses need the setting."""
     for kind in KINDS:
 
         def run(board, kind=kind):

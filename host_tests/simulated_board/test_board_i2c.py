@@ -12,7 +12,7 @@ def open_sensor(freq=400_000, timeout=5000):
 
 
 def check(firmware, **fitted):
-    """The firmware must reach its end."""
+    """Run the firmware on a board, check that it returns, and return the board."""
     outcome, board = on_board(firmware, **fitted)
     assert outcome == "returned"
     return board
@@ -101,7 +101,7 @@ def test_interrupts_of_an_esp32_wait_for_the_end_of_a_transfer():
 
 def test_a_classic_esp32_crashes_if_a_flash_pin_is_driven():
     def drive(number):
-        Pin(number)  # which alone does no harm
+        Pin(number)  # this alone does no harm
         Pin(number, Pin.OPEN_DRAIN)
 
     for machine, number, outcome in (

@@ -8,7 +8,7 @@ STEP_US = 10_000
 
 
 class Listing:
-    """A UART with these bytes to read, at most a piece at a time."""
+    """A UART that delivers these bytes, at most `piece` bytes per read."""
 
     def __init__(self, data, piece=1000):
         self._data = data

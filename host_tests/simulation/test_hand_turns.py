@@ -22,7 +22,8 @@ from kickstand_tools.simulation.scripted import sensor_errors
     ],
 )
 def test_the_rates_of_a_hand_turn_gravity_to_the_next_pose(before, after, degrees):
-    """In the sensor's axes du/dt = -rate x u. From 1 to 3 s, halfway at 2 s, fastest there: 15 / 8 of the mean rate."""
+    """In the sensor's axes du/dt = -rate x u. The turn lasts from 1 to 3 s. It is fastest
+    halfway, at 2 s: 15 / 8 of the mean rate."""
     part = SimpleNamespace(vehicle_from_sensor=np.eye(3).ravel().tolist(), world=lambda motion: motion)  # no errors
     world = sensor_errors.turning(part, before, after, 1.0, 3.0)
     up, step_s = np.array(before) / np.linalg.norm(before), 0.002

@@ -38,7 +38,7 @@ class Record:
         self.last = tuple(answer["last"])
         self.too_fast = answer["too_fast"]
         self.touched = answer["touched"]
-        self.rides = answer.get("rides")  # on the SD card: {path: content}
+        self.rides = answer.get("rides")  # files on the SD card: {path: content}
         self.card_hz = answer.get("card_hz")
         self.phones = answer.get("phones", [])
         self.console = console

@@ -68,7 +68,7 @@ class EmulatedPort:
 
 
 def plug_in(monkeypatch, device, meanwhile=lambda: None):
-    """From now on this Pico is at NAME, and the time of mpremote and the tools that talk to it is the emulated one."""
+    """Connect this Pico at the port NAME. mpremote and the tools that talk to it then use the emulated time."""
     port = EmulatedPort(device, meanwhile)
 
     def open_port(_name, timeout, **_options):

@@ -25,7 +25,7 @@ class PageTurner:
         return True
 
     def check(self):
-        """Raise AssertionError if a view has not been shown. It names the views that were."""
+        """Raise AssertionError if a view has not been shown. The message names the views that were shown."""
         if self._wanted:
             seen = ", ".join(sorted(set(self._seen))) or "nothing"
             raise AssertionError(f"no view {self._wanted[0]} after {len(self._seen)} presses, only: {seen}")

@@ -17,7 +17,7 @@ CLASSES = {name for name in vars(errors) if name[0].isupper()}
 # Codes from a name or a call, not from a text beside the class
 INDIRECT = {"other-side", "mount-moved", "incomplete", "no-memory", "out-of-memory", "out-of-room"}
 INDIRECT |= {"sensor-lost", "sensor-frozen", "sensor-silent", "sensor-reset", "flash-fault", "card-fault", "usb-fault"}
-# For these the display shows the setting's name
+# For these codes the display shows the setting's name
 OTHER_SETTINGS = {"not-allowed", "card-pins", "one-i2c", "no-such-pin", "i2c-pins", "uart-pins", "aliasing"}
 CONSOLE_ONLY = {"wrong-code"}  # reported during imports, before there is a display
 # Values that fit the words of any code: numbers, names, and long ones of both

@@ -8,8 +8,8 @@ import pytest
 from kickstand.ui import messages
 from support.mpy import run_mpy
 
-# Waits and presses of a rider, each a generator of (s, name, value); the names are those of Device.act()
-# turn_to: presses until a view is shown
+# A rider's waits and presses. Each generator yields (s, name, value) with a name from Device.act().
+# turn_to presses until a view is shown.
 DRIVE = """
 import json, sys
 from kickstand_tools.web.device import PageDevice

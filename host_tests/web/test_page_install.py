@@ -109,7 +109,7 @@ def test_config_with_more_than_settings_stays_with_the_rider(line, board):
 
 
 def test_pulled_cable_leaves_a_board_that_starts_nothing(line, board):
-    """The board can be flashed again."""
+    """The user can flash the board again."""
     line.plug_in(RawPrompt(board))
     line.look()
     line.cut_after = 12_000
@@ -271,7 +271,7 @@ def test_browser_with_serial_ports_gets_no_other_advice(line):
 
 
 def test_the_wiring_is_that_of_the_boards_own_pins(line):
-    """In the tables, as the firmware has them, and drawn."""
+    """The tables and the drawing show the pins that the firmware uses."""
     page = line.rider.page
     for board, pins in (
         ("pico", ["GP4, pin 6", "GP5, pin 7", "GP6, pin 9", "GP7, pin 10", "GP15, pin 20"]),

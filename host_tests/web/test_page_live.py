@@ -160,7 +160,7 @@ def test_pulled_rides_equal_those_of_the_command(line, rider, board, tmp_path, m
     with rider.context.expect_page() as opened:
         rider.page.click("#files li:first-child button")
     rides = opened.value
-    assert "/rides.html" in rides.url  # the page itself takes the #pulled away
+    assert "/rides.html" in rides.url  # the page removes #pulled from its address
     rides.wait_for_selector("#held li:has-text('ride-00004-')", state="attached", timeout=60_000)
     opened.value.close()
 
@@ -170,7 +170,7 @@ def unpacked(data):
 
 
 def has_firmware(board, monkeypatch):
-    """The modules that list the rides, on this board's flash."""
+    """Make the modules that list the rides read this board's flash."""
     monkeypatch.setattr(ride_paths, "directory", lambda _settings: "rides")
     monkeypatch.setattr(ride_paths, "os", board.modules["os"])
     settings = types.SimpleNamespace(VEHICLE="motorcycle")

@@ -1,5 +1,5 @@
-"""The pages under their own content security policy, which the other tests switch off, except those of the page Rides:
-nothing they need is blocked."""
+"""The content security policy of the pages blocks nothing that they need. Most other tests switch it off; those of the
+page Rides keep it."""
 
 import re
 

@@ -85,7 +85,7 @@ def test_page_does_not_wait_for_impossible_charts(page, ride, calibration):
     page.page.evaluate("given()")
     page.give(ride, calibration)
     page.page.wait_for_function("document.querySelector('#drawing').hidden")
-    page.rider.errors[:] = before  # without those of the frame that had no library
+    page.rider.errors[:] = before  # drop the errors of the frame that had no library
 
 
 def test_too_short_ride_is_reported_at_the_top(page, calibration, tmp_path):

@@ -22,8 +22,8 @@ def says(rider, selector, text):
 
 
 def test_by_the_keyboard_alone(chromium, address):
-    """A pose is chosen, and then the arrow keys lean and the space bar is the board's button. What is not to be steered
-    shows what the motorcycle does. The focus outlives the guide's step."""
+    """A pose is chosen, and then the arrow keys lean and the space bar is the board's button. Controls that
+    the rider cannot steer show what the motorcycle does. The focus outlives the guide's step."""
     rider = Rider(chromium, address, **LAPTOP)
     rider.reads("Raw")
     says(rider, "#lean-out", "12° left")
@@ -60,7 +60,7 @@ def test_by_the_keyboard_alone(chromium, address):
 
 
 def test_every_step_has_its_room(chromium, address, files):
-    """So that no step moves what is below it. Taken from the guide's source: the longest are among them."""
+    """No step may move what is below it. The texts come from the guide's source, so the longest are included."""
     guide = files["guide.mjs"].decode()
     pages = re.findall(r'^  \w+: "(.{20,})",$', guide, re.M)
     steps = [text for pair in re.findall(r'"([^"\n]{25,})"|`([^`]{25,})`', guide) for text in pair if text]

@@ -84,7 +84,7 @@ def test_site_is_served_and_opened(files, built, monkeypatch):
 
 
 def test_site_works_at_any_address(files):
-    """All files that it names are beside it."""
+    """All files that the site names are beside it."""
     to_micropython = re.compile(r'<a href="https://micropython\.org/download/\w+/" target="_blank" rel="noopener">')
     ours = {path.relative_to(site.PAGE).as_posix() for path in site.PAGE.rglob("*") if path.is_file()}
     assert ours < set(files)
@@ -96,8 +96,8 @@ def test_site_works_at_any_address(files):
 
 
 def test_every_page_leads_home(files, monkeypatch):
-    """To the first page, and to the project, if the installed package knows its address. Then the site has another
-    version."""
+    """Each page links to the first page. If the installed package knows the project's address, each page links to it,
+    and the site's version differs."""
     home = "https://an.example/kickstand"
     monkeypatch.setattr(site, "home", lambda: home)
     made = site.site_files()

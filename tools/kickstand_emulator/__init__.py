@@ -9,4 +9,4 @@ with Pico(world, files=flash_image.firmware()) as pico:
 
 from . import native
 
-native.install()  # before any import of rp2040py
+native.install()  # must run before any import of rp2040py

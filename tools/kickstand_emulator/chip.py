@@ -118,7 +118,7 @@ class EmulatedChip:
         self.rp2040.core.pc = FLASH_START_ADDRESS
 
     def _hurry(self) -> None:
-        """Double the emulation's speed on the host. There is no other effect.
+        """Double the emulation's speed on the host. The emulated results stay the same.
 
         rp2040py's compiled core looks up the method of each memory access by name, which makes a new method object
         each time unless the instance holds one. It also polls both PIO blocks, which MicroPython does not use, after

@@ -48,7 +48,7 @@ class ConsoleServer:
             self._disconnect()
 
     def say(self, data: bytes) -> None:
-        """Send the board's output to the client. Without a client it is lost."""
+        """Send the board's output to the client. Without a client the output is lost."""
         if self._client:
             try:
                 self._client.setblocking(True)

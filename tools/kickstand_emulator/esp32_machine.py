@@ -1,7 +1,8 @@
 """The process in which QEMU emulates an ESP32. QEMU's library can be started only once per process.
 
 python -m kickstand_emulator.esp32_machine SOCKET LIBRARY FLASH SDA,SCL... is started by esp32.py, which has the models
-of sensor and display. The two exchange messages over an inherited socket. This process converts the levels of the I2C
+of sensor and display. The two processes exchange messages over an
+inherited socket. This process converts the levels of the I2C
 wires to bytes, because one message per level would take too long.
 
 Time is counted in instructions, and advances only after a GO. Three parts of QEMU would still make it depend on the

@@ -81,8 +81,8 @@ class Pico(EmulatedDevice):
     def stall(self, seconds: float) -> None:
         """Advance the time while the processor is stopped, as in a long flash operation.
 
-        The program starts such an operation, never in the middle of an I2C transfer. So this waits until there has been
-        no transfer for a millisecond.
+        A program never starts such an operation in the middle of an I2C transfer. So this method first waits until
+        there has been no transfer for a millisecond.
         """
         before = None
         while before != (begun := [dict(bus.transfers) for bus in self.board.buses]) or self._transferring():

@@ -197,7 +197,7 @@ def _without_interrupts() -> Iterator[None]:
     """A context that defers Ctrl-C to its end. If Dask is interrupted while it starts or connects, it prints pages of
     errors.
 
-    Processes started in it never receive Ctrl-C.
+    Processes started in this context never receive Ctrl-C.
     """
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield

@@ -2,8 +2,8 @@
 
 The device keeps eight regression blocks, in which the slope of the road during braking looks like forward. Whole logs
 let us filter out the road (see evidence.py). On simulated buses, which brake gently and seldom, this halves the error.
-On recorded drives neither method is always better. So if the device has an alignment, forward is the mean of both,
-weighted by their variances. Up is always the device's.
+On recorded drives sometimes one and sometimes the other method is better. If the device has an alignment, forward is
+the mean of both, weighted by their variances. Up is always the device's.
 """
 
 from dataclasses import dataclass

@@ -78,7 +78,7 @@ class Journal:
                 self._path.unlink()
         with contextlib.suppress(OSError):
             self._file.close()
-            if not self._end and os.name == "nt":  # which removes no open file
+            if not self._end and os.name == "nt":  # Windows cannot remove an open file
                 self._path.unlink()
 
     def __contains__(self, key: str) -> bool:

@@ -33,7 +33,7 @@ YAW_PRIOR_DEG = 0.4
 # The direction of sway: its change by roads on each side, 1 sigma in degrees. It is not used if its standard deviation
 # over both sides is above SWAY_WORST_DEG, or if it contradicts the braking by more than SWAY_SIGMAS
 SWAY_DEG, SWAY_WORST_DEG, SWAY_SIGMAS = 0.7, 5.0, 3.0
-SURELY_DEG = 8.0  # no two slopes of a road differ by more; during a log a smaller tilt must be sudden
+SURELY_DEG = 8.0  # slopes of roads differ by less; within a log a smaller tilt must be sudden
 TILT_DEG = 2.2  # a rotation with less tilt is one about the vertical
 STEP_S, STEP_GAP_S = 8.0, 1.0  # a sudden tilt is measured from STEP_GAP_S to STEP_S on each side of the moment
 STEP_SHARE = 0.7  # share of the tilt that must be sudden
@@ -88,7 +88,7 @@ def _search(logs: list[Intervals], whole: Blocks, share: float) -> list[Move]:
         score = move.sigmas / share / (BETWEEN_SIGMAS if between else SUDDEN_SIGMAS if tilted else WITHIN_SIGMAS)
         if move.angle_deg < LEAST_DEG or score < 1.0 or (best and score <= best[0]):
             continue
-        if not between and tilted and abs(turn[1]) < WITHIN_SIGMAS * sigma[1]:  # a slope of the road has no yaw
+        if not between and tilted and abs(turn[1]) < WITHIN_SIGMAS * sigma[1]:  # a slope of the road causes no yaw
             moment = _moment_of_jump(logs[move.log], move)
             if moment is None:
                 continue

@@ -33,7 +33,7 @@ def maybe(**changed: float) -> Channels:
     ride.up_g += changed.get("heavier", 0.0) * middle
     ride.forward_g += changed.get("drifting", 0.0) * np.where(middle, t - BEGIN_S, 0.0)
     ride.rolling[middle] = np.arange(np.count_nonzero(middle)) % 10 < changed.get("rolling", 0.0)
-    if "rested" in changed:  # in the ride there is a rest, that the filter found, with this force
+    if "rested" in changed:  # the filter found a rest in the ride, with this force
         rest = (t >= 5.0) & (t < 7.0)
         ride.resting[rest] = 1.0
         ride.up_g[rest] = changed["rested"]

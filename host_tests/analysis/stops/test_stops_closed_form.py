@@ -136,7 +136,7 @@ class TestStandstill:
     """The rest after the stop shows the slope and the gyro's reading at rest."""
 
     def disturbed(self, begin_s: float, end_s: float, off_g: float = 0.1) -> float:
-        """Deceleration found where the force is off from begin_s to end_s after the standstill at 18 s."""
+        """Return the deceleration found if the force is wrong from begin_s to end_s after the standstill at 18 s."""
         road = braking(20.0, 5.0)
         ride = road.channels()
         ride.forward_g[(road.t_s > 18.0 + begin_s - 0.01) & (road.t_s < 18.0 + end_s - 0.01)] += off_g
@@ -147,7 +147,7 @@ class TestStandstill:
         right = self.disturbed(9.0, 9.0)
         assert right == pytest.approx(5.0, rel=0.002)
         assert self.disturbed(2.56, 4.0) == pytest.approx(right, rel=1e-4)
-        # in between it counts as slope: 0.1 g for 1 of 2 s, 0.49 m/s2
+        # between these times the disturbance counts as slope: 0.1 g for 1 of 2 s, 0.49 m/s2
         assert self.disturbed(0.5, 1.5) == pytest.approx(right + 0.49, rel=0.02)
         assert self.disturbed(1.5, 2.5) == pytest.approx(right + 0.49, rel=0.02)
 

@@ -211,7 +211,7 @@ def sensor_kinetics(ride: Riding, semicolon: bool = False) -> dict[str, str]:
 
 
 def racechrono(ride: Riding, sign: float = 1.0, version: int = 3) -> str:
-    """Version 3: three lines of heads and some names twice; version 2: one line, units in brackets."""
+    """Version 3 has three header lines and repeats some names. Version 2 has one, with units in brackets."""
     force, rates = sign * ride.phone_g, np.degrees(ride.phone_rad)
     none = [""] * len(ride.t_s)
     speed = [f"{value:.2f}" for value in ride.speed_mps]

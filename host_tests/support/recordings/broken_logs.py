@@ -1,4 +1,4 @@
-"""Logs broken in many ways, each by a number: the same number breaks the same log in the same way."""
+"""Logs that are broken in many ways. The same number always breaks a log in the same way."""
 
 import contextlib
 import functools

@@ -7,7 +7,7 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 
-SCALE = 3755  # of the gyro's integers, as HERO cameras have it
+SCALE = 3755  # scale of the gyro's integers in HERO cameras
 
 
 def film(path: Path, seconds: float, fps: int = 10, size: str = "320x240", colour: str = "green") -> Path:

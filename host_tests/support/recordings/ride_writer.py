@@ -86,6 +86,6 @@ def begun(length, sequence=0, block=None):
 
 
 def ended(block):
-    """What the tools read of it."""
+    """Close the block and return what the tools read from it."""
     block.close()
     return block_reader.parse(bytes(block.buffer[: block.length]))

@@ -1,5 +1,5 @@
-"""Rides of both simulators with sloppy calibrations, with what the display shows of them. As a program: the table of
-tools/docs/accuracy.md, errors of the shown and of the smoothed lean."""
+"""Rides of both simulators with sloppy calibrations, and the lean that the display shows in them. As a program it
+prints the table of tools/docs/accuracy.md: errors of the shown and of the smoothed lean."""
 
 from dataclasses import dataclass
 

@@ -122,7 +122,7 @@ class Rider:
             for thread in Path(f"/proc/{process}/task").glob("*"):
                 if (thread / "comm").read_text().strip() == "DedicatedWorker":
                     fields = (thread / "stat").read_text().rsplit(")", 1)[1].split()
-                    ticks += int(fields[11]) + int(fields[12])  # in user mode, and in the kernel
+                    ticks += int(fields[11]) + int(fields[12])  # time in user mode and in the kernel
         return ticks / os.sysconf("SC_CLK_TCK")
 
 

@@ -20,7 +20,7 @@ from rich.console import Console
 from .evaluation import bands, integrity, integrity_report, picture, report, runs
 from .evaluation.estimators import missing
 
-FAULTS_SECONDS = 120.0  # of riding with each fault, unless another length is given
+FAULTS_SECONDS = 120.0  # default riding time with each fault
 _WIDTH = 110  # columns of a table not printed to a terminal
 
 

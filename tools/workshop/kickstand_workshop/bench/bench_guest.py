@@ -57,7 +57,7 @@ class TimedGc:
             return
         start = ticks_us()
         gc.collect()
-        app_module.fill_gaps(app_module.SINGLE_GAPS)  # as the app does after each of its collections
+        app_module.fill_gaps(app_module.SINGLE_GAPS)  # the app does the same after each collection
         if app.n_pauses < MAX_PAUSES:
             app.pauses[app.n_pauses] = min(ticks_diff(ticks_us(), start), 65535)
             app.n_pauses += 1
@@ -115,7 +115,7 @@ class MeasuredApp(app_module.App):
             raise Done
         self.took[turn] = took
         if self._spent:
-            self._out.write(self._spent_bytes)  # at once, because keeping it would use heap that is measured
+            self._out.write(self._spent_bytes)  # written at once: storing it would add to the measured heap
             self._clear()
         if self.count == HEAP_TURNS:
             self.heap_bytes = gc.mem_alloc() - self._allocated

@@ -48,7 +48,7 @@ def calibrated(log: Log, calibration: CalibrationFile) -> Samples:
 
 
 def trailing_mean(x: NDArray, seconds: float, rate_hz: float) -> NDArray[np.float64]:
-    """Mean of the last `seconds`, shorter at the start."""
+    """Mean over the last `seconds`. At the start the window is shorter."""
     n = max(round(seconds * rate_hz), 1)
     total = np.cumsum(np.concatenate((np.zeros((1, *x.shape[1:])), x)), axis=0)
     first = np.maximum(np.arange(1, len(x) + 1) - n, 0)

@@ -75,5 +75,5 @@ def gps_lean(made: SimulatedRide, rate_hz: float) -> NDArray[np.float64]:
 
 
 def leans(made: SimulatedRide) -> dict[str, NDArray[np.float64]]:
-    """By name: the oracle's lean, and the GPS formula's at each of GPS_HZ."""
+    """Return the leans by name: the oracle's, and the GPS formula's at each rate in GPS_HZ."""
     return {NAME: oracle(made), **{f"GPS {rate_hz:g} Hz": gps_lean(made, rate_hz) for rate_hz in GPS_HZ}}

@@ -28,7 +28,7 @@ TRIPS_WITH_A_BIKE = 8  # after this number of trips: another sensor, mounting an
 PART_SHARE = 0.5  # the sensor's errors over the data sheet's limits; the six positions have found offset and scale
 WHO_AM_I, RANGE_G = 0x68, 8
 WARM_TRIPS = 3  # in the first trips memory may grow: modules are imported when they are first needed
-MAX_GROWTH = 3000  # blocks of memory from the second minute of a trip to its end: recording a ride takes some hundred
+MAX_GROWTH = 3000  # memory blocks, from a trip's second minute to its end; recording a ride uses a few hundred
 
 
 @dataclass

@@ -68,7 +68,7 @@ def make_trip(chance: random.Random, speed: str | None, aligned: bool) -> Trip:
     again = aligned and chance.random() < 0.3
     if not aligned:
         presses += [(3.0, SHORT_S), (ride_s - 6.0, SHORT_S)]
-    elif again:  # through the menu, whose first entry it is
+    elif again:  # through the menu: the alignment is its first entry
         presses += [(2.0, LONG_S), (4.5, LONG_S), (7.0, SHORT_S), (ride_s - 6.0, SHORT_S)]
     # in most trips no presses, because they leave the page with the lean
     t_s = ride_s + chance.uniform(5, 40) if chance.random() < 0.4 else ride.seconds
