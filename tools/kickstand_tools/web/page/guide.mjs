@@ -66,7 +66,7 @@ export class Guide {
   #fault(kind, state) {
     if (!state.powered) {
       const how = this.#cut
-        ? "The power was cut after 40 bytes of the calibration were written. Is the old one still there?"
+        ? "The power was cut when 40 bytes of the calibration were written. Is the old one still there?"
         : "The board has no power: the display is dark.";
       return step(0, how, ["Switch it on", "power"]);
     }
@@ -95,7 +95,7 @@ export class Guide {
     const there = stand ? ON_STAND : UPRIGHT;
     const right = pose === this.#wanted;
     if (kind === "six" || (kind === "spoilt" && this.#wanted === "six")) {
-      return step(0, "For the six positions you turn the sensor by hand, so this page cannot show them. Hold the button to leave.");
+      return step(0, "For the six positions the sensor is turned by hand, which this page cannot show. Hold the button to leave.");
     }
     switch (kind) {
       case "unaligned":
@@ -138,7 +138,7 @@ export class Guide {
     if (kind !== "lean" && kind !== "menu" && !PAGES[kind]) return null;
     if (state.armed) return this.#save(kind, view, pose);
     if (kind === "menu") {
-      return step(0, "This is the menu. A press goes to the next entry, a long press chooses it. It closes after 20 seconds.");
+      return step(0, "The menu is open. A press goes to the next entry, a long press chooses it. It closes after 20 seconds.");
     }
     if (kind === "info") return step(0, `This page shows ${PAGES.info}. A press leaves it.`);
     const riding = pose === "ride";
@@ -181,7 +181,7 @@ export class Guide {
     else this.#shownSince ??= state.time;
     this.#sure = this.#shownSince !== null && state.time - this.#shownSince > SURE_S;
     if (Math.abs(state.lean_deg) > STRAIGHT_DEG) {
-      return step(4, "Not yet: the meter needs ten seconds of straight riding to find the errors of its sensor.", STRAIGHT);
+      return step(4, "Not yet: the meter needs ten seconds straight on to find the errors of its sensor.", STRAIGHT);
     }
     if (shown === null) {
       return step(4, "It rides straight. The meter is not sure yet, and says so instead of showing a wrong lean.");
