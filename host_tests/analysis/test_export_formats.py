@@ -177,7 +177,7 @@ def first_time(path: Path, form: str) -> float:
 @pytest.mark.parametrize(
     ("start_s", "now_s", "first_s"),
     [
-        (1e8, EVENING_S, 1e8),  # before 3 March 1973 a time is not taken for Unix time
+        (1e8, EVENING_S, 1e8),  # from 3 March 1973 on a time is Unix time
         (1e8 - 1.0, EVENING_S, EVENING_S - 2.0),  # three years and two months after power-on
         (0.0, EVENING_S + 0.985, EVENING_S - 2.0),  # 1.99 s before, in whole seconds
         (0.0, 1.0, 0.0),  # a clock that was never set: no time before 1970 is written

@@ -69,7 +69,7 @@ def share(ride: Channels) -> float:
         (
             {"heavier": 0.145, "rested": 1.1},
             {"heavier": 0.155, "rested": 1.1},
-        ),  # 0.05 g if a rest shows a force above 1 g
+        ),  # 0.05 g from the force at a rest
         ({"heavier": 0.055, "rested": 1.1}, {"heavier": 0.045, "rested": 1.1}),
     ],
 )
