@@ -25,7 +25,7 @@ ARROWS = {
     "imu": set(),
     "calibration": set(),
     "lean": {"calibration"},
-    "drive_alignment": set(),  # the app passes it the calibrations
+    "drive_alignment": set(),  # the app passes calibrations to this folder
     "speed": {"board"},
     "rides": {"board", "calibration", "console"},  # each block of a ride holds its calibration's record
     "live": {"calibration.transform"},  # the radio is in live.radio, and the message format does not depend on it

@@ -94,7 +94,7 @@ def test_bus_errors_are_shown_while_they_last(riding, inject, request):
 
 @pytest.mark.parametrize("riding", ["pico"], indirect=True)
 def test_stalled_processor_keeps_the_lean_right(riding):
-    """Stalls from 45 ms (a flash erase with interrupts off) up lose no sample. A stall of seconds overflows the
+    """A stall of 45 ms (a flash erase with interrupts off) or more loses no sample. A stall of seconds overflows the
     FIFO: the lost samples are counted, the sensor is not restarted, and the lean stays correct."""
     samples = SampleCount(riding.board.sensor)
     samples.begin()

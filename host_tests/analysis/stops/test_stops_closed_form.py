@@ -1,6 +1,6 @@
 """Stops without noise, compared with their closed form: the definition of a stop, and each figure.
 
-Nothing shakes, so a standstill is where the lean filter finds rest, or where the log's speed is 0.
+Nothing shakes, so a standstill is found only by the lean filter's rest or by a speed of 0 in the log.
 """
 
 import numpy as np
@@ -147,7 +147,7 @@ class TestStandstill:
         right = self.disturbed(9.0, 9.0)
         assert right == pytest.approx(5.0, rel=0.002)
         assert self.disturbed(2.56, 4.0) == pytest.approx(right, rel=1e-4)
-        # in between it counts as slope: 0.1 g for 1 of 2 s, 0.49 m/s2
+        # here it counts as slope: 0.1 g for 1 of 2 s is 0.49 m/s2
         assert self.disturbed(0.5, 1.5) == pytest.approx(right + 0.49, rel=0.02)
         assert self.disturbed(1.5, 2.5) == pytest.approx(right + 0.49, rel=0.02)
 
