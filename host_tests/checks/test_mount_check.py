@@ -154,8 +154,8 @@ def test_what_is_reported():
 
 
 def jerky(late_s: int = 0, sign: float = 1.0, seconds: int = 240, mps2: float = 2.0) -> Log:
-    """Simulate a random acceleration along z in each second, at 10 Hz. The speed comes at the start of each second,
-    `late` seconds late."""
+    """Simulate a random acceleration along z in each second, at 10 Hz. The log has a speed at the start of each
+    second, late_s late."""
     chance = np.random.default_rng(5)
     pushes = chance.normal(scale=mps2, size=seconds)
     speed_at = 30.0 + np.concatenate(([0.0], np.cumsum(pushes)))
@@ -213,8 +213,8 @@ def test_seconds_without_a_speed_or_without_samples():
 
 
 def swaying(yaw_dps: float, seconds: float) -> Log:
-    """Simulate yaw to and fro with a period of 4 s and an amplitude of yaw_dps. The bike rolls in proportion, as
-    motorcycles do."""
+    """Simulate yaw to and fro with a period of 4 s and an amplitude of yaw_dps. The roll rate has
+    half this amplitude and is a quarter of a period apart."""
     time = np.arange(0.0, seconds, 0.02)
     yaw, roll = yaw_dps * np.sin(np.pi / 2 * time), -0.5 * yaw_dps * np.cos(np.pi / 2 * time)
     return Log(time, np.tile([0.0, 1.0, 0.0], (len(time), 1)), np.column_stack((0 * yaw, yaw, roll)))

@@ -173,7 +173,7 @@ def test_a_turn_beyond_the_range_does_not_end_six_positions(faults, goes_on, tmp
 
 
 def ill(monkeypatch, change):
-    """Return sensors whose gyro reads change(rate) about x."""
+    """Make the gyro of every simulated sensor read change(rate) about x."""
     read = sensor_errors.Sensor.read
 
     def changed(self, motion, t_s):
