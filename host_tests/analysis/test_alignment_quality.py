@@ -19,24 +19,24 @@ from support import command
 from support.recordings import analysis_rides
 
 NONE = np.zeros(1)
-# "up" leans to the right of the bike's own; "forward" points up; "forward" points to the right
+# roll: "up" leans to the right of the bike's up; pitch: "forward" points up; yaw: "forward" points to the right
 AXES = {"roll": (0.0, 0.0, -1.0), "pitch": (1.0, 0.0, 0.0), "yaw": (0.0, 1.0, 0.0)}
 
 
 def turn(name, degrees):
-    """(3, 3): by which this angle of the alignment is off by so much."""
+    """Return the rotation (3, 3) that puts this angle of the alignment off by this many degrees."""
     return rotation_matrix(np.radians(degrees) * np.array(AXES[name]))
 
 
 def turned(calibration, name, degrees):
-    """The calibration with that angle off."""
+    """Return the calibration with this angle off."""
     matrix = turn(name, degrees) @ calibration.vehicle_from_sensor
     return dataclasses.replace(calibration, vehicle_from_sensor=matrix)
 
 
 @pytest.fixture(scope="module", params=["street", pytest.param("city", marks=pytest.mark.nightly)])
 def ride(request):
-    """Log of 100 samples a second with a speed, its true calibration and true lean."""
+    """Return a log of 100 samples per second with a speed, its true calibration and the true lean."""
     made = simulate_ride(request.param, seed=2, seconds=150.0)
     n = round(made.rate_hz / 100.0)
     readings = made.readings[: len(made.readings) // n * n].reshape(-1, n, 7).mean(axis=1)
@@ -48,7 +48,7 @@ def ride(request):
 
 
 def error_deg(ride, calibration, from_share=0.0):
-    """rms error of the shown lean while it is trusted and the bike moves."""
+    """Return the rms error of the displayed lean while it is trusted and the bike moves."""
     log, _, true, _ = ride
     shown = vehicle_channels(log, calibration)
     there = shown.trusted & (shown.resting < 0.5)
@@ -58,7 +58,7 @@ def error_deg(ride, calibration, from_share=0.0):
 
 @pytest.mark.parametrize(("name", "degrees"), [("yaw", 6.0), ("yaw", 15.0), ("pitch", 6.0), ("pitch", 12.0)])
 def test_yaw_and_pitch_cause_the_stated_lean_error(ride, name, degrees):
-    """In both directions, because an error may also compensate another one."""
+    """Both signs are tried, because one alignment error may compensate another."""
     usual = error_deg(ride, ride[1])
     more = [error_deg(ride, turned(ride[1], name, angle)) for angle in (degrees, -degrees)]
     cost = np.sqrt(max(0.0, np.mean(np.square(more)) - usual**2))
@@ -89,14 +89,14 @@ def test_calibrate_drive_corrects_yaw(ride):
 
 
 def with_calibration(ride, name, degrees, **changed):
-    """The path of a CAL.json in which that is wrong."""
+    """Return the path of a CAL.json with this error."""
     matrix = turn(name, degrees).tolist()
     return analysis_rides.calibration(ride.with_name(f"{name}.json"), vehicle_from_sensor=matrix, **changed)
 
 
 @pytest.fixture(scope="module")
 def scripted(tmp_path_factory):
-    """Straights and turns between standstills, with a speed each second."""
+    """Simulate straights and turns between standstills, with one speed per second."""
     segments = [script.upright(4)]
     for lean in 25, -30, 20:
         segments += [script.accelerate(16, 5), script.straight(6), script.turn(lean, 4), script.straight(5)]
@@ -126,7 +126,7 @@ def test_ride_without_straights_shows_no_alignment(tmp_path):
     ("notice", "fits"), [(Mirrored(), False), (LeftHanded(), False), (ForwardExchanged(False, "left", 0.0), True)]
 )
 def test_a_log_that_contradicts_its_calibration_is_not_judged(scripted, notice, fits):
-    """The angles of a mirrored log look right, but left and right are exchanged."""
+    """In a mirrored log the angles look right, but left and right are exchanged."""
     seen = overview(open_ride(scripted, with_calibration(scripted, "yaw", 0.0)))
     seen.notices.append(notice)
     assert ("not judged" not in report.words(seen).alignment) == fits
@@ -158,13 +158,13 @@ def test_report_gives_the_cost_of_an_error_and_the_remedy(scripted, name, degree
     most = {"yaw": yaw_cost_deg(degrees), "roll": max(0.0, degrees - 3.5), "pitch": 0.33}[name]
     assert cost == pytest.approx(most, abs=0.05)
     car = with_calibration(scripted, name, degrees, vehicle="car")
-    assert "lean_cost" not in report.as_data(overview(open_ride(scripted, car)))  # it has none to lose
+    assert "lean_cost" not in report.as_data(overview(open_ride(scripted, car)))  # a car has no lean to lose
 
 
 def test_alignment_is_good_if_fully_known_and_exact(scripted):
     seen = overview(open_ride(scripted, with_calibration(scripted, "yaw", 2.6)))
     assert report.words(seen).alignment.startswith("Alignment: good.")
-    dear = dataclasses.replace(seen.quality, pitch_deg=2.0)  # 0.14 and 0.17 degrees of lean
+    dear = dataclasses.replace(seen.quality, pitch_deg=2.0)  # these cost 0.14 and 0.17 degrees of lean
     for quality in (dataclasses.replace(seen.quality, yaw_deg=None), dear):
         said = report.words(dataclasses.replace(seen, quality=quality)).alignment
         assert said.startswith("Alignment: it seems off by ")

@@ -1,4 +1,4 @@
-"""Vectorised values equal the firmware's, step by step; thinning keeps the means."""
+"""Vectorised values equal the firmware's at every step, and thinning keeps the means."""
 
 from dataclasses import fields
 
@@ -32,7 +32,7 @@ def test_smoothed_ride_differs_only_in_its_lean(ride, course):
 
 
 def test_maxima_are_those_of_the_display(ride):
-    """For any division into blocks."""
+    """The maxima are the same for any division into blocks."""
     log = reader.read_log(ride.log)
     engine = replay_engine.Replay(ride.calibration.to_firmware())
     for row in log.rows():
@@ -41,7 +41,7 @@ def test_maxima_are_those_of_the_display(ride):
     whole = joined(list(ride.blocks()))
     for start in range(0, len(whole.t_s), 777):
         summary.add(whole.part(slice(start, start + 777)))
-    # the display's 150 ms begin every 75 ms, those of the summary with every sample
+    # the display's windows of 150 ms begin every 75 ms, those of the summary at every sample
     assert meter.max_left_deg - 0.01 < summary.left_deg.value < meter.max_left_deg + 0.5
     assert meter.max_right_deg - 0.01 < summary.right_deg.value < meter.max_right_deg + 0.5
     assert summary.left_deg.value > 25
@@ -76,12 +76,12 @@ def test_thinned_ride_is_the_mean_of_each_stretch(course, block):
         want = getattr(course, name)[: 4 * n].reshape(n, 4).mean(axis=1)
         assert np.allclose(getattr(thin, name)[:n], want)
     assert np.count_nonzero(~np.isnan(thin.speed_mps)) == np.count_nonzero(~np.isnan(course.speed_mps))
-    slow = course.part(slice(0, None, 10))  # of a slow log nothing is thinned
+    slow = course.part(slice(0, None, 10))  # a slow log is not thinned
     assert np.array_equal(joined(list(downsampled([slow], 0.02))).lean_deg, slow.lean_deg, equal_nan=True)
 
 
 def part(n=100, **changed) -> Channels:
-    """A second at 100 Hz, riding straight on, everything known."""
+    """Return one second at 100 Hz, straight ahead, with all values certain."""
     zero = np.zeros(n)
     columns = {field.name: zero for field in fields(Channels)}
     columns |= {"t_s": np.arange(n) / 100.0, "sure": np.ones(n)}
@@ -90,7 +90,7 @@ def part(n=100, **changed) -> Channels:
 
 
 def test_uncertain_lean_counts_only_as_uncertain():
-    """30 of 100 samples, with the largest values of the ride. A fallen bike also counts as uncertain."""
+    """The 30 uncertain samples of 100 have the largest values of the ride. A fallen bike also counts as uncertain."""
     sure = np.ones(100)
     sure[20:50] = 0.0
     lean = np.where(sure > 0.0, 32.0, 50.0)

@@ -25,7 +25,8 @@ pytest.importorskip("plotly")
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory) -> Overview:
-    """Only left turns, gentle acceleration and a hard stop; forward is 10 degrees off on purpose."""
+    """Return a ride with left turns only, gentle acceleration and a hard stop. Its forward is 10 degrees off on
+    purpose."""
     ride = analysis_rides.write(
         tmp_path_factory.mktemp("ride"),
         [script.upright(4), script.accelerate(15, 12), script.turn(-35, 5), script.brake(0, 3), script.wait(4)],
@@ -38,13 +39,13 @@ def seen(tmp_path_factory) -> Overview:
 
 @pytest.fixture(scope="module")
 def panels(seen):
-    """The axes of the picture by their titles."""
+    """Return the axes of the picture by their titles."""
     return {axes.get_title(loc="left").partition(",")[0]: axes for axes in picture.figure_of(seen).axes}
 
 
 @pytest.fixture(scope="module")
 def drawn(seen):
-    """The traces of the page by their names."""
+    """Return the traces of the page by their names."""
     return {trace["name"]: trace for trace in interactive.figure(charts(seen))["data"] if "name" in trace}
 
 
@@ -68,8 +69,8 @@ def test_lean_to_the_left_is_below_and_on_the_left(seen, panels, drawn):
 
 
 def test_chart_of_g_against_g_has_the_right_sides(seen, panels, drawn):
-    """The turn shows 0.7 g for 5 s, and its beginning and end. The stop shows 0.5 g for 3 s. Nothing is at the top
-    right."""
+    """The turn has 0.7 g for 5 s, plus its beginning and end. The stop has 0.5 g for 3 s. No point is above or on
+    the right."""
     (cells,) = (trace for trace in chart(seen, "g against").traces if isinstance(trace, CellMap))
     middle = (cells.edges[1:] + cells.edges[:-1]) / 2.0
     x, y = np.meshgrid(middle, middle)
@@ -87,7 +88,7 @@ def test_chart_of_g_against_g_has_the_right_sides(seen, panels, drawn):
 
 
 def test_the_straights_and_their_line(seen, panels, drawn):
-    """Forces to the left on the left; the line of the yaw goes through them."""
+    """Forces to the left are drawn on the left, and the line of the yaw goes through them."""
     _, dots, line = chart(seen, "Alignment").traces
     assert isinstance(dots, Dots) and isinstance(line, Line)
     assert dots.x == pytest.approx(-seen.quality.lateral_g)
@@ -123,7 +124,7 @@ def test_charts_of_car_and_speed_are_drawn_only_if_present(seen, car, speed):
 
 
 def test_charts_are_stacked_in_a_narrow_window(seen):
-    """In a wide one the last three are side by side and do not overlap."""
+    """In a wide window the last three charts are side by side and do not overlap."""
     for kind, last_row in (("layout", 3), ("narrow", 1)):
         drawn = interactive.figure(charts(seen))[kind]
         axes = [name.removeprefix("xaxis") for name in drawn if name.startswith("xaxis")]
@@ -136,7 +137,7 @@ def test_charts_are_stacked_in_a_narrow_window(seen):
 
 
 def test_unknown_values_are_not_drawn(seen):
-    """Nothing is sure enough; nor is an alignment drawn for another mount's calibration."""
+    """Uncertain values are not drawn, nor is an alignment if the calibration is of another mount."""
     made = replace(seen, notices=[UpOff(20.0, False)], summary=replace(seen.summary))
     made.summary.left_deg = made.summary.right_deg = made.summary.brake_g = made.summary.accel_g = Peak()
     assert title(made).endswith("lean as displayed -- left, -- right  ·  braking --, acceleration --")
@@ -147,7 +148,7 @@ def test_unknown_values_are_not_drawn(seen):
 
 @pytest.mark.parametrize("most", [(1.0, 1.0), (0.0, 6.0), (12.0, 11.0), (60.0, 60.0)])
 def test_labels_of_the_lean_histogram_do_not_overlap(seen, most):
-    """For any small lean."""
+    """The labels do not overlap however small the lean is."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -165,11 +166,11 @@ def test_labels_of_the_lean_histogram_do_not_overlap(seen, most):
     assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
     inside = axes.get_window_extent()
     assert max(box.x1 for box in boxes) < inside.x1 + 15
-    if max(most) > 6.0:  # smaller ones are in the middle
+    if max(most) > 6.0:  # the labels of smaller values are in the middle
         assert min(box.x0 for box in boxes) > inside.x0
     (corner,) = (text.get_window_extent() for text in axes.texts if "upright" in text.get_text())
     tops = [line.get_window_extent().y1 for line in axes.lines]
-    assert len(tops) == 2 and max(tops) < corner.y0  # no line through the words
+    assert len(tops) == 2 and max(tops) < corner.y0  # no line crosses the words
 
 
 def test_doubtful_lean_and_warnings_are_drawn(seen, tmp_path):
@@ -210,7 +211,7 @@ def test_an_envelope_keeps_every_peak():
 
 @pytest.mark.parametrize("points", [10_000, 500])
 def test_line_is_broken_in_a_gap(points):
-    """Readings are missing from 40 to 60 s, and the lean is not shown from 70 to 75."""
+    """Readings are missing from 40 to 60 s, and the lean is hidden from 70 to 75 s."""
     time = np.concatenate((np.arange(0.0, 40.0, 0.02), np.arange(60.0, 100.0, 0.02)))
     values = np.where((time > 70.0) & (time < 75.0), np.nan, 5.0)
     x, y = envelope(time, values, points, 1.0)
@@ -223,13 +224,13 @@ HUE_180 = np.array([[-0.574, 1.43, 0.144], [0.426, 0.43, 0.144], [0.426, 1.43, -
 
 
 def luminance(rgb):
-    """Relative luminance as in WCAG 2; rgb: 0 to 1."""
+    """Return the relative luminance as defined in WCAG 2. rgb: 0 to 1."""
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     return float(linear @ [0.2126, 0.7152, 0.0722])
 
 
 def test_rarest_g_is_visible_on_white_and_on_dark_paper(seen):
-    """The page inverts the charts in the dark. The rarest value has the scale's first colour."""
+    """The page inverts the charts in dark mode. The rarest value has the first colour of the scale."""
     (cells,) = [trace for trace in interactive.figure(charts(seen))["data"] if trace["type"] == "heatmap"]
     logs = np.array([[np.nan if value is None else value for value in row] for row in cells["z"]])
     assert cells["zmin"] == pytest.approx(np.nanmin(logs), abs=0.001)

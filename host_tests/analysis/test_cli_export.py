@@ -1,4 +1,5 @@
-"""kickstand export: every sample is in the file; refusals. The rest: test_export_formats.py."""
+"""Test `kickstand export`: every sample is in the file, and unusable input is refused. The contents of each format
+are tested in test_export_formats.py."""
 
 from pathlib import Path
 
@@ -18,7 +19,7 @@ def ride(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def shown(ride) -> np.ndarray:
-    """The result of replay."""
+    """Return what replay shows."""
     out = ride.with_name("LEAN.csv")
     command.works("replay", ride, "--calibration", ride.with_name("RIDE.cal.json"), "--out", out)
     return analysis_rides.table(out)
@@ -32,7 +33,7 @@ def export(ride, form, out, *more) -> Path:
 
 @pytest.mark.parametrize("form", ["parquet", "csv.gz"])
 def test_csv_and_parquet_have_every_sample(ride, shown, tmp_path, form):
-    """Vectorised forces, rates and formula are those of the firmware's own replay."""
+    """The vectorised forces, rates and formula equal those of the firmware's replay."""
     read = pandas.read_parquet if form == "parquet" else pandas.read_csv
     got = read(export(ride, form.partition(".")[0], tmp_path / f"out.{form}", "--live"))
     given = analysis_rides.table(ride)
@@ -41,13 +42,15 @@ def test_csv_and_parquet_have_every_sample(ride, shown, tmp_path, form):
     for name in "lean_deg", "lean_sigma_deg", "left_g", "up_g", "forward_g", "yaw_rate_dps", "roll_rate_dps":
         near = 1e-3 if name.endswith("deg") else 2e-4
         assert np.allclose(got[name], shown[name], atol=near, equal_nan=True), name
-    steep = np.abs(shown["left_g"] ** 2 + shown["up_g"] ** 2 - 1.0) < 1e-4  # 32-bit floats move the square root
+    steep = (
+        np.abs(shown["left_g"] ** 2 + shown["up_g"] ** 2 - 1.0) < 1e-4
+    )  # near 0 the square root magnifies the rounding of 32-bit floats
     assert np.allclose(got["lean_formula_deg"][~steep], shown["lean_formula_deg"][~steep], atol=0.02)
     lean = np.radians(shown["lean_deg"])
     s = shown["left_g"] * np.cos(lean) - shown["up_g"] * np.sin(lean)
     assert np.allclose(got["lateral_g"], s, atol=1e-4)
     assert np.array_equal(got["speed_mps"].notna(), ~np.isnan(given["speed_mps"]))
-    assert got["temp_c"].isna().all()  # the log has none
+    assert got["temp_c"].isna().all()  # the log has no temperatures
 
 
 def test_a_car_has_no_lean_as_in_replay(ride, tmp_path):
@@ -60,7 +63,7 @@ def test_a_car_has_no_lean_as_in_replay(ride, tmp_path):
 
 
 def test_ride_that_cannot_be_exported_is_refused(ride, tmp_path, monkeypatch):
-    """Without a calibration beside it, or with one that is not aligned; without pyarrow."""
+    """A ride is refused without a calibration, with one that is not aligned, and without pyarrow."""
     alone = tmp_path / "alone.csv"
     alone.write_bytes(ride.read_bytes())
     empty = tmp_path / "empty.csv"

@@ -26,7 +26,7 @@ def ride(tmp_path_factory):
 
 
 def printed(seen):
-    """The lines of the report in a terminal of 80 columns."""
+    """Return the lines of the report in a terminal of 80 columns."""
     console = Console(width=80, record=True, file=io.StringIO())
     console.print(report.page(seen))
     return console.export_text().split("\n")
@@ -46,7 +46,7 @@ def test_a_report_has_the_ride_in_figures(ride):
     (stop,) = data["stops"]
     assert stop["speed_from"] == "log"
     assert stop["initial_speed_mps"] == pytest.approx(15.0, abs=0.3)
-    assert stop["distance_m"] == pytest.approx(21.0, abs=1.5)  # its start has no exact definition
+    assert stop["distance_m"] == pytest.approx(21.0, abs=1.5)  # the start of a stop has no exact definition
     assert abs(stop["side_m"]) < 0.2
     assert data["alignment"]["gravity_g"] == pytest.approx(1.0, abs=0.002)
     assert abs(data["alignment"]["roll_deg"]) < 0.5
@@ -59,7 +59,7 @@ def test_unknown_figures_are_not_reported(ride, tmp_path):
     seen = overview(open_ride(ride, up_is_back))
     assert [notice.code for notice in seen.notices] == ["up-off"]
     total = seen.summary
-    total.left_deg = total.right_deg = total.brake_g = total.accel_g = Peak()  # as where nothing was sure enough
+    total.left_deg = total.right_deg = total.brake_g = total.accel_g = Peak()  # as if no value was certain enough
     rows = {name: value for name, value, _ in report.words(seen).ride}
     names = "Max left", "Max right", "Over 30°", "Over 40°", "Max braking", "Max acceleration"
     assert [rows[name] for name in names] == ["--"] * 6
@@ -90,7 +90,7 @@ def test_page_shows_the_same_report(ride, monkeypatch):
 
 @pytest.mark.parametrize(("unsure_s", "line"), [(0.9, ""), (1.0, "0:01"), (65.4, "1:05")])
 def test_uncertain_time_is_reported_from_one_second(ride, unsure_s, line):
-    """The page shows it from one second on; the JSON always has it."""
+    """The page shows uncertain time from one second on. The JSON always has it."""
     seen = overview(open_ride(ride, None))
     seen.summary.not_sure_s = unsure_s
     said = [row.split()[3:] for row in printed(seen) if row.startswith("Lean not sure")]
@@ -112,7 +112,7 @@ def test_report_without_a_speed_may_know_no_stops(tmp_path):
 
 
 def turned_round(directory, **changed):
-    """CAL.json with forward and left reversed."""
+    """Write a CAL.json with forward and left reversed."""
     matrix = [[-1, 0, 0], [0, 1, 0], [0, 0, -1]]
     return analysis_rides.calibration(
         directory / "changed.json", vehicle_from_sensor=matrix, kickstand_side="left", **changed
@@ -138,7 +138,7 @@ def test_a_kickstand_on_the_other_side_is_noticed(ride, tmp_path):
 
 
 def test_stop_shown_only_by_the_speed_is_reported(ride, tmp_path):
-    """Forward is across: neither right nor exchanged."""
+    """Forward points across the bike, so it is neither right nor reversed."""
     cal = analysis_rides.calibration(tmp_path / "changed.json", vehicle_from_sensor=[[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
     said = command.works("report", ride, "--calibration", cal, "--live").out
     assert "No stop" not in said
@@ -153,7 +153,7 @@ def test_picture_and_page_are_complete(ride, tmp_path):
     assert struct.unpack(">2I", png[16:24]) == (1100, 950)
     html = (out / "RIDE.html").read_text()
     assert "Plotly.newPlot" in html
-    assert not re.search(r"<(script|link)[^>]*(src|href)=", html)  # all of it is inside
+    assert not re.search(r"<(script|link)[^>]*(src|href)=", html)  # the page loads nothing from elsewhere
     assert sorted(path.name for path in out.iterdir()) == ["RIDE.html", "RIDE.png"]
 
 

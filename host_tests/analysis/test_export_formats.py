@@ -47,7 +47,7 @@ NOWHERE = dict.fromkeys(("lat_deg", "lon_deg", "utc_s"), np.nan)
 
 
 def block(*times_s: float, **changed: float) -> Channels:
-    """Samples with VALUES in every channel, except the changed ones."""
+    """Return samples with VALUES in every channel, except the changed channels."""
     columns = {"t_s": np.array(times_s)}
     columns |= {name: np.full(len(times_s), value) for name, value in (VALUES | changed).items()}
     return Channels(*(columns[field.name] for field in fields(Channels)))
@@ -69,7 +69,8 @@ def test_csv_to_the_letter(tmp_path):
 
 
 def test_racechrono_to_the_letter(tmp_path):
-    """Elapsed time from the first sample; z is forward; speed and position only where there are new ones."""
+    """t_s is the elapsed time since the first sample, z points forward, and speed and position are written only when
+    new."""
     none = block(0.5, speed_mps=np.nan, **NOWHERE)
     text = written(export_racechrono.write, tmp_path / "x", block(0.25), none)
     assert text == expected("ride.racechrono.csv")
@@ -77,7 +78,7 @@ def test_racechrono_to_the_letter(tmp_path):
 
 def test_vbo_to_the_letter(tmp_path):
     """10.5 m/s are 37.8 km/h. The clock starts again at midnight. Minutes of longitude are positive in the west."""
-    evening = EVENING_S + 6400.0 - 0.25  # the second before midnight
+    evening = EVENING_S + 6400.0 - 0.25  # one second before midnight
     moved = block(0.25, 61.5, 3661.75)
     moved.lon_deg[0] += 1e-5  # 0.68 m to the east
     moved.lat_deg[2] = moved.lon_deg[2] = np.nan
@@ -112,7 +113,8 @@ def test_vbo_has_a_channel_with_gaps(tmp_path):
 
 
 def test_vbo_keeps_the_heading_at_standstill(tmp_path):
-    """North, east, and in the next block the same place and one 0.8 mm north of it, like a receiver's noise."""
+    """The block goes north, then east. The next block repeats the last place, then moves 0.8 mm north like receiver
+    noise."""
     ridden, stood = block(0.0, 1.0, 2.0), block(3.0, 4.0)
     ridden.lat_deg[1:] += 1e-5
     ridden.lon_deg[2] += 1e-5
@@ -123,18 +125,18 @@ def test_vbo_keeps_the_heading_at_standstill(tmp_path):
 
 
 RATE_HZ = 100.0
-SQUARE = CalibrationFile(aligned=True, vehicle="car")  # sensor axes left, up, forward: its readings are the vehicle's
+SQUARE = CalibrationFile(aligned=True, vehicle="car")  # sensor axes left, up, forward: the same as the vehicle's axes
 
 
 def squarely(seconds: float = 2.0, start_s: float = 0.0, speed_mps=()) -> Log:
-    """Braking in a left turn, with a different reading on each axis."""
+    """Simulate braking in a left turn, with a different reading on each axis."""
     n = round(seconds * RATE_HZ)
     force, rate = np.tile([0.2, 1.0, -0.4], (n, 1)), np.tile([5.0, 7.0, 9.0], (n, 1))
     return Log(start_s + np.arange(n) / RATE_HZ, force, rate, np.asarray(speed_mps, dtype=float))
 
 
 def test_a_left_turn_under_braking_has_the_signs_of_each_format(tmp_path):
-    """Rates about x left, y up, z forward are positive as the gyro has them; nose up is the other way round x."""
+    """Rates about x left, y up and z forward have the gyro's sign, except that nose up is negative about x."""
     ride = open_ride(squarely(), SQUARE)
     out = tmp_path / "out"
     export(ride, "racechrono", out)
@@ -143,7 +145,7 @@ def test_a_left_turn_under_braking_has_the_signs_of_each_format(tmp_path):
     expected = {"lateral_acc": 0.2, "longitudinal_acc": -0.4, "x_acc": 0.2, "y_acc": 1.0, "z_acc": -0.4}
     expected |= {f"{axis}_rate_of_rotation": dps for axis, dps in zip("xyz", (5.0, 7.0, 9.0))}
     assert found == pytest.approx(expected, abs=1e-3)
-    assert row["lean_angle"] == ""  # a car has none
+    assert row["lean_angle"] == ""  # a car has no lean
     export(ride, "vbo", out)
     cells = [float(cell) for cell in out.read_text().split("\n")[-2].split(" ")]
     assert cells[7:9] == [-0.4, 0.2]  # long accel > 0 forward, lat accel > 0 in a left turn
@@ -163,7 +165,7 @@ def test_exported_lean_is_smoothed_unless_live(tmp_path):
 
 
 def first_time(path: Path, form: str) -> float:
-    """Unix time of the first row; for vbo within the day."""
+    """Return the Unix time of the first row. For vbo it is the time of day."""
     lines = path.read_text().split("\n")
     if form == "racechrono":
         return float(lines[lines.index("") + 4].partition(",")[0])
@@ -175,10 +177,10 @@ def first_time(path: Path, form: str) -> float:
 @pytest.mark.parametrize(
     ("start_s", "now_s", "first_s"),
     [
-        (1e8, EVENING_S, 1e8),  # 3 March 1973: Unix time
+        (1e8, EVENING_S, 1e8),  # from 3 March 1973 on a time is Unix time
         (1e8 - 1.0, EVENING_S, EVENING_S - 2.0),  # three years and two months after power-on
         (0.0, EVENING_S + 0.985, EVENING_S - 2.0),  # 1.99 s before, in whole seconds
-        (0.0, 1.0, 0.0),  # a computer whose clock was never set: not before 1970
+        (0.0, 1.0, 0.0),  # a clock that was never set: no time before 1970 is written
     ],
 )
 def test_log_in_memory_without_a_clock_ends_now(tmp_path, monkeypatch, form, start_s, now_s, first_s):
@@ -188,7 +190,7 @@ def test_log_in_memory_without_a_clock_ends_now(tmp_path, monkeypatch, form, sta
 
 
 def test_every_row_of_a_vbo_has_a_speed(tmp_path):
-    """Between two values speeds are interpolated; elsewhere the format leaves gaps."""
+    """Speeds between two values are interpolated. Outside them the format leaves gaps."""
     speed = np.full(200, np.nan)
     speed[[50, 150]] = 10.0, 20.0
     ride = open_ride(squarely(speed_mps=speed), SQUARE)
@@ -203,7 +205,7 @@ def test_every_row_of_a_vbo_has_a_speed(tmp_path):
 
 @pytest.mark.parametrize(("form", "rows"), [("csv", 400), ("parquet", 400), ("racechrono", 400), ("vbo", 201)])
 def test_vbo_has_at_most_100_rows_per_second(tmp_path, form, rows):
-    """The written rows are counted, for any blocks of the log."""
+    """The number of written rows is right for any division of the log into blocks."""
     if form == "parquet":
         pytest.importorskip("pyarrow")
     n = 400
@@ -217,7 +219,7 @@ def test_vbo_has_at_most_100_rows_per_second(tmp_path, form, rows):
 @pytest.mark.parametrize("start_s", [1e8, 1e8 + 0.0043, 1e8 + 0.00065])
 @pytest.mark.parametrize(("form", "step_s", "columns"), [("racechrono", 0.001, (0, 3)), ("vbo", 0.01, (1,))])
 def test_no_time_is_written_twice(tmp_path, form, step_s, columns, start_s):
-    """Under one step apart, also on both sides of a step, and in the middle between two; every sample is counted."""
+    """Times less than one step apart keep their order, and every sample is counted."""
     t_s = step_s * np.array([0.0, 0.96, 1.04, 2.5, 3.5, 4.5, 5.49, 5.51, 6.4, 7.0, 8.0, 9.96, 10.04, 10.5])
     log = Log(t_s, np.tile([0.0, 1.0, 0.0], (len(t_s), 1)), np.zeros((len(t_s), 3)), start_s=start_s)
     notices = []
@@ -230,7 +232,7 @@ def test_no_time_is_written_twice(tmp_path, form, step_s, columns, start_s):
 
 
 def test_progress_and_notices_are_passed_on(tmp_path):
-    """Of a ride whose readings freeze for two seconds."""
+    """The readings of this ride freeze for two seconds."""
     n = 3000
     force, rate = np.tile([0.0, 1.0, 0.0], (n, 1)), np.zeros((n, 3))
     rate[200::2] += 1e-4

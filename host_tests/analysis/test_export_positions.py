@@ -1,4 +1,4 @@
-"""A ride's positions in the files of other programs, read back by the programs' own rules."""
+"""Exported positions are read back by the rules of the programs that use the files."""
 
 import functools
 from dataclasses import replace
@@ -17,8 +17,8 @@ from support.recordings import app_exports
 
 gpxpy = pytest.importorskip("gpxpy")
 pandas = pytest.importorskip("pandas")
-START_S = app_exports.START_UTC_S + 0.004  # milliseconds matter
-HZ = 5  # positions
+START_S = app_exports.START_UTC_S + 0.004  # not a whole second, because exports must keep milliseconds
+HZ = 5  # positions per second
 ALIGNED = api.CalibrationFile(aligned=True)
 DEGREE_M = np.radians(app_exports._EARTH_M)
 
@@ -43,7 +43,7 @@ def exported(form: str, tmp_path: Path, ride: api.Log | api.Stretch | None = Non
 
 
 def away_m(lat, lon, t_s) -> np.ndarray:
-    """Distance of these places from the ride's true ones at these times."""
+    """Return the distance in metres between these places and the ride's true places at these times."""
     ride = app_exports.riding()
     north = (np.asarray(lat) - np.interp(t_s, ride.t_s, ride.lat_deg)) * DEGREE_M
     east = (np.asarray(lon) - np.interp(t_s, ride.t_s, ride.lon_deg)) * DEGREE_M * np.cos(np.radians(52.5))
@@ -51,7 +51,7 @@ def away_m(lat, lon, t_s) -> np.ndarray:
 
 
 def values(points, name: str) -> np.ndarray:
-    """The numbers in the extensions of track points by the name of the element, NaN where there is none."""
+    """Return the numbers in the track points' extensions by element name. A missing number is NaN."""
     found = []
     for point in points:
         elements = [one for part in point.extensions for one in part.iter() if one.tag.endswith("}" + name)]
@@ -79,7 +79,7 @@ def test_gpx_has_all_positions_with_time_speed_and_lean(tmp_path):
 
 
 def test_uncertain_lean_is_left_out_of_a_track(tmp_path):
-    """A log that begins in a turn: the lean is unknown for some seconds. The positions are there."""
+    """The log begins in a turn, so the lean is unknown for some seconds. The positions are kept."""
     later = log().part(log().t_s > 7.5)
     gpx = gpxpy.parse(exported("gpx", tmp_path, later).read_text())
     points = [point for segment in gpx.tracks[0].segments for point in segment.points]
@@ -120,7 +120,7 @@ def test_vbo_interpolates_positions_for_every_row(tmp_path):
 
 @pytest.mark.parametrize("form", ["gpx", "racechrono", "vbo"])
 def test_time_of_the_satellites_is_preferred(tmp_path, form):
-    """A log whose own clock was set wrong, and a stretch of a log that begins within a second without a position."""
+    """The log's own clock was set wrong, and one stretch of the log begins without a position for up to a second."""
     for ride in (log(1.2e9), api.Stretch(log(), 12.5, 25.0)):
         out = exported(form, tmp_path, ride)
         if form == "gpx":
@@ -150,7 +150,7 @@ def test_a_track_across_180_degrees_goes_the_short_way():
 
 
 def test_last_position_of_a_stretch_is_kept():
-    """Their mean across 180 degrees would be on the other side of the earth."""
+    """The mean of two positions across the meridian of 180 degrees would be on the other side of the earth."""
     few = log().part(log().t_s < 0.1)
     few.lon_deg[:] = np.nan
     few.lat_deg[:], few.lon_deg[3:6], few.utc_s[2] = -10.0, (179.9999, -179.9999, -179.9998), START_S

@@ -1,4 +1,5 @@
-"""The map in the page of a ride: in metres, north up, the sides in their colours, and linked with the charts."""
+"""The map on a ride's page is in metres, with north up and the sides in their colours, and is linked with the
+charts."""
 
 import functools
 import json
@@ -21,7 +22,8 @@ MOTORCYCLE = api.CalibrationFile(aligned=True)
 
 @functools.cache
 def seen(lat_deg: float = 52.5, lon_deg: float = 13.4, gap: bool = False, car: bool = False) -> Overview:
-    """Half a minute from this place on, with a position each half second; gap: none from 10 to 16 s."""
+    """Simulate half a minute from this place on, with a position every half second. gap: leave out positions from 10
+    to 16 s."""
     ride = app_exports.riding().every(2)
     known = np.arange(len(ride.t_s)) % 50 == 3
     if gap:
@@ -50,7 +52,7 @@ def test_the_map_has_the_shape_of_its_track_within_limits(east_m, north_m, shape
 
 @pytest.mark.parametrize("place", [(-33.9, 151.2), (69.6, 18.9), (47.6, 179.999), (-0.001, 0.001)])
 def test_metre_of_the_map_is_right_in_both_directions(place):
-    """At every latitude, on both sides of the equator and across the meridian of 180 degrees."""
+    """A metre is right at every latitude, on both sides of the equator and across the meridian of 180 degrees."""
     found = points_of(*place)
     ride = app_exports.riding()
     north = (ride.lat_deg - ride.lat_deg[0]) * np.radians(EARTH_M)
@@ -60,12 +62,12 @@ def test_metre_of_the_map_is_right_in_both_directions(place):
         assert np.max(np.abs(got - got[0] - (want - want[0]))) < 0.5
     moved = np.hypot(np.diff(found.east_m), np.diff(found.north_m))
     assert np.sum(moved) == pytest.approx(np.sum(np.hypot(np.diff(east), np.diff(north))), rel=0.01)
-    assert np.min(moved) > 0.3  # where the bike stands there is one point
+    assert np.min(moved) > 0.3  # a standstill gives only one point
 
 
 def test_map_shows_lean_and_speed_at_each_moment():
     _, dots = track_map.figure(points_of(car=True), seen(car=True))["data"]
-    assert isinstance(dots["marker"]["color"], str) and len(dots["x"]) > 50  # a car's track has no lean
+    assert isinstance(dots["marker"]["color"], str) and len(dots["x"]) > 50  # the track of a car has no lean
     found, channels = points_of(), seen().course
     lean = np.interp(found.t_s, channels.t_s, channels.lean_deg)
     known = np.isfinite(found.lean_deg)
@@ -109,7 +111,7 @@ def page_of(tmp_path: Path, which: Overview, tiles: bool = False) -> str:
 
 @pytest.mark.parametrize("positions", [0, 1])
 def test_without_positions_there_is_no_map(tmp_path, positions):
-    """A single position is not a track."""
+    """One position is not a track."""
     course = seen().course
     places = {name: np.where(np.arange(len(course.t_s)) < positions, 5.0, np.nan) for name in ("lat_deg", "lon_deg")}
     html = page_of(tmp_path, replace(seen(), course=replace(course, **places)))
@@ -131,7 +133,7 @@ def test_page_loads_nothing_unless_tiles_are_requested(tmp_path):
 
 @pytest.mark.parametrize("place", [(52.5, 13.4), (-33.9, 151.2), (47.6, -0.01)])
 def test_tiles_match_the_track(place):
-    """The number of the start's tile by the map's metres, and by the formula of slippy maps."""
+    """The tile of the start has the same number by the map's metres and by the formula of slippy maps."""
     found = points_of(*place)
     tiles = page.tiles_at(found)
     size = tiles["world_m"] / 2**15
@@ -151,7 +153,7 @@ _POINT = """() => {
 def test_in_a_browser_chart_and_map_show_the_same_moment(tmp_path, chromium):
     page_of(tmp_path, seen())
     view = chromium.new_page(viewport={"width": 1300, "height": 800})
-    view.set_default_timeout(120_000)  # a busy machine draws late
+    view.set_default_timeout(120_000)  # on a busy machine drawing is slow
     asked, errors = [], []
     view.on("request", lambda request: asked.append(request.url))
     view.on("pageerror", lambda error: errors.append(str(error)))

@@ -13,7 +13,7 @@ from support.recordings import analysis_rides
 
 
 def standing(seconds, shake_g, shake_dps, speed_mps=np.nan, bias_dps=0.0):
-    """A standing bike whose engine shakes it by this much, rms."""
+    """Simulate a bike on its wheels whose engine shakes it with this rms."""
     count = round(100 * seconds)
     random = np.random.default_rng(2)
     force = [0.0, 1.0, 0.0] + random.normal(0.0, shake_g, (count, 3))
@@ -40,14 +40,14 @@ def test_standing_bike_is_not_riding(log):
 
 
 def test_knock_at_the_start_is_not_riding():
-    """Like the hand that switches it on: 0.4 g for 0.02 s, which are 0.008 g over a second."""
+    """A hand that switches the device on knocks it with 0.4 g for 0.02 s, an average of 0.008 g over a second."""
     log = standing(40, 0.05, 1.5)
     log.accel_g[:2, 2] = 0.4
     assert words_of(log).ride[0][2] == "riding 0:00"
 
 
 def test_riding_time_excludes_standing(tmp_path):
-    """Of 37 s, four before and four after the ride are standing; with a speed and without."""
+    """The bike stands for four of the 37 s before and four after the ride. The result is the same without a speed."""
     for speed_hz in (0, 5):
         said = words_of(analysis_rides.short(tmp_path, speed_hz=speed_hz))
         minutes, seconds = said.ride[0][2].removeprefix("riding ").split(":")
@@ -58,7 +58,7 @@ def test_riding_time_excludes_standing(tmp_path):
 
 
 def test_a_speed_that_is_always_0_hides_no_ride(tmp_path):
-    """A broken wheel contact gives such a log. Its riding time equals that of a ride without a speed."""
+    """A broken wheel contact gives such a speed. The riding time is then computed as without a speed."""
     log = read_log(analysis_rides.short(tmp_path))
     without = words_of(log)
     log.speed_mps[::20] = 0.0
@@ -68,7 +68,7 @@ def test_a_speed_that_is_always_0_hides_no_ride(tmp_path):
 
 
 def test_straight_stretch_without_speed_counts_as_riding():
-    """On a rough road at constant speed: this does not prove that a whole log stood still."""
+    """A bike at constant speed on a rough road does not prove that it stood still for a whole log."""
     assert words_of(Stretch(standing(40, 0.05, 1.5), 5.0, 30.0)).too_little == ""
 
 

@@ -29,7 +29,7 @@ def test_example_in_each_docstring_runs(name):
 
 
 def test_pydoc_lists_the_promised_functions():
-    """The list omits names that a module without __all__ only imports."""
+    """pydoc leaves out names that a module without __all__ only imports."""
     shown = pydoc.plain(pydoc.render_doc(api))
     for name in ("import_recording", "fit_ride", "open_ride", "export", "simulate_ride"):
         assert re.search(rf"^ +{name}(\(| = )", shown, re.M), name
@@ -38,7 +38,7 @@ def test_pydoc_lists_the_promised_functions():
 
 @pytest.fixture(scope="module")
 def directory(tmp_path_factory):
-    """A simulated ride with its poses, calibrated by the functions."""
+    """Return the folder of a simulated ride and its poses, calibrated by the functions under test."""
     made = tmp_path_factory.mktemp("ride")
     simulate("street", 1, made, seconds=60.0, speed=True)
     six = api.fit_six_positions([made / f"POSE_{k}.csv" for k in range(1, 8)])
@@ -56,7 +56,7 @@ def test_nothing_is_printed(directory, capfd):
     with pytest.raises(api.RefusedInput, match="only 2 of 5 braking events"):
         api.fit_drive([log], calibration, progress=lambda done, total: seen.append((done, total)))
     assert tuple(capfd.readouterr()) == ("", "")
-    assert [done == total for done, total in seen].count(True) == 3  # each ends with all done
+    assert [done == total for done, total in seen].count(True) == 3  # each progress bar ends at its total
 
 
 def test_any_source_gives_the_same_log(directory):
@@ -80,7 +80,7 @@ def test_any_source_gives_the_same_log(directory):
 
 
 def test_stops_and_summary_of_arrays_match_the_report(directory):
-    """For whole logs or blocks, files or arrays."""
+    """The figures match for whole logs and blocks, and for files and arrays."""
     channels = api.vehicle_channels(api.read_log(directory / "RIDE.csv"), directory / "RIDE.cal.json")
     seen = api.overview(api.open_ride(directory / "RIDE.csv"))
     assert seen.stops == api.find_stops(channels) != []

@@ -1,4 +1,4 @@
-"""Notices and refusals: each has a sentence, and what to do in the words of a terminal and of a page."""
+"""Each notice and refusal is a sentence and says what to do, in the words of a terminal and of a page."""
 
 import json
 import pickle

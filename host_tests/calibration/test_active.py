@@ -1,4 +1,4 @@
-"""The calibration in use: loading, saving and using it, and saving the trim to flash."""
+"""The active calibration: loading, applying, saving, and writing the trim to flash."""
 
 import pytest
 from kickstand.calibration.parameters import Calibration
@@ -33,7 +33,7 @@ class Chip:
 
 @pytest.fixture
 def made(tmp_path, monkeypatch):
-    """An ActiveCalibration created at 0 ms, its meter, and the arguments of changed()."""
+    """Return an ActiveCalibration created at 0 ms, its meter, and the arguments of its calls to changed()."""
     monkeypatch.chdir(tmp_path)
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):
         from kickstand.calibration.active import ActiveCalibration
@@ -84,7 +84,8 @@ def test_save_replaces_and_refine_corrects(made):
 
 
 def test_the_trim_is_saved_once_a_minute_at_most(made):
-    """Because flash wears. Not in the first minute. If there was nothing to save, the next chance is used."""
+    """Each write wears the flash. The trim is not saved in the first minute. If nothing changed, it is saved at the
+    next chance."""
     active, meter, _ = made
     active.chip_started(Chip())
     active.save(aligned())

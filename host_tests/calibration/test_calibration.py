@@ -1,4 +1,4 @@
-"""Counts to g, the pose capture, the six-position fit."""
+"""Conversion of counts to g, the pose capture, and the six-position fit."""
 
 import numpy as np
 import pytest
@@ -14,14 +14,14 @@ AXES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0,
 
 
 def tipped(direction, angle_deg, rng):
-    """The direction rotated by an angle about a random axis at a right angle to it."""
+    """Return the direction rotated by an angle about a random axis perpendicular to it."""
     across = np.cross(direction, rng.normal(size=3))
     across /= np.linalg.norm(across)
     return np.asarray(direction) * np.cos(np.radians(angle_deg)) + across * np.sin(np.radians(angle_deg))
 
 
 def worst_lean_error_deg(offset, slope, true_offset, true_slope, rng):
-    """Largest angle between true and calibrated gravity over random poses."""
+    """Return the largest angle between true and calibrated gravity over random poses."""
     up = np.array([random_rotation(rng)[0] for _ in range(200)])
     got = (up - true_offset) / true_slope * slope + offset
     cosine = np.sum(got * up, axis=1) / np.linalg.norm(got, axis=1)
@@ -49,7 +49,7 @@ def test_closed_form_is_equations_16_and_17(engine):
 @pytest.mark.parametrize("engine", engines.ENGINES)
 @pytest.mark.parametrize("tilt", [0, 10, 19])
 def test_the_fit_needs_no_exact_poses(engine, tilt):
-    """The closed form errs by 0.6 degrees with poses 10 degrees off; the fit must stay near 0.1."""
+    """With poses 10 degrees off, the closed form has an error of 0.6 degrees. The fit stays near 0.1."""
     rng = np.random.default_rng(tilt)
     calls, truths = [], []
     for _ in range(15):
@@ -97,7 +97,7 @@ def test_every_side_is_found(engine):
 
 
 def still(rng, count=300, accel=(0.1, 0.97, -0.2), gyro=(12.0, -3.0, 0.4)):
-    """Samples of a still chip in the driver's form: 8192 counts per g, 65.5 per deg/s."""
+    """Return samples of a chip at rest in the driver's form: 8192 counts per g, 65.5 per deg/s."""
     samples = np.zeros((count, 7))
     samples[:, 0:3] = np.array(accel) * 8192 + rng.normal(scale=27, size=(count, 3))
     samples[:, 3] = -3000 + rng.normal(scale=5, size=count)
@@ -137,12 +137,12 @@ def test_a_pose_that_is_not_still_is_refused(engine, rows, column, more, reason)
 
 
 def readings(offset=(0.0,) * 3, slope=(1.0,) * 3, forces: ArrayLike = AXES):
-    """The readings of the forces by a sensor with these errors."""
+    """Return the readings of these forces by a sensor with these errors."""
     return ((np.asarray(forces) - offset) / slope).tolist()
 
 
 def test_six_poses_with_a_duplicate_give_no_parameters():
-    """Though each axis changes enough."""
+    """The fit fails although each axis changes enough."""
     poses = AXES.copy()
     poses[0] = poses[2] = [0.9, 0.9, 0.0]
     with pytest.raises(CalibrationError) as refusal:

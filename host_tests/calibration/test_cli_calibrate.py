@@ -1,4 +1,4 @@
-"""kickstand calibrate: from captures to CAL.json, and every unusable pose."""
+"""Test `kickstand calibrate`: captures give a CAL.json, and every unusable pose is refused."""
 
 import json
 import shutil
@@ -15,17 +15,17 @@ BIAS = (4.0, -11.0, 0.7)
 
 
 def reads(force):
-    """The reading of a true force by a sensor with these errors, in its own axes."""
+    """Return the reading of a true force by a sensor with these errors, in the sensor's axes."""
     return (np.asarray(force, float) - OFFSET) / SLOPE
 
 
 def leaned(angle_deg):
-    """Specific force (left, up, forward) of a bike at rest that leans to the right by an angle."""
+    """Return the specific force (left, up, forward) of a bike at rest that leans to the right by this angle."""
     return np.array([np.sin(np.radians(angle_deg)), np.cos(np.radians(angle_deg)), 0.0])
 
 
 def two_poses(directory, stand, upright=(0.0, 1.0, 0.0), bias=(0.0, 0.0, 0.0)):
-    """The logs of a pose on the kickstand and an upright one, with these readings."""
+    """Write the logs of a pose on the kickstand and an upright pose with these readings."""
     return [
         command.still(directory / "stand.csv", stand, bias),
         command.still(directory / "upright.csv", upright, bias, seed=1),
@@ -33,7 +33,7 @@ def two_poses(directory, stand, upright=(0.0, 1.0, 0.0), bias=(0.0, 0.0, 0.0)):
 
 
 def aligned(poses, *more):
-    """Run calibrate two; return the content of CAL.json and the output."""
+    """Run `calibrate two`. Return the content of CAL.json and the output."""
     out = poses[0].parent / "CAL.json"
     result = command.works("calibrate", "two", *poses, *more, "--out", out)
     return json.loads(out.read_text()), result.out
@@ -41,7 +41,7 @@ def aligned(poses, *more):
 
 @pytest.fixture
 def six_poses(tmp_path):
-    """Each side up once, tilted by up to 10 degrees."""
+    """Return one pose for each side up, tilted by up to 10 degrees."""
     rng = np.random.default_rng(1)
     return [
         command.still(tmp_path / f"side{side}.csv", reads(tipped(axis, rng.uniform(0, 10), rng)), BIAS, seed=k)
@@ -76,7 +76,7 @@ def test_six_without_a_free_pose_says_what_is_unproven(tmp_path, six_poses):
 @pytest.mark.parametrize(("seed", "side"), [(0, "left"), (1, "right")])
 def test_six_and_two_find_the_mounting_to_0_3_degrees(tmp_path, six_poses, free_pose, seed, side):
     rng = np.random.default_rng(seed)
-    mounting = random_rotation(rng)  # vehicle from sensor
+    mounting = random_rotation(rng)  # from the sensor's axes to the vehicle's
     stand, upright = (reads(mounting.T @ leaned(lean)) for lean in (-12.0 if side == "left" else 12.0, 0.0))
     poses = two_poses(tmp_path, stand, upright, BIAS)
     command.works("calibrate", "six", *six_poses, free_pose, "--out", tmp_path / "SIX.json")
@@ -108,7 +108,7 @@ def test_a_small_tilt_is_warned_of(tmp_path):
 
 
 def test_the_bias_of_the_six_positions_is_the_median(tmp_path, six_poses):
-    """A hand at the table during one pose does not change it."""
+    """A hand that moves the table during one pose does not change the bias."""
     command.still(six_poses[2], reads(command.AXES["+y"]), np.array(BIAS) + 20.0, seed=2)
     command.works("calibrate", "six", *six_poses, "--out", tmp_path / "CAL.json")
     assert json.loads((tmp_path / "CAL.json").read_text())["gyro_bias_dps"] == pytest.approx(BIAS, abs=0.05)
@@ -149,7 +149,7 @@ def test_a_free_pose_that_is_not_1_g(tmp_path, six_poses):
 
 @pytest.mark.parametrize("which", ["six", "stand", "upright"])
 def test_a_spoilt_pose_is_refused_by_name(tmp_path, six_poses, which):
-    """Other causes: test_still_pose.py."""
+    """Other causes of a spoilt pose are tested in test_still_pose.py."""
     poses = two_poses(tmp_path, leaned(-12))
     path = six_poses[3] if which == "six" else tmp_path / f"{which}.csv"
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:16]))
@@ -158,7 +158,7 @@ def test_a_spoilt_pose_is_refused_by_name(tmp_path, six_poses, which):
 
 
 def two_refused(poses, words, *more):
-    """calibrate two over an older CAL.json that must be kept."""
+    """Run `calibrate two` where an older CAL.json must be kept."""
     directory = poses[0].parent
     (directory / "CAL.json").write_text("the one from yesterday\n")
     return command.refused(directory, "calibrate", "two", *poses, *more, "--out", directory / "CAL.json", words=words)

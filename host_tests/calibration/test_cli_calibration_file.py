@@ -1,4 +1,4 @@
-"""CAL.json: refused and accepted contents."""
+"""The content of CAL.json: which values are accepted and which are refused."""
 
 import io
 import json
@@ -14,7 +14,7 @@ from kickstand_tools.common.errors import InputError
 from kickstand_tools.replay.replay_engine import ReplayMeter
 from support import command
 
-I = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]  # noqa: E741 - its name
+I = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]  # noqa: E741 - the usual name of the identity
 
 BAD = {
     "no version": ({"version": None}, "version is missing"),
@@ -94,7 +94,7 @@ def test_a_byte_order_mark_is_accepted(tmp_path):
 
 
 def test_an_unlabelled_identity_is_not_an_alignment(tmp_path):
-    """Another program's file may lack the key `aligned`. Only a measured matrix is an alignment."""
+    """A file from another program may lack the key `aligned`. Only a matrix other than the identity is an alignment."""
     assert not read_calibration(command.write_cal(tmp_path / "CAL.json", vehicle_from_sensor=I)).aligned
     assert read_calibration(command.write_cal(tmp_path / "CAL.json", vehicle_from_sensor=I, aligned=True)).aligned
 
@@ -125,7 +125,7 @@ def test_harmful_outputs_are_refused(tmp_path, log):
 
 @pytest.mark.skipif(os.name == "nt", reason="named pipes are of Unix")
 def test_a_special_file_is_not_replaced(tmp_path, log):
-    """Such as /dev/null, for a user with the rights. The test uses its own pipe."""
+    """A user with enough rights could replace /dev/null. The test uses a pipe of its own."""
     cal = command.write_cal(tmp_path / "CAL.json")
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
@@ -134,7 +134,7 @@ def test_a_special_file_is_not_replaced(tmp_path, log):
 
 
 def test_a_link_is_written_through(tmp_path, log):
-    """A CAL.json kept elsewhere is still there afterwards."""
+    """Writing through a link keeps the link: a CAL.json stored elsewhere is updated in place."""
     (tmp_path / "kept").mkdir()
     (tmp_path / "LEAN.csv").symlink_to(tmp_path / "kept" / "LEAN.csv")
     cal = command.write_cal(tmp_path / "CAL.json")
@@ -144,7 +144,7 @@ def test_a_link_is_written_through(tmp_path, log):
 
 
 def whole():
-    """A calibration with matrices and an alignment."""
+    """Return a calibration with matrices and an alignment."""
     turned = np.array([[0.0, 0.6, -0.8], [1.0, 0.0, 0.0], [0.0, -0.8, -0.6]])
     return CalibrationFile(
         np.array([0.01, -0.02, 0.03]),
@@ -160,7 +160,7 @@ def whole():
 
 
 def test_matrices_are_applied_alike_wherever_a_calibration_is(tmp_path):
-    """In the file, in numpy, and in the firmware's own meter."""
+    """The file, numpy and the firmware's own meter apply the matrices alike."""
     write_calibration(tmp_path / "CAL.json", whole())
     found = read_calibration(tmp_path / "CAL.json")
     assert found == whole()

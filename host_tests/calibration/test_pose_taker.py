@@ -1,4 +1,4 @@
-"""How the device waits for a still pose and takes it. 8192 counts per g, 65.5 per deg/s."""
+"""How the device waits for a still pose and captures it. The sensor has 8192 counts per g and 65.5 per deg/s."""
 
 import pytest
 from kickstand.calibration.pose_taker import AVERAGING, DONE, SETTLED, SETTLING, PoseTaker
@@ -11,12 +11,12 @@ class Chip:
 
 
 def taker():
-    """At 100 samples a second: 50 to settle, 1000 to give up, 300 to average."""
+    """At 100 samples per second it needs 50 samples to settle and 300 to average, and gives up after 1000."""
     return PoseTaker(Chip, 100, 3.0)
 
 
 def step(taking, row):
-    """The result of step(), or the code of its CaptureError."""
+    """Return the result of step(), or the code of the CaptureError that it raises."""
     try:
         return taking.step(row)
     except CaptureError as error:

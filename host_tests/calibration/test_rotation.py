@@ -1,4 +1,4 @@
-"""Vectors and matrices against numpy, on both engines."""
+"""Vectors and matrices give the same results as numpy, on both engines."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ FLOAT32 = {"rtol": 0, "atol": 1e-6}
 
 
 def random_rotation(rng):
-    """A rotation matrix, uniformly distributed, as float32 holds it."""
+    """Return a uniformly distributed rotation matrix, rounded to float32."""
     q, r = np.linalg.qr(rng.normal(size=(3, 3)))
     q = q * np.sign(np.diag(r))
     return (q * np.linalg.det(q)).astype(np.float32).astype(float)

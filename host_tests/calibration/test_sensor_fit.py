@@ -1,4 +1,4 @@
-"""Calibration of the gyro by the turns between still poses: the integration, the fit, its proof."""
+"""Calibrate the gyro by the turns between still poses: integration, fit, and the check of the result."""
 
 import numpy as np
 import pytest
@@ -18,14 +18,14 @@ DIAGONAL = np.eye(3, dtype=bool)
 
 
 def handled(seed, hand=None):
-    """A random sensor, and its readings of the six positions in one log."""
+    """Return a random sensor's readings of the six positions in one log, and the sensor."""
     chance = np.random.default_rng([seed, 38])
     chip = Chip.random(chance)
     return chip, hands.procedure(chance, chip, np.array(list(poses.ups(chance))), 22.0, hand)
 
 
 def errors_left(chip, calibration):
-    """The remaining errors of the gyro (3, 3), in the axes of the calibrated accelerometer."""
+    """Return the remaining errors of the gyro (3, 3) in the axes of the calibrated accelerometer."""
     a = calibration.accel_matrix @ np.diag(calibration.accel_slope) @ chip.accel_matrix
     u, _, v = np.linalg.svd(a)
     return calibration.gyro_matrix @ chip.gyro_matrix - u @ v
@@ -109,7 +109,7 @@ def test_rates_near_the_range_and_gaps_are_noticed(sums, dt_us, quick, lost):
 
 
 def made(seed):
-    """Poses, turns and true errors of a sensor without noise, from rotations alone."""
+    """Return the poses, turns and true errors of a sensor without noise, computed from rotations alone."""
     rng = np.random.default_rng(seed)
     gyro = np.eye(3) + 0.01 * rng.normal(size=(3, 3))
     skew = 0.006 * rng.normal(size=3)
@@ -147,7 +147,7 @@ def fitted(seed=3):
 
 
 def test_the_fit_is_numpys_and_so_is_its_covariance():
-    """Numpy minimises the same residuals, with numeric derivatives in double precision."""
+    """numpy minimises the same residuals in double precision with numeric derivatives."""
     fit = fitted()
     start, sigma = np.array(fit._start), np.array(fit._sigma)
 
@@ -171,7 +171,7 @@ def test_the_fit_is_numpys_and_so_is_its_covariance():
 
 
 def test_micropython_finds_the_same():
-    """With the poses and turns of a log, step by step; its list of numbers is the whole answer."""
+    """MicroPython processes the poses and turns of a log step by step. Its list of numbers is the whole result."""
     fit = fitted()
     script = (
         "from array import array\nfrom kickstand.calibration.sensor_fit import SensorFit\n"
@@ -184,7 +184,7 @@ def test_micropython_finds_the_same():
 
 
 def with_axis(axis, change):
-    """The log of a calibration with a faulty gyro axis."""
+    """Return the log of a calibration with a faulty gyro axis."""
     _, readings = handled(5)
     bias = np.median(readings[:, 4 + axis])
     readings[:, 4 + axis] = bias + change(readings[:, 4 + axis] - bias)
@@ -192,7 +192,7 @@ def with_axis(axis, change):
 
 
 def late(rates):
-    return np.concatenate((np.zeros(30), rates[:-30]))  # 150 ms
+    return np.concatenate((np.zeros(30), rates[:-30]))  # late by 150 ms
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -201,9 +201,9 @@ def late(rates):
     [
         (lambda rates: 0.5 * rates, "gyro-scale"),
         (lambda rates: 2.0 * rates, "gyro-scale"),
-        (lambda rates: -rates, None),  # named if the turns were nearly about one axis
+        (lambda rates: -rates, None),  # the axis is named only if the turns were nearly about one axis
         (lambda rates: 0.0 * rates, "dead-gyro"),
-        (lambda rates: np.where(np.abs(rates) > 5.0, 0.0, rates), "dead-gyro"),  # but noisy
+        (lambda rates: np.where(np.abs(rates) > 5.0, 0.0, rates), "dead-gyro"),  # dead at small rates, but noisy
         (late, "gyro-misfit"),
         (lambda rates: np.clip(rates, -60.0, 60.0), None),
     ],
@@ -249,5 +249,5 @@ def test_a_gross_misfit_is_no_plausible_fit():
 
 
 def sides(fit):
-    """The readings of the six sides, in the order of SIDES."""
+    """Return the readings of the six sides in the order of SIDES."""
     return [min((p for p in fit._poses if six_position.side_of(p) == k), key=six_position.tilt_deg) for k in range(6)]

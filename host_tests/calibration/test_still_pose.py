@@ -1,5 +1,5 @@
-"""A still pose, each axis alone: 8192 counts per g, 65.5 per deg/s. Other causes of a spoilt pose:
-test_calibration.py."""
+"""A still pose is tested one axis at a time, with 8192 counts per g and 65.5 per deg/s. Other causes of a spoilt
+pose are tested in test_calibration.py."""
 
 import math
 
@@ -11,7 +11,7 @@ LEVEL: tuple[int, ...] = (100, -200, 8192, -521, 65, -131, 655)
 
 
 def samples(count=100):
-    """Samples at rest, with a count of noise in each reading. The noise has a mean of zero in each half."""
+    """Return samples at rest with noise of one count in each reading. The mean of the noise is zero in both halves."""
     return [[value + (-1) ** k for value in LEVEL] for k in range(count)]
 
 
@@ -38,7 +38,7 @@ def problem_of(rows, **settings):
 @pytest.mark.parametrize("axis", [0, 1, 2, 4, 5, 6])
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_a_knock_about_or_along_any_axis_spoils_the_pose(axis, sign):
-    """A difference from the first sample, in any sample. One shock alone does not move the mean past other limits."""
+    """Each sample is compared with the first one, because one shock moves the mean too little for the other limits."""
     peak = 0.08 * 8192 if axis < 3 else 5.0 * 65.5
     for at in (1, 50, 99):
         for share, code in ((0.8, None), (1.2, "moved")):
@@ -59,7 +59,7 @@ def test_readings_that_never_change_are_frozen():
     rows = [list(LEVEL) for _ in range(100)]
     assert problem_of(rows) == "frozen-pose"
     for row in rows:
-        row[3] = row[3] + 1  # only the temperature
+        row[3] = row[3] + 1  # only the temperature differs
     rows[50][3] += 7
     assert problem_of(rows) == "frozen-pose"
 
@@ -79,7 +79,7 @@ def test_each_axis_has_to_change_by_a_count_now_and_then(axis, code):
 def test_a_noisy_gyro_spoils_the_pose_and_a_sway_does_not(axis):
     for dps, code in ((0.5, None), (0.7, "noisy-gyro")):
         rows = samples(600)
-        for k, row in enumerate(rows):  # the rms of this noise is dps
+        for k, row in enumerate(rows):  # the rms of this noise equals dps
             row[axis] += round((-1, 1, 1, -1)[k % 4] * dps * 65.5)
         assert problem_of(rows) == code
     rows = samples(600)

@@ -1,4 +1,4 @@
-"""The calibration records: after any damage to the files, loading gives a whole calibration or none, and never
+"""The calibration records: after any damage to the files, loading returns a whole calibration or none, and never
 fails."""
 
 import io
@@ -14,7 +14,7 @@ from kickstand.lean.upright_trim import MAX_TRIM
 
 
 def calibration(mark):
-    """A plausible calibration that can be distinguished from others."""
+    """Return a plausible calibration that differs for each argument."""
     new = Calibration()
     new.set_accel((mark / 100, 0, 0), (1.0, 1.01, 0.99))
     new.gyro_bias[2] = -3.5
@@ -32,7 +32,7 @@ def store(tmp_path):
 
 
 def newest_file(tmp_path, store):
-    """The file that the next load would use."""
+    """Return the file that the next load would use."""
     contents = {name: (tmp_path / name).read_bytes() for name in FILES if (tmp_path / name).exists()}
     return tmp_path / max(contents, key=lambda name: struct.unpack_from("<I", contents[name], 8))
 
@@ -52,11 +52,11 @@ def test_the_largest_trim_that_the_filter_finds_is_loaded_again(store, sign):
 
 
 IDENTITY = [1, 0, 0, 0, 1, 0, 0, 0, 1]
-NUMBERS = [0.25, -0.125, 0.375, 1.125, 0.875, 1.0, 3.5, -2.5, 1.5, *IDENTITY, 2.5]  # exact in 32 bits
+NUMBERS = [0.25, -0.125, 0.375, 1.125, 0.875, 1.0, 3.5, -2.5, 1.5, *IDENTITY, 2.5]  # all are exact in 32 bits
 
 
 def record(*, magic=b"KSTD", version=1, sequence=7, chip=(0x68, 8), six_done=1, how=1, numbers=NUMBERS):
-    """A record as written by every release since the first: 96 bytes, little-endian."""
+    """Return a record as every release has written it: 96 bytes, little-endian."""
     body = struct.pack("<4sHHI", magic, version, 96, sequence) + struct.pack("<4B19f", *chip, six_done, how, *numbers)
     return body + struct.pack("<I", crc32(body))
 
@@ -94,7 +94,9 @@ def test_the_flash_of_a_board_with_0_4_0_is_read(store, tmp_path):
     assert loaded.matrices() == [*IDENTITY, *IDENTITY, *[0.0] * 9]
     assert loaded.six_done and loaded.aligned and not loaded.whole
     store.save(loaded)
-    assert len((tmp_path / FILES[1]).read_bytes()) == 96  # a board downgraded to 0.4.0 reads it
+    assert (
+        len((tmp_path / FILES[1]).read_bytes()) == 96
+    )  # after a downgrade to 0.4.0 the board can still read the record
 
 
 MATRICES = [1.0, 0.01, -0.02, 0.01, 1.0, 0.003, -0.02, 0.003, 1.0]
@@ -161,7 +163,7 @@ def test_the_fault_of_a_record_is_reported(store, tmp_path, content, problem):
 
 
 def test_a_record_of_another_range_stays_valid(store, tmp_path):
-    """Older boards were calibrated with a range of 8 g; 16 g became the default later."""
+    """Older boards were calibrated with a range of 8 g. The default is now 16 g."""
     (tmp_path / FILES[1]).write_bytes(record(chip=(0x68, 16)))
     assert store.load().aligned
     assert store.message == "record 7"
@@ -179,7 +181,7 @@ def test_power_cut_at_every_byte_of_a_save(store, tmp_path, saved_before):
         for name, content in before.items():
             (tmp_path / name).write_bytes(content)
         written.write_bytes(record[:cut])
-        assert mark_of(store.load()) == saved_before  # the previous one, or none
+        assert mark_of(store.load()) == saved_before  # the previous record, or none
         store.save(calibration(5))  # and the next save works
         assert mark_of(store.load()) == 5
         assert store.load().aligned
@@ -226,7 +228,7 @@ def test_a_flash_that_loses_writes_is_reported(store, tmp_path, monkeypatch):
 
 
 def test_a_trim_may_be_stored_beside_a_foreign_record(store, tmp_path):
-    """Such as a record of another chip, or one left empty by a power cut."""
+    """The foreign record may come from another chip, or be left empty by a power cut."""
     store.save(calibration(1))
     store.save(calibration(2))
     other = Store(0x70, 8, str(tmp_path))

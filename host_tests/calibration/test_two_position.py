@@ -1,4 +1,5 @@
-"""Two-position alignment: truth recovered from simulated poses, refusals, all mountings."""
+"""Two-position alignment: the true mount is found from simulated poses in any mounting, and unusable poses are
+refused."""
 
 import itertools
 
@@ -13,21 +14,21 @@ from test_rotation import random_rotation
 
 
 def poses(vehicle_from_sensor, tilt_deg, side="left"):
-    """Specific force in the sensor's axes on the kickstand and upright, g."""
-    tilt = np.radians(tilt_deg) * (-1 if side == "left" else 1)  # lean > 0 is to the right
+    """Return the specific force in g on the kickstand and upright, in the sensor's axes."""
+    tilt = np.radians(tilt_deg) * (-1 if side == "left" else 1)  # lean to the right is positive
     kickstand = np.array([np.sin(tilt), np.cos(tilt), 0.0])
     return (vehicle_from_sensor.T @ kickstand).tolist(), (vehicle_from_sensor.T @ [0, 1, 0]).tolist()
 
 
 def rotation_angle_deg(a, b):
-    """Angle of the rotation between two matrices."""
+    """Return the angle of the rotation between two matrices."""
     r = np.asarray(a).reshape(3, 3) @ np.asarray(b).reshape(3, 3).T
     skew = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
     return np.degrees(np.arctan2(np.linalg.norm(skew) / 2, (np.trace(r) - 1) / 2))
 
 
 def axis_aligned():
-    """All 24 rotations that map axes to axes."""
+    """Return all 24 rotations that map axes to axes."""
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1, -1), repeat=3):
             m = np.zeros((3, 3))
@@ -67,14 +68,14 @@ def test_every_mounting_is_recovered(engine, side):
 )
 def test_poses_that_fix_nothing_are_refused(engine, kickstand, upright, reason):
     answer = engines.run(engine, [("two_position", (kickstand, upright, "left"))])[0]
-    if kickstand == [0, -1, 0]:  # exactly antiparallel: upside down is not a second pose
+    if kickstand == [0, -1, 0]:  # exactly antiparallel: an upside-down bike is no second pose
         reason = "no kickstand"
     assert reason in engines.words(answer)
     assert all(len(line) <= 16 for line in answer["lcd"])
 
 
 def at(angle_deg):
-    """Specific force of a bike leaned to the left by an angle, g."""
+    """Return the specific force in g of a bike that leans to the left by this angle."""
     return [-np.sin(np.radians(angle_deg)), np.cos(np.radians(angle_deg)), 0.0]
 
 
@@ -88,7 +89,7 @@ class Pose:
 @pytest.mark.parametrize("pose", [0, 1])
 @pytest.mark.parametrize("size", [0.9, 1.1])
 def test_after_the_six_positions_a_pose_reads_1_g_more_closely(pose, size):
-    """Before them the data sheet allows 80 mg and 3 %; after them only drift is left."""
+    """Without the six positions the data sheet allows 80 mg and 3 % of error. With them only drift remains."""
     forces = np.array([at(12), at(0)])
     forces[pose] *= size
     kickstand, upright = (Pose(force.tolist(), [0.0] * 3) for force in forces)
@@ -101,7 +102,7 @@ def test_after_the_six_positions_a_pose_reads_1_g_more_closely(pose, size):
 
 
 def test_an_alignment_keeps_offset_and_slope_and_sets_the_bias():
-    """A stand holds the bike stiller than a rider does."""
+    """A bike is stiller on a stand than under a rider."""
     before = Calibration()
     before.set_accel((0.05, -0.02, 0.0), (1.02, 0.98, 1.0))
     before.six_done = True

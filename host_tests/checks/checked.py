@@ -1,4 +1,4 @@
-"""A log, or arrays, as the checks take them; and simulated rides, each made once."""
+"""Logs and arrays in the form that the checks take, and simulated rides that are each made once."""
 
 import functools
 
@@ -10,7 +10,8 @@ from kickstand_tools.simulation.ride import SimulatedRide, ride
 
 
 def cells_of(log: Log, accel=None, gyro=None, speed=True) -> LogCells:
-    """accel, gyro (3, 3): by which the sensors' axes are exchanged and reversed; a number makes the readings larger."""
+    """Return the cells of a log. accel, gyro: (3, 3) matrices that exchange and reverse the sensors' axes. A number
+    scales the readings."""
     force = log.accel_g if accel is None else log.accel_g @ np.transpose(accel)
     rate = log.gyro_dps if gyro is None else log.gyro_dps @ np.transpose(gyro)
     mps = log.speed_mps if speed else np.full(len(log.t_s), np.nan)
@@ -22,20 +23,20 @@ def cells_of(log: Log, accel=None, gyro=None, speed=True) -> LogCells:
 
 
 def words(notice) -> str:
-    """In words, "" for nothing."""
+    """Return the remark in words, or "" for none."""
     return sentence(notice) if notice else ""
 
 
 @functools.cache
 def made_up(profile: str) -> SimulatedRide:
-    """A ride by an MPU6050 with the errors that its data sheet allows. In the upright pose the bike leaned by 3.5
-    degrees, to the right or to the left."""
+    """Simulate a ride read by an MPU6050 with the errors that its data sheet allows. In the upright pose the bike
+    leaned by 3.5 degrees to the right or left."""
     return ride(profile, 3, 150.0, 3.5 * (-1) ** len(profile))
 
 
 @functools.cache
 def simulated(profile: str) -> Log:
-    """made_up() at 50 Hz, with one speed per second."""
+    """Return the ride of made_up() at 50 Hz, with one speed per second."""
     made = made_up(profile)
     readings, mps = made.readings[::4], np.full(len(made.time[::4]), np.nan)
     mps[::50] = made.truth["speed_mps"][::200]

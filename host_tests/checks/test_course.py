@@ -1,4 +1,4 @@
-"""Positions show a log that is a mirror image, whose accelerations are all of the opposite sign."""
+"""Positions show that a log is a mirror image, with all accelerations of the opposite sign."""
 
 import functools
 from dataclasses import replace
@@ -16,7 +16,8 @@ from kickstand_tools.simulation.files import positions
 
 @functools.cache
 def simulated(profile: str = "street", late_s: float = 0.6) -> Log:
-    """50 readings a second of a board, with its gyro's bias; positions once a second, late as a receiver's are."""
+    """Simulate a board with a gyro bias and 50 readings per second. Positions come once per second, late as from a
+    receiver."""
     made = made_up(profile)
     here = slice(None, None, 4)
     times, readings = made.time[here], made.readings[here]
@@ -50,8 +51,8 @@ def test_a_bias_of_the_gyro_is_no_turning(bias_dps):
 
 
 def circling(both_sides: bool, bias_dps: float, wavering_dps: float = 0.0) -> bool | None:
-    """At 10 m/s round and round, to the left or to either side. wavering_dps: of the track, which the gyro has against
-    it: noise of positions."""
+    """Ride in circles at 10 m/s, to the left or to either side. wavering_dps: noise of the track's turn rate against
+    the gyro's."""
     t_s = np.arange(0.0, 120.0, 0.02)
     turning_dps = np.where(both_sides & (t_s > 60.0), -10.0, 10.0)
     wave_dps = wavering_dps * np.sin(t_s)

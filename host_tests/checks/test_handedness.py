@@ -1,4 +1,4 @@
-"""Left-handed axes, a gyro with the opposite sign and exchanged axes give a remark. Correct logs never do."""
+"""Left-handed axes, a gyro of the opposite sign and exchanged axes give a remark, and correct logs never do."""
 
 import itertools
 
@@ -22,7 +22,7 @@ WRONG_WAY = "are the axes left-handed (reverse one in both sensors) or the gyro 
 
 
 def judged(log, accel=None, gyro=None, speed=True):
-    """What is said of a log whose sensors' axes are exchanged and reversed by these matrices; "" for nothing."""
+    """Return the remark on a log whose sensors' axes are exchanged and reversed by these matrices, or "" for none."""
     return words(handedness(cells_of(log, accel, gyro, speed)))
 
 
@@ -30,7 +30,7 @@ def judged(log, accel=None, gyro=None, speed=True):
     ("profile", "speed"), [("street", False), pytest.param("city", True, marks=pytest.mark.nightly)]
 )
 def test_all_48_ways_to_exchange_and_reverse_axes(profile, speed):
-    """Put on both sensors alike: the left-handed ones are remarked on, the right-handed ones are not."""
+    """Applied to both sensors alike, the left-handed ways give a remark and the right-handed ones do not."""
     remarks = [judged(simulated(profile), exchange, exchange, speed) for exchange in SIGNED]
     for exchange, said in zip(SIGNED, remarks, strict=True):
         assert (WRONG_WAY in said) == bool(said) == (np.linalg.det(exchange) < 0.0), (exchange, said)
@@ -39,13 +39,13 @@ def test_all_48_ways_to_exchange_and_reverse_axes(profile, speed):
 
 @pytest.mark.parametrize("profile", PROFILES)
 def test_simulated_rides(profile):
-    """Without a speed not all of them show it, but none is accused."""
+    """Without a speed some wrong logs are missed, but no correct log gives a remark."""
     log = simulated(profile)
     assert judged(log) == judged(log, speed=False) == ""
     assert (WRONG_WAY in judged(log, gyro=MINUS)) is (profile != "parked")
     if profile not in ("parked", "city"):
         assert WRONG_WAY in judged(log, gyro=MINUS, speed=False)
-    assert judged(log, gyro=np.eye(3) * np.radians(1.0)) == ""  # rates in rad/s: there is another remark for them
+    assert judged(log, gyro=np.eye(3) * np.radians(1.0)) == ""  # rates in rad/s have a remark of their own
 
 
 @pytest.mark.parametrize("profile", MAIN)
@@ -74,18 +74,18 @@ def test_the_remark_names_what_fits():
         (None, swap, f"{EITHER} along x and y are exchanged, or the rates are in another order or of another sign"),
         (np.eye(3)[[1, 2, 0]], None, f": the rates are in another order or of another sign, {INSTEAD} gz, gx, gy"),
         (MINUS, None, WRONG_WAY),
-        (None, MINUS, None),  # the mirror image: motion cannot show it
+        (None, MINUS, None),  # motion cannot show a mirror image
     ):
         said = judged(log, accel, gyro)
         assert (line in said) if line else said == "", said
 
 
 def test_axes_exchanged_in_one_sensor():
-    """With a speed nearly all exchanges are seen (24 of the 47 are tried), and those that are have the right name."""
+    """With a speed nearly all exchanges are found, and each with its correct name. The test tries 24 of the 47."""
     seen = 0
     log = simulated("street")
     for exchange in EXCHANGES[1::2]:
-        turning = liveliest(cells_of(log, gyro=exchange.T))  # exchange undoes it
+        turning = liveliest(cells_of(log, gyro=exchange.T))  # exchange undoes exchange.T
         assert turning is not None
         place = better_exchange(turning)
         assert place is None or np.array_equal(EXCHANGES[place], exchange)
@@ -94,7 +94,7 @@ def test_axes_exchanged_in_one_sensor():
 
 
 def hand(seconds=60.0, seed=0, hz=50):
-    """A phone that is waved about in the hand: turned by up to 90 degrees, moved by a few decimetres."""
+    """Simulate a phone that is waved in the hand: turned by up to 90 degrees and moved by a few decimetres."""
     chance = np.random.default_rng(seed)
     time = np.arange(0.0, seconds, 1.0 / hz)
     waves = [chance.uniform(0.1, 0.7, (4, 3)), chance.uniform(0.0, 6.3, (4, 3)), chance.normal(0.0, 0.3, (4, 3))]
@@ -121,12 +121,12 @@ def test_a_phone_in_the_hand():
 
 def test_gaps_and_frozen_readings():
     log = simulated("street")
-    kept = (log.t_s % 30.0) < 25.0  # every half minute five seconds are missing
+    kept = (log.t_s % 30.0) < 25.0  # five seconds of every half minute are missing
     gaps = log.part(kept)
     assert judged(gaps) == ""
     assert WRONG_WAY in judged(gaps, gyro=MINUS)
     force, rate = log.accel_g.copy(), log.gyro_dps.copy()
-    for k in range(1000, len(force) - 1500, 1500):  # and here they are what they were
+    for k in range(1000, len(force) - 1500, 1500):  # here the readings are exchanged back
         force[k : k + 400], rate[k : k + 400] = force[k], rate[k]
     for sign, codes in (1.0, ["frozen-readings"]), (-1.0, ["frozen-readings", "left-handed"]):
         read = read_log(Log(log.t_s, force, sign * rate, log.speed_mps))
@@ -150,7 +150,7 @@ def test_recordings(shared_data):
 
 
 def test_a_bias_is_found_while_fitting():
-    """The hand is never calm, so nothing else shows it."""
+    """The hand is never still, so only the fit can show the bias."""
     log = hand(seed=0)
     turning = {}
     for bias in 0.0, 2.5:

@@ -1,4 +1,4 @@
-"""A calibration of another mount is noticed by every command that takes one; a right one never is."""
+"""Every command that uses a calibration notices one that belongs to another mount, and never rejects a correct one."""
 
 import json
 import re
@@ -25,19 +25,19 @@ G = 9.80665
 
 
 def turned(matrix, left=0.0, up=0.0, forward=0.0):
-    """Return a mount's matrix turned about the vehicle's axes by these errors, degrees."""
+    """Return the matrix of a mount that is turned about the vehicle's axes by these angles in degrees."""
     about_left, about_up, about_forward = rotation_matrix(np.diag(np.radians([left, up, forward])))
     return about_forward @ about_up @ about_left @ matrix
 
 
 def made(profile, speed=True):
-    """A ride at 50 Hz and its calibration by six, then two poses."""
+    """Simulate a ride at 50 Hz and its calibration by the six positions, then by two poses."""
     log = simulated(profile)
     return log if speed else silent(log), calibrated_by_poses(made_up(profile))
 
 
 def silent(log):
-    """Without a speed."""
+    """Return the log without a speed."""
     return Log(log.t_s, log.accel_g, log.gyro_dps)
 
 
@@ -55,7 +55,7 @@ def test_right_calibrations_are_never_accused(profile):
     log, calibration = made(profile)
     for each in log, silent(log):
         assert said(each, calibration) == ""
-        assert said(each, other(calibration, up=8.0)) == ""  # what two poses may be off
+        assert said(each, other(calibration, up=8.0)) == ""  # two poses may have this error
 
 
 @pytest.mark.parametrize(("profile", "speed"), [("street", True), ("city", False), ("track", False), ("hills", True)])
@@ -80,7 +80,7 @@ def test_wrong_ones_are(profile, speed):
 
 
 def test_another_seeds_calibration(rides=("street", "sweeper", "city")):
-    """Of another bike, whose sensor is mounted in another way."""
+    """The calibration is of another bike, whose sensor is mounted differently."""
     pairs = [made(profile) for profile in rides]
     for (log, _), (_, calibration) in zip(pairs, pairs[1:] + pairs[:1]):
         assert "is it another mount's?" in said(log, calibration)
@@ -97,13 +97,13 @@ def test_gaps():
 
 def test_what_does_not_tell():
     log, calibration = made("street")
-    assert said(log, CalibrationFile()) == ""  # not aligned: that is said elsewhere
+    assert said(log, CalibrationFile()) == ""  # not aligned: another message reports this
     assert said(log.part(log.t_s < 10.0), other(calibration, up=90.0)) == ""
     assert said(silent(log), other(calibration, "car", up=90.0)) == ""  # a car does not lean
 
 
 def test_the_commands_say_so_in_one_line(tmp_path):
-    """report and plot: test_cli_report.py."""
+    """The messages of report and plot are tested in test_cli_report.py."""
     legs = [script.upright(4)]
     for side in (-1, 1, -1, 1):
         legs += [script.accelerate(15, 5), script.turn(30 * side, 5), script.straight(2), script.brake(5, 3)]
@@ -143,8 +143,8 @@ def exchanged_line(car, side, roll_deg=None):
 
 
 def test_what_is_reported():
-    """The sign of the log is always named as the other cause: the other side of the kickstand would make a clean report
-    of it, mirrored."""
+    """The message always names the sign of the log as the other possible cause. Changing the side of the kickstand
+    would turn such a log into a clean but mirrored report."""
     assert exchanged_line(False, "left", 0.0).endswith("exchanged: calibrate two --side right?" + SIGN)
     assert exchanged_line(False, "right", -3.9).endswith("exchanged: calibrate two --side left?" + SIGN)
     assert exchanged_line(False, "", 0.0).endswith("calibrate two with the other --side?" + SIGN)
@@ -154,7 +154,8 @@ def test_what_is_reported():
 
 
 def jerky(late_s: int = 0, sign: float = 1.0, seconds: int = 240, mps2: float = 2.0) -> Log:
-    """Another acceleration each second, by chance, along z; a speed at its beginning, so many seconds late. 10 Hz."""
+    """Simulate a random acceleration along z in each second, at 10 Hz. The log has a speed at the start of each
+    second, late_s late."""
     chance = np.random.default_rng(5)
     pushes = chance.normal(scale=mps2, size=seconds)
     speed_at = 30.0 + np.concatenate(([0.0], np.cumsum(pushes)))
@@ -178,13 +179,13 @@ def exchanged(log: Log) -> bool:
 
 @pytest.mark.parametrize(("late_s", "shown"), [(-1, False), (0, True), (1, True), (2, True), (3, False), (4, False)])
 def test_a_speed_up_to_two_seconds_late_shows_which_way_is_forward(late_s, shown):
-    """Each second pushes otherwise than the one before, so that one second off says nothing."""
+    """The acceleration changes at random each second, so a delay of one second removes the relation."""
     assert exchanged(jerky(late_s, sign=-1.0)) is shown
     assert not exchanged(jerky(late_s))
 
 
 def test_only_the_last_hour_counts():
-    """What was the other way round before it, as with a sensor that was turned over."""
+    """In the earlier part the axis was reversed, as with a sensor that was turned over."""
     before, after = jerky(sign=-1.0, seconds=3600, mps2=8.0), jerky(seconds=3600)
     after.speed_mps += before.speed_mps[-10] - after.speed_mps[0]
     force, speed = (np.concatenate((getattr(before, name), getattr(after, name))) for name in ("accel_g", "speed_mps"))
@@ -200,7 +201,7 @@ def test_of_several_speeds_in_a_second_the_first_counts():
 
 
 def test_seconds_without_a_speed_or_without_samples():
-    """A gap in the log and lost satellites: what is left is enough. But two days are not one ride."""
+    """After a gap in the log and lost satellites enough data is left. But two days are not treated as one ride."""
     log = jerky(sign=-1.0)
     log.speed_mps[500:900] = np.nan
     assert exchanged(log.part((log.t_s < 100.0) | (log.t_s > 130.0)))
@@ -212,7 +213,8 @@ def test_seconds_without_a_speed_or_without_samples():
 
 
 def swaying(yaw_dps: float, seconds: float) -> Log:
-    """Yawing to and fro every 4 s by up to yaw_dps, and rolling as a motorcycle does then: by half the change."""
+    """Simulate yaw to and fro with a period of 4 s and an amplitude of yaw_dps. The roll rate has
+    half this amplitude and is a quarter of a period apart."""
     time = np.arange(0.0, seconds, 0.02)
     yaw, roll = yaw_dps * np.sin(np.pi / 2 * time), -0.5 * yaw_dps * np.cos(np.pi / 2 * time)
     return Log(time, np.tile([0.0, 1.0, 0.0], (len(time), 1)), np.column_stack((0 * yaw, yaw, roll)))

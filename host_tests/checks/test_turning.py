@@ -1,4 +1,4 @@
-"""Which exchange of the gyro's axes is reported, from given residuals; and the functions of an unknown velocity."""
+"""Which exchange of the gyro's axes is reported for given residuals, and the basis functions of an unknown velocity."""
 
 from types import SimpleNamespace
 
@@ -50,7 +50,7 @@ def test_the_likelier_mistake_wins_unless_another_fits_better(left, best):
 
 
 def test_where_the_windows_differ_twice_as_good_is_needed():
-    """Of ten windows the gain swings by s: its standard error is s / root 10, which times 3 is 0.95 s."""
+    """If the gain of ten windows swings by s, its standard error is s / root 10, and three times this is 0.95 s."""
     for g2, swing, clear in ((0.0195, 0.011, False), (0.0195, 0.0099, True), (0.0201, 0.011, True)):
         assert (reported((AS_IT_IS, g2), (OPPOSITE, 0.01), swing=swing) is not None) is clear, (g2, swing)
 
@@ -65,7 +65,8 @@ def test_three_windows_must_show_it_five_times_as_well(g2, windows, unbiased, cl
 
 
 def test_an_unknown_velocity_is_linear_between_its_knots():
-    """Knots every 5 s. With their own times as coefficients the velocity is the time and its derivative 1."""
+    """The knots are 5 s apart. If the coefficients are the knots' times, the velocity equals the time and its
+    derivative is 1."""
     values, changes = turning._knots(2, 100)
     knots_s, time_s = np.array([0.0, 5.0, 10.0]), 0.1 * np.arange(100) + 0.05
     assert values.shape == changes.shape == (3, 2, 100)

@@ -1,5 +1,5 @@
-"""Starts a board once for all tests of a process that need the same start. Each test runs in a fork, with a copy of a
-Pico. QEMU cannot be copied: tests of the ESP32 restore its state, or use a separate one."""
+"""Start a board once for all tests of a process that need the same start. Each test of a Pico runs in a fork with
+its own copy. QEMU cannot be copied, so tests of the ESP32 restore its state or use a separate board."""
 
 import os
 import traceback
@@ -13,7 +13,7 @@ COPIED = {"riding", "at_prompt"}
 
 @pytest.fixture(scope="session", params=["pico", pytest.param("esp32", marks=pytest.mark.esp32)])
 def riding(request):
-    """A calibrated board that shows the lean of a bike held at 20 degrees to the right."""
+    """Return a calibrated board that shows the lean of a bike held at 20 degrees to the right."""
     device = CHIPS[request.param](leaning(20.0), firmware(request.param) | calibrated())
     device.power_on()
     device.run_until(lambda: shown_lean(device.lcd()) == 20.0, 4.0)
@@ -23,7 +23,7 @@ def riding(request):
 
 @pytest.fixture(scope="session")
 def at_prompt():
-    """The same board without main.py: it waits for code."""
+    """Return the same board without main.py, waiting for code at the prompt."""
     device = pico(leaning(20.0), modules() | calibrated())
     device.power_on()
     device.exec("pass")
@@ -32,7 +32,7 @@ def at_prompt():
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_pyfunc_call(pyfuncitem):
-    """Run each test that uses a shared board in a fork, so that the next test gets the board unchanged."""
+    """Run a test of a Pico in a fork, so that the next test gets the board unchanged."""
     devices = [pyfuncitem.funcargs[name] for name in COPIED & set(pyfuncitem.fixturenames)]
     if not devices or devices[0].NAME == "ESP32":
         return None

@@ -1,4 +1,4 @@
-"""`kickstand check` on the emulated boards: a good one passes, and each of many planted defects is named."""
+"""Test `kickstand check` on the emulated boards: a good board passes, and each planted defect is named."""
 
 import pytest
 from kickstand_tools.deploy import check
@@ -38,7 +38,8 @@ def test_a_good_board_is_good(chip):
 
 
 def spoilt(t_s):
-    """x of the accelerometer is dead and y noisy; x of the gyro is biased, y noisy and z dead; it is hot."""
+    """The accelerometer's x is dead and y is noisy. The gyro's x is biased, y is noisy and z is dead. The chip is
+    hot."""
     force, rate = list(REST(t_s)[:3]), list(REST(t_s)[3:6])
     hashed = int(t_s * 1e4) * 2654435761 % 65536 / 65536 - 0.5
     force[0] = 0.3
@@ -116,7 +117,7 @@ PLANTED = {
 
 @pytest.mark.parametrize("name", PLANTED)
 def test_a_defect_that_hides_others_is_found_by_its_name(name):
-    """Together with the eleven above: twenty."""
+    """With the eleven defects above this makes twenty."""
     what, planted = PLANTED[name]
     found = checked("pico", **planted)
     assert next(iter(found), None) == what, found

@@ -1,4 +1,5 @@
-"""The corrections of the emulated Pico: bus and flash take time, errors are the chip's, the console is quiet."""
+"""Corrections to the emulated Pico: the bus and flash take time, errors are those of the chip, and the console is
+quiet."""
 
 import os
 import subprocess
@@ -27,15 +28,15 @@ def timed(f, *a):
 
 @pytest.fixture(scope="module")
 def board():
-    """One Pico without files, with _TOOLS run."""
+    """Return a Pico without files on which _TOOLS has run."""
     with pico() as emulated:
         emulated.exec(_TOOLS)
         yield emulated
 
 
 def test_fast_division_gives_the_results_of_rp2040py():
-    """The same results, flags and cycles, also of a division by zero and of signed numbers."""
-    device = pico()  # or skip
+    """Results, flags and cycles are the same, also for division by zero and for signed numbers."""
+    device = pico()  # skips the test without the emulator
     from rp2040py.rp2040 import RP2040
 
     quick, own = device.chip.rp2040, RP2040()
@@ -44,7 +45,7 @@ def test_fast_division_gives_the_results_of_rp2040py():
         chip.sio.reset()
         began = chip.core.cycles
         seen = []
-        for signed in (0, 8):  # the registers of signed numbers are the next two
+        for signed in (0, 8):  # the registers of signed division are the next two
             for dividend in (0, 1, 7, 1000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF):
                 for divisor in (1, 3, 0, 0x7FFFFFFF, 0xFFFFFFF9, 0xFFFFFFFF):
                     for register, value in ((0x60 + signed, dividend), (0x64 + signed, divisor)):
@@ -54,7 +55,7 @@ def test_fast_division_gives_the_results_of_rp2040py():
     assert results[0] == results[1]
 
 
-# Without the finder for the modules compiled for this Python
+# Leave out the import hook for modules compiled for this Python.
 _WHEELS_OWN = """
 import sys, kickstand_emulator
 del sys.meta_path[0]
@@ -64,20 +65,20 @@ print(emulated.begun(0.003))
 
 
 def test_chip_runs_the_same_on_every_host():
-    """Compiled for this Python or from the wheel, and on a slow host: the same cycles, the same memory."""
-    pico()  # or skip
+    """Cycles and memory are the same whether compiled for this Python or taken from the wheel, and on a slow host."""
+    pico()  # skips the test without the emulator
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     other = subprocess.run([sys.executable, "-c", _WHEELS_OWN], env=environment, capture_output=True, text=True)
     assert other.stdout == f"{emulated.begun(0.0)}\n", other.stderr
 
 
 def ask(board, expression):
-    """The value of an expression on the board."""
+    """Return the value of an expression on the board."""
     return eval(board.exec(f"print(repr(({expression})))"))
 
 
 def test_i2c_bits_take_time(board):
-    """156 bits at 400 kHz are 390 us, and MicroPython adds some; 69 bytes at 100 kHz are 6.2 ms."""
+    """At 400 kHz 156 bits take 390 us plus MicroPython's overhead. At 100 kHz 69 bytes take 6.2 ms."""
     us, _ = ask(board, "timed(sensor.readfrom_mem, 0x68, 0x3B, 14)")
     assert 390 < us < 500
     us, _ = ask(board, "timed(lcd.writeto, 0x27, bytes(68))")
@@ -93,7 +94,7 @@ def test_absent_device_fails_fast_and_harms_no_transfer(board):
 
 
 def test_held_wires_time_out_until_freed(board):
-    """The time-out is 5 ms as set. After nine manual clocks the chip answers again."""
+    """The time-out is 5 ms as set. After nine manual clock pulses the chip answers again."""
     board.board.sensor_bus.hang()
     us, number = ask(board, "timed(sensor.readfrom_mem, 0x68, 0x75, 1)")
     assert number == 110
@@ -109,7 +110,7 @@ def test_held_wires_time_out_until_freed(board):
 
 
 def test_devices_answer_bit_banged_pins(board):
-    """MicroPython drives the pins directly for scan(), which writes 0 bytes, and for SoftI2C."""
+    """MicroPython drives the pins itself for SoftI2C and for scan(), which writes 0 bytes."""
     assert ask(board, "sensor.scan(), lcd.scan()") == ([0x68], [0x27])
     board.exec("soft = SoftI2C(sda=Pin(4), scl=Pin(5), freq=100000)\nsoft.writeto_mem(0x68, 0x6B, b'\\x01')")
     assert ask(board, "soft.readfrom_mem(0x68, 0x6B, 1), soft.readfrom_mem(0x68, 0x75, 1)") == (b"\x01", b"h")
@@ -124,7 +125,7 @@ def test_flash_operations_take_time(board):
 
 
 def test_idle_console_takes_no_processor_time(board):
-    """A turn of an empty loop takes 3.1 us. With empty USB packets it would take three times as long."""
+    """One pass of an empty loop takes 3.1 us. With empty USB packets it would take three times as long."""
     code = (
         "def f():\n    t = ticks_us()\n    for i in range(1000): pass\n    return ticks_diff(ticks_us(), t)\nprint(f())"
     )

@@ -1,4 +1,4 @@
-"""Alignment by driving on the chip: the same result as on the host, within the time of a sample, in constant memory."""
+"""Alignment by driving on the chip gives the host's result, within the time of a sample and in constant memory."""
 
 import json
 import time
@@ -12,8 +12,8 @@ from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 
 pytestmark = pytest.mark.chip
 
-# mount, clock, elapsed and allocated are defined outside. Each update does one step of the work, so all are timed in
-# the same way
+# mount, clock, elapsed and allocated are defined outside. Each update does one step of the work, so all updates are
+# timed alike.
 _DRIVE = """
 from kickstand.drive_alignment import alignment
 from kickstand.rotation import matrix
@@ -58,8 +58,8 @@ def allocated():
 
 
 def test_alignment_by_driving_on_the_chip(at_prompt, monkeypatch):
-    """Five acceleration events, a braking event between each two. An update takes at most 2 ms of the 10 ms between
-    samples."""
+    """The drive has five acceleration events with braking events between them. An update takes at most 2 ms of the
+    10 ms between samples."""
     mount = random_mounting(4)
     host = {"mount": mount, "clock": time.monotonic_ns, "elapsed": lambda began: 0, "allocated": lambda: 0}
     monkeypatch.setattr(alignment, "STEP_US", 10**9)
@@ -71,7 +71,7 @@ def test_alignment_by_driving_on_the_chip(at_prompt, monkeypatch):
     between = np.reshape(chip["matrix"], (3, 3)) @ np.reshape(host["result"]["matrix"], (3, 3)).T
     assert np.degrees(np.linalg.norm(rotation_vector(between))) < 0.05
     assert chip["longest"] < 2100, "microseconds"
-    # after each number has its place on the heap, it does not grow
+    # The heap does not grow once each number is on it.
     later = chip["memory"][len(chip["memory"]) // 2 :]
     assert max(later) - min(later) < 400, chip["memory"]
     assert later[-1] - chip["memory"][0] < 3000

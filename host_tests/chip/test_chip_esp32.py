@@ -33,13 +33,13 @@ save(0)
 
 
 def board(config="", world=None, files=None):
-    """A calibrated board held at LEAN_DEG, still off. config: of config.py."""
+    """Return a calibrated board held at LEAN_DEG, still off. config: the text of config.py."""
     own = FILES | ({"/config.py": config.encode()} if config else {})
     return esp32(world or leaning(LEAN_DEG), (files or firmware("esp32")) | own)
 
 
 def test_board_survives_ctrl_c_unplugging_and_soft_reset():
-    """Actions of an owner with a running board."""
+    """The owner does all this to a running board."""
     with board() as device:
         shows(device, LEAN, BOOT_S)
         faults = device.board.faults
@@ -51,7 +51,7 @@ def test_board_survives_ctrl_c_unplugging_and_soft_reset():
         assert not device.board.lcd.on
         shows(device, LEAN, 4.0)
         device.send(b"\x03")
-        device.run(9.0)  # longer than the watchdog would wait
+        device.run(9.0)  # longer than the watchdog's time-out
         assert device.resets == 0
         assert b"Kickstand stopped." in device.said
         status = device.exec("import kickstand\nkickstand.status()", 20.0)
@@ -73,8 +73,8 @@ def test_board_survives_ctrl_c_unplugging_and_soft_reset():
 
 
 def test_safe_mode_and_refused_pins():
-    """The button held at power-on stops the app before it begins. A pin that the chip needs for its flash would crash
-    it at each start: it is refused."""
+    """Holding the button at power-on stops the app before it begins. A pin that the chip needs for its flash is
+    refused, because it would crash the board at each start."""
     with board("SENSOR_SDA = 6\n") as device:
         shows(device, r"SENSOR_SDA", BOOT_S)
         assert device.resets == 0
@@ -87,8 +87,8 @@ def test_safe_mode_and_refused_pins():
 
 
 def states_of_flash(device, code):
-    """Yield the file system before, and after each flash write while code runs. QEMU's flash takes no time, but the
-    program needs tens of microseconds between two writes."""
+    """Yield the file system before the code runs, and after each of its flash writes. QEMU's flash takes no time,
+    but the program needs tens of microseconds between two writes."""
     device.exec("pass")
     device.send(code.encode() + b"\x04")
     del device.said[:]
@@ -102,7 +102,7 @@ def states_of_flash(device, code):
 
 
 def test_old_or_new_wherever_a_save_is_cut(tmp_path):
-    """Cut the power after each write of four saves. A board that starts from that flash has a complete calibration."""
+    """The power is cut after each write of four saves. A board that starts with that flash has a whole calibration."""
     with board(files=modules("esp32")) as device:
         device.exec(_SAVE)
         states, writes = [], 0
@@ -134,7 +134,7 @@ _SIDES = [[1, 0, 0], [0, 0, -1], [0, 1, 0], [-1, 0, 0], [0, 0, 1], [0, -1, 0], [
 
 @pytest.mark.nightly
 def test_six_positions_by_the_button():
-    """From the menu to a stored calibration; the last position is a free one."""
+    """The rider starts in the menu and ends with a stored calibration. The last position is a free one."""
     steps = [[0, None]]
     for i, up in enumerate(_SIDES):
         steps += [[8.0 + 6.0 * i, up], [13.0 + 6.0 * i, None]]
@@ -168,7 +168,7 @@ def test_power_cut_loses_only_the_last_block_of_a_ride():
 
 
 def test_ride_removes_the_oldest_parts_first():
-    """In a flash full of rides, only as many of the first parts as needed are removed."""
+    """In a flash full of rides, only as many of the oldest parts as needed are removed."""
     parts = [part_path("rides", ride, number) for ride in (1, 2) for number in range(11)]
     full = dict.fromkeys(parts, bytes(PART_BLOCKS * BLOCK))
     with board(files=modules("esp32") | full) as device:
@@ -177,7 +177,7 @@ def test_ride_removes_the_oldest_parts_first():
         device.exec("recorder.start(Chip(), Calibration())\nfeed(2)\nrecorder.stop()", 30.0)
         files = device.files()
     gone = [path for path in parts if path not in files]
-    short = needed - (before - 2 * BLOCK)  # missing bytes, after the ride has its directory
+    short = needed - (before - 2 * BLOCK)  # missing bytes, after the ride has created its directory
     assert short > 0
     assert gone == parts[: math.ceil(short / (PART_BLOCKS * BLOCK))]
     assert FILES.items() <= files.items()
@@ -213,7 +213,7 @@ except KeyboardInterrupt:
 
 @pytest.mark.nightly
 def test_the_heap_does_not_grow():
-    """Minutes of bends, recorded, with a wheel's speed."""
+    """The ride has minutes of bends and is recorded with a wheel's speed."""
     ride = Ride([wait(2.0), accelerate(15.0, 3.0)] + [turn(-30.0, 3.0), turn(35.0, 3.0)] * 10 * _MINUTES)
     with board(world=PART.world(ride.motion), files=modules("esp32")) as device:
         device.fit_wheel(lambda t_s: ride.truth(t_s)[1])

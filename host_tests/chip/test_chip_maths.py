@@ -1,4 +1,5 @@
-"""The firmware's mathematics in the chip's 32-bit floats and small integers of 31 bits, against the other engines."""
+"""The firmware's mathematics with the chip's 32-bit floats and 31-bit small integers, compared with the other
+engines."""
 
 import io
 import struct
@@ -19,7 +20,7 @@ pytestmark = pytest.mark.chip
 
 
 def records():
-    """Three seconds of a ride, as replay_engine.run() takes them."""
+    """Return three seconds of a ride in the form that replay_engine.run() takes."""
     world = PART.world(Ride([accelerate(15.0, 1.0), turn(-30.0, 1.0, 0.5)]).motion)
     offsets = [-o / s for o, s in zip(PART.accel_offset_g, PART.accel_scale, strict=True)]
     slopes = [1.0 / s for s in PART.accel_scale]
@@ -35,7 +36,7 @@ def records():
 
 
 def agree(results):
-    """Through the whole LeanMeter: within 0.01 degrees in every sample."""
+    """The whole LeanMeter gives the same lean within 0.01 degrees at every sample."""
     host, *others = (np.frombuffer(result).reshape(-1, len(replay_engine.COLUMNS)) for result in results)
     assert abs(host[:, 0]).max() > 25.0
     for other in others:
@@ -52,8 +53,8 @@ def on_host():
 
 
 def test_the_same_log_gives_the_same_lean(tmp_path):
-    """On a Pico, on the unix port and on CPython."""
-    pico()  # or skip
+    """The test compares a Pico, the unix port and CPython."""
+    pico()  # skips the test without the emulator
     from kickstand_emulator.engine import rp2040
 
     with rp2040(iter([records()]), None) as results_of_chip:

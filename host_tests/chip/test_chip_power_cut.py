@@ -1,4 +1,4 @@
-"""The supply is cut at every flash operation of saving a calibration, on the emulated Pico's own file system."""
+"""The power is cut at every flash operation while a calibration is saved, on the emulated Pico's own file system."""
 
 from itertools import pairwise
 
@@ -7,9 +7,9 @@ from kickstand.calibration.store import Store
 
 pytestmark = pytest.mark.chip
 
-SAVES = 16  # littlefs writes a page at a time; at every fifteenth save it erases a new block
+SAVES = 16  # littlefs writes one page at a time, and every fifteenth save erases a new block
 
-# The calibrations differ in the gyro bias about x
+# The calibrations differ in the gyro bias about x.
 _TOOLS = """
 from kickstand.calibration.store import Store
 def bias():
@@ -25,7 +25,7 @@ save(0)
 
 
 def torn(before, after, share):
-    """The flash after only a share of one operation's change."""
+    """Return the flash after only this share of one operation's change."""
     first = next(i for i in range(0, len(before), 256) if before[i : i + 256] != after[i : i + 256])
     last = next(i for i in range(len(before), 0, -256) if before[i - 256 : i] != after[i - 256 : i])
     while before[first] == after[first]:
@@ -35,7 +35,7 @@ def torn(before, after, share):
 
 
 def loaded(system, image, directory):
-    """The gyro bias that the firmware loads from this flash, which must have a whole record."""
+    """Return the gyro bias that the firmware loads from this flash. Fails without a whole record."""
     for name, content in system.read(image).items():
         if name.endswith(".cal"):
             (directory / name).write_bytes(content)
@@ -43,7 +43,7 @@ def loaded(system, image, directory):
 
 
 def test_old_or_new_wherever_a_save_is_cut(at_prompt, tmp_path):
-    """Before, within and after each operation of SAVES saves."""
+    """The power is cut before, during and after each operation of SAVES saves."""
     at_prompt.exec(_TOOLS)
     operations = 0
     for value in range(1, SAVES + 1):
@@ -58,12 +58,12 @@ def test_old_or_new_wherever_a_save_is_cut(at_prompt, tmp_path):
         assert set(found) == {value - 1, value}
         assert found[0] == value - 1
         assert found[len(states) - 1] == value
-    assert operations >= SAVES + 2  # a block was erased on the way
+    assert operations >= SAVES + 2  # at least one block was erased
 
 
 @pytest.mark.parametrize("operation", [8, *(pytest.param(n, marks=pytest.mark.nightly) for n in (1, 9, 10))])
 def test_board_starts_and_saves_after_a_power_cut(at_prompt, operation):
-    """The power is really cut in the middle of an operation, and restored. The eighth is an erase."""
+    """The power is really cut in the middle of an operation and then restored. The eighth operation is an erase."""
     at_prompt.exec(_TOOLS)
     at_prompt.chip.flash.cut_power(operation, 0.5)
     del at_prompt.said[:]

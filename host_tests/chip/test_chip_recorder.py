@@ -1,4 +1,4 @@
-"""The recorder on the emulated Pico: its own littlefs, flash that stalls, 32-bit floats, power cuts, mpremote."""
+"""The recorder on the emulated Pico, with its own littlefs, stalling flash, 32-bit floats, power cuts and mpremote."""
 
 import ast
 import re
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.chip
 
 RIDE = Ride([wait(1.0), accelerate(15.0, 2.0), turn(-30.0, 3.0), turn(35.0, 3.0)])
 
-# The unchanged app; the lean of each turn is recorded for some seconds, then the ride is ended
+# Run the unchanged app, record the lean at each loop pass for some seconds, then end the ride.
 _RUN = """
 from array import array
 from time import ticks_add, ticks_diff, ticks_ms
@@ -53,7 +53,7 @@ except KeyboardInterrupt:
 print(list(leans[:count]))
 """
 
-# Turns of a simulated ride, written as fast as possible
+# Write the samples of a simulated ride as fast as possible.
 FEED = """
 import random
 from kickstand.rides.recorder import Recorder
@@ -79,7 +79,7 @@ def feed(blocks):
 
 
 def rides(files):
-    """The blocks of each ride in order; the files must contain only whole blocks."""
+    """Return the blocks of each ride in order. Fails if a file contains anything but whole blocks."""
     found = {}
     for name in sorted(files):
         if name.startswith("rides/"):
@@ -90,9 +90,9 @@ def rides(files):
     return found
 
 
-@pytest.mark.nightly  # on the simulated board: host_tests/rides/test_recorder.py, with slow flash test_slow_flash.py
+@pytest.mark.nightly  # host_tests/rides: test_recorder.py on the simulated board, test_slow_flash.py with slow flash
 def test_a_recorded_ride_replays_as_it_was_shown(at_prompt, tmp_path):
-    """During the recording no sample is lost, and the display keeps working."""
+    """No sample is lost during the recording, and the display keeps working."""
     begun_s, world = at_prompt.time_s, PART.world(RIDE.motion)
     at_prompt.board.sensor.world = lambda t_s: world(t_s - begun_s)
     samples = SampleCount(at_prompt.board.sensor)
@@ -117,9 +117,9 @@ def test_a_recorded_ride_replays_as_it_was_shown(at_prompt, tmp_path):
     assert max(leans) - min(leans) > 10
 
 
-@pytest.mark.nightly  # the next test cuts the power at one write, test_chip_power_cut.py at each write of a calibration
+@pytest.mark.nightly  # the next test cuts one write, test_chip_power_cut.py each write of a calibration
 def test_power_cut_loses_only_the_last_block(at_prompt):
-    """The power is cut before, within and after each flash operation. The calibration always survives."""
+    """The power is cut before, during and after each flash operation. The calibration always survives."""
     at_prompt.exec(FEED)
     states = []
     at_prompt.chip.flash.before_operation = lambda: states.append((at_prompt.file_system, None))
@@ -165,14 +165,14 @@ def test_board_records_again_after_a_power_cut(at_prompt, operation):
 @pytest.mark.nightly
 @pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=pytest.mark.esp32)])
 def test_pull_and_record_through_mpremote(tmp_path, monkeypatch, chip):
-    """The current ride, with an ESP32's GPS, is ended and pulled; then a log is streamed. Both can be replayed."""
+    """A ride with an ESP32's GPS is ended and pulled, then a log is streamed. Both can be replayed."""
     config = "RECORD = True\n" + {"pico": "", "esp32": 'SPEED = "gps"\n'}[chip]
     files = firmware(chip) | calibrated() | {"config.py": config.encode()}
     board: Any = CHIPS[chip](PART.world(RIDE.motion), files)
     with board as device:
         if chip == "esp32":
             device.fit_gps(lambda t_s: RIDE.truth(t_s)[1])
-        ends = []  # when Ctrl-C is pressed here, seconds
+        ends = []  # times in seconds when Ctrl-C is pressed here
 
         def ctrl_c():
             if ends and device.time_s > ends[0]:
@@ -190,7 +190,7 @@ def test_pull_and_record_through_mpremote(tmp_path, monkeypatch, chip):
         assert np.isfinite(log.lat_deg).any() == (chip == "esp32")
 
         live = tmp_path / "live.csv"
-        device.run(2.0)  # a starting ESP32 ignores its console, and would be asked again after 10 s
+        device.run(2.0)  # a starting ESP32 ignores its console, and the next attempt would be 10 s later
         ends.append(device.time_s + 5.0)
         result = command.works("record", "--port", emulated_port.NAME, "--out", live)
         assert result.err == ""

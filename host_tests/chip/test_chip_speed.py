@@ -1,4 +1,4 @@
-"""A speed's sources on the emulated boards: real pin interrupts and a real UART under the firmware's own drivers."""
+"""Speed sources on the emulated boards: the firmware's own drivers use real pin interrupts and a real UART."""
 
 import json
 from typing import Any
@@ -32,7 +32,7 @@ print(got)
     ("chip", "sources"), [("pico", ["wheel"]), pytest.param("esp32", ["wheel", "gps"], marks=pytest.mark.esp32)]
 )
 def test_wheel_and_gps(chip, sources):
-    """The wheel's contact bounces."""
+    """The contact of the wheel sensor bounces."""
     board: Any = CHIPS[chip](files=modules(chip))
     with board as device:
         device.fit_wheel(lambda t_s: 15.0, bounce_us=1000)

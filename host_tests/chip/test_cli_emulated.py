@@ -1,4 +1,4 @@
-"""`kickstand emulate`, and flash and status with mpremote on the emulated board."""
+"""Test `kickstand emulate`, and flash and status with mpremote on the emulated board."""
 
 import math
 import queue
@@ -29,7 +29,7 @@ pytestmark = pytest.mark.chip
     [("rp2040", "Pico"), pytest.param("esp32", "ESP32", marks=pytest.mark.esp32)],
 )
 def test_emulate_in_a_terminal(chip, name):
-    """The bike is drawn, the button and the end follow the keys."""
+    """The picture shows the bike, and the keys work the button and end the program."""
     need("esp32" if chip == "esp32" else "pico")
     with socket.create_server(("127.0.0.1", 0)) as found:
         free = found.getsockname()[1]
@@ -52,7 +52,7 @@ def test_without_its_library_an_esp32_is_refused(words, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("chip", ["rp2040", "esp32"])
 def test_emulate_reports_its_start_at_once(tmp_path, monkeypatch, chip):
-    """Also if a file is missing: the message says where to get it and where to put it."""
+    """If a file is missing, the message says where to get it and where to put it."""
     monkeypatch.setattr(Path, "home", lambda: tmp_path)
     monkeypatch.setattr(image, "URL", "http://127.0.0.1:9/" + image.NAME)
     monkeypatch.setenv(esp32_library.VARIABLE, str(tmp_path))
@@ -64,7 +64,7 @@ def test_emulate_reports_its_start_at_once(tmp_path, monkeypatch, chip):
 
 
 def test_an_esp32_needs_no_emulator_of_the_pico():
-    """The ESP32's modules can be imported without rp2040py."""
+    """The modules for an ESP32 are imported without rp2040py."""
     script = "import sys; sys.modules['rp2040py'] = None\nfrom kickstand_emulator.emulate import device_class\n"
     script += "import kickstand_workshop.bench.bench\nprint(device_class('esp32').NAME)"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
@@ -72,7 +72,7 @@ def test_an_esp32_needs_no_emulator_of_the_pico():
 
 
 class Emulating(threading.Thread):
-    """Run `kickstand emulate` in a thread, with these files on its board. It ends at end_s of emulated time."""
+    """Runs `kickstand emulate` beside the test, with these files on its board, until end_s of the board's time."""
 
     def __init__(self, patch, files, chip):
         super().__init__(daemon=True)
@@ -104,23 +104,24 @@ class Emulating(threading.Thread):
             self.said.put(None)
 
     def time_s(self):
-        """The emulated board's."""
+        """Return the time of the emulated board in seconds."""
         return self.device.time_s if self.device else 0.0
 
     def sleep(self, seconds):
-        """By the board's time."""
+        """Wait by the board's time."""
         end_s = self.time_s() + seconds
         while self.time_s() < end_s and self.is_alive():
             time.sleep(0.001)
 
 
-@pytest.mark.nightly  # like the page Install at an emulated Pico; with a made-up board: host_tests/deploy
+@pytest.mark.nightly  # the page Install has a similar test, and host_tests/deploy tests a fake board
 @pytest.mark.parametrize("chip", ["rp2040", pytest.param("esp32", marks=pytest.mark.esp32)])
 def test_flash_and_status_on_the_emulated_board(monkeypatch, chip):
-    """Over an older version with an edited config. Then the bike's ride begins, and the display shows what to do."""
+    """The board has an older version and an edited config. After the flash the ride begins, and the display says
+    what to do."""
     name = "esp32" if chip == "esp32" else "pico"
     names = {"rp2040": "Raspberry Pi Pico with RP2040", "esp32": "Generic ESP32 module with ESP32"}
-    CHIPS[name]()  # or skip
+    CHIPS[name]()  # skips the test without the emulator
     kept = calibrated() | {"config.py": b'SIDE = "right"\n'}
     ours = firmware(name)
     older = {"/kickstand/lean/formula.mpy": b"old", "/kickstand/lean/old_idea.py": b"pass"}

@@ -1,4 +1,4 @@
-"""Commands of other packages: found by their entry points, and a broken one harms no other."""
+"""Commands of other packages are found by their entry points, and a broken one does not affect the others."""
 
 import subprocess
 import sys
@@ -26,7 +26,8 @@ def crash_command():
 
 @pytest.fixture
 def installed(tmp_path, monkeypatch):
-    """installed(distribution, its entry_points.txt, name=content of its modules): as if pip had installed it."""
+    """Return installed(distribution, text of entry_points.txt, name=content of a module), which simulates pip's
+    installation."""
 
     def install(distribution: str, entry_points: str, **modules: str) -> None:
         info = tmp_path / f"{distribution}-1.0.dist-info"
@@ -37,7 +38,7 @@ def installed(tmp_path, monkeypatch):
             monkeypatch.delitem(sys.modules, name, raising=False)
             (tmp_path / f"{name}.py").write_text(text)
 
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # a refusal leaves nothing behind in the folder
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # a refusal leaves no files in the folder
     monkeypatch.syspath_prepend(tmp_path)
     return install
 
@@ -94,7 +95,7 @@ def test_unreadable_metadata_adds_no_command(installed):
 
 
 def test_users_own_script_is_not_run(tmp_path):
-    """For any name."""
+    """A script is not run, whatever its name."""
     (tmp_path / "kickstand_my_rides.py").write_text("raise RuntimeError('it was run')\n")
     started = [sys.executable, "-m", "kickstand_tools.cli", "--help"]
     done = subprocess.run(started, cwd=tmp_path, capture_output=True, text=True)
@@ -102,5 +103,5 @@ def test_users_own_script_is_not_run(tmp_path):
 
 
 def test_a_checkout_has_the_workshops_commands():
-    """The wheel does not have them: host_tests/deploy/test_cli_package.py."""
+    """The wheel does not contain these commands, as host_tests/deploy/test_cli_package.py tests."""
     assert {"bands", "bench", "evaluate"} <= set(main.kickstand.list_commands(None))

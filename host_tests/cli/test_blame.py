@@ -1,4 +1,4 @@
-"""External faults are named correctly: circles of links, nesting, escapes in names, signals, odd values."""
+"""External faults are named correctly: circular links, nesting, escapes in names, signals, and odd values."""
 
 import os
 import signal

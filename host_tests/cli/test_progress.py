@@ -1,4 +1,4 @@
-"""Progress of slow work: shown at once if it is known to be slow, and only on a terminal."""
+"""Progress of slow work is shown at once if the work is known to be slow, and only on a terminal."""
 
 import contextlib
 
@@ -34,7 +34,7 @@ def test_simulating_a_ride_shows_progress(tmp_path, monkeypatch):
 
 
 def test_evaluation_shows_progress_from_the_start(monkeypatch):
-    """On a terminal from 0 %, not only after the first ride; otherwise in occasional lines."""
+    """A terminal shows progress from 0 %, not only after the first ride. Other outputs get occasional lines."""
     monkeypatch.setattr(runs.estimators, "estimate", lambda log, calibration: {})
     arguments = ["evaluate", "--profiles", "parked", "--seeds", 2, "--seconds", 60, "--json"]
     shown = watched(monkeypatch, Watched(), *arguments)

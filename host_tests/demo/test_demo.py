@@ -1,4 +1,4 @@
-"""kickstand demo as a user meets it: printed, in a terminal, by hand."""
+"""Test `kickstand demo` as a user runs it: printed, in a terminal, and by hand."""
 
 import functools
 import itertools
@@ -16,18 +16,18 @@ from kickstand_tools.simulated_board.lcd import shown_lean
 from support.command import run
 from support.terminal import Terminal
 
-HUNG_S = 300  # only a process that hangs takes as long, whatever else the machine does
+HUNG_S = 300  # only a hung process takes this long, even on a busy machine
 
 
 def demo_command(engine, hand=False):
-    """Command line of the demo. By hand its time passes six times as quickly."""
+    """Return the command line of the demo. By hand its time passes six times as fast."""
     code = f"from kickstand_tools.demo import demo; demo.HAND_SPEED = 6.0; demo.demo({hand}, {engine == 'cpython'})"
     return [sys.executable, "-c", code]
 
 
 @functools.cache
 def printed_by(engine):
-    """The demo's output where standard output is no terminal."""
+    """Return the demo's output if standard output is not a terminal."""
     done = subprocess.run(
         demo_command(engine),
         stdin=subprocess.DEVNULL,
@@ -44,12 +44,12 @@ def printed_by(engine):
 
 @pytest.fixture(scope="module")
 def printed():
-    """What every engine prints: test_both_engines_show_the_same."""
+    """Return the output, which is the same for every engine (test_both_engines_show_the_same)."""
     return printed_by("cpython")
 
 
 def frames(text):
-    """[(time, phase, true lean, line 1, line 2), ...]"""
+    """Return [(time, phase, true lean, line 1, line 2), ...]."""
     head = r"^ *([\d.]+) s  ([\w ]+), true lean ([\d.]+)° ?(left|right|)"
     edge, line = r"\+-{16}\+", r"\|(.{16})\|"
     found = re.findall("\n".join([head, edge, line, line, edge]), text, re.MULTILINE)
@@ -130,13 +130,13 @@ def test_a_device_that_stops_early_is_an_error(monkeypatch):
     assert "no sensor in the shop" in failed.err
 
 
-CLOCK = r"(\d+\.\d) s\s"  # the ride's, drawn in the corner
+CLOCK = r"(\d+\.\d) s\s"  # the time of the ride, drawn in the corner
 
 
 @pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 def test_in_a_terminal_by_hand():
-    """Presses, raises the bike, presses, rides off and leans left, all with keys; the LCD follows."""
+    """Keys press the button, raise the bike, ride off and lean left, and the LCD follows."""
     with Terminal(demo_command("cpython", hand=True)) as at:
         at.wait_for("On stand: press")
         at.press("b")

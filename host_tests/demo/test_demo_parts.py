@@ -1,4 +1,4 @@
-"""Parts of kickstand demo: its picture, the lean read from the LCD, the score, the keys."""
+"""Parts of `kickstand demo`: the picture, the lean read from the LCD, the score, and the keys."""
 
 import os
 

@@ -1,4 +1,5 @@
-"""Boards are flashed hundreds of times here, and each time a separate process checks the config.py."""
+"""Cache the checks of config.py. Boards are flashed hundreds of times here, and each flash starts a process for the
+check."""
 
 import functools
 from pathlib import Path

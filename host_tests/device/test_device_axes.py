@@ -1,4 +1,4 @@
-"""A dead axis, in standby or at the end of its range, on the whole device: it is reported, and no lean is shown."""
+"""A sensor axis that is dead, in standby or at the end of its range: the whole device reports it and shows no lean."""
 
 import math
 
@@ -12,14 +12,14 @@ FAULT_S, END_S = 5.0, 8.0
 
 @pytest.fixture
 def aligned(tmp_path):
-    """A flash with an alignment in it, of the part with seed None."""
+    """Return a flash with an alignment of the sensor with seed None."""
     device_plans.align(tmp_path)
     return tmp_path
 
 
 @pytest.fixture
 def spoilt(monkeypatch):
-    """spoilt(column, value, from_s, until_s): what the sensor measures there is this value for a while."""
+    """Return spoilt(column, value, from_s, until_s), which sets a column of the readings to a value for a while."""
 
     def spoil(column, value, from_s, until_s):
         def installed(board):
@@ -73,7 +73,7 @@ def test_an_axis_that_dies_in_a_pose_ends_it(spoilt, tmp_path):
 
 
 def test_a_moment_at_the_end_of_the_range_hides_nothing_for_long(spoilt, aligned):
-    """Reported, and correct again at once: the bike is at rest."""
+    """The fault is reported, and the lean is right again at once because the bike is at rest."""
     spoilt(3, 600.0, FAULT_S, FAULT_S + 0.3)
     record = device_plans.run("cpython", aligned, {"lean": [[0, STATIC]], "until": 10})
     assert record.first("Gyro clips", FAULT_S) < FAULT_S + 0.5
@@ -82,7 +82,7 @@ def test_a_moment_at_the_end_of_the_range_hides_nothing_for_long(spoilt, aligned
 
 
 def test_a_gyro_in_standby_is_set_up_again(aligned, monkeypatch):
-    """By PWR_MGMT_2 alone, as a disturbed write leaves it."""
+    """PWR_MGMT_2 alone puts the gyro in standby, as a disturbed write would."""
     install = simulator.Board.install
 
     def installed(board):

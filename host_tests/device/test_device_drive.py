@@ -1,5 +1,5 @@
-"""The whole device aligned by driving: cars without an earlier alignment, motorcycles whose alignment is checked and
-refined, and unusable speed sources."""
+"""The whole device aligned by driving. Cars have no earlier alignment, and motorcycles have theirs checked and
+refined. Some speed sources are unusable."""
 
 import math
 import re
@@ -18,8 +18,8 @@ POSES_S = 20.0
 
 
 def town(blocks):
-    """A ride of blocks of 30 s, each with a turn and one straight braking event to a stop of some 8 s. Each entry is
-    [the name of a manoeuvre, its arguments]."""
+    """Return a ride of 30 s blocks, each with a turn and one straight braking event to a stop of about 8 s. Each
+    entry is [name of a manoeuvre, its arguments]."""
     ride = []
     for k in range(blocks):
         ride += [["accelerate", 13.0 + k % 3, 6.0], ["turn", -25.0 if k % 2 else 20.0, 3.0], ["straight", 5.0]]
@@ -28,7 +28,7 @@ def town(blocks):
 
 
 def stops(time_s, start_s):
-    """True while the vehicle is at rest, in a ride whose town() begins at start_s."""
+    """Return True while the vehicle is at rest in a ride whose town() begins at start_s."""
     return time_s < start_s or (time_s - start_s) % 30.0 > 21.0
 
 
@@ -50,7 +50,7 @@ def stored(flash):
 
 
 def forward_error_deg(calibration, seed=None):
-    """The yaw error, which driving finds. seed: of the sensor's mount and errors."""
+    """Return the yaw error, which driving corrects. seed: of the sensor's mount and errors."""
     true = sensor_errors.Sensor(seed=seed).vehicle_from_sensor
     up, forward = true[3:6], calibration.vehicle_from_sensor[6:9]
     left = sum(a * b for a, b in zip(true[0:3], forward, strict=True))
@@ -61,7 +61,7 @@ def forward_error_deg(calibration, seed=None):
 
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
 def test_a_car_finds_its_alignment_and_shows_the_next_step(engine, tmp_path):
-    """On MicroPython, with its floats and its heap: the other drives are CPython's."""
+    """This drive runs on MicroPython with its floats and heap. The other drives run on CPython."""
     record = device_plans.run(engine, tmp_path, car("gps", 5, presses=[[60, SHORT], [65, SHORT]]))
     assert record.at(3.0) == ["Brakings   0/5  ", "stop needed     "]
     assert record.first("brake straight") < 8.0
@@ -83,7 +83,7 @@ def test_a_car_finds_its_alignment_and_shows_the_next_step(engine, tmp_path):
 
 
 def test_a_car_by_its_wheel_stores_at_standstill_only(tmp_path):
-    """It becomes ready in a braking event that ends at a slower speed, not at a stop."""
+    """The alignment becomes ready in a braking event that ends at a slower speed, not at a stop."""
     plan = car("wheel", 2, wheel={"bounce_us": 2000})
     moving = [["brake", 4.0, 3.0], ["straight", 2.0], ["accelerate", 15.0, 6.0], ["straight", 5.0]]
     plan["ride"] += [["accelerate", 15.0, 6.0], ["straight", 5.0], *moving * 4, ["brake", 0.0, 5.0], ["wait", 8.0]]
@@ -101,7 +101,7 @@ def test_a_car_whose_sensor_is_mounted_anew_finds_it_out(tmp_path):
     record = device_plans.run("cpython", tmp_path, car("wheel", 7, remount=[20.0, 8]))
     assert record.first("Aligned by drive") < math.inf
     after, true = stored(tmp_path).vehicle_from_sensor, sensor_errors.random_mounting(8)
-    assert max(abs(a - b) for a, b in zip(after, true, strict=True)) < 0.12  # the sensor's own errors make 4 degrees
+    assert max(abs(a - b) for a, b in zip(after, true, strict=True)) < 0.12  # the sensor's own errors cause 4 degrees
     assert max(abs(a - b) for a, b in zip(before.vehicle_from_sensor, true, strict=True)) > 0.5
 
 
@@ -111,13 +111,13 @@ TURN_S = POSES_S + 30.0 * 2 + 9.0  # in a right turn of 20 degrees
 
 @pytest.fixture(scope="module")
 def unanswered(tmp_path_factory):
-    """The Record of a ride with the poses on the wrong side, without an answer to the question."""
+    """Return the Record of a ride with the poses on the wrong side and no answer to the question."""
     return device_plans.run("cpython", tmp_path_factory.mktemp("asked"), bike("gps", 3, kickstand=(12.0,)))
 
 
 @pytest.fixture
 def asked(unanswered):
-    """The time when the display asks about the side."""
+    """Return the time when the display asks about the side."""
     return unanswered.first(QUESTION)
 
 
@@ -125,8 +125,8 @@ def test_a_wrong_kickstand_side_is_noticed(unanswered, asked):
     assert asked < POSES_S + 60.0 and stops(asked, POSES_S)
     assert unanswered.at(asked)[1] == "hold = fix      "
     away = unanswered.first("Lean", asked)
-    assert not stops(away, POSES_S)  # it does not disturb the ride
-    assert unanswered.lean_at(TURN_S) is None  # it would have the wrong sign
+    assert not stops(away, POSES_S)  # the question does not disturb the ride
+    assert unanswered.lean_at(TURN_S) is None  # a lean would have the wrong sign
     assert unanswered.at(TURN_S) == ["Lean  --        ", "side was wrong? "]
 
 
@@ -150,8 +150,8 @@ def test_a_side_that_the_rider_confirms_is_not_asked_for_again(asked, tmp_path):
 
 @pytest.mark.parametrize(("model", "config"), [({"until_s": 65.0}, {}), ({}, {"PULSES_PER_METRE": 0.25})])
 def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
-    """A wire that breaks during the ride reads as a standstill, a second magnet as twice the speed. The display reports
-    it at a stop."""
+    """A wire that breaks during the ride reads as a standstill, and a second magnet as twice the speed. The display
+    reports both at a stop."""
     plan = bike("wheel", 6, wheel=model, config={"SPEED": "wheel", **config})
     record = device_plans.run("cpython", tmp_path, plan)
     for town_round in range(6):
@@ -159,12 +159,13 @@ def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
         assert shown == pytest.approx(-25 if town_round % 2 else 20, abs=4)
     shown_s = record.first("Speed (stuck at|2.0 times)")
     assert stops(shown_s, POSES_S)
-    assert record.at(shown_s + 2.0) == record.at(shown_s)  # until it is answered, or the ride goes on
+    assert record.at(shown_s + 2.0) == record.at(shown_s)  # until the rider answers or rides on
 
 
 def test_errors_of_both_poses_are_found_while_riding(tmp_path):
-    """Two degrees of pitch on the kickstand give a yaw error of almost ten: forward is refined at a stop, and at most
-    1.5 are left. The upright pose was 2 degrees off: that trim outlives the new alignment. The maxima are kept."""
+    """Two degrees of pitch on the kickstand give a yaw error of almost ten degrees. Forward is refined at a stop,
+    and at most 1.5 degrees remain. The upright pose was 2 degrees off, and its trim is kept by the new alignment.
+    The maxima are kept too."""
     plan = bike("wheel", 8, kickstand=(-12.0, 2.0))
     plan["ride"][1] = ["upright", 10.0, 2.0, 0.0]
     first = device_plans.run("cpython", tmp_path, {**plan, "until": 19.0})
@@ -174,12 +175,12 @@ def test_errors_of_both_poses_are_found_while_riding(tmp_path):
     assert forward_error_deg(stored(tmp_path)) < 1.5
     assert stored(tmp_path).by_drive
     for town_round in range(3, 7):
-        assert record.lean_at(POSES_S + 30.0 * town_round - 1.0) in (-1, 0, 1)  # stands upright
+        assert record.lean_at(POSES_S + 30.0 * town_round - 1.0) in (-1, 0, 1)  # the bike is upright
     assert record.first("Max right +(19|2[0-9])°", POSES_S + 232.0) < math.inf
 
 
 def test_a_moved_mount_hides_the_lean_despite_other_messages(tmp_path):
-    """The wheel's wire breaks later, and nobody has answered the first message."""
+    """The wheel's wire breaks later, and the rider has not answered the first message."""
     record = device_plans.run(
         "cpython", tmp_path, bike("wheel", 6, remount=[POSES_S + 60.0, 8], wheel={"until_s": 130.0})
     )
@@ -190,8 +191,8 @@ def test_a_moved_mount_hides_the_lean_despite_other_messages(tmp_path):
 
 
 def test_a_requested_drive_keeps_the_old_alignment_until_ready(tmp_path):
-    """The rider asks for it in the menu, for a sensor that was mounted anew. A fault of the sensor during the drive
-    does no harm."""
+    """The rider requests the drive in the menu after remounting the sensor. A sensor fault during the drive does no
+    harm."""
     device_plans.align(tmp_path)
     old = list(stored(tmp_path).vehicle_from_sensor)
     menu = [[2, LONG], *([4 + t, SHORT] for t in range(4)), [9, LONG]]
@@ -279,13 +280,15 @@ def test_status_shows_the_speed(config, fitted, said, capsys, monkeypatch, tmp_p
 
 
 def test_ctrl_c_keeps_the_worst_for_the_status(tmp_path, monkeypatch, capsys):
-    """For half a second other code used the processor: the FIFO was full, and a turn was that long."""
+    """Other code used the processor for half a second. The FIFO was full, and one pass of the loop took as long."""
     monkeypatch.chdir(tmp_path)
 
     def interrupt():
         raise KeyboardInterrupt
 
-    with Board(sensor_errors.resting(sensor_errors.Sensor(), (0, 1, 0))) as board:  # level would be a frozen sensor
+    with Board(
+        sensor_errors.resting(sensor_errors.Sensor(), (0, 1, 0))
+    ) as board:  # a perfectly level sensor would look frozen
         from kickstand import app, devices, settings, status_report
         from kickstand.lean import consistency
 
@@ -313,7 +316,7 @@ def test_ctrl_c_keeps_the_worst_for_the_status(tmp_path, monkeypatch, capsys):
 
 
 def test_a_press_for_a_page_does_not_answer_a_hidden_question(asked, tmp_path):
-    """The information page is in front of the question."""
+    """The information page covers the question."""
     plan = bike("gps", 3, kickstand=(12.0,))
     to_info = [[asked - 14.0, LONG], *([asked - 12.0 + t, SHORT] for t in range(3)), [asked - 9.0, LONG]]
     presses = [*POSES, *to_info, [asked + 2.0, LONG]]

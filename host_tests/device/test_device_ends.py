@@ -1,4 +1,4 @@
-"""At every end of the firmware the display says so and keeps no lean."""
+"""However the firmware ends, the display says so and shows no lean."""
 
 import pytest
 from kickstand_tools.simulated_board import simulator
@@ -20,7 +20,7 @@ def on_lean(lean_deg, trusted, meter):
 
 @pytest.fixture
 def boards(tmp_path, monkeypatch):
-    """The simulated boards that ran, each with an alignment in its flash."""
+    """Return the simulated boards that ran, each with an alignment in its flash."""
     device_plans.align(tmp_path)
     made = []
     install = simulator.Board.install
@@ -41,7 +41,7 @@ def test_after_an_error_in_user_py_no_lean_is_shown(kind, boards, tmp_path, monk
 
 @pytest.mark.parametrize("turn", [1, 2, 150, 300])
 def test_ctrl_c_in_a_transfer_leaves_no_lean(turn, boards, tmp_path, monkeypatch):
-    """In the middle of a line of the display, whose two halves of a byte are then out of step."""
+    """Ctrl-C comes in the middle of a display line, between the two halves of a byte."""
     from kickstand.board import hd44780
 
     calls = []

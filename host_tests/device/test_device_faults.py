@@ -1,5 +1,5 @@
-"""Faults of sensor, bus, display and flash on the whole device: shown while they last, cleared soon after,
-and nothing wrong is shown as good."""
+"""Faults of sensor, bus, display and flash on the whole device are shown while they last and cleared soon after. A
+wrong value is never shown as good."""
 
 import math
 import time
@@ -15,13 +15,13 @@ RECOVERY_S = 0.5
 
 @pytest.fixture
 def aligned(tmp_path):
-    """A flash with an alignment in it, of the part with seed None."""
+    """Return a flash with an alignment of the sensor with seed None."""
     device_plans.align(tmp_path)
     return tmp_path
 
 
 def standing(faults, until=10, **more):
-    """A bike at rest at 25 degrees, and the faults of the device."""
+    """Return a bike at rest at 25 degrees, with these faults of the device."""
     return {"lean": [[0, STATIC]], "faults": faults, "until": until, **more}
 
 
@@ -42,7 +42,7 @@ def test_a_lasting_fault_is_shown_until_it_ends(faults, said, aligned):
     assert record.first(said, FAULT_S) < FAULT_S + 0.4
     back = record.first("Lean +25° right", END_S)
     assert back < END_S + RECOVERY_S + 0.1  # the record is taken every 0.1 s
-    assert set(record.leans(0, 10)) == {STATIC}  # nothing else was ever shown as lean
+    assert set(record.leans(0, 10)) == {STATIC}  # no other lean was ever shown
 
 
 @pytest.mark.parametrize(
@@ -95,13 +95,13 @@ def test_a_sagging_supply_while_the_calibration_is_read(fault, aligned):
     files = {path.name: path.read_bytes() for path in aligned.iterdir()}
     record = device_plans.run("cpython", aligned, standing([[fault, [".cal", 0, 2]]], until=4))
     assert record.first("Not aligned") < math.inf
-    assert {path.name: path.read_bytes() for path in aligned.iterdir()} == files  # nothing rewritten
+    assert {path.name: path.read_bytes() for path in aligned.iterdir()} == files  # no file was rewritten
     assert device_plans.run("cpython", aligned, standing([], until=3)).lean_at(2.5) == STATIC
 
 
 @pytest.fixture
 def in_turn_300(monkeypatch):
-    """Call it with a function that replaces this turn of the app's loop once."""
+    """Return a function that runs its argument in place of pass 300 of the app's loop."""
     from kickstand import app
 
     original, calls = app.App.turn, []
@@ -118,7 +118,7 @@ def in_turn_300(monkeypatch):
 
 def test_an_exception_is_reported_and_the_board_restarts(aligned, in_turn_300, capsys):
     in_turn_300(lambda: 1 / 0)
-    held = {"presses": [[3.0, 5.0]]}  # the button, all that time: no safe mode, which is for power-up
+    held = {"presses": [[3.0, 5.0]]}  # the button is held until later, but safe mode is only for power-on
     record = device_plans.run("cpython", aligned, standing([], until=12, **held), capsys)
     assert record.first("Error, restarts") < math.inf
     assert record.first("ZeroDivisionErro") < math.inf
@@ -139,18 +139,18 @@ def test_a_loop_that_hangs_is_restarted_by_the_watchdog(aligned, in_turn_300):
 
 @pytest.mark.parametrize(("lean", "off_s"), [(-14, 0.507), (-30, 0.4)])
 def test_a_sensor_lost_in_a_turn(lean, off_s, tmp_path):
-    """A turn is as calm as rest and has no force to the side: after the fault it must not be treated as upright."""
+    """A turn is as calm as rest and has no side force. After the fault it must not be treated as upright."""
     ride = [["kickstand", 8.0], ["upright", 8.0], ["accelerate", 20.0, 8.0], ["turn", 25.0, 3.0], ["turn", lean, 20.0]]
     plan = {"ride": ride, "presses": [[2, 0.15], [12, 0.15]], "until": 53}
     record = device_plans.run("cpython", tmp_path, {**plan, "faults": [["unplug_sensor", [40.0, off_s]]]})
     assert record.lean_at(39.5) == pytest.approx(lean, abs=2)
     assert record.first("No sensor|Sensor", 40) < 40.5
-    assert all(abs(shown - lean) <= 7 for shown in record.leans(40.6, 52))  # "not sure yet" at first
+    assert all(abs(shown - lean) <= 7 for shown in record.leans(40.6, 52))  # "not sure yet" comes first
     assert record.lean_at(51) == pytest.approx(lean, abs=3)
 
 
 def test_a_fifo_out_of_step_is_noticed(aligned, monkeypatch):
-    """Stray bytes in the FIFO: shifted frames would be read as readings forever."""
+    """After stray bytes in the FIFO, shifted frames would be read as readings forever."""
     install = simulator.Board.install
 
     def with_stray_bytes(board):
@@ -164,7 +164,7 @@ def test_a_fifo_out_of_step_is_noticed(aligned, monkeypatch):
 
 
 def test_a_changed_range_is_repaired(aligned, monkeypatch):
-    """The readings continue and look normal: only the register shows the fault."""
+    """The readings continue and look normal, and only the register shows the fault."""
     install, boards = simulator.Board.install, []
 
     def installed(board):

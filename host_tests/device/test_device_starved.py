@@ -1,13 +1,12 @@
-"""Events that take the board's time: an erase of the flash, slow USB, a storm of wheel pulses; and a display that fails
-in the middle of a line. The display never shows a lean over half a second old, nor one that is half old and half
-new."""
+"""The board loses time to a flash erase, slow USB or a storm of wheel pulses, or the display fails in the middle of
+a line. The display never shows a lean that is over half a second old, or half old and half new."""
 
 import pytest
 from kickstand_tools.simulation.scripted import script
 from support import device_plans, engines
 
 FROM_S = 32.0
-# From FROM_S on the bike rolls from side to side, so quickly that the lean that is shown shows how old it is
+# From FROM_S on the bike rolls from side to side, so fast that the displayed lean shows its own age.
 RIDE = [
     *device_plans.RIDE[:3],
     ["turn", -30.0, 2.0],
@@ -15,9 +14,9 @@ RIDE = [
     *[["turn", 40.0 * (-1) ** k, 0.3] for k in range(8)],
 ]
 TRUE = script.Ride([getattr(script, name)(*more) for name, *more in RIDE])
-OLDEST_S = 0.5 + 0.1 + 0.1  # half a second, a page, and the time between two looks at the display
-HANG_S = 1.46  # the first page after it, which says why, then stands when the next frame is taken
-NEAR_DEG = 10.0  # readings lost while the bike rolls cost up to 8 degrees until the filter has made up for them
+OLDEST_S = 0.5 + 0.1 + 0.1  # half a second, one page, and the time between two samples of the display
+HANG_S = 1.46  # the first page after the hang gives its reason and is still shown at the next frame
+NEAR_DEG = 10.0  # readings lost while the bike rolls cost up to 8 degrees until the filter recovers
 
 STARVED = {
     "flash erase": ([["busy", [FROM_S, 0.4, 6]]], {}),
@@ -35,7 +34,7 @@ def run(engine, flash, faults, config, **more):
 
 
 def too_old(record, from_s=FROM_S - 5.0):
-    """[(t_s, line), ...] of each lean on the display that the bike has not had for OLDEST_S."""
+    """Return [(t_s, line), ...] of each displayed lean that the bike has not had within OLDEST_S."""
     found = []
     for k in range(int(10 * (FROM_S + 8.0 - from_s))):
         t_s = from_s + k / 10
@@ -51,7 +50,7 @@ def test_no_lean_on_the_display_is_too_old(engine, name, tmp_path):
     faults, config = STARVED[name]
     record = run(engine, tmp_path, faults, config)
     assert record.ends == ["off"]
-    # the program cannot change the display while it hangs
+    # a hung program cannot change the display
     hang_s = (FROM_S + 0.3, FROM_S + 0.3 + HANG_S + 0.05) if name == "a hang" else (0, 0)
     assert [found for found in too_old(record) if not hang_s[0] < found[0] < hang_s[1]] == []
     if name == "a hang":
@@ -62,7 +61,7 @@ def test_no_lean_on_the_display_is_too_old(engine, name, tmp_path):
 
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
 def test_a_storm_of_wheel_pulses_is_reported_and_leaves_the_lean(engine, tmp_path):
-    """50,000 pulses per second leave the loop no time until the interrupt turns itself off."""
+    """At 50,000 pulses per second the loop gets no time until the interrupt disables itself."""
     storm = [["wheel_storm", [FROM_S, 3.0, 50_000]]]
     record = run(engine, tmp_path, storm, {"SPEED": "wheel"}, wheel={})
     assert record.ends == ["off"]

@@ -1,4 +1,4 @@
-"""The whole device with each display: the same lean, and the display recovers from everything."""
+"""The whole device with each display shows the same lean, and the display recovers from every fault."""
 
 import random
 
@@ -24,7 +24,7 @@ def test_the_lean_is_that_of_the_character_display(engine, display, one_bus, tmp
 
 @pytest.mark.parametrize(("engine", "display"), [("cpython", "lcd"), ("micropython", "ssd1306")])
 def test_presses_and_unplugs_at_random(engine, display, tmp_path):
-    """At the end it shows a page as ever; MicroPython's heap is watched by the displays' own tests."""
+    """At the end the display shows a normal page. The displays' own tests check MicroPython's heap."""
     chance = random.Random(3)
     presses, faults = [[2, 0.15], [12, 0.15]], []
     for k in range(SHOTS):
@@ -33,7 +33,7 @@ def test_presses_and_unplugs_at_random(engine, display, tmp_path):
             presses.append([at_s, chance.choice((0.1, 0.15, 0.9))])
         else:
             faults.append(["unplug_lcd", [at_s, chance.choice((0.001, 0.05, 0.25))]])
-    until_s = 18.0 + 0.2 * SHOTS + 45.0  # so long that each menu and wizard has ended
+    until_s = 18.0 + 0.2 * SHOTS + 45.0  # by this time every menu and wizard has ended
     plan = {
         "ride": device_plans.RIDE,
         "presses": presses,

@@ -1,4 +1,4 @@
-"""Wrong machine code is detected when its module is imported. Then the plain function is used, and the console says
+"""Wrong machine code is detected when its module is imported. The plain function is then used, and the console says
 so."""
 
 import re
@@ -10,7 +10,7 @@ from kickstand_tools.common import firmware_path, unix_port
 from kickstand_tools.deploy import bytecode
 from support import emulated
 
-# The choices of each pair: (function, the plain one's name)
+# The two versions of each function: (function, name of the plain version).
 _CHOSEN = """
 from kickstand.calibration import transform
 from kickstand.imu import fifo_frames
@@ -21,7 +21,8 @@ for module, name in PAIRS + ((kalman, "add_products"),):
     plain = getattr(module, name + "_python")
     print(name, "plain" if getattr(module, name) is plain else "quick")
 """
-# One mistake per viper function, such as a compiler might make. {(module, function): (old text, new text)}
+# One mistake in each viper function, as a compiler might make it. (module, function): text to replace and its
+# replacement.
 MISTAKES = {
     ("imu/fifo_frames_viper.py", "decode"): ("frames[at] << 8 |", "frames[at] << 8 &"),
     ("imu/fifo_frames_viper.py", "add_up"): ("value > 32767", "value > 32768"),
@@ -33,7 +34,7 @@ NAMES = [name for _, name in MISTAKES]
 
 
 def write_broken(path, name, target):
-    """The module with its mistake in that function."""
+    """Write the module with its mistake in this function."""
     source = (firmware_path.PACKAGE / path).read_text(encoding="utf-8")
     right, wrong = MISTAKES[path, name]
     start = source.index(f"def {name}(")
@@ -42,8 +43,8 @@ def write_broken(path, name, target):
 
 
 def imported(tmp_path, path="", name="", error=""):
-    """MicroPython's output when the firmware is imported and the function chosen, with a mistake in that function or an
-    error while importing its module."""
+    """Return MicroPython's output when the firmware is imported and the function chosen. Either the function has a
+    mistake, or the import of its module raises an error."""
     if not unix_port.available():
         pytest.skip("no MicroPython unix port for this system")
     shutil.copytree(firmware_path.PACKAGE, tmp_path / "kickstand")
@@ -60,7 +61,7 @@ def imported(tmp_path, path="", name="", error=""):
 
 
 def test_correct_machine_code_is_used(tmp_path):
-    """That of every viper function."""
+    """The machine code of every viper function is used."""
     found = [
         (path.relative_to(firmware_path.PACKAGE).as_posix(), name)
         for path in firmware_path.PACKAGE.rglob("*_viper.py")
@@ -87,7 +88,7 @@ def test_wrong_machine_code_is_not_used(tmp_path, path, name):
     ],
 )
 def test_machine_code_that_cannot_be_loaded_is_not_used(tmp_path, path, error):
-    """An ESP32 runs it from a separate memory, which may be too small. The meter still works."""
+    """An ESP32 runs machine code from a separate memory, which may be too small. The meter still works."""
     without = [name for other, name in MISTAKES if other == path]
     chosen = imported(tmp_path, path, error=error)
     assert chosen == [f"{name} {'plain' if name in without else 'quick'}" for name in NAMES]

@@ -1,4 +1,4 @@
-"""The button is pressed until a page is shown, and not for ever."""
+"""The button is pressed until a page is shown, and a missing page ends the presses."""
 
 import pytest
 from support import device_plans

@@ -1,4 +1,4 @@
-"""An ESP32's heap starts small. Garbage is still collected between turns of the loop, never within one.
+"""An ESP32's heap starts small. Garbage is still collected between passes of the loop, never during one.
 
 MicroPython's unix port with a heap that is nearly full, as an ESP32's is. Its objects are twice as large, and the
 models of the parts are on it too, so what a turn uses is measured first."""
@@ -82,9 +82,10 @@ print(json.dumps({"free": free, "turns": turns.n, "within": within, "plan": plan
 
 @pytest.mark.parametrize("plan", [True, False])
 def test_the_garbage_is_collected_between_turns(plan):
-    """Without a check of the free heap, collections would be within turns: proof that this heap is small enough."""
+    """Without a check of the free heap, garbage is collected during passes. This proves that the heap is small
+    enough."""
     found = json.loads(run_mpy(_SCRIPT.replace("PLAN", str(plan)), heap="4M").splitlines()[-1])
-    assert 8 < found["free"] < 20  # turns until the heap is full: fewer than 25
+    assert 8 < found["free"] < 20  # passes until the heap is full: fewer than 25
     assert 3 <= found["plan"] <= 10
     assert found["turns"] > 500
     assert (found["within"] == 0) is plan, found

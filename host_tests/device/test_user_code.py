@@ -1,4 +1,4 @@
-"""user.py, the owner's own code: it is called at the right times, and the lean continues whatever it does."""
+"""user.py, the owner's own code, is called at the right times, and the lean continues whatever it does."""
 
 import re
 import sys
@@ -30,7 +30,8 @@ def page_two(app):
 
 @pytest.fixture
 def run(tmp_path, monkeypatch, capsys):
-    """run(source of user.py, plan) -> Record. MicroPython's exceptions, memory and printing are its own."""
+    """Return run(source of user.py, plan) -> Record. It runs on MicroPython, with its exceptions, memory and
+    printing."""
 
     def run(source, plan=PLAN, engine="micropython"):
         if plan["ride"] == PLAN["ride"]:
@@ -43,7 +44,7 @@ def run(tmp_path, monkeypatch, capsys):
 
 
 def goes_on(record, t_s=13.5):
-    """The lean is right at the end of the left turn."""
+    """Assert that the lean is right at the end of the left turn."""
     lean = record.lean_at(t_s)
     return lean is not None and abs(lean + 30) < 4
 
@@ -59,7 +60,7 @@ def test_each_function_is_called(run, engine):
 
 
 def test_its_pages_follow_the_others_and_are_in_the_menu(run):
-    # the menu: Own pages is its sixth entry
+    # Own pages is the sixth entry of the menu
     presses = [[2, 1.2]] + [[4 + 0.5 * k, 0.15] for k in range(5)] + [[8, 1.2], [10, 0.15], [11, 0.15]]
     record = run(WHOLE, POSES | {"presses": presses, "until": 13})
     assert record.at(7.5)[0].startswith("→Own pages"), record.frames
@@ -122,7 +123,7 @@ def test_user_py_is_disabled_before_memory_runs_out(run):
 
 
 def test_without_a_user_py_its_module_is_not_loaded(run, tmp_path):
-    """On a board it would take 3 KB of heap."""
+    """On a board the module would take 3 KB of heap."""
     sys.modules.pop("kickstand.user_code", None)
     device_plans.run("cpython", tmp_path, PLAN | {"until": 1.0})
     assert "kickstand.user_code" not in sys.modules

@@ -1,4 +1,4 @@
-"""The notebook of the tools runs as it is, from the first cell to the last, and finds the lean of its own ride."""
+"""The notebook of the tools runs unchanged from the first cell to the last, and finds the lean of its own ride."""
 
 import json
 import re
@@ -34,7 +34,7 @@ def test_the_notebook_runs_and_finds_the_lean(monkeypatch, tmp_path, capsys):
 
 
 def test_each_step_of_the_notebook_is_explained_and_no_output_is_kept():
-    """What it prints is the reader's own run."""
+    """Readers see the output of their own run."""
     whole = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
     assert whole[0]["cell_type"] == "markdown" and len(cells("markdown")) >= len(cells("code")) - 1
     assert not any(cell.get("outputs") or cell.get("execution_count") for cell in whole)

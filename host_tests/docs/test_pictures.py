@@ -1,4 +1,4 @@
-"""The pictures of the pages of text are those of the firmware, the settings and the commands as they are now."""
+"""The pictures in the documents match the current firmware, settings and commands."""
 
 import io
 import re
@@ -28,10 +28,10 @@ def test_no_drawing_is_stale(pictures):
     assert not stale, f"{', '.join(stale)}: {STALE}"
 
 
-@pytest.mark.nightly  # each draws a whole ride; what a plot shows is tested in host_tests/analysis
+@pytest.mark.nightly  # each draws a whole ride, and host_tests/analysis tests the content of plots
 @pytest.mark.parametrize(("name", "draw"), [("ride.png", ride.draw), ("lean_compared.png", explained.lean_compared)])
 def test_no_plot_of_a_ride_is_stale(name, draw):
-    """By its look: matplotlib's files differ from version to version."""
+    """The pictures are compared by pixels, because matplotlib's files differ between versions."""
     fresh, kept = (
         np.asarray(Image.open(io.BytesIO(data)).convert("L"), dtype=float)
         for data in (draw(), (PICTURES / name).read_bytes())
@@ -42,7 +42,7 @@ def test_no_plot_of_a_ride_is_stale(name, draw):
 
 
 def test_the_picture_of_the_page_is_not_stale():
-    """Compare a hash of the page's files, because recording the picture again would take a minute."""
+    """The files that decide how the page looks are compared, because drawing it again would take a minute."""
     with Image.open(PICTURES / page.NAME) as moving:
         assert moving.info["xmp"].decode() == page.looks(), STALE
         assert sum(1 for _ in ImageSequence.Iterator(moving)) > 50
@@ -57,7 +57,7 @@ def test_they_are_small_and_fetch_nothing(pictures):
 
 
 def test_the_wires_go_to_the_pins_of_the_settings(pictures):
-    """Both boards' default pins are emphasized, no other GPIO is."""
+    """The default pins of both boards are emphasized, and no other GPIO is."""
     for name, pins in (("pico", {"GP4", "GP5", "GP6", "GP7", "GP15"}), ("esp32", {"21", "22", "18", "19", "4"})):
         bold = re.findall(r'font-weight="bold"[^>]*>(?:\d+  )?(GP\d+|\d+)<', pictures[f"wiring_{name}.svg"])
         assert set(bold) == pins

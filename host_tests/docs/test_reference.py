@@ -1,4 +1,4 @@
-"""The reference of the functions, as the site's workflow builds it."""
+"""The reference of the functions can be built as the site's workflow builds it."""
 
 import re
 import shlex

@@ -1,4 +1,4 @@
-"""kickstand calibrate drive: its results on simulated and recorded drives, and its refusals."""
+"""Test `kickstand calibrate drive`: results on simulated and recorded drives, and refusals."""
 
 import csv
 import gzip
@@ -13,7 +13,8 @@ from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 from support import command, driving_runs
 from support.driving_runs import RATE_HZ, STAND, around, mounted
 
-# vehicle from sensor, rows left, up, forward, from the recording's own receiver: good to 1 to 2 degrees
+# From the sensor's axes to the vehicle's, rows left, up, forward, by the recording's own receiver: within 1 to 2
+# degrees.
 RECORDED = {
     "car-urban-short-turn-loop-nominal-001": [
         [0.0124, 0.9995, 0.0302],
@@ -60,7 +61,7 @@ def matrix_in(path):
 
 
 def errors(found, true):
-    """Yaw and total error in degrees."""
+    """Return the yaw error and total error in degrees."""
     between = found @ np.asarray(true).reshape(3, 3).T
     yaw = np.degrees(np.arctan2(between[2, 0] - between[0, 2], between[0, 0] + between[2, 2]))
     return abs(yaw), np.degrees(np.arccos(np.clip((np.trace(between) - 1) / 2, -1, 1)))
@@ -100,7 +101,7 @@ def test_a_calibrated_accelerometer_keeps_its_parameters(tmp_path):
 
 
 def test_notes_in_a_calibration_are_kept(tmp_path):
-    """Such as the board and the chip of a recorded ride."""
+    """The notes give the board and the chip of a recorded ride, for example."""
     log = record(tmp_path / "drive.csv", around(7), MOUNT)
     before = CalibrationFile(notes={"board": "Raspberry Pi Pico", "sensor": "MPU6050"})
     found = fit_drive([log], before).calibration
@@ -109,7 +110,7 @@ def test_notes_in_a_calibration_are_kept(tmp_path):
 
 
 def test_several_logs_of_one_mount_are_combined(tmp_path):
-    """No log is enough alone."""
+    """None of the logs is enough alone."""
     logs = [record(tmp_path / f"{k}.csv", around(2), MOUNT) for k in range(3)]
     refused(tmp_path, "braking events in a straight line", logs[0])
     command.works("calibrate", "drive", *logs, "--out", tmp_path / "CAL.json")
@@ -143,7 +144,7 @@ def test_a_log_without_speed_among_others(tmp_path):
 
 
 def test_a_drive_that_begins_in_motion_counts_from_its_beginning(tmp_path):
-    """The gyro's bias, known only from the stop at the end, is subtracted."""
+    """The gyro's bias is known only from the stop at the end, and is subtracted from the whole drive."""
     legs = [*around(6, stands=False)[1:], [20.0, -1.0, 0.0], list(STAND)]
     log = record(tmp_path / "drive.csv", legs, MOUNT, (5.0, -9.0, 3.0), start_mps=12.0)
     command.works("calibrate", "drive", log, "--out", tmp_path / "CAL.json")
@@ -152,8 +153,8 @@ def test_a_drive_that_begins_in_motion_counts_from_its_beginning(tmp_path):
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_a_motorcycle_whose_pitch_changed_on_the_kickstand(tmp_path, side):
-    """With 2 degrees of pitch the two poses are 8 degrees off; braking reduces that to 1.5. A wrong side is
-    reported."""
+    """With 2 degrees of pitch the two poses are 8 degrees off, and braking reduces this to 1.5 degrees. A wrong side
+    is reported."""
     ride = simulate("city", 3, tmp_path, 320.0, pitch_change_deg=2.0, speed=True)
     poses = [tmp_path / f"POSE_{k}.csv" for k in range(1, 8)]
     six, two, out = tmp_path / "SIX.json", tmp_path / "TWO.json", tmp_path / "CAL.json"
@@ -187,7 +188,7 @@ def refused(tmp_path, words, *arguments):
     ],
 )
 def test_refusals(tmp_path, method, words, legs, how):
-    """Other refusals of the improved method: test_drive_alignment.py."""
+    """test_drive_alignment.py tests the other refusals of the improved method."""
     log = record(tmp_path / "drive.csv", legs, MOUNT, **how)
     refused(tmp_path, words, log, "--method", method)
 
@@ -207,7 +208,7 @@ def test_a_log_with_too_few_samples_per_second_is_refused(tmp_path):
 
 @pytest.mark.parametrize("name", RECORDED)
 def test_recorded_cars_remounted_at_random(tmp_path, shared_data, name):
-    """Yaw within 1.6 degrees and the total error within 3 degrees of a reference that is good to 1 or 2."""
+    """Yaw is within 1.6 degrees and the total error within 3 degrees of a reference with an error of 1 to 2 degrees."""
     q = np.reshape(random_mounting(1), (3, 3))
     log = remount(shared_data / f"{name}.csv.gz", tmp_path / "log.csv", q)
     command.works("calibrate", "drive", log, "--out", tmp_path / "CAL.json")
@@ -220,7 +221,7 @@ UPSIDE_DOWN = [0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0]  # rows left, up, 
 
 
 def test_a_log_of_opposite_sign_looks_upside_down(tmp_path):
-    """Nothing else in a car's log shows it: without the notice its mirror image would be accepted."""
+    """In a car's log only this notice shows the opposite sign. Without it the mirror image would be accepted."""
     log, out = record(tmp_path / "drive.csv", around(8), UPSIDE_DOWN), tmp_path / "CAL.json"
     said = command.works("calibrate", "drive", log, "--out", out)
     assert "the sensor's z points down: if it is not mounted upside down, all accelerations are of the" in said.err

@@ -1,4 +1,4 @@
-"""Alignment by driving on simulated drives: results, refusals and their reasons; on CPython and MicroPython."""
+"""Alignment by driving on simulated drives, on CPython and MicroPython: results, refusals and their reasons."""
 
 import numpy as np
 import pytest
@@ -13,19 +13,19 @@ PLAIN = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
 
 
 def errors(result, mount):
-    """Yaw error and total error of the matrix, in degrees."""
+    """Return the yaw error and total error of the matrix in degrees."""
     between = np.reshape(result["matrix"], (3, 3)) @ np.reshape(mount, (3, 3)).T
     yaw = np.degrees(np.arctan2(between[2, 0] - between[0, 2], between[0, 0] + between[2, 2]))
     return yaw, np.degrees(np.arccos(np.clip((np.trace(between) - 1) / 2, -1, 1)))
 
 
 def drive(legs, mount=MOUNT, **options):
-    """driving_runs.drive on CPython."""
+    """Run driving_runs.drive on CPython."""
     return driving_runs.drive(legs, mount, options)
 
 
 def turned(m, axis, degrees):
-    """The mount m rotated about the vehicle's axis 0 (left), 1 (up) or 2 (forward)."""
+    """Return the mount m rotated about the vehicle's axis 0 (left), 1 (up) or 2 (forward)."""
     angle = np.radians(degrees)
     r = np.eye(3)
     i, j = [k for k in range(3) if k != axis]
@@ -36,7 +36,7 @@ def turned(m, axis, degrees):
 
 @pytest.mark.parametrize("engine", [*ENGINES, "published"])
 def test_a_car_is_aligned(engine):
-    """The published method, only on CPython."""
+    """The published method is tested only on CPython."""
     options = {"method": "published"} if engine == "published" else {}
     calls = [("drive", (around(), MOUNT, options | {"gyro_bias": [6.0, -5.0, 1.0]}))]
     [result] = run("cpython" if options else engine, calls)
@@ -48,7 +48,8 @@ def test_a_car_is_aligned(engine):
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("known", [True, False])
 def test_a_motorcycle_is_aligned(engine, known):
-    """With and without the vertical of the upright pose. It moves from the start: a motorcycle needs no stop."""
+    """Tested with and without the vertical of the upright pose. The motorcycle moves from the start, because it
+    needs no stop."""
     options = {"vehicle": "motorcycle", "up": MOUNT[3:6] if known else None, "bias": [0.0, 0.0, 0.0]}
     options["samples"] = {"start_mps": 5.0}
     [result] = run(engine, [("drive", (around(stands=False), MOUNT, options))])
@@ -59,7 +60,7 @@ def test_a_motorcycle_is_aligned(engine, known):
 
 @pytest.mark.parametrize("method", ["improved", "published"])
 def test_the_result_turns_with_the_sensor(method):
-    """Equivariance within 0.05 degrees: mounts along the axes, also where an axis is exactly antiparallel."""
+    """The result is equivariant within 0.05 degrees, also for mounts along the axes and exactly antiparallel ones."""
     legs = around(5, pause_s=2.0)
     plain = np.reshape(drive(legs, PLAIN, method=method)["matrix"], (3, 3))
     for order, signs in (
@@ -70,7 +71,7 @@ def test_the_result_turns_with_the_sensor(method):
     ):
         q = np.zeros((3, 3))
         q[range(3), order] = signs
-        # the noise is the same in the vehicle's axes, so each sample is that of PLAIN multiplied by q
+        # The noise is the same in the vehicle's axes, so each sample is PLAIN's sample multiplied by q.
         result = drive(legs, q.T.ravel().tolist(), method=method)
         between = np.reshape(result["matrix"], (3, 3)) @ q @ plain.T
         assert np.degrees(np.linalg.norm(rotation_vector(between))) < 0.05
@@ -78,7 +79,8 @@ def test_the_result_turns_with_the_sensor(method):
 
 @pytest.mark.parametrize(("method", "yaw_deg"), [("improved", 0.0), ("published", 10.0)])
 def test_camber_at_the_stops_does_not_reach_forward(method, yaw_deg):
-    """2 degrees of camber give the published method a yaw error of 10: sin 2 degrees against 0.2 g of braking."""
+    """With 2 degrees of camber the published method has a yaw error of 10 degrees: sin 2 degrees against 0.2 g of
+    braking."""
     yaw, total = errors(drive(around(8), samples={"tilt_deg": 2.0}, method=method), MOUNT)
     assert abs(yaw) == pytest.approx(yaw_deg, abs=1.0)
     assert total < max(2.3, 1.1 * abs(yaw))
@@ -151,7 +153,7 @@ def test_only_usable_speeds_align(source, fine):
     ],
 )
 def test_a_mount_that_moved(axis, degrees, from_s, words):
-    """Ten braking events, the last one from 137 s on."""
+    """The drive has ten braking events, the last one from 137 s on."""
     legs = [*around(10), [4.0, 1.5, 20.0], [4.0, -1.5, 20.0]]  # events in turns do not repair it
     result = drive(legs, moved=[from_s, turned(MOUNT, axis, degrees)])
     assert result["ready"] is (words is None), result
@@ -163,13 +165,13 @@ def test_the_first_braking_counts_after_any_late_first_speed(silent_s):
     """The history's time wraps every nine minutes."""
     legs = [[silent_s, 0.0, 0.0], *around(6)]
     result = drive(legs, source={"every_s": 1.0, "silent": (-1.0, silent_s)})
-    assert result["counted"] == 6  # all braking events; all acceleration is in turns
+    assert result["counted"] == 6  # all braking events count, but all acceleration is in turns
     assert result["ready"]
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_silent_source_at_zero_is_no_standstill(engine):
-    """It drives off after the receiver has failed, in long curves with a force as steady as at a stop."""
+    """The receiver fails, and the vehicle then drives in long curves with a force as steady as at a stop."""
     before = [*around(7), [8.0, -1.0, 0.0], STAND]
     legs = [*before, [4.0, 4.0, 0.0], [30.0, 0.0, 9.0]]
     seconds = sum(leg[0] for leg in before)
@@ -180,7 +182,7 @@ def test_a_silent_source_at_zero_is_no_standstill(engine):
 
 
 def test_a_silent_source_is_not_a_stuck_one():
-    """There is no speed in a straight tunnel with stop-and-go traffic, only before and after it."""
+    """In a straight tunnel with stop-and-go traffic there is no speed, only before and after it."""
     tunnel = [[seconds, acceleration, 0.0] for seconds, acceleration, _ in around(6, pause_s=3.0, stands=False)]
     before = around(3)
     begin = sum(leg[0] for leg in before)
@@ -191,7 +193,7 @@ def test_a_silent_source_is_not_a_stuck_one():
 
 
 def test_nothing_is_joined_across_missing_samples():
-    """With gaps of 1.5 s every 25 s it is still aligned."""
+    """Gaps of 1.5 s every 25 s do not prevent the alignment."""
     drive = alignment.DriveAlignment("car")
     source = driving_runs.SpeedSource()
     gap = 0
@@ -222,7 +224,7 @@ def test_nothing_is_joined_across_missing_samples():
     ],
 )
 def test_an_alignment_is_compared_with_driving(against, brakings, verdict):
-    """2 degrees of pitch on a kickstand at 10 degrees give a yaw error of 11.4."""
+    """Two degrees of pitch on a kickstand at 10 degrees give a yaw error of 11.4 degrees."""
     up = against[3:6] if against[3:6] == PLAIN[3:6] else PLAIN[3:6]
     options = {"vehicle": "motorcycle", "up": up, "bias": [0.0, 0.0, 0.0], "against": against}
     assert drive(around(brakings), PLAIN, **options)["compare"] == verdict

@@ -1,4 +1,4 @@
-"""What is done with each speed, and the state that the rider sees."""
+"""What the background alignment does with each speed, and the state that the rider sees."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -13,8 +13,8 @@ from kickstand_tools.simulated_board.simulator import Board
 
 
 def device(leans=True, counted=9, problem=None, speed_problem=None, state=alignment.TURNING, speed_mps=0.0):
-    """A BackgroundAlignment whose drive is in this state; passed: the speeds that the lean filter got."""
-    with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):  # the module needs a board's time
+    """Return a BackgroundAlignment whose drive is in this state. passed: the speeds that the lean filter received."""
+    with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):  # the module needs a board's clock
         from kickstand.drive_alignment.background import BackgroundAlignment
     made: Any = object.__new__(BackgroundAlignment)
     quality = SimpleNamespace(speed_problem=speed_problem)

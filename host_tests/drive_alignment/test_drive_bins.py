@@ -1,4 +1,4 @@
-"""A log summed by numpy gives the same alignment as its single samples on the board."""
+"""A log that numpy sums in bins gives the same alignment as its single samples on the board."""
 
 from array import array
 
@@ -17,7 +17,8 @@ CALIBRATION = CalibrationFile(accel_offset_g=np.array([0.02, -0.01, 0.03]), acce
 
 
 def drive(rate_hz=100, every_s=0.5, events=7, seed=5, before=()):
-    """A simulated drive as a Log with uneven times; a speed every every_s, anywhere within a bin. before: legs."""
+    """Simulate a drive as a Log with uneven times. A speed comes every every_s, anywhere in a bin. before: earlier
+    legs."""
     mount = np.reshape(random_mounting(seed), (3, 3))
     made = list(driving_runs.samples([*before, *driving_runs.around(events)], tilt_deg=1.0))[:: 100 // rate_hz]
     n = len(made)
@@ -30,7 +31,7 @@ def drive(rate_hz=100, every_s=0.5, events=7, seed=5, before=()):
 
 
 def as_on_the_board(log, bias):
-    """The matrix of a DriveAlignment that gets each single sample."""
+    """Return the matrix of a DriveAlignment that gets each sample."""
     alignment, firmware = DriveAlignment("car", None, bias), CALIBRATION.to_firmware()
     force, rate, previous = [0.0] * 3, [0.0] * 3, 0
     for now, reading, speed in log.rows():
@@ -94,7 +95,7 @@ def test_a_refusal_is_in_the_result_with_its_counts():
 
 
 def test_another_slope_in_the_next_log_is_no_moved_mount():
-    """Parked nose down at the end of the first log, nose up at the beginning of the second."""
+    """The vehicle is parked nose down at the end of the first log, and nose up at the beginning of the second."""
     mount = np.reshape(random_mounting(5), (3, 3))
     logs = []
     for slope_deg, first in ((-4.5, False), (4.5, True)):
@@ -103,7 +104,7 @@ def test_another_slope_in_the_next_log_is_no_moved_mount():
         standing_g = np.array([0.0, np.cos(np.radians(slope_deg)), np.sin(np.radians(slope_deg))]) @ mount
         noise_g = np.random.default_rng(1).normal(0.0, 0.002, log.accel_g.shape)
         log.accel_g = np.where(at[:, None], standing_g + noise_g, log.accel_g)
-        if not first:  # the drive of the helper ends before the vehicle stands
+        if not first:  # the simulated drive ends before the vehicle stands
             log.gyro_dps = np.where(at[:, None], [0.5, -1.0, 0.3], log.gyro_dps)
             log.speed_mps = np.where(at & ~np.isnan(log.speed_mps), 0.0, log.speed_mps)
         logs.append(log)
@@ -111,8 +112,8 @@ def test_another_slope_in_the_next_log_is_no_moved_mount():
 
 
 def test_bins_have_their_speeds_where_they_came():
-    """At 100 samples a second bins of 50 ms: a speed at the first sample, in the middle, at the end of a bin, and after
-    a gap of 2 s. The ages are before the end of all but the last sample."""
+    """At 100 samples per second the bins are 50 ms. Speeds come at the first sample, in the middle and at the end of
+    a bin, and after a gap of 2 s. Each age counts back from the end of all samples but the last."""
     t_s = np.append(np.arange(11), np.arange(210, 216)) / 100.0
     speed = np.full(17, np.nan)
     speed[[0, 2, 5, 7, 11]] = [10.0, 10.2, 10.5, 10.7, 11.0]

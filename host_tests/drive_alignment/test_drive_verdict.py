@@ -1,4 +1,4 @@
-"""An alignment against the one of a drive, by angles; and a speed that is stuck, by seconds."""
+"""An alignment is judged against a drive by angles, and a stuck speed by seconds."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -10,7 +10,7 @@ from kickstand.drive_alignment.speed_check import SpeedCheck
 
 
 def judged(yaw=0.0, up=0.0, straight=6, counted=6, ready=True, quality=0.5, problem=None, blocks=()):
-    """The verdict on axes left, up, forward whose forward is yaw degrees off and whose up is `up` degrees off."""
+    """Return the verdict on axes left, up, forward with forward `yaw` degrees off and up `up` degrees off."""
     cos, sin = np.cos(np.radians(yaw)), np.sin(np.radians(yaw))
     fit = SimpleNamespace(forward=[sin, 0.0, cos], level=[0.0, np.cos(np.radians(up)), np.sin(np.radians(up))])
 
@@ -84,7 +84,7 @@ def test_bends_and_changes_of_the_speed_do_not_count_as_stuck():
         check.measure(12.0 + k // 7 * 0.1)
         check.update_second([0.05 * (k % 2), 1.0, 0.0])
     for k in range(40):
-        check.update_second([0.05 * (k % 2), 1.0, 0.0], 5.1 * (k % 2 == 0))  # and the second after a bend
+        check.update_second([0.05 * (k % 2), 1.0, 0.0], 5.1 * (k % 2 == 0))  # and one second after a bend
     assert check.problem is None
 
 

@@ -1,4 +1,4 @@
-"""The single steps of alignment by driving, compared with numpy if they compute something."""
+"""The single steps of alignment by driving. Those that compute are compared with numpy."""
 
 import types
 
@@ -22,7 +22,7 @@ def unit(rng):
 
 @pytest.mark.parametrize("off_deg", [0.0, 0.01, 45.0, 89.9, 90.1, 179.99, 180.0])
 def test_rotation_between_is_safe_at_every_angle(off_deg):
-    """It is a rotation from a to b within 1e-12, even if a and b are exactly antiparallel."""
+    """The matrix is a rotation from a to b within 1e-12, even if a and b are exactly antiparallel."""
     rng = np.random.default_rng(3)
     off = np.radians(off_deg)
     for axis, b in ((0, published.UP), (2, published.UP), (1, published.BACKWARD)):
@@ -50,7 +50,8 @@ def test_dispersion_is_fishers(sigma_deg):
 
 
 def test_history_is_exact_and_wraps_round():
-    """Differences of the integrals against numpy, across the wrap of time and sums. No answer outside the history."""
+    """Differences of the integrals match numpy when time and sums wrap round. Outside the history there is no
+    answer."""
     rng = np.random.default_rng(2)
     history = ForceHistory()
     history.now = MASK - 3_000_000
@@ -73,7 +74,7 @@ def test_history_is_exact_and_wraps_round():
         expected = [np.interp(times[-1] - one, times, np.array(totals)[:, i]) for i in range(4)]
         expected -= np.array([np.interp(times[-1] - two, times, np.array(totals)[:, i]) for i in range(4)])
         got = [((a - b + 2**28) & MASK) - 2**28 for a, b in zip(out, before, strict=True)]
-        assert np.abs(np.array(got) - expected).max() < 200  # of a million: rounding of some 60 bins
+        assert np.abs(np.array(got) - expected).max() < 200  # of a million: the rounding of about 60 bins
         assert not history.at(out, history.now + 1000)
         assert not history.at(out, history.now - oldest - 1000)
     history.clear()
@@ -83,7 +84,7 @@ def test_history_is_exact_and_wraps_round():
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("count", [60, 300])
 def test_regression_is_weighted_least_squares(engine, count):
-    """Forward and level agree with numpy for any number of joined blocks."""
+    """Forward and level match numpy for any number of joined blocks."""
     rng = np.random.default_rng(count)
     seconds = rng.uniform(0.4, 1.1, count)
     a, c = rng.normal(0, 0.1, count), rng.normal(0, 0.03, count)
@@ -94,7 +95,7 @@ def test_regression_is_weighted_least_squares(engine, count):
     weight = np.sqrt(seconds)[:, None]
     design = np.column_stack((a, np.ones(count), c))
     expected = np.linalg.lstsq(design * weight, force * weight, rcond=None)[0]
-    assert np.abs(np.array(forward) - expected[0]).max() < 2e-3  # the ridge on c, 32-bit sums
+    assert np.abs(np.array(forward) - expected[0]).max() < 2e-3  # caused by the ridge on c and 32-bit sums
     assert np.abs(np.array(level) - expected[1]).max() < 2e-4
     assert 5 <= blocks <= 8
 
@@ -118,8 +119,8 @@ def test_two_fits_at_the_same_time_do_not_interfere():
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_parts_of_a_drive(engine):
-    """Forward turns by 12 degrees after five of eight blocks. Against numpy, with two directions of the whole drive's
-    forward."""
+    """Forward turns by 12 degrees after five of eight blocks. The parts match numpy, with two directions of the
+    forward of the whole drive."""
     rng = np.random.default_rng(5)
     weights, seconds = rng.uniform(0.1, 0.5, 8), rng.uniform(25.0, 40.0, 8)
     angles = np.array([0.0] * 5 + [12.0] * 3) + rng.normal(0.0, 1.0, 8)
@@ -164,8 +165,8 @@ def test_each_stop_counts_once_in_the_vertical():
 
 
 def test_a_late_speed_is_no_rotated_sensor():
-    """A vehicle may accelerate evenly for some seconds while a late speed is still zero. A rotated sensor stays so for
-    longer."""
+    """A vehicle may accelerate evenly for some seconds while a late speed is still zero. A rotated sensor shows a
+    constant force for longer."""
     standing = StandingVertical()
     stand(standing, level(0.0), 5.0)
     stand(standing, level(15.0), 2.5)
@@ -176,8 +177,8 @@ def test_a_late_speed_is_no_rotated_sensor():
 
 
 def test_each_vehicle_has_its_source_of_the_vertical():
-    """A car uses its stops. If it also has a fit, it uses the mean of both. A motorcycle uses the upright pose, or
-    straight riding without one."""
+    """A car uses its stops, and with a fit the mean of stops and fit. A motorcycle uses the upright pose, or else
+    straight riding."""
     standing = types.SimpleNamespace(up=None)
     fit = types.SimpleNamespace(level=[2.0 * part for part in level(4.0)])
 
@@ -190,7 +191,7 @@ def test_each_vehicle_has_its_source_of_the_vertical():
     assert (pitch(bike, fit), pitch(posed, fit)) == (pytest.approx(4.0), 0.0)
     standing.up = level(10.0)
     assert (pitch(car), pitch(car, fit)) == (pytest.approx(10.0), pytest.approx(7.0))
-    for pitch_deg, times, mean in ((0.0, 1, 0.0), (8.0, 1, 4.0), (8.0, 60, 8.0)):  # of the last minute
+    for pitch_deg, times, mean in ((0.0, 1, 0.0), (8.0, 1, 4.0), (8.0, 60, 8.0)):  # the mean of the last minute
         for _ in range(times):
             bike.update(level(pitch_deg), 10.0)
         assert pitch(bike) == pytest.approx(mean, abs=0.1)
@@ -201,7 +202,7 @@ def test_each_vehicle_has_its_source_of_the_vertical():
 
 @pytest.mark.parametrize(("share", "moved"), [(0.9, True), (1.1, False)])
 def test_a_bend_at_a_stuck_zero_is_no_stop(share, moved):
-    """In a bend the rate differs from the last stop's bias by more than warming up can change it."""
+    """In a bend the rate differs from the bias at the last stop by more than warming up can explain."""
     standing = StandingVertical()
     stand(standing, level(0.0), 5.0, rate=(1.0, -4.0, 2.0))
     stand(standing, level(0.0), 3.0, speed=10.0)
@@ -215,7 +216,7 @@ def test_a_bend_at_a_stuck_zero_is_no_stop(share, moved):
     [(2.0, 0.0, 0.02, 0), (4.0, 0.0, 0.02, 1), (9.0, 1.0, 0.0, 0), (9.0, 0.0, 0.2, 0)],
 )
 def test_a_stop_requires_stillness_and_time(seconds, speed, shake_g, stops):
-    """Standing for three seconds, with no more than an engine's shaking."""
+    """The vehicle must stand for three seconds and shake no more than an engine does."""
     standing = StandingVertical()
     for k in range(round(seconds * 10)):
         standing.update([0.0, 1.0, shake_g * (-1) ** k], (0.0, 0.0, 0.0), speed, 0.1)
@@ -226,7 +227,7 @@ def test_a_stop_requires_stillness_and_time(seconds, speed, shake_g, stops):
     ("speeds", "yaw_dps", "stuck"), [((7.0, 7.0), 0.0, True), ((7.0, 7.1), 0.0, False), ((7.0, 7.0), 10.0, False)]
 )
 def test_a_speed_that_stays_the_same_in_a_lively_ride_is_stuck(speeds, yaw_dps, stuck):
-    """But not a changing speed, nor a steady one through bends."""
+    """A changing speed is not stuck, nor is a steady speed through bends."""
     check = SpeedCheck()
     for k in range(30):
         check.measure(speeds[k % 6 // 3])

@@ -68,13 +68,13 @@ def test_directions_without_a_mean_have_the_largest_dispersion():
     wide = (1 + 4j) / 17**0.5
     assert circular_dispersion([wide, wide.conjugate()]) == 9.9
     assert circular_dispersion([1.0, -1.0]) == 9.9
-    # tangent 3: d = 9, which is given as it is
+    # a tangent of 3 gives d = 9, which is not limited
     far = (1 + 3j) / 10**0.5
     assert circular_dispersion([far, far.conjugate()]) == pytest.approx(9.0, rel=1e-9)
 
 
 class Drive:
-    """A drive with a sample each 10 ms and a speed each every_s."""
+    """A drive with a sample every 10 ms and a speed every every_s."""
 
     def __init__(self, every_s=0.5, mount=MOUNT):
         self.alignment, self.mount = PublishedAlignment("car"), mount
@@ -82,8 +82,10 @@ class Drive:
         self.go(STEADY, 6.0)
 
     def go(self, forces, seconds, mps2=0.0):
-        """With each of the forces for an equal part of the time."""
-        readings = (np.atleast_2d(forces) @ self.mount).tolist()  # the transposed matrix: sensor from vehicle
+        """Drive with each of the forces for an equal share of the time."""
+        readings = (
+            np.atleast_2d(forces) @ self.mount
+        ).tolist()  # the transposed matrix: from the vehicle's axes to the sensor's
         samples = round(100 * seconds)
         for k in range(samples):
             self.speed += 0.01 * mps2
@@ -92,7 +94,7 @@ class Drive:
                 self.alignment.measure_speed(self.speed)
 
     def brake(self, *forces, seconds=2.0, mps2=-0.3 * G):
-        """From 15 m/s, and on at a steady speed."""
+        """Brake from 15 m/s, then continue at a steady speed."""
         self.reach_15_mps()
         self.go(forces or BRAKES, seconds, mps2)
         self.go(STEADY, 2.0)
@@ -150,15 +152,16 @@ def test_a_longer_braking_counts_for_more():
 
 @pytest.mark.parametrize(("side_g", "counted"), [(0.040, 1), (0.045, 0)])
 def test_a_braking_whose_direction_spreads_does_not_count(side_g, counted):
-    """Half of it pulls to the left and half to the right by side_g of 0.3 g: d = (side_g / 0.3)^2, which is 0.0178 and
-    0.0225; 0.02 is the limit."""
+    """Half of the braking pulls to the left and half to the right, by side_g of 0.3 g. d = (side_g / 0.3)^2 is
+    0.0178 and 0.0225, and the limit is 0.02."""
     drive = Drive()
     drive.brake((side_g, 1.0, -0.3), (-side_g, 1.0, -0.3))
     assert (drive.alignment.counted, drive.alignment.turned) == (counted, 1 - counted)
 
 
 def test_a_shaking_of_ten_times_a_second_is_averaged_away():
-    """Each 50 ms it is 0.2 g to the other side: over 100 ms 0, over 50 ms a dispersion of (0.2 / 0.3)^2 = 0.44."""
+    """Every 50 ms the force changes sides by 0.2 g. Over 100 ms the mean is 0, but over 50 ms the dispersion would
+    be (0.2 / 0.3)^2 = 0.44."""
     drive = Drive()
     drive.brake(*[(side, 1.0, -0.3) for side in (0.2, -0.2)] * 20)
     assert (drive.alignment.counted, drive.alignment.turned) == (1, 0)
@@ -167,10 +170,10 @@ def test_a_shaking_of_ten_times_a_second_is_averaged_away():
 @pytest.mark.parametrize(
     ("seconds", "mps2", "counted"),
     [
-        (2.0, -0.74, 0),  # less than 1 m/s2: no braking, whatever the force
+        (2.0, -0.74, 0),  # under 1 m/s2 there is no braking, whatever the force
         (2.0, -0.99, 0),
         (2.0, -1.01, 1),
-        (1.0, -1.45, 0),  # less than 1.5 m/s in all
+        (1.0, -1.45, 0),  # less than 1.5 m/s in total
         (1.0, -1.55, 1),
         (0.5, -2.9, 0),
         (0.5, -3.1, 1),
@@ -178,7 +181,7 @@ def test_a_shaking_of_ten_times_a_second_is_averaged_away():
     ],
 )
 def test_which_change_of_speed_is_a_braking(seconds, mps2, counted):
-    """A braking that reduces the speed by too little is noise: it is not counted as one in a bend either."""
+    """A braking event that reduces the speed too little is noise. It is not counted as braking in a bend either."""
     drive = Drive()
     drive.brake(seconds=seconds, mps2=mps2)
     assert (drive.alignment.counted, drive.alignment.turned) == (counted, 0)
@@ -222,7 +225,8 @@ def test_a_braking_with_a_gap_is_dropped_and_earlier_ones_stay(lost):
 
 @pytest.mark.parametrize("lost", [lost_samples, lost_speeds])
 def test_the_loss_of_a_dropped_braking_is_dropped_too(lost):
-    """3 m/s are lost before the gap, 0.5 s x 2 m/s2 = 1 m/s after it: less than the 1.5 m/s of a braking."""
+    """The braking loses 3 m/s before the gap and 0.5 s x 2 m/s2 = 1 m/s after it. This is less than the 1.5 m/s that
+    a braking event needs."""
     drive = Drive()
     drive.reach_15_mps()
     drive.go(BRAKES, 1.0, -3.0)

@@ -1,4 +1,4 @@
-"""kickstand calibrate ride: the alignment of a motorcycle from a ride without poses, and refusals.
+"""Test `kickstand calibrate ride`: the alignment of a motorcycle from a ride without poses, and refusals.
 
 Simulated rides have a sensor mounted at random, with errors as the data sheet allows.
 """
@@ -27,7 +27,7 @@ def simulated(profile="street", seed=21, seconds=180.0):
 
 
 def log_of(made, speed=True):
-    """As recorded, with speed once a second."""
+    """Return the log of a ride as recorded, with one speed per second."""
     log = api.Log.from_readings(made.readings.copy(), RATE_HZ, "RIDE.csv")
     if speed:
         log.speed_mps[::RATE_HZ] = made.truth["speed_mps"][::RATE_HZ]
@@ -35,12 +35,12 @@ def log_of(made, speed=True):
 
 
 def mounted(log, rotation):
-    """The same ride with the sensor turned: its axes see everything rotated."""
+    """Return the same ride with the sensor rotated, and its readings with it."""
     return replace(log, accel_g=log.accel_g @ rotation.T, gyro_dps=log.gyro_dps @ rotation.T)
 
 
 def errors_deg(found, true):
-    """Of pitch, yaw and roll: about left, up and forward."""
+    """Return the errors of pitch, yaw and roll: about left, up and forward."""
     return np.abs(np.degrees(rotation_vector(found.calibration.vehicle_from_sensor @ true.T)))
 
 
@@ -72,11 +72,12 @@ def test_the_display_shows_the_lean_with_this_alignment():
     shown = ~np.isnan(found.lean_sigma_deg)
     assert np.mean(shown) > 0.95
     off = (found.lean_deg - made.truth["lean_deg"])[shown]
-    assert np.sqrt(np.mean(off**2)) < 1.0  # 1.5 was asked for
+    assert np.sqrt(np.mean(off**2)) < 1.0  # the goal was 1.5
 
 
 def test_ride_alignment_is_as_good_as_two_poses():
-    """In yaw, which a kickstand pose hardly determines, and in roll, which an offset of the accelerometer falsifies."""
+    """Yaw matters because a kickstand pose hardly determines it, and roll because an accelerometer offset falsifies
+    it."""
     made = simulated("hills", 22, 240.0)
     kickstand, upright = (api.Log.from_readings(pose, RATE_HZ) for pose in (made.kickstand, made.upright))
     two = errors_deg(api.fit_two_positions(kickstand, upright), made.vehicle_from_sensor)
@@ -86,7 +87,7 @@ def test_ride_alignment_is_as_good_as_two_poses():
 
 
 def test_the_offset_across_the_bike_is_found():
-    """Half of a tolerance of 50 mg would be 1.4 degrees of roll: the result for the same log must be better."""
+    """Half of the tolerance of 50 mg would be 1.4 degrees of roll. The result for the same log must be better."""
     made = simulated()
     log = log_of(made)
     across = made.vehicle_from_sensor[0]
@@ -99,8 +100,8 @@ def test_the_offset_across_the_bike_is_found():
 
 
 def test_left_handed_axes_are_refused():
-    """Of the 48 exchanges and reversals of axes the 24 right-handed ones are only another mounting. Every fifth is
-    tried here, all of them in checks/test_handedness.py."""
+    """Of the 48 ways to exchange and reverse axes, the 24 right-handed ones are only another mounting. This test
+    tries every fifth way, and checks/test_handedness.py tries all."""
     log = log_of(simulated(), speed=False)
     want = first_guess.axes(mounted_windows(log)).matrix
     for order, signs in [*itertools.product(itertools.permutations(range(3)), SIGNS)][::5]:
@@ -125,7 +126,7 @@ def test_phones_mounting_shows_a_reversed_accelerometer():
 
 
 def test_a_phones_mounting_is_a_prior():
-    """It has little weight against the ride."""
+    """The prior has little weight against the ride."""
     made = simulated()
     tilted = rotation_matrix(np.radians([35.0, 0.0, 0.0])) @ PHONES["flat"][0]
     log = mounted(log_of(made, speed=False), tilted.T @ made.vehicle_from_sensor)
@@ -138,7 +139,7 @@ def test_a_phones_mounting_is_a_prior():
 
 @pytest.mark.parametrize("phone", PHONES)
 def test_a_phones_mounting_is_checked(phone):
-    """Within the usual tilt of a holder."""
+    """The mounting may differ by the usual tilt of a holder."""
     made = simulated()
     tilted = rotation_matrix(np.radians([35.0, 10.0, 0.0]))
     for mountings in PHONES.values():
@@ -184,7 +185,7 @@ def test_bad_readings_are_left_out_and_a_rough_speed_suffices():
 
 
 def car(seconds=300.0):
-    """A car on level ground, 12 m/s in bends to both sides; its body leans outwards by 3 degrees per g."""
+    """Simulate a car on level ground at 12 m/s, in bends to both sides. Its body leans outwards by 3 degrees per g."""
     chance = np.random.default_rng(1)
     t = np.arange(0.0, seconds, 0.01)
     yaw = 0.3 * np.sin(0.2 * t) ** 3
@@ -236,7 +237,7 @@ def test_slow_log_or_unknown_phone_mounting_is_refused():
 
 
 def test_a_recorded_car_is_refused(shared_data):
-    """In any mounting, with its speed and without."""
+    """The car is refused in any mounting, with its speed and without."""
     rotation = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     rotation *= np.linalg.det(rotation)
     drives = sorted(shared_data.glob("car-*.csv.gz"))
@@ -250,7 +251,8 @@ def test_a_recorded_car_is_refused(shared_data):
 
 
 def test_recorded_motorcycle_is_aligned(shared_data):
-    """Its forward, by braking between the same two lights, and the up of its first second are known to some degrees."""
+    """The reference is known to a few degrees: forward by braking between the same two lights, up by the first
+    second."""
     log = api.read_log(shared_data / "motorcycle-ride.csv.gz")
     rough = np.array([[0.9869, 0.1612, 0.0060], [-0.0137, 0.0466, 0.9988], [0.1608, -0.9858, 0.0482]])
     found, without = api.fit_ride(log), api.fit_ride(replace(log, speed_mps=np.full(len(log.t_s), np.nan)))

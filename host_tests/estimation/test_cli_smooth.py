@@ -1,4 +1,4 @@
-"""kickstand smooth: its output and its refusals."""
+"""Test `kickstand smooth`: output and refusals."""
 
 import json
 
@@ -15,7 +15,7 @@ from support.recordings.smoothed_rides import simulated
 
 @pytest.fixture(scope="module")
 def ride(tmp_path_factory):
-    """RIDE.csv with its calibration beside it, at 50 samples a second."""
+    """Write RIDE.csv with its calibration beside it, at 50 samples per second."""
     directory = tmp_path_factory.mktemp("ride")
     known = simulated("street", 2, 40.0)
     rows = np.column_stack((known.log.t_s + 7.25, known.log.accel_g, known.log.gyro_dps))[::4]
@@ -75,13 +75,13 @@ def test_report_has_the_smoothed_or_the_live_lean(ride):
         assert data["lean"] == word
         assert said in works("report", log, *option).out
         largest[word] = [data[f"max_{side}_deg"]["value"] for side in ("left", "right")]
-    true = [-np.min(lean), np.max(lean)]  # the one to the left is on the kickstand
+    true = [-np.min(lean), np.max(lean)]  # the largest lean to the left is on the kickstand
     assert np.max(np.abs(np.subtract(largest["smoothed"], true))) < 1.0
     assert largest["smoothed"] != largest["live"]
 
 
 def test_slow_log_is_reported_with_the_displayed_lean(tmp_path):
-    """Its lean is the one that the display showed; smooth itself refuses such a log."""
+    """The report gives the lean that the display showed, because `smooth` refuses such a log."""
     t_s = np.arange(0.0, 60.0, 0.2)
     noise = np.random.default_rng(1).normal(0.0, 0.01, (len(t_s), 6))
     table = np.column_stack((t_s, noise + [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]))

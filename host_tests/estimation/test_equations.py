@@ -1,4 +1,4 @@
-"""The process model and the measurement model, compared with motions whose readings follow from geometry."""
+"""The process model and measurement model are compared with motions whose readings follow from geometry."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,8 @@ WHEELS = (eq.SLIDING, eq.CLIMBING, eq.SLOPING)
 
 
 def found(rate, force, states=(), parameters=(), speed=np.nan, warm=0.0):
-    """(ROWS): of one window with these readings; states and parameters by their index, else 0."""
+    """Return the residuals (ROWS) of one window with these readings. States and parameters are set by index, all
+    others are 0."""
     x = np.zeros((STATES + PARAMETERS, 1))
     for index, value in dict(states).items():
         x[index] = value
@@ -29,7 +30,7 @@ def found(rate, force, states=(), parameters=(), speed=np.nan, warm=0.0):
 @pytest.mark.parametrize("lean", [-0.9, 0.0, 0.6])
 @pytest.mark.parametrize("yaw_rate", [-0.4, 0.5])
 def test_steady_turn_is_constant(lean, yaw_rate):
-    """Nicolae's (22) and (23): the force of a turn at any lean, balanced or not."""
+    """Nicolae's equations (22) and (23) give the force of a turn at any lean, balanced or not."""
     speed, s, c = 17.0, np.sin(lean), np.cos(lean)
     across = speed * yaw_rate / G
     rate, force = [yaw_rate * s, yaw_rate * c, 0.0], [across * c + s, c - across * s, 0.0]
@@ -49,7 +50,7 @@ def test_rest_and_braking_on_a_slope_fit_the_model(pitch, braking):
 
 @pytest.mark.parametrize("lean", [-0.5, 0.0, 0.8])
 def test_sensor_above_the_roll_axis_moves_with_the_roll(lean):
-    """It is 0.6 m above it and 0.7 m in front of the rear wheel, while the bike rolls and turns."""
+    """The sensor is 0.6 m above the roll axis and 0.7 m in front of the rear wheel, while the bike rolls and turns."""
     height, ahead, speed, roll, yaw = 0.6, 0.7, 15.0, 1.2, -0.3
     s, c = np.sin(lean), np.cos(lean)
     left, up, forward = -height * c * roll + ahead * yaw, -height * s * roll, speed + height * s * yaw
@@ -83,7 +84,8 @@ def test_a_warmer_sensor_has_other_offsets():
 
 
 def test_the_jacobian_is_that_of_the_equations():
-    """By the states and by every parameter, against central differences; the speed backwards and forwards."""
+    """The derivatives by the states and by every parameter match central differences, with the speed backwards and
+    forwards."""
     rng, n = np.random.default_rng(3), 30
     force, rate = rng.normal(size=(2, n, 3))
     windows = windows_of(np.linspace(0.0, 6.0, n), force, rate, rng.normal(size=n), rng.normal(size=n))
@@ -97,7 +99,7 @@ def test_the_jacobian_is_that_of_the_equations():
 
 
 def test_a_yaw_of_eight_degrees_is_no_error_of_scale():
-    """A bike that leans, rolls and turns, read by a sensor that is turned about its up axis."""
+    """A bike leans, rolls and turns, and its sensor is turned about the up axis."""
     lean, speed, yaw_rate, roll = 0.7, 25.0, -0.3, 1.5
     s, c = np.sin(lean), np.cos(lean)
     across = speed * yaw_rate / G
@@ -108,7 +110,7 @@ def test_a_yaw_of_eight_degrees_is_no_error_of_scale():
         found(a, b, states, p)
         for a, b, p in ((rate, force, {}), (turn.T @ rate, turn.T @ force, {of.ROTATION.start + 1: np.radians(8.0)}))
     )
-    assert np.allclose(turned[:LEFT], right[:LEFT], atol=1e-3)  # to first order it is 15e-3
+    assert np.allclose(turned[:LEFT], right[:LEFT], atol=1e-3)  # to first order the difference is 15e-3
 
 
 def test_a_measured_gyro_is_not_estimated_again():
@@ -121,7 +123,7 @@ def test_a_measured_gyro_is_not_estimated_again():
 
 
 def test_the_upright_pose_determines_the_sum_of_rotation_and_offset():
-    """A sensor whose offset the pose has taken for a tilt is right at rest, whatever the offset."""
+    """If the pose mistook the sensor's offset for a tilt, the sensor is right at rest, whatever the offset."""
     prior, p = Prior.of_pose(six_done=False), np.zeros(PARAMETERS)
     p[of.ROTATION.stop - 1] = p[of.OFFSET.start] = 0.03  # to the side
     p[of.ROTATION.start], p[of.OFFSET.stop - 1] = 0.02, -0.02  # forward
@@ -152,7 +154,7 @@ def test_windows_hold_the_integrals_and_gaps_are_windows_of_their_own():
 
 
 def test_gravity_stays_whole_in_a_window_while_the_bike_rolls():
-    """By 30 degrees in a window: means along axes that roll are 1 % small."""
+    """The bike rolls by 30 degrees in a window. Means along axes that roll are 1 % too small."""
     t = np.arange(400) / 200.0
     lean = np.radians(150.0) * (t - 1.0)
     force = np.column_stack((np.sin(lean), np.cos(lean), np.zeros(400)))

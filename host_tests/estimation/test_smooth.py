@@ -1,4 +1,4 @@
-"""The smoothed lean: compared with the truth of two simulators, and rides with other parts than riding."""
+"""The smoothed lean is compared with the truth of two simulators, also in rides with phases other than riding."""
 
 import functools
 from dataclasses import replace
@@ -47,14 +47,14 @@ def error(ride):
     return smooth(ride.log, ride.calibration).lean_deg - ride.lean_deg
 
 
-# each has a special feature; at night those similar to another one are also tested
+# Each has a special feature. The nightly run adds rides similar to these.
 NIGHTLY = "banked", "warming up"
 NAMES = [pytest.param(name, marks=pytest.mark.nightly) if name in NIGHTLY else name for name in RIDES]
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_smoothed_lean_beats_the_display_and_knows_its_error(name):
-    """Including the first turns."""
+    """The comparison includes the first turns."""
     ride, found = known(name), smoothed(name)
     off, sigma = (found.lean_deg - ride.lean_deg)[ride.riding], found.lean_sigma_deg[ride.riding]
     assert rms(off) < 0.6 * rms((ride.live() - ride.lean_deg)[ride.riding])
@@ -73,8 +73,8 @@ def test_forces_that_are_not_the_bikes_count_less():
 
 @pytest.mark.parametrize(("seed", "mount"), [(2018, "drifting"), (98, "holder")])
 def test_steady_ride_on_a_straight_is_not_a_standstill(seed, mount):
-    """For 2 s both hardly move, at 22 and at 12 m/s. Taken for a standstill it made the lean worse than the live one:
-    0.56 and 0.37 degrees."""
+    """At 22 and at 12 m/s the bike hardly moves for 2 s. When this was treated as a standstill, the smoothed lean
+    was worse than the live one: 0.56 and 0.37 degrees."""
     live, off, _ = judged(drawn_ride(seed, mounts=[mount]))
     assert rms(off) < 0.8 * rms(live)
 
@@ -87,14 +87,14 @@ def test_good_mounts_and_roads_are_not_doubted():
 
 
 def test_side_force_of_tyres_grows_with_the_force_up():
-    """Taken for a share of gravity alone, bends of unequal lean shifted the whole lean: 0.44 degrees, and more than the
-    display's."""
+    """When the side force was treated as a share of gravity alone, bends of unequal lean shifted the whole lean. The
+    error was 0.44 degrees, more than the display's."""
     ride = simulated("sweeper", 304, 200.0)
     assert rms(error(ride)[ride.riding]) < 0.2
 
 
 def test_wheelies_do_not_count_as_a_soft_mount():
-    """Counted as one the error was 0.4 degrees, as slopes 0.16."""
+    """When wheelies counted as a soft mount, the error was 0.4 degrees. Treated as slopes, they give 0.16."""
     ride, found = known("wheelie"), smoothed("wheelie")
     assert not np.any(found.doubtful)
     assert rms((found.lean_deg - ride.lean_deg)[ride.riding]) < 0.155
@@ -102,7 +102,7 @@ def test_wheelies_do_not_count_as_a_soft_mount():
 
 @pytest.mark.parametrize("dive_deg_per_g", [-1.5, 6.0])
 def test_the_dive_of_a_bike_is_learned(monkeypatch, dive_deg_per_g):
-    """Treated as the road's slope or as an acceleration, it made the lean depend on the bike's fork."""
+    """When the dive was treated as a slope of the road or as acceleration, the lean depended on the bike's fork."""
     drawn, made = Bike.random, []
     dives = {"dive_deg_per_g": dive_deg_per_g, "squat_deg_per_g": dive_deg_per_g}
     monkeypatch.setattr(Bike, "random", staticmethod(lambda chance: replace(drawn(chance), **dives)))
@@ -118,12 +118,13 @@ def test_pose_that_was_not_upright_is_reported(street, wrong_deg):
     calibration = replace(street.calibration, vehicle_from_sensor=turned)
     (notice,) = (n for n in smooth(street.log, calibration).notices if isinstance(n, PoseOff))
     assert np.sign(notice.angle_deg) == np.sign(wrong_deg)
-    assert abs(abs(notice.angle_deg) - 4.0) < 2.1  # the ride's own pose is 1.5 off
+    assert abs(abs(notice.angle_deg) - 4.0) < 2.1  # the ride's own pose is 1.5 degrees off
     assert ("right" if wrong_deg > 0.0 else "left") in sentence(notice)
 
 
 def test_slipping_mount_has_little_effect_afterwards(street):
-    """By 1.5 degrees about forward, within 0.3 s: the gyro measures it, and from then on straights seem to lean."""
+    """The mount slips by 1.5 degrees about forward within 0.3 s. The gyro measures this, and afterwards straights
+    seem to lean."""
     log, calibration = street.log, street.calibration
     angle = np.radians(1.5) * np.clip((log.t_s - 65.0) / 0.3, 0.0, 1.0)
     about = calibration.vehicle_from_sensor
@@ -142,14 +143,14 @@ def test_slipping_mount_has_little_effect_afterwards(street):
 
 
 def _turned(vectors, angle):
-    """vectors (n, 3) in the axes of a sensor turned by angle (n, rad) to the right about forward."""
+    """Return vectors (n, 3) in the axes of a sensor that is turned by angle (n, rad) to the right about forward."""
     s, c = np.sin(angle), np.cos(angle)
     x, y, z = vectors.T
     return np.column_stack((c * x + s * y, c * y - s * x, z))
 
 
 def test_a_mount_that_yields_makes_the_lean_less_sure():
-    """The mount yields by 2 to 5 degrees during the ride."""
+    """The mount yields by 2 to 5 degrees in the course of the ride."""
     ride = simulated("creep", 10, 150.0)
     found = smooth(ride.log, ride.calibration)
     sigmas = (np.abs(found.lean_deg - ride.lean_deg) / found.lean_sigma_deg)[ride.riding]
@@ -159,7 +160,7 @@ def test_a_mount_that_yields_makes_the_lean_less_sure():
 
 
 def test_a_wind_that_turns_makes_the_lean_less_sure():
-    """It looks like a wrong upright pose."""
+    """A turning wind looks like a wrong upright pose."""
     windy, calm = (np.mean(smoothed(name).lean_sigma_deg[-10_000:]) for name in ("crosswind", "street"))
     assert windy > 2.0 * calm
 
@@ -205,7 +206,8 @@ def test_frozen_readings_have_no_lean_and_do_not_harm_the_rest(street):
 
 
 def test_a_pothole_leaves_no_lean_behind(street):
-    """Roll rate 300 deg/s for 60 ms, as two phones on a scooter had it in opposite sense: no motion of the bike."""
+    """The roll rate is 300 deg/s for 60 ms, with opposite signs on two phones on a scooter. It is not a motion of
+    the bike."""
     log, at = street.log, 80.0
     hit = (log.t_s > at) & (log.t_s < at + 0.06)
     rate = log.gyro_dps.copy()
@@ -217,7 +219,7 @@ def test_a_pothole_leaves_no_lean_behind(street):
 
 
 def hand(seconds, rate_hz=200, seed=4):
-    """Force (n, 3, g) and rate (n, 3, deg/s) of a sensor turned in the hand."""
+    """Return the force (n, 3, g) and rate (n, 3, deg/s) of a sensor turned in the hand."""
     rng = np.random.default_rng(seed)
     n = int(seconds * rate_hz)
     t = np.arange(n) / rate_hz
@@ -254,8 +256,8 @@ def test_short_log_has_a_lean_with_a_large_sigma(street, seconds):
 
 
 def test_long_ride_is_estimated_in_parts(street, monkeypatch):
-    """So that time grows with the length of the ride, and memory does not. Ends of parts are estimated twice, because
-    they are known only with what follows; remarks count each second once."""
+    """Parts keep the memory constant, and the time grows with the length of the ride. The ends of parts are
+    estimated twice, because they depend on what follows. Remarks count each second once."""
     whole, sizes, added = smoothed("street"), [], []
     estimated = module.Smoother.estimated
 
@@ -271,6 +273,6 @@ def test_long_ride_is_estimated_in_parts(street, monkeypatch):
     assert len(sizes) > 2
     assert len(added) > 1 and sum(added) == pytest.approx(street.log.t_s[-1], abs=0.3 * len(added))
     assert max(sizes) <= 7 * 2000
-    assert sizes[-1] > 5 * 2000  # the end is estimated with earlier parts
+    assert sizes[-1] > 5 * 2000  # the end is estimated together with earlier parts
     assert np.array_equal(parts.t_s, whole.t_s)
     assert rms((parts.lean_deg - street.lean_deg)[street.riding]) < 0.8

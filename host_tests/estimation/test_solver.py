@@ -1,4 +1,4 @@
-"""Chains of blocks solved by elimination, compared with one direct least-squares solution."""
+"""Chains of blocks solved by elimination are compared with one direct least-squares solution."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ S, M, ROWS = 3, 2, 6
 
 
 class Problem:
-    """Random residuals of blocks of windows, and random walks of the parameters with G variances of their steps."""
+    """Random residuals of blocks of windows, and random walks of the parameters whose steps have G variances."""
 
     def __init__(self, blocks, length, variances=([0.01, 0.1],)):
         rng = np.random.default_rng(0)
@@ -27,7 +27,8 @@ class Problem:
         self.blocks = reduce_windows(self.jacobian, S)
 
     def at_once(self, g=0):
-        """All states in a row, then the parameters of each block: solution, covariance, -2 log(likelihood)."""
+        """Solve for all states in a row, then the parameters of each block. Return solution, covariance and -2
+        log(likelihood)."""
         blocks, length = self.jacobian.shape[:2]
         states = blocks * length + 1
         n = states * S + blocks * M

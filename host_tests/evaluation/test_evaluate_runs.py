@@ -1,4 +1,4 @@
-"""Estimators over simulated and recorded rides, and `kickstand evaluate` as a whole."""
+"""Estimators on simulated and recorded rides, and `kickstand evaluate` as a whole."""
 
 import json
 import math
@@ -20,7 +20,8 @@ THERE = [name for name in estimators.OTHERS if estimators.PACKAGES.get(name) not
 
 
 def leaned(lean_deg: float, roll_s: float = 1.5) -> Samples:
-    """A bike at rest, leaned slowly from upright to lean_deg, then held for the same time: no turn."""
+    """Simulate a bike at rest that leans slowly from upright to lean_deg, then holds for the same time. It does not
+    turn."""
     n = int(roll_s * 200)
     lean = np.radians(np.concatenate((np.linspace(0.0, lean_deg, n), np.full(n, lean_deg))))
     rate = np.zeros((2 * n, 3))
@@ -52,7 +53,7 @@ def test_every_estimator_is_scored(swept):
 
 
 def test_filters_that_trust_the_force_decay_in_a_held_turn(swept):
-    """Riders complain of this: it is the reason for this project."""
+    """Riders complain of this decay, and it is the reason for this project."""
     assert swept.scores["complementary"].slope < 0.5
     assert 0.85 < swept.scores["formula"].slope < 1.1
     assert swept.scores["formula 0.3 s"].rms_deg < 0.5 * swept.scores["formula"].rms_deg
@@ -62,7 +63,7 @@ def test_filters_that_trust_the_force_decay_in_a_held_turn(swept):
 
 
 def test_no_live_filter_beats_the_oracle(swept):
-    """The oracle is worse than the display without one of the sensor's errors."""
+    """Without one of the sensor's errors, the oracle would be worse than the display."""
     others = [score.rms_deg for name, score in swept.scores.items() if name not in ("possible", "smoothed")]
     assert swept.scores["possible"].rms_deg < min(0.25, 0.8 * min(others))
 
@@ -85,14 +86,14 @@ def test_the_calibration_is_from_the_poses_alone(calibrated):
     assert np.any(calibration.gyro_sigma) == (calibrated is runs.calibrated_by_log)
     matrix = calibration.vehicle_from_sensor
     turned = np.degrees(np.arccos((np.trace(matrix @ made.vehicle_from_sensor.T) - 1.0) / 2.0))
-    assert turned < 1.5  # forward by what a hand holds and the ground slopes
+    assert turned < 1.5  # within the slope of the ground and the accuracy of a hand
     assert calibration.accel_slope == pytest.approx([1.0] * 3, abs=0.002)
     assert calibration.six_done and calibration.aligned
 
 
 @pytest.fixture
 def one_other(monkeypatch):
-    """Only one of the other filters, because each takes seconds."""
+    """Use only one of the other filters, because each takes seconds."""
     monkeypatch.setattr(estimators, "OTHERS", {"complementary": estimators.OTHERS["complementary"]})
 
 
@@ -121,7 +122,8 @@ MOUNTED = CalibrationFile(
 
 
 def recorded() -> Log:
-    """A level ride, the phone turned about the vertical: straight acceleration after 2 s, then a left turn."""
+    """Simulate a level ride with the phone turned about the vertical: straight acceleration after 2 s, then a left
+    turn."""
     n, rate = 3000, 50.0
     t = np.arange(n) / rate
     speed = np.clip((t - 2.0) * 2.0, 0.0, 10.0)
@@ -153,8 +155,8 @@ def test_a_recording_without_speed_is_refused():
 
 
 def test_recorded_motorcycle_has_its_known_scores(shared_data):
-    """The complementary filter's share there is known to be 0.40 (measured with another calibration). With forward from
-    braking and up from the first second the shown lean had 2.98 degrees rms and a slope of 1.226."""
+    """The known slope of the complementary filter is 0.40, measured with another calibration. With forward from
+    braking and up from the first second, the displayed lean had 2.98 degrees rms and a slope of 1.226."""
     made = real_ride.compare(shared_data / "motorcycle-ride.csv.gz")
     scores, leans = made.scores, made.traces
     assert scores["complementary"].slope == pytest.approx(0.40, abs=0.06)
@@ -214,8 +216,8 @@ def test_simulate_states_both_leans_on_the_stand(tmp_path):
 
 
 def test_a_wheelie_is_not_treated_as_a_faulty_sensor():
-    """Its innovations are large, because the equations do not hold: judged by them, the filter restarted (4.0 degrees
-    rms)."""
+    """A wheelie has large innovations, because the equations do not hold. Judged by them, the filter restarted with
+    an error of 4.0 degrees rms."""
     made = ride("wheelie", 2, 120.0)
     shown = replay(runs.as_log(made), runs.calibrated_by_log(made))
     error = (np.asarray(shown.lean_deg) - made.truth["lean_deg"])[made.truth["speed_mps"] > 5.0]

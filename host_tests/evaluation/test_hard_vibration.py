@@ -1,5 +1,5 @@
-"""Engine vibration beyond the accelerometer's range, which its low-pass hides: the reason for the default range of 16
-g. The driver also notices larger vibration."""
+"""Engine vibration can exceed the accelerometer's range while its low-pass hides the excess. This is why the default
+range is 16 g. The driver also notices stronger vibration."""
 
 import dataclasses
 from array import array
@@ -15,7 +15,8 @@ from kickstand_workshop.evaluation.runs import as_log, calibrated_by_poses
 
 
 def shaken(monkeypatch, profile, seed, factor, range_g, seconds):
-    """A ride with engine vibration times `factor`, measured in this range, and the vibration, g rms per axis."""
+    """Return a ride with engine vibration times `factor`, measured in this range, and the vibration in g rms per
+    axis."""
     rms = []
 
     def harder(*arguments):

@@ -1,4 +1,4 @@
-"""Wrong leans shown as good: the judgement, the faults, and `kickstand evaluate --faults`."""
+"""Wrong leans that are shown as good: how they are judged, the faults, and `kickstand evaluate --faults`."""
 
 import json
 
@@ -14,7 +14,7 @@ NAMED = {fault.title: fault for fault in FAULTS}
 
 
 def trace(error_deg, shown=None, first_s=10.0, end_s=100.0):
-    """60 s of riding with an error (600); shown (600): True where the lean is shown."""
+    """Return 60 s of riding with an error (600) and a flag `shown` (600), True where the lean is shown."""
     n = 600
     time = np.linspace(0.0, STEP_S * (n - 1), n)
     shown = np.ones(n, dtype=bool) if shown is None else shown
@@ -55,7 +55,7 @@ def test_recovery_is_judged_ten_seconds_after_the_end(back_s, right):
 
 
 def readings(seconds=60.0, up_g=1.0):
-    """Still, upright, with noise."""
+    """Return readings of a bike that is still and upright, with noise."""
     n = int(200 * seconds)
     made = np.random.default_rng(0).normal(0.0, 0.01, (n, 7))
     made[:, 1] += up_g

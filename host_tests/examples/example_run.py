@@ -18,7 +18,7 @@ RIDE = (kickstand(2.0, 0.0), accelerate(15.0, 4.0), turn(35.0, 6.0))
 
 
 def save_calibration(part, directory=""):
-    """In flash, as the device leaves it after the six positions and the alignment of this part."""
+    """Save the calibration that the device stores after the six positions and the alignment of this sensor."""
     from kickstand.calibration.parameters import Calibration
     from kickstand.calibration.store import Store
 
@@ -31,8 +31,8 @@ def save_calibration(part, directory=""):
 
 
 def run(program, until_s, turn_to):
-    """See above. until_s: s. turn_to: [[at_s, name of a view], ...]: from then on it presses the button until that
-    view is shown. Raises AssertionError if it never is."""
+    """Run the program as described at the top of this file. until_s: s. turn_to: [[at_s, name of a view], ...]: from
+    at_s on, the button is pressed until the view is shown. Raises AssertionError if it never is."""
     part = Sensor(seed=3)
     board = Board(part.world(Ride(RIDE).motion))
     board.install()

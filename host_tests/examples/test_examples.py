@@ -1,4 +1,4 @@
-"""The programs in firmware/examples, on MicroPython: what each prints, or shows on the display."""
+"""The programs in firmware/examples on MicroPython: what each prints or shows on the display."""
 
 import json
 import re
@@ -10,17 +10,17 @@ from support.mpy import BOARD_HEAP, run_mpy
 
 SCRIPT = Path(__file__).resolve().with_name("example_run.py")
 EXAMPLES = SCRIPT.parents[2] / "firmware" / "examples"
-TURN_DEG = 35.0  # of example_run.py's ride
+TURN_DEG = 35.0  # lean in the ride of example_run.py
 
 
 def run(flash, name, until, turn_to=()):
-    """What the program printed, and the display's two lines each second. A user.py example runs as user.py."""
+    """Return what the program printed, and the display's two lines each second. A user.py is run as one."""
     printed, seen = run_all(flash, name, until, turn_to)
     return printed, seen["frames"]
 
 
 def run_all(flash, name, until, turn_to=()):
-    """What the program printed, and what example_run.py says of it. name: None for the user.py that is in flash."""
+    """Return what the program printed, and the results of example_run.py. name: None for the user.py in flash."""
     program = name and str(EXAMPLES / name)
     if name and name.startswith("user_"):
         (flash / "user.py").write_bytes((EXAMPLES / name).read_bytes())
@@ -41,8 +41,8 @@ def test_print_sensor(tmp_path):
     assert found == "Found an MPU6050"
     assert len([line for line in lines if line]) == 7  # 0.2 s apart, after 0.2 s of setting up
     ax, ay, az, gx, gy, gz, temperature = numbers(lines[0])
-    assert (ax * ax + ay * ay + az * az) ** 0.5 == pytest.approx(1.0, abs=0.1)  # an uncalibrated part, at rest
-    assert max(abs(gx), abs(gy), abs(gz)) < 25.0  # and with its bias
+    assert (ax * ax + ay * ay + az * az) ** 0.5 == pytest.approx(1.0, abs=0.1)  # an uncalibrated sensor at rest
+    assert max(abs(gx), abs(gy), abs(gz)) < 25.0  # including the gyro's bias
     assert temperature == pytest.approx(25.0, abs=0.1)
 
 
@@ -57,11 +57,11 @@ def test_print_lean(tmp_path):
     assert len(lines) > 100
     assert numbers(lines[0])[0] == pytest.approx(0.0, abs=1.0)
     assert numbers(lines[-1])[0] == pytest.approx(TURN_DEG, abs=3.0)
-    assert max(numbers(line)[1] for line in lines) > 0.2  # setting off
+    assert max(numbers(line)[1] for line in lines) > 0.2  # the bike sets off
 
 
 def test_user_page(tmp_path):
-    """The user's page comes after the usual pages. The first page follows it."""
+    """The usual pages come before the user's page, and the first one comes again after it."""
     _, frames = run(tmp_path, "user_page.py", 12.0, turn_to=[(4, "own")])
     shown = re.fullmatch(r"Load     (\d\.\d\d) x", frames[-1][0].rstrip())
     assert shown and float(shown[1]) == pytest.approx(1.22, abs=0.05)  # 1 / cos(35 degrees)
@@ -99,7 +99,7 @@ def test_try_refuses_what_only_cpython_can_run(tmp_path):
 
 
 def test_user_light(tmp_path):
-    """It stays off at 35 degrees, and comes on there when its limit is lower."""
+    """The light stays off at 35 degrees, and turns on there with a lower limit."""
     _, seen = run_all(tmp_path, "user_light.py", 12.0)
     assert not any(seen["lamp"])
     lower = (tmp_path / "user.py").read_text().replace("LIMIT_DEG = 45", "LIMIT_DEG = 30")

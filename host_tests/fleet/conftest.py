@@ -1,4 +1,4 @@
-"""One small fleet and one run over it for all tests of a module, because both take seconds."""
+"""Make one small fleet and run it once for all tests of a module, because both take seconds."""
 
 import made_fleet
 import pytest
@@ -7,11 +7,11 @@ from kickstand_fleet import run
 
 @pytest.fixture(scope="session")
 def fleet(tmp_path_factory):
-    """A MadeFleet of nine vehicles, several of which have a problem."""
+    """Return a MadeFleet of nine vehicles, several of them with a trouble."""
     return made_fleet.make(tmp_path_factory.mktemp("fleet"))
 
 
 @pytest.fixture
 def alone(monkeypatch):
-    """Process vehicles in this process."""
+    """Run the tasks in this process instead of in workers."""
     monkeypatch.setattr(run, "run_tasks", made_fleet.in_this_process)

@@ -1,4 +1,4 @@
-"""Tasks for the workers of a fleet, good and bad ones. They are in a module because workers import them."""
+"""Tasks for a fleet's workers, some of which fail. They are in a module because workers must import them."""
 
 import os
 import time
@@ -6,8 +6,8 @@ from pathlib import Path
 
 
 def task(number, behaviour="", note=""):
-    """Returns its number. behaviour: "die" ends the worker, "hang" never returns, "raise" raises, "slow" takes a while.
-    note: a file that gets a line with the worker's process id at each start of the task."""
+    """Return the task's number. behaviour: "die" ends the worker, "hang" never returns, "raise" raises, "slow" takes
+    longer. note: a file to which each start of the task adds a line with the worker's process id."""
     if note:
         with Path(note).open("a") as file:
             file.write(f"{number} {os.getpid()}\n")

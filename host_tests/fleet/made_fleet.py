@@ -13,7 +13,7 @@ from kickstand_fleet.simulation.vehicle import HANDLING, Receiver, drive_log, ra
 from kickstand_tools.logs.csv_lines import write_log
 from kickstand_tools.signals import rotation_matrix
 
-# the trouble of each vehicle: a car, a bus and a motorcycle in turn
+# the trouble of each vehicle; the kinds are car, bus and motorcycle in turn
 TROUBLES = ["", "", "", "moved-between", "garbage", "moved-within", "km/h", "dead", "late"]
 
 
@@ -28,7 +28,7 @@ class MadeFleet:
         return self.directory / "MANIFEST.csv"
 
     def mount(self, vehicle):
-        """Vehicle from sensor (3, 3)."""
+        """Return the mount as a matrix (3, 3) from the sensor's axes to the vehicle's."""
         return np.reshape([float(self.truth[vehicle][name]) for name in made_up.MATRIX], (3, 3))
 
 
@@ -40,7 +40,7 @@ def make(directory, troubles=TROUBLES, seed=3, seconds=170.0):
 
 
 def drive(seed, kind="car", seconds=200.0, sensor=None, moved=None, straight=True, rate_hz=50.0, **receiver):
-    """(Log, Sensor) of one drive. moved: (seconds, mount from then on)."""
+    """Return (Log, Sensor) of one drive. moved: (seconds, mount from then on)."""
     chance = np.random.default_rng([seed, 5])
     sensor = sensor or random_sensor(chance)
     route = random_route(chance, HANDLING[kind], seconds, rate_hz, straight)
@@ -49,7 +49,7 @@ def drive(seed, kind="car", seconds=200.0, sensor=None, moved=None, straight=Tru
 
 
 def turn_of(degrees, axis):
-    """(3, 3): a turn about an axis (3)."""
+    """Return the matrix (3, 3) of a rotation about an axis (3)."""
     return rotation_matrix(np.radians(degrees) * np.asarray(axis) / np.linalg.norm(axis))
 
 
@@ -59,7 +59,7 @@ def yaw_deg(found, true):
 
 
 def worked_on(directory, *logs):
-    """The result for these logs of one car."""
+    """Return the result for these logs of one car."""
     paths = tuple(str(directory / f"{k}.csv") for k in range(1, 1 + len(logs)))
     for path, log in zip(paths, logs):
         write_log(path, log)
@@ -67,6 +67,6 @@ def worked_on(directory, *logs):
 
 
 def in_this_process(function, items, *_):
-    """Instead of run_tasks(): the same without workers."""
+    """Process the tasks in this process, without workers, in place of run_tasks()."""
     for index, item in enumerate(items):
         yield index, function(*item), "", ""

@@ -1,4 +1,4 @@
-"""Dask's workers: a bad task costs no other task, and a stopped run is resumed."""
+"""Tests with Dask's workers: a failing task does not affect other tasks, and a stopped run is resumed."""
 
 import json
 import os
@@ -26,13 +26,13 @@ from support.recordings import broken_logs
 
 @pytest.fixture(scope="module")
 def cluster():
-    """A cluster with a timeout so long that a busy machine ends no task."""
+    """Return a cluster that ends no task because the machine is busy."""
     with Cluster(None, 2, timeout_s=600.0) as running:
         yield running
 
 
 class Overdue(dict):
-    """Start times of tasks: task 5 began long ago and is ended at once. No other one is ended, even on a busy
+    """Start times of tasks. Task 5 began long ago and is ended at once. No other task is ended, even on a busy
     machine."""
 
     def __setitem__(self, key, began):
@@ -61,7 +61,7 @@ def test_killed_worker_costs_no_result(cluster, tmp_path):
     def kill():
         while not note.exists() or len(note.read_text().splitlines()) < 3:
             time.sleep(0.05)
-        os.kill(int(note.read_text().splitlines()[-1].split()[1]), signal.SIGKILL)  # a worker of ours
+        os.kill(int(note.read_text().splitlines()[-1].split()[1]), signal.SIGKILL)  # one of this run's workers
 
     killer = threading.Thread(target=kill)
     killer.start()
@@ -101,13 +101,13 @@ def test_fleet_on_a_cluster_is_resumed(cluster, fleet, tmp_path, monkeypatch):
     assert "://" not in page.replace("http://www.w3.org/2000/svg", "")
     assert all(row["vehicle"] in page for row in rows)
 
-    # only a changed log is processed again
+    # Only a changed log is processed again.
     path = Path(periods[0].paths[0])
     stat = path.stat()
     os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + 1_000_000))
     assert run_fleet(periods, tmp_path).new == 1
     assert run_fleet(periods, tmp_path).new == 0
-    # so are other options
+    # Other options also cause a new run.
     assert run_fleet(periods[:1], tmp_path, with_signals=True).new == 1
     written = sorted((tmp_path / "signals").rglob("*.parquet"))
     assert len(written) >= len(periods[0].paths)
@@ -168,7 +168,7 @@ def test_two_runs_do_not_share_a_journal(tmp_path):
 
 
 def test_removed_journal_is_replaced_and_locked_again(tmp_path, monkeypatch):
-    """It is locked until it is removed. A run that has opened it meanwhile creates a new one."""
+    """The journal is locked until it is removed. A run that has opened it meanwhile creates a new one."""
     fcntl = pytest.importorskip("fcntl", reason="files are not locked on this system")
     path = tmp_path / "journal.jsonl"
     locks, lock = [], fcntl.flock
@@ -223,11 +223,11 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.nightly  # the next test's moment does not depend on how busy the machine is
+@pytest.mark.nightly  # the next test stops at a moment that does not depend on the machine's load
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="Ctrl-C comes at once on this system")
 @pytest.mark.parametrize("after_s", [0.6, 1.6])
 def test_ctrl_c_while_workers_start_is_deferred(tmp_path, after_s):
-    """Interrupted at once, they would print pages of errors."""
+    """Workers that are interrupted at once would print pages of errors."""
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)
     command, pipe = [sys.executable, str(program)], subprocess.PIPE
@@ -235,7 +235,7 @@ def test_ctrl_c_while_workers_start_is_deferred(tmp_path, after_s):
         assert process.stdout is not None
         assert process.stdout.readline() == "starting\n"
         time.sleep(after_s)
-        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers, too
+        os.killpg(process.pid, signal.SIGINT)  # a terminal also sends it to the workers
         _, trouble = process.communicate(timeout=120)
     assert trouble.count("Traceback") == 1
     assert trouble.endswith("KeyboardInterrupt\n")

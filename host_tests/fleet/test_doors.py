@@ -1,4 +1,4 @@
-"""Names, other users of the computer and changing files cost a fleet at most their own row."""
+"""Bad names, other users of the computer and changing files cost a fleet only their own row."""
 
 import http.client
 import os
@@ -27,7 +27,7 @@ from support.recordings import broken_logs
 
 @pytest.fixture
 def drive(fleet):
-    """A log of a car that can be aligned."""
+    """Return the log of a car that can be aligned."""
     return Path(read_manifest(str(fleet.manifest))[0].paths[0])
 
 
@@ -49,7 +49,7 @@ def test_signals_of_equally_named_logs_have_separate_files(drive, tmp_path, alon
     assert sum(parquet.ParquetFile(tmp_path / path).metadata.num_rows for path in written) == 6 * len(
         files.open_log(str(drive)).t_s
     )
-    assert sum("second" in path.name for path in written) == 2  # the mount's name is in them
+    assert sum("second" in path.name for path in written) == 2  # both files have the mount's name
     run_fleet(periods[:1], tmp_path / "again", with_signals=True)
     again = {path.name for path in (tmp_path / "again" / "signals").rglob("*.parquet")}
     assert len(again) == 2 and again <= {path.name for path in written}
@@ -150,9 +150,9 @@ def test_only_the_run_itself_can_run_code_on_its_workers(tmp_path):
             except OSError as refused:
                 assert "404" in str(refused) or not isinstance(refused, urllib.error.HTTPError)
             except http.client.HTTPException:
-                pass  # no web server
+                pass  # there is no web server
         process.stdin.close()
-        assert process.stderr.read() == b""  # Dask would print each connection that it refused
+        assert process.stderr.read() == b""  # Dask would print each connection that it refuses
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,8 @@ def test_hostile_manifest_gives_one_line_or_a_row(tmp_path, alone, content, word
 
 
 def test_move_at_an_unknown_time_is_counted(tmp_path, monkeypatch):
-    """For example a motorcycle treated as a car: it leans on its stand. Names are short, and the kind is reported."""
+    """For example, a motorcycle treated as a car leans on its stand. Names are short, and the message gives the
+    kind."""
 
     def moved(_, items, *__):
         for index, (period, _) in enumerate(items):
@@ -226,7 +227,7 @@ def test_pipe_is_refused_as_manifest_and_log(tmp_path, alone):
 
 
 def test_unwritable_file_is_reported_with_its_reason(tmp_path, monkeypatch):
-    """On a read-only file system the temporary file cannot be removed."""
+    """The temporary file cannot be removed on a read-only file system."""
 
     def read_only(*_, **__):
         raise OSError(30, "Read-only file system")

@@ -1,4 +1,4 @@
-"""The intervals of a drive show level, forward and left, each 1 g for 1 g."""
+"""The intervals of a drive show level, forward and left, and 1 g stays 1 g in each."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The page of a fleet: in the site's style, for everyone, and a zero is not coloured like a fault."""
+"""A fleet's page has the site's style and readable colours, and a zero is not coloured like a fault."""
 
 import pytest
 from kickstand_fleet.manifest import read_manifest
@@ -13,7 +13,7 @@ INK = "() => getComputedStyle(document.body).color"
 
 @pytest.fixture(scope="module")
 def page_file(fleet, tmp_path_factory):
-    """Of an aligned vehicle and of one that moved."""
+    """Return the page of one aligned vehicle and one whose mount moved."""
     glance = Glance()
     for period in read_manifest(str(fleet.manifest))[1:4:2]:
         glance.add(work_on_period(period))

@@ -1,4 +1,4 @@
-"""A disk that fills up during any write: no finished row is lost, and one line reports it."""
+"""The disk fills up during any write: no finished row is lost, and one line reports the full disk."""
 
 import copy
 import errno
@@ -20,7 +20,7 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 @pytest.fixture
 def disk(tmp_path):
-    """The directory of a disk made by resize()."""
+    """Return the directory of a disk made by resize()."""
     if not sys.platform.startswith("linux"):
         pytest.skip("tmpfs is of Linux")
     path = tmp_path / "disk"
@@ -39,7 +39,7 @@ def resize(path, kb):
 
 @pytest.fixture(scope="module")
 def results(fleet):
-    """Of three vehicles, by name, and their periods."""
+    """Return the results of three vehicles by name, and their periods."""
     periods = read_manifest(str(fleet.manifest))[:3]
     return {period.vehicle: work_on_period(period) for period in periods}, periods
 
@@ -51,7 +51,7 @@ def finished(directory, keys):
         return sum(key in journal for key in keys)
 
 
-# From a disk without room for a picture to one without room for the last table beside all rows
+# The sizes go from a disk without room for a picture to one with room for all rows but not for the last table.
 @pytest.mark.parametrize("kb", [8, 48, 80])
 def test_disk_of_any_size_loses_no_finished_row(disk, results, alone, monkeypatch, kb):
     known, periods = results
@@ -68,7 +68,7 @@ def test_disk_of_any_size_loses_no_finished_row(disk, results, alone, monkeypatc
     rows = parquet.read_table(out / "alignments.parquet").to_pylist()
     assert [row["status"] for row in rows] == [known[period.vehicle].alignment["status"] for period in periods]
     assert all((out / row["plot"]).is_file() for row in rows)
-    assert not list(out.rglob(".*"))  # nothing half written
+    assert not list(out.rglob(".*"))  # no half-written file is left
     assert run_fleet(periods, out).new == 0
 
 
@@ -84,7 +84,7 @@ def test_unwritable_picture_costs_no_row(results, alone, tmp_path, monkeypatch):
         run_fleet(periods, tmp_path)
     rows = parquet.read_table(tmp_path / "alignments.parquet").to_pylist()
     assert [(row["status"], row["plot"]) for row in rows] == [("aligned", "")]
-    assert run_fleet(periods, tmp_path).new == len(periods)  # the first one again, for its picture
+    assert run_fleet(periods, tmp_path).new == len(periods)  # the first period runs again for its picture
 
 
 def test_signals_that_did_not_fit_are_written_by_the_next_run(results, alone, tmp_path, monkeypatch):

@@ -1,4 +1,4 @@
-"""Valid manifests, and refusals of `kickstand fleet` and `simulate --fleet`."""
+"""Valid manifests, and refusals by `kickstand fleet` and `simulate --fleet`."""
 
 import pytest
 from kickstand_fleet.manifest import Period, by_pattern, is_pattern, read_manifest

@@ -1,4 +1,4 @@
-"""Results for the logs of one mount of one vehicle."""
+"""Results for all logs of one mount of one vehicle."""
 
 import numpy as np
 import pytest

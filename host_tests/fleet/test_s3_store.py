@@ -1,4 +1,4 @@
-"""A fleet whose logs and results are in S3: the same as over files."""
+"""A fleet with its logs and results in S3 gives the same results as a fleet in files."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ TABLE_FILES = [f"{name}.parquet" for name in TABLES]
 
 @pytest.fixture
 def s3(alone, monkeypatch):
-    """A file system on a simulated S3 with a bucket `fleet`."""
+    """Return a file system on a simulated S3 with a bucket `fleet`."""
     moto = pytest.importorskip("moto.server")
     s3fs = pytest.importorskip("s3fs")
     server = moto.ThreadedMotoServer(port=0, verbose=False)
@@ -39,7 +39,7 @@ def s3(alone, monkeypatch):
 
 
 def table(content, base):
-    """The rows of a table, with paths relative to the logs."""
+    """Return the rows of a table, with paths relative to the logs."""
     rows = parquet.read_table(content).to_pylist()
     return [
         {name: value.replace(f"{base}/", "") if isinstance(value, str) else value for name, value in row.items()}
@@ -69,7 +69,7 @@ def test_logs_and_results_in_s3_give_the_same_as_files(s3, fleet, tmp_path):
         assert drawn == (tmp_path / "results" / name).read_text(), name
     signals = {path.removeprefix("fleet/results/") for path in s3.glob("fleet/results/signals/**/*.parquet")}
     written = {str(path.relative_to(tmp_path / "results")) for path in tmp_path.glob("results/signals/**/*.parquet")}
-    # the last part of a name is a hash of the log's path
+    # The last part of a name is a hash of the log's path.
     assert {path.rpartition("-")[0] for path in signals} == {path.rpartition("-")[0] for path in written} != set()
     assert len(signals) == len(written)
 

@@ -1,4 +1,4 @@
-"""The command reports its choices, and writes a log that every other command reads."""
+"""`kickstand import` reports its choices, and every other command reads its logs."""
 
 import json
 
@@ -29,7 +29,7 @@ def test_import_reports_its_choices_and_the_next_step(tmp_path):
 
 @pytest.mark.parametrize("name", ["EXPORT.zip", "EXPORT"])
 def test_report_reads_an_export_directly(tmp_path, name):
-    """The export is imported and aligned, and a line says so. A calibration beside it is used."""
+    """The export is imported and aligned, and a line reports this. A calibration beside the export is used."""
     ride = riding().every(4)
     again = app_exports.Riding(*(np.concatenate([column] * 3) for column in vars(ride).values()))
     again.t_s = np.arange(len(again.t_s)) / 50.0
@@ -49,7 +49,7 @@ def test_report_reads_an_export_directly(tmp_path, name):
 
 
 def test_export_of_one_file_is_read(tmp_path):
-    """RaceChrono's CSV is such a file, too. An unknown file is refused as a log."""
+    """RaceChrono's CSV is such an export. An unknown file is refused as a log."""
     (tmp_path / "r.csv").write_text(app_exports.racechrono(riding().every(4)))
     words = "s of riding: at least 30 s with bends are needed"
     assert "r.csv: only" in command.refused(tmp_path, "report", tmp_path / "r.csv", words=words)
@@ -76,7 +76,7 @@ def test_export_in_vehicle_axes_needs_no_alignment(tmp_path):
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_mutated_export_gives_a_log_or_one_line(tmp_path):
-    """Never a traceback, a numpy warning, or an unreadable log."""
+    """The result is never a traceback, a numpy warning or an unreadable log."""
     ride = riding().every(8).every(1, 100)
     exports = [app_exports.racebox(ride), app_exports.vbo(ride), app_exports.aim(ride), app_exports.sensorlog(ride)]
     exports += [app_exports.racechrono(ride), app_exports.sensor_kinetics(ride)["Ride_accm.csv"]]
@@ -106,7 +106,7 @@ def test_mutated_export_gives_a_log_or_one_line(tmp_path):
 
 
 def aligned_export(target, files):
-    """An export with a calibration beside it."""
+    """Return an export with a calibration beside it."""
     api.write_calibration(
         target.with_name("EXPORT.cal.json"), api.CalibrationFile(vehicle_from_sensor=app_exports.PHONE.T, aligned=True)
     )
@@ -114,14 +114,14 @@ def aligned_export(target, files):
 
 
 def test_no_output_destroys_a_file_of_the_export(tmp_path):
-    """Of import: test_refusals.py."""
+    """test_refusals.py tests the command `import` itself."""
     source = aligned_export(tmp_path / "EXPORT", app_exports.phyphox(riding().every(4)))
     given = "export", source, "--to", "csv", "--out", source / "Accelerometer.csv"
     command.refused(tmp_path, *given, words="Accelerometer.csv is also an input")
 
 
 def test_remarks_of_an_import_are_in_report_and_page(tmp_path):
-    """They appear once, though the imported log is checked again."""
+    """The remarks appear once, though the imported log is checked again."""
     source = aligned_export(tmp_path / "EXPORT", app_exports.sensor_kinetics(riding().every(4)))
     result = command.works("report", source, "--json", "--live")
     assert [remark["code"] for remark in json.loads(result.out)["remarks"]].count("import-sign") == 1

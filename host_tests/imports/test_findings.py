@@ -1,4 +1,4 @@
-"""The columns of an unknown table are found from their values, for any names, units, separators and times."""
+"""The columns of an unknown table are found from their values, whatever its names, units, separators and times."""
 
 import functools
 import re
@@ -18,12 +18,12 @@ HEAD = "t,ax,ay,az,gx,gy,gz"
 
 @functools.cache
 def hand(hz=50.0):
-    """A sensor turned in a hand: (time, force, rates)."""
+    """Return (time, force, rates) of a sensor turned in a hand."""
     return drawn_tables.motion("hand", hz, np.random.default_rng(5))
 
 
 def lines(form, times=1.0, force=1.0, rates=1.0, head=""):
-    """A row for each sample, by a format of seven numbers."""
+    """Return a row for each sample, in a format of seven numbers."""
     t, f, w = hand()
     rows = [form.format(*row) for row in np.column_stack((times * t, force * f, rates * w)).tolist()]
     return "\n".join([head, *rows] if head else rows) + "\n"
@@ -128,7 +128,7 @@ def test_import_reports_at_once_why_no_lean_is_possible(tmp_path):
 
 
 def judged(seed, path):
-    """Result of importing a random table: "right", "refused", or the error."""
+    """Return the result of importing a random table: "right", "refused", or the error."""
     drawn = drawn_tables.draw(seed)
     path.write_text(drawn.text)
     try:
@@ -157,7 +157,7 @@ def judged(seed, path):
 
 @pytest.mark.parametrize("count", [30, pytest.param(500, marks=pytest.mark.nightly)])
 def test_no_random_table_is_imported_wrongly(tmp_path, count):
-    results = [judged(seed, tmp_path / "log.csv") for seed in range(1, 2 * count, 2)]  # odd ones were not used before
+    results = [judged(seed, tmp_path / "log.csv") for seed in range(1, 2 * count, 2)]  # not used in development
     assert [result for result in results if result not in ("right", "refused")] == []
     assert results.count("right") >= 0.99 * count
 

@@ -1,4 +1,4 @@
-"""Sensors with different rates on one clock: no values across a gap, or if one of them is missing."""
+"""Sensors with different rates are joined on one clock. No values are made up across a gap or for a missing sensor."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ MS = 10**6
 
 
 def sensor(name: str, t_s: np.ndarray, column: np.ndarray | None = None) -> RecordedSensor:
-    """One whose values are the time itself, times 1, 2 and 3."""
+    """Return a sensor whose values are its times, multiplied by 1, 2 and 3."""
     values = t_s if column is None else column
     return RecordedSensor(name, np.rint(t_s * 1e9).astype(np.int64), np.outer(values, [1.0, 2.0, 3.0]))
 
@@ -29,7 +29,7 @@ def test_slower_gyro_is_interpolated_within_its_own_time():
 
 
 def test_a_faster_gyro_is_averaged_over_each_sample():
-    """Otherwise vibration between two samples would become a slow rate."""
+    """Without averaging, vibration between two samples would become a slow rate."""
     t_s = np.arange(0.0, 4.0, 0.0025)
     gyro = sensor("gyro", t_s, 10.0 * t_s + 50.0 * np.sin(2 * np.pi * 99.0 * t_s))
     clock = np.arange(100, 390) * 10 * MS
@@ -72,7 +72,7 @@ def test_fix_is_only_in_the_nearest_row():
 
 
 def test_markers_of_unknown_speed_and_position_are_dropped():
-    """A phone writes -1 for an unknown speed; 0, 0 is in the sea."""
+    """A phone writes -1 for an unknown speed. The position 0, 0 is in the sea."""
     t_ns = np.arange(4) * 10**9
     track = ReceiverTrack(
         t_ns, np.array([-1.0, 3.0, -1.0, 4.0]), np.array([0.0, 52.0, 91.0, 52.1]), np.array([0.0, 13.0, 13.0, 13.1])
@@ -89,7 +89,7 @@ def test_repeated_values_at_standstill_are_kept_once_per_second():
 
 
 def test_rounded_and_repeated_times_are_spread(tmp_path):
-    """Sensor Kinetics writes four decimals, and one time for several samples."""
+    """Sensor Kinetics writes four decimals, and gives several samples the same time."""
     ride = riding()
     found = api.import_recording(app_exports.into(tmp_path / "k", app_exports.sensor_kinetics(ride)))
     steps = np.diff(found.log.t_s)
@@ -108,7 +108,7 @@ def test_late_samples_are_sorted(tmp_path):
 
 
 def test_damaged_row_costs_only_itself(tmp_path):
-    """An impossible time, an impossible reading and a word are counted; a cut last line is left out."""
+    """An impossible time, an impossible reading and a word are counted. A last line that is cut is left out."""
     ride = riding().every(4)
     lines = app_exports.racebox(ride).splitlines()
     lines[200] = lines[200].replace("2024-05-17", "2031-05-17")

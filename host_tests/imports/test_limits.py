@@ -1,4 +1,4 @@
-"""Input that is too large, endless or not a time is refused in one line. Rows left out are counted."""
+"""Input that is too large, endless or has invalid times is refused in one line. Rows that are left out are counted."""
 
 import gzip
 import os

@@ -1,4 +1,4 @@
-"""Tables from any source: separators, decimal marks, letters, units, times; messages about unknown files."""
+"""Tables from any source: separators, decimal marks, character sets, units, times, and messages about unknown files."""
 
 import shlex
 
@@ -109,20 +109,20 @@ TIMES = {
 
 
 def column(texts):
-    """Read these texts as the cells of one column."""
+    """Return these cells as they are read."""
     return csv_reader.columns_of([[text] for text in texts], 1)[0]
 
 
 @pytest.mark.parametrize("name", TIMES)
 def test_times_of_any_kind_without_a_unit(name):
     found = units.times_ns(column(TIMES[name]))
-    assert np.allclose(np.diff(found), 10_000_000, atol=600)  # of a double in ns since 1970
+    assert np.allclose(np.diff(found), 10_000_000, atol=600)  # rounding of a double in ns since 1970
     if "1970" in name or "zone" in name or name == "UTC":
         assert found[0] == pytest.approx(START_NS, abs=600)
 
 
 def test_slow_times_in_ms_are_not_read_as_seconds():
-    """Ten and twenty-five samples a second, and as fast as 400."""
+    """Tested at 10 and 25 samples per second, and up to 400."""
     for step, unit in ((100, 1e6), (40, 1e6), (2.5, 1e6), (0.1, 1e9), (0.0025, 1e9), (100_000, 1e3), (2500, 1e3)):
         found = units.times_ns(np.array([step * k for k in range(20)]))
         assert np.allclose(np.diff(found), step * unit), (step, unit)
@@ -223,7 +223,8 @@ def test_columns_are_whole_numbers_floats_or_text():
 
 
 def test_a_damaged_row_costs_itself(monkeypatch):
-    """A quotation mark that is not closed, cells too many or too few, a line too long; text after numbers."""
+    """The table has an unclosed quotation mark, too few or too many cells, a line that is too long, and text after
+    numbers."""
     monkeypatch.setattr(csv_reader, "ROWS", 2)
     rows = ['"1","2","3"', '"4","5,"6"', "7,8,9,10", "11", f"12,13,{14:0200000d}", "15,stop,16"]
     (first, second, third), left_out = csv_reader.columns_of_text("\n".join(rows), ",", 3)

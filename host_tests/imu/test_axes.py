@@ -1,4 +1,4 @@
-"""The driver finds faulty axes by their counts, and only those."""
+"""The driver finds faulty axes by their counts, and never reports a good axis."""
 
 from array import array
 
@@ -12,7 +12,7 @@ NOISE = (13, 13, 13, 3, 2.66, 2.66, 2.66)  # by the data sheet at DLPF 3; see se
 
 
 def filtered(rng, count, bandwidth_hz):
-    """Noise of rms 1 behind a low-pass of the first order."""
+    """Return noise of rms 1 behind a first-order low-pass."""
     pole = np.exp(-2 * np.pi * bandwidth_hz / RATE_HZ)
     white = rng.normal(size=count + 50) * np.sqrt(1 - pole * pole)
     out = np.zeros(count + 50)
@@ -22,14 +22,14 @@ def filtered(rng, count, bandwidth_hz):
 
 
 def counts(seconds, seed=0, noise=NOISE, bandwidth_hz=42, rest=REST):
-    """Samples of a chip at rest, (n, 7)."""
+    """Return samples (n, 7) of a chip at rest."""
     rng = np.random.default_rng(seed)
     n = int(seconds * RATE_HZ)
     return np.stack([at + of * filtered(rng, n, bandwidth_hz) for at, of in zip(rest, noise, strict=True)], axis=1)
 
 
 def ride(seconds, seed=0):
-    """Samples of a ride: leans, the engine, bumps."""
+    """Return samples of a ride with leans, engine vibration and bumps."""
     t = np.arange(int(seconds * RATE_HZ)) / RATE_HZ
     rng = np.random.default_rng(seed)
     samples = counts(seconds, seed)
@@ -39,7 +39,7 @@ def ride(seconds, seed=0):
 
 
 def judged(samples, gyro_range=1, dlpf=3, accel_range=3):
-    """Each change of the notice: [(seconds, words or None), ...]."""
+    """Return each change of the notice: [(seconds, words or None), ...]."""
     axes = AxisWatch(RATE_HZ, accel_range, gyro_range, dlpf, 20)
     sums = array("i", [0] * 7)
     said: list[tuple[float, str | None]] = [(0.0, None)]
@@ -55,7 +55,8 @@ def judged(samples, gyro_range=1, dlpf=3, accel_range=3):
 
 
 def stuck(column, value):
-    """A fault of one column from second 2 to 5. value: a function from the column's samples to the faulty readings."""
+    """Return a fault of one column from second 2 to 5. value: a function from the column's samples to the faulty
+    readings."""
 
     def spoil(samples):
         part = samples[2 * RATE_HZ : 5 * RATE_HZ]
@@ -103,7 +104,7 @@ HIGH_BYTE = [
 
 @pytest.mark.parametrize(("words", "spoil"), ILL + HIGH_BYTE)
 def test_a_faulty_axis_is_reported_at_once_and_recovers(words, spoil):
-    """Within 1.2 s. A stuck high byte shows only when the counts pass through it."""
+    """The fault is reported within 1.2 s. A stuck high byte shows only when the counts pass through it."""
     said = judged(spoil(ride(8)))
     assert [what for _, what in said] == [words, None]
     assert 2.3 < said[0][0] <= (3.7 if (words, spoil) in HIGH_BYTE else 3.2)
@@ -113,7 +114,8 @@ def test_a_faulty_axis_is_reported_at_once_and_recovers(words, spoil):
 @pytest.mark.parametrize("gyro_range", range(4))
 @pytest.mark.parametrize("dlpf", [1, 2, 3, 4, 5, 6])
 def test_the_quietest_chip_at_rest_is_not_faulty(gyro_range, dlpf):
-    """100 ug/sqrt(Hz) at 16 g, 0.004 deg/s/sqrt(Hz), each with a mean that makes the counts as quiet as they can be."""
+    """The noise is 100 ug/sqrt(Hz) at 16 g and 0.004 deg/s/sqrt(Hz). Each mean makes the counts as quiet as
+    possible."""
     bandwidth = (None, 188, 98, 42, 20, 10, 5)[dlpf]
     per_g, per_dps = 2048, (131, 65.5, 32.8, 16.4)[gyro_range]
     root = np.sqrt(np.pi / 2 * bandwidth)
@@ -123,7 +125,7 @@ def test_the_quietest_chip_at_rest_is_not_faulty(gyro_range, dlpf):
 
 
 def test_no_axis_is_faulty_in_a_ride(monkeypatch):
-    """Their axes also look so good that the judge (2 KB of heap) is not imported."""
+    """The axes look so good that the judge module (2 KB of heap) is never imported."""
     monkeypatch.setattr(AxisWatch, "_load", lambda watch: pytest.fail("not well"))
     for seed in range(4):
         assert judged(ride(20, seed)) == []
@@ -147,7 +149,7 @@ def test_single_samples_at_the_end_of_the_range_are_no_fault():
 
 @pytest.mark.parametrize(("accel_range", "said"), [(0, 0), (1, 0), (2, 2), (3, 2)])
 def test_hard_vibration_clips_unless_the_range_is_small(accel_range, said):
-    """After the low-pass the vibration still reaches half of 8 g or of 16 g for three seconds. In a range of 2 g, bends
+    """After the low-pass the vibration still reaches half of 8 g or 16 g for three seconds. In a range of 2 g bends
     clip too."""
     samples = ride(8)
     samples[400:1000, 1] += 17000 * np.sin(np.arange(600) * 2.2)

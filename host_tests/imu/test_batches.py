@@ -1,5 +1,5 @@
-"""The samples of one turn of the loop are added up and transformed together. Compared with numpy on CPython and
-MicroPython; machine code is compared with Python."""
+"""The samples of one loop pass are added up and transformed together. The sums match numpy on CPython and
+MicroPython, and machine code matches Python."""
 
 import numpy as np
 import pytest
@@ -9,18 +9,18 @@ LIMIT = 5
 
 
 def frames(samples):
-    """Seven int16 each to bytes on the wire."""
+    """Convert samples of seven int16 to the bytes on the bus."""
     return np.asarray(samples, ">i2").view(np.uint8).reshape(-1, 14).tolist()
 
 
 def noise(count, seed=0):
-    """Samples that are all different."""
+    """Return samples that are all different."""
     return np.random.default_rng(seed).integers(-32768, 32768, (count, 7))
 
 
 def added(engine, batches):
-    """The number of samples that add_up() takes from each batch, and their sums. add_up_python() must return and note
-    the same."""
+    """Return the number of samples that add_up() takes from each batch, and their sums. Fails if add_up_python()
+    returns or notes anything else."""
     chosen, python = engines.run(engine, [("add_up", (batches, LIMIT))])[0]
     assert chosen == python
     return [answer[:2] for answer in chosen]
@@ -28,7 +28,7 @@ def added(engine, batches):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_sums(engine):
-    """For zero, one and eight samples, and near the ends of the range."""
+    """Tested with zero, one and eight samples, and near the ends of the range."""
     ends = np.array([[-32699] * 7, [32699] * 7, [-32699] * 7, [32697] * 7])
     batches = [noise(0), noise(1), noise(8), ends]
     answers = added(engine, [frames(batch) for batch in batches])
@@ -37,7 +37,7 @@ def test_sums(engine):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_a_frame_is_seven_big_endian_numbers(engine):
-    """At any place in the FIFO's bytes, and at the ends of the range and of its halves."""
+    """Tested at every place in the FIFO's bytes, and at the ends of the range and of its halves."""
     edges = [[value] * 7 for value in (-32768, -32767, -1, 0, 1, 255, 256, 16383, 16384, 32766, 32767)]
     samples = np.vstack((noise(5), edges))
     chosen, python = engines.run(engine, [("decode", (frames(samples),))])[0]
@@ -47,7 +47,7 @@ def test_a_frame_is_seven_big_endian_numbers(engine):
 @pytest.mark.parametrize("engine", engines.ENGINES)
 @pytest.mark.parametrize("dead", [0, -1])
 def test_all_zeros_or_ones_is_a_dead_frame(engine, dead):
-    """Frames before such a reading count, for any temperature and rate. A chip with zero force in only two axes
+    """Frames before a dead frame count, whatever its temperature and rate. A chip with zero force in only two axes
     works."""
     samples = noise(4)
     samples[2, 0:3] = dead
@@ -63,7 +63,7 @@ def test_all_zeros_or_ones_is_a_dead_frame(engine, dead):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_repeated_readings_are_a_frozen_chip(engine):
-    """Repetitions are counted from batch to batch. A change of any byte but the temperature's ends them."""
+    """Repetitions are counted across batches. A change of any byte except the temperature's ends them."""
     still = np.repeat(noise(1), 12, axis=0)
     calls, expected = [[still[:3], still[3:7], still[7:]]], [[3, 2, 0]]
     for column in range(7):
@@ -80,7 +80,8 @@ def test_repeated_readings_are_a_frozen_chip(engine):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_a_sample_at_the_end_of_the_range_is_left_out(engine):
-    """For any axis, at either end, but not for the temperature. The good samples move up."""
+    """A sample with any axis at either end is left out, but the temperature does not matter. The good samples move
+    up."""
     samples = noise(8) // 2
     samples[2, 1], samples[3, 6], samples[5, 0], samples[5, 4], samples[6, 3] = 32700, -32768, -32700, 32767, 32767
     good = samples[[0, 1, 4, 6, 7]]
@@ -95,7 +96,8 @@ def test_a_sample_at_the_end_of_the_range_is_left_out(engine):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_a_watch_records_the_low_bits_wraps_and_differences(engine):
-    """The values of the lowest four bits, a changed high byte, a jump below it, and the axes that differ."""
+    """The watch records the values of the lowest four bits, a changed high byte, a jump below it, and the axes that
+    differ."""
     samples = np.full((8, 7), 700) + np.arange(7)
     samples[:, 0] = 5, 6, 5, 6, 5, 6, 5, 6  # two values
     samples[:, 1] = 2, 194, 5, 6, 7, 198, 9, 8  # jumps within one high byte
@@ -114,7 +116,8 @@ def test_a_watch_records_the_low_bits_wraps_and_differences(engine):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_integers_are_as_good_as_floats(engine):
-    """Within 0.03 degrees of lean and 0.05 % of a rate. Eight samples at the ends of the range do not overflow."""
+    """The error is at most 0.03 degrees of lean and 0.05 % of a rate. Eight samples at the ends of the range do not
+    overflow."""
     rng = np.random.default_rng(2)
     calls = []
     for _ in range(30):

@@ -29,7 +29,7 @@ def sensor_i2c():
 
 
 def test_the_example_in_the_drivers_docstring_runs(board, capsys):
-    """For a second: its name and temperature, then about 200 samples."""
+    """The example runs for a second. It prints the chip's name and temperature, then about 200 samples."""
     from kickstand.imu import mpu6050
 
     example = re.search(r"\n\n((?:    .*\n|\n)+)", mpu6050.__doc__ or "")
@@ -42,7 +42,7 @@ def test_the_example_in_the_drivers_docstring_runs(board, capsys):
 
 
 def test_a_stuck_bus_is_freed_and_a_dead_one_is_reported(board):
-    """A device that was left in the middle of a byte needs up to nine clocks (NXP UM10204, 3.1.16)."""
+    """A device that stopped in the middle of a byte needs up to nine clock pulses (NXP UM10204, 3.1.16)."""
     from kickstand.board import i2c_bus
 
     def freed(bits):
@@ -81,7 +81,7 @@ def test_presses(board, held_s, events):
 
 
 def test_ctrl_c_stops_the_watchdog(board, monkeypatch, capsys, tmp_path):
-    """After Ctrl-C nothing feeds it, and a reset in the middle of a copy would break an installation."""
+    """After Ctrl-C the watchdog is not fed, and a reset in the middle of a copy would break an installation."""
     from kickstand import app, start
 
     monkeypatch.chdir(tmp_path)

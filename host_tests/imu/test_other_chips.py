@@ -1,25 +1,25 @@
-"""Other chips at the sensor's addresses are named by their registers, as their data sheets have them."""
+"""Other chips at the sensor's addresses are named by their registers, as given in their data sheets."""
 
 import pytest
 from kickstand_tools.simulated_board.simulator import Board
 
 OTHER, MOTION, SUPPORTED = 0, 1, 2
 WHO_AM_I, PWR_MGMT_1 = 0x75, 0x6B
-# second 37, minute 59, hour 23, then by the chip; binary-coded decimals
+# second 37, minute 59, hour 23, then an order that depends on the chip; binary-coded decimals
 DS3231 = [0x37, 0x59, 0x23, 0x05, 0x26, 0x11, 0x26, 0, 0, 0]  # day of the week, date, month, year
 PCF8523 = [0, 0, 0, 0x37, 0x59, 0x23, 0x26, 0x04, 0x11, 0x26]  # date, day of the week, month, year
 
 
 @pytest.fixture
 def chips():
-    with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):  # the driver needs a board's time
+    with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):  # the driver needs a board's clock
         from kickstand.imu import other_chips
 
         yield other_chips
 
 
 class Wires:
-    """A machine.I2C with a device at one address. registers: {register: value}, 0 for the others."""
+    """A machine.I2C with a device at one address. registers: {register: value}. All other registers are 0."""
 
     def __init__(self, address, registers):
         self._address, self._registers = address, registers
@@ -46,7 +46,7 @@ class Wires:
         (0x57, {}, ("EEPROM", OTHER)),
         (0x58, {}, ("", OTHER)),
         (0x27, {}, ("display", OTHER)),
-        # Register 0 of chips like the MPU6050 can hold any number; these are named by WHO_AM_I
+        # Register 0 of chips like the MPU6050 can hold any number. WHO_AM_I names these chips.
         *[((0x68), {WHO_AM_I: 0x68, PWR_MGMT_1: power, 0: 0xD1}, ("MPU6050", SUPPORTED)) for power in (0x40, 0x41, 1)],
         (0x68, {WHO_AM_I: 0x68, PWR_MGMT_1: 0x02, 0: 0xD1}, ("BMI160", MOTION)),
         (0x68, {WHO_AM_I: 0x55, PWR_MGMT_1: 0x40}, ("", OTHER)),

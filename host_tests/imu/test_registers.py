@@ -1,4 +1,4 @@
-"""The driver with constant registers: its writes, its checks, and its use of the FIFO's count.
+"""The driver with constant registers: its writes, its checks, and its use of the FIFO count.
 
 The values are those of the register map, RM-MPU-6000A rev 4.2, and of the other chips' data sheets.
 """
@@ -17,7 +17,7 @@ MPU6500, MPU6886 = 0x70, 0x19
 
 @pytest.fixture(autouse=True)
 def time():
-    """Of a board, which the driver waits for."""
+    """Give the driver a board's clock, because it waits."""
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0)) as board:
         yield board.clock
 
@@ -49,7 +49,7 @@ class Wires:
 
     def readfrom_mem_into(self, address, register, buffer):
         self._expect(address)
-        if register not in (FIFO_R_W, USER_CTRL):  # no byte more than is used: each takes 25 us
+        if register not in (FIFO_R_W, USER_CTRL):  # no unused byte is read, because each takes 25 us
             assert len(buffer) == {SMPLRT_DIV: 11, 0x3B: 14, FIFO_COUNT_H: 2}.get(register, 1)
         self.registers[FIFO_COUNT_H], self.registers[FIFO_COUNT_H + 1] = divmod(self.waiting, 256)
         if register == FIFO_R_W:
@@ -87,7 +87,7 @@ def test_setup_writes_the_values_of_the_register_map(time):
     reset, awake, configured, *_ = wires.times_us
     assert awake - reset >= 100_000  # longest time of a reset (p. 41)
     assert configured - awake >= 30_000  # the gyro's start-up time (PS-MPU-6000A, 6.1)
-    assert wires.times_us[6] - wires.times_us[5] >= 4 * 4800  # four delays of the slowest low-pass that is usual
+    assert wires.times_us[6] - wires.times_us[5] >= 4 * 4800  # four delays of the slowest usual low-pass
     assert wires.times_us[-1] - reset < 200_000
 
 
@@ -101,7 +101,7 @@ def test_setup_writes_the_values_of_the_register_map(time):
     ],
 )
 def test_ranges_and_their_counts(accel_g, accel_bits, lsb_per_g, gyro_dps, gyro_bits, lsb_per_dps):
-    """Register map pp. 14, 15, 29 and 31."""
+    """The values are from pages 14, 15, 29 and 31 of the register map."""
     wires = Wires()
     chip = started(wires, accel_range_g=accel_g, gyro_range_dps=gyro_dps)
     assert (wires.registers[ACCEL_CONFIG], wires.registers[GYRO_CONFIG]) == (accel_bits, gyro_bits)
@@ -109,7 +109,7 @@ def test_ranges_and_their_counts(accel_g, accel_bits, lsb_per_g, gyro_dps, gyro_
 
 
 def test_one_burst_is_one_reading():
-    """Registers 0x3B to 0x48 (p. 29): accelerometer, temperature, gyro."""
+    """Registers 0x3B to 0x48 (p. 29) give the accelerometer, temperature and gyro."""
     wires = Wires()
     chip = started(wires)
     wires.registers[0x3B:0x49] = bytes(range(0x70, 0x70 + 28, 2))
@@ -119,11 +119,11 @@ def test_one_burst_is_one_reading():
 
 
 def test_the_delay_of_each_low_pass():
-    """Of the gyro, p. 13, in seconds."""
+    """The delays in seconds are those of the gyro, p. 13."""
     from kickstand.imu.mpu6050 import GYRO_DELAY_S
 
     assert GYRO_DELAY_S == {dlpf: DLPF_DELAY_US[dlpf] / 1e6 for dlpf in range(1, 7)}
-    assert lean_filter.DELAY_S == GYRO_DELAY_S[3]  # of the default low-pass
+    assert lean_filter.DELAY_S == GYRO_DELAY_S[3]  # delay of the default low-pass
 
 
 @pytest.mark.parametrize(
@@ -160,7 +160,7 @@ def test_any_changed_register_ends_configured(who_am_i):
 
 @pytest.mark.parametrize(("who_am_i", "bits"), [(0x68, 0xF8), (MPU6500, 0xF8), (0x98, 0xF8), (MPU6886, 0x18)])
 def test_each_bit_of_the_fifo_that_the_chip_has_must_stay(who_am_i, bits):
-    """Bits 7 to 3: temperature, gyro x, y, z, accelerometer. The MPU6886 has 4 (gyro) and 3 only."""
+    """Bits 7 to 3 stand for temperature, gyro x, y, z and accelerometer. The MPU6886 has only bits 4 (gyro) and 3."""
     wires = Wires(who_am_i)
     chip = started(wires)
     for bit in range(8):
@@ -179,7 +179,7 @@ def test_an_unknown_number_is_an_unknown_chip_unless_accepted():
     wires = Wires(0x55)
     accepted = started(wires, accept=0x55, dlpf=4)
     assert (ACCEL_CONFIG2, 4) in wires.log
-    wires.registers[ACCEL_CONFIG2] = 0  # a register that it need not have
+    wires.registers[ACCEL_CONFIG2] = 0  # not every chip has this register
     assert accepted.configured()
     assert accepted.temperature_c(333.87) == pytest.approx(22.0)
     assert Mpu6050(Wires(0x68), accept=0x55).identify() == 0x68
@@ -222,7 +222,8 @@ def test_the_simulated_board_models_every_chip_of_the_driver():
     [(0, 0, 0), (1, 1, 0), (3, 3, 0), (4, 3, 1), (7, 3, 4), (8, 8, 0), (9, 8, 1), (20, 8, 12), (72, 8, 64)],
 )
 def test_how_many_frames_are_read_and_left(frames, read, left):
-    """Three at a time, eight to catch up. The MPU6050's 1024 bytes hold 73 frames: 72 are no overflow."""
+    """It reads three frames at a time, or eight to catch up. The MPU6050's 1024 bytes hold 73 frames, so 72 are no
+    overflow."""
     wires = Wires()
     chip = started(wires)
     wires.waiting = 14 * frames
@@ -233,12 +234,13 @@ def test_how_many_frames_are_read_and_left(frames, read, left):
 
 @pytest.mark.parametrize(("who_am_i", "most"), [(0x68, 72), (MPU6500, 35), (0x98, 35), (MPU6886, 35)])
 def test_a_fifo_that_may_have_overflowed_is_emptied(who_am_i, most):
-    """Of 1024 bytes, or of 512 (MPU-6500 register map p. 31): when fewer than 14 are free."""
+    """The FIFO has 1024 or 512 bytes (MPU-6500 register map p. 31). It may have overflowed when fewer than 14 are
+    free."""
     wires = Wires(who_am_i)
     chip = started(wires)
     wires.waiting = 14 * most
     assert chip.fetch() == 8
-    wires.waiting = (1024 if who_am_i == 0x68 else 512) - 14  # still room for a frame: one is being written
+    wires.waiting = (1024 if who_am_i == 0x68 else 512) - 14  # a frame still fits: one is being written
     assert (chip.fetch(), chip.overflows) == (0, 0)
     wires.waiting = 14
     assert chip.fetch() == 1
@@ -260,7 +262,7 @@ def test_a_frame_that_is_being_written_is_waited_for_once():
         assert (chip.frames_left, chip.overflows) == (left, 0)
     wires.waiting = 33
     assert chip.fetch() == 0
-    wires.waiting = 47  # still odd: an overflow cut a frame short
+    wires.waiting = 47  # still odd, because an overflow cut a frame short
     assert chip.fetch() == 0
     assert (chip.overflows, chip.frames_left) == (1, 0)
     wires.waiting = 5
@@ -270,7 +272,7 @@ def test_a_frame_that_is_being_written_is_waited_for_once():
 
 @pytest.mark.parametrize(("rate_hz", "good"), [(200, 20), (100, 10)])
 def test_readings_that_repeat_for_100_ms_are_frozen(rate_hz, good):
-    """The first one is new. The count restarts after a set-up."""
+    """The first reading is new. The count restarts after a set-up."""
     wires = Wires()
     chip = started(wires, rate_hz=rate_hz)
     wires.waiting = 14
@@ -286,7 +288,7 @@ def test_readings_that_repeat_for_100_ms_are_frozen(rate_hz, good):
     wires.waiting = 0
     chip.setup()
     wires.waiting = 14
-    assert accepted() == good - 1  # the reading that it knows repeats once more
+    assert accepted() == good - 1  # the first reading repeats the last one before the set-up
 
 
 @pytest.mark.parametrize(
@@ -335,7 +337,7 @@ def test_a_write_or_a_read_that_fails_is_repeated_once():
 
 
 def test_the_low_pass_of_a_rate_is_the_widest_under_half_of_it():
-    """DLPF_CFG of the register map, p. 13: bandwidth of the gyro in Hz; 0 is 256 Hz."""
+    """DLPF_CFG is from the register map, p. 13: the gyro's bandwidth in Hz. Value 0 is 256 Hz."""
     from kickstand.imu.mpu6050 import MIN_DLPF
 
     hz = [256, 188, 98, 42, 20, 10, 5]
@@ -344,7 +346,7 @@ def test_the_low_pass_of_a_rate_is_the_widest_under_half_of_it():
 
 
 def test_a_row_of_samples_at_the_end_of_the_range_clips():
-    """20 samples are 0.1 s. The axes are bits: the accelerometer's three are below the gyro's."""
+    """A row of 20 samples is 0.1 s. The axes are bits, with the accelerometer's three below the gyro's."""
     from kickstand.imu import fifo_frames
 
     watch = fifo_frames.AxisWatch(200, 3, 1, 3, 20)

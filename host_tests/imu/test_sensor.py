@@ -1,4 +1,4 @@
-"""Sensor, which keeps the chip working, with a chip controlled by the test."""
+"""Sensor keeps the chip working. The test controls the chip."""
 
 import pytest
 from kickstand_tools.simulated_board.simulator import Board
@@ -11,14 +11,14 @@ def board():
 
 
 class Chip:
-    """waiting: results of the next fetches, samples or an exception; then always one sample. bad: number of spoilt
-    samples. setups: exceptions of the set-ups in their last step, or None. calls: the calls so far."""
+    """waiting: results of the next fetches, samples or an exception; later fetches return one sample. bad: number of
+    spoilt samples. setups: exceptions of the set-ups in their last step, or None. calls: the calls so far."""
 
     def __init__(self):
         from kickstand.imu.fifo_frames import AxisWatch
 
         self.axes = AxisWatch(200, 3, 1, 3, 20)
-        self.axes.notes[9] = 1 << 29  # the next look is far away
+        self.axes.notes[9] = 1 << 29  # the next check of the axes is far away
         self.waiting, self.setups, self.states = [], [], []
         self.bad = 0
         self.overflows = self.frames_left = 0
@@ -68,7 +68,7 @@ def made(board, explain=None):
 
 
 def set_up(sensor, now_ms):
-    """Let the chip be set up from now_ms on, in turns of 10 ms; return the time of the end."""
+    """Let the chip be set up from now_ms on, in loop passes of 10 ms. Return the time of the end."""
     for _ in range(19):
         assert sensor.fetch(now_ms) == 0
         now_ms += 10
@@ -76,7 +76,7 @@ def set_up(sensor, now_ms):
 
 
 def running(board, explain=None):
-    """A sensor whose chip runs, and the time in ms of its first sample."""
+    """Return a sensor with a running chip, and the time of its first sample in ms."""
     sensor, chip = made(board, explain)
     now_ms = set_up(sensor, 0)
     assert sensor.fetch(now_ms) == 1
@@ -103,7 +103,7 @@ def test_a_new_chip_is_at_fault_until_its_first_sample(board):
 
 
 def test_a_chip_that_is_prepared_starts_with_the_first_fetch(board):
-    """So no earlier samples are waiting."""
+    """No earlier samples are waiting."""
     sensor, chip = made(board)
     for now_ms in range(0, 1000, 15):
         sensor.prepare(now_ms)
@@ -159,7 +159,7 @@ def test_an_overflow_is_no_silence(board):
 
 
 def test_half_a_second_of_lost_readings_is_a_fault(board):
-    """The FIFO overflowed again and again: the board had no time to read."""
+    """The FIFO overflowed repeatedly because the board had no time to read it."""
     sensor, chip, now_ms = running(board)
     for after_ms, said in ((300, None), (500, None), (502, "readings-lost")):
         board.clock.advance(max(0, (now_ms + after_ms) * 1000 - board.clock.now_us))
@@ -184,7 +184,7 @@ def test_two_lost_transfers_are_tolerated_and_three_are_a_fault(board):
 
 
 def test_the_fifo_is_emptied_after_a_failed_transfer(board):
-    """It may have taken half a frame with it. Only once."""
+    """The failed transfer may have taken half a frame from the FIFO. It is emptied only once."""
     sensor, chip, now_ms = running(board)
     chip.waiting = [OSError(110), 1, 1]
     for k in range(3):
@@ -229,7 +229,7 @@ def test_a_check_that_is_lost_counts_as_a_lost_transfer(board):
 
 
 def test_nothing_is_judged_after_a_lost_transfer(board):
-    """Restarting the FIFO may be incomplete. The next successful transfer ends this."""
+    """A restart of the FIFO may be incomplete until the next successful transfer."""
     sensor, chip, now_ms = running(board)
     chip.waiting, chip.states = [OSError(5)], [False, False]
     sensor.fetch(now_ms + 10)
@@ -241,14 +241,14 @@ def test_nothing_is_judged_after_a_lost_transfer(board):
 
 
 def until_failed(sensor, chip, now_ms, since_ms):
-    """Let a chip that is set up give no samples for since_ms; return the time of its fault."""
+    """Let a chip that is set up give no samples for since_ms. Return the time of the fault."""
     chip.waiting = [0] * 20
     sensor.fetch(now_ms + since_ms)
     return now_ms + since_ms
 
 
 def test_the_fifo_is_tested_if_set_ups_do_not_help(board):
-    """At the third fault in a row, each soon after a set-up."""
+    """The test runs at the third fault in a row, if each fault comes soon after a set-up."""
     from kickstand.errors import Notice
 
     asked = []
@@ -260,7 +260,7 @@ def test_the_fifo_is_tested_if_set_ups_do_not_help(board):
         said.append(code(sensor))
         now_ms = set_up(sensor, now_ms)
     assert said == ["sensor-silent", "sensor-silent", "sensor-fifo", "sensor-fifo"]
-    assert asked == [None]  # it takes 0.3 s, and presses count meanwhile
+    assert asked == [None]  # the test takes 0.3 s, and presses count during it
     chip.waiting = []
     sensor.fetch(now_ms + 5)
     assert code(sensor) is None

@@ -11,7 +11,7 @@ REST_S = 5.0
 
 
 class Road:
-    """A ride made of stretches of constant acceleration, m/s2, on the level and upright unless channels are changed."""
+    """A ride of stretches with constant acceleration in m/s2, level and upright unless a test changes the channels."""
 
     def __init__(self, *legs: tuple[float, float], rate_hz: float = RATE_HZ):
         """legs: seconds and m/s2. At speed 0 without acceleration the vehicle stands."""
@@ -26,7 +26,7 @@ class Road:
         self.rests = (self.mps == 0.0) & (after == 0.0)
 
     def channels(self, **changed: np.ndarray) -> Channels:
-        """Without a speed in the log."""
+        """Return the channels of a log without a speed."""
         n = len(self.t_s)
         columns = {field.name: np.zeros(n) for field in fields(Channels)}
         columns |= {
@@ -41,5 +41,5 @@ class Road:
 
 
 def braking(mps: float, mps2: float, before_s: float = 4.0) -> Road:
-    """Stand, speed up to this speed at 4 m/s2, ride straight ahead, and stop with this deceleration."""
+    """Simulate a stand, acceleration to this speed at 4 m/s2, a straight, and a stop with this deceleration."""
     return Road((REST_S, 0.0), (mps / 4.0, 4.0), (before_s, 0.0), (mps / mps2, -mps2), (REST_S, 0.0))

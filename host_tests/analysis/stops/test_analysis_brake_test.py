@@ -1,4 +1,4 @@
-"""Stops of simulated rides against their truth: mean fully developed deceleration within 1 %."""
+"""Stops of simulated rides are compared with the truth: the mean fully developed deceleration (MFDD) is within 1 %."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from kickstand_tools.simulation import profiles
 from kickstand_tools.simulation.files import simulate
 from kickstand_tools.simulation.plan import Conditions, Plan
 
-# Speed in the log: how often, how late, how noisy (m/s)
+# Speed in the log: samples per second, delay, noise (m/s)
 PERFECT_1HZ, PERFECT_10HZ = (1, 0.0, 0.0), (10, 0.0, 0.0)
 SATELLITES_1HZ, SATELLITES_10HZ = (1, 0.2, 0.05), (10, 0.2, 0.05)
 
@@ -36,7 +36,8 @@ def brakes(plan: Plan) -> Conditions:
 
 @pytest.fixture(scope="module")
 def ride(tmp_path_factory) -> tuple[Channels, np.ndarray, np.ndarray]:
-    """A ride read by a randomly mounted MPU6050, calibrated by its poses: the course, true times and speeds."""
+    """Simulate a ride with a randomly mounted MPU6050 calibrated by its poses. Return the course, true times and
+    speeds."""
     directory = tmp_path_factory.mktemp("brakes")
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(profiles.PROFILES, "brakes", brakes)
@@ -50,7 +51,7 @@ def ride(tmp_path_factory) -> tuple[Channels, np.ndarray, np.ndarray]:
 
 
 def with_speed(ride, hz: int, late_s: float, noise_mps: float) -> Channels:
-    """The course with the true speed in some samples."""
+    """Return the course with the true speed in some samples."""
     whole, time, speed = ride
     result = whole.part(slice(None))
     result.speed_mps = np.full(len(result.t_s), np.nan)
@@ -61,10 +62,10 @@ def with_speed(ride, hz: int, late_s: float, noise_mps: float) -> Channels:
 
 
 def truth(time: np.ndarray, speed: np.ndarray, stop: Stop) -> tuple[float, float, float]:
-    """(initial speed, distance from the start found, MFDD) from the true speed around this stop."""
+    """Return (initial speed, distance from the start found, MFDD), computed from the true speed around this stop."""
     near = (time > stop.start_s - 1.0) & (time < stop.stop_s + 1.0)
     t, v = time[near], speed[near]
-    first = len(v) - 1 - int(np.argmax(v[::-1] > np.max(v) - 0.01))  # the last of the speed before
+    first = len(v) - 1 - int(np.argmax(v[::-1] > np.max(v) - 0.01))  # the last sample at the speed before braking
     t, v = t[first:], v[first:]
     distance = np.concatenate(([0.0], np.cumsum(np.diff(t) * (v[1:] + v[:-1]) / 2.0)))
     kmh = v * 3.6
@@ -80,7 +81,7 @@ def true_stops(time: np.ndarray, speed: np.ndarray) -> np.ndarray:
     return time[1:][(speed[1:] < 0.01) & (speed[:-1] >= 0.01)]
 
 
-# at most, in per cent: of the MFDD, of the initial speed
+# largest errors in per cent: of the MFDD, of the initial speed
 LIMITS = {
     "1 Hz": (PERFECT_1HZ, 1.0, 0.5),
     "10 Hz": (PERFECT_10HZ, 1.0, 0.5),
@@ -108,7 +109,7 @@ def test_stops_with_a_speed_match_the_truth(ride, name):
 
 
 def test_stops_without_a_speed_match_the_truth(ride):
-    """Exactly the true stops are found; errors are at most 3 %, 1 % rms."""
+    """All true stops are found, and no others. Errors are at most 3 %, and 1 % rms."""
     whole = ride[0]
     found = find_stops(whole)
     assert len(found) == len(true_stops(ride[1], ride[2]))
@@ -121,21 +122,23 @@ def test_stops_without_a_speed_match_the_truth(ride):
 
 
 def test_mfdd_follows_its_definition():
-    """Constant deceleration gives the same value. Before 0.8 v0 and after 0.1 v0 nothing counts."""
+    """A constant deceleration is its own MFDD. Speeds above 0.8 v0 and below 0.1 v0 do not count."""
     v = np.linspace(20.0, 0.0, 2001)
     assert mfdd_mps2(v, (20.0**2 - v * v) / (2 * 5.0)) == pytest.approx(5.0, rel=1e-9)
-    # 3 m/s2 down to 0.8 v0, then 8 and 5, then 3 again
+    # decelerate at 3 m/s2 down to 0.8 v0, then at 8 and 5, then at 3 again
     pieces = [(20.0, 16.0, 3.0), (16.0, 9.0, 8.0), (9.0, 2.0, 5.0), (2.0, 0.0, 3.0)]
     distance = np.cumsum([0.0, *[(high**2 - low**2) / (2 * level) for high, low, level in pieces]])
     corners = np.array([20.0, *[low for _, low, _ in pieces]])
     bent = np.interp(-v * v, -corners * corners, distance)
     want = (16.0**2 - 2.0**2) / (2 * (distance[3] - distance[1]))
     assert mfdd_mps2(v, bent) == pytest.approx(want, rel=1e-6)
-    assert mfdd_mps2(np.array([9.0, 0.0]), np.zeros(2)) == float("inf")  # from one sample to the next
+    assert mfdd_mps2(np.array([9.0, 0.0]), np.zeros(2)) == float(
+        "inf"
+    )  # the whole speed is lost from one sample to the next
 
 
 def test_slowing_down_is_not_a_stop(ride):
-    """The part of the ride before the standstill."""
+    """The log is cut before the standstill."""
     whole, time, speed = ride
     first = true_stops(time, speed)[0]
     part = with_speed(ride, *PERFECT_1HZ).part(whole.t_s < first - 0.5)

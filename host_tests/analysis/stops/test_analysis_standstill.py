@@ -1,4 +1,5 @@
-"""Without a speed in the log, a standstill must be proven and a stop plausible: on a fast, smooth track."""
+"""Without a speed in the log, a standstill must be proven and a stop plausible. The simulated track is fast and
+smooth."""
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from kickstand_tools.simulation.files import simulate
 
 @pytest.fixture(scope="module", params=[1, pytest.param(2, marks=pytest.mark.nightly)])
 def track(tmp_path_factory, request) -> Channels:
-    """A ride without a speed, read by an MPU6050: smooth, fast, with held turns and one stop at the end."""
+    """Simulate a smooth, fast ride with held turns and one stop at the end, read by an MPU6050 without a speed."""
     directory = tmp_path_factory.mktemp("track")
     made = simulate("track", request.param, directory, seconds=200.0)
     pair = directory / "KICKSTAND.csv", directory / "UPRIGHT.csv"
@@ -31,7 +32,7 @@ def without_speed(whole: Channels) -> Channels:
 
 
 def test_fast_smooth_track_is_not_a_standstill(track):
-    """Not even with a sensor that had no six positions: its weight at rest is known from the ride."""
+    """This also holds for a sensor without the six positions, because the ride shows its weight at rest."""
     still = standing(without_speed(track))
     assert np.max(track.speed_mps[still]) < 0.5
     assert np.mean(still[track.speed_mps == 0.0]) > 0.9
@@ -60,6 +61,7 @@ def test_stop_at_a_false_standstill_is_not_shown(track, monkeypatch):
     ("mps", "side_m", "heading_deg"), [(80.0, 0.0, 0.0), (20.0, -20.0, 0.0), (20.0, 20.0, 0.0), (20.0, 0.0, -40.0)]
 )
 def test_implausible_bend_or_speed_is_not_a_stop(mps, side_m, heading_deg):
-    """If only integrated readings show it: 288 km/h, 20 m beside the line, a heading that changes by 40 degrees."""
+    """These stops rest on integrated readings alone: 288 km/h, 20 m beside the line, or a heading that changes by 40
+    degrees."""
     assert brake_test.plausible(60.0, 10.0, 20.0)
     assert not brake_test.plausible(mps, side_m, heading_deg)

@@ -33,7 +33,7 @@ def maybe(**changed: float) -> Channels:
     ride.up_g += changed.get("heavier", 0.0) * middle
     ride.forward_g += changed.get("drifting", 0.0) * np.where(middle, t - BEGIN_S, 0.0)
     ride.rolling[middle] = np.arange(np.count_nonzero(middle)) % 10 < changed.get("rolling", 0.0)
-    if "rested" in changed:  # the filter found a rest in the ride, with this force
+    if "rested" in changed:  # the filter found a rest during the ride, with this force
         rest = (t >= 5.0) & (t < 7.0)
         ride.resting[rest] = 1.0
         ride.up_g[rest] = changed["rested"]
@@ -42,7 +42,7 @@ def maybe(**changed: float) -> Channels:
 
 
 def share(ride: Channels) -> float:
-    """The share of the middle that is a standstill. The rest must not be."""
+    """Return the share of the middle that is found to be a standstill. Fails if any other part is."""
     still = standing(ride)
     t = ride.t_s
     assert not still[(t < 5.0) | (t > END_S + 0.5)].any()
@@ -52,21 +52,24 @@ def share(ride: Channels) -> float:
 @pytest.mark.parametrize(
     ("stands", "does_not"),
     [
-        ({"pitch_rate_dps": 0.14}, {"pitch_rate_dps": 0.16}),  # 15 % of the shaking on the move
+        ({"pitch_rate_dps": 0.14}, {"pitch_rate_dps": 0.16}),  # 15 % of the shaking while riding
         ({"yaw_rate_dps": 0.14}, {"yaw_rate_dps": 0.16}),
-        ({"up_g": 0.19}, {"up_g": 0.21}),  # 20 % of it
-        ({"engine": 3.0}, {"pitch_rate_dps": 1.0}),  # idling: as much, but faster
+        ({"up_g": 0.19}, {"up_g": 0.21}),  # 20 % of the shaking while riding
+        ({"engine": 3.0}, {"pitch_rate_dps": 1.0}),  # an idling engine shakes as much, but faster
         ({"pitching": 0.95}, {"pitching": 1.05}),  # 1 deg/s
         ({"pitching": -0.95}, {"pitching": -1.05}),
         ({"yawing": 0.95}, {"yawing": 1.05}),
         ({"yawing": -0.95}, {"yawing": -1.05}),
-        ({"bends": 15.0}, {"bends": 15.0, "yaw_rate_dps": 0.5}),  # slow: they hide no shaking by the road
+        ({"bends": 15.0}, {"bends": 15.0, "yaw_rate_dps": 0.5}),  # slow bends do not hide shaking by the road
         ({"drifting": 0.018}, {"drifting": 0.022}),  # the forward force, 0.01 g in half a second
         ({"drifting": -0.018}, {"drifting": -0.022}),
-        ({"rolling": 4.0}, {"rolling": 6.0}),  # the filter knows: half of a second
+        ({"rolling": 4.0}, {"rolling": 6.0}),  # the filter finds rest in half of a second
         ({"heavier": 0.115}, {"heavier": 0.125}),  # 0.12 g, of a sensor without six positions
         ({"heavier": -0.115}, {"heavier": -0.125}),
-        ({"heavier": 0.145, "rested": 1.1}, {"heavier": 0.155, "rested": 1.1}),  # 0.05 g, where a rest shows more
+        (
+            {"heavier": 0.145, "rested": 1.1},
+            {"heavier": 0.155, "rested": 1.1},
+        ),  # 0.05 g from the force at a rest
         ({"heavier": 0.055, "rested": 1.1}, {"heavier": 0.045, "rested": 1.1}),
     ],
 )
@@ -77,7 +80,7 @@ def test_each_condition_of_a_standstill_has_its_limit(stands, does_not):
 
 @pytest.mark.parametrize("ridden_s", [(0.0, 24.0), (8.0, 15.0)])
 def test_standstill_is_found_within_half_a_second(ridden_s):
-    """Also if it is the larger part of the ride."""
+    """This also holds if the standstill is the larger part of the ride."""
     ride = maybe()
     ride = ride.part((ride.t_s >= ridden_s[0]) & (ride.t_s < ridden_s[1]))
     times = ride.t_s[standing(ride)]

@@ -1,5 +1,4 @@
-"""The speed of a log, fitted to the measured force: compared with the same estimate computed differently, and its
-delay."""
+"""A log's speed is fitted to the measured force. The fit and its delay are compared with an independent computation."""
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ BEGIN_S, STOP_S = 14.0, 18.0  # of the braking
 
 
 def part_of(road: Road, every: int, scale=1.0, off_mps=0.0, late_s=0.0):
-    """The ride up to 2.5 s of rest, with a speed every `every` samples: late by late_s, and wrong."""
+    """Return the ride up to 2.5 s of rest, with a speed at every `every`-th sample that is late by late_s and wrong."""
     ride = road.channels()
     ride.speed_mps[::every] = scale * np.interp(ride.t_s[::every] - late_s, road.t_s, road.mps) + off_mps
     return ride.part(ride.t_s < STOP_S + 2.5)
@@ -32,7 +31,7 @@ def conditioned(part, speed, acceleration, delay_s):
     knots = time[-1] - 0.5 * np.arange(count)
     back = np.arange(count)
     covariance = 0.05**2 + 0.1**2 * 0.5 * np.minimum(back[:, None], back[None, :])
-    slopes = []  # m/s by which each of them makes the speed at a sample differ
+    slopes = []  # change of the speed at a sample in m/s, for each slope
     for k in range(count):
         hat = np.interp(-time, -knots, np.eye(count)[k])
         steps = np.append(np.diff(time) * (hat[1:] + hat[:-1]) / 2.0, 0.0)
@@ -84,14 +83,14 @@ def test_fit_needs_several_speeds_during_braking():
         return fitted_speed(part, begin, np.zeros(len(part.t_s)), acceleration, 0.0)
 
     assert fit(BEGIN_S + 1.0) is None
-    assert fit(BEGIN_S - 4.1, BEGIN_S + 1.0) is None  # four seconds of the ride before are used
+    assert fit(BEGIN_S - 4.1, BEGIN_S + 1.0) is None  # the fit needs four seconds of the ride before braking
     assert fit(BEGIN_S - 3.9, BEGIN_S + 1.0) is not None
     assert fit(BEGIN_S - 3.0, BEGIN_S - 1.0) is None
     assert fit(BEGIN_S - 3.0, BEGIN_S) is not None
 
 
 def waves(seconds=60.0, late_s=0.0, size_mps2=1.5, every_s=1.0, period_s=5.0):
-    """Alternately faster and slower, with a speed delayed by late_s."""
+    """Simulate a speed that rises and falls, with the measured speed delayed by late_s."""
     road = Road((seconds, 0.0))
     t, omega = road.t_s, 2.0 * np.pi / period_s
     ride = road.channels(forward_g=size_mps2 * np.cos(omega * t) / STANDARD_GRAVITY)
@@ -114,8 +113,8 @@ def test_impossible_delay_of_the_speed_is_ignored(late_s):
 @pytest.mark.parametrize(
     ("shows", "does_not"),
     [
-        ({"seconds": 30.0}, {"seconds": 29.0}),  # thirty speeds
-        ({"seconds": 30.0, "every_s": 0.5}, {"seconds": 29.0, "every_s": 0.5}),  # one a second of them
+        ({"seconds": 30.0}, {"seconds": 29.0}),  # thirty speeds are needed
+        ({"seconds": 30.0, "every_s": 0.5}, {"seconds": 29.0, "every_s": 0.5}),  # only one speed per second counts
         ({"size_mps2": 0.80}, {"size_mps2": 0.70}),  # that change by 0.5 m/s rms: 0.66 of the acceleration's size
     ],
 )

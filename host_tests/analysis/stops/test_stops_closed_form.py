@@ -1,6 +1,6 @@
-"""Stops without noise, compared with their closed form: the definition of a stop, and each of its figures.
+"""Stops without noise, compared with their closed form: the definition of a stop, and each figure.
 
-Nothing shakes, so a standstill is where the lean filter finds rest, or where the log's speed is 0.
+Nothing shakes, so a standstill is found only by the lean filter's rest or by a speed of 0 in the log.
 """
 
 import numpy as np
@@ -32,7 +32,7 @@ def test_limits_of_a_stop(mps, mps2, counts):
 
 @pytest.mark.parametrize("speed", ["log", "integrated"])
 def test_every_figure_of_a_stop_is_right(speed):
-    """20 m/s at 5 m/s2: 4 s and 40 m, straight ahead."""
+    """From 20 m/s at 5 m/s2 a stop takes 4 s and 40 m, straight ahead."""
     road = braking(20.0, 5.0)
     ride = road.channels()
     if speed == "log":
@@ -66,7 +66,7 @@ def test_rebound_of_the_fork_does_not_change_the_end():
 
 
 def test_jerk_is_the_steepest_change_of_the_force():
-    """Braking that grows by 10 m/s3 to 6 m/s2, stays, and lets go by 20 m/s3, 3 m/s at the end."""
+    """Braking grows by 10 m/s3 to 6 m/s2, stays, and is released at 20 m/s3 until 3 m/s are left."""
     t = np.arange(0.0, 30.0, 1.0 / RATE_HZ)
     braked = np.interp(t, [15.0, 15.6, 17.6, 17.9, 19.0], [0.0, 6.0, 6.0, 0.0, 0.0])
     lost = np.concatenate(([0.0], np.cumsum((braked[1:] + braked[:-1]) / 2.0 / RATE_HZ)))[-1]
@@ -91,7 +91,7 @@ def test_jerk_is_the_steepest_change_of_the_force():
     ],
 )
 def test_start_of_braking_is_found(engine_mps2, mps2, earlier_s):
-    """After 4 s of braking only with the engine."""
+    """The brakes are applied after 4 s of slowing down by the engine alone."""
     mps = 18.0
     seconds = (mps - 4.0 * engine_mps2) / mps2
     road = Road((REST_S, 0.0), (6.0, 3.0), (3.0, 0.0), (4.0, -engine_mps2), (seconds, -mps2), (REST_S, 0.0))
@@ -101,7 +101,7 @@ def test_start_of_braking_is_found(engine_mps2, mps2, earlier_s):
 
 @pytest.mark.parametrize(("pause_s", "counts"), [(0.26, True), (0.56, False)])
 def test_brief_pause_before_the_standstill_is_bridged(pause_s, counts):
-    """After a short pause the stop continues. A longer one ends it, and the rest is too slow to count."""
+    """A short pause does not end a stop. A longer pause ends it, and the rest is then too slow to count."""
     road = Road(*((REST_S, 0.0), (5.0, 4.0), (3.0, 0.0), (3.9, -5.0), (pause_s, 0.0), (0.1, -5.0), (REST_S, 0.0)))
     found = find_stops(road.channels())
     assert len(found) == counts
@@ -110,7 +110,7 @@ def test_brief_pause_before_the_standstill_is_bridged(pause_s, counts):
 
 
 def test_no_stop_is_longer_than_a_minute():
-    """67.6 m/s at 1.04 m/s2 take 65 s, of which the last 60 are used."""
+    """From 67.6 m/s at 1.04 m/s2 a stop takes 65 s, but only the last 60 s are used."""
     (stop,) = find_stops(braking(67.6, 1.04).channels())
     assert stop.initial_speed_mps == pytest.approx(1.04 * 60.0, rel=0.005)
 
@@ -125,7 +125,7 @@ def test_missing_readings_are_bridged_for_half_a_second(missing_s, initial_mps):
 
 
 def test_only_readings_after_the_last_gap_are_integrated():
-    """Two gaps: the last one counts."""
+    """With two gaps, integration begins after the last one."""
     road = braking(20.0, 2.0)
     there = ~((road.t_s > 14.5) & (road.t_s < 15.4)) & ~((road.t_s > 17.0) & (road.t_s < 17.9))
     (stop,) = find_stops(road.channels().part(there))
@@ -136,7 +136,7 @@ class TestStandstill:
     """The rest after the stop shows the slope and the gyro's reading at rest."""
 
     def disturbed(self, begin_s: float, end_s: float, off_g: float = 0.1) -> float:
-        """Return the deceleration found if the force is wrong from begin_s to end_s after the standstill at 18 s."""
+        """Return the deceleration found if the force is off from begin_s to end_s after the standstill at 18 s."""
         road = braking(20.0, 5.0)
         ride = road.channels()
         ride.forward_g[(road.t_s > 18.0 + begin_s - 0.01) & (road.t_s < 18.0 + end_s - 0.01)] += off_g
@@ -147,12 +147,12 @@ class TestStandstill:
         right = self.disturbed(9.0, 9.0)
         assert right == pytest.approx(5.0, rel=0.002)
         assert self.disturbed(2.56, 4.0) == pytest.approx(right, rel=1e-4)
-        # between these times the disturbance counts as slope: 0.1 g for 1 of 2 s, 0.49 m/s2
+        # here it counts as slope: 0.1 g for 1 of 2 s is 0.49 m/s2
         assert self.disturbed(0.5, 1.5) == pytest.approx(right + 0.49, rel=0.02)
         assert self.disturbed(1.5, 2.5) == pytest.approx(right + 0.49, rel=0.02)
 
     def test_rebound_of_the_fork_is_not_part_of_the_slope(self):
-        """Its mean is zero, so it changes no speed, and it is only in the first half second."""
+        """The rebound has a mean of zero, so it changes no speed, and it lasts less than half a second."""
         road = braking(20.0, 5.0)
         ride = road.channels()
         after = road.t_s - 18.0
@@ -171,7 +171,7 @@ class TestStandstill:
 
 @pytest.mark.parametrize("up", [-0.33, 0.33])
 def test_steep_road_does_not_change_the_figures(up):
-    """The sine of 19 degrees, as in the steepest streets: the force at standstill shows it."""
+    """The road has the slope of the steepest streets, 19 degrees. The force at standstill shows it."""
     road = braking(20.0, 5.0)
     (stop,) = find_stops(road.channels(forward_g=road.mps2 / STANDARD_GRAVITY + up))
     assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.002)
@@ -179,7 +179,7 @@ def test_steep_road_does_not_change_the_figures(up):
 
 @pytest.mark.parametrize(("samples", "counts"), [(10, 0), (11, 1)])
 def test_brief_standstill_shows_no_slope(samples, counts):
-    """A longer one shows that of a road that falls by 10 %."""
+    """Only a longer standstill shows the slope of the road, here 10 % downhill."""
     road = braking(20.0, 5.0)
     still = (road.t_s >= 18.0 - 1e-6) & (road.t_s < 18.0 + samples / RATE_HZ - 1e-6)
     found = stops_of(road.channels(forward_g=road.mps2 / STANDARD_GRAVITY - 0.1), still)
@@ -208,7 +208,7 @@ def test_bend_is_not_a_dive(side):
     road = braking(20.0, 5.0)
     turning = (road.t_s >= 14.5) & (road.t_s < 16.5)
     lean = np.where(turning, 30.0 * side, 0.0)
-    rate = np.where(turning, -8.0 * side, 0.0)  # > 0 to the left
+    rate = np.where(turning, -8.0 * side, 0.0)  # positive to the left
     ride = road.channels(
         lean_deg=lean, pitch_rate_dps=-rate * np.sin(np.radians(lean)), yaw_rate_dps=rate * np.cos(np.radians(lean))
     )
@@ -233,7 +233,7 @@ def test_deviation_from_the_straight_line_is_right():
 
 
 def test_each_stop_begins_after_the_previous_standstill():
-    """Its initial speed and start are its own, for any order of hard and soft stops."""
+    """Each stop has its own initial speed and start, for any order of hard and soft stops."""
     legs = []
     for mps, mps2 in (20.0, 6.0), (12.0, 3.0), (25.0, 8.0):
         legs += [(3.0, 0.0), (mps / 4.0, 4.0), (3.0, 0.0), (mps / mps2, -mps2), (3.0, 0.0)]
@@ -244,12 +244,15 @@ def test_each_stop_begins_after_the_previous_standstill():
 
 @pytest.mark.parametrize(("off_g", "counts"), [(0.11, True), (0.15, False)])
 def test_stop_with_an_open_speed_is_rejected(off_g, counts):
-    """0.15 g too much for 8.8 s of riding on would be 13 m/s at the standstill before: over 3 + 0.7 m/s a s."""
+    """An error of 0.15 g over 8.8 s of riding gives 13 m/s at the earlier standstill. The limit is 3 m/s + 0.7 m/s
+    per second."""
     road = braking(20.0, 5.0, before_s=4.0)
     ride = road.channels()
     ride.forward_g[(road.t_s > 5.0) & (road.t_s < 14.0)] -= off_g
     assert len(find_stops(ride)) == counts
-    assert closes(40.0, seconds=40.0) and not closes(40.0, seconds=20.0)  # after long, a speed shows nothing
+    assert closes(40.0, seconds=40.0) and not closes(
+        40.0, seconds=20.0
+    )  # after a long ride an integrated speed proves nothing
 
 
 def test_rolling_out_is_not_braking():
@@ -257,7 +260,7 @@ def test_rolling_out_is_not_braking():
 
 
 def test_speed_in_the_log_corrects_the_integral():
-    """The accelerometer's slope is 3 % too large: the log's speed corrects it."""
+    """The accelerometer's slope is 3 % too large. The log's speed corrects this error."""
     road = braking(20.0, 5.0)
     ride = road.channels(forward_g=1.03 * road.mps2 / STANDARD_GRAVITY)
     (stop,) = find_stops(ride)
@@ -270,7 +273,7 @@ def test_speed_in_the_log_corrects_the_integral():
 
 @pytest.mark.parametrize(("mps2", "counts"), [(1.45, False), (1.55, True)])
 def test_hard_stop_is_shown_by_the_speed_alone(mps2, counts):
-    """It is surely a stop from 1.5 m/s2 and over 10 km/h."""
+    """From 1.5 m/s2 and 10 km/h on it is surely a stop."""
     road = braking(20.0, mps2)
     ride = road.channels()
     ride.speed_mps[::50] = road.mps[::50]
@@ -285,7 +288,7 @@ def test_hard_stop_is_shown_by_the_speed_alone(mps2, counts):
     ("hard", "easy", "counts"), [((4.0, -4.0), (8.0, -0.5), True), ((4.0, -9.0), (16.0, -0.25), False)]
 )
 def test_stop_by_speed_alone_takes_at_most_15_seconds(hard, easy, counts):
-    """From 20 m/s within 12 s it is one; from 40 m/s within 20 s the last 15 s do not show it."""
+    """A stop from 20 m/s within 12 s counts. A stop from 40 m/s within 20 s does not, because it takes over 15 s."""
     top_mps = -hard[0] * hard[1] - easy[0] * easy[1]
     road = Road((REST_S, 0.0), (top_mps / 4.0, 4.0), (3.0, 0.0), hard, easy, (REST_S, 0.0))
     ride = road.channels()
@@ -295,7 +298,7 @@ def test_stop_by_speed_alone_takes_at_most_15_seconds(hard, easy, counts):
 
 @pytest.mark.parametrize(("age_s", "stands"), [(2.9, True), (3.1, False)])
 def test_old_speed_shows_no_standstill(age_s, stands):
-    """The log's only speed is 0 m/s. Three seconds later the vehicle may be riding again."""
+    """The log's only speed is 0 m/s. Three seconds later the vehicle may be moving again."""
     road = Road((10.0, 0.0), (20.0, 0.5))
     road.rests[:] = False
     ride = road.channels()
@@ -306,14 +309,15 @@ def test_old_speed_shows_no_standstill(age_s, stands):
 
 
 def test_log_may_begin_on_the_move():
-    """There is no previous standstill with speed 0."""
+    """The log has no earlier standstill with speed 0."""
     ride = braking(20.0, 5.0).channels()
     (stop,) = find_stops(ride.part(ride.t_s >= 11.0))
     assert stop.initial_speed_mps == pytest.approx(20.0, rel=0.003)
 
 
 def test_stops_are_searched_at_50_samples_per_second():
-    """Of a log with 200, each the mean of four: of a time of 13.88, 13.885, 13.89 and 13.895 s."""
+    """A log with 200 samples per second is averaged over four samples: times of 13.88, 13.885, 13.89 and 13.895 s
+    become one."""
     road = Road((REST_S, 0.0), (5.0, 4.0), (4.0, 0.0), (4.0, -5.0), (REST_S, 0.0), rate_hz=200.0)
     (stop,) = find_stops(road.channels())
     assert stop.start_s == pytest.approx(13.8875, abs=1e-6)
@@ -321,8 +325,8 @@ def test_stops_are_searched_at_50_samples_per_second():
 
 
 def test_the_straight_line_is_the_direction_just_before_braking():
-    """That of the first tenth of a second of the stop, in which the vehicle here turns by half a degree: in the mean a
-    quarter is behind it and a quarter before it."""
+    """The direction is averaged over the first tenth of a second of the stop. The vehicle turns by half a degree in
+    it."""
     road = braking(20.0, 5.0)
     begin = 14.0 - 0.12
     ride = road.channels(yaw_rate_dps=np.where((road.t_s > begin - 0.01) & (road.t_s < begin + 0.09), 5.0, 0.0))
@@ -342,7 +346,7 @@ def test_full_deceleration_is_from_the_last_two_seconds(hard, easy, earlier_s):
 
 
 def test_rolling_out_after_braking_is_left_out():
-    """The last metre per second at 0.4 m/s2: the brakes are released, and the stop is the part before."""
+    """The last metre per second is lost at 0.4 m/s2: the brakes are released, and the stop ends before."""
     legs = (REST_S, 0.0), (5.0, 4.0), (3.0, 0.0), (3.9, -5.0), (1.25, -0.4), (REST_S, 0.0)
     (stop,) = find_stops(Road(*legs).channels())
     assert stop.initial_speed_mps == pytest.approx(20.0, rel=1e-3)
