@@ -253,9 +253,7 @@ class Machine:
         while qemu.runstate_is_running():
             if qemu.qemu_reset_requested_get() and self._may_reset:
                 self._resetting = True
-                qemu.qemu_clock_enable(
-                    _VIRTUAL, False
-                )  # otherwise QEMU would set the clock forward. The reset enables it again
+                qemu.qemu_clock_enable(_VIRTUAL, False)  # keeps QEMU from setting it; the reset enables it
                 return
             idle = qemu.all_cpu_threads_idle()
             if self._sleeps(0.0 if idle else wait_s) and idle and qemu.all_cpu_threads_idle():

@@ -74,9 +74,7 @@ class Journal:
 
     def __exit__(self, *exception: object) -> None:
         with contextlib.suppress(OSError):
-            if (
-                not self._end and os.name != "nt"
-            ):  # remove it while locked: after unlocking it may belong to another run
+            if not self._end and os.name != "nt":  # remove it while it is still locked
                 self._path.unlink()
         with contextlib.suppress(OSError):
             self._file.close()
