@@ -87,7 +87,7 @@ def test_riders_settings_are_shown_and_kept(line, board):
 
 
 def test_each_board_has_its_own_default_pins(line, board):
-    """The fields above still have the values of a Pico."""
+    """The fields were filled for a Pico before."""
     other(board, _machine="Generic ESP32 module with ESP32")
     board.modules["sys"].platform = "esp32"
     line.plug_in(RawPrompt(board))

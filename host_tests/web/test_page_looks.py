@@ -71,7 +71,7 @@ def test_a_phone_leans_the_motorcycle_and_a_tablet_without_motion_data_says_so(c
 
 
 def test_nothing_is_below_the_choice_of_the_display(chromium, address):
-    """A computer with a narrow window has a keyboard, too."""
+    """This also holds in a narrow window of a computer, whose help names keys."""
     rider = Rider(chromium, address, viewport={"width": 390, "height": 844})
     for width in (360, 390, 420, 480, 512, 560, 800):
         rider.page.set_viewport_size({"width": width, "height": 844})
