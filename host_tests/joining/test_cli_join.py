@@ -31,7 +31,7 @@ def log(tmp_path, ride):
 
 
 def placed(path) -> np.ndarray:
-    """The rows with a position."""
+    """Return the rows with a position."""
     table = analysis_rides.table(path)
     return table[np.isfinite(table["lat_deg"])]
 
@@ -68,7 +68,7 @@ def test_nearest_row_may_be_before_or_after():
 
 
 def test_lines_of_the_ride_are_unchanged(tmp_path, log, track):
-    """Line for line, with columns at the end."""
+    """Every line is kept, and columns are added at its end."""
     gpx = phone_tracks.write_gpx(tmp_path / "track.gpx", track)
     packed = tmp_path / "JOINED.csv.gz"
     command.works("join", log, gpx, "--out", packed)

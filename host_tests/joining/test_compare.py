@@ -15,7 +15,7 @@ LATER_S, SLOW = 7.3, 80e-6
 
 
 def shifted(log, later_s, drift):
-    """The log as recorded by a device that was started later by later_s and whose clock loses."""
+    """Return the log of a device that was started later by later_s, with a slow clock."""
     kept = log.t_s >= later_s
     t_s = (log.t_s[kept] - later_s) * (1.0 - drift)
     return api.Log(t_s, log.accel_g[kept], log.gyro_dps[kept])

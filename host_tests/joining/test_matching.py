@@ -26,7 +26,7 @@ def log_of(ride, part: slice = slice(None), slow_ppm: float = 0.0) -> api.Log:
 
 
 def error_s(joined, late_s: float, at_s: float = 0.0) -> float:
-    """Time error of the match at a time of the ride."""
+    """Return the time error of the match at a time of the ride."""
     return float(joined.match.ride_s(np.array([phone_tracks.START_UTC_S + late_s + at_s]))[0]) - at_s
 
 
@@ -69,7 +69,7 @@ def winding(seconds: float, slow_ppm: float = 0.0) -> tuple[api.Log, api.Track]:
 
 
 def test_drift_of_the_clocks_is_found():
-    """300 ppm are 0.5 s in half an hour: a match without drift would be off by half of it at both ends."""
+    """A drift of 300 ppm is 0.5 s in half an hour. A match without drift would be off by 0.25 s at both ends."""
     log, track = winding(1800.0, slow_ppm=300.0)
     found = api.join_track(log, track).match
     assert found.drift == pytest.approx(300e-6, abs=20e-6)
@@ -92,7 +92,7 @@ def test_another_rides_track_is_refused(rides, profile, other):
 
 @pytest.mark.parametrize(("profile", "differs"), [("street", 0.03), ("track", 0.08), ("city", 0.08), ("hills", 0.03)])
 def test_the_same_roads_on_another_day_are_refused(rides, profile, differs):
-    """Every bend is there, at a speed that differs by some per cent from minute to minute."""
+    """The other ride has the same bends, at a speed that differs by some per cent from minute to minute."""
     ride = rides[profile]
     knots_s = np.arange(0.0, ride.time[-1] + 40.0, 20.0)
     faster = np.interp(ride.time, knots_s, 1.0 + np.random.default_rng(6).normal(0.0, differs, len(knots_s)))

@@ -1,4 +1,4 @@
-"""The steps, speeds and segments of a track, and the weights of its errors, with numbers by hand."""
+"""The steps, speeds and segments of a track, and the weights of its errors, compared with hand-computed numbers."""
 
 import numpy as np
 import pytest

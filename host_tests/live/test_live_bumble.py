@@ -21,7 +21,7 @@ def on_air(tmp_path, monkeypatch, capsys):
     """run(until_s, [(at_s, visit, pin)], **config): the Centrals and the device's Record."""
     monkeypatch.chdir(tmp_path)
     made = []
-    browsers = asyncio._get_running_loop()  # playwright's, where this process has tested a page before: it rests
+    browsers = asyncio._get_running_loop()  # playwright's idle loop, if this process has tested a page before
     asyncio._set_running_loop(None)
 
     def run(until_s, visits, machine="pico w", **config):

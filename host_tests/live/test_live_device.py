@@ -109,8 +109,8 @@ def test_a_lean_that_is_not_trusted_is_never_a_number(run):
 
 
 def test_the_second_phone_waits_for_the_first(run):
-    """The second waits until the first has gone; what the first asked for is forgotten. One that asks for nothing
-    makes room. The display says who is there."""
+    """A second phone waits until the first has disconnected. The requests of the first are forgotten. A phone without
+    requests makes room for another. The display shows which phone is connected."""
     first = [[22.0, "connect", 1], [22.1, "write", "filter", [1, 0, 100]], [26.0, "leave"]]
     second = [[24.0, "connect", 2], [27.5, "connect", 2], [30.0, "write", "rate", [100, 0]], [33.0, "leave"]]
     third = [[35.0, "connect", 3]]
@@ -141,7 +141,7 @@ def test_the_loop_continues_if_the_phone_is_out_of_reach(run):
 
 
 def test_the_menu_switches_live_off(run):
-    """Reset maxima, and the entries behind it, to the last but one."""
+    """From "Reset maxima" to the last entry but one of the menu."""
     presses = device_plans.PRESSES + [[22.0, 1.0]] + [[23.5 + 0.4 * k, 0.15] for k in range(5)] + [[26.0, 1.0]]
     record = run(
         {**device_plans.ALIGNED, **LIVE, "phones": [ASK + [[40.0, "found"], [41.0, "connect"]]], "presses": presses}

@@ -19,7 +19,7 @@ def used():
     """Bytes of MicroPython's heap in use."""
     gc.collect()
     gc.collect()
-    return getattr(gc, "mem_alloc", int)()  # CPython does not say: 0
+    return getattr(gc, "mem_alloc", int)()  # 0 on CPython, which cannot tell
 
 
 class Forgetful(Phone):
@@ -65,7 +65,7 @@ def act(dice, phone, radio):
 
 
 def test_random_acts_of_a_phone_do_no_harm():
-    for drops in (True, False):  # what it cannot send, as an ESP32, or keeps it, as a Pico W
+    for drops in (True, False):  # packets that cannot be sent are dropped on an ESP32, and kept on a Pico W
         board = Board(Sensor(seed=3).world(standing([[0, 10]])))
         board.radio = radio = Radio(board.clock, drops)
         with board:

@@ -78,7 +78,7 @@ def test_a_vehicle_at_rest_is_not_frozen(digits, noise):
 
 
 def test_constant_log_is_not_marked_as_frozen():
-    """There is nothing to compare it with. A pose of such readings is refused, see test_still_pose."""
+    """Such a log has no readings to compare with. A pose of frozen readings is refused, see test_still_pose."""
     assert not np.any(frozen(log_of(np.tile(REST, (500, 1)))))
 
 
@@ -155,7 +155,8 @@ def test_quiet_phone_in_a_ride_is_not_frozen(digits):
 @pytest.mark.parametrize(("count", "marked"), [(9, 0), (10, 9), (11, 10)])
 @pytest.mark.parametrize("block", [6, 24])
 def test_ten_equal_readings_are_frozen_across_blocks(count, marked, block):
-    """Two readings a second, so that the number decides. Across blocks only those of the later blocks are marked."""
+    """With two readings per second, the number of equal readings decides. Across blocks, only readings of the later
+    blocks are marked."""
     readings = np.insert(riding(24 / HZ), 3, 20.0, axis=1)
     readings[4 : 4 + count] = readings[4]
     finder, found = FrozenFinder(), []

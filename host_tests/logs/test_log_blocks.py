@@ -86,7 +86,7 @@ def test_mistake_far_down_is_reported_with_its_line(tmp_path, monkeypatch, row, 
 
 
 def test_memory_does_not_grow_with_the_log(tmp_path, monkeypatch):
-    """Except for the cells of its last hour (here half a minute), which are used to check it."""
+    """Only the cells of the last hour (here half a minute) stay in memory, to check them."""
     monkeypatch.setattr(reader, "BLOCK_BYTES", 1 << 16)
     monkeypatch.setattr(cells, "KEPT", 300)
     peaks = []

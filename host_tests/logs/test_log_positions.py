@@ -29,7 +29,7 @@ def text(n: int = 400, t: str = "{:.2f}") -> str:
 
 
 def placed(log: Log) -> list[tuple[int, tuple[float, ...]]]:
-    """(hundredths of a second by the recorder's clock, position and time) of each row that has one."""
+    """Return (hundredths of a second by the recorder's clock, position and time) of each row with a position."""
     assert np.array_equal(np.isfinite(log.lat_deg), np.isfinite(log.utc_s))
     rows = np.flatnonzero(np.isfinite(log.lat_deg) & np.isfinite(log.lon_deg))
     return [

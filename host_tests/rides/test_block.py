@@ -47,7 +47,7 @@ def places(block):
 
 @pytest.mark.parametrize("length", range(700, 720))
 def test_the_worst_turn_and_a_position_fit_into_any_block(length):
-    """After quiet turns, each of few bits, every number of a violent one takes the longest code."""
+    """After quiet turns, which need few bits each, every number of a violent turn needs the longest code."""
     quiet = [800] * 7, 8, 40_000
     count = 0
     for violent in (False, True):  # first to see how many quiet ones there are, then with the last one violent
@@ -106,7 +106,7 @@ def test_a_littlefs_block_begins_with_a_pointer_per_halving(index):
 
 
 def test_the_first_position_is_dropped_if_it_has_no_room():
-    """From then on every block keeps room for one, however full it is."""
+    """After the first position, every block keeps room for another one."""
     block = RideBlock(5000)
     for sequence in range(3):
         ride_writer.begun(512, sequence, block)

@@ -11,7 +11,7 @@ from rings import CARD
 
 
 def tried(root, monkeypatch, **failing):
-    """The problem found by the trial of a card. failing: the error of each failing function."""
+    """Return the problem that the trial of a card finds. failing: the error of each failing function."""
     from kickstand.rides import card_trial
 
     def raised(error):

@@ -241,7 +241,7 @@ def test_a_gap_belongs_to_its_own_ride(recorder, keeper, clock):
 
 
 def test_a_position_and_a_speed_belong_to_the_next_turn_only(recorder, keeper):
-    """Also one without the other. Zero is a valid speed."""
+    """A turn may have only one of them. Zero is a valid speed."""
     start(recorder)
     recorder.add_fix(None, ride_writer.place(0))
     recorder.add_fix(None, ride_writer.place(1))  # the newest one counts

@@ -20,7 +20,7 @@ def run(flash, card=None, **plan):
 
 
 def blocks(record):
-    """Those on the card."""
+    """Return the rides on the card."""
     found = []
     for _, content in sorted((record.rides or {}).items()):
         whole, problems = block_reader.read(base64.b64decode(content))
@@ -80,7 +80,7 @@ def test_a_failing_card_ends_the_ride_without_a_restart(fault, tmp_path):
 
 
 def test_a_cards_room_is_counted_before_the_watchdog_runs(tmp_path):
-    """Its FSINFO is not valid, and reading its whole FAT takes longer than the watchdog waits."""
+    """The card has no valid FSINFO, and reading its whole FAT takes longer than the watchdog waits."""
     record = run(tmp_path, {"sectors": 1 << 24, "read_s": 0.006, "fsinfo": False}, until=40)
     assert record.first("SD card") < 1.0
     assert record.first("Raw   20°") < 30

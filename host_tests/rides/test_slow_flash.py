@@ -83,7 +83,8 @@ def test_a_lean_that_is_wrong_after_a_loss_is_not_shown(run):
     rode = [turn for turn in turns if turn[0] > FROM_S]
     errors = [(t, abs(lean - ride.truth(t)[0]), trusted, dt) for t, lean, trusted, dt, _ in rode]
     assert max(error for _, error, _, _ in errors) > 4  # the gaps cause errors
-    # How the gaps fall into the bends decides, and ten microseconds decide that: 0 to 1.6 s with the parts 2 to 7
+    # The result depends on where the gaps are in the bends, which changes with ten microseconds: 0 to 1.6 s for parts 2
+    # to 7
     assert sum(dt for _, error, trusted, dt in errors if trusted and error > 5) < 2.0
     assert max(error for _, error, trusted, _ in errors if trusted) < 12
     assert all(not trusted for _, _, trusted, dt in errors if dt > 0.3)

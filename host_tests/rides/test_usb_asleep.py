@@ -19,7 +19,7 @@ def just_booted(monkeypatch):
 
 
 def blocks(said):
-    """The whole blocks in the board's output."""
+    """Return the complete blocks in the board's output."""
     data = b""
     for line in said.splitlines():
         if line == ".":

@@ -86,7 +86,7 @@ def test_no_turn_delays_the_loop(board, display):
 
 @on_each()
 def test_nothing_is_sent_while_nothing_changes(board, display):
-    """Except the check that it is connected, five times per second."""
+    """Only the check for a connected display uses the bus, five times per second."""
     address = board.lcd.address
     before = board.lcd_bus.transfers[address]
     for _ in range(20):

@@ -28,7 +28,7 @@ def waiting(chip):
 
 
 def frames(chip, count, size=FRAME):
-    """(accelerometer x, gyro z) of whole frames."""
+    """Return (accelerometer x, gyro z) of whole frames."""
     found = []
     for _ in range(count):
         data = read(chip, 0x74, size)

@@ -57,7 +57,7 @@ def test_an_invalid_position_is_none_and_does_no_harm():
 
 
 def test_a_date_that_is_not_known_yet_is_0():
-    for date in ("", "xx1126", "0x1126", "311299"):  # no receiver is as old as the last
+    for date in ("", "xx1126", "0x1126", "311299"):  # no receiver is older than the last of these dates
         assert places_of(rmc(date=date))[0][:2] == [0, NOON]
     assert places_of(rmc(date="311226"))[0][0] == 26 << 9 | 12 << 5 | 31
 
@@ -74,7 +74,7 @@ def test_midnight_and_ten_a_second():
 
 
 def test_an_old_position_is_not_returned_as_new():
-    """After only VTG, and after a silence that ends without a fix."""
+    """This holds after only VTG, and after a silence that ends without a fix."""
     with Board(level):
         from kickstand.speed.gps import Gps
 

@@ -222,7 +222,7 @@ def test_no_receiver_and_a_wrong_baud_rate():
 
 
 def ride(t_s):
-    """Stands, 20 m/s, stands."""
+    """Return the speed of a ride: standstill, 20 m/s, standstill."""
     return 0.0 if t_s < 5.0 or t_s > 45.0 else min(20.0, 2.0 * (t_s - 5.0), 4.0 * (45.0 - t_s))
 
 

@@ -53,7 +53,7 @@ def test_a_low_pass_of_second_order_at_its_own_frequency():
 
 
 def test_a_mount_that_creeps_turns_slowly_and_at_once():
-    """By 2 degrees in all, about one axis: 60 % evenly, 40 % within a second."""
+    """The mount turns by 2 degrees about one axis: 60 % evenly, 40 % within a second."""
     turned = ride._creep(np.random.default_rng(3), 20_000, 2.0)
     size = np.degrees(np.linalg.norm(turned, axis=1))
     assert size[0] == pytest.approx(0.0, abs=1e-3)

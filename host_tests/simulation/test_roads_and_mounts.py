@@ -29,7 +29,8 @@ def in_vehicle(made):
 
 
 def test_each_road_class_is_twice_as_rough(rides):
-    """Four times its power; the quietest has the engine beside it. Ridden is alike, but for rider and camber."""
+    """Each class has four times the power of the one before. On the quietest road the engine adds to it. Roads only
+    change the lean through rider and camber."""
     assert np.array_equal(rides("A").truth["speed_mps"], rides("D").truth["speed_mps"])
     off = rides("C").truth["lean_deg"] - rides().truth["lean_deg"]
     assert 0.1 < np.sqrt(np.mean(off**2)) < 2.0
@@ -69,7 +70,7 @@ def test_bad_mount_changes_readings_but_not_the_ride(rides, mount):
 
 
 def test_aliased_engine_vibration_appears_at_low_frequencies(rides):
-    """The road shakes below 25 Hz: more there is of frequencies over 100 Hz."""
+    """The road shakes below 25 Hz. Any additional vibration is aliased from above 100 Hz."""
     plain, aliased = (bands_of(*in_vehicle(rides("A", mount)), 200.0)[QUANTITIES[1]] for mount in (None, "aliasing"))
     assert aliased[4] > 1.05 * plain[4]
 

@@ -145,7 +145,7 @@ def test_ride_has_the_requested_length(profile, seed):
 
 
 def test_calibration_of_the_previous_ride_is_removed(tmp_path):
-    """`report` looks there for the calibration of RIDE.csv, but it is of a sensor that was mounted otherwise."""
+    """`report` would use the old RIDE.cal.json, whose sensor was mounted differently."""
     works("simulate", "--profile", "street", "--seconds", 30, "--out", tmp_path)
     (tmp_path / "RIDE.cal.json").write_text("{}")
     works("simulate", "--profile", "street", "--seed", 1, "--seconds", 30, "--out", tmp_path)

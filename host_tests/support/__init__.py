@@ -1,1 +1,2 @@
-"""What the tests share: boards, devices and programs to run, and what they show. Some of it runs on MicroPython too."""
+"""Code that the tests share: boards, devices, helpers to run programs and read their output. Some modules also run on
+MicroPython."""

@@ -6,12 +6,12 @@ LEVEL = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
 
 def level(t_s):
-    """world() of a chip that lies flat and still."""
+    """Return the readings of a chip that lies flat and still: a world() for a board."""
     return LEVEL
 
 
 def raised(function, *args):
-    """What function(*args) raises, or None."""
+    """Return the exception that function(*args) raises, or None."""
     try:
         function(*args)
     except BaseException as error:
@@ -20,7 +20,7 @@ def raised(function, *args):
 
 
 def read(chip, register, count=1):
-    """One burst from a device model, as a list."""
+    """Read `count` bytes from a device model in one burst. Return them as a list."""
     chip.start(chip.address, False)
     chip.write_byte(register)
     chip.start(chip.address, True)
@@ -28,7 +28,7 @@ def read(chip, register, count=1):
 
 
 def write(chip, register, *values):
-    """One write to a device model."""
+    """Write bytes to a device model in one transfer."""
     chip.start(chip.address, False)
     chip.write_byte(register)
     for value in values:
@@ -36,7 +36,7 @@ def write(chip, register, *values):
 
 
 def counts(chip):
-    """The seven signed numbers of a burst: force, temperature, rate."""
+    """Return the seven signed numbers of a burst: force, temperature, rate."""
     data = read(chip, 0x3B, 14)
     values = [data[2 * i] << 8 | data[2 * i + 1] for i in range(7)]
     return [value - 65536 if value > 32767 else value for value in values]
@@ -55,7 +55,7 @@ def on_board(program, until_s=1.0, **fitted):
 
 
 def firmware(until_s=30.0, **fitted):
-    """Decorates test(board): it runs as the firmware of a new Board(**fitted), and must get to its end."""
+    """Decorator: run test(board) as the firmware of a new Board(**fitted). The test must run to its end."""
 
     def decorated(function):
         def test():

@@ -12,11 +12,11 @@ from kickstand_tools.deploy.check_limits import Finding
 from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor, resting
 
-PRESS_S = 0.5  # after the board is asked for
+PRESS_S = 0.5  # after check() asks for the press
 
 
 def part(seed: int = 1, **more: float):
-    """world(t_s) of an ordinary part at rest, on some side."""
+    """Return world(t_s) of an ordinary sensor at rest, in some orientation."""
     made = Sensor(seed=seed, **more)
     return resting(made, (0.3, -0.5, 0.8))
 
@@ -40,13 +40,13 @@ class CheckedBoard:
         self.free_bytes = 90_000
 
     def findings(self, folder: Path) -> list[Finding]:
-        """All of them. folder: its flash."""
+        """Return all findings. folder: the directory used as the board's flash."""
         found: list[Finding] = []
         self.run(folder, lambda ask: found.extend(check.measured(ask, self.say)))
         return found
 
     def say(self, text: str) -> None:
-        """What check() calls: presses the button when it is asked for."""
+        """Receive a text of check(). Press the button if the text asks for it."""
         self.said.append(text)
         if text.startswith("Press") and self._presses is None:
             self.board.press(self.board.clock.now_us / 1e6 + PRESS_S, 0.2)

@@ -22,7 +22,7 @@ class Result:
 
 
 def run(*arguments: object, err: io.StringIO | None = None) -> Result:
-    """The exit status of `kickstand arguments...` and what it printed. err: its standard error."""
+    """Run `kickstand arguments...`. Return its exit status and its output. err: receives its standard error."""
     out, err = io.StringIO(), err or io.StringIO()
     with pytest.raises(SystemExit) as leaving, contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         main.main([str(argument) for argument in arguments])
@@ -32,14 +32,15 @@ def run(*arguments: object, err: io.StringIO | None = None) -> Result:
 
 
 def works(*arguments: object, err: io.StringIO | None = None) -> Result:
-    """run() of something that has to succeed."""
+    """Call run() and assert that the command succeeds."""
     result = run(*arguments, err=err)
     assert result.status == 0, result.err
     return result
 
 
 def refused(directory: Path, *arguments: object, words: str = "") -> str:
-    """run() of something that is refused in one line with these words in it, leaving directory as it was."""
+    """Call run() and assert that the command fails with one line that contains these words, and leaves directory
+    unchanged. Return the line."""
     before = snapshot(directory)
     result = run(*arguments)
     assert result.status == 2, result.out + result.err
@@ -54,7 +55,7 @@ def refused(directory: Path, *arguments: object, words: str = "") -> str:
 
 
 def snapshot(directory: Path) -> dict[str, bytes]:
-    """Every file of a directory with its content."""
+    """Return the content of every file of a directory, by path."""
     return {str(p): p.read_bytes() for p in directory.rglob("*") if p.is_file()}
 
 

@@ -1,4 +1,4 @@
-"""Runs a device plan on either engine, in a directory that stands for the board's flash."""
+"""Runs a device plan on either engine, in a directory used as the board's flash."""
 
 import functools
 import gc
@@ -30,7 +30,7 @@ ALIGNED = {"ride": RIDE, "presses": PRESSES, "until": 46}
 
 
 class Record:
-    """What was on the display at which time."""
+    """The texts of the display over time."""
 
     def __init__(self, answer, console):
         self.frames = answer["frames"]
@@ -44,7 +44,7 @@ class Record:
         self.console = console
 
     def at(self, t_s):
-        """Both lines as they were at t_s."""
+        """Return both lines of the display at t_s."""
         shown = ["", ""]
         for start, line1, line2 in self.frames:
             if start <= t_s + 1e-6:
@@ -52,29 +52,31 @@ class Record:
         return shown
 
     def first(self, pattern, after=0.0):
-        """When a line first matched after a time; infinity if never."""
+        """Return the first time after `after` at which a line matches, infinity if none does."""
         for start, line1, line2 in self.frames:
             if start >= after and (re.search(pattern, line1) or re.search(pattern, line2)):
                 return start
         return math.inf
 
     def lean_at(self, t_s):
-        """The lean on the display in degrees, > 0 to the right; None if none is shown, or one half written."""
+        """Return the displayed lean in degrees, > 0 to the right. None if the display shows no lean, or a half-written
+        one."""
         match = re.fullmatch(r"Lean +(\d+)° (right|left |     )[ *]", self.at(t_s)[0])
         return match and int(match[1]) * (-1 if match[2] == "left " else 1)
 
     def leans(self, from_s, until_s):
-        """Every lean that was shown between two times."""
+        """Return every lean shown between two times."""
         shown = [self.lean_at(from_s)] + [self.lean_at(f[0]) for f in self.frames if from_s < f[0] < until_s]
         return [lean for lean in shown if lean is not None]
 
 
 def run(engine, flash, plan, capsys=None):
-    """The Record of a plan. flash: a directory, kept from run to run as a board's is."""
+    """Run a plan and return its Record. flash: a directory that keeps its files from run to run, like a board's
+    flash."""
     if engine == "cpython":
         before = os.getcwd()
         os.chdir(flash)
-        gc.freeze()  # the app collects all the time, and what other tests have left would take it minutes
+        gc.freeze()  # the app often collects garbage, and scanning the objects of other tests would take minutes
         try:
             answer = json.loads(json.dumps(device_runs.run_device(plan)))
         finally:
@@ -89,12 +91,12 @@ def run(engine, flash, plan, capsys=None):
 
 @functools.cache
 def _aligned_once():
-    """A directory that is kept as long as this process: the flash after a ride of ALIGNED."""
+    """Return a directory with the flash content after a ride of ALIGNED. It exists as long as this process."""
     directory = tempfile.TemporaryDirectory()
     run("cpython", directory.name, ALIGNED)
     return directory
 
 
 def align(flash):
-    """Put the alignment of a ride of ALIGNED into a directory that is a board's flash."""
+    """Copy the alignment from a ride of ALIGNED into a directory used as a board's flash."""
     shutil.copytree(_aligned_once().name, flash, dirs_exist_ok=True)

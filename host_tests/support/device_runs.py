@@ -1,4 +1,4 @@
-"""The whole device on the simulated board: a run described as data, its display recorded. CPython and
+"""Runs the whole device on the simulated board and records its display. A run is described as data. Runs on CPython and
 MicroPython.
 
 As a script: reads the description as JSON from standard input, runs it in the current directory (the board's
@@ -16,11 +16,12 @@ from support import sd_cards, simulated_phones
 from support.page_turner import PageTurner
 
 FRAME_S = 0.1
-PRESS_EVERY_S = 0.4  # while a page is looked for
+PRESS_EVERY_S = 0.4  # between presses that search for a page
 
 
 class CarRide(script.Ride):
-    """The same ride by car: its yaw rate is that of a motorcycle with this lean, its body rolls a little outwards."""
+    """The same ride by car. It has the yaw rate of a motorcycle with this lean, but its body rolls slightly
+    outwards."""
 
     ROLL_SHARE = -0.08  # of the lean that a motorcycle would have
 
@@ -29,11 +30,11 @@ class CarRide(script.Ride):
         return state[:1] + (self.ROLL_SHARE * state[1], self.ROLL_SHARE * state[2]) + state[3:]
 
 
-RAISE_S = 0.3  # how long a bike takes from one lean of standing() to the next
+RAISE_S = 0.3  # time that standing() takes from one lean to the next
 
 
 def standing(plan):
-    """motion(t_s) of a bike that stands at the leans of the plan [[from_s, lean_deg], ...] and moves between them."""
+    """Return motion(t_s) of a bike that does not ride, and leans as planned. plan: [[from_s, lean_deg], ...]."""
 
     def motion(t_s):
         now = before = plan[0]
@@ -49,8 +50,8 @@ def standing(plan):
 
 
 def poses_of(seed, steps):
-    """world(t_s) of the bare sensor: steps [[from_s, [up in its own axes] or None while it is being turned],
-    ...]. Before the first pose and after the last one it is shaken."""
+    """Return world(t_s) of the bare sensor in poses. steps: [[from_s, up in the sensor's axes, or None while the sensor
+    is turned], ...]. The sensor is shaken before the first pose and after the last one."""
     part = sensor_errors.Sensor(seed=seed)
     worlds = []
     for i, (start, up) in enumerate(steps):
@@ -76,7 +77,7 @@ def poses_of(seed, steps):
 
 
 def remounted(world, motion, seed, at_s, mounting_seed):
-    """world(t_s) of a sensor that is mounted at another angle from at_s on."""
+    """Return world(t_s) of a sensor that is mounted at another angle from at_s on."""
     part = sensor_errors.Sensor(seed=seed)
     part.vehicle_from_sensor = sensor_errors.random_mounting(mounting_seed)
     later = part.world(motion)
@@ -84,8 +85,8 @@ def remounted(world, motion, seed, at_s, mounting_seed):
 
 
 class Device:
-    """The whole device on a simulated board. What will happen to it is said first, by the board's own methods and
-    those below; then it runs."""
+    """The whole device on a simulated board. First plan its events by the board's methods and the methods below. Then
+    call run()."""
 
     def __init__(self, world, **fitted):
         """world(t_s): what the sensor measures. fitted: arguments of Board."""
@@ -96,31 +97,31 @@ class Device:
         self._turner = PageTurner()
 
     def turn_to(self, at_s, name):
-        """From at_s on, press the button until the view has this name: see kickstand/state.py. run() raises
-        AssertionError if it has not been shown."""
+        """From at_s on, press the button until the display shows the view with this name (see kickstand/state.py).
+        run() raises AssertionError if that view never appears."""
         self.board.at(at_s, lambda: self._turner.turn_to(name))
 
     def fit_speed(self, source, ride, place=None, **model):
-        """A "gps" or "wheel" that measures the speed of the ride. place: [latitude, longitude, degrees north a second,
-        degrees east a second]."""
+        """Fit a speed source, "gps" or "wheel", that measures the speed of the ride. place: [latitude, longitude,
+        degrees north per second, degrees east per second]."""
         if place:
             model["place"] = lambda t_s: (place[0] + place[2] * t_s, place[1] + place[3] * t_s)
         getattr(self.board, "fit_" + source)(lambda t_s: ride.truth(t_s)[1], **model)
 
     def fit_card(self, formatted=True, fsinfo=True, faults=(), **model):
-        """An SD card, as sd_cards.format_card() leaves it. faults: [[at_s, attribute, value], ...]."""
+        """Fit an SD card, formatted by sd_cards.format_card(). faults: [[at_s, attribute, value], ...]."""
         self.board.fit_card(**model)
         sd_cards.format_card(self.board.card, formatted, fsinfo)
         for at_s, attribute, value in faults:
             self.board.at(at_s, lambda attribute=attribute, value=value: setattr(self.board.card, attribute, value))
 
     def run(self, config, off_s, streams=False):
-        """Run the firmware with these settings; after each of the times off_s its power is switched off and on again.
-        streams: as `kickstand record` starts it."""
+        """Run the firmware with these settings. off_s: times of power cycles. streams: True to start the firmware as
+        `kickstand record` does."""
         self.board.every(FRAME_S, self._watch)
         self.board.every(PRESS_EVERY_S, self._turn_page)
         self.board.install()
-        before = take_firmware() if self.board.poses else {}  # it needs firmware that is imported on it
+        before = take_firmware() if self.board.poses else {}  # poses need firmware that this board imports
         try:
             from kickstand import settings, start
 
@@ -129,7 +130,7 @@ class Device:
             for until_s in off_s:
                 self._run_until(until_s, _stream if streams else lambda: start.main(self._run_app))
             settings.load = load
-            if self.ends[-1] == "returned":  # with power on: what it leaves on the display
+            if self.ends[-1] == "returned":  # the power is still on: keep the last display
                 self._watch()
             self._turner.check()
         finally:
@@ -147,7 +148,7 @@ class Device:
             self.board.press(for_s=0.15)
 
     def record(self):
-        """What was seen, as JSON can hold it."""
+        """Return the record of the run, in types that JSON can hold."""
         board = self.board
         seen = {"frames": self.frames, "ends": self.ends, "last": self.frames[-1][1:], "too_fast": board.too_fast}
         seen["touched"] = sorted(board.touched)
@@ -171,7 +172,7 @@ class Device:
 
 
 def _config(settings):
-    """A module config.py with these settings; JSON has no tuples."""
+    """Return a module config.py with these settings. Lists become tuples, because JSON has no tuples."""
     values = {name: tuple(value) if isinstance(value, list) else value for name, value in settings.items()}
     return type("Config", (), values)
 
@@ -186,13 +187,13 @@ def _stream():
 
 
 def take_firmware():
-    """Forget the firmware's modules that are imported, and return them by name."""
+    """Remove the imported firmware modules from sys.modules, and return them by name."""
     names = [name for name in sys.modules if name.split(".")[0] == "kickstand"]
     return {name: sys.modules.pop(name) for name in names}
 
 
 def _world(plan):
-    """world(t_s) of a plan, and its ride, if it has one."""
+    """Return world(t_s) of a plan, and its ride or None."""
     seed = plan.get("seed")
     if "poses" in plan:
         return poses_of(seed, plan["poses"]), None
@@ -209,7 +210,7 @@ def _world(plan):
 
 
 def run_device(plan):
-    """Device.record() of a run that is described as data, so that it can be sent to another process.
+    """Run a device as described by a plan, which can be sent to another process. Return Device.record().
 
     plan: "until" (s); "lean" as for standing(), or "ride" [[name of a function in rides, arguments...], ...],
     or "poses" as for poses_of; "seed" of the part (None: perfect); "presses" [[at_s, for_s], ...];

@@ -1,4 +1,4 @@
-"""Made-up drives through the firmware's alignment by driving. Runs on CPython and on MicroPython.
+"""Runs synthetic drives through the firmware's alignment by driving. Runs on CPython and on MicroPython.
 
 A drive is a list of legs [seconds, acceleration in m/s^2, yaw rate in deg/s]. The samples are those of a vehicle
 without suspension on a level road.
@@ -20,8 +20,8 @@ RATE_HZ = 100
 
 
 def around(events=6, braking=-2.0, seconds=3.0, yaw_dps=0.0, pause_s=5.0, stands=True):
-    """Legs of a drive that stands first, then speeds up and brakes events times. braking (m/s^2), seconds and yaw_dps:
-    of each braking event."""
+    """Return the legs of a drive that stands first, then speeds up and brakes. events: number of braking events.
+    braking (m/s^2), seconds and yaw_dps describe each of them."""
     legs = [list(STAND)] if stands else []
     for k in range(events):
         legs.append([4.0 + (6.0 if k == 0 else 0.0), -braking * seconds / 4.0 if k else 1.2, 12.0])
@@ -46,7 +46,7 @@ def samples(legs, vehicle="car", tilt_deg=0.0, noise_g=0.003, start_mps=0.0):
             if vehicle == "car":
                 force[0] += side
             else:
-                lean = math.atan(side)  # to the left of a left turn
+                lean = math.atan(side)  # to the left in a left turn
                 force[1] = math.sqrt(1.0 + side * side)
                 rate[0], rate[1] = yaw_dps * math.sin(lean), yaw_dps * math.cos(lean)
             for i in range(3):
@@ -56,14 +56,14 @@ def samples(legs, vehicle="car", tilt_deg=0.0, noise_g=0.003, start_mps=0.0):
 
 
 def mounted(m, vector):
-    """A vector of the vehicle's axes in those of the sensor. m: vehicle from sensor (9, rows left, up, forward)."""
+    """Convert a vector from the vehicle's axes to the sensor's. m: vehicle from sensor (9, rows left, up, forward)."""
     x, y, z = vector
     return [m[i] * x + m[3 + i] * y + m[6 + i] * z for i in range(3)]
 
 
 class SpeedSource:
-    """A GPS that gives a speed every_s, late_s late, times scale, rounded to multiples of step (m/s), always the same
-    from stuck_from_s on, and none within silent (from, to; s)."""
+    """A GPS with errors. every_s: interval between speeds. late_s: delay. scale: factor on the speed. step: rounding,
+    m/s. stuck_from_s: the speed no longer changes after this time. silent: (from, to), s, without speeds."""
 
     def __init__(self, every_s=0.5, late_s=0.0, scale=1.0, step=0.0, stuck_from_s=1e9, silent=(1e9, 1e9)):
         self.every = round(every_s * RATE_HZ)
@@ -75,7 +75,7 @@ class SpeedSource:
         self.last = 0.0
 
     def step_to(self, speed):
-        """The next hundredth of a second: a new value, or None."""
+        """Advance by 10 ms. Return a new speed, or None."""
         self.past.append(speed)
         if len(self.past) > self.late + 1:
             self.past.pop(0)
@@ -136,7 +136,8 @@ def drive(legs, mount, options):
 
 
 def regression(rows, lag):
-    """rows: [seconds, change_g, curve_g, force (3)], an event ends with each tenth. Returns forward, level, blocks."""
+    """rows: [seconds, change_g, curve_g, force (3)]. An event ends after every tenth row. Returns forward, level,
+    blocks."""
     fitted, fit = ForwardRegression(), Fit()
     for k, (seconds, change, curve, force) in enumerate(rows):
         fitted.add(lag, seconds, change, curve, force)

@@ -1,4 +1,4 @@
-"""Short ways to the emulated boards for their tests."""
+"""Helpers for tests on the emulated boards."""
 
 import functools
 import hashlib
@@ -14,18 +14,18 @@ from kickstand_tools.deploy import bytecode
 from kickstand_tools.simulation.scripted.script import Ride, upright
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 
-PART = Sensor(seed=1, share=0.5)  # an ordinary part, stuck on at some angle
+PART = Sensor(seed=1, share=0.5)  # an ordinary sensor, mounted at some angle
 
 
 def need(chip: str) -> None:
-    """Skip the test if what emulates this chip is missing: "pico" or "esp32"."""
+    """Skip the test if the emulator of this chip is missing. chip: "pico" or "esp32"."""
     if reason := _lacking(chip):
         pytest.skip(reason)
 
 
-@functools.cache  # what is missing is not downloaded for each test
+@functools.cache  # avoids a download attempt for each test
 def _lacking(chip: str) -> str:
-    """Why this chip cannot be emulated, "" if it can."""
+    """Return the reason why this chip cannot be emulated, "" if it can."""
     from kickstand_emulator import esp32_library, image
 
     try:
@@ -42,7 +42,7 @@ def _lacking(chip: str) -> str:
 
 
 def pico(world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any):
-    """An emulator.pico.Pico, without power yet. Skips if emulator or image is missing."""
+    """Return an emulated Pico, still without power. Skips the test if the emulator or its image is missing."""
     need("pico")
     from kickstand_emulator.pico import Pico
 
@@ -50,7 +50,7 @@ def pico(world: Callable[[float], tuple] | None = None, files: dict[str, bytes] 
 
 
 def esp32(world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any):
-    """An emulator.esp32.Esp32, without power yet. Skips if QEMU's library is missing."""
+    """Return an emulated ESP32, still without power. Skips the test if QEMU's library is missing."""
     need("esp32")
     from kickstand_emulator.esp32 import Esp32
 
@@ -63,20 +63,20 @@ MPY = {"pico": bytecode.PICO, "esp32": bytecode.ESP32}
 
 @functools.cache
 def firmware(chip: str = "pico") -> dict[str, bytes]:
-    """The firmware's files, compiled: they start in half the time."""
+    """Return the firmware's files, compiled, because these start in half the time."""
     from kickstand_emulator import flash_image
 
     return flash_image.firmware(True, MPY[chip])
 
 
 def modules(chip: str = "pico") -> dict[str, bytes]:
-    """The firmware without main.py: the board waits at its prompt."""
+    """Return the firmware without main.py, so the board waits at its prompt."""
     return {path: content for path, content in firmware(chip).items() if path != "/main.py"}
 
 
 @functools.cache
 def calibrated(who_am_i: int = 0x68) -> dict[str, bytes]:
-    """The calibration of PART, as its board keeps it: mounting, gyro bias and accelerometer."""
+    """Return the calibration files of PART: mounting, gyro bias and accelerometer."""
     from kickstand.calibration.parameters import Calibration
     from kickstand_emulator import flash_image
 
@@ -94,20 +94,20 @@ def calibrated(who_am_i: int = 0x68) -> dict[str, bytes]:
 
 
 def begun(pause_s: float) -> tuple[int, str]:
-    """Cycles, and a digest of the memory, 0.15 s after a Pico without files was switched on. pause_s: the host's, every
-    now and then."""
+    """Run a Pico without files for 0.15 s from power-on. Return its cycles and a digest of its memory. pause_s: length
+    of occasional pauses on the host."""
     with pico() as device:
         device.run(0.15, lambda: time.sleep(pause_s))
         return device.chip.rp2040.core.cycles, hashlib.sha256(bytes(device.chip.rp2040.sram)).hexdigest()
 
 
 def leaning(lean_deg: float) -> Callable[[float], tuple]:
-    """What PART reads on a bike that is held at this lean."""
+    """Return world(t_s) of PART on a bike that is held at this lean."""
     return PART.world(Ride([upright(1e6, lean_deg=lean_deg)]).motion)
 
 
 def shows(device, pattern: str, limit_s: float) -> re.Match:
-    """Let time pass until the display's two lines, as one text with a bar between, match; the match."""
+    """Advance the time until the display matches, and return the match. The pattern sees both lines joined by a bar."""
     return device.run_until(lambda: re.search(pattern, "|".join(device.lcd())), limit_s)
 
 

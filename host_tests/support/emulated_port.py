@@ -1,7 +1,7 @@
-"""The emulated Pico's console as the port that mpremote and the tools open, all in the test's own process.
+"""Offers the emulated Pico's console as the port that mpremote and the tools open. All runs in the test's process.
 
-Emulated time passes only while somebody waits at the port, and every time-out counts it: a busy machine makes a test
-longer and changes nothing else, and a board that hangs ends it.
+Emulated time only passes while the tools wait at the port, and all time-outs use emulated time. So a busy computer
+slows a test down but does not change its result. A board that hangs ends the test.
 """
 
 import types
@@ -30,7 +30,7 @@ class EmulatedPort:
         return len(self._heard)
 
     def read(self, size=1):
-        """As many bytes, or fewer at the time-out."""
+        """Return `size` bytes, or fewer after the time-out."""
         self._let_pass(self.timeout_s, size)
         data = bytes(self._heard[:size])
         del self._heard[:size]
@@ -45,7 +45,7 @@ class EmulatedPort:
         pass
 
     def sleep(self, seconds):
-        """time.sleep(), cut short by what the board prints."""
+        """Replace time.sleep(). Output of the board ends it early."""
         self._let_pass(seconds, len(self._heard) + 1)
 
     def _let_pass(self, seconds, until_bytes):

@@ -1,4 +1,4 @@
-"""The firmware's mathematics, called by name: JSON in, JSON out. Runs on CPython and on MicroPython.
+"""Calls the firmware's mathematics by name, with JSON input and output. Runs on CPython and on MicroPython.
 
 As a script: reads one JSON list of [name, arguments] from standard input and prints the list of results.
 """
@@ -52,7 +52,7 @@ def apply(offset, slope, bias, lsb, gyro_lsb, reading):
 
 
 def transform(offset, slope, matrix, sums, n):
-    """Force and rate of the mean of n samples, as the board does it and with floats; 4096 counts per g."""
+    """Return force and rate of the mean of n samples, computed by the board's code and by floats. 4096 counts per g."""
     calibration = Calibration()
     calibration.set_accel(offset, slope)
     for i in range(9):
@@ -72,12 +72,12 @@ def transform(offset, slope, matrix, sums, n):
 
 
 def add_up(batches, limit):
-    """Batches of frames of 14 bytes: [how many are good, their sums, the good frames, the watch] of each, as the board
-    does it and in Python."""
+    """Add up batches of 14-byte frames, by the board's code and in Python. Return for each batch [number of good
+    frames, their sums, the good frames, the watch]."""
     out = []
     for function in (fifo_frames.add_up, fifo_frames.add_up_python):
         watch = fifo_frames.AxisWatch(200, 3, 1, 3, limit).notes
-        sums = array("i", [99] * 7)  # whatever was in it before
+        sums = array("i", [99] * 7)  # arbitrary earlier content
         answers = []
         for batch in batches:
             data = bytearray()
@@ -90,7 +90,7 @@ def add_up(batches, limit):
 
 
 def decode(batch):
-    """Frames of 14 bytes: the counts of each, as the board does it and in Python."""
+    """Return the counts of each 14-byte frame, decoded by the board's code and in Python."""
     data = b"".join([bytes(frame) for frame in batch])
     out = []
     for function in (fifo_frames.decode, fifo_frames.decode_python):

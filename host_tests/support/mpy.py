@@ -1,4 +1,4 @@
-"""Runs a script under MicroPython's unix port, with the firmware, the tools and these tests on its path."""
+"""Runs a script on MicroPython's unix port. Firmware, tools and tests are on its import path."""
 
 import subprocess
 import tempfile
@@ -8,7 +8,7 @@ import pytest
 from kickstand_tools.common import unix_port
 
 HOST_TESTS = Path(__file__).resolve().parents[1]
-# The models of a board fit. Each time that the app collects its garbage, all of the heap is looked through.
+# Large enough for the models of a board. A larger heap would make each garbage collection slower.
 BOARD_HEAP = "4M"
 _TESTS = """
 import sys
@@ -22,7 +22,7 @@ for name in sorted(dir(module)):
 
 
 def run_tests(module: Path, heap: str = "64M") -> None:
-    """Every test of a module that needs no more than MicroPython has, in one process."""
+    """Run every test of a module in one MicroPython process. The module must only import what MicroPython has."""
     assert "test_" in run_mpy(_TESTS, str(module.parent), module.stem, heap=heap)
 
 
@@ -33,8 +33,8 @@ def run_mpy(
     stdin: str = "",
     directory: Path | None = None,
 ) -> str:
-    """Standard output of a script (text, or Path). Skips without MicroPython; AssertionError if it fails. directory:
-    where it runs, an empty one without it."""
+    """Run a script (its text, or a Path) and return its standard output. directory: working directory, None for a new,
+    empty one. Skips the test without MicroPython. Raises AssertionError if the script fails."""
     if not unix_port.available():
         pytest.skip("no MicroPython unix port for this system")
     environment = unix_port.environment()
@@ -55,8 +55,8 @@ def run_mpy(
             timeout=300,
         )
     said = done.stdout + done.stderr
-    # The package's main() does not pass every exit status on. What takes data answers with JSON at its end, and a
-    # board's console before that may have tracebacks of its own.
+    # The package's main() does not always pass on the exit status, so search for a traceback. A script with input ends
+    # with JSON, and the board's console output before it may contain tracebacks.
     came_to_its_end = done.returncode == 0 and (bool(stdin) or "Traceback (most recent" not in said)
     assert came_to_its_end, f"MicroPython says:\n{said}"
     return done.stdout

@@ -1,10 +1,10 @@
 """Finds a page of the display by pressing the button. CPython and MicroPython."""
 
-MOST_PRESSES = 20  # twice as many as there are pages
+MOST_PRESSES = 20  # twice the number of pages
 
 
 class PageTurner:
-    """Says when to press the button, until the views that are wanted have been shown, one after the other."""
+    """Decides when to press the button, until the wanted views have been shown in order."""
 
     def __init__(self):
         self._wanted = []

@@ -1,5 +1,4 @@
-"""Decodes what comes from the radio by firmware/docs/live.md alone: its equations for RaceChrono and its
-tables of bytes."""
+"""Decodes radio packets only by firmware/docs/live.md, with its equations for RaceChrono and its byte tables."""
 
 import re
 from pathlib import Path
@@ -8,7 +7,7 @@ PAGE = Path(__file__).resolve().parents[2] / "firmware" / "docs" / "live.md"
 _SECTION = PAGE.read_text(encoding="utf-8")
 SERVICE = re.findall(r"is `([0-9a-f-]{36})`", _SECTION)[0]
 
-# {channel, its words before the first comma: (packet, equation)}
+# {channel name up to the first comma: (packet, equation)}
 EQUATIONS = {
     name.split(",")[0]: (int(packet), equation)
     for name, packet, equation in re.findall(r"^\| ([^|]+) \| (\d) \| `(.+)` \|$", _SECTION, re.MULTILINE)
@@ -20,7 +19,7 @@ _FUNCTIONS = {
 
 
 def channels(data):
-    """{channel: value} of a packet of RaceChrono's service."""
+    """Return {channel: value} of a packet of RaceChrono's service."""
     number, raw = int.from_bytes(data[:4], "little"), bytes(data[4:])
     assert 1 <= len(raw) <= 16
     return {
@@ -43,7 +42,7 @@ def _rows(title):
 
 
 def own(title, data):
-    """{what: whole number in the table's unit, None for unknown} of a packet of our own."""
+    """Return {name: integer in the table's unit, None for unknown} of a packet of Kickstand's own service."""
     rows = _rows(title)
     assert len(data) == rows[-1][1] + 1
     found = {}

@@ -1,7 +1,7 @@
-"""The simulated board's SD card with MicroPython's own FAT: formatted before a run, read after it."""
+"""Formats the simulated board's SD card before a run and reads it afterwards, with MicroPython's own FAT."""
 
 # pyright: reportAttributeAccessIssue=false
-# the os is MicroPython's
+# os is MicroPython's module
 
 import binascii
 import os
@@ -11,7 +11,7 @@ READER = "/reader"  # as a computer has it
 
 
 def format_card(card, formatted=True, fsinfo=True):
-    """With a FAT file system; without fsinfo nothing says how much of it is free."""
+    """Format the card with FAT. fsinfo: False to leave out the count of free clusters."""
     if formatted:
         os.VfsFat.mkfs(card)
     if not fsinfo:
@@ -20,13 +20,13 @@ def format_card(card, formatted=True, fsinfo=True):
 
 
 def eject():
-    """What a reset does: nothing is mounted then."""
+    """Unmount everything, as a reset does."""
     if hasattr(os, "umount") and MOUNT[1:] in os.listdir("/"):
         os.umount(MOUNT)
 
 
 def rides(board):
-    """{path: content in base64} of all files on it, as a computer reads them."""
+    """Return {path: content in base64} of all files on the card, as a computer reads them."""
     found = {}
     try:
         os.mount(os.VfsFat(board.card), READER)

@@ -1,5 +1,5 @@
-"""A phone beside the simulated board, without a radio stack: what it does is a plan, and what it hears is kept. CPython
-and MicroPython."""
+"""A simulated phone for the simulated board, without a radio stack. It follows a plan and stores what it receives. Runs
+on CPython and MicroPython."""
 
 CHRONO, FILTER = (0x1FF8, 0x0001), (0x1FF8, 0x0002)
 _OWN = "7b6f000%d-3c1e-4d5a-9a55-6b69636b7374"
@@ -55,7 +55,7 @@ class Phone:
         return self._board.radio.give_pin(pin)
 
     def found(self):
-        """What the board advertises."""
+        """Return the data that the board advertises."""
         radio = self._board.radio
         return None if radio.found is None else [list(radio.found), list(radio.named)]
 

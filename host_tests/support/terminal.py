@@ -1,4 +1,4 @@
-"""Runs a command in a terminal of 80 by 24: sends keys and reads what is drawn."""
+"""Runs a command in a terminal of 80 by 24 characters, sends keys and reads the output."""
 
 import contextlib
 import os
@@ -7,7 +7,7 @@ import subprocess
 import time
 
 SILENT_S = 120.0
-DRAWN = 4_000_000  # characters: more than a minute of a screen that is drawn all the time
+DRAWN = 4_000_000  # characters: more than a minute of continuous drawing
 
 
 class Terminal:
@@ -35,8 +35,8 @@ class Terminal:
     def wait_for(self, pattern: str) -> re.Match:
         """Wait until a text that matches appears; drop the output up to then and return the match.
 
-        What limits it is what is drawn, not the time, which depends on how busy the machine is. Only one that has
-        drawn nothing for SILENT_S is taken for dead.
+        The amount of output limits the wait, because the time depends on the computer's load. A command without output
+        for SILENT_S is treated as dead.
         """
         drawn, heard_s = 0, time.monotonic()
         while not (found := re.search(pattern, self._seen)):
@@ -51,7 +51,8 @@ class Terminal:
         return found
 
     def end(self) -> int:
-        """Its exit status; what it still draws is read, so that it can end."""
+        """Wait for the end and return the exit status. Read the remaining output, because a full buffer would block the
+        command."""
         heard_s = time.monotonic()
         while self.process.poll() is None:
             self._read()

@@ -19,7 +19,7 @@ ASKED = {model.READ_PAIRED: "READ", model.WRITE_PAIRED: "WRITE"}
 
 
 class BoardLoop(asyncio.SelectorEventLoop):
-    """An event loop whose time is the board's."""
+    """An event loop that runs on the board's clock."""
 
     def __init__(self, clock):
         self._board_clock = clock
@@ -29,7 +29,7 @@ class BoardLoop(asyncio.SelectorEventLoop):
         return self._board_clock.now_us / 1e6
 
     def pump(self):
-        """Do what is due, and wait for nothing."""
+        """Run the callbacks that are due, without waiting."""
         for _ in range(ROUNDS):
             self.call_soon(self.stop)
             self.run_forever()
@@ -57,7 +57,8 @@ class _Pin(pairing.PairingDelegate):
 
 
 class Air:
-    """Puts board.radio on the air. central(): a Device that can scan and connect. task: runs beside the board."""
+    """Connects board.radio to the virtual radio. central(): returns a Device that can scan and connect. task: runs in
+    parallel with the board."""
 
     def __init__(self, board):
         self.radio = board.radio

@@ -20,6 +20,6 @@ class Watched(io.StringIO):
 
 
 def watched(monkeypatch, terminal: Watched, *arguments: object) -> str:
-    """What a command that works writes to such a terminal."""
+    """Run a command that must succeed, and return its output to such a terminal."""
     monkeypatch.setenv("TERM", "xterm")
     return command.works(*arguments, err=terminal).err

@@ -15,7 +15,7 @@ def glance():
 
 
 class Canvas:
-    """What was drawn: digits {column: digit} of the number's row; the other calls in their order."""
+    """Records the drawing: digits {column: digit} of the number's row, and the other calls in order."""
 
     def __init__(self, glance):
         self._glyphs = glance._GLYPHS

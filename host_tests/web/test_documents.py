@@ -63,7 +63,7 @@ def test_a_page_lists_all_documents_and_its_own_headings(files):
 
 
 def test_one_page_has_all_the_words(files):
-    """To be searched and printed. A name of an anchor is in it once."""
+    """All documents are on one page, for searching and printing. Each anchor's name occurs once."""
 
     def words(text):
         return re.sub(r"<[^>]+>", " ", re.findall("<article>(.*?)</article>", text, re.S)[0]).split()

@@ -15,7 +15,7 @@ SLOWED = 4  # times
 
 @pytest.mark.long
 def test_a_first_visit(chromium, address, tmp_path):
-    """In real time, so all in one. What follows from a power cut, test_guide.py shows."""
+    """One test covers all, because it runs in real time. test_guide.py tests a power cut."""
     rider = Rider(chromium, address, viewport={"width": 1000, "height": 700})
     first_minute(rider)
     pull_the_wire(rider)

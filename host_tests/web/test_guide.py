@@ -58,7 +58,7 @@ for stage, orders in enumerate(json.load(sys.stdin)):
 print("\\n" + json.dumps(said))
 """
 
-# As tell() in main.mjs
+# Does the same as tell() in main.mjs
 LOOK = Path(__file__).with_name("guide_steps.js").read_text()
 
 SHORT, LONG = ("press", 0.15), ("press", 1.2)
@@ -192,7 +192,7 @@ def test_after_power_on_in_a_steady_bend_it_says_what_ends_the_doubt(stages):
 
 
 def test_it_rides_straight_is_not_said_of_a_bike_that_leans(guide):
-    """Neither before the first lean, nor after it."""
+    """This holds before the first lean and after it."""
     tick = {"powered": True, "plugged": True, "pose": "ride", "phase": "ride", "stage": 0}
     tick.update(t_s=1.0, lean_deg=-7.5)
     said = [
@@ -224,7 +224,7 @@ def view_of(code):
 
 
 def test_each_refusal_and_fault_has_its_step(guide):
-    """Also those that the simulated board does not come to by itself."""
+    """Codes that the simulated board never reaches are included."""
     tick = {"powered": True, "plugged": True, "pose": "kickstand", "phase": "kickstand", "t_s": 1.0, "stage": 0}
     spoilt = ("refused", "The meter says why it has not taken this pose. Press the button: once more.")
     unlike = ("refused", "The meter says why it takes neither pose. Press the button, and begin with the stand.")

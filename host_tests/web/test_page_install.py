@@ -87,7 +87,7 @@ def test_riders_settings_are_shown_and_kept(line, board):
 
 
 def test_each_board_has_its_own_default_pins(line, board):
-    """After a Pico, which filled the fields above."""
+    """The fields were filled for a Pico before."""
     other(board, _machine="Generic ESP32 module with ESP32")
     board.modules["sys"].platform = "esp32"
     line.plug_in(RawPrompt(board))
@@ -217,7 +217,7 @@ def test_setting_of_0_is_not_shown_as_the_default(line):
 
 
 def test_browser_without_serial_ports_is_told_so(chromium, address):
-    """At the top, and it offers nothing that needs one."""
+    """The notice is at the top, and the page offers nothing that needs a serial port."""
     rider = Rider(chromium, address, script="delete Navigator.prototype.serial")
     for name in ("install.html", "live.html"):
         rider.page.goto(address + name)

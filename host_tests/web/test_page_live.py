@@ -97,7 +97,7 @@ def test_failed_loading_of_tools_can_be_repeated(chromium, address, board):
     line = SerialLine(chromium, address + "live.html", service_workers="block")
     rider = line.rider
     line.plug_in(RawPrompt(board, half_seconds(3)[0]))
-    for name in ("python.mjs", "pyodide.asm.wasm"):  # that the second is missing Pyodide itself does not say
+    for name in ("python.mjs", "pyodide.asm.wasm"):  # Pyodide itself does not report that the second is missing
         rider.page.route(f"**/{name}", lambda route: route.abort())
         rider.page.click("#start")
         rider.page.wait_for_selector("#live-said:has-text('Is there a network? Press the button again')")

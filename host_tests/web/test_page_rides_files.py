@@ -68,7 +68,7 @@ def test_one_of_several_rides_is_chosen(page, ride, calibration, tmp_path):
         files[-1].write_bytes(calibration.read_bytes())
     page.give(*files)
     first = page.report()[0]
-    with page.page.expect_download(timeout=WAIT_MS) as lean:  # which comes though another ride is chosen meanwhile
+    with page.page.expect_download(timeout=WAIT_MS) as lean:  # downloads even if another ride is chosen meanwhile
         page.page.evaluate("document.querySelector('#save-lean').click()")
         page.page.select_option("#ride", "B.csv")
     assert lean.value.suggested_filename == "A.lean.csv"

@@ -12,7 +12,7 @@ def test_singular_matrix_is_detected_in_webassembly():
     silent = rides_guest.raising(lambda matrix: np.full_like(matrix, np.nan))
     with pytest.raises(np.linalg.LinAlgError):
         silent(np.zeros((3, 3)))
-    assert np.all(np.isnan(silent(np.full((3, 3), np.nan))))  # as numpy does elsewhere
+    assert np.all(np.isnan(silent(np.full((3, 3), np.nan))))  # like numpy on other platforms
     assert rides_guest.raising(np.linalg.inv)(2.0 * np.eye(2)).tolist() == [[0.5, 0.0], [0.0, 0.5]]
 
 

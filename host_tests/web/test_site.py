@@ -84,7 +84,7 @@ def test_site_is_served_and_opened(files, built, monkeypatch):
 
 
 def test_site_works_at_any_address(files):
-    """All files that the site names are beside it."""
+    """The folder contains all files that the site refers to."""
     to_micropython = re.compile(r'<a href="https://micropython\.org/download/\w+/" target="_blank" rel="noopener">')
     ours = {path.relative_to(site.PAGE).as_posix() for path in site.PAGE.rglob("*") if path.is_file()}
     assert ours < set(files)

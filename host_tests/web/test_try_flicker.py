@@ -1,4 +1,4 @@
-"""What the page Try shows is never a display that the firmware has written half: sampled every 20 ms."""
+"""The page Try never shows a half-written display. The test samples it every 20 ms."""
 
 import json
 import re
@@ -52,7 +52,7 @@ WHOLE = re.compile(
     r"|Formula +-?\d+° *$| *-?\d\.\d\d *-?\d\.\d\d *-?\d\.\d\dg *$"
 )
 STARTED_S = 1.0
-LASTING_S = 0.08  # the firmware writes a page each 0.1 s: what goes sooner than that was no page
+LASTING_S = 0.08  # the firmware writes a page every 0.1 s, so a shorter text was not a page
 LOOK = """(seconds) => new Promise((done) => {
   const seen = [], until = performance.now() + 1000 * seconds;
   const look = () => {
@@ -66,7 +66,7 @@ LOOK = """(seconds) => new Promise((done) => {
 
 
 def flashes(samples):
-    """The words of [[s, words], ...] that last for less than LASTING_S between two others, each with its time."""
+    """Return the entries of [[s, words], ...] that last for less than LASTING_S between two others."""
     changes = [samples[0]]
     for sample in samples:
         if sample[1] != changes[-1][1]:

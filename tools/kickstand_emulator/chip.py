@@ -101,7 +101,7 @@ class EmulatedChip:
         self.stopped = True
 
     def reset(self) -> None:
-        """Reset the chip, as machine.reset() does and a watchdog that is not fed."""
+        """Reset the chip, like machine.reset() or an expired watchdog."""
         self.rp2040.psm.write_uint32(WDSEL, PSM_BITS_MASK & ~_OSCILLATORS)
         self.rp2040.watchdog._reason |= TIMER
         self._reset(from_watchdog=True)
@@ -112,7 +112,7 @@ class EmulatedChip:
         self.rp2040.pio = self._pios
         self.rp2040.enter_reset(from_watchdog=from_watchdog)
         self.rp2040.pio = []
-        # rp2040py's watchdog keeps running; the chip's own stops at a reset until it is started again
+        # rp2040py's watchdog keeps running after a reset. On the real chip it stops until it is started again
         watchdog = self.rp2040.watchdog
         watchdog.timer.enable = watchdog.alarm.enable = False
         self.rp2040.core.pc = FLASH_START_ADDRESS

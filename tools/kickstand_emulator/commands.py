@@ -26,7 +26,7 @@ def emulate_command(port: int, chip: str, display: str) -> None:
 
 
 def ready_emulator(chip: str) -> None:
-    """Find the files that this chip's emulator needs; compile the Pico's emulator. Call it before importing the
+    """Find the files that this chip's emulator needs, and compile the Pico's emulator. Call it before importing the
     emulator. Raises InputError if something is missing."""
     from . import esp32_library, image, native
 

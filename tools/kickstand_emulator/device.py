@@ -24,7 +24,7 @@ class GuestError(Exception):
 
 class EmulatedDevice(ABC):
     """An emulated board. It is off until power_on(). `with` switches it on, and off at the end. Times are emulated
-    seconds; they continue through resets and power cycles.
+    seconds; they also advance through resets and power cycles.
 
     Arguments: world: as for simulator.Board; level and at rest if None. files: the content of its flash, see
     flash_image.py. fitted: other arguments of Board.
@@ -92,7 +92,7 @@ class EmulatedDevice(ABC):
         """Set the level of this GPIO from outside: pulled to ground (0) or released (1)."""
 
     def _wire(self, number: int) -> None:
-        """Wire this GPIO to the part that simulator.Board has there."""
+        """Wire this GPIO to the part that simulator.Board connects to it."""
         self.board.watch_pin(number, partial(self._set_pin, number))
 
     def fit_wheel(self, speed: Callable[[float], float], **kind: Any) -> None:
@@ -101,13 +101,14 @@ class EmulatedDevice(ABC):
         self._wire(self.board.wheel_pin)
 
     def power_cycle(self, off_s: float = 0.5) -> None:
-        """Switch it off, and on again after off_s."""
+        """Switch the board off, and on again after off_s."""
         self.power_off()
         self.run(off_s)
         self.power_on()
 
     def run_until(self, condition: Callable[[], Any], limit_s: float, step_s: float = 0.005) -> Any:
-        """Advance the time until condition() is true; return its value. It is called every step_s. Raises NotReached if
+        """Advance the time until condition() is true, and return its value. condition() is called every step_s. Raises
+        NotReached if
         the condition is not met within limit_s."""
         end_s = self.time_s + limit_s
         while not (reached := condition()):

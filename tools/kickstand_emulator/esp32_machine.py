@@ -230,8 +230,8 @@ class Machine:
         self._stale = list(self._inputs)
 
     def _calm_timers(self) -> None:
-        """Postpone the scheduler's timer for ever, by changing its scale. Of the two timers due after a tenth of a
-        second it is the one without an owner. The other ends a read of the eFuses, see _guard()."""
+        """Postpone the scheduler's timer for ever, by changing its scale. Two timers end after 0.1 s, and the
+        scheduler's is the one without an owner. The other ends a read of the eFuses, see _guard()."""
         self._qemu.timer_mod_ns(c.addressof(self._stop), 0)
         following = self._stop.next
         while following:
@@ -253,7 +253,7 @@ class Machine:
         while qemu.runstate_is_running():
             if qemu.qemu_reset_requested_get() and self._may_reset:
                 self._resetting = True
-                qemu.qemu_clock_enable(_VIRTUAL, False)  # otherwise it would be set forward; the reset enables it
+                qemu.qemu_clock_enable(_VIRTUAL, False)  # keeps QEMU from setting it; the reset enables it
                 return
             idle = qemu.all_cpu_threads_idle()
             if self._sleeps(0.0 if idle else wait_s) and idle and qemu.all_cpu_threads_idle():

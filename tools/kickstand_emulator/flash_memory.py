@@ -29,7 +29,7 @@ class TimedFlash(RPSSI):
     begun."""
 
     def __init__(self, rp2040: RP2040, name: str) -> None:
-        rp2040.qspi[1]._listeners.clear()  # the interface that this one replaces
+        rp2040.qspi[1]._listeners.clear()  # removes the replaced interface
         super().__init__(rp2040, name)
         self.operations = 0
         self.before_operation: Callable[[], None] | None = None
@@ -37,8 +37,8 @@ class TimedFlash(RPSSI):
         self._cut_share = 0.0
 
     def cut_power(self, operation: int, share: float = 0.0) -> None:
-        """Raise PowerCut in an erase or program: number `operation` from now (1: the next), after a share of it
-        (0..1)."""
+        """Raise PowerCut in a later erase or program operation (1: the next one). share: completed part of the
+        operation, 0..1."""
         self._cut_at = self.operations + operation
         self._cut_share = share
 

@@ -1,4 +1,4 @@
-"""Registers through which code on the emulated Pico exchanges bytes with the host. The real chip has none of them.
+"""Registers through which code on the emulated Pico exchanges bytes with the host. The real chip does not have them.
 
 The console would work too, but every byte on it costs the Pico time. GUEST is the code for the Pico.
 """

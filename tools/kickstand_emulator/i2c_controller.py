@@ -37,7 +37,7 @@ class TimedI2C(RPI2C):
         self._clock = rp2040.clock
         self._alarm = self._clock.create_alarm(self._over)
         self._due_ns = 0.0
-        self._then: Callable[[], None] | None = None  # called when the bits on the wire are over
+        self._then: Callable[[], None] | None = None  # called after the last bit on the wire
         self.on_start = lambda repeated: self._after(1, self.complete_start)
         self.on_connect = lambda address, mode: self._after(9, lambda: self._connect(address, bool(mode)))
         self.on_write_byte = lambda value: self._after(9, lambda: self._written(value))

@@ -58,7 +58,7 @@ class Wires:
         if self._mode == _LISTENS and self._bit <= 8:
             self._byte = self._byte << 1 | self._driven_sda
         elif self._mode == _SENDS and self._bit == 9 and self._driven_sda:
-            self._mode = _IDLE  # not acknowledged: it was the last byte
+            self._mode = _IDLE  # not acknowledged, so it was the last byte
 
     def _clock_falls(self) -> None:
         if self._mode == _LISTENS and self._bit == 8:

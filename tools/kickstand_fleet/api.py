@@ -1,4 +1,4 @@
-"""The fleet's functions for a notebook or a cluster. Those for single rides are in kickstand_tools.api.
+"""The fleet's functions for a notebook or a cluster. kickstand_tools.api has the functions for single rides.
 
     from kickstand_fleet import api
 

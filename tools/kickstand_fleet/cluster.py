@@ -1,13 +1,14 @@
 """Runs a function on many items with Dask, on this computer or on a cluster.
 
-Workers on this computer and their scheduler talk over 127.0.0.1 by TLS. The keys are made for the run, and only its
-processes have them: another user of the computer can connect, but can neither read nor run anything. Dask has no Unix
+Workers on this computer and their scheduler talk over 127.0.0.1 by TLS. Each run creates its own keys, and only its
+processes have them. Another user of the computer can connect, but can neither read nor run anything. Dask has no Unix
 sockets, and our own process pool would have to handle crashes a second time. Dask's web pages are off.
 
-A task that kills its worker must not cost another task. Dask would give it to other workers, which it kills too, and
-recompute the results that these had finished. So no retries are allowed, only a few tasks run at a time, and Dask keeps
-no results. Tasks whose worker died are tried a second time, after all others and one at a time: if the worker dies
-then, the task itself has killed it.
+A task that kills its worker must not cost another task. Dask would retry the task on other workers and so kill them
+too. It would also recompute their finished results. So no retries are allowed, only a few tasks run at a time, and Dask
+keeps
+no results. Tasks whose worker died run a second time, after all others and one at a time. If the worker dies again, the
+task is the cause.
 """
 
 import contextlib
@@ -168,7 +169,7 @@ class Cluster:
                 else:
                     yield index, None, CRASHED, f"{type(error).__name__}: {error}"
             elif self._client.status == "running":
-                suspects.append(index)  # its worker was ended because of another task
+                suspects.append(index)  # another task ended its worker
             else:
                 raise InputError(f"the cluster{f' at {self._address}' if self._address else ''} was lost; {KEPT}")
             future.release()
@@ -183,7 +184,7 @@ class Cluster:
                 index, future = self._under_way.pop(key)
                 self._started.pop(key, None)
                 future.cancel(force=True)
-                with contextlib.suppress(Exception):  # it may have died meanwhile
+                with contextlib.suppress(Exception):  # the worker may already be dead
                     self._client.restart_workers([worker], timeout=30, raise_for_error=False)
                 yield index, None, TIMED_OUT, f"took longer than {self._timeout_s:.0f} s, so it was ended"
 

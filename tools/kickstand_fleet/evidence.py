@@ -29,7 +29,7 @@ from kickstand_tools.signals import STANDING_MPS, Array, moving_mean, runs
 
 INTERVAL_S = 0.9  # least time between two speeds that are used
 MOVING_MPS = 2.0
-STANDING_WEIGHT = 0.3  # weight of a second at a stop: a stop shows one slope of the road, however long it is
+STANDING_WEIGHT = 0.3  # weight of a second at a stop: a long stop shows only one slope of the road, like a short one
 LEVEL_S = 20.0  # over this time the mean force is about vertical: the rate about it is the yaw rate
 BLOCK_S = 8.0
 # The road: ratio of the variance of its slope to that of all other errors in a mean over 1 s, and its correlation
@@ -98,7 +98,7 @@ def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
     if kind == MOTORCYCLE:
         terms = np.column_stack((np.sqrt(1.0 + c * c), a, np.zeros_like(a), np.zeros_like(a)))
         weight = length * (mean_mps > MOVING_MPS)  # at lower speeds a foot is down
-        shown = np.zeros_like(a)  # not used: a motorcycle sways about its wheels' contacts and with its rider
+        shown = np.zeros_like(a)  # not used for a motorcycle, which sways about its tyre contacts and with its rider
     else:
         later, sooner = (_integrals(rate.T, log.t_s, step, time + ahead) for ahead in (SWING_S / 2.0, -SWING_S / 2.0))
         swing = (later - sooner) / SWING_S

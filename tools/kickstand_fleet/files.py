@@ -153,8 +153,8 @@ def listed(parent: str) -> dict[str, str]:
 
 @contextlib.contextmanager
 def _in_store(path: str, what: str) -> Iterator[tuple[Any, str]]:
-    """A context with (file system, path in it) of a remote path. Any error of the libraries in it becomes an
-    InputError: the path cannot be read, or written."""
+    """A context with (file system, path in it) of a remote path. It turns any error of the libraries into an
+    InputError."""
     try:
         yield _system(path)
     except InputError:
@@ -186,7 +186,7 @@ def write_bytes(path: str, content: bytes) -> None:
             fs.pipe_file(place, content)
         return
     directory = Path(path).parent
-    try:  # the directory stays if the write fails: other workers use it, too
+    try:  # keep the directory if the write fails, because other workers use it too
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{directory} cannot be made: {cause(error)}") from error

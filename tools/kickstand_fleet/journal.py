@@ -20,7 +20,7 @@ from . import KEPT, files
 from .period import PeriodResult
 
 _AT_ONCE = 200  # results that are fetched from a store together
-_LONGEST = 1 << 26  # longest line in bytes; the line of a thousand logs is a hundredth of that
+_LONGEST = 1 << 26  # longest line in bytes, 100 times the line of a thousand logs
 
 
 class Journal:
@@ -44,7 +44,7 @@ class Journal:
                 if not self._note(line) and line.strip():
                     self.damaged += 1
                     self._file.seek(self._end)
-                    self._file.write(b" " * (len(line) - 1) + b"\n")  # it must be counted only once
+                    self._file.write(b" " * (len(line) - 1) + b"\n")  # overwritten, to count it only once
                 self._end += len(line)
             self._file.flush()
         except OSError as error:
@@ -74,7 +74,7 @@ class Journal:
 
     def __exit__(self, *exception: object) -> None:
         with contextlib.suppress(OSError):
-            if not self._end and os.name != "nt":  # while still locked: once unlocked it may belong to another run
+            if not self._end and os.name != "nt":  # remove it while it is still locked
                 self._path.unlink()
         with contextlib.suppress(OSError):
             self._file.close()
@@ -182,7 +182,7 @@ def _line(key: str, result: PeriodResult, again: bool) -> bytes:
 
 
 def _entry(line: bytes) -> tuple[str, bool, PeriodResult] | None:
-    """(key, again, result) of a line; None for a damaged one."""
+    """Return (key, again, result) of a line, or None for a damaged line."""
     try:
         entry = json.loads(line)
         sum_then = entry.pop("crc32")

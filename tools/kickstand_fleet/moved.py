@@ -1,7 +1,8 @@
 """Finds mounts that rotated by a few degrees or more, between two logs or during one.
 
-The firmware refuses a drive only if the mount surely moved, by some 7 to 30 degrees. Here, for every moment in all logs
-of a mount, the alignment before it is compared with the alignment after it. A rotation that tilts the sensor shows in
+The firmware only refuses a drive if the mount surely moved, by some 7 to 30 degrees. This module checks every moment in
+all logs of a mount: it compares the alignment before that moment with the alignment after it. A rotation that tilts the
+sensor shows in
 gravity. A rotation about the vertical shows only in braking, in bends, and in the direction in which the vehicle sways
 on its springs, which needs neither. The variance comes from a jackknife over blocks of some seconds. Errors that last
 longer are added: slopes of a road and, from one log to another, load and temperature.
@@ -33,7 +34,7 @@ YAW_PRIOR_DEG = 0.4
 # The direction of sway: its change by roads on each side, 1 sigma in degrees. It is not used if its standard deviation
 # over both sides is above SWAY_WORST_DEG, or if it contradicts the braking by more than SWAY_SIGMAS
 SWAY_DEG, SWAY_WORST_DEG, SWAY_SIGMAS = 0.7, 5.0, 3.0
-SURELY_DEG = 8.0  # slopes of roads differ by less; within a log a smaller tilt must be sudden
+SURELY_DEG = 8.0  # slopes of roads differ by less. Within a log, a smaller tilt must be sudden
 TILT_DEG = 2.2  # a rotation with less tilt is one about the vertical
 STEP_S, STEP_GAP_S = 8.0, 1.0  # a sudden tilt is measured from STEP_GAP_S to STEP_S on each side of the moment
 STEP_SHARE = 0.7  # share of the tilt that must be sudden

@@ -1,4 +1,4 @@
-"""One mount of one vehicle: its alignment, the moves of the mount, its brake tests. A plain function on files."""
+"""Processes the log files of one mount of one vehicle: alignment, moves of the mount, and brake tests."""
 
 import errno
 import math
@@ -150,7 +150,7 @@ def _refusal(drive: _Drive, logs: list[Log]) -> tuple[str, str]:
     if _mirrored(drive.intervals):
         reason = LeftHanded()
     elif fit.reason == MOVED:
-        late = fit_problem(fit.lag_s or 0.0, 1.0)  # if it is late, braking looks like a stop on another slope
+        late = fit_problem(fit.lag_s or 0.0, 1.0)  # with a late speed, braking looks like a stop on another slope
         reason = of_firmware(late) if late else None
     elif found and found.sure:
         return "", ""

@@ -29,7 +29,7 @@ _WRITE_S, _SHARE = 15.0, 20.0  # s and multiple of the last writing's time until
 
 @dataclass
 class FleetRun:
-    """vehicles: number of mounts of vehicles. new: number of these that this run computed; the others were finished
+    """vehicles: number of mounts of vehicles. new: number of mounts that this run computed. The others were finished
     earlier. damaged: number of earlier results that could not be read and are recomputed. seen: a summary of all
     results."""
 

@@ -1,1 +1,1 @@
-"""Rides, logs and exports of apps that the tests make: whole, random or broken."""
+"""Generates rides, logs and app exports for the tests: valid, random or broken."""

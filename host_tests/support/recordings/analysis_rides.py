@@ -1,4 +1,4 @@
-"""Simulated rides for the tests of the analysis: a perfect sensor, turned into the vehicle's axes already."""
+"""Simulated rides for the tests of the analysis. The sensor is perfect, and its axes are the vehicle's."""
 
 import functools
 import json
@@ -28,7 +28,7 @@ def calibration(path: Path, **changed) -> Path:
 def write(directory: Path, segments: list, rate_hz: int = 100, speed_hz: int = 0, vibration_g: float = 0.02) -> Path:
     """Write RIDE.csv and RIDE.cal.json of a ride of these script segments; return the path of the former.
 
-    speed_hz: how often the log has a speed, 0 for never.
+    speed_hz: rate of the speed in the log, 0 for a log without speed.
     """
     return _put(directory, _text(segments, rate_hz, speed_hz, vibration_g))
 
@@ -53,7 +53,7 @@ def _text(segments: list, rate_hz: int, speed_hz: int, vibration_g: float) -> st
 
 
 def short(directory: Path, rate_hz: int = 100, speed_hz: int = 0) -> Path:
-    """A ride under a minute: stand, set off, a turn to each side, a hard stop."""
+    """Write a ride of less than a minute: stand, set off, a turn to each side, a hard stop."""
     return _put(directory, _short(rate_hz, speed_hz))
 
 
@@ -65,5 +65,5 @@ def _short(rate_hz: int, speed_hz: int) -> str:
 
 
 def table(path: Path) -> np.ndarray:
-    """A CSV of numbers by the names of its columns."""
+    """Read a CSV of numbers as an array with named columns."""
     return np.genfromtxt(path, delimiter=",", names=True)

@@ -1,6 +1,7 @@
-"""A known ride as apps and loggers export it: small writers of each format, after what its maker has published.
+"""Writes a known ride in the formats of apps and loggers. Each writer follows the published description of its format.
 
-Addresses are in the modules of kickstand_tools.imports.apps and in the tests. Nothing in here is copied from an export.
+Links to the descriptions are in the modules of kickstand_tools.imports.apps and in the tests. Nothing is copied from a
+real export.
 """
 
 import functools
@@ -36,11 +37,11 @@ class Riding:
     lean_deg: np.ndarray
 
     def every(self, steps: int, offset: int = 0) -> "Riding":
-        """Each of so many samples, from the one of number offset on."""
+        """Return every steps-th sample, starting at index offset."""
         return Riding(*(getattr(self, name)[offset::steps] for name in self.__dataclass_fields__))
 
     def each_second(self) -> "Riding":
-        """One sample a second."""
+        """Return one sample per second."""
         return self.every(round(1.0 / float(np.median(np.diff(self.t_s)))), 20)
 
     def without(self, begin_s: float, end_s: float) -> "Riding":
@@ -60,14 +61,14 @@ class Riding:
 
     @property
     def gravity_g(self) -> np.ndarray:
-        """What a phone takes for gravity: the direction up in its axes, upright or leaned, as a specific force."""
+        """Return the phone's estimate of gravity: a specific force along up, in the phone's axes."""
         lean = np.radians(self.lean_deg)
         return np.column_stack((np.sin(lean), np.cos(lean), np.zeros(len(lean)))) @ PHONE.T
 
 
 @functools.cache
 def riding(rate_hz: int = 200) -> Riding:
-    """Half a minute: stand, set off, a turn to each side, a stop; with positions from Berlin on."""
+    """Return a ride of half a minute: stand, set off, a turn to each side, a stop. Its positions begin in Berlin."""
     parts = [script.upright(3), script.accelerate(14, 4), script.turn(-25, 4), script.straight(1)]
     ride = script.Ride([*parts, script.turn(35, 4), script.straight(1), script.brake(0, 3), script.wait(2)], 0.02)
     t_s = np.arange(round(ride.seconds * rate_hz)) / rate_hz
@@ -106,7 +107,8 @@ def into(target: Path, files: dict[str, str]) -> Path:
 
 
 def phyphox(ride: Riding, separator: str = ",", comma: bool = False) -> dict[str, str]:
-    """Names and columns of the app's own template; a gyro of half the rate and a bit later, GPS once a second."""
+    """Use the names and columns of the app's own template. The gyro has half the rate and starts slightly later. GPS
+    comes once per second."""
 
     def number(value: float, digits: int = 9) -> str:
         return f"{value:.{digits}E}".replace(".", "," if comma else ".")
@@ -133,7 +135,8 @@ def phyphox(ride: Riding, separator: str = ",", comma: bool = False) -> dict[str
 
 
 def sensor_logger(ride: Riding, platform: str = "android", standard: bool = False) -> dict[str, str]:
-    """One CSV a sensor, z before y before x, times in ns since 1970. An iPhone has no TotalAcceleration."""
+    """Write one CSV per sensor, with columns in the order z, y, x and times in ns since 1970. An iPhone has no
+    TotalAcceleration."""
     sign = -1.0 if platform == "ios" and not standard else 1.0
     gyro = ride.every(2, 1)
     head = ["time", "seconds_elapsed", "z", "y", "x"]
@@ -167,7 +170,8 @@ def sensor_logger(ride: Riding, platform: str = "android", standard: bool = Fals
 
 
 def sensorlog(ride: Riding, separator: str = ",", accelerometer: bool = True) -> str:
-    """The wide CSV: Core Motion's values, rows that repeat what is not new, a fix once a second."""
+    """Write the wide CSV with Core Motion's values. Rows repeat old values until new ones come. GPS comes once per
+    second."""
     boot_s = 86_400.0
     names = ["loggingTime(txt)", "loggingSample(N)", "locationTimestamp_since1970(s)", "locationLatitude(WGS84)"]
     names += ["locationLongitude(WGS84)", "locationSpeed(m/s)"]
@@ -193,7 +197,8 @@ def sensorlog(ride: Riding, separator: str = ",", accelerometer: bool = True) ->
 
 
 def sensor_kinetics(ride: Riding, semicolon: bool = False) -> dict[str, str]:
-    """NAME_accm.csv, NAME_gyrm.csv, NAME_lacm.csv, NAME_grvm.csv: times of four decimals, some of them twice."""
+    """Write NAME_accm.csv, NAME_gyrm.csv, NAME_lacm.csv and NAME_grvm.csv. Times have four decimals, and some occur
+    twice."""
     head = ["time", "X_value", "Y_value", "Z_value"]
 
     def table(part: Riding, values: np.ndarray) -> str:
@@ -211,7 +216,8 @@ def sensor_kinetics(ride: Riding, semicolon: bool = False) -> dict[str, str]:
 
 
 def racechrono(ride: Riding, sign: float = 1.0, version: int = 3) -> str:
-    """Version 3 has three header lines and repeats some names. Version 2 has one, with units in brackets."""
+    """Version 3 has three header lines and repeats some names. Version 2 has one header line, with units in
+    brackets."""
     force, rates = sign * ride.phone_g, np.degrees(ride.phone_rad)
     none = [""] * len(ride.t_s)
     speed = [f"{value:.2f}" for value in ride.speed_mps]
@@ -244,7 +250,7 @@ def racechrono(ride: Riding, sign: float = 1.0, version: int = 3) -> str:
 
 
 def racebox(ride: Riding, per_mps: float = 3.6, laps: bool = False) -> str:
-    """x forward, y left, z up; Speed without a unit, per_mps times m/s."""
+    """Axes: x forward, y left, z up. The header gives no unit for Speed. per_mps: its value for 1 m/s."""
     names = "Record,Time,Latitude,Longitude,Altitude,Speed,GForceX,GForceY,GForceZ,Lap,GyroX,GyroY,GyroZ".split(",")
     rows = []
     for k, (left, up, forward) in enumerate(ride.force_g.tolist()):
@@ -260,7 +266,8 @@ def racebox(ride: Riding, per_mps: float = 3.6, laps: bool = False) -> str:
 
 
 def vbo(ride: Riding, speed: str = "kmh") -> str:
-    """Sections; minutes, positive in the west; an IMU04's channels in their own signs."""
+    """Write a file in sections. Positions are in minutes, west positive. The channels of an IMU04 have its own
+    signs."""
     per_mps = {"kmh": 3.6, "knots": 3600.0 / 1852.0}[speed]
     names = ["sats", "time", "lat", "long", "velocity", "heading", "height"]
     units = ["g", "g", "g", "deg/s", "deg/s", "deg/s"]
@@ -282,7 +289,8 @@ def vbo(ride: Riding, speed: str = "kmh") -> str:
 
 
 def aim(ride: Riding, quoted: bool = True, up_sign: float = -1.0) -> str:
-    """Axes forward, right, down; every cell in quotation marks, or as a spreadsheet has saved it."""
+    """Axes: forward, right, down. quoted: True for quotation marks around every cell, False for a file saved again by a
+    spreadsheet."""
     names = ["Time", "GPS Speed", "GPS Nsat", "GPS Latitude", "GPS Longitude", "InlineAcc", "LateralAcc", "VerticalAcc"]
     names += ["RollRate", "PitchRate", "YawRate", "GPS InlineAcc"]
     units = ["s", "km/h", "#", "deg", "deg", "g", "g", "g", "deg/s", "deg/s", "deg/s", "g"]
@@ -307,7 +315,7 @@ ANY_NAMES: dict[str, str] = dict(
 
 
 def any_table(ride: Riding, separator: str = ",", comma: bool = False) -> str:
-    """A logger that nobody knows: ms, m/s2, rad/s, km/h."""
+    """Write the table of an unknown logger, in ms, m/s2, rad/s and km/h."""
     names = ["Millis", "Acc_X", "Acc_Y", "Acc_Z", "Gyro_X", "Gyro_Y", "Gyro_Z", "Speed_kmh", "Note"]
     rows = []
     for k, t in enumerate(ride.t_s.tolist()):

@@ -1,4 +1,4 @@
-"""Logs that are broken in many ways. The same number always breaks a log in the same way."""
+"""Breaks logs in many ways. The same number always breaks a log in the same way."""
 
 import contextlib
 import functools
@@ -16,7 +16,7 @@ SIZES = (0.0, 1e-3, 1e-6, 9.80665, 57.29578, 1000.0, 1e6, 1e12, -1.0)
 
 
 def _of_lines(way):
-    """A way to break the lines of a text as one to break the text."""
+    """Turn a function that breaks a list of lines into one that breaks a text."""
 
     @functools.wraps(way)
     def of_text(text: bytes, chance: random.Random) -> bytes:
@@ -27,7 +27,7 @@ def _of_lines(way):
 
 
 def _of_cells(way):
-    """The same of lists of cells, which it changes."""
+    """Turn a function that breaks lists of cells in place into one that breaks a text."""
 
     @functools.wraps(way)
     def of_text(text: bytes, chance: random.Random) -> bytes:
@@ -92,7 +92,7 @@ def lose_a_column(rows: Rows, chance: random.Random) -> None:
 def exchange_columns(rows: Rows, chance: random.Random) -> None:
     width = max(1, len(rows[0]))
     a, b = chance.randrange(width), chance.randrange(width)
-    header = chance.random() < 0.5  # with their names, or without
+    header = chance.random() < 0.5  # exchange the names in the header, too
     for row in rows[0 if header else 1 :]:
         if len(row) > max(a, b):
             row[a], row[b] = row[b], row[a]
@@ -134,7 +134,7 @@ def round_the_time(rows: Rows, chance: random.Random) -> None:
 
 @_of_cells
 def go_wild(rows: Rows, chance: random.Random) -> None:
-    """Readings up to the ends of the widest ranges."""
+    """Replace readings by values up to the limits of the widest ranges."""
     begin = chance.choice((1, len(rows) // 3))
     g, dps = chance.choice(((19.0, 2400.0), (4.0, 2400.0), (19.0, 10.0)))
     for row in rows[begin : begin + chance.choice((1, 20, 1000))]:
@@ -184,7 +184,7 @@ def nearly_nothing(text: bytes, chance: random.Random) -> bytes:
 
 
 def pack(text: bytes, chance: random.Random) -> bytes:
-    """With gzip's magic, whatever the name says."""
+    """Compress with gzip, with any file name."""
     return gzip.compress(text, 1, mtime=0)
 
 
@@ -196,7 +196,7 @@ WAYS = [
 
 
 def broken(bases: list[bytes], number: int) -> tuple[str, bytes, str]:
-    """Name and content of a file, and the ways in which it was broken, one to three of them."""
+    """Break a log in one to three ways. Return the name and content of the file, and these ways."""
     chance = random.Random(number)
     text = chance.choice(bases)
     ways = [WAYS[number % len(WAYS)], *chance.choices(WAYS, k=chance.choice((0, 0, 1, 2)))]

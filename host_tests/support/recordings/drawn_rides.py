@@ -1,7 +1,8 @@
-"""Rides whose road, bike, rider, mount and sensor are drawn at random, each from what is real: a second opinion.
+"""Draws rides at random: road, bike, rider, mount and sensor, each within real limits. They check the results of the
+first simulator.
 
-On the second simulator (other_bike.py), so that nothing is shared with kickstand_tools.simulation. The one exception is
-the data sheet's sensor with its six positions, where a caller asks for it. Parameters of the estimators are fitted with
+They use the second simulator (other_bike.py), which shares no code with kickstand_tools.simulation. With sheet=True,
+the sensor and its six positions come from kickstand_tools.simulation. Parameters of the estimators are fitted with
 even seeds only, and figures are reported of odd ones:
 
     OMP_NUM_THREADS=1 PYTHONPATH=host_tests .venv/bin/python -m support.recordings.drawn_rides odd 100
@@ -22,7 +23,7 @@ from kickstand_tools.simulation.physics.chip import GYRO_DPS_PER_G, Chip
 from support.recordings.other_bike import FINE_HZ, KINDS, G, _about, _course, _mounting, _noise, _readings, _tolerances
 from support.recordings.smoothed_rides import Known, rms
 
-# And how often. "foreign": accelerations that are not the bike's, of whatever shakes or bends the mount
+# Probability of each mount. "foreign": something else than the bike shakes or bends the mount
 MOUNTS = {"firm": 0.5, "holder": 0.1, "aliasing": 0.1, "clipping": 0.1, "drifting": 0.1, "foreign": 0.1}
 ROUGH = {"track": (4e-6, 32e-6)}  # m^3 at 0.1 cycles/m, of ISO 8608; others from a new motorway to a patched lane
 USUALLY_ROUGH = 8e-6, 512e-6
@@ -32,7 +33,7 @@ WAVES_PER_M = 0.03, 4.0
 @dataclass
 class DrawnRide:
     """logs: of each device on the bike (n samples each, on its own clock); calibrations likewise. Truth (m): time_s,
-    lean_deg, speed_mps. kind, mounts: what was drawn."""
+    lean_deg, speed_mps. kind, mounts: as drawn or as passed."""
 
     logs: list
     calibrations: list
@@ -43,7 +44,7 @@ class DrawnRide:
     mounts: list
 
     def true_lean(self, k):
-        """At the samples of device k."""
+        """Return the true lean at the samples of device k."""
         return np.interp(self.logs[k].t_s, self.time_s, self.lean_deg)
 
     def riding(self, k):
@@ -80,7 +81,7 @@ def city(chance):
 
 
 def hills(chance):
-    """As street, slower; slopes come by the ride's conditions."""
+    """Like street(), but slower. The ride's conditions add the slopes."""
     return [(s, lean, 0.7 * v) for s, lean, v in street(chance)]
 
 
@@ -88,9 +89,9 @@ DRAWN = {**KINDS, "street": street, "city": city, "hills": hills}
 
 
 def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
-    """mounts: of each device on the bike, drawn for one if None. kind: drawn if None. sheet: the sensor has all errors
-    of its data sheet, and is calibrated by one log of the six positions and by two poses; else it has those that are
-    left."""
+    """mounts: one per device on the bike, None to draw one for a single device. kind: None to draw it. sheet: True for
+    a sensor with all errors of its data sheet, calibrated by one log of the six positions and by two poses. Otherwise
+    the sensor only has the errors that remain after calibration."""
     chance = np.random.default_rng([seed, 24])
     drawn = str(chance.choice(list(DRAWN)))
     kind = kind or drawn
@@ -104,7 +105,7 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
     time, lean, v = _course([*kept, (8.0, 0.0, 15.0)])
     n = len(time)
     riding = np.clip((v - 1.0) / 3.0, 0.0, 1.0)
-    # The balance, and how the chassis leans beside it: wide tyres on a road with a tilt, and a rider who moves
+    # The balance lean, and the chassis lean, which differs: wide tyres, a banked road, and a rider who moves
     wander = chance.uniform(0.2, 0.8) * _noise(chance, n, chance.uniform(0.5, 1.5)) * riding
     balance = np.radians(lean + wander)
     tilt = np.radians(chance.uniform(-2.5, 2.5) + chance.uniform(0.3, 1.0) * _noise(chance, n, 8.0))
@@ -119,7 +120,7 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
     yaw_rate = np.where(v > 0.5, (falling - G * np.tan(balance)) / np.maximum(v, 3.0), 0.0)
     steep = chance.uniform(1.5, 4.0) if kind == "hills" else chance.uniform(0.3, 1.5)
     slope = np.radians(steep) * _noise(chance, n, chance.uniform(4.0, 10.0)) * riding
-    chance.uniform(0.15, 0.4)  # once the dive's: without it a seed would give another ride
+    chance.uniform(0.15, 0.4)  # unused: keeps the random sequence of each seed
     dive = _dive(np.random.default_rng([seed, 25]), np.gradient(v) * FINE_HZ / G)
     dive = _through(dive, *_spring(chance.uniform(1.4, 2.2), chance.uniform(0.35, 0.6)))
     low, high = ROUGH.get(kind, USUALLY_ROUGH)

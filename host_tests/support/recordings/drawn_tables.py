@@ -1,4 +1,4 @@
-"""Tables of six columns as people have them, drawn at random: names, order, units, separators, times, signs, motion."""
+"""Draws random but realistic tables with six columns: names, order, units, separators, times, signs and motion vary."""
 
 from dataclasses import dataclass
 
@@ -38,7 +38,7 @@ EPOCH_S = 1_715_938_200.25
 
 @dataclass
 class DrawnTable:
-    """text: of the file. time_s (n), force_g (n, 3), rates_dps (n, 3): what is in it. kind: of motion."""
+    """text: of the file. time_s (n), force_g (n, 3), rates_dps (n, 3): the readings in it. kind: of motion."""
 
     text: str
     time_s: np.ndarray
@@ -49,7 +49,7 @@ class DrawnTable:
 
 
 def draw(seed: int) -> DrawnTable:
-    """A table; the same for the same seed."""
+    """Return a random table. The same seed gives the same table."""
     random = np.random.default_rng(seed)
     kind = str(random.choice(["ride", "hand", "hand", "rest", "shaken"]))
     hz = float(random.choice([25.0, 50.0, 100.0, 200.0]))
@@ -171,7 +171,7 @@ def _table(random: np.random.Generator, names: list[str] | None, clock: str, tim
 
 
 def _labels(random: np.random.Generator, clock: str, time: list[str], cells: Cells) -> str:
-    """As a sketch prints them for a serial monitor."""
+    """Write lines as an Arduino sketch prints them for the serial monitor."""
     stamped = ":" in time[0]
     names = [name for axes in NAMES[random.integers(3)] for name in axes.split()]
     mark, between = str(random.choice([": ", ":", " = "])), str(random.choice(["\t", ", ", " "]))
@@ -184,7 +184,7 @@ def _labels(random: np.random.Generator, clock: str, time: list[str], cells: Cel
 
 
 def _events(random: np.random.Generator, clock: str, time: list[str], cells: Cells) -> str:
-    """A row for each event: the inertial unit's have all six values."""
+    """Write one row per event. Rows of the inertial unit have all six values."""
     lines = [f"{clock},sensor,v1,v2,v3,v4,v5,v6"]
     for k, (at, row) in enumerate(zip(time, cells)):
         lines.append(",".join((at, "IMU", *row)))
@@ -194,7 +194,7 @@ def _events(random: np.random.Generator, clock: str, time: list[str], cells: Cel
 
 
 def _two_sensors(random: np.random.Generator, clock: str, time: list[str], cells: Cells) -> str:
-    """A row for each event: accelerometer and gyro in turn."""
+    """Write one row per event, alternately from accelerometer and gyro."""
     names = [("accelerometer", "gyroscope"), ("ACC", "GYR"), ("acc", "gyro")][random.integers(3)]
     lines = [f"{clock},type,x,y,z"]
     for at, row in zip(time, cells):

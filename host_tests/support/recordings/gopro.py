@@ -1,4 +1,4 @@
-"""Small videos, and the telemetry of a GoPro in them."""
+"""Makes small videos, with or without a GoPro's telemetry."""
 
 import struct
 import subprocess
@@ -22,7 +22,7 @@ def film(path: Path, seconds: float, fps: int = 10, size: str = "320x240", colou
 def frames(path: Path, form: str = "rgb24") -> np.ndarray:
     """(n, height, width, 3 or 4) all pictures of a video; "rgba": with its transparency."""
     channels = 4 if form == "rgba" else 3
-    decoder = ["-c:v", "libvpx-vp9"] if path.suffix == ".webm" else []  # ffmpeg's own leaves the transparency out
+    decoder = ["-c:v", "libvpx-vp9"] if path.suffix == ".webm" else []  # ffmpeg's own decoder ignores transparency
     reader = imageio_ffmpeg.read_frames(str(path), pix_fmt=form, bits_per_pixel=8 * channels, input_params=decoder)
     width, height = next(reader)["size"]
     return np.array([np.frombuffer(frame, np.uint8).reshape(height, width, channels) for frame in reader])
@@ -35,7 +35,7 @@ def with_telemetry(video: Path, rate_dps: np.ndarray, rate_hz: float) -> Path:
     content = video.read_bytes()
     moov = _find(content, b"moov")
     head, inner, rest = content[: moov.start], content[moov.start + 8 : moov.stop], content[moov.stop :]
-    assert not rest  # what stands before stays where it is
+    assert not rest  # the data before it must not move
     length = 8 + len(inner) + len(_track(packets, 0))
     grown = inner + _track(packets, len(head) + length + 8)
     video.write_bytes(head + _box(b"moov", grown) + _box(b"mdat", b"".join(packets)))
@@ -72,7 +72,7 @@ def _find(content: bytes, name: bytes) -> slice:
 
 
 def _track(packets: list[bytes], begin: int) -> bytes:
-    """A track of MP4 with a packet a second. begin: place of the first one in the file."""
+    """Return an MP4 track with one packet per second. begin: offset of the first packet in the file."""
     count, seconds = len(packets), 1000 * len(packets)
     matrix = struct.pack(">9i", 65536, 0, 0, 0, 65536, 0, 0, 0, 1 << 30)
     tkhd = struct.pack(">IIIIII8xHHHH", 7, 0, 0, 3, 0, seconds, 0, 0, 0, 0) + matrix + struct.pack(">II", 0, 0)

@@ -27,7 +27,7 @@ SPEEDS = ("GPS 1 Hz", "GPS 10 Hz", "wheel")
 
 @dataclass
 class Measured(Known):
-    """A ride, with its true speed (n, m/s)."""
+    """A ride with its true speed (n, m/s)."""
 
     speed_mps: np.ndarray
 
@@ -39,7 +39,7 @@ class Measured(Known):
         n = len(at)
         true, lean = (np.interp(at - late, time, values) for values in (self.speed_mps, self.lean_deg))
         if kind == "wheel":
-            # Its tyre is worn, smaller where it leans, and slips by what it drives with
+            # The tyre is worn, has a smaller radius when leaned, and slips with the driving force
             push = np.gradient(true, at) / 9.8
             shrunk = 1.0 - 0.28 * (1.0 - np.cos(np.radians(lean)))
             seen = true * chance.uniform(0.98, 1.02) / shrunk * (1.0 + 0.05 * np.clip(push, -0.3, 0.5))

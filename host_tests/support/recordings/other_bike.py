@@ -1,4 +1,4 @@
-"""A second simulator of rides, which shares nothing with kickstand_tools.simulation: a check on what is fitted to that.
+"""A second simulator of rides. It shares no code with kickstand_tools.simulation, and checks parameters fitted to that.
 
 A path and an attitude are drawn as curves, the place of the sensor follows from them, and its readings are numerical
 derivatives: of the place for the force, of the attitude's matrix for the rates. The bike is in exact balance, but for a
@@ -26,7 +26,7 @@ def sweepers(chance):
 
 
 def held(chance):
-    """Long turns to both sides, one directly after the other."""
+    """Return long turns to both sides, without straights between them."""
     legs = [(6.0, 0.0, 0.0), (8.0, 0.0, 20.0)]
     for k in range(5):
         legs += [(chance.uniform(25.0, 60.0), chance.uniform(28.0, 42.0) * (-1.0) ** k, chance.uniform(18.0, 25.0))]
@@ -34,7 +34,7 @@ def held(chance):
 
 
 def track(chance):
-    """35 corners of 30 to 55 degrees, one after the other, with a short straight now and then."""
+    """Return 35 corners of 30 to 55 degrees, with a few short straights."""
     legs = [(6.0, 0.0, 0.0), (8.0, 0.0, 28.0)]
     for _ in range(35):
         lean, speed = chance.choice((-1.0, 1.0)) * chance.uniform(30.0, 55.0), chance.uniform(18.0, 33.0)
@@ -96,7 +96,7 @@ def _tolerances(chance):
 
 
 def _mounting(chance):
-    """How a sensor sits: any rotation."""
+    """Return a random rotation as the sensor's mounting."""
     mounting, _ = np.linalg.qr(chance.standard_normal((3, 3)))
     return mounting * np.linalg.det(mounting)
 
@@ -143,7 +143,7 @@ def _about(axis, angle):
 
 
 def _smooth(values, seconds):
-    """Twice a moving mean: as smooth as a hand."""
+    """Apply a moving mean twice, for motion as smooth as a hand's."""
     width = max(1, round(seconds * FINE_HZ))
     window = np.full(width, 1.0 / width)
     for _ in range(3):
@@ -153,7 +153,7 @@ def _smooth(values, seconds):
 
 
 def _noise(chance, n, seconds):
-    """Smooth noise of rms 1 that changes within so many seconds."""
+    """Return smooth noise of rms 1 that changes within this number of seconds."""
     knots = chance.standard_normal(int(n / FINE_HZ / seconds) + 3)
     values = _smooth(np.interp(np.arange(n) / FINE_HZ / seconds, np.arange(len(knots)), knots), 0.5 * seconds)
     return values / np.std(values)

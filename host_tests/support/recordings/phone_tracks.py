@@ -1,4 +1,4 @@
-"""Tracks as a phone records them on a simulated ride, and files of them."""
+"""Simulates the tracks that a phone records on a ride, and writes them to files."""
 
 import datetime
 import struct
@@ -27,11 +27,11 @@ def track(
     speed: bool = True,
     pace: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Track:
-    """One point a second, from before the ride until after it.
+    """Return one point per second, from before the ride until after it.
 
-    Positions err by error_m (1 sigma), which changes within changes_s. They are late by late_s in all; smooth_s of it
-    is the mean delay of a low-pass. pace: the same road at other times: for each sample of the ride when it comes, s,
-    and how much faster.
+    Positions err by error_m (1 sigma), which changes within changes_s. Their total delay is late_s, and smooth_s of it
+    is the mean delay of a low-pass. pace: the same road at another speed: for each sample of the ride, its new time in
+    s and the factor on its speed.
     """
     chance = np.random.default_rng(seed)
     step_s = 1.0 / ride.rate_hz
@@ -63,7 +63,7 @@ def _low_pass(values: np.ndarray, delay_s: float, step_s: float) -> np.ndarray:
 
 
 def _wander(chance: np.random.Generator, count: int, sigma_m: float, changes_s: float) -> np.ndarray:
-    """An error that is forgotten within changes_s, and a little noise."""
+    """Return an error with correlation time changes_s, plus a little noise."""
     kept, values = np.exp(-1.0 / changes_s), [chance.normal(0.0, sigma_m)]
     for push in chance.normal(0.0, sigma_m * np.sqrt(1.0 - kept * kept), count - 1):
         values.append(kept * values[-1] + push)
@@ -90,7 +90,7 @@ def write_gpx(path: Path, track: Track, speed_as: str = "") -> Path:
 
 
 def write_fit(path: Path, track: Track) -> Path:
-    """Records with time, position and speed, as Garmin's FIT protocol has them; whole seconds."""
+    """Write records with time in whole seconds, position and speed, in Garmin's FIT format."""
     fields = ((253, 4, 0x86), (0, 4, 0x85), (1, 4, 0x85), (6, 2, 0x84))  # number, size, type
     body = struct.pack("<BBBHB", 0x40, 0, 0, 20, len(fields)) + b"".join(struct.pack("BBB", *field) for field in fields)
     for utc_s, lat, lon, speed in zip(track.utc_s, track.lat_deg, track.lon_deg, track.speed_mps):
@@ -103,7 +103,7 @@ def write_fit(path: Path, track: Track) -> Path:
 
 
 def _crc(data: bytes) -> int:
-    """CRC-16/ARC, that of the FIT protocol."""
+    """Return the CRC-16/ARC, which the FIT protocol uses."""
     crc = 0
     for byte in data:
         crc ^= byte

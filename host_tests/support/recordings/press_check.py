@@ -1,4 +1,4 @@
-"""How often the gyro check of the two presses refuses a sound sensor, and how often it misses an ill one.
+"""Measures how often the gyro check of the two presses refuses a good sensor, and how often it misses a faulty one.
 
 Sensors with all errors of the data sheet, calibrated by the six positions or not, mounted at any angle. Hands raise the
 bike from its stand at once or after a while, shake it and turn it about the vertical. As a program:
@@ -58,7 +58,7 @@ def presses(chance, chip, mounting):
 
 
 def refusal(chance, fault=None, six_done=False, axis=0):
-    """The code of the refusal, or None. fault: of the gyro's `axis`."""
+    """Return the code of the refusal, or None. fault: a fault of the gyro's `axis`."""
     chip, mounting = Chip.random(chance), random_rotation(chance)
     readings, _ = presses(chance, chip, mounting)
     factor = {"dead": 0.0, "half": 0.5, "mirrored": -1.0, "double": 2.0, None: 1.0}[fault]
@@ -88,7 +88,7 @@ def refusal(chance, fault=None, six_done=False, axis=0):
 
 
 def main(count):
-    """Print the share of refusals of so many sound sensors, then of each fault."""
+    """Print the share of good sensors that are refused, then the share for each fault."""
     for six_done in (False, True):
         codes = [refusal(np.random.default_rng([k, 31]), None, six_done)[0] for k in range(int(count))]
         found = {str(code): codes.count(code) for code in set(codes)}

@@ -1,4 +1,4 @@
-"""Rides written by the firmware's own recorder, as a board's flash would hold them."""
+"""Writes rides with the firmware's own recorder, as in a board's flash."""
 
 import math
 import random
@@ -79,7 +79,7 @@ def blocks(
 
 
 def begun(length, sequence=0, block=None):
-    """A block of ride 1 with nothing in it yet; of the same RideBlock as before, if one is given."""
+    """Return an empty block of ride 1. Reuse the RideBlock if one is passed."""
     block = block or RideBlock(5000)
     block.begin(length, 1, sequence, 0, CHIP, 200, bytes(80))
     return block

@@ -1,1 +1,2 @@
-"""The pages in a browser: a user who clicks, ports and radios that lead to boards in the test's process."""
+"""Tests of the pages in a browser: a simulated user, and fake ports and radios connected to boards in the test's
+process."""

@@ -55,7 +55,7 @@ class Bridge:
                 try:
                     answer.set_result(await getattr(self, "_" + name)(central, kind, data))
                 except (Exception, asyncio.CancelledError) as error:
-                    # bumble cancels what waits for a connection that is lost: the page is to hear of it and to go on
+                    # bumble cancels tasks that wait for a lost connection: report the loss to the page and continue
                     task = asyncio.current_task()
                     if task is not None and task.cancelling():
                         raise
@@ -98,7 +98,7 @@ class Bridge:
     # Called by the test
 
     def drop(self):
-        """The connection is lost."""
+        """Cut the connection."""
         self.air.radio._clock.at(0, self.air.dropped)
 
     def silence(self, on):

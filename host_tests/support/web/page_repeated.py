@@ -12,7 +12,7 @@ from kickstand_tools.web.device import Device, PageDevice
 
 
 def page(orders, until_s):
-    """As worker.mjs turns it, but in slices of other lengths."""
+    """Run the board like worker.mjs, but in slices of other lengths."""
     device = PageDevice()
     done, slice_s, now_s = [], 0.007, 0.0
     for at_s, name, value in orders:
@@ -26,7 +26,7 @@ def page(orders, until_s):
 
 
 def loop(orders, until_s):
-    """With kickstand.start.main() and its loop."""
+    """Run the board with kickstand.start.main() and its own loop."""
     device = Device()
     from kickstand.start import main
 

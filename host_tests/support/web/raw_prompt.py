@@ -1,4 +1,4 @@
-"""An imagined board at the other end of a SerialLine: MicroPython's raw prompt, byte by byte, before a FakeBoard."""
+"""A fake board for a SerialLine. It speaks MicroPython's raw prompt byte by byte, and runs code on a FakeBoard."""
 
 import base64
 
@@ -8,7 +8,7 @@ _RAW_PASTE = b"\x05A\x01"
 
 
 class RawPrompt:
-    """Has as much of an emulator.pico.Pico as SerialLine asks for. board: a FakeBoard, on which the code is run.
+    """Has the part of the emulated Pico's interface that SerialLine uses. board: a FakeBoard, on which the code is run.
     streams: blocks that the app sends each time that it is started, in place of being run; it goes on, and sends no
     more, until Ctrl-C.  vehicle: in its config.py.  deaf: says nothing at all."""
 
@@ -37,7 +37,7 @@ class RawPrompt:
                     self.heard(b"\x04\x04>")
             elif byte == _CTRL_A and self._typed + b"\x01" == _RAW_PASTE:
                 self._typed = b""
-                self.heard(b"R\x00")  # it understands, but cannot
+                self.heard(b"R\x00")  # raw paste is understood, but not supported
             elif byte == _CTRL_A:
                 self._typed = b""
                 self.heard(_PROMPT)
@@ -63,7 +63,7 @@ class RawPrompt:
 
 
 def said(blocks):
-    """Blocks as usb_stream prints them."""
+    """Return blocks in the form in which usb_stream prints them."""
     return b"".join(
         b"".join(base64.b64encode(block[at : at + 256]) + b"\r\n" for at in range(0, len(block), 256)) + b".\r\n"
         for block in blocks

@@ -1,4 +1,4 @@
-"""A rider at the page: real clicks and keys, and what there is to be seen then."""
+"""A simulated rider who uses the page by real clicks and keys, and reads what it shows."""
 
 import os
 from pathlib import Path
@@ -8,9 +8,9 @@ import pytest
 
 PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
 LAPTOP: dict[str, Any] = {"viewport": {"width": 1440, "height": 900}}
-READ_S = 120  # at most, until the page shows what is waited for: a busy machine is late with all of it
+READ_S = 120  # longest wait for the page, long enough for a busy computer
 
-# Keeps what the board's worker sends, for tests to look at and to repeat; and lets the page draw less often
+# Stores the messages of the board's worker for the tests, and makes the page draw less often
 KEEP = Path(__file__).with_name("keep.js").read_text()
 
 # Of a file whose address ends so the site gives nothing but this status; window.given() again fetches all. The service
@@ -37,18 +37,18 @@ class Rider:
         self.page.goto(address)
 
     def reads(self, text):
-        """Wait until the display says this in its first line."""
+        """Wait until the display's first line starts with this text."""
         self.page.wait_for_function(
             "text => seen.last && document.querySelector('#display').ariaLabel.startsWith(`Display: ${text}`)",
             arg=text,
         )
 
     def guide_says(self, text):
-        """Wait until the guide says this."""
+        """Wait until the guide shows this text."""
         self.page.wait_for_function("text => document.querySelector('#todo').textContent.includes(text)", arg=text)
 
     def wait(self, seconds):
-        """Until so much of the board's time has passed."""
+        """Wait until this time has passed on the board's clock."""
         self.page.wait_for_function(
             "until => seen.last.t_s >= until", arg=self.seen("last")["t_s"] + seconds, timeout=1000 * (seconds + READ_S)
         )
@@ -58,28 +58,28 @@ class Rider:
             self.page.keyboard.press(key)
 
     def hold(self, seconds):
-        """Keep the space bar pressed for so long."""
+        """Press the space bar for this time."""
         self.page.keyboard.down("Space")
         self.wait(seconds)
         self.page.keyboard.up("Space")
-        self.wait(0.3)  # as a finger does, which does not press again at once
+        self.wait(0.3)  # a finger also waits between presses
 
     def click(self, selector):
         self.page.click(selector)
 
     def seen(self, what):
-        """What the board has sent, by a name in KEEP."""
+        """Return messages of the board, by a name in KEEP."""
         return self.page.evaluate(f"seen.{what}")
 
     def text(self, selector):
         return self.page.inner_text(selector)
 
     def leans(self):
-        """(true, shown) as the page says them, degrees, > 0 to the right."""
+        """Return the (true, shown) lean from the page's text, degrees, > 0 to the right."""
         return tuple(_lean_deg(self.text(selector)) for selector in ("#true-lean", "#shown-lean"))
 
     def align(self):
-        """The two presses, as the guide asks for them."""
+        """Do the two presses that the guide asks for."""
         self.guide_says("Press the button")
         self.click("#press")
         self.reads("Now upright")
@@ -88,7 +88,7 @@ class Rider:
         self.click("#press")
 
     def axe(self):
-        """What axe-core finds, in the light and in the dark: a line for each."""
+        """Return axe-core's findings in light and dark mode, one line per finding."""
         axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
         found = []
         for scheme in ("light", "dark"):
@@ -98,16 +98,16 @@ class Rider:
         return found
 
     def fits(self):
-        """Is the page as wide as its window?"""
+        """True if the page fits the width of its window."""
         return self.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
     def strangers(self):
-        """The addresses beyond the site that it has asked for."""
+        """Return the requested addresses outside the site."""
         home = "/".join(self.asked[0].split("/")[:3]) + "/"
         return [url for url in self.asked if not url.startswith((home, f"blob:{home}", "data:"))]
 
     def slow(self, times):
-        """Let the page's own thread have this part of the processor only."""
+        """Slow down the page's main thread by this factor."""
         self.context.new_cdp_session(self.page).send("Emulation.setCPUThrottlingRate", {"rate": times})
 
     def processes(self):

@@ -1,4 +1,4 @@
-"""The page Rides, with somebody who gives it files; and numbers compared."""
+"""Drives the page Rides, and compares numbers in its output."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ import pytest
 
 from support.recordings import analysis_rides, app_exports
 
-WAIT_MS = 120_000  # a busy machine starts Python late
+WAIT_MS = 120_000  # Python starts slowly on a busy computer
 PHONE_MOUNTED = analysis_rides.CALIBRATION | {"vehicle_from_sensor": app_exports.PHONE.tolist()}
 
 
@@ -18,19 +18,19 @@ class Rides:
         self.rider, self.page = rider, rider.page
 
     def give(self, *files):
-        """Choose files in place of all before; what the page says in the end."""
+        """Replace all earlier files by these. Return the page's final text."""
         while self.held():
             self.remove("#held li:first-child button")
             self.said()
         return self.add(*files)
 
     def show(self, *files):
-        """Give them, unless their report is there already."""
+        """Give these files to the page, unless their report is already shown."""
         if set(self.held()) != {file.name for file in files} or self.page.is_hidden("#report"):
             assert self.give(*files) == ""
 
     def add(self, *files):
-        """Choose files; what the page says in the end."""
+        """Choose files and return the page's final text."""
         self.page.set_input_files("#files", files)
         return self.said()
 
@@ -49,7 +49,7 @@ class Rides:
         return self.page.inner_text("#said")
 
     def saved(self, selector) -> bytes:
-        """What a button offers for download."""
+        """Return the file that a button downloads."""
         with self.page.expect_download(timeout=WAIT_MS) as download:
             self.page.click(selector)
         return Path(download.value.path()).read_bytes()
@@ -71,7 +71,7 @@ def near(found, wanted, by):
 
 
 def assert_near(found, wanted):
-    """The same JSON, but for the last digit of its numbers."""
+    """Check that the JSON is equal, except for the last digit of numbers."""
     if isinstance(wanted, dict):
         assert found.keys() == wanted.keys()
         for key in wanted:

@@ -10,7 +10,7 @@ from pathlib import Path
 from support.web.raw_prompt import RawPrompt
 from support.web.rider import Rider
 
-# Takes the place of navigator.serial. boardSays() and boardHears() are Python's.
+# Replaces navigator.serial. boardSays() and boardHears() are Python functions.
 FAKE = Path(__file__).with_name("fake_serial.js").read_text()
 
 
@@ -58,23 +58,23 @@ class SerialLine:
         return self.connected
 
     def look(self):
-        """Click, and what the page says of the board."""
+        """Click, and return the page's text about the board."""
         self.rider.page.click("#look")
         return self._said_by("#look")
 
     def install(self):
-        """Click, and what the page says in the end."""
+        """Click, and return the page's final text."""
         self.rider.page.click("#install")
         return self._said_by("#look")
 
     def status(self):
-        """Click, and the status that the page shows, or why it shows none."""
+        """Click, and return the status on the page, or the reason for its absence."""
         self.rider.page.click("#status")
         why = self._said_by("#status", "#status-said")
         return self.rider.text("#status-text") if self.rider.page.is_visible("#status-text") else why
 
     def check(self):
-        """Click, and the text of the check that the page shows, or why it shows none."""
+        """Click, and return the text of the check on the page, or the reason for its absence."""
         self.rider.page.click("#check")
         why = self._said_by("#check", "#status-said")
         return self.rider.text("#status-text") if self.rider.page.is_visible("#status-text") else why

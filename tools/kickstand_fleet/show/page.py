@@ -1,4 +1,4 @@
-"""index.html: a fleet at a glance. It needs no network and no server."""
+"""Writes index.html, an overview of a fleet. The page needs no network and no server."""
 
 import heapq
 import math

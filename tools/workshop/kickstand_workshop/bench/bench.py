@@ -33,7 +33,7 @@ _MODES: dict[str, dict[str, Any]] = {
 
 
 def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
-    """Measure everything, which takes minutes. The names of the figures end with their units.
+    """Measure all costs. This takes minutes. The name of each figure ends with its unit.
 
     seconds: emulated time of each of five runs (four on an ESP32, whose stages are not measured). Raises GuestError if
     the program on the board fails.
@@ -47,7 +47,7 @@ def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
         **plain,
         "chip": chip,
         "stage_us": {name: _spread(us) for name, us in _stages(_run(chip, seconds, detail=True)).items()}
-        if chip == "rp2040"  # on other chips noting a stage would take longer than the stage
+        if chip == "rp2040"  # on other chips, recording a stage takes longer than the stage
         else {},
         "modes": modes,
         "boot": {form: asdict(start(chip, form == "mpy")) for form in ("py", "mpy")},
@@ -56,7 +56,7 @@ def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
 
 
 def tables(result: dict[str, Any]) -> Group:
-    """The result of bench() for a terminal."""
+    """Format the result of bench() for a terminal."""
     times = Table(title=f"A turn of the loop at {result['sample_hz']} samples a second: emulated us, {result['chip']}")
     times.add_column("stage")
     for name in ("median", "p99", "max"):
@@ -97,8 +97,8 @@ def start(chip: str, compiled: bool = True) -> boot.Boot:
 
 
 def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Measure the costs of the app's loop in a run of this emulated time. The names of the figures end with their
-    units. chosen: settings by name."""
+    """Measure the costs of the app's loop. seconds: emulated time of the run. chosen: settings by name. The name of
+    each figure ends with its unit."""
     run = _run(chip, seconds, chosen=chosen)
     figures = run["figures"]
     return {
@@ -118,7 +118,7 @@ def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = Non
 
 
 def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Run the app's loop for this emulated time. chosen: settings by name. Returns the figures and arrays of
+    """Run the app's loop. seconds: emulated time. chosen: settings by name. Returns the figures and arrays of
     bench_guest, and the numbers of samples taken and lost.
     """
     chosen = chosen or {}
@@ -150,7 +150,7 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
             device.fit_wheel(lambda t_s: _SPEED_MPS)
         code = f"{device.SINK}import bench_guest\nbench_guest.run({detail}, {seconds}, Sink(), {chosen})\n"
         said = device.exec(code, limit_s=2.0 * seconds + 30.0)
-        result["figures"] = ast.literal_eval(said.rpartition("\x02")[2].strip())  # after what a Sink has printed
+        result["figures"] = ast.literal_eval(said.rpartition("\x02")[2].strip())  # after the output of a Sink
     turns = result["figures"]["turns"]
     result["took"] = arrays[0][:turns]
     asked_for = arrays[1][: result["figures"]["collections_by_app"]]
@@ -187,7 +187,7 @@ def _spread(us: np.ndarray) -> dict[str, float]:
 
 
 def _calibration() -> dict[str, bytes]:
-    """The files with the calibration of _SENSOR, which only contains the mounting."""
+    """Return the calibration files of _SENSOR. The calibration only contains the mounting."""
     calibration = Calibration()
     calibration.aligned = True
     for i, value in enumerate(_SENSOR.vehicle_from_sensor):

@@ -12,15 +12,15 @@ from machine import mem16
 from uctypes import addressof, bytearray_at
 
 SETTLE_TURNS = 150  # turns before anything is recorded
-# Number of turns without garbage collection, after which their heap use is recorded. An ESP32's heap is small, and does
-# not grow without collections.
+# The heap use is recorded after this number of turns without garbage collection. An ESP32's heap is small, and does not
+# grow without collections.
 HEAP_TURNS = 3 if sys.platform == "esp32" else 10
 MAX_PAUSES = 2000
 MAX_TURNS_HZ = 200
 
 
 class Config:
-    """The bench's settings that differ from the defaults, as in config.py."""
+    """The settings of the bench that differ from the defaults. It has the form of config.py."""
 
     SAMPLE_HZ = 200
     WATCHDOG = False
@@ -31,22 +31,22 @@ class Done(Exception):
 
 
 class Canary:
-    """A piece of heap without a reference. After a collection has freed it, it is soon overwritten.
+    """A piece of heap without a reference, to detect garbage collections. A freed piece is soon overwritten.
 
-    So it shows that a collection has run. gc.mem_alloc() would also show it, but takes 7 ms.
+    gc.mem_alloc() would also show a collection, but takes 7 ms.
     """
 
     MARK = 0x5AC3
 
     def arm(self):
-        self._address = addressof(array("H", [self.MARK] * 8))  # the collector does not treat an address as a reference
+        self._address = addressof(array("H", [self.MARK] * 8))  # an address does not keep the array alive
 
     def died(self):
         return mem16[self._address] != self.MARK
 
 
 class TimedGc:
-    """Replaces the module gc in the app: times the collections that the app starts."""
+    """Replaces the module gc in the app, to time the collections that the app starts."""
 
     def __init__(self, app):
         self._app = app
@@ -72,7 +72,7 @@ class MeasuredApp(app_module.App):
 
     def prepare(self, seconds, out, spent):
         """seconds: recording time. out: a Sink to the host. spent: us of each stage in this turn, or None."""
-        gc.collect()  # otherwise the arrays would be behind garbage, and make each collection longer
+        gc.collect()  # otherwise the arrays come after garbage, and lengthen each collection
         turns = seconds * MAX_TURNS_HZ
         self._out, self._spent, self._turns = out, spent, turns
         self._until_us = seconds * 1_000_000
@@ -135,8 +135,8 @@ class MeasuredApp(app_module.App):
 
 
 def _attach(app):
-    """Attach a phone that wants everything, without a radio: a Pico has none, and that of an emulated ESP32 does not
-    start."""
+    """Attach a phone that subscribes to everything. The radio is simulated, because a Pico has no radio and an emulated
+    ESP32's radio does not start."""
     sys.modules["bluetooth"] = __import__("bluetooth_guest")
     from kickstand.live.live import attach
     from kickstand.live.radio import Radio
@@ -148,8 +148,8 @@ def _attach(app):
 def run(detail, seconds, out, chosen):
     """Run the app for this time and print one line, a dictionary of figures.
 
-    Writes to out b"begin", b"heap" after HEAP_TURNS, b"end", then two arrays of 16 bits: us of each turn, us of each
-    collection. detail: before the end also the us of each stage, an array of 32 bits per turn.
+    Writes b"begin" to out, b"heap" after HEAP_TURNS, and b"end". Two arrays of 16-bit numbers follow: us of each turn,
+    and us of each collection. detail: True to write the us of each stage after each turn, as 32-bit numbers.
     chosen: settings by name.
     """
     for name in chosen:

@@ -1,5 +1,5 @@
-"""Replaces the module bluetooth on the emulated board and discards what is sent. A phone is always connected, and wants
-everything as often as possible."""
+"""Replaces the module bluetooth on the emulated board and discards all data. A phone is always connected. It subscribes
+to everything at the highest rate."""
 
 FASTEST_MS = 40
 

@@ -15,7 +15,7 @@ from rich.table import Table
 _LIMIT_S = 10.0
 _ROWS = 10  # modules in the table
 
-# Imports each module after the modules that it imports, so each time is only the module's own.
+# Each module is imported after its own imports. So its time does not contain theirs.
 _GUEST = """
 from time import ticks_diff, ticks_us
 took = []
@@ -41,8 +41,9 @@ class Boot:
 
 
 def boot(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes], compiled: bool = True) -> Boot:
-    """kind: of board. world: as for a Device, upright and at rest. files: further files for the board: its calibration.
-    compiled: the firmware as .mpy. Raises NotReached if there is no lean in 10 s."""
+    """Measure the parts of the start. kind: the board. world: as for a Device, upright and at rest. files: the
+    calibration files of the board. compiled: True for the firmware as .mpy. Raises NotReached if the display shows no
+    lean within 10 s."""
     board_files = flash_image.firmware(compiled, kind.MPY) | files
     with kind(world, board_files) as device:
         device.run_until(lambda: device.lcd()[1].startswith("starting"), _LIMIT_S, 0.001)
@@ -55,7 +56,7 @@ def boot(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes], c
 
 
 def table(result: dict[str, Any]) -> Table:
-    """A Boot's values by name, for a terminal."""
+    """Format the result for a terminal. result: the values of a Boot by name."""
     rows = Table(title="From reset to the first lean, compiled: emulated ms")
     rows.add_column("what")
     rows.add_column("at", justify="right")
@@ -76,7 +77,7 @@ def _micropython_s(kind: Kind, files: dict[str, bytes]) -> float:
     """Time until MicroPython runs main.py, s."""
     begun: list[bytes] = []
     with kind(files={**files, "/main.py": f"{kind.SINK}Sink().write(b'main')\n".encode()}) as device:
-        device.listen(begun.append)  # on a Pico not over USB, which starts later than main.py
+        device.listen(begun.append)  # not over USB: a Pico starts it after main.py
         device.run_until(lambda: begun, _LIMIT_S, 0.001)
         return device.time_s
 
@@ -92,7 +93,7 @@ def _imports(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes
 
 
 def in_order(name: str, found: list[str]) -> list[str]:
-    """The module and everything imported with it, each after its own imports. Appended to found."""
+    """Append the module and its imports to found, each module after its own imports. Return found."""
     for other in _imported(name):
         if other not in found:
             in_order(other, found)

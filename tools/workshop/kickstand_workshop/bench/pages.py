@@ -1,4 +1,4 @@
-"""Measures the loading time of the site's pages on a phone with a quarter of this computer's speed, and their size:
+"""Measures the size of the site's pages, and their loading time on a phone with a quarter of this computer's speed:
 
 .venv/bin/python -m kickstand_workshop.bench.pages
 """
@@ -13,7 +13,7 @@ from kickstand_tools.web import site
 from ..browser import CHROMIUM, opened
 
 PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
-READY = {  # by page: the element that is usable when the page is ready
+READY = {  # {page: the element that is usable when the page is ready}
     "": "#kind:enabled",  # the firmware has started
     "install.html": "#look:visible, #unable:visible",
     "live.html": "#simulated:enabled",
@@ -25,8 +25,8 @@ _PAINT = "performance.getEntriesByName('first-contentful-paint')[0].startTime"
 
 
 class PageFigures(NamedTuple):
-    """Figures of a page that is opened for the first time. size: compressed size of the files that it requests until it
-    is ready, bytes."""
+    """Figures of a page that is opened for the first time. size: bytes of the compressed files that the page loads
+    until it is ready."""
 
     paint_ms: float
     ready_ms: float
@@ -34,7 +34,7 @@ class PageFigures(NamedTuple):
 
 
 def measure(browser: Any, address: str, files: dict[str, bytes], name: str) -> PageFigures:
-    """name: one of READY. address, files: of a server of the site."""
+    """Open the page and measure it. name: a key of READY. address: of a server of the site. files: the site's files."""
     context = browser.new_context(service_workers="block", **PHONE)
     asked: set[str] = set()
     context.on("request", lambda request: asked.add(request.url.removeprefix(address)))

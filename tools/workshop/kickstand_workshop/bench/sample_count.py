@@ -33,13 +33,13 @@ class SampleCount:
         return self._popped // (len(self._sensor._fifo_registers) or 1) or len(self._read)
 
     def lost(self) -> int:
-        """Samples that can no longer be read: overwritten, pushed out of the FIFO or cleared with it."""
+        """Samples that were overwritten, pushed out of the FIFO or cleared with it, before they were read."""
         taken = self.taken()  # called first, because it updates the FIFO
         frame = len(self._sensor._fifo_registers)
         if frame:
             kept = self._popped + self._sensor.fifo.count - self._waiting
             return taken - kept // frame
-        return max(0, taken - 1 - len(self._read))  # the latest can still be read
+        return max(0, taken - 1 - len(self._read))  # the latest sample can still be read
 
     def _on_start(self, address: int, read: bool) -> bool:
         acknowledged = self._start(address, read)

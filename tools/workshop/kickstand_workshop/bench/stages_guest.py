@@ -3,7 +3,7 @@
 from array import array
 from time import ticks_diff, ticks_us
 
-# Name of a stage, and its method: module, class, method with its parameters.
+# Each entry: name of the stage, module, class, and method with its parameters.
 STAGES = (
     ("decode and sum", "imu.mpu6050", "Mpu6050", "add_up(self, n)"),
     ("calibrate and rotate", "calibration.transform", "Transform", "apply_sum(self, sums, n, force, rate)"),
@@ -17,8 +17,8 @@ WITHOUT_RESULT = ("apply_sum", "tick")  # methods that return nothing
 BUS = len(STAGES)  # one column more: the sensor's transfers
 COLUMNS = BUS + 1
 
-# Without *arguments and with few locals, because both use heap that is freed on return: then the measured allocations
-# would take longer to find free heap.
+# The wrapper has no *arguments and few locals. Both would use heap, and the measured allocations would take longer to
+# find free heap.
 _TIMED = """
 def {name}({parameters}):
     begin({i})
@@ -51,7 +51,7 @@ class TimedBus:
 
 
 def time_stages(spent):
-    """From now on every call of a stage adds its us to spent[its index in STAGES]."""
+    """Make every call of a stage add its time in us to spent, at the stage's index in STAGES."""
     for i in range(BUS):
         _, module, of, method = STAGES[i]
         name = method.split("(")[0]
@@ -75,7 +75,7 @@ def stopwatch_us(spent):
 
 
 def _timed(spent, function, i, signature, returns):
-    """The function with a stopwatch around it, which adds to spent[i]."""
+    """Return the function with a stopwatch that adds the time of each call to spent[i]."""
     starts = array("I", bytes(4 * BUS))
 
     def begin(i):

@@ -22,7 +22,8 @@ Figures = dict[str, NDArray[np.float64]]
 
 
 def bands_of(force_g: NDArray[np.float64], rate_dps: NDArray[np.float64], rate_hz: float) -> Figures:
-    """rms (len(BANDS_HZ)) of each of QUANTITIES, of evenly spaced force and rate (n, 3) along left, up, forward."""
+    """Return the rms in each band (len(BANDS_HZ)) for each of QUANTITIES. force_g, rate_dps: (n, 3) along left, up,
+    forward, evenly spaced."""
     columns = force_g[:, 1], force_g[:, 0], *rate_dps.T
     window = np.hanning(len(force_g))
     frequency = np.fft.rfftfreq(len(force_g), 1.0 / rate_hz)
@@ -35,14 +36,14 @@ def bands_of(force_g: NDArray[np.float64], rate_dps: NDArray[np.float64], rate_h
 
 
 def bands_of_log(log: Log, calibration: CalibrationFile) -> Figures:
-    """The bands of a log, from its first riding to its last. Raises InputError."""
+    """Return the bands of a log, from the start of riding to its end. Raises InputError if the ride is too short."""
     step = 1.0 / _GRID_HZ
     time = np.arange(log.t_s[0], log.t_s[-1], step)
     force, rate = calibration.in_vehicle(log.readings)
     number = np.searchsorted(time, log.t_s, side="right") - 1
 
     def mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The mean of the samples in each step, to avoid aliasing, interpolated along straight lines."""
+        """Average the samples in each step, to avoid aliasing. Interpolate linearly between the means."""
         count = np.bincount(number, minlength=len(time))
         there = count > 0
         total = np.bincount(number, values, minlength=len(time))
@@ -57,7 +58,7 @@ def bands_of_log(log: Log, calibration: CalibrationFile) -> Figures:
 
 
 def of_recording(path: Path) -> Figures:
-    """The bands of a recorded ride, which also gives its alignment. Raises InputError."""
+    """Return the bands of a recorded ride. The alignment is found from the same ride. Raises InputError."""
     log = read_log(path)
     return bands_of_log(log, fit_ride(log).calibration)
 
@@ -70,7 +71,7 @@ def of_simulated(profile: str, seed: int, seconds: float, road: str | None, moun
 
 
 def table(found: dict[str, Figures]) -> Table:
-    """A table with a block of lines per quantity. found: by the name of the ride."""
+    """Return a table with a block of lines per quantity. found: bands by the name of the ride."""
     made = Table(title="rms by band of frequency, Hz", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     made.add_column("ride", overflow="fold")
     for low, high in BANDS_HZ:

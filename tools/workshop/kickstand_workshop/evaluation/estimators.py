@@ -2,8 +2,8 @@
 of the literature.
 
 Each takes Samples and returns the lean in degrees of every sample, > 0 to the right. The filters of the packages
-`ahrs`, `vqf` and `imufusion` run with their authors' default gains, and again ("best") with the gain with the least
-error on a ride of each profile with another seed (20). They start from the first reading.
+`ahrs`, `vqf` and `imufusion` run twice: with their authors' default gains, and ("best") with tuned gains. The tuned
+gains have the least error on a ride of each profile with another seed (20). These filters start from the first reading.
 """
 
 from collections.abc import Callable
@@ -19,7 +19,7 @@ from kickstand_tools.logs.log import Log
 from kickstand_tools.replay import replay_engine
 from numpy.typing import NDArray
 
-AVERAGE_S = 0.3  # of the formula's lean
+AVERAGE_S = 0.3  # averaging time of the formula's lean
 COMPLEMENTARY = 0.98  # weight of the integrated lean at each sample; the rest is for the direction of the force
 
 _SHOWN, _FORMULA = (replay_engine.COLUMNS.index(name) for name in ("lean_deg", "lean_formula_deg"))
@@ -43,7 +43,7 @@ class Samples:
 
 
 def calibrated(log: Log, calibration: CalibrationFile) -> Samples:
-    """All estimators use the same calibrated samples."""
+    """Return the calibrated samples of a log, the same for all estimators."""
     return Samples(log.t_s, *calibration.in_vehicle(log.readings))
 
 
@@ -114,12 +114,13 @@ OTHERS: dict[str, Callable[[Samples], NDArray[np.float64]]] = {
 
 
 def missing() -> list[str]:
-    """The missing packages. estimate() leaves out their filters."""
+    """Return the packages that are not installed. estimate() leaves out their filters."""
     return sorted({package for package in PACKAGES.values() if find_spec(package) is None})
 
 
 def estimate(log: Log, calibration: CalibrationFile) -> dict[str, NDArray[np.float64]]:
-    """Lean in degrees, > 0 to the right, by the name of each estimator that is installed; without the log's speed."""
+    """Return the lean in degrees, > 0 to the right, by the name of each installed estimator. None of them uses the
+    log's speed."""
     engine = replay_engine.Replay(calibration.to_firmware())
     shown, formula = np.empty(len(log.t_s)), np.empty(len(log.t_s))
     for i, (time_us, reading, _) in enumerate(log.rows()):

@@ -1,7 +1,7 @@
-"""The table of faults that a sensor may have in a ride, each a function that changes readings.
+"""Lists the faults that a sensor may have in a ride. Each fault is a function that changes readings.
 
-There are three kinds of faults. SEEN: counts and registers show it (an axis that is dead, in standby or at the end of
-its range). ILL: it only shows when readings do not fit each other. HARMLESS: the lean stays nearly right.
+There are three kinds of faults. SEEN: counts and registers show the fault (an axis is dead, in standby or at the end of
+its range). ILL: the fault only shows when readings contradict each other. HARMLESS: the lean stays nearly right.
 """
 
 from collections.abc import Callable, Iterator
@@ -20,8 +20,8 @@ ACCEL_RANGE_G, GYRO_RANGE_DPS = 16.0, 500.0  # the board's defaults
 @dataclass
 class Part:
     """The readings while a fault lasts: force (n, 3, g) and rate (n, 3, deg/s) in the chip's axes, to be changed in
-    place; lost (n): True for readings that never arrive. rate_hz: of the readings. axis: the ill axis, if there is one;
-    0, 1, 2 may be the bike's left, up, forward. sign: 1 or -1."""
+    place; lost (n): True for readings that never arrive. rate_hz: rate of the readings. axis: index of the axis with
+    the fault, for faults of one axis. sign: 1 or -1."""
 
     force: Array
     rate: Array
@@ -34,8 +34,8 @@ class Part:
 
 @dataclass(frozen=True)
 class Fault:
-    """change: applies the fault to a Part. seconds: its duration, None: to the end of the ride. from_start: True if it
-    exists from power-on; otherwise it begins in mid-ride."""
+    """change: applies the fault to a Part. seconds: duration of the fault, None for one that lasts to the end of the
+    ride. from_start: True if the fault exists from power-on. Otherwise it begins in mid-ride."""
 
     name: str
     kind: str
@@ -97,7 +97,7 @@ def _gyro_bias_drifts(part: Part, dps: float) -> None:
 
 
 def _mount_slips(part: Part, degrees: float) -> None:
-    """Rotate about one of the bike's axes if the chip is mounted square, otherwise about one of the chip's."""
+    """Rotate the readings about one of the chip's axes. They are the bike's axes if the chip is mounted square."""
     turned = rotation_matrix(np.radians(part.sign * degrees) * np.eye(3)[part.axis])
     part.force[:] = part.force @ turned
     part.rate[:] = part.rate @ turned
@@ -218,7 +218,8 @@ class Ill:
 def apply(fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: int, vehicle_from_sensor: Array) -> Ill:
     """A copy of the readings with the fault. begin_s: start of a fault that does not exist from power-on.
 
-    The seed chooses the axis, the sign, and whether the chip is mounted square: then its axes are the bike's.
+    The seed chooses the axis, the sign, and whether the chip is mounted square. The axes of a square chip are the
+    bike's.
     """
     chance = np.random.default_rng([seed, *fault.title.encode()])
     made = readings.copy()
@@ -226,7 +227,7 @@ def apply(fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: i
     first = 0 if fault.from_start else round(begin_s * rate_hz)
     end = len(made) if fault.seconds is None else min(len(made), first + round(fault.seconds * rate_hz))
     span = slice(first, end)
-    # A fault that shows in counts must be in the chip's own axes
+    # A fault of kind SEEN must be in the chip's own axes, because it shows in their counts
     square = seed // 3 % 2 == 0 and fault.kind != SEEN
     turned = vehicle_from_sensor if square else np.eye(3)
     part = Part(

@@ -1,7 +1,8 @@
-"""Tests whether a wrong lean is ever shown as good: runs the firmware's meter over simulated rides with each fault.
+"""Tests whether the meter ever shows a wrong lean as good. It runs the firmware's meter over simulated rides with each
+fault.
 
-The result is judged as in aviation: at each instant a lean is good (shown and right), hidden, or misleading. "Right" is
-within WRONG_DEG. A lean that is wrong for a moment misleads nobody: it counts as misleading after STANDS_S.
+The result is judged as in aviation: at each instant a lean is good (shown and right), hidden, or misleading. A lean is
+right if its error is at most WRONG_DEG. A wrong lean counts as misleading after it was shown for STANDS_S.
 """
 
 from collections.abc import Callable
@@ -32,15 +33,15 @@ TURN = 2  # readings per turn of the loop
 GPS_LATE_S = 0.4
 PROFILES = "street", "track", "hills", "city", "sweeper"
 SIGMA_EDGES = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0])  # degrees, claimed
-# Claimed accuracy of a lean; a display gives no sigma
+# Classes of claimed accuracy. "display" is the class of a displayed lean, which has no sigma
 CLAIMS = [f"{low:g}-{high:g}" for low, high in pairwise(SIGMA_EDGES)] + ["display", "hidden"]
 ERROR_EDGES = np.array([0.0, 1.0, 2.0, 3.0, 5.0, WRONG_DEG, 12.0, 20.0, 40.0, 180.0])  # degrees
 
 
 @dataclass(frozen=True)
 class FaultJob:
-    """A ride of this seed with a fault, or without. road, mount: as for simulation.ride.ride(). profile: None: chosen
-    from PROFILES by the seed. device: True for the whole device instead of only the meter."""
+    """A ride with a fault, or without one. road, mount: as for simulation.ride.ride(). profile: None if the seed
+    chooses it from PROFILES. device: True to run the whole device, False for only the meter."""
 
     fault: Fault | None
     seed: int
@@ -52,7 +53,7 @@ class FaultJob:
 
     @property
     def gps(self) -> bool:
-        """True for every fourth ride: it has a late speed once per second, as from GPS."""
+        """True for every fourth ride. Its speed comes late and once per second, as from GPS."""
         return self.seed % 4 == 3
 
     @property
@@ -81,11 +82,12 @@ class Trace:
 
 @dataclass
 class Outcome:
-    """The result for a rider. Seconds count from setting off.
+    """The result of a ride. Only the time from setting off counts.
 
-    misleading_s: see above. hidden, available: shares of the riding. hidden_after_s, named_after_s: since the fault's
-    start, NaN for never. recovered: for a fault that ends, True if the lean is right RECOVERY_S later; None for the
-    others. diagram: seconds, one row per entry of CLAIMS, by ERROR_EDGES.
+    misleading_s: time with a misleading lean. hidden, available: shares of the riding time. hidden_after_s,
+    named_after_s: since the fault's
+    start, NaN for never. recovered: True if the lean is right RECOVERY_S after the fault ends, None for a fault that
+    does not end. diagram: seconds (len(CLAIMS), len(ERROR_EDGES) - 1) for each claim and error.
     """
 
     job: FaultJob
@@ -99,13 +101,13 @@ class Outcome:
 
 
 def stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """(first, end) of each run of True."""
+    """Return (first, end) of each run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def judge(job: FaultJob, trace: Trace) -> Outcome:
-    """Judge a ride as a rider saw it."""
+    """Judge the lean that the rider saw in a ride."""
     step = float(np.median(np.diff(trace.time)))
     off = int(np.argmax(trace.speed > 0.5)) if (trace.speed > 0.5).any() else 0
     error = np.abs(trace.lean - trace.true)
@@ -231,8 +233,9 @@ def run(job: FaultJob) -> Outcome:
 
 
 def jobs(seeds: int, first_seed: int = 0, seconds: float = 120.0, device: bool = False) -> list[FaultJob]:
-    """For each seed a ride without a fault, on good and bad mounts and roads, and one with each fault. device: run all
-    on the whole device; otherwise only those whose fault the driver sees."""
+    """Return the jobs: for each seed, rides without a fault on good and bad mounts and roads, and one ride with each
+    fault. device: True to run all on the whole device. Otherwise only rides with a fault that the driver sees run on
+    it."""
     numbers = range(first_seed, first_seed + seeds)
     conditions: list[tuple[str | None, str | None]] = [(None, None), *[(None, road) for road in CLASSES]]
     conditions += [(mount, None) for mount in MOUNTS]
@@ -251,7 +254,7 @@ def evaluate(jobs: list[FaultJob], done: Callable[[], None] = lambda: None) -> l
         job = jobs[k]
         return (job.seed, str(job.profile), str(job.road), str(job.mount))
 
-    order = sorted(range(len(jobs)), key=ride_of)  # jobs of the same ride in sequence: it is simulated once
+    order = sorted(range(len(jobs)), key=ride_of)  # jobs of the same ride are neighbours, to simulate it once
     found: dict[int, Outcome] = {}
     for k, outcome in zip(order, on_all_processors(run, [jobs[k] for k in order], chunk=8), strict=True):
         found[k] = outcome

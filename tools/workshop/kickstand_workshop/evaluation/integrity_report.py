@@ -26,8 +26,9 @@ _UNKNOWN = "--"
 
 @dataclass
 class FaultSummary:
-    """All rides of one fault. misleading_s, most_s: mean and largest. available: share. hidden_s, named_s: medians, NaN
-    for never; hidden, named: shares of the rides. recovered: share, NaN for a fault that does not end."""
+    """The results of all rides with one fault. misleading_s, most_s: mean and largest misleading time. available: mean
+    share of the riding time with a lean. hidden_s, named_s: median delays, NaN for never. hidden, named: shares of the
+    rides. recovered: share of the rides, NaN for a fault that does not end."""
 
     kind: str
     title: str
@@ -43,7 +44,7 @@ class FaultSummary:
 
 
 def summaries(outcomes: list[Outcome]) -> list[FaultSummary]:
-    """One Summary per fault, in the order in which faults first appear."""
+    """Return one FaultSummary per fault, in the order in which faults first appear."""
     groups: dict[tuple[str, str], list[Outcome]] = {}
     for outcome in outcomes:
         fault = outcome.job.fault
@@ -133,7 +134,7 @@ def diagram_table(outcomes: list[Outcome]) -> Table:
 
 
 def document(outcomes: list[Outcome]) -> dict[str, Any]:
-    """All figures for a JSON file; null for a missing one."""
+    """Return all figures for a JSON file. A missing figure is null."""
     rides = [
         {
             "fault": o.job.title,

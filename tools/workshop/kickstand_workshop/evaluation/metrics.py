@@ -1,4 +1,4 @@
-"""Computes figures for how well a shown lean follows the true one."""
+"""Measures how well a shown lean follows the true lean."""
 
 from dataclasses import dataclass
 
@@ -6,17 +6,18 @@ import numpy as np
 from kickstand_tools.signals import peak_offset
 from numpy.typing import NDArray
 
-LEANED_DEG = 10.0  # the slope is fitted where the true lean is larger: most of a ride is nearly upright
+LEANED_DEG = 10.0  # the slope is fitted at larger true leans: most of a ride is nearly upright
 _LAG_RANGE_S = (-0.2, 0.8)  # searched
 _LAG_SMOOTHING_S = 0.05
 _STILL_DPS = 1.0  # rms of the true roll rate below which no lag can be found
-# A straight: for this time, yaw rate and lean are below these limits and the speed is above
+# A straight: for at least this time, yaw rate and lean are below their limits and the speed is above its limit
 _STRAIGHT_DPS, _STRAIGHT_DEG, _STRAIGHT_MPS, _STRAIGHT_S = 2.0, 6.0, 5.0, 1.0
 
 
 @dataclass
 class LeanScore:
-    """Errors in degrees. slope: shown over true lean. lag: > 0 if shown late. NaN where not observable."""
+    """Errors in degrees. slope: shown over true lean. lag: > 0 if the lean is shown late. A figure is NaN if the ride
+    cannot show it."""
 
     rms_deg: float
     p95_deg: float  # 95 % of the absolute errors are smaller
@@ -32,8 +33,8 @@ def rms(error: NDArray) -> float:
 
 
 def slope(shown: NDArray, true: NDArray, beyond: float = LEANED_DEG) -> float:
-    """Shown over true lean where the true one is over `beyond` degrees: least squares through the origin. NaN if
-    undefined."""
+    """Fit the slope of shown over true lean by least squares through the origin. Only true leans over `beyond` degrees
+    count. Returns NaN without such leans."""
     leaned = np.abs(true) > beyond
     square = float(np.sum(true[leaned] ** 2))
     return float(np.sum(shown[leaned] * true[leaned]) / square) if square > 0.0 else float("nan")
@@ -70,7 +71,7 @@ def straights(truth: dict[str, NDArray], rate_hz: float) -> NDArray[np.bool_]:
 def score(shown: NDArray, truth: dict[str, NDArray], rate_hz: float) -> LeanScore:
     """Score a shown lean (N, degrees) from setting off to the end of the ride, or all of it if it never sets off.
 
-    truth: (N,) each of lean_deg, speed_mps, yaw_rate_dps.
+    truth: lean_deg, speed_mps and yaw_rate_dps, each (N,).
     """
     off = truth["speed_mps"] > 0.5
     first = int(np.argmax(off)) if off.any() else round(rate_hz)

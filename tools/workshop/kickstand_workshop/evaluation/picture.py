@@ -9,7 +9,7 @@ from kickstand_tools.signals import window_spreads
 from numpy.typing import NDArray
 
 ZOOM_S = 60.0
-# Colour and line width, in the order of drawing: the noisy ones are behind
+# Colour and line width, in the order of drawing: noisy leans are drawn first
 _STYLES = {
     "formula": ("0.8", 0.4),
     "formula 0.3 s": ("tab:olive", 0.7),

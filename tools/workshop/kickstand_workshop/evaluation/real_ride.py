@@ -1,8 +1,8 @@
-"""Compares estimators on a recorded ride, which has neither a calibration nor a true lean: both come from the ride.
+"""Compares estimators on a recorded ride. The calibration and a reference lean are computed from the ride itself.
 
-The calibration is that of `kickstand calibrate ride`. The reference lean is atan(v * yaw rate / g), averaged over
+The calibration comes from `kickstand calibrate ride`. The reference lean is atan(v * yaw rate / g), averaged over
 1 s, with the yaw rate about the bike's own up axis. It reads low (1 Hz speed, wide tyres, an axis that leans with the
-bike) and ignores slope and bank of the road: it can compare methods and show a lean that decays in a turn, but do not
+bike) and ignores slope and bank of the road. It can compare methods and reveal a lean that decays in a turn. Do not
 trust its values in degrees.
 """
 
@@ -30,7 +30,7 @@ _LEANED_DEG = 5.0  # the slope is fitted above this: the reference is rarely ove
 
 @dataclass
 class RealScore:
-    """Against the rough reference. slope: shown over reference lean where that is over 5 degrees."""
+    """Errors against the rough reference. slope: shown over reference lean, for reference leans over 5 degrees."""
 
     rms_deg: float
     slope: float

@@ -26,7 +26,8 @@ _UNKNOWN = "--"
 
 
 def pooled(scores: list[LeanScore]) -> dict[str, float]:
-    """One estimator's scores on one profile, pooled over the seeds: degrees, lag in ms. NaN where not observable."""
+    """Pool one estimator's scores on one profile over the seeds. Units: degrees, lag in ms. NaN if no ride can show a
+    figure."""
     rms = np.array([s.rms_deg for s in scores])
     slopes, lags, biases = (
         [value for s in scores if not np.isnan(value := getattr(s, name))]
@@ -107,7 +108,7 @@ def _table(title: str, caption: str) -> Table:
 
 
 def document(evaluation: Evaluation) -> dict[str, Any]:
-    """All figures for a JSON file; null where not observable."""
+    """Return all figures for a JSON file. A figure that the rides cannot show is null."""
     rides = [
         {"profile": r.job.profile, "seed": r.job.seed, "refusal": r.refusal, "scores": _scores(r.scores)}
         for r in evaluation.results
@@ -129,7 +130,7 @@ def write(evaluation: Evaluation, directory: Path) -> tuple[Path, Path]:
 
 
 def _scores(scores: Mapping[str, LeanScore | RealScore]) -> dict[str, dict[str, float]]:
-    """Scores by estimator, for the file; entries in degrees have no unit in their names."""
+    """Return the scores by estimator for the file. Names of figures in degrees have no unit."""
     return {name: {key.removesuffix("_deg"): value for key, value in asdict(s).items()} for name, s in scores.items()}
 
 

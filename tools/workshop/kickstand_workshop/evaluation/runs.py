@@ -103,19 +103,19 @@ def on_all_processors(function: Callable, jobs: list, chunk: int = 1, ordered: b
     """Yield function(job) for each job. ordered: in the order of the jobs, otherwise as results become ready."""
     with multiprocessing.Pool(min(len(jobs), os.cpu_count() or 1), _begin_worker) as pool:
         yield from (pool.imap if ordered else pool.imap_unordered)(function, jobs, chunk)
-        # Let the workers end on their own: SIGTERM may come before _begin_worker(), and then one would wait forever
+        # Do not stop the workers by SIGTERM: a worker that gets it before _begin_worker() would wait forever
         pool.close()
         pool.join()
 
 
 def calibrated_by_poses(made: SimulatedRide) -> CalibrationFile:
-    """`kickstand calibrate six` and `two` over the ride's poses, each a log of its own. Raises InputError."""
+    """Calibrate by `kickstand calibrate six` and `two`, with one log per pose. Raises InputError."""
     seven = [Log.from_readings(pose, made.rate_hz, f"POSE_{k}.csv") for k, pose in enumerate(made.poses, 1)]
     return _aligned(made, fit_six_positions(seven).calibration)
 
 
 def calibrated_by_log(made: SimulatedRide) -> CalibrationFile:
-    """`kickstand calibrate six` over one log of the whole procedure, as the board does it, and `two`. Raises
+    """Calibrate by `kickstand calibrate six` over one log of the whole procedure, as on the board, and by `two`. Raises
     InputError."""
     return _aligned(made, fit_procedure(Log.from_readings(made.procedure, made.rate_hz, "SIX.csv")).calibration)
 
@@ -127,13 +127,13 @@ def _aligned(made: SimulatedRide, six: CalibrationFile) -> CalibrationFile:
 
 
 def as_log(made: SimulatedRide) -> Log:
-    """The ride as a log, as if read from its file."""
+    """Return the ride as a log, as if it were read from its file."""
     readings = made.readings
     return Log(made.time, readings[:, :3], readings[:, 4:], temperature_c=readings[:, 3], name="RIDE.csv")
 
 
 def _begin_worker() -> None:
     """Close standard error, because every worker would print a traceback after Ctrl-C. Let SIGTERM end the worker at
-    once: the command's handler, which it inherits, would wait with it for a lock."""
+    once: the inherited handler of the command would wait for a lock."""
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     sys.stderr = open(os.devnull, "w", encoding="utf-8")

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from .faults import ACCEL_RANGE_G
 
 LOOK_S = 0.1
-# Texts that name a fault of the sensor. `Lean --` and texts about a speed source or a display do not
+# Texts that name a fault of the sensor: not `Lean --`, and no text about a speed source or a display
 NAMES = re.compile("Sensor|Gyro|Accel|No sensor", re.IGNORECASE)
 STARTED_S = 2.0  # before this time, the display shows the start
-WRITING = 2  # successive reads of a display that is just being written
+WRITING = 2  # successive reads that may catch a half-written display
 
 
 def display_of(
@@ -58,7 +58,7 @@ def display_of(
 
     board.every(LOOK_S, look)
     config = {"SPEED": "gps"} if speed else {}
-    gc.freeze()  # the firmware collects all the time, but should not scan earlier objects
+    gc.freeze()  # the firmware often collects garbage, and must not scan earlier objects
     try:
         with tempfile.TemporaryDirectory() as flash, contextlib.chdir(flash):
             with board, contextlib.redirect_stdout(io.StringIO()):
@@ -77,7 +77,7 @@ def display_of(
 
 
 def _read(leans: list[float]) -> NDArray[np.float64]:
-    """The leans as a rider reads them: a half-written line is read as its previous text."""
+    """Return the leans as a rider reads them. Reads of a half-written line are replaced by the previous lean."""
     read = np.array(leans)
     absent = np.isnan(read)
     for k in range(1, len(read)):

@@ -1,5 +1,5 @@
-"""Makes single changes to a file: some of cosmic-ray's operators of each kind, and two of our own. Each operator is
-replaced by one or two similar ones; all eleven would only repeat the result.
+"""Makes single changes to a file, by some of cosmic-ray's operators of each kind and two of our own. An operator in the
+code is replaced by only one or two similar ones, because all eleven would repeat the result.
 """
 
 import ast
@@ -27,7 +27,8 @@ SMALL = 16  # integers up to this are counts and indices: changed by +1 and -1. 
 
 
 class Change(NamedTuple):
-    """path: of the file, from the project's root. line: its number, from 1. The change is the operator's occurrence."""
+    """path: of the file, relative to the project's root. line: number of the changed line, from 1. operator and
+    occurrence identify the change."""
 
     path: Path
     line: int
@@ -44,7 +45,7 @@ class Change(NamedTuple):
 
 
 class Number(Operator):
-    """Changed numbers: a limit that can be doubled unnoticed is not tested."""
+    """Changes numbers, to find limits that no test checks."""
 
     def mutation_positions(self, node):
         if is_number(node):
@@ -69,7 +70,7 @@ class Number(Operator):
 
 
 class Drop(Operator):
-    """Statements left out: calls, raises, returns from the middle, assignments to attributes and elements."""
+    """Leaves out statements: calls, raises, early returns, assignments to attributes and elements."""
 
     def mutation_positions(self, node):
         if node.type == "simple_stmt" and self._matters(node.children[0]):
@@ -114,7 +115,7 @@ def changes(path: Path, root: Path) -> list[Change]:
 
 
 def _bare(source: str) -> str | None:
-    """The text as a syntax tree without annotations and decorators; None if it is not Python."""
+    """Return the syntax tree of the text without annotations and decorators, or None if it is not Python."""
     try:
         tree = ast.parse(source)
     except SyntaxError:

@@ -16,10 +16,10 @@ import pytest
 
 WARM = ("numpy", "hypothesis", "click", "rich.console", "matplotlib.pyplot", "pandas", "plotly.graph_objects")
 WARM += ("pyarrow.parquet",)
-# Without MicroPython if a test can choose: it is slow, and the same tests run on CPython.
+# Skips variants of tests on MicroPython: it is slow, and the same tests run on CPython.
 ARGUMENTS = ("-x", "-q", "-k", "not micropython", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0")
 KILLED, SURVIVED, TIMED_OUT = "killed", "survived", "timed out"
-TIMES, EXTRA_S = 3, 5  # processor time allowed for a change: that of the unchanged tests times 3, and 5 s
+TIMES, EXTRA_S = 3, 5  # processor time for a change: 3 times that of the unchanged tests, plus 5 s
 WALL_TIMES = 10  # factor on the wall-clock time, for tests that wait for ever
 
 
@@ -43,7 +43,7 @@ class Tests:
 
     def pass_unchanged(self) -> bool:
         """True if the tests pass without changes. Leaves their bytecode in the copy."""
-        self._run(self._files)  # once without bytecode, once to take the time
+        self._run(self._files)  # the first run writes bytecode, the second is timed
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         passed = self._run(self._files) == SURVIVED
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -58,7 +58,7 @@ class Tests:
         file = self.root / path
         original = file.read_text("utf-8")
         for bytecode in file.parent.glob(f"__pycache__/{file.stem}.*"):
-            bytecode.unlink()  # Python would use it for any text of the same length and second
+            bytecode.unlink()  # Python would use it for another text of equal length written in the same second
         try:
             file.write_text(mutant, "utf-8")
             return self._run(sorted(self._files, key=lambda name: file.stem not in name))

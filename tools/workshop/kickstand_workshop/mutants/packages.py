@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
-UNTESTABLE = ("_viper.py", "_guest.py")  # they run on a board or on MicroPython only
+UNTESTABLE = ("_viper.py", "_guest.py")  # these files only run on a board or on MicroPython
 
 
 class Package(NamedTuple):

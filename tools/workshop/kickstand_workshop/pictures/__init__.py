@@ -1,1 +1,1 @@
-"""The pictures of the READMEs, made from the real firmware, settings and commands."""
+"""Draws the pictures of the READMEs from the real firmware, settings and commands."""

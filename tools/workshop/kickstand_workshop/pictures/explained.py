@@ -1,4 +1,4 @@
-"""How the lean is found: the forces in a bend, and three leans of one simulated ride."""
+"""Draws how the lean is found: the forces in a bend, and three leans of one simulated ride."""
 
 import io
 from math import cos, radians, sin, tan
@@ -18,12 +18,12 @@ _PROFILE, _SEED, _SECONDS, _SHOWN_S = "track", 1, 120.0, (40.0, 100.0)
 
 
 def forces() -> str:
-    """A motorcycle from behind in a bend to the right, and the forces on it."""
+    """Draw a motorcycle from behind in a bend to the right, and the forces on it."""
     page = Drawing(900, 400)
     foot, lean = (330.0, 340.0), radians(_LEAN_DEG)
 
     def at(along: float, aside: float = 0.0) -> tuple[float, float]:
-        """Pixels of a place on the bike: above its foot, and to its right."""
+        """Return the pixels of a point on the bike: along units above the tyre, aside units to the right."""
         return foot[0] + along * sin(lean) + aside * cos(lean), foot[1] - along * cos(lean) + aside * sin(lean)
 
     page.box(0, 340, 900, 60, "#dcd6c6", 0)

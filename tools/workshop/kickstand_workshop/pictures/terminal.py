@@ -16,7 +16,7 @@ _KEYS = "b button  B long press  p pause  q quit"
 _FONT = "DejaVu Sans Mono, Menlo, Consolas, monospace"
 _COLOURS = [(24, 26, 31), (224, 82, 78), (90, 180, 110), (242, 201, 76), (31, 79, 200), (200, 120, 220), (90, 200, 230)]
 _THEME = TerminalTheme((24, 26, 31), (220, 223, 228), [*_COLOURS, (220, 223, 228)], [*_COLOURS, (255, 255, 255)])
-# Rich's format without its comment and its fonts, which would be loaded from another server
+# Rich's format without its comment, and without fonts that a browser would load from another server
 _FORMAT = re.sub(r"@font-face \{\{.*?\}\}\s*|<!--.*?-->\s*", "", CONSOLE_SVG_FORMAT, flags=re.DOTALL)
 
 

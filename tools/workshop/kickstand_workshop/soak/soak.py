@@ -1,7 +1,7 @@
 """Runs trips on the simulated board, keeps tallies of them, and records broken invariants.
 
-Invariants: the calibration is not lost, memory does not grow, the program neither ends nor hangs, and those of
-watch.py. __main__.py prints the figures and fails where an invariant was broken.
+Invariants: the calibration is not lost, memory does not grow, and the program neither ends nor hangs. watch.py checks
+others. __main__.py prints the figures, and fails if an invariant was broken.
 """
 
 import gc
@@ -33,7 +33,7 @@ MAX_GROWTH = 3000  # memory blocks, from a trip's second minute to its end; reco
 
 @dataclass
 class Tallies:
-    """Counts of what was tried, and the worst figures. found: one line per broken invariant."""
+    """Counts of trips, faults and presses, and the worst figures. found: one line per broken invariant."""
 
     seed: int
     hours: float = 0.0
@@ -67,7 +67,7 @@ class SoakBoard:
         }
         if self.config["SAMPLE_HZ"] < 200:
             self.config["DLPF"] = 4 if self.config["SAMPLE_HZ"] == 100 else 5
-        self.aligned = False  # as in its flash
+        self.aligned = False  # True if the flash has an alignment
 
     def store(self) -> Any:
         from kickstand.calibration.store import Store
@@ -88,8 +88,8 @@ class SoakBoard:
 
 
 def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: None) -> Tallies:
-    """Run trips for this total of the board's time. say: called with the progress, each hour of it. The same seed gives
-    the same trips. It works in a temporary directory."""
+    """Run trips. hours: total time on the board's clock. say: called with the progress after each of these hours. The
+    same seed gives the same trips. Files are in a temporary directory."""
     figures = Tallies(seed)
     begun, said_h = time.monotonic(), 0.0
     chance = random.Random(seed)
@@ -144,7 +144,7 @@ def _run(bike: SoakBoard, trip: Trip, figures: Tallies) -> None:
     board.every(60.0, lambda: blocks.append(_blocks()))
     console = io.StringIO()
     gc.collect()
-    gc.freeze()  # the app collects all the time, but earlier objects are not its own
+    gc.freeze()  # the app often collects garbage, and must not scan earlier objects
     try:
         with board, redirect_stdout(console):
             from kickstand import settings, start
@@ -191,7 +191,7 @@ def _blocks() -> int:
 
 
 def _check_calibration(bike: SoakBoard, watch: Watch, figures: Tallies) -> None:
-    """Check that after a power cut at any moment there is the old calibration or a new one, never none."""
+    """Check that a power cut never loses the calibration: the old or the new one must be in flash."""
     calibration = bike.store().load()
     if bike.aligned and not calibration.aligned:
         watch.found.append("the alignment is lost")

@@ -11,7 +11,7 @@ KICKSTAND_S, UPRIGHT_S = 14.0, 12.0  # the stay in each pose, long enough for an
 QUIET_S = 12.0  # from the end of a fault to the next one
 SENSOR, LCD = 0x68, 0x27
 
-# The manoeuvres of a kind of ride: (smallest and largest lean in degrees, speeds in m/s, slopes in degrees)
+# For each kind of ride: ranges of lean (degrees), speed (m/s) and slope (degrees) of its manoeuvres
 RIDES = {
     "street": ((10, 38), (8, 20), (0, 0)),
     "track": ((30, 52), (18, 35), (0, 0)),
@@ -45,7 +45,8 @@ GPS_FAULTS = ("unplugged", "garbled", "void", "stuck")
 @dataclass
 class Trip:
     """until_s: time of the power cut. presses: (start, duration). faults: (name, start, end). calls: (method of Faults,
-    its arguments) for them. gps_faults: as for Gps. cut_save: number of bytes of the next calibration that are written
+    its arguments) that cause the faults. gps_faults: as for Gps. cut_save: number of bytes of the next calibration that
+    are written
     before the power cut, or None."""
 
     kind: str
@@ -60,7 +61,7 @@ class Trip:
 
 def make_trip(chance: random.Random, speed: str | None, aligned: bool) -> Trip:
     """A trip of some minutes. speed: the speed source, "gps", "wheel" or None. aligned: False if the trip must begin
-    with an alignment; otherwise a few trips repeat it."""
+    with an alignment. If True, a few trips repeat the alignment."""
     kind = chance.choice(list(RIDES))
     ride = script.Ride(_manoeuvres(chance, kind), vibration_g=chance.uniform(0.01, 0.08))
     ride_s = KICKSTAND_S + UPRIGHT_S + 2 * script.MOVE_S
@@ -70,7 +71,7 @@ def make_trip(chance: random.Random, speed: str | None, aligned: bool) -> Trip:
         presses += [(3.0, SHORT_S), (ride_s - 6.0, SHORT_S)]
     elif again:  # through the menu: the alignment is its first entry
         presses += [(2.0, LONG_S), (4.5, LONG_S), (7.0, SHORT_S), (ride_s - 6.0, SHORT_S)]
-    # in most trips no presses, because they leave the page with the lean
+    # most trips have no presses, because a press leaves the page with the lean
     t_s = ride_s + chance.uniform(5, 40) if chance.random() < 0.4 else ride.seconds
     while t_s < ride.seconds - 5.0:
         presses.append((t_s, chance.choice((SHORT_S, SHORT_S, SHORT_S, LONG_S))))

@@ -1,4 +1,4 @@
-"""Watches display and bus during a trip. Keeps the broken invariants, and the worst figures."""
+"""Watches display and bus during a trip. Records broken invariants and the worst figures."""
 
 import re
 from collections.abc import Callable
