@@ -53,7 +53,7 @@ def report(refusal):
 
 
 def attempt(function, *arguments):
-    """Call tried(), and report its Notice."""
+    """Call the function with tried(). Report and return the Notice, if any."""
     problem = tried(function, *arguments)
     if problem:
         report(problem)

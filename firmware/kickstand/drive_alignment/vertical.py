@@ -145,8 +145,8 @@ class Vertical:
         return (self.is_car and self._standing.up) or self._from_pose or self._mean
 
     def known(self, out, fit=None):
-        """Write the vertical into out (a unit vector). Return False if it is not known yet (a car's before its first
-        stop).
+        """Write the vertical into out (a unit vector). Return False if it is not known yet. In a car it is
+        unknown until the first stop.
 
         fit: the Fit of all straight driving, or None.
         """

@@ -1,5 +1,5 @@
 """The base of both wizards: a view that takes one pose after another, with a few named states. Between two poses the
-wizard integrates the gyro's rates. The result must match the turn of the sensor."""
+wizard integrates the gyro's rates. The result must match the turn between the two measured poses."""
 
 from time import ticks_add, ticks_diff
 

@@ -25,7 +25,7 @@ class Installation:
     """One board. Call look() first, then install(); call check() any time between."""
 
     def look(self, line, name):
-        """Identify the board at a SerialLine, and read its config.py. name: of its port, for messages. The board is
+        """Identify the board at a SerialLine, and read its config.py. name: the port's name, for messages. The board is
         restarted.
 
         Returns {"refused": reason} or {"board", "settings": {name: value in config.py}, "usual": {name: default value},

@@ -26,7 +26,7 @@ let riding = null; // the running Riding, or null
 
 const tell = (text) => (byId("live-said").textContent = text);
 
-/** Listen until the rider stops it or the board is gone. A new alignment starts another log. */
+/** Listen until the rider stops it or the board is gone. A new alignment starts a new log. */
 async function start() {
   const port = await choosePort(tell);
   if (!port) return;

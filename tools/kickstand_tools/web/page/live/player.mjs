@@ -11,7 +11,7 @@ export class Player {
   #late = null; // s of our time minus s of the recording
   #heardMs = -Infinity;
 
-  /** Forget earlier moments: another recording begins. */
+  /** Forget earlier moments before another recording is played. */
   restart() {
     this.moments = [];
     this.#late = null;

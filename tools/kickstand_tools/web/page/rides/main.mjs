@@ -63,7 +63,7 @@ async function sortOut(added) {
   }, true);
 }
 
-/** A ride with its earlier results, if it has the same files. given: its name among the given files. */
+/** Return the ride, with its earlier results if its files are the same. given: its name among the given files. */
 function kept(ride) {
   const sources = [...ride.files, ...(ride.track ? [ride.track] : [])].map((name) => held.file(name));
   const bytes = sources.reduce((sum, file) => sum + file.size, 0);
