@@ -10,7 +10,7 @@ from kickstand_tools.simulation.ride import SimulatedRide, ride
 
 
 def cells_of(log: Log, accel=None, gyro=None, speed=True) -> LogCells:
-    """accel, gyro (3, 3): by which the sensors' axes are exchanged and reversed; a number makes the readings larger."""
+    """accel, gyro: a matrix (3, 3) that exchanges and reverses the sensor's axes, or a factor on its readings."""
     force = log.accel_g if accel is None else log.accel_g @ np.transpose(accel)
     rate = log.gyro_dps if gyro is None else log.gyro_dps @ np.transpose(gyro)
     mps = log.speed_mps if speed else np.full(len(log.t_s), np.nan)
@@ -22,7 +22,7 @@ def cells_of(log: Log, accel=None, gyro=None, speed=True) -> LogCells:
 
 
 def words(notice) -> str:
-    """In words, "" for nothing."""
+    """The remark as text, "" for none."""
     return sentence(notice) if notice else ""
 
 

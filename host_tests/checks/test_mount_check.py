@@ -55,7 +55,7 @@ def test_right_calibrations_are_never_accused(profile):
     log, calibration = made(profile)
     for each in log, silent(log):
         assert said(each, calibration) == ""
-        assert said(each, other(calibration, up=8.0)) == ""  # what two poses may be off
+        assert said(each, other(calibration, up=8.0)) == ""  # the error that two poses may have
 
 
 @pytest.mark.parametrize(("profile", "speed"), [("street", True), ("city", False), ("track", False), ("hills", True)])
@@ -80,7 +80,7 @@ def test_wrong_ones_are(profile, speed):
 
 
 def test_another_seeds_calibration(rides=("street", "sweeper", "city")):
-    """Of another bike, whose sensor is mounted in another way."""
+    """The calibration belongs to another bike, whose sensor is mounted differently."""
     pairs = [made(profile) for profile in rides]
     for (log, _), (_, calibration) in zip(pairs, pairs[1:] + pairs[:1]):
         assert "is it another mount's?" in said(log, calibration)
@@ -97,7 +97,7 @@ def test_gaps():
 
 def test_what_does_not_tell():
     log, calibration = made("street")
-    assert said(log, CalibrationFile()) == ""  # not aligned: that is said elsewhere
+    assert said(log, CalibrationFile()) == ""  # an unaligned calibration has its own message
     assert said(log.part(log.t_s < 10.0), other(calibration, up=90.0)) == ""
     assert said(silent(log), other(calibration, "car", up=90.0)) == ""  # a car does not lean
 
@@ -143,8 +143,8 @@ def exchanged_line(car, side, roll_deg=None):
 
 
 def test_what_is_reported():
-    """The sign of the log is always named as the other cause: the other side of the kickstand would make a clean report
-    of it, mirrored."""
+    """The message always names the log's sign as another cause. Choosing the other side of the kickstand would only
+    give a plausible but mirrored report."""
     assert exchanged_line(False, "left", 0.0).endswith("exchanged: calibrate two --side right?" + SIGN)
     assert exchanged_line(False, "right", -3.9).endswith("exchanged: calibrate two --side left?" + SIGN)
     assert exchanged_line(False, "", 0.0).endswith("calibrate two with the other --side?" + SIGN)
@@ -154,7 +154,7 @@ def test_what_is_reported():
 
 
 def jerky(late_s: int = 0, sign: float = 1.0, seconds: int = 240, mps2: float = 2.0) -> Log:
-    """Another acceleration each second, by chance, along z; a speed at its beginning, so many seconds late. 10 Hz."""
+    """A random acceleration along z in each second, with a speed at its beginning, delayed by some seconds; 10 Hz."""
     chance = np.random.default_rng(5)
     pushes = chance.normal(scale=mps2, size=seconds)
     speed_at = 30.0 + np.concatenate(([0.0], np.cumsum(pushes)))
@@ -178,13 +178,13 @@ def exchanged(log: Log) -> bool:
 
 @pytest.mark.parametrize(("late_s", "shown"), [(-1, False), (0, True), (1, True), (2, True), (3, False), (4, False)])
 def test_a_speed_up_to_two_seconds_late_shows_which_way_is_forward(late_s, shown):
-    """Each second pushes otherwise than the one before, so that one second off says nothing."""
+    """The acceleration changes every second, so a speed that is one second late proves nothing."""
     assert exchanged(jerky(late_s, sign=-1.0)) is shown
     assert not exchanged(jerky(late_s))
 
 
 def test_only_the_last_hour_counts():
-    """What was the other way round before it, as with a sensor that was turned over."""
+    """The axes were reversed until this time, as if the sensor had been turned over."""
     before, after = jerky(sign=-1.0, seconds=3600, mps2=8.0), jerky(seconds=3600)
     after.speed_mps += before.speed_mps[-10] - after.speed_mps[0]
     force, speed = (np.concatenate((getattr(before, name), getattr(after, name))) for name in ("accel_g", "speed_mps"))
@@ -200,7 +200,7 @@ def test_of_several_speeds_in_a_second_the_first_counts():
 
 
 def test_seconds_without_a_speed_or_without_samples():
-    """A gap in the log and lost satellites: what is left is enough. But two days are not one ride."""
+    """After a gap in the log and lost satellites the remaining data suffice. But two days are not one ride."""
     log = jerky(sign=-1.0)
     log.speed_mps[500:900] = np.nan
     assert exchanged(log.part((log.t_s < 100.0) | (log.t_s > 130.0)))
@@ -212,7 +212,8 @@ def test_seconds_without_a_speed_or_without_samples():
 
 
 def swaying(yaw_dps: float, seconds: float) -> Log:
-    """Yawing to and fro every 4 s by up to yaw_dps, and rolling as a motorcycle does then: by half the change."""
+    """Yaw swings with a period of 4 s and an amplitude of yaw_dps. Roll is half the change of yaw, as on a
+    motorcycle."""
     time = np.arange(0.0, seconds, 0.02)
     yaw, roll = yaw_dps * np.sin(np.pi / 2 * time), -0.5 * yaw_dps * np.cos(np.pi / 2 * time)
     return Log(time, np.tile([0.0, 1.0, 0.0], (len(time), 1)), np.column_stack((0 * yaw, yaw, roll)))
@@ -222,9 +223,9 @@ def swaying(yaw_dps: float, seconds: float) -> Log:
     ("yaw_dps", "seconds", "shown"), [(1.16, 90.0, False), (1.24, 90.0, True), (3.0, 61.0, False), (3.0, 63.0, True)]
 )
 def test_small_or_short_bends_show_no_forward(yaw_dps, seconds, shown):
-    """Means over 0.5 s have 0.974 of the amplitude, their changes over a second 1.414 times that, evened out 0.854: a
-    standard deviation of 0.832 yaw_dps, of which 1 deg/s is needed. Of 61 s 118 changes are left, of 63 s 122; 120 are
-    needed."""
+    """Means over 0.5 s keep 0.974 of the amplitude. Their changes over a second are 1.414 times as large; smoothing
+    keeps 0.854. So the standard deviation is 0.832 yaw_dps; 1 deg/s is needed. A log of 61 s has 118 changes, one of 63
+    s has 122; 120 are needed."""
     calibration = CalibrationFile(aligned=True)
     log = swaying(yaw_dps, seconds)
     assert said(log, calibration) == ""

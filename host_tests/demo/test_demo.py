@@ -16,18 +16,18 @@ from kickstand_tools.simulated_board.lcd import shown_lean
 from support.command import run
 from support.terminal import Terminal
 
-HUNG_S = 300  # only a process that hangs takes as long, whatever else the machine does
+HUNG_S = 300  # only a hanging process takes this long, even on a busy machine
 
 
 def demo_command(engine, hand=False):
-    """Command line of the demo. By hand its time passes six times as quickly."""
+    """Command line of the demo. With --hand its time passes six times as fast."""
     code = f"from kickstand_tools.demo import demo; demo.HAND_SPEED = 6.0; demo.demo({hand}, {engine == 'cpython'})"
     return [sys.executable, "-c", code]
 
 
 @functools.cache
 def printed_by(engine):
-    """The demo's output where standard output is no terminal."""
+    """The demo's output if standard output is not a terminal."""
     done = subprocess.run(
         demo_command(engine),
         stdin=subprocess.DEVNULL,
@@ -44,7 +44,7 @@ def printed_by(engine):
 
 @pytest.fixture(scope="module")
 def printed():
-    """What every engine prints: test_both_engines_show_the_same."""
+    """The output that every engine prints, see test_both_engines_show_the_same."""
     return printed_by("cpython")
 
 

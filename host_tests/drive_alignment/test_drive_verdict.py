@@ -1,4 +1,4 @@
-"""An alignment against the one of a drive, by angles; and a speed that is stuck, by seconds."""
+"""The verdict on an alignment by its angle to the drive's, and on a stuck speed by its duration."""
 
 from types import SimpleNamespace
 from typing import Any
