@@ -105,14 +105,14 @@ _tests = itertools.count(1)
 
 
 def pytest_collection_finish() -> None:
-    """What the tests have imported stays."""
+    """Keep the modules that the tests have imported."""
     gc.collect()
     gc.freeze()
 
 
 def pytest_runtest_setup() -> None:
-    """The app collects garbage often. Of all that earlier tests have left that takes CPython half a second, so what is
-    there before a test is not looked through; now and then it is, and what is garbage of it goes."""
+    """The app collects garbage often. CPython needs half a second to scan the objects of earlier tests. So collections
+    skip the objects that exist before a test. Occasionally those are scanned too, to free their garbage."""
     if next(_tests) % TESTS_PER_COLLECTION == 0:
         gc.unfreeze()
         gc.collect()
@@ -120,7 +120,8 @@ def pytest_runtest_setup() -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """One line: how many tests were skipped for want of what. Reasons are written "no X", "no X: how to have it"."""
+    """Print one line: the number of skipped tests for each missing thing. Reasons have the form "no X" or "no X: how to
+    get it"."""
     reasons = [str(report.longrepr[-1]) for report in terminalreporter.stats.get("skipped", ())]
     wanted = Counter(_why_skipped(reason.removeprefix("Skipped: ")) for reason in reasons)
     if wanted:
@@ -129,7 +130,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 
 def _why_skipped(reason: str) -> str:
-    """Why a test was skipped, for the line of all: "for want of" what is missing, as far as the reason says so."""
+    """The cause of a skip for the summary line: "for want of" the missing thing, if the reason names it."""
     missing = re.match(r"no (.+?)(?: for this system)?(?:: |$)|needs (.+)|could not import '([\w.]+)'", reason)
     return "for want of " + next(filter(None, missing.groups())) if missing else f"because {reason}"
 
@@ -145,7 +146,8 @@ def shared_data() -> Path:
 
 @pytest.fixture(scope="session")
 def chromium():
-    """Chromium as playwright's browser, one for all tests of a process: playwright cannot be begun twice."""
+    """Chromium as playwright's browser, shared by all tests of a process, because playwright cannot be started
+    twice."""
     executable = shutil.which("chromium")
     if executable is None:
         pytest.skip("no Chromium: on Debian the package chromium")

@@ -1,1 +1,2 @@
-"""What the tests share: boards, devices and programs to run, and what they show. Some of it runs on MicroPython too."""
+"""Helpers that the tests share: they run boards, devices and programs, and read their output. Some run on MicroPython
+too."""

@@ -1,4 +1,4 @@
-"""A board behind mpremote's own file commands: their scripts run here, on a directory instead of a flash."""
+"""A fake board for mpremote's own file commands: their scripts run on the host, on a directory instead of a flash."""
 
 import builtins
 import contextlib
@@ -19,7 +19,7 @@ PICO_PORT = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
 
 
 def plug_in(monkeypatch: pytest.MonkeyPatch, board: Any) -> Any:
-    """Make a board, which is returned, the only one that is plugged in, and let it restart at once."""
+    """Make this board the only connected one and let it restart at once. Returns the board."""
     monkeypatch.setattr(list_ports, "comports", lambda: [PICO_PORT])
     monkeypatch.setattr(connection, "ConnectedBoard", lambda name, timeout: board)
     monkeypatch.setattr(connection, "_RESTART_S", 0)
@@ -27,10 +27,9 @@ def plug_in(monkeypatch: pytest.MonkeyPatch, board: Any) -> Any:
 
 
 class FakeBoard(Transport):
-    """Takes the place of SerialTransport.
-
-    root: the directory that is its flash.  written: paths in the order they were opened for writing, or renamed after
-    that.  on_write(path, data): called before each write, returns what really lands on the flash.  before_change():
+    """Replaces SerialTransport. root: the directory that serves as its flash. written: paths in the order in which they
+    were opened for writing, or their new names. on_write(path, data): called before each write; returns the bytes that
+    are really written.  before_change():
     called before each change of the flash.  mpy: as sys.implementation._mpy.
     """
 
@@ -54,14 +53,14 @@ class FakeBoard(Transport):
                 return self.modules[name]
             if name == "kickstand":
                 return self._kickstand()
-            if name.startswith("kickstand."):  # not the one that is installed on the host
+            if name.startswith("kickstand."):  # not the module installed on the host
                 raise ImportError(f"no module named '{name}'")
             return __import__(name, *rest)
 
         self._globals = {"__builtins__": vars(builtins) | {"__import__": imports, "open": self._open}}
 
     def wait(self, seconds: float) -> None:
-        """By the clock that a test may have given the tools."""
+        """Uses the clock that a test may have set for the tools."""
         board_console.time.sleep(seconds)
 
     def enter_raw_repl(self, soft_reset: bool = True, timeout_overall: int = 10) -> None:
@@ -155,7 +154,7 @@ class FakeBoard(Transport):
 
 
 class Serial:
-    """The port: data that waits to be read, and what was written."""
+    """The port: data to be read, and data written."""
 
     def __init__(self) -> None:
         self.data = b""
@@ -191,5 +190,5 @@ def _implementation(name: str, mpy: int) -> types.SimpleNamespace:
 
 
 def files(root: Path) -> dict[str, bytes]:
-    """Path on the board and content of everything on it."""
+    """Return {path on the board: content} of all files on it."""
     return {"/" + p.relative_to(root).as_posix(): p.read_bytes() for p in root.rglob("*") if p.is_file()}

@@ -22,7 +22,7 @@ for name in sorted(dir(module)):
 
 
 def run_tests(module: Path, heap: str = "64M") -> None:
-    """Every test of a module that needs no more than MicroPython has, in one process."""
+    """Run all tests of a module that needs only MicroPython, in one process."""
     assert "test_" in run_mpy(_TESTS, str(module.parent), module.stem, heap=heap)
 
 
@@ -33,8 +33,8 @@ def run_mpy(
     stdin: str = "",
     directory: Path | None = None,
 ) -> str:
-    """Standard output of a script (text, or Path). Skips without MicroPython; AssertionError if it fails. directory:
-    where it runs, an empty one without it."""
+    """The standard output of a script (text, or Path). Skips the test without MicroPython. Raises AssertionError if the
+    script fails. directory: its working directory; by default an empty one."""
     if not unix_port.available():
         pytest.skip("no MicroPython unix port for this system")
     environment = unix_port.environment()
@@ -55,8 +55,8 @@ def run_mpy(
             timeout=300,
         )
     said = done.stdout + done.stderr
-    # The package's main() does not pass every exit status on. What takes data answers with JSON at its end, and a
-    # board's console before that may have tracebacks of its own.
+    # The package's main() does not return every exit status. Scripts that take data print JSON at their end. Before
+    # that, a board's console may print tracebacks.
     came_to_its_end = done.returncode == 0 and (bool(stdin) or "Traceback (most recent" not in said)
     assert came_to_its_end, f"MicroPython says:\n{said}"
     return done.stdout

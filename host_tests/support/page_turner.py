@@ -1,17 +1,17 @@
 """Finds a page of the display by pressing the button. CPython and MicroPython."""
 
-MOST_PRESSES = 20  # twice as many as there are pages
+MOST_PRESSES = 20  # twice the number of pages
 
 
 class PageTurner:
-    """Says when to press the button, until the views that are wanted have been shown, one after the other."""
+    """Decides when to press the button, until each wanted view has been shown in turn."""
 
     def __init__(self):
         self._wanted = []
         self._seen = []  # the views at the presses for the first of _wanted
 
     def turn_to(self, name):
-        """Want the view with this name next: see kickstand/state.py."""
+        """Wait for the view with this name next: see kickstand/state.py."""
         self._wanted.append(name)
 
     def presses(self, view):
