@@ -1,17 +1,17 @@
 """The simulated board's SD card with MicroPython's own FAT: formatted before a run, read after it."""
 
 # pyright: reportAttributeAccessIssue=false
-# the os is MicroPython's
+# imported here, because this needs MicroPython's os
 
 import binascii
 import os
 
 MOUNT = "/sd"
-READER = "/reader"  # as a computer has it
+READER = "/reader"  # as on a computer
 
 
 def format_card(card, formatted=True, fsinfo=True):
-    """With a FAT file system; without fsinfo nothing says how much of it is free."""
+    """Create a card with a FAT file system. Without fsinfo the card has no count of its free space."""
     if formatted:
         os.VfsFat.mkfs(card)
     if not fsinfo:
@@ -20,13 +20,13 @@ def format_card(card, formatted=True, fsinfo=True):
 
 
 def eject():
-    """What a reset does: nothing is mounted then."""
+    """Unmount the card, as a reset does."""
     if hasattr(os, "umount") and MOUNT[1:] in os.listdir("/"):
         os.umount(MOUNT)
 
 
 def rides(board):
-    """{path: content in base64} of all files on it, as a computer reads them."""
+    """Return {path: content in base64} of all files on the card, as a computer reads them."""
     found = {}
     try:
         os.mount(os.VfsFat(board.card), READER)

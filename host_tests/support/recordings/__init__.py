@@ -1,1 +1,1 @@
-"""Rides, logs and exports of apps that the tests make: whole, random or broken."""
+"""Creates rides, logs and exports of apps for the tests: whole, random or broken."""

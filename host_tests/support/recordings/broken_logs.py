@@ -1,4 +1,4 @@
-"""Logs that are broken in many ways. The same number always breaks a log in the same way."""
+"""Breaks logs in many ways. The same number always breaks a log in the same way."""
 
 import contextlib
 import functools
@@ -16,7 +16,7 @@ SIZES = (0.0, 1e-3, 1e-6, 9.80665, 57.29578, 1000.0, 1e6, 1e12, -1.0)
 
 
 def _of_lines(way):
-    """A way to break the lines of a text as one to break the text."""
+    """Convert a function that breaks a list of lines to one that breaks a text."""
 
     @functools.wraps(way)
     def of_text(text: bytes, chance: random.Random) -> bytes:
@@ -27,7 +27,7 @@ def _of_lines(way):
 
 
 def _of_cells(way):
-    """The same of lists of cells, which it changes."""
+    """Convert a function that changes lists of cells in place to one that breaks a text."""
 
     @functools.wraps(way)
     def of_text(text: bytes, chance: random.Random) -> bytes:
@@ -184,7 +184,7 @@ def nearly_nothing(text: bytes, chance: random.Random) -> bytes:
 
 
 def pack(text: bytes, chance: random.Random) -> bytes:
-    """With gzip's magic, whatever the name says."""
+    """Gzip's first bytes, whatever the file's name."""
     return gzip.compress(text, 1, mtime=0)
 
 
@@ -196,7 +196,7 @@ WAYS = [
 
 
 def broken(bases: list[bytes], number: int) -> tuple[str, bytes, str]:
-    """Name and content of a file, and the ways in which it was broken, one to three of them."""
+    """Return the name and content of a broken file, and the one to three ways in which it was broken."""
     chance = random.Random(number)
     text = chance.choice(bases)
     ways = [WAYS[number % len(WAYS)], *chance.choices(WAYS, k=chance.choice((0, 0, 1, 2)))]

@@ -1,1 +1,2 @@
-"""The pages in a browser: a user who clicks, ports and radios that lead to boards in the test's process."""
+"""Helpers to test the pages in a browser: a user who clicks, and ports and radios connected to boards in the test's
+process."""

@@ -1,4 +1,4 @@
-"""A rider at the page: real clicks and keys, and what there is to be seen then."""
+"""A rider who uses the page with real clicks and keys, and reads what it shows."""
 
 import os
 from pathlib import Path
@@ -8,20 +8,20 @@ import pytest
 
 PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
 LAPTOP: dict[str, Any] = {"viewport": {"width": 1440, "height": 900}}
-READ_S = 120  # at most, until the page shows what is waited for: a busy machine is late with all of it
+READ_S = 120  # longest wait for the page to show something; a busy machine is slow
 
-# Keeps what the board's worker sends, for tests to look at and to repeat; and lets the page draw less often
+# Keeps the messages of the board's worker, for tests to check and repeat, and makes the page draw less often
 KEEP = Path(__file__).with_name("keep.js").read_text()
 
-# Of a file whose address ends so the site gives nothing but this status; window.given() again fetches all. The service
-# worker is passed by.
+# Makes the site answer with this status for files whose address ends so, until window.given() is called. The service
+# worker is bypassed.
 MISSING = Path(__file__).with_name("missing.js").read_text()
 
 
 class Rider:
-    """browser: of playwright. asked: the addresses that the page has fetched; errors: what went wrong in it. policy:
-    whether the page's content security policy holds, which forbids playwright's wait_for_function() but on the page
-    Rides. script: runs before those of each page."""
+    """browser: playwright's. asked: the addresses that the page has requested; errors: the errors in it. policy: True
+    to enforce the page's content security policy, which forbids playwright's wait_for_function() except on the page
+    Rides. script: runs before each page's own scripts."""
 
     def __init__(self, browser, address, policy=False, script="", **kind):
         self._browser = browser
@@ -37,18 +37,18 @@ class Rider:
         self.page.goto(address)
 
     def reads(self, text):
-        """Wait until the display says this in its first line."""
+        """Wait until the first line of the display shows this text."""
         self.page.wait_for_function(
             "text => seen.last && document.querySelector('#display').ariaLabel.startsWith(`Display: ${text}`)",
             arg=text,
         )
 
     def guide_says(self, text):
-        """Wait until the guide says this."""
+        """Wait until the guide shows this text."""
         self.page.wait_for_function("text => document.querySelector('#todo').textContent.includes(text)", arg=text)
 
     def wait(self, seconds):
-        """Until so much of the board's time has passed."""
+        """Wait until this much of the board's time has passed."""
         self.page.wait_for_function(
             "until => seen.last.t_s >= until", arg=self.seen("last")["t_s"] + seconds, timeout=1000 * (seconds + READ_S)
         )
@@ -58,28 +58,28 @@ class Rider:
             self.page.keyboard.press(key)
 
     def hold(self, seconds):
-        """Keep the space bar pressed for so long."""
+        """Hold the space bar down for this time."""
         self.page.keyboard.down("Space")
         self.wait(seconds)
         self.page.keyboard.up("Space")
-        self.wait(0.3)  # as a finger does, which does not press again at once
+        self.wait(0.3)  # a finger does not press again at once either
 
     def click(self, selector):
         self.page.click(selector)
 
     def seen(self, what):
-        """What the board has sent, by a name in KEEP."""
+        """The messages of the board, by a name in KEEP."""
         return self.page.evaluate(f"seen.{what}")
 
     def text(self, selector):
         return self.page.inner_text(selector)
 
     def leans(self):
-        """(true, shown) as the page says them, degrees, > 0 to the right."""
+        """The true and the shown lean on the page, degrees, > 0 to the right."""
         return tuple(_lean_deg(self.text(selector)) for selector in ("#true-lean", "#shown-lean"))
 
     def align(self):
-        """The two presses, as the guide asks for them."""
+        """Do the two presses when the guide asks for them."""
         self.guide_says("Press the button")
         self.click("#press")
         self.reads("Now upright")
@@ -88,7 +88,7 @@ class Rider:
         self.click("#press")
 
     def axe(self):
-        """What axe-core finds, in the light and in the dark: a line for each."""
+        """The findings of axe-core, in the light and the dark style: one line each."""
         axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
         found = []
         for scheme in ("light", "dark"):
@@ -98,20 +98,20 @@ class Rider:
         return found
 
     def fits(self):
-        """Is the page as wide as its window?"""
+        """True if the page fits the width of its window."""
         return self.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
     def strangers(self):
-        """The addresses beyond the site that it has asked for."""
+        """The requested addresses outside the site."""
         home = "/".join(self.asked[0].split("/")[:3]) + "/"
         return [url for url in self.asked if not url.startswith((home, f"blob:{home}", "data:"))]
 
     def slow(self, times):
-        """Let the page's own thread have this part of the processor only."""
+        """Limit the page's own thread to this share of the processor."""
         self.context.new_cdp_session(self.page).send("Emulation.setCPUThrottlingRate", {"rate": times})
 
     def processes(self):
-        """The numbers of the browser's processes."""
+        """The ids of the browser's processes."""
         info = self._browser.new_browser_cdp_session().send("SystemInfo.getProcessInfo")
         return [process["id"] for process in info["processInfo"]]
 

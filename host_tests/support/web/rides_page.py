@@ -1,4 +1,4 @@
-"""The page Rides, with somebody who gives it files; and numbers compared."""
+"""Uses the page Rides in a browser, and compares numbers."""
 
 from pathlib import Path
 
@@ -12,25 +12,25 @@ PHONE_MOUNTED = analysis_rides.CALIBRATION | {"vehicle_from_sensor": app_exports
 
 
 class Rides:
-    """Drives the page Rides in a browser: gives it files, and returns what it says."""
+    """Uses the page Rides in a browser: chooses files, and returns the page's texts."""
 
     def __init__(self, rider):
         self.rider, self.page = rider, rider.page
 
     def give(self, *files):
-        """Choose files in place of all before; what the page says in the end."""
+        """Replace all files by these; return the page's final message."""
         while self.held():
             self.remove("#held li:first-child button")
             self.said()
         return self.add(*files)
 
     def show(self, *files):
-        """Give them, unless their report is there already."""
+        """Choose these files, unless their report is already shown."""
         if set(self.held()) != {file.name for file in files} or self.page.is_hidden("#report"):
             assert self.give(*files) == ""
 
     def add(self, *files):
-        """Choose files; what the page says in the end."""
+        """Choose files; return the page's final message."""
         self.page.set_input_files("#files", files)
         return self.said()
 
@@ -40,7 +40,7 @@ class Rides:
         self.page.click(button)
 
     def held(self):
-        """{name: what the page says of it} of the files that it has."""
+        """{name: the page's text about it} for each chosen file."""
         cells = "rows => rows.map((row) => [row.children[0].textContent, row.children[1].textContent])"
         return dict(self.page.eval_on_selector_all("#held li", cells))
 
@@ -49,7 +49,7 @@ class Rides:
         return self.page.inner_text("#said")
 
     def saved(self, selector) -> bytes:
-        """What a button offers for download."""
+        """The file that a button offers for download."""
         with self.page.expect_download(timeout=WAIT_MS) as download:
             self.page.click(selector)
         return Path(download.value.path()).read_bytes()
@@ -71,7 +71,7 @@ def near(found, wanted, by):
 
 
 def assert_near(found, wanted):
-    """The same JSON, but for the last digit of its numbers."""
+    """Assert that both JSON values are equal, except for the last digit of their numbers."""
     if isinstance(wanted, dict):
         assert found.keys() == wanted.keys()
         for key in wanted:
