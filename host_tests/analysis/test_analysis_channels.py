@@ -32,7 +32,7 @@ def test_smoothed_ride_differs_only_in_its_lean(ride, course):
 
 
 def test_maxima_are_those_of_the_display(ride):
-    """For any division into blocks."""
+    """The maxima are the same for any division into blocks."""
     log = reader.read_log(ride.log)
     engine = replay_engine.Replay(ride.calibration.to_firmware())
     for row in log.rows():
@@ -145,5 +145,5 @@ def test_channels_are_those_of_the_meter(ride, course):
             assert np.max(np.abs(getattr(course, name) - column)) < 1e-5, name
     assert np.array_equal(course.shown_g, shown)
     assert np.array_equal(course.rolling, rolling)
-    assert 0.2 < np.mean(rolling) < 0.9  # in its turns it knows
+    assert 0.2 < np.mean(rolling) < 0.9  # the lean is known in its turns
     assert np.array_equal(course.trusted, trusted)

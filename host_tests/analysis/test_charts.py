@@ -87,7 +87,7 @@ def test_chart_of_g_against_g_has_the_right_sides(seen, panels, drawn):
 
 
 def test_the_straights_and_their_line(seen, panels, drawn):
-    """Forces to the left on the left; the line of the yaw goes through them."""
+    """Forces to the left are on the left. The line of the yaw goes through the points."""
     _, dots, line = chart(seen, "Alignment").traces
     assert isinstance(dots, Dots) and isinstance(line, Line)
     assert dots.x == pytest.approx(-seen.quality.lateral_g)
@@ -123,7 +123,7 @@ def test_charts_of_car_and_speed_are_drawn_only_if_present(seen, car, speed):
 
 
 def test_charts_are_stacked_in_a_narrow_window(seen):
-    """In a wide one the last three are side by side and do not overlap."""
+    """In a wide window the last three charts are side by side and do not overlap."""
     for kind, last_row in (("layout", 3), ("narrow", 1)):
         drawn = interactive.figure(charts(seen))[kind]
         axes = [name.removeprefix("xaxis") for name in drawn if name.startswith("xaxis")]
@@ -136,7 +136,7 @@ def test_charts_are_stacked_in_a_narrow_window(seen):
 
 
 def test_unknown_values_are_not_drawn(seen):
-    """Nothing is sure enough; nor is an alignment drawn for another mount's calibration."""
+    """Values that are not sure enough are not drawn, nor is the alignment of another mount's calibration."""
     made = replace(seen, notices=[UpOff(20.0, False)], summary=replace(seen.summary))
     made.summary.left_deg = made.summary.right_deg = made.summary.brake_g = made.summary.accel_g = Peak()
     assert title(made).endswith("lean as displayed -- left, -- right  ·  braking --, acceleration --")

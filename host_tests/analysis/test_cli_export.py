@@ -60,7 +60,7 @@ def test_a_car_has_no_lean_as_in_replay(ride, tmp_path):
 
 
 def test_ride_that_cannot_be_exported_is_refused(ride, tmp_path, monkeypatch):
-    """Without a calibration beside it, or with one that is not aligned; without pyarrow."""
+    """The ride has no calibration beside it, or an unaligned one; or pyarrow is missing."""
     alone = tmp_path / "alone.csv"
     alone.write_bytes(ride.read_bytes())
     empty = tmp_path / "empty.csv"

@@ -120,7 +120,7 @@ def test_vbo_interpolates_positions_for_every_row(tmp_path):
 
 @pytest.mark.parametrize("form", ["gpx", "racechrono", "vbo"])
 def test_time_of_the_satellites_is_preferred(tmp_path, form):
-    """A log whose own clock was set wrong, and a stretch of a log that begins within a second without a position."""
+    """Two cases: a log whose own clock was wrong, and a stretch that begins in a second without a position."""
     for ride in (log(1.2e9), api.Stretch(log(), 12.5, 25.0)):
         out = exported(form, tmp_path, ride)
         if form == "gpx":
@@ -150,7 +150,7 @@ def test_a_track_across_180_degrees_goes_the_short_way():
 
 
 def test_last_position_of_a_stretch_is_kept():
-    """Their mean across 180 degrees would be on the other side of the earth."""
+    """The mean of positions on both sides of the meridian of 180 degrees would be on the other side of the earth."""
     few = log().part(log().t_s < 0.1)
     few.lon_deg[:] = np.nan
     few.lat_deg[:], few.lon_deg[3:6], few.utc_s[2] = -10.0, (179.9999, -179.9999, -179.9998), START_S

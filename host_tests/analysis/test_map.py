@@ -50,7 +50,7 @@ def test_the_map_has_the_shape_of_its_track_within_limits(east_m, north_m, shape
 
 @pytest.mark.parametrize("place", [(-33.9, 151.2), (69.6, 18.9), (47.6, 179.999), (-0.001, 0.001)])
 def test_metre_of_the_map_is_right_in_both_directions(place):
-    """At every latitude, on both sides of the equator and across the meridian of 180 degrees."""
+    """A metre is right at every latitude, on both sides of the equator and across the meridian of 180 degrees."""
     found = points_of(*place)
     ride = app_exports.riding()
     north = (ride.lat_deg - ride.lat_deg[0]) * np.radians(EARTH_M)
@@ -131,7 +131,7 @@ def test_page_loads_nothing_unless_tiles_are_requested(tmp_path):
 
 @pytest.mark.parametrize("place", [(52.5, 13.4), (-33.9, 151.2), (47.6, -0.01)])
 def test_tiles_match_the_track(place):
-    """The number of the start's tile by the map's metres, and by the formula of slippy maps."""
+    """The number of the start's tile is the same from the map's metres and from the formula of slippy maps."""
     found = points_of(*place)
     tiles = page.tiles_at(found)
     size = tiles["world_m"] / 2**15

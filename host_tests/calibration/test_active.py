@@ -84,7 +84,8 @@ def test_save_replaces_and_refine_corrects(made):
 
 
 def test_the_trim_is_saved_once_a_minute_at_most(made):
-    """Because flash wears. Not in the first minute. If there was nothing to save, the next chance is used."""
+    """The trim is saved seldom because flash wears, and never in the first minute. If there was nothing to save, the
+    next chance is used."""
     active, meter, _ = made
     active.chip_started(Chip())
     active.save(aligned())

@@ -171,7 +171,7 @@ def test_the_fit_is_numpys_and_so_is_its_covariance():
 
 
 def test_micropython_finds_the_same():
-    """With the poses and turns of a log, step by step; its list of numbers is the whole answer."""
+    """MicroPython gets the poses and turns of a log, step by step. Its list of numbers is the whole answer."""
     fit = fitted()
     script = (
         "from array import array\nfrom kickstand.calibration.sensor_fit import SensorFit\n"

@@ -26,7 +26,7 @@ def crash_command():
 
 @pytest.fixture
 def installed(tmp_path, monkeypatch):
-    """installed(distribution, its entry_points.txt, name=content of its modules): as if pip had installed it."""
+    """installed(distribution, its entry_points.txt, name=content of its modules): install a package as pip does."""
 
     def install(distribution: str, entry_points: str, **modules: str) -> None:
         info = tmp_path / f"{distribution}-1.0.dist-info"
@@ -102,5 +102,5 @@ def test_users_own_script_is_not_run(tmp_path):
 
 
 def test_a_checkout_has_the_workshops_commands():
-    """The wheel does not have them: host_tests/deploy/test_cli_package.py."""
+    """The wheel does not have these commands, see host_tests/deploy/test_cli_package.py."""
     assert {"bands", "bench", "evaluate"} <= set(main.kickstand.list_commands(None))

@@ -53,7 +53,7 @@ def first_line(screen, now_ms):
 
 
 def test_a_cancelled_alignment_gets_no_more_samples(screen):
-    """The trim is not saved even during the 100 ms until the next page, although the last sample would save it."""
+    """Samples are not used even during the 100 ms until the next page: the last one would save the alignment."""
     screen.press(LONG, 0)
     screen.press(LONG, 100)
     assert screen.wizard is not None

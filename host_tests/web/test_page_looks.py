@@ -43,7 +43,8 @@ def test_on_a_phone_everything_for_the_first_minute_is_on_its_first_screen(chrom
 
 
 def test_a_phone_leans_the_motorcycle_and_a_tablet_without_motion_data_says_so(chromium, address):
-    """The page also says what it is. A screen reader's click, which comes without a pointer, presses the button too."""
+    """The page's introduction is visible, too. A screen reader's click, which comes without a pointer, also presses the
+    button."""
     rider = Rider(chromium, address, **PHONE)
     rider.page.set_viewport_size({"width": 820, "height": 1180})
     rider.reads("Raw")
@@ -71,7 +72,7 @@ def test_a_phone_leans_the_motorcycle_and_a_tablet_without_motion_data_says_so(c
 
 
 def test_nothing_is_below_the_choice_of_the_display(chromium, address):
-    """Keys are also shown in a narrow window of a computer, which has a keyboard."""
+    """The same holds in a narrow window of a computer, where the page also explains the keys."""
     rider = Rider(chromium, address, viewport={"width": 390, "height": 844})
     for width in (360, 390, 420, 480, 512, 560, 800):
         rider.page.set_viewport_size({"width": width, "height": 844})

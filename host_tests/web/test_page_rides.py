@@ -146,7 +146,7 @@ def test_once_used_it_works_without_a_network(chromium, address, ride, calibrati
 
 
 def test_long_work_can_be_stopped(page, ride, calibration):
-    """The other files are used instead."""
+    """After the stop, the page can read other files."""
     page.give()
     page.page.set_input_files("#files", [ride, calibration])
     page.page.click("#stop")

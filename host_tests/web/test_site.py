@@ -278,7 +278,7 @@ def test_silent_connections_do_not_hold_the_page():
 
 
 def test_pages_get_no_other_installed_packages(tmp_path, monkeypatch):
-    """numpy and rich are then installed beside it."""
+    """The tools are installed beside numpy and rich here."""
     shutil.copytree(firmware_path.TOOLS / "kickstand_tools", tmp_path / "kickstand_tools")
     for name in "numpy", "rich":
         (tmp_path / name).mkdir()

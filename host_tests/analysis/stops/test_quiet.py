@@ -42,7 +42,7 @@ def maybe(**changed: float) -> Channels:
 
 
 def share(ride: Channels) -> float:
-    """The share of the middle that is a standstill. The rest must not be."""
+    """Return the share of the middle that counts as a standstill. The riding before and after must not count."""
     still = standing(ride)
     t = ride.t_s
     assert not still[(t < 5.0) | (t > END_S + 0.5)].any()
@@ -55,7 +55,7 @@ def share(ride: Channels) -> float:
         ({"pitch_rate_dps": 0.14}, {"pitch_rate_dps": 0.16}),  # 15 % of the shaking on the move
         ({"yaw_rate_dps": 0.14}, {"yaw_rate_dps": 0.16}),
         ({"up_g": 0.19}, {"up_g": 0.21}),  # 20 % of it
-        ({"engine": 3.0}, {"pitch_rate_dps": 1.0}),  # idling: as much, but faster
+        ({"engine": 3.0}, {"pitch_rate_dps": 1.0}),  # idling: as strong, but faster
         ({"pitching": 0.95}, {"pitching": 1.05}),  # 1 deg/s
         ({"pitching": -0.95}, {"pitching": -1.05}),
         ({"yawing": 0.95}, {"yawing": 1.05}),
@@ -77,7 +77,7 @@ def test_each_condition_of_a_standstill_has_its_limit(stands, does_not):
 
 @pytest.mark.parametrize("ridden_s", [(0.0, 24.0), (8.0, 15.0)])
 def test_standstill_is_found_within_half_a_second(ridden_s):
-    """Also if it is the larger part of the ride."""
+    """This also holds if the standstill is the larger part of the ride."""
     ride = maybe()
     ride = ride.part((ride.t_s >= ridden_s[0]) & (ride.t_s < ridden_s[1]))
     times = ride.t_s[standing(ride)]
@@ -95,8 +95,8 @@ def test_standstill_needs_a_second_of_quiet(seconds, stands):
 
 
 def test_rest_of_the_filter_is_extended_back():
-    """On a road without shaking: braking until 12 s, a fork that rebounds for 0.3 s, and a rest found from 13.5 s
-    on."""
+    """The road does not shake the bike. It brakes until 12 s, the fork rebounds for 0.3 s, and the filter finds a rest
+    from 13.5 s on."""
     road = Road((8.0, 0.0), (4.0, -4.0), (4.0, 0.0))
     ride = road.channels(resting=(road.t_s >= 13.5).astype(float))
     ride.forward_g += 0.03
