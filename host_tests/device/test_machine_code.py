@@ -57,7 +57,7 @@ def imported(tmp_path, path="", name="", error=""):
 
 
 def test_correct_machine_code_is_used(tmp_path):
-    """That of every viper function."""
+    """The machine code of every viper function is used."""
     found = [
         (path.relative_to(firmware_path.PACKAGE).as_posix(), name)
         for path in firmware_path.PACKAGE.rglob("*_viper.py")

@@ -128,7 +128,7 @@ def test_the_other_address_is_tried(mine, tmp_path, monkeypatch):
 
 
 def test_a_clock_that_has_the_sensors_address_is_not_set(tmp_path, monkeypatch):
-    """Only the number of the register to read is written to it."""
+    """The driver only writes the number of the register to read."""
     clocks = []
 
     def fit(board):
@@ -233,7 +233,7 @@ def test_status_lists_both_buses(tmp_path, monkeypatch):
 
 
 def test_the_sensor_page_lists_the_devices(tmp_path, monkeypatch):
-    """It is the menu's fourth entry without a speed source. A fault does not hide the menu."""
+    """Without a speed source the page is the menu's fourth entry. A fault does not hide the menu."""
     fit = instead(Ds3231, Registers(0x57), Registers(0x77))
     presses = [(2.0, 1.0), (3.5,), (3.9,), (4.3,), (4.7, 1.0)]
     seen = shows(tmp_path, monkeypatch, fit, noisy, [6 + 0.5 * k for k in range(8)], presses=presses)
@@ -259,7 +259,7 @@ def test_a_nack_does_not_fail_the_set_up(nth, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("wiring", [1, 2, 3, 4])
 def test_status_finds_the_wiring_of_a_backpack(wiring, tmp_path, monkeypatch):
-    """Each wiring is used to show its number: only the right one is readable and lit."""
+    """The board shows the number of each wiring by means of that wiring: only the right one is readable and lit."""
     monkeypatch.chdir(tmp_path)
     board = Board(noisy)
     setattr(board.lcd, "wiring", wiring)  # noqa: B010 - of an Lcd, not of an Oled

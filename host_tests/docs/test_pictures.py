@@ -31,7 +31,7 @@ def test_no_drawing_is_stale(pictures):
 @pytest.mark.nightly  # each draws a whole ride; what a plot shows is tested in host_tests/analysis
 @pytest.mark.parametrize(("name", "draw"), [("ride.png", ride.draw), ("lean_compared.png", explained.lean_compared)])
 def test_no_plot_of_a_ride_is_stale(name, draw):
-    """By its look: matplotlib's files differ from version to version."""
+    """The pixels are compared, because matplotlib's files differ between versions."""
     fresh, kept = (
         np.asarray(Image.open(io.BytesIO(data)).convert("L"), dtype=float)
         for data in (draw(), (PICTURES / name).read_bytes())

@@ -1,4 +1,4 @@
-"""The pages of text: every link leads somewhere, and what they list is what there is."""
+"""The documents: every link has a target, and every list matches the files."""
 
 import ast
 import re
@@ -15,7 +15,7 @@ BEHIND = sorted(path for folder in ("firmware", "tools") for path in (ROOT / fol
 DISPLAYS, HOW = (ROOT / "firmware" / "docs" / name for name in ("displays.md", "how-it-works.md"))
 PAGES = [FIRST, DEVICE, TOOLS, CONTRIBUTING, ROOT / "firmware/FAQ.md", ROOT / "CHANGELOG.md", *BEHIND]
 MOST_LINES = {FIRST: 130, DEVICE: 250, TOOLS: 200}
-WIDEST = 120  # but for tables, pictures and commands
+WIDEST = 120  # except for tables, pictures and commands
 # Issues, releases, the site, wherever the project is hosted
 OF_THE_REPOSITORY = re.compile(r"(\.\./){2,}(issues|releases|deployments)\b")
 LINK = re.compile(r'\]\(([^)\s]+)\)|src="([^"]+)"')

@@ -22,7 +22,7 @@ def unit(rng):
 
 @pytest.mark.parametrize("off_deg", [0.0, 0.01, 45.0, 89.9, 90.1, 179.99, 180.0])
 def test_rotation_between_is_safe_at_every_angle(off_deg):
-    """It is a rotation from a to b within 1e-12, even if a and b are exactly antiparallel."""
+    """The result is a rotation from a to b within 1e-12, even if a and b are exactly antiparallel."""
     rng = np.random.default_rng(3)
     off = np.radians(off_deg)
     for axis, b in ((0, published.UP), (2, published.UP), (1, published.BACKWARD)):
@@ -50,7 +50,8 @@ def test_dispersion_is_fishers(sigma_deg):
 
 
 def test_history_is_exact_and_wraps_round():
-    """Differences of the integrals against numpy, across the wrap of time and sums. No answer outside the history."""
+    """Differences of the integrals equal numpy's, also where time and sums wrap. Outside the history there is no
+    result."""
     rng = np.random.default_rng(2)
     history = ForceHistory()
     history.now = MASK - 3_000_000
@@ -215,7 +216,7 @@ def test_a_bend_at_a_stuck_zero_is_no_stop(share, moved):
     [(2.0, 0.0, 0.02, 0), (4.0, 0.0, 0.02, 1), (9.0, 1.0, 0.0, 0), (9.0, 0.0, 0.2, 0)],
 )
 def test_a_stop_requires_stillness_and_time(seconds, speed, shake_g, stops):
-    """Standing for three seconds, with no more than an engine's shaking."""
+    """A stop needs three seconds at rest, with no more shaking than an engine's."""
     standing = StandingVertical()
     for k in range(round(seconds * 10)):
         standing.update([0.0, 1.0, shake_g * (-1) ** k], (0.0, 0.0, 0.0), speed, 0.1)
@@ -226,7 +227,7 @@ def test_a_stop_requires_stillness_and_time(seconds, speed, shake_g, stops):
     ("speeds", "yaw_dps", "stuck"), [((7.0, 7.0), 0.0, True), ((7.0, 7.1), 0.0, False), ((7.0, 7.0), 10.0, False)]
 )
 def test_a_speed_that_stays_the_same_in_a_lively_ride_is_stuck(speeds, yaw_dps, stuck):
-    """But not a changing speed, nor a steady one through bends."""
+    """A changing speed is not stuck, nor is a steady speed through bends."""
     check = SpeedCheck()
     for k in range(30):
         check.measure(speeds[k % 6 // 3])

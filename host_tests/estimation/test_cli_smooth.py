@@ -81,7 +81,7 @@ def test_report_has_the_smoothed_or_the_live_lean(ride):
 
 
 def test_slow_log_is_reported_with_the_displayed_lean(tmp_path):
-    """Its lean is the one that the display showed; smooth itself refuses such a log."""
+    """The report contains the lean that the display showed. The command smooth refuses such a log."""
     t_s = np.arange(0.0, 60.0, 0.2)
     noise = np.random.default_rng(1).normal(0.0, 0.01, (len(t_s), 6))
     table = np.column_stack((t_s, noise + [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]))

@@ -49,7 +49,7 @@ def test_rest_and_braking_on_a_slope_fit_the_model(pitch, braking):
 
 @pytest.mark.parametrize("lean", [-0.5, 0.0, 0.8])
 def test_sensor_above_the_roll_axis_moves_with_the_roll(lean):
-    """It is 0.6 m above it and 0.7 m in front of the rear wheel, while the bike rolls and turns."""
+    """The sensor is 0.6 m above the roll axis and 0.7 m in front of the rear wheel, while the bike rolls and turns."""
     height, ahead, speed, roll, yaw = 0.6, 0.7, 15.0, 1.2, -0.3
     s, c = np.sin(lean), np.cos(lean)
     left, up, forward = -height * c * roll + ahead * yaw, -height * s * roll, speed + height * s * yaw
@@ -83,7 +83,8 @@ def test_a_warmer_sensor_has_other_offsets():
 
 
 def test_the_jacobian_is_that_of_the_equations():
-    """By the states and by every parameter, against central differences; the speed backwards and forwards."""
+    """The derivatives by the states and by every parameter equal central differences, for both directions of the
+    speed."""
     rng, n = np.random.default_rng(3), 30
     force, rate = rng.normal(size=(2, n, 3))
     windows = windows_of(np.linspace(0.0, 6.0, n), force, rate, rng.normal(size=n), rng.normal(size=n))
@@ -152,7 +153,7 @@ def test_windows_hold_the_integrals_and_gaps_are_windows_of_their_own():
 
 
 def test_gravity_stays_whole_in_a_window_while_the_bike_rolls():
-    """By 30 degrees in a window: means along axes that roll are 1 % small."""
+    """The bike rolls by 30 degrees in a window. Means along the rolling axes are 1 % too small."""
     t = np.arange(400) / 200.0
     lean = np.radians(150.0) * (t - 1.0)
     force = np.column_stack((np.sin(lean), np.cos(lean), np.zeros(400)))
