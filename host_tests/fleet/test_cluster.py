@@ -107,7 +107,7 @@ def test_fleet_on_a_cluster_is_resumed(cluster, fleet, tmp_path, monkeypatch):
     os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + 1_000_000))
     assert run_fleet(periods, tmp_path).new == 1
     assert run_fleet(periods, tmp_path).new == 0
-    # so are other options
+    # other options cause a new computation, too
     assert run_fleet(periods[:1], tmp_path, with_signals=True).new == 1
     written = sorted((tmp_path / "signals").rglob("*.parquet"))
     assert len(written) >= len(periods[0].paths)
@@ -227,7 +227,7 @@ if __name__ == "__main__":
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="Ctrl-C comes at once on this system")
 @pytest.mark.parametrize("after_s", [0.6, 1.6])
 def test_ctrl_c_while_workers_start_is_deferred(tmp_path, after_s):
-    """Interrupted at once, they would print pages of errors."""
+    """Workers that are interrupted at once would print pages of errors."""
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)
     command, pipe = [sys.executable, str(program)], subprocess.PIPE

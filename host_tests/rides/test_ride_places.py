@@ -103,7 +103,7 @@ def test_a_log_has_no_empty_columns(tmp_path):
 
 
 def test_an_older_reader_finds_all_but_the_positions():
-    """It reads the number of positions as a byte of the version's name, and their bytes as zeros."""
+    """An older reader takes the number of positions for a byte of the version's name, and their bytes for zeros."""
     data, _ = ride_writer.blocks(3, places_every=10)
     for content in data:
         fields = struct.unpack_from("<4sHHIIqhHHH11sB", content)
