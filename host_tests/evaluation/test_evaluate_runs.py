@@ -154,8 +154,7 @@ def test_a_recording_without_speed_is_refused():
 
 def test_recorded_motorcycle_has_its_known_scores(shared_data):
     """The complementary filter's slope on this recording is known to be 0.40 (measured with another calibration). With
-    forward from
-    braking and up from the first second the shown lean had 2.98 degrees rms and a slope of 1.226."""
+    forward from braking and up from the first second the shown lean had 2.98 degrees rms and a slope of 1.226."""
     made = real_ride.compare(shared_data / "motorcycle-ride.csv.gz")
     scores, leans = made.scores, made.traces
     assert scores["complementary"].slope == pytest.approx(0.40, abs=0.06)

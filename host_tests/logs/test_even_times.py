@@ -29,7 +29,7 @@ def test_rounded_times_are_even_again(rate_hz, tick_s, how):
     true = 0.123 + np.arange(5000) / rate_hz
     recorded = ROUND[how](true / tick_s) * tick_s
     step_error, time_error = errors(true, recorded)
-    assert step_error < 0.03  # the recorded times have an error over 1: steps of 0 and of twice the right length
+    assert step_error < 0.03  # the error before the repair is over 1: steps of 0 and of twice the right length
     assert time_error < 0.07 * tick_s
     found = even_times(recorded)
     assert np.max(np.abs(found - recorded)) <= 0.6 * tick_s + 1e-9

@@ -91,7 +91,7 @@ def edges_in_a_transfer(machine, pulses_per_s):
 
 
 def test_interrupts_of_an_esp32_wait_for_the_end_of_a_transfer():
-    """At most eight interrupts are delayed, and they see the pin's level after the transfer. On a Pico they come at
+    """At most eight interrupts are kept, and they see the pin's level after the transfer. On a Pico they come at
     once."""
     assert edges_in_a_transfer("pico", 300)[0] in (5, 6, 7)
     during, after = edges_in_a_transfer("esp32", 300)

@@ -70,7 +70,7 @@ def test_bad_mount_changes_readings_but_not_the_ride(rides, mount):
 
 
 def test_aliased_engine_vibration_appears_at_low_frequencies(rides):
-    """The road shakes the bike below 25 Hz, so most of the rest is above 100 Hz."""
+    """The road shakes the bike below 25 Hz. The additional vibration there is aliased from above 100 Hz."""
     plain, aliased = (bands_of(*in_vehicle(rides("A", mount)), 200.0)[QUANTITIES[1]] for mount in (None, "aliasing"))
     assert aliased[4] > 1.05 * plain[4]
 

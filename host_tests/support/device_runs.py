@@ -213,13 +213,13 @@ def _world(plan):
 def run_device(plan):
     """Device.record() of a run that is described as data, which can be sent to another process.
 
-    plan: "until" (s); "lean" as for standing(), or "ride" [[name of a function in rides, arguments...], ...],
-    or "poses" as for poses_of; "seed" of the part (None: perfect); "presses" [[at_s, for_s], ...];
-    "faults" [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...];
-    "gps", "wheel" and "card": arguments of Device's methods; config "VEHICLE" "car": the ride is a car's; "remount"
-    [at_s, seed of the mounting from then on]; "turn_to" [[at_s, name of a view], ...], as for Device.turn_to();
-    "phones": [[[at_s, action of a simulated Phone, arguments...], ...], ...], one after the other; "stream" True: start
-    the app as `kickstand record` does.
+    plan: "until" (s); "lean" as for standing(), or "ride" [[name of a function in rides, arguments...], ...], or
+    "poses" as for poses_of; "seed" of the part (None: perfect); "presses" [[at_s, for_s], ...]; "faults" [[method,
+    arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...]; "gps", "wheel" and "card":
+    arguments of Device's methods; config "VEHICLE" "car": the ride is a car's; "remount" [at_s, seed of the mounting
+    from then on]; "turn_to" [[at_s, name of a view], ...], as for Device.turn_to(); "phones": [[[at_s, action of a
+    simulated Phone, arguments...], ...], ...], one after the other; "stream" True: start the app as `kickstand record`
+    does.
     """
     world, ride = _world(plan)
     device = Device(world, **plan.get("board", {}))

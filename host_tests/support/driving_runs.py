@@ -21,8 +21,7 @@ RATE_HZ = 100
 
 def around(events=6, braking=-2.0, seconds=3.0, yaw_dps=0.0, pause_s=5.0, stands=True):
     """Legs of a drive: the vehicle stands, then speeds up and brakes `events` times. braking (m/s^2), seconds and
-    yaw_dps:
-    of each braking event."""
+    yaw_dps: of each braking event."""
     legs = [list(STAND)] if stands else []
     for k in range(events):
         legs.append([4.0 + (6.0 if k == 0 else 0.0), -braking * seconds / 4.0 if k else 1.2, 12.0])

@@ -29,8 +29,7 @@ def plug_in(monkeypatch: pytest.MonkeyPatch, board: Any) -> Any:
 class FakeBoard(Transport):
     """Replaces SerialTransport. root: the directory that serves as its flash. written: paths in the order in which they
     were opened for writing, or their new names. on_write(path, data): called before each write; returns the bytes that
-    are really written.  before_change():
-    called before each change of the flash.  mpy: as sys.implementation._mpy.
+    are really written.  before_change(): called before each change of the flash.  mpy: as sys.implementation._mpy.
     """
 
     def __init__(self, root: Path, python: str = "micropython", answers: bool = True, mpy: int = PICO) -> None:

@@ -101,7 +101,7 @@ class EmulatedDevice(ABC):
         self._wire(self.board.wheel_pin)
 
     def power_cycle(self, off_s: float = 0.5) -> None:
-        """Switch it off, and on again after off_s."""
+        """Switch the board off, and on again after off_s."""
         self.power_off()
         self.run(off_s)
         self.power_on()

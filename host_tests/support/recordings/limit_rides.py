@@ -1,8 +1,7 @@
 """Compares the error of the lean with its targets. Sensors have all errors of the data sheet and are calibrated by one
 log of the six positions. The upright pose is 1.5 degrees off. Bikes have any dive, and rides are with and without a
 measured speed. Both simulators are used. Parameters are fitted with even seeds only; figures are reported for odd
-seeds. As a program: a
-line per simulator, profile and mount, in 20 s per ride on one processor:
+seeds. As a program: a line per simulator, profile and mount, in 20 s per ride on one processor:
 
     OMP_NUM_THREADS=1 PYTHONPATH=host_tests .venv/bin/python -m support.recordings.limit_rides odd 4
 """

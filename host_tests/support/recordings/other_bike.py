@@ -116,8 +116,7 @@ def _readings(v, yaw_rate, slope, lean, pitch, height_m, slip=0.0, heave_m=0.0, 
     """Specific force (g) and rates (rad/s) along left, up, forward, by differences of place and attitude.
 
     slip: angle (rad, to the left) from the bike's heading to its direction of travel. heave_m: of the roll axis at the
-    rear
-    wheel. height_m, ahead_m: of the sensor above this axis, and in front of that wheel."""
+    rear wheel. height_m, ahead_m: of the sensor above this axis, and in front of that wheel."""
     heading = np.cumsum(yaw_rate) / FINE_HZ
     course = heading + slip
     direction = np.cos(slope) * np.cos(course), np.cos(slope) * np.sin(course), np.sin(slope)
