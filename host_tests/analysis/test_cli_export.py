@@ -41,7 +41,7 @@ def test_csv_and_parquet_have_every_sample(ride, shown, tmp_path, form):
     for name in "lean_deg", "lean_sigma_deg", "left_g", "up_g", "forward_g", "yaw_rate_dps", "roll_rate_dps":
         near = 1e-3 if name.endswith("deg") else 2e-4
         assert np.allclose(got[name], shown[name], atol=near, equal_nan=True), name
-    steep = np.abs(shown["left_g"] ** 2 + shown["up_g"] ** 2 - 1.0) < 1e-4  # 32-bit floats move the square root
+    steep = np.abs(shown["left_g"] ** 2 + shown["up_g"] ** 2 - 1.0) < 1e-4  # 32-bit floats change the square root
     assert np.allclose(got["lean_formula_deg"][~steep], shown["lean_formula_deg"][~steep], atol=0.02)
     lean = np.radians(shown["lean_deg"])
     s = shown["left_g"] * np.cos(lean) - shown["up_g"] * np.sin(lean)

@@ -25,8 +25,8 @@ DEGREE_M = np.radians(app_exports._EARTH_M)
 
 @functools.cache
 def log(start_s: float = 0.0) -> api.Log:
-    """Half a minute with a position every 0.2 s, each in the row in which it has come: none before 1 s, and none from
-    10 to 20 s; a speed each second. start_s: by the log's own clock."""
+    """Half a minute with a position every 0.2 s, in the row in which it arrived, and a speed every second. There are no
+    positions before 1 s and from 10 to 20 s. start_s: by the log's own clock."""
     ride = app_exports.riding().every(2)  # 100 a second
     row = np.arange(len(ride.t_s))
     known = (row % (100 // HZ) == 7) & (ride.t_s > 1.0) & ~((ride.t_s > 10.0) & (ride.t_s < 20.0))

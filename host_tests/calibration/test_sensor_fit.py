@@ -201,7 +201,7 @@ def late(rates):
     [
         (lambda rates: 0.5 * rates, "gyro-scale"),
         (lambda rates: 2.0 * rates, "gyro-scale"),
-        (lambda rates: -rates, None),  # named if the turns were nearly about one axis
+        (lambda rates: -rates, None),  # the axis is named if the turns were nearly about one axis
         (lambda rates: 0.0 * rates, "dead-gyro"),
         (lambda rates: np.where(np.abs(rates) > 5.0, 0.0, rates), "dead-gyro"),  # but noisy
         (late, "gyro-misfit"),

@@ -224,8 +224,8 @@ def swaying(yaw_dps: float, seconds: float) -> Log:
 )
 def test_small_or_short_bends_show_no_forward(yaw_dps, seconds, shown):
     """Means over 0.5 s keep 0.974 of the amplitude. Their changes over a second are 1.414 times as large; smoothing
-    keeps 0.854. So the standard deviation is 0.832 yaw_dps; 1 deg/s is needed. A log of 61 s has 118 changes, one of 63
-    s has 122; 120 are needed."""
+    keeps 0.854. So the standard deviation is 0.832 yaw_dps. Finding forward requires 1 deg/s. A log of 61 s has 118
+    changes, one of 63 s has 122; 120 are needed."""
     calibration = CalibrationFile(aligned=True)
     log = swaying(yaw_dps, seconds)
     assert said(log, calibration) == ""

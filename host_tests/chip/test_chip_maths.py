@@ -52,7 +52,7 @@ def on_host():
 
 
 def test_the_same_log_gives_the_same_lean(tmp_path):
-    """On a Pico, on the unix port and on CPython."""
+    """The results agree on a Pico, on the unix port and on CPython."""
     pico()  # or skip
     from kickstand_emulator.engine import rp2040
 

@@ -89,7 +89,7 @@ def test_pages_and_menu(tmp_path):
     # imported here because the import needs a board
     source = (firmware_path.PACKAGE / "ui" / "page_ring.py").read_text(encoding="utf-8")
     ring = re.findall(r"pages\.(\w+)", source.partition("MOTORCYCLE = (")[2].partition(")")[0])
-    turns_s = [46.0 + k for k in range(len(ring))]  # through all pages, back to the first
+    turns_s = [46.0 + k for k in range(len(ring))]  # presses through all pages, back to the first one
     menu_s = turns_s[-1] + 1.0
     short = [*turns_s, *(menu_s + after_s for after_s in (2, 3, 7.5, 11, 12, 13, 19))]
     long = [menu_s + after_s for after_s in (0, 4, 9, 14)]
@@ -234,7 +234,7 @@ def test_a_tilted_upright_pose_is_corrected_on_the_road(tmp_path):
         ride += [["turn", -25.0, 3.0], ["straight", 25.0], ["turn", 25.0, 3.0], ["straight", 25.0]]
     plan = {**ALIGNED, "ride": [*ride, ["brake", 0.0, 6.0], ["wait", 10.0]], "until": 230}
     record = device_plans.run("cpython", tmp_path, plan)
-    assert record.lean_at(20.2) == 0  # of a bike that leans by 2 degrees: so it was aligned
+    assert record.lean_at(20.2) == 0  # the bike leans by 2 degrees, as at the alignment
     assert record.last[0].startswith("Lean   0°")
     again = device_plans.run("cpython", tmp_path, {"ride": [["upright", 5.0]], "until": 4})
     assert again.lean_at(3.5) == 0

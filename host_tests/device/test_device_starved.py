@@ -16,7 +16,7 @@ RIDE = [
 ]
 TRUE = script.Ride([getattr(script, name)(*more) for name, *more in RIDE])
 OLDEST_S = 0.5 + 0.1 + 0.1  # half a second, a page, and the time between two looks at the display
-HANG_S = 1.46  # the first page after it, which says why, then stands when the next frame is taken
+HANG_S = 1.46  # the first page after the event, which names the cause, is complete at the next frame
 NEAR_DEG = 10.0  # readings lost while the bike rolls cost up to 8 degrees until the filter has made up for them
 
 STARVED = {

@@ -165,8 +165,8 @@ def test_each_stop_counts_once_in_the_vertical():
 
 
 def test_a_late_speed_is_no_rotated_sensor():
-    """A vehicle may accelerate evenly for some seconds while a late speed is still zero. A rotated sensor stays so for
-    longer."""
+    """A vehicle may accelerate evenly for some seconds while a late speed is still zero. A rotated sensor shows a
+    constant force for longer."""
     standing = StandingVertical()
     stand(standing, level(0.0), 5.0)
     stand(standing, level(15.0), 2.5)

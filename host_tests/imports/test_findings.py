@@ -23,7 +23,7 @@ def hand(hz=50.0):
 
 
 def lines(form, times=1.0, force=1.0, rates=1.0, head=""):
-    """A row for each sample, by a format of seven numbers."""
+    """Write one row per sample, with a format for seven numbers."""
     t, f, w = hand()
     rows = [form.format(*row) for row in np.column_stack((times * t, force * f, rates * w)).tolist()]
     return "\n".join([head, *rows] if head else rows) + "\n"

@@ -72,7 +72,7 @@ def test_rides_become_logs_with_their_calibration(board, tmp_path):
     assert cal["vehicle_from_sensor"] == [[0, 1, 0], [0, 0, 1], [1, 0, 0]]
     assert cal["accel_offset_g"] == pytest.approx([0.01, -0.02, 0.03])
     assert (cal["trim_deg"], cal["firmware"], cal["who_am_i"], cal["sample_hz"]) == (1.25, __version__, "0x68", 200)
-    assert len(list(board.root.glob("rides/*/*/*"))) == 3  # nothing was to be deleted
+    assert len(list(board.root.glob("rides/*/*/*"))) == 3  # the command must delete nothing
 
 
 @pytest.mark.parametrize(
@@ -300,10 +300,10 @@ def test_a_file_comes_in_parts_and_is_compared_with_its_sum(monkeypatch):
 @pytest.mark.parametrize(
     ("first", "kept"),
     [
-        (sent(b"abc", b"abcdef"), b"abc"),  # half of it
+        (sent(b"abc", b"abcdef"), b"abc"),  # half of the file
         (sent(b"abcdef", b"abcdeg"), b"abcdef"),  # another byte
         ([b"?", *sent(b"abcdef")[1:]], b"def"),  # a line that is not base64
-        (sent(b"abcdef")[:-1], b"abcdef"),  # without its sum
+        (sent(b"abcdef")[:-1], b"abcdef"),  # without its check sum
     ],
 )
 def test_a_file_that_is_not_whole_is_copied_again(monkeypatch, first, kept):

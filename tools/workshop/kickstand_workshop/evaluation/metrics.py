@@ -32,8 +32,8 @@ def rms(error: NDArray) -> float:
 
 
 def slope(shown: NDArray, true: NDArray, beyond: float = LEANED_DEG) -> float:
-    """Shown over true lean where the true one is over `beyond` degrees: least squares through the origin. NaN if
-    undefined."""
+    """The ratio of shown to true lean where the true lean exceeds `beyond` degrees: least squares through the origin.
+    NaN if undefined."""
     leaned = np.abs(true) > beyond
     square = float(np.sum(true[leaned] ** 2))
     return float(np.sum(shown[leaned] * true[leaned]) / square) if square > 0.0 else float("nan")
