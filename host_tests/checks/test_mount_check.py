@@ -177,7 +177,7 @@ def exchanged(log: Log) -> bool:
 
 
 @pytest.mark.parametrize(("late_s", "shown"), [(-1, False), (0, True), (1, True), (2, True), (3, False), (4, False)])
-def test_a_speed_up_to_two_seconds_late_shows_which_way_is_forward(late_s, shown):
+def test_a_speed_up_to_two_seconds_late_shows_forward(late_s, shown):
     """The acceleration changes every second, so a speed that is one second late proves nothing."""
     assert exchanged(jerky(late_s, sign=-1.0)) is shown
     assert not exchanged(jerky(late_s))

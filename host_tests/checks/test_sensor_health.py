@@ -74,7 +74,7 @@ def test_a_bias_that_steps_is_said_by_replay_and_report(street):
         assert "the readings do not fit together" in sentence(notice)
 
 
-def test_a_saturated_gyro_is_said_and_the_rest_of_the_ride_is_good(street):
+def test_a_saturated_gyro_is_reported_and_the_rest_is_good(street):
     def saturate(time, force, rate):
         rate[(time > 60.0) & (time < 60.5), 1] = 500.0
 

@@ -75,7 +75,7 @@ def test_every_picture_is_shown():
     assert shown == {path.resolve() for path in (ROOT / "tools" / "pictures").iterdir()}
 
 
-def test_the_first_page_is_short_and_begins_with_a_moving_picture():
+def test_the_first_page_is_short_and_begins_with_an_animation():
     text = text_of(FIRST)
     assert re.findall(r'src="([^"]+)"', text)[0].endswith(".webp")
     assert "    python3 tools/dev.py demo\n" in text

@@ -121,7 +121,7 @@ def test_a_measured_gyro_is_not_estimated_again():
     assert measured[0] == unmeasured.sigma[of.GYRO][0] == of.SIGMA[of.GYRO][0]
 
 
-def test_the_upright_pose_determines_the_sum_of_rotation_and_offset():
+def test_the_upright_pose_gives_the_sum_of_rotation_and_offset():
     """A sensor whose offset the pose has taken for a tilt is right at rest, whatever the offset."""
     prior, p = Prior.of_pose(six_done=False), np.zeros(PARAMETERS)
     p[of.ROTATION.stop - 1] = p[of.OFFSET.start] = 0.03  # to the side
@@ -135,7 +135,7 @@ def test_the_upright_pose_determines_the_sum_of_rotation_and_offset():
     assert np.all(np.linalg.eigvalsh(information) > 0.0)
 
 
-def test_windows_hold_the_integrals_and_gaps_are_windows_of_their_own():
+def test_windows_hold_the_integrals_and_gaps_are_separate():
     rng = np.random.default_rng(2)
     t = np.cumsum(rng.uniform(0.005, 0.015, 300))
     t[150:] += 5.0

@@ -172,7 +172,7 @@ def test_ten_equal_readings_are_frozen_across_blocks(count, marked, block):
 
 
 @pytest.mark.parametrize(("near_s", "marked"), [(0.2, True), (0.4, False)])
-def test_half_a_second_beside_decides_whether_rounding_hid_the_noise(near_s, marked):
+def test_the_adjacent_half_second_shows_if_rounding_hid_noise(near_s, marked):
     """Digits of 0.01 g: 0.025 g from the mean is near. At 0.1 g for the rest of half a second the mean is 0.06 or 0.02
     off."""
     readings = np.round(np.tile(REST, (400, 1)), 2)

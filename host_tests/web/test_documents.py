@@ -44,7 +44,7 @@ def test_every_link_of_a_page_leads_somewhere(files):
             assert not anchor or f'id="{anchor}"' in files[target].decode(), (name, link)
 
 
-def test_a_link_leads_to_the_projects_files_where_its_home_is_known():
+def test_links_lead_to_the_projects_files_if_its_home_is_known():
     made = {name: data.decode() for name, data in documents.document_files(HOME).items() if name.endswith(".html")}
     assert f'href="{HOME}/blob/main/firmware/config.py"' in made["docs/settings.html"]
     assert f'href="{HOME}/tree/main/firmware/examples"' in made["docs/your-own-code.html"]

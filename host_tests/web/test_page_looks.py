@@ -20,7 +20,7 @@ def test_axe_finds_nothing(chromium, address, name):
     rider.context.close()
 
 
-def test_on_a_phone_everything_for_the_first_minute_is_on_its_first_screen(chromium, address):
+def test_a_phones_first_screen_has_all_for_the_first_minute(chromium, address):
     rider = Rider(chromium, address, **PHONE)
     tops = rider.page.eval_on_selector_all("main > section", "all => all.map((one) => one.getBoundingClientRect().top)")
     assert tops == sorted(tops), "what arrives first is seen first, or the page moves while it loads"
@@ -42,7 +42,7 @@ def test_on_a_phone_everything_for_the_first_minute_is_on_its_first_screen(chrom
     rider.context.close()
 
 
-def test_a_phone_leans_the_motorcycle_and_a_tablet_without_motion_data_says_so(chromium, address):
+def test_a_phone_leans_the_motorcycle_if_it_has_motion_data(chromium, address):
     """The page's introduction is visible, too. A screen reader's click, which comes without a pointer, also presses the
     button."""
     rider = Rider(chromium, address, **PHONE)
