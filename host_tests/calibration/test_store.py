@@ -75,7 +75,7 @@ def test_records_are_read_and_written_as_by_the_first_release(store, tmp_path, s
     assert (tmp_path / FILES[1]).read_bytes() == record(sequence=9, six_done=six_done, how=how)
 
 
-# What a board with firmware 0.4.0 has in its flash after the six positions, and then after the two presses
+# The flash of a board with firmware 0.4.0 after the six positions, and then after the two presses
 OF_0_4_0 = {
     "kickstand_b.cal": "4b535444010060000100000068080100a69b443c96430bbd4260653d7368813f08ac7c3faaf1823f000050400000"
     "c0bf0000403f0000803f0000000000000000000000000000803f0000000000000000000000000000803f000000007ca03fb8",

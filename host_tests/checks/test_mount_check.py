@@ -1,4 +1,4 @@
-"""A calibration of another mount is noticed by every command that takes one; a right one never is."""
+"""Every command that takes a calibration reports one of another mount, and never reports a right one."""
 
 import json
 import re

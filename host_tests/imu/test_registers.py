@@ -49,7 +49,7 @@ class Wires:
 
     def readfrom_mem_into(self, address, register, buffer):
         self._expect(address)
-        if register not in (FIFO_R_W, USER_CTRL):  # no byte more than is used: each takes 25 us
+        if register not in (FIFO_R_W, USER_CTRL):  # only the bytes that are used: each takes 25 us
             assert len(buffer) == {SMPLRT_DIV: 11, 0x3B: 14, FIFO_COUNT_H: 2}.get(register, 1)
         self.registers[FIFO_COUNT_H], self.registers[FIFO_COUNT_H + 1] = divmod(self.waiting, 256)
         if register == FIFO_R_W:

@@ -1,4 +1,4 @@
-"""Each field of each packet against the tables of firmware/docs/live.md, at its limits too."""
+"""Each field of each packet equals the tables of firmware/docs/live.md, also at its limits."""
 
 import types
 
