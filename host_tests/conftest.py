@@ -106,14 +106,14 @@ _tests = itertools.count(1)
 
 
 def pytest_collection_finish() -> None:
-    """Keep the objects that the tests have imported out of garbage collection."""
+    """Keep the modules that the tests have imported."""
     gc.collect()
     gc.freeze()
 
 
 def pytest_runtest_setup() -> None:
-    """Keep objects of earlier tests out of the app's frequent garbage collections, which would take CPython half a
-    second each. From time to time they are collected."""
+    """The app collects garbage often. CPython needs half a second to scan the objects of earlier tests. So collections
+    skip the objects that exist before a test. Occasionally those are scanned too, to free their garbage."""
     if next(_tests) % TESTS_PER_COLLECTION == 0:
         gc.unfreeze()
         gc.collect()
@@ -121,8 +121,8 @@ def pytest_runtest_setup() -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Print one line with the number of skipped tests for each missing thing. Reasons have the form "no X" or "no X:
-    how to get it"."""
+    """Print one line: the number of skipped tests for each missing thing. Reasons have the form "no X" or "no X: how to
+    get it"."""
     reasons = [str(report.longrepr[-1]) for report in terminalreporter.stats.get("skipped", ())]
     wanted = Counter(_why_skipped(reason.removeprefix("Skipped: ")) for reason in reasons)
     if wanted:
@@ -131,7 +131,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 
 def _why_skipped(reason: str) -> str:
-    """Return the missing thing that caused a skip, as far as the reason names it."""
+    """The cause of a skip for the summary line: "for want of" the missing thing, if the reason names it."""
     missing = re.match(r"no (.+?)(?: for this system)?(?:: |$)|needs (.+)|could not import '([\w.]+)'", reason)
     return "for want of " + next(filter(None, missing.groups())) if missing else f"because {reason}"
 
@@ -147,7 +147,7 @@ def shared_data() -> Path:
 
 @pytest.fixture(scope="session")
 def chromium():
-    """Return Chromium as playwright's browser, one for all tests of a process, because playwright cannot start
+    """Chromium as playwright's browser, shared by all tests of a process, because playwright cannot be started
     twice."""
     executable = shutil.which("chromium")
     if executable is None:

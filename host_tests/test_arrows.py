@@ -1,11 +1,10 @@
-"""Which module may import which, in the firmware and in the tools. These tests enforce the architecture that is
-written here.
+"""Checks which modules may import which, in the firmware and in the tools. A sample takes the path imu -> calibration
+-> lean -> ui. drive_alignment, speed and rides are beside this path. The app connects them all. Only start, which
+main.py runs, imports the app.
 
-A sample goes one way, imu -> calibration -> lean -> ui. drive_alignment, speed and rides stand beside that way. The app
-wires them all, and nothing but start, which main.py runs, imports the app.
-
-In the tools kickstand_fleet, kickstand_emulator and the workshop are leaves: they import the core, kickstand_tools. It
-imports none of them and finds what they add by entry points. Their commands alone import cli, for shared options.
+In the tools, kickstand_fleet, kickstand_emulator and the workshop are leaves: they import the core, kickstand_tools.
+The core imports none of them, and finds their commands by entry points. Only these commands import cli, for shared
+options.
 """
 
 import ast
@@ -15,7 +14,7 @@ from kickstand_tools.common import firmware_path
 
 ROOT = {"errors", "units", "rotation"}  # modules above the folders, which any folder may import
 
-# folder or module: other firmware modules that it may import
+# folder or module: the other parts of the firmware that it may import
 ARROWS = {
     "errors": set(),
     "units": set(),
@@ -25,10 +24,10 @@ ARROWS = {
     "imu": set(),
     "calibration": set(),
     "lean": {"calibration"},
-    "drive_alignment": set(),  # the app passes calibrations to this folder
+    "drive_alignment": set(),  # the app passes the calibrations to it
     "speed": {"board"},
     "rides": {"board", "calibration", "console"},  # each block of a ride holds its calibration's record
-    "live": {"calibration.transform"},  # the radio is in live.radio, and the message format does not depend on it
+    "live": {"calibration.transform"},  # only live.radio uses the radio; the modules that build packets do not
     "ui": {"board.button", "lean", "calibration", "drive_alignment"},
     "settings": set(),
     "setting_table": {"board", "imu.mpu6050"},  # ranges and pins that can be chosen
@@ -53,18 +52,19 @@ ARROWS = {
 }
 # Imported only by the function that needs it, because it costs memory or words that most boards never need.
 LATE = {
-    "settings": {"setting_table"},  # it is unloaded again
+    "settings": {"setting_table"},  # the module is unloaded after use
     "errors": {"console"},  # report() prints a refusal in words
-    "status_report": {"rides"},  # to report whether its machine code is used
+    "status_report": {"rides"},  # reports whether its machine code is used
     "app": {"state", "user_code"},
-    "devices": {"diagnosis"},  # explains why no sensor answers
-    "start": {"app", "console", "ui.messages", "live"},  # meanwhile the display says "starting"
+    "devices": {"diagnosis"},  # finds out why no sensor answers
+    "start": {"app", "console", "ui.messages", "live"},  # the display says "starting" meanwhile
 }
-# Modules of MicroPython that access hardware. Only drivers may import them.
+# MicroPython's hardware modules, which only drivers may import
 HARDWARE = {"machine", "micropython", "esp32", "rp2", "neopixel", "network", "bluetooth"}
 DRIVERS = {"board", "imu", "speed", "devices", "diagnosis", "start", "live.radio"}
 
-# For the tools: a folder or module of kickstand_tools, or another package: other parts of the tools that it may import.
+# For the tools: a folder or module of kickstand_tools, or another package: the other parts of the tools that it may
+# import
 LEAVES = {"kickstand_fleet", "kickstand_emulator", "kickstand_workshop"}
 TOOL_ARROWS = {
     "common": set(),
@@ -179,7 +179,7 @@ TOOL_ARROWS = {
 
 
 def modules():
-    """Return (folder, path) of each module. Without a folder, the module's own name takes its place."""
+    """(folder, path) of each module. A module outside any folder has its own name instead."""
     package = firmware_path.PACKAGE
     for path in sorted(package.rglob("*.py")):
         place = path.relative_to(package)
@@ -187,8 +187,7 @@ def modules():
 
 
 def imports(path, package=None):
-    """Return (module below kickstand, True if imported within a function) for each import of the firmware's own
-    modules."""
+    """(module below kickstand, True if imported within a function) of each import of the firmware's own modules."""
     package = package or firmware_path.PACKAGE
     folders = path.relative_to(package).parts[:-1]
     tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -224,8 +223,8 @@ def test_nothing_imports_what_it_may_not():
 
 
 def test_a_wrong_arrow_is_noticed(tmp_path):
-    """A backward import is noticed, also within a function, and so is an early import where only a late one is
-    allowed. Correct imports pass."""
+    """The check finds a backward import, also within a function, and an import that is only allowed within a function.
+    It accepts allowed imports."""
     lines = (
         "from ..lean import meter",
         "def f():\n    from .. import app",
@@ -247,7 +246,7 @@ def test_each_folder_has_its_arrows():
 
 
 def test_no_arrow_is_left_over():
-    """Every allowed import exists in the code."""
+    """Every allowed import exists."""
     used = {}
     for folder, path in modules():
         for target, _ in imports(path):
@@ -283,7 +282,7 @@ def tool_packages():
 
 
 def dotted(package, path):
-    """Return the dotted name of a module. The name of a package is that of its folder."""
+    """The dotted name of a module, or of a package's folder."""
     parts = [package.name, *path.relative_to(package).with_suffix("").parts]
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
@@ -296,8 +295,8 @@ def is_tool(name):
 
 
 def tool_imports(text, within):
-    """Return the full names of the tools' modules that a module imports, also within functions and for type checking
-    only. within: the parts of the name of its package."""
+    """The full names of the tools' modules that a module imports, also within functions and for type checking only.
+    within: the parts of its package's name."""
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
@@ -313,7 +312,7 @@ def tool_imports(text, within):
 
 
 def tool_modules():
-    """Return {full name: full names of its imports} for each module of the tools."""
+    """{full name: the full names of its imports} of each module of the tools."""
     found = {}
     for package in tool_packages().values():
         for path in sorted(package.rglob("*.py")):
@@ -324,7 +323,7 @@ def tool_modules():
 
 
 def shortened(name):
-    """Return a full name in the form of TOOL_ARROWS, without kickstand_tools for the core."""
+    """A full name in the form of TOOL_ARROWS: without kickstand_tools for a module of the core."""
     return name.removeprefix("kickstand_tools.")
 
 
@@ -333,7 +332,7 @@ def is_below(name, place):
 
 
 def tool_arrows(modules):
-    """Return (folder, import from another folder) pairs of these modules."""
+    """(folder, its imports from other folders) of these modules."""
     for name, targets in modules.items():
         folder = shortened(name).partition(".")[0]
         yield from ((folder, shortened(target)) for target in targets if not is_below(shortened(target), folder))

@@ -1,4 +1,4 @@
-"""Class names are unique in the product, except for good reasons."""
+"""Class names are unique: no two classes in the product have the same name without a reason."""
 
 import ast
 from collections import defaultdict
@@ -7,7 +7,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 # a driver of the firmware and the model of the same part
 PARTS = {"Button", "Gps", "Lcd", "Mpu6050", "Oled", "Radio", "Sensor", "Wheel"}
-# Both names are chosen for users: api.Ride is a log with its calibration, script.Ride is a list of segments.
+# Users write both names: api.Ride is a log with its calibration, script.Ride a list of segments
 PUBLIC = {"Ride"}
 
 

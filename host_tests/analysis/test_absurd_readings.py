@@ -19,7 +19,7 @@ def spinning(seed):
 
 
 def test_impossible_readings_give_a_warning_and_no_lean():
-    """Such readings make the filter diverge in some of the six rides."""
+    """Impossible readings make the filter diverge in some of six rides."""
     diverged_in = 0
     for seed in range(6):
         notices = []

@@ -24,7 +24,7 @@ AXES = {"roll": (0.0, 0.0, -1.0), "pitch": (1.0, 0.0, 0.0), "yaw": (0.0, 1.0, 0.
 
 
 def turn(name, degrees):
-    """Return the rotation (3, 3) that puts this angle of the alignment off by this many degrees."""
+    """Return the rotation (3, 3) that adds an error to this angle of the alignment."""
     return rotation_matrix(np.radians(degrees) * np.array(AXES[name]))
 
 
@@ -58,7 +58,7 @@ def error_deg(ride, calibration, from_share=0.0):
 
 @pytest.mark.parametrize(("name", "degrees"), [("yaw", 6.0), ("yaw", 15.0), ("pitch", 6.0), ("pitch", 12.0)])
 def test_yaw_and_pitch_cause_the_stated_lean_error(ride, name, degrees):
-    """Both signs are tried, because one alignment error may compensate another."""
+    """Errors in both directions are tried, because one error may compensate another."""
     usual = error_deg(ride, ride[1])
     more = [error_deg(ride, turned(ride[1], name, angle)) for angle in (degrees, -degrees)]
     cost = np.sqrt(max(0.0, np.mean(np.square(more)) - usual**2))
@@ -158,7 +158,8 @@ def test_report_gives_the_cost_of_an_error_and_the_remedy(scripted, name, degree
     most = {"yaw": yaw_cost_deg(degrees), "roll": max(0.0, degrees - 3.5), "pitch": 0.33}[name]
     assert cost == pytest.approx(most, abs=0.05)
     car = with_calibration(scripted, name, degrees, vehicle="car")
-    assert "lean_cost" not in report.as_data(overview(open_ride(scripted, car)))  # a car has no lean to lose
+    # it shows no lean that could get worse
+    assert "lean_cost" not in report.as_data(overview(open_ride(scripted, car)))
 
 
 def test_alignment_is_good_if_fully_known_and_exact(scripted):

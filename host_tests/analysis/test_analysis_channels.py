@@ -145,5 +145,5 @@ def test_channels_are_those_of_the_meter(ride, course):
             assert np.max(np.abs(getattr(course, name) - column)) < 1e-5, name
     assert np.array_equal(course.shown_g, shown)
     assert np.array_equal(course.rolling, rolling)
-    assert 0.2 < np.mean(rolling) < 0.9  # in its turns it knows
+    assert 0.2 < np.mean(rolling) < 0.9  # the lean is known in its turns
     assert np.array_equal(course.trusted, trusted)

@@ -88,7 +88,7 @@ def test_chart_of_g_against_g_has_the_right_sides(seen, panels, drawn):
 
 
 def test_the_straights_and_their_line(seen, panels, drawn):
-    """Forces to the left are drawn on the left, and the line of the yaw goes through them."""
+    """Forces to the left are on the left. The line of the yaw goes through the points."""
     _, dots, line = chart(seen, "Alignment").traces
     assert isinstance(dots, Dots) and isinstance(line, Line)
     assert dots.x == pytest.approx(-seen.quality.lateral_g)
@@ -137,7 +137,7 @@ def test_charts_are_stacked_in_a_narrow_window(seen):
 
 
 def test_unknown_values_are_not_drawn(seen):
-    """Uncertain values are not drawn, nor is an alignment if the calibration is of another mount."""
+    """Values that are not sure enough are not drawn, nor is the alignment of another mount's calibration."""
     made = replace(seen, notices=[UpOff(20.0, False)], summary=replace(seen.summary))
     made.summary.left_deg = made.summary.right_deg = made.summary.brake_g = made.summary.accel_g = Peak()
     assert title(made).endswith("lean as displayed -- left, -- right  ·  braking --, acceleration --")

@@ -42,9 +42,7 @@ def test_csv_and_parquet_have_every_sample(ride, shown, tmp_path, form):
     for name in "lean_deg", "lean_sigma_deg", "left_g", "up_g", "forward_g", "yaw_rate_dps", "roll_rate_dps":
         near = 1e-3 if name.endswith("deg") else 2e-4
         assert np.allclose(got[name], shown[name], atol=near, equal_nan=True), name
-    steep = (
-        np.abs(shown["left_g"] ** 2 + shown["up_g"] ** 2 - 1.0) < 1e-4
-    )  # near 0 the square root magnifies the rounding of 32-bit floats
+    steep = np.abs(shown["left_g"] ** 2 + shown["up_g"] ** 2 - 1.0) < 1e-4  # 32-bit floats change the square root
     assert np.allclose(got["lean_formula_deg"][~steep], shown["lean_formula_deg"][~steep], atol=0.02)
     lean = np.radians(shown["lean_deg"])
     s = shown["left_g"] * np.cos(lean) - shown["up_g"] * np.sin(lean)
@@ -63,7 +61,7 @@ def test_a_car_has_no_lean_as_in_replay(ride, tmp_path):
 
 
 def test_ride_that_cannot_be_exported_is_refused(ride, tmp_path, monkeypatch):
-    """A ride is refused without a calibration, with one that is not aligned, and without pyarrow."""
+    """The ride has no calibration beside it, or an unaligned one; or pyarrow is missing."""
     alone = tmp_path / "alone.csv"
     alone.write_bytes(ride.read_bytes())
     empty = tmp_path / "empty.csv"

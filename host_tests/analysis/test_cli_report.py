@@ -59,7 +59,7 @@ def test_unknown_figures_are_not_reported(ride, tmp_path):
     seen = overview(open_ride(ride, up_is_back))
     assert [notice.code for notice in seen.notices] == ["up-off"]
     total = seen.summary
-    total.left_deg = total.right_deg = total.brake_g = total.accel_g = Peak()  # as if no value was certain enough
+    total.left_deg = total.right_deg = total.brake_g = total.accel_g = Peak()  # as if no value was sure enough
     rows = {name: value for name, value, _ in report.words(seen).ride}
     names = "Max left", "Max right", "Over 30°", "Over 40°", "Max braking", "Max acceleration"
     assert [rows[name] for name in names] == ["--"] * 6
@@ -90,7 +90,7 @@ def test_page_shows_the_same_report(ride, monkeypatch):
 
 @pytest.mark.parametrize(("unsure_s", "line"), [(0.9, ""), (1.0, "0:01"), (65.4, "1:05")])
 def test_uncertain_time_is_reported_from_one_second(ride, unsure_s, line):
-    """The page shows uncertain time from one second on. The JSON always has it."""
+    """The page shows the uncertain time from one second on; the JSON always contains it."""
     seen = overview(open_ride(ride, None))
     seen.summary.not_sure_s = unsure_s
     said = [row.split()[3:] for row in printed(seen) if row.startswith("Lean not sure")]
@@ -138,7 +138,7 @@ def test_a_kickstand_on_the_other_side_is_noticed(ride, tmp_path):
 
 
 def test_stop_shown_only_by_the_speed_is_reported(ride, tmp_path):
-    """Forward points across the bike, so it is neither right nor reversed."""
+    """The axis "forward" points sideways: it is neither right nor reversed."""
     cal = analysis_rides.calibration(tmp_path / "changed.json", vehicle_from_sensor=[[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
     said = command.works("report", ride, "--calibration", cal, "--live").out
     assert "No stop" not in said
@@ -153,7 +153,7 @@ def test_picture_and_page_are_complete(ride, tmp_path):
     assert struct.unpack(">2I", png[16:24]) == (1100, 950)
     html = (out / "RIDE.html").read_text()
     assert "Plotly.newPlot" in html
-    assert not re.search(r"<(script|link)[^>]*(src|href)=", html)  # the page loads nothing from elsewhere
+    assert not re.search(r"<(script|link)[^>]*(src|href)=", html)  # the whole text is inside
     assert sorted(path.name for path in out.iterdir()) == ["RIDE.html", "RIDE.png"]
 
 

@@ -77,8 +77,9 @@ def test_racechrono_to_the_letter(tmp_path):
 
 
 def test_vbo_to_the_letter(tmp_path):
-    """10.5 m/s are 37.8 km/h. The clock starts again at midnight. Minutes of longitude are positive in the west."""
-    evening = EVENING_S + 6400.0 - 0.25  # one second before midnight
+    """A speed of 10.5 m/s is 37.8 km/h. The clock starts again at midnight. Minutes of longitude are positive in the
+    west."""
+    evening = EVENING_S + 6400.0 - 0.25  # the second before midnight
     moved = block(0.25, 61.5, 3661.75)
     moved.lon_deg[0] += 1e-5  # 0.68 m to the east
     moved.lat_deg[2] = moved.lon_deg[2] = np.nan
@@ -113,7 +114,7 @@ def test_vbo_has_a_channel_with_gaps(tmp_path):
 
 
 def test_vbo_keeps_the_heading_at_standstill(tmp_path):
-    """The block goes north, then east. The next block repeats the last place, then moves 0.8 mm north like receiver
+    """The positions go north and east. The next block has the same place and one 0.8 mm north of it, like a receiver's
     noise."""
     ridden, stood = block(0.0, 1.0, 2.0), block(3.0, 4.0)
     ridden.lat_deg[1:] += 1e-5
@@ -136,7 +137,7 @@ def squarely(seconds: float = 2.0, start_s: float = 0.0, speed_mps=()) -> Log:
 
 
 def test_a_left_turn_under_braking_has_the_signs_of_each_format(tmp_path):
-    """Rates about x left, y up and z forward have the gyro's sign, except that nose up is negative about x."""
+    """Rates about x left, y up and z forward have the gyro's sign. Nose up is a negative rate about x."""
     ride = open_ride(squarely(), SQUARE)
     out = tmp_path / "out"
     export(ride, "racechrono", out)
@@ -219,7 +220,8 @@ def test_vbo_has_at_most_100_rows_per_second(tmp_path, form, rows):
 @pytest.mark.parametrize("start_s", [1e8, 1e8 + 0.0043, 1e8 + 0.00065])
 @pytest.mark.parametrize(("form", "step_s", "columns"), [("racechrono", 0.001, (0, 3)), ("vbo", 0.01, (1,))])
 def test_no_time_is_written_twice(tmp_path, form, step_s, columns, start_s):
-    """Times less than one step apart keep their order, and every sample is counted."""
+    """Samples are less than one time step apart, on both sides of a step or in the middle between two. Every sample is
+    counted."""
     t_s = step_s * np.array([0.0, 0.96, 1.04, 2.5, 3.5, 4.5, 5.49, 5.51, 6.4, 7.0, 8.0, 9.96, 10.04, 10.5])
     log = Log(t_s, np.tile([0.0, 1.0, 0.0], (len(t_s), 1)), np.zeros((len(t_s), 3)), start_s=start_s)
     notices = []
@@ -232,7 +234,7 @@ def test_no_time_is_written_twice(tmp_path, form, step_s, columns, start_s):
 
 
 def test_progress_and_notices_are_passed_on(tmp_path):
-    """The readings of this ride freeze for two seconds."""
+    """The ride's readings freeze for two seconds."""
     n = 3000
     force, rate = np.tile([0.0, 1.0, 0.0], (n, 1)), np.zeros((n, 3))
     rate[200::2] += 1e-4

@@ -133,7 +133,7 @@ def test_page_loads_nothing_unless_tiles_are_requested(tmp_path):
 
 @pytest.mark.parametrize("place", [(52.5, 13.4), (-33.9, 151.2), (47.6, -0.01)])
 def test_tiles_match_the_track(place):
-    """The tile of the start has the same number by the map's metres and by the formula of slippy maps."""
+    """The number of the start's tile is the same from the map's metres and from the formula of slippy maps."""
     found = points_of(*place)
     tiles = page.tiles_at(found)
     size = tiles["world_m"] / 2**15

@@ -40,14 +40,14 @@ def test_standing_bike_is_not_riding(log):
 
 
 def test_knock_at_the_start_is_not_riding():
-    """A hand that switches the device on knocks it with 0.4 g for 0.02 s, an average of 0.008 g over a second."""
+    """A hand that switches the device on causes such a knock: 0.4 g for 0.02 s, which are 0.008 g over a second."""
     log = standing(40, 0.05, 1.5)
     log.accel_g[:2, 2] = 0.4
     assert words_of(log).ride[0][2] == "riding 0:00"
 
 
 def test_riding_time_excludes_standing(tmp_path):
-    """The bike stands for four of the 37 s before and four after the ride. The result is the same without a speed."""
+    """The bike stands for four of 37 s before the ride and four after it. The log is tried with a speed and without."""
     for speed_hz in (0, 5):
         said = words_of(analysis_rides.short(tmp_path, speed_hz=speed_hz))
         minutes, seconds = said.ride[0][2].removeprefix("riding ").split(":")
@@ -68,7 +68,7 @@ def test_a_speed_that_is_always_0_hides_no_ride(tmp_path):
 
 
 def test_straight_stretch_without_speed_counts_as_riding():
-    """A bike at constant speed on a rough road does not prove that it stood still for a whole log."""
+    """The bike rides on a rough road at constant speed: this does not prove that it stood still in a whole log."""
     assert words_of(Stretch(standing(40, 0.05, 1.5), 5.0, 30.0)).too_little == ""
 
 

@@ -56,7 +56,7 @@ def test_nothing_is_printed(directory, capfd):
     with pytest.raises(api.RefusedInput, match="only 2 of 5 braking events"):
         api.fit_drive([log], calibration, progress=lambda done, total: seen.append((done, total)))
     assert tuple(capfd.readouterr()) == ("", "")
-    assert [done == total for done, total in seen].count(True) == 3  # each progress bar ends at its total
+    assert [done == total for done, total in seen].count(True) == 3  # each call of progress ends with done equal to all
 
 
 def test_any_source_gives_the_same_log(directory):
@@ -80,7 +80,7 @@ def test_any_source_gives_the_same_log(directory):
 
 
 def test_stops_and_summary_of_arrays_match_the_report(directory):
-    """The figures match for whole logs and blocks, and for files and arrays."""
+    """They match for whole logs and blocks, for files and arrays."""
     channels = api.vehicle_channels(api.read_log(directory / "RIDE.csv"), directory / "RIDE.cal.json")
     seen = api.overview(api.open_ride(directory / "RIDE.csv"))
     assert seen.stops == api.find_stops(channels) != []

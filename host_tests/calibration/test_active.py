@@ -84,8 +84,8 @@ def test_save_replaces_and_refine_corrects(made):
 
 
 def test_the_trim_is_saved_once_a_minute_at_most(made):
-    """Each write wears the flash. The trim is not saved in the first minute. If nothing changed, it is saved at the
-    next chance."""
+    """The trim is saved seldom because flash wears, and never in the first minute. If there was nothing to save, the
+    next chance is used."""
     active, meter, _ = made
     active.chip_started(Chip())
     active.save(aligned())

@@ -125,7 +125,7 @@ def test_harmful_outputs_are_refused(tmp_path, log):
 
 @pytest.mark.skipif(os.name == "nt", reason="named pipes are of Unix")
 def test_a_special_file_is_not_replaced(tmp_path, log):
-    """A user with enough rights could replace /dev/null. The test uses a pipe of its own."""
+    """A user with the rights could replace /dev/null, for example. The test uses its own pipe."""
     cal = command.write_cal(tmp_path / "CAL.json")
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
@@ -160,7 +160,7 @@ def whole():
 
 
 def test_matrices_are_applied_alike_wherever_a_calibration_is(tmp_path):
-    """The file, numpy and the firmware's own meter apply the matrices alike."""
+    """The matrices act alike in the file, in numpy, and in the firmware's own meter."""
     write_calibration(tmp_path / "CAL.json", whole())
     found = read_calibration(tmp_path / "CAL.json")
     assert found == whole()

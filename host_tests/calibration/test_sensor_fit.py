@@ -171,7 +171,7 @@ def test_the_fit_is_numpys_and_so_is_its_covariance():
 
 
 def test_micropython_finds_the_same():
-    """MicroPython processes the poses and turns of a log step by step. Its list of numbers is the whole result."""
+    """MicroPython gets the poses and turns of a log, step by step. Its list of numbers is the whole answer."""
     fit = fitted()
     script = (
         "from array import array\nfrom kickstand.calibration.sensor_fit import SensorFit\n"
@@ -201,7 +201,7 @@ def late(rates):
     [
         (lambda rates: 0.5 * rates, "gyro-scale"),
         (lambda rates: 2.0 * rates, "gyro-scale"),
-        (lambda rates: -rates, None),  # the axis is named only if the turns were nearly about one axis
+        (lambda rates: -rates, None),  # the axis is named if the turns were nearly about one axis
         (lambda rates: 0.0 * rates, "dead-gyro"),
         (lambda rates: np.where(np.abs(rates) > 5.0, 0.0, rates), "dead-gyro"),  # dead at small rates, but noisy
         (late, "gyro-misfit"),

@@ -38,7 +38,8 @@ def problem_of(rows, **settings):
 @pytest.mark.parametrize("axis", [0, 1, 2, 4, 5, 6])
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_a_knock_about_or_along_any_axis_spoils_the_pose(axis, sign):
-    """Each sample is compared with the first one, because one shock moves the mean too little for the other limits."""
+    """Any sample that differs from the first one spoils the pose. A single knock moves the mean too little for the
+    other limits."""
     peak = 0.08 * 8192 if axis < 3 else 5.0 * 65.5
     for at in (1, 50, 99):
         for share, code in ((0.8, None), (1.2, "moved")):

@@ -63,7 +63,7 @@ def record(*, magic=b"KSTD", version=1, sequence=7, chip=(0x68, 8), six_done=1, 
 
 @pytest.mark.parametrize(("six_done", "how"), [(1, 1), (1, 2), (0, 1), (0, 0)])
 def test_records_are_read_and_written_as_by_the_first_release(store, tmp_path, six_done, how):
-    """how: 0 not aligned, 1 by two poses, 2 by driving."""
+    """how: 0: not aligned, 1: aligned by two poses, 2: by driving."""
     (tmp_path / FILES[1]).write_bytes(record(sequence=7, six_done=six_done, how=how))
     loaded = store.load()
     assert loaded.parameters() == NUMBERS
@@ -75,7 +75,7 @@ def test_records_are_read_and_written_as_by_the_first_release(store, tmp_path, s
     assert (tmp_path / FILES[1]).read_bytes() == record(sequence=9, six_done=six_done, how=how)
 
 
-# What a board with firmware 0.4.0 has in its flash after the six positions, and then after the two presses
+# The flash of a board with firmware 0.4.0 after the six positions, and then after the two presses
 OF_0_4_0 = {
     "kickstand_b.cal": "4b535444010060000100000068080100a69b443c96430bbd4260653d7368813f08ac7c3faaf1823f000050400000"
     "c0bf0000403f0000803f0000000000000000000000000000803f0000000000000000000000000000803f000000007ca03fb8",
@@ -228,7 +228,7 @@ def test_a_flash_that_loses_writes_is_reported(store, tmp_path, monkeypatch):
 
 
 def test_a_trim_may_be_stored_beside_a_foreign_record(store, tmp_path):
-    """The foreign record may come from another chip, or be left empty by a power cut."""
+    """A foreign record may be from another chip, or empty after a power cut."""
     store.save(calibration(1))
     store.save(calibration(2))
     other = Store(0x70, 8, str(tmp_path))

@@ -89,7 +89,7 @@ class Pose:
 @pytest.mark.parametrize("pose", [0, 1])
 @pytest.mark.parametrize("size", [0.9, 1.1])
 def test_after_the_six_positions_a_pose_reads_1_g_more_closely(pose, size):
-    """Without the six positions the data sheet allows 80 mg and 3 % of error. With them only drift remains."""
+    """Before the six positions the data sheet allows 80 mg and 3 %. After them only drift is left."""
     forces = np.array([at(12), at(0)])
     forces[pose] *= size
     kickstand, upright = (Pose(force.tolist(), [0.0] * 3) for force in forces)

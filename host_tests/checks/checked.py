@@ -10,8 +10,7 @@ from kickstand_tools.simulation.ride import SimulatedRide, ride
 
 
 def cells_of(log: Log, accel=None, gyro=None, speed=True) -> LogCells:
-    """Return the cells of a log. accel, gyro: (3, 3) matrices that exchange and reverse the sensors' axes. A number
-    scales the readings."""
+    """accel, gyro: a matrix (3, 3) that exchanges and reverses the sensor's axes, or a factor on its readings."""
     force = log.accel_g if accel is None else log.accel_g @ np.transpose(accel)
     rate = log.gyro_dps if gyro is None else log.gyro_dps @ np.transpose(gyro)
     mps = log.speed_mps if speed else np.full(len(log.t_s), np.nan)
@@ -23,7 +22,7 @@ def cells_of(log: Log, accel=None, gyro=None, speed=True) -> LogCells:
 
 
 def words(notice) -> str:
-    """Return the remark in words, or "" for none."""
+    """The remark as text, "" for none."""
     return sentence(notice) if notice else ""
 
 

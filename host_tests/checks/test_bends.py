@@ -13,7 +13,7 @@ from support.recordings.drawn_rides import drawn_ride
 
 
 def judged(log, scale=1.0):
-    """Return the remark on a whole log whose rates are multiplied by a factor."""
+    """Return the remark on a whole log whose rates are multiplied by a factor below 1."""
     return words(bends(cells_of(log, gyro=scale * np.eye(3))))
 
 
@@ -32,7 +32,7 @@ def test_a_short_ride_shows_it_too():
 
 
 def test_one_long_steady_bend_is_not_the_gyros_bias():
-    """The bend lasts for 60 of 92 s, so most of the calmest seconds are in it."""
+    """The bend lasts for 60 of 92 s, so it contains most of the calmest seconds."""
     log = drawn_ride(1036, mounts=["firm"], kind="sweepers").logs[0]
     assert words(handedness(cells_of(log)) or bends(cells_of(log))) == ""
     log.gyro_dps = -log.gyro_dps
@@ -43,7 +43,7 @@ TURN = np.reshape(random_mounting(3), (3, 3))
 
 
 def straight_on(time, forward, up):
-    """Return the remark on a vehicle that hardly turns."""
+    """Return the remark on a vehicle that hardly turns at all."""
     force = np.column_stack((0.05 * np.sin(0.3 * time), up * np.ones(len(time)), forward)) @ TURN
     rate = 0.01 * np.column_stack((np.cos(time), np.sin(time), time % 1.0)) @ TURN
     return judged(Log(time, force, rate))

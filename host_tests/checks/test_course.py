@@ -51,8 +51,8 @@ def test_a_bias_of_the_gyro_is_no_turning(bias_dps):
 
 
 def circling(both_sides: bool, bias_dps: float, wavering_dps: float = 0.0) -> bool | None:
-    """Ride in circles at 10 m/s, to the left or to either side. wavering_dps: noise of the track's turn rate against
-    the gyro's."""
+    """A ride at 10 m/s in circles, to the left or to both sides. wavering_dps: noise of the track's yaw rate, which the
+    gyro does not have."""
     t_s = np.arange(0.0, 120.0, 0.02)
     turning_dps = np.where(both_sides & (t_s > 60.0), -10.0, 10.0)
     wave_dps = wavering_dps * np.sin(t_s)

@@ -22,7 +22,7 @@ WRONG_WAY = "are the axes left-handed (reverse one in both sensors) or the gyro 
 
 
 def judged(log, accel=None, gyro=None, speed=True):
-    """Return the remark on a log whose sensors' axes are exchanged and reversed by these matrices, or "" for none."""
+    """Return the remark on a log whose axes these matrices exchange and reverse; "" for none."""
     return words(handedness(cells_of(log, accel, gyro, speed)))
 
 
@@ -30,7 +30,7 @@ def judged(log, accel=None, gyro=None, speed=True):
     ("profile", "speed"), [("street", False), pytest.param("city", True, marks=pytest.mark.nightly)]
 )
 def test_all_48_ways_to_exchange_and_reverse_axes(profile, speed):
-    """Applied to both sensors alike, the left-handed ways give a remark and the right-handed ones do not."""
+    """Each matrix is applied to both sensors. Left-handed axes get a remark, right-handed axes do not."""
     remarks = [judged(simulated(profile), exchange, exchange, speed) for exchange in SIGNED]
     for exchange, said in zip(SIGNED, remarks, strict=True):
         assert (WRONG_WAY in said) == bool(said) == (np.linalg.det(exchange) < 0.0), (exchange, said)
@@ -39,13 +39,13 @@ def test_all_48_ways_to_exchange_and_reverse_axes(profile, speed):
 
 @pytest.mark.parametrize("profile", PROFILES)
 def test_simulated_rides(profile):
-    """Without a speed some wrong logs are missed, but no correct log gives a remark."""
+    """Without a speed, not every wrong log is found, but no correct log gets a remark."""
     log = simulated(profile)
     assert judged(log) == judged(log, speed=False) == ""
     assert (WRONG_WAY in judged(log, gyro=MINUS)) is (profile != "parked")
     if profile not in ("parked", "city"):
         assert WRONG_WAY in judged(log, gyro=MINUS, speed=False)
-    assert judged(log, gyro=np.eye(3) * np.radians(1.0)) == ""  # rates in rad/s have a remark of their own
+    assert judged(log, gyro=np.eye(3) * np.radians(1.0)) == ""  # rates in rad/s have their own remark
 
 
 @pytest.mark.parametrize("profile", MAIN)
@@ -81,7 +81,7 @@ def test_the_remark_names_what_fits():
 
 
 def test_axes_exchanged_in_one_sensor():
-    """With a speed nearly all exchanges are found, and each with its correct name. The test tries 24 of the 47."""
+    """With a speed nearly all exchanges are found (24 of the 47 are tried). Each one found is named correctly."""
     seen = 0
     log = simulated("street")
     for exchange in EXCHANGES[1::2]:
@@ -94,7 +94,7 @@ def test_axes_exchanged_in_one_sensor():
 
 
 def hand(seconds=60.0, seed=0, hz=50):
-    """Simulate a phone that is waved in the hand: turned by up to 90 degrees and moved by a few decimetres."""
+    """A phone waved in the hand: it turns by up to 90 degrees and moves by a few decimetres."""
     chance = np.random.default_rng(seed)
     time = np.arange(0.0, seconds, 1.0 / hz)
     waves = [chance.uniform(0.1, 0.7, (4, 3)), chance.uniform(0.0, 6.3, (4, 3)), chance.normal(0.0, 0.3, (4, 3))]
@@ -121,7 +121,7 @@ def test_a_phone_in_the_hand():
 
 def test_gaps_and_frozen_readings():
     log = simulated("street")
-    kept = (log.t_s % 30.0) < 25.0  # five seconds of every half minute are missing
+    kept = (log.t_s % 30.0) < 25.0  # five seconds are missing in every half minute
     gaps = log.part(kept)
     assert judged(gaps) == ""
     assert WRONG_WAY in judged(gaps, gyro=MINUS)
@@ -150,7 +150,7 @@ def test_recordings(shared_data):
 
 
 def test_a_bias_is_found_while_fitting():
-    """The hand is never still, so only the fit can show the bias."""
+    """The hand is never calm, so no other check can find the wrong axes."""
     log = hand(seed=0)
     turning = {}
     for bias in 0.0, 2.5:

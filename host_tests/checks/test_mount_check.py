@@ -1,4 +1,4 @@
-"""Every command that uses a calibration notices one that belongs to another mount, and never rejects a correct one."""
+"""Every command that takes a calibration reports one of another mount, and never reports a right one."""
 
 import json
 import re
@@ -55,7 +55,7 @@ def test_right_calibrations_are_never_accused(profile):
     log, calibration = made(profile)
     for each in log, silent(log):
         assert said(each, calibration) == ""
-        assert said(each, other(calibration, up=8.0)) == ""  # two poses may have this error
+        assert said(each, other(calibration, up=8.0)) == ""  # the error that two poses may have
 
 
 @pytest.mark.parametrize(("profile", "speed"), [("street", True), ("city", False), ("track", False), ("hills", True)])
@@ -80,7 +80,7 @@ def test_wrong_ones_are(profile, speed):
 
 
 def test_another_seeds_calibration(rides=("street", "sweeper", "city")):
-    """The calibration is of another bike, whose sensor is mounted differently."""
+    """The calibration belongs to another bike, whose sensor is mounted differently."""
     pairs = [made(profile) for profile in rides]
     for (log, _), (_, calibration) in zip(pairs, pairs[1:] + pairs[:1]):
         assert "is it another mount's?" in said(log, calibration)
@@ -97,7 +97,7 @@ def test_gaps():
 
 def test_what_does_not_tell():
     log, calibration = made("street")
-    assert said(log, CalibrationFile()) == ""  # not aligned: another message reports this
+    assert said(log, CalibrationFile()) == ""  # an unaligned calibration has its own message
     assert said(log.part(log.t_s < 10.0), other(calibration, up=90.0)) == ""
     assert said(silent(log), other(calibration, "car", up=90.0)) == ""  # a car does not lean
 
@@ -143,8 +143,8 @@ def exchanged_line(car, side, roll_deg=None):
 
 
 def test_what_is_reported():
-    """The message always names the sign of the log as the other possible cause. Changing the side of the kickstand
-    would turn such a log into a clean but mirrored report."""
+    """The message always names the log's sign as another cause. Choosing the other side of the kickstand would only
+    give a plausible but mirrored report."""
     assert exchanged_line(False, "left", 0.0).endswith("exchanged: calibrate two --side right?" + SIGN)
     assert exchanged_line(False, "right", -3.9).endswith("exchanged: calibrate two --side left?" + SIGN)
     assert exchanged_line(False, "", 0.0).endswith("calibrate two with the other --side?" + SIGN)
@@ -154,8 +154,7 @@ def test_what_is_reported():
 
 
 def jerky(late_s: int = 0, sign: float = 1.0, seconds: int = 240, mps2: float = 2.0) -> Log:
-    """Simulate a random acceleration along z in each second, at 10 Hz. The log has a speed at the start of each
-    second, late_s late."""
+    """A random acceleration along z in each second, with a speed at its beginning, delayed by some seconds; 10 Hz."""
     chance = np.random.default_rng(5)
     pushes = chance.normal(scale=mps2, size=seconds)
     speed_at = 30.0 + np.concatenate(([0.0], np.cumsum(pushes)))
@@ -178,14 +177,14 @@ def exchanged(log: Log) -> bool:
 
 
 @pytest.mark.parametrize(("late_s", "shown"), [(-1, False), (0, True), (1, True), (2, True), (3, False), (4, False)])
-def test_a_speed_up_to_two_seconds_late_shows_which_way_is_forward(late_s, shown):
-    """The acceleration changes at random each second, so a delay of one second removes the relation."""
+def test_a_speed_up_to_two_seconds_late_shows_forward(late_s, shown):
+    """The acceleration changes every second, so a speed that is one second late proves nothing."""
     assert exchanged(jerky(late_s, sign=-1.0)) is shown
     assert not exchanged(jerky(late_s))
 
 
 def test_only_the_last_hour_counts():
-    """In the earlier part the axis was reversed, as with a sensor that was turned over."""
+    """The axes were reversed until this time, as if the sensor had been turned over."""
     before, after = jerky(sign=-1.0, seconds=3600, mps2=8.0), jerky(seconds=3600)
     after.speed_mps += before.speed_mps[-10] - after.speed_mps[0]
     force, speed = (np.concatenate((getattr(before, name), getattr(after, name))) for name in ("accel_g", "speed_mps"))
@@ -201,7 +200,7 @@ def test_of_several_speeds_in_a_second_the_first_counts():
 
 
 def test_seconds_without_a_speed_or_without_samples():
-    """After a gap in the log and lost satellites enough data is left. But two days are not treated as one ride."""
+    """After a gap in the log and lost satellites the remaining data suffice. But two days are not one ride."""
     log = jerky(sign=-1.0)
     log.speed_mps[500:900] = np.nan
     assert exchanged(log.part((log.t_s < 100.0) | (log.t_s > 130.0)))
@@ -213,8 +212,8 @@ def test_seconds_without_a_speed_or_without_samples():
 
 
 def swaying(yaw_dps: float, seconds: float) -> Log:
-    """Simulate yaw to and fro with a period of 4 s and an amplitude of yaw_dps. The roll rate has
-    half this amplitude and is a quarter of a period apart."""
+    """Yaw swings with a period of 4 s and an amplitude of yaw_dps. Roll is half the change of yaw, as on a
+    motorcycle."""
     time = np.arange(0.0, seconds, 0.02)
     yaw, roll = yaw_dps * np.sin(np.pi / 2 * time), -0.5 * yaw_dps * np.cos(np.pi / 2 * time)
     return Log(time, np.tile([0.0, 1.0, 0.0], (len(time), 1)), np.column_stack((0 * yaw, yaw, roll)))
@@ -224,9 +223,9 @@ def swaying(yaw_dps: float, seconds: float) -> Log:
     ("yaw_dps", "seconds", "shown"), [(1.16, 90.0, False), (1.24, 90.0, True), (3.0, 61.0, False), (3.0, 63.0, True)]
 )
 def test_small_or_short_bends_show_no_forward(yaw_dps, seconds, shown):
-    """Means over 0.5 s have 0.974 of the amplitude, their changes over a second 1.414 times that, evened out 0.854: a
-    standard deviation of 0.832 yaw_dps, of which 1 deg/s is needed. Of 61 s 118 changes are left, of 63 s 122; 120 are
-    needed."""
+    """Means over 0.5 s keep 0.974 of the amplitude. Their changes over a second are 1.414 times as large; smoothing
+    keeps 0.854. So the standard deviation is 0.832 yaw_dps. Finding forward requires 1 deg/s. A log of 61 s has 118
+    changes, one of 63 s has 122; 120 are needed."""
     calibration = CalibrationFile(aligned=True)
     log = swaying(yaw_dps, seconds)
     assert said(log, calibration) == ""

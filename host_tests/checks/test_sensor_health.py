@@ -1,4 +1,4 @@
-"""A dead axis and a gyro at the end of its range are reported, and the smoother refuses such a log."""
+"""A dead axis and a gyro at the end of its range: reported for a log, and never smoothed into a plausible lean."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ def street():
 
 
 def ill(known, change):
-    """Return the ride's log after change(time, force, rate) has modified its arrays in place."""
+    """The ride's log after change(time, force, rate) has changed force and rates in place."""
     force, rate = known.log.accel_g.copy(), known.log.gyro_dps.copy()
     change(known.log.t_s, force, rate)
     return Log(known.log.t_s, force, rate, temperature_c=known.log.temperature_c)
@@ -74,7 +74,7 @@ def test_a_bias_that_steps_is_said_by_replay_and_report(street):
         assert "the readings repeatedly contradict each other" in sentence(notice)
 
 
-def test_a_saturated_gyro_is_said_and_the_rest_of_the_ride_is_good(street):
+def test_a_saturated_gyro_is_reported_and_the_rest_is_good(street):
     def saturate(time, force, rate):
         rate[(time > 60.0) & (time < 60.5), 1] = 500.0
 
@@ -105,7 +105,7 @@ def test_sound_sensors_are_not_called_ill(street):
 
 
 def test_rounding_and_a_standstill_are_no_dead_axis():
-    """The logs have few digits, or come from an ideal sensor without noise."""
+    """A log with few digits, and an ideal one without noise, get no remark."""
     time = np.arange(4000) / 100.0
     turn = rotation_matrix(np.array([0.3, 0.1, 0.2]))
     force = np.round(np.tile(turn[1], (4000, 1)) + 0.002 * np.random.default_rng(1).normal(size=(4000, 3)), 2)

@@ -1,4 +1,4 @@
-"""Every reader of a log refuses a speed that is not in m/s, and never refuses a correct one."""
+"""Every reader of a log refuses a speed that is not in m/s, and never a speed that is."""
 
 import functools
 
@@ -28,14 +28,14 @@ KMH, MPH, KNOTS = 3.6, 2.2369, 1.9438
 
 @functools.cache
 def driven(brakings):
-    """Return the force, rate and speed of a simulated ride."""
+    """Force, rate and speed of a simulated ride."""
     made = list(driving_runs.samples(driving_runs.around(brakings), "motorcycle"))
     force, rate = (np.array([driving_runs.mounted(MOUNT, row[k]) for row in made]) for k in (0, 1))
     return force, rate, [row[2] for row in made]
 
 
 def record(brakings=7, **source):
-    """Return a log of the ride. source: as in driving_runs.SpeedSource."""
+    """A log of the simulated ride; source: a driving_runs.SpeedSource."""
     force, rate, mps = driven(brakings)
     gps = driving_runs.SpeedSource(**{"every_s": 1.0} | source)
     speed = np.array([gps.step_to(value) for value in mps], dtype=float)
@@ -63,7 +63,7 @@ def test_what_is_right_is_read(every_s, late_s):
 
 @pytest.mark.parametrize("samples", [30, 1500])
 def test_it_takes_no_whole_log(monkeypatch, samples):
-    """Each block continues from the previous one, and the speed is refused as soon as the unit is certain."""
+    """Evidence accumulates from block to block, and the log is refused as soon as it suffices."""
     log = record(20, scale=KMH)
     monkeypatch.setattr(reader, "BLOCK_SAMPLES", samples)
     before = 0
@@ -85,7 +85,7 @@ def test_no_simulated_ride_is_refused(profile):
 
 
 def test_what_was_felt_while_samples_are_missing_is_not_known():
-    """A logger sleeps for half of each second, so it measures only half of the force."""
+    """A logger that sleeps for half of each second records only half of the force."""
     time = np.arange(0.0, 300.0, 0.01)
     push = 0.4 * np.sign(np.sin(2.0 * np.pi * time / 20.0)) * (time % 10.0 < 4.0)
     speed = np.where(np.arange(len(time)) % 100 == 99, 20.0 + np.cumsum(push) * 0.01 * 9.80665, np.nan)
@@ -96,7 +96,7 @@ def test_what_was_felt_while_samples_are_missing_is_not_known():
 
 
 def test_a_speed_that_has_nothing_to_do_with_the_ride():
-    """Such a speed says nothing about its unit. None of a hundred random ones may look wrong by chance."""
+    """A random speed shows no unit: not one of a hundred may look like one by chance."""
     rng = np.random.default_rng(0)
     time = np.arange(0.0, 60.0, 0.1)
     for _ in range(100):
@@ -115,7 +115,7 @@ def test_recordings(shared_data):
 
 
 def test_the_unit_is_judged_once_in_20_s_while_a_log_is_read(monkeypatch):
-    """The unit is judged on parts of 8 s at 24 and 48 s, and at the end."""
+    """The message comes from parts of 8 s at 24 and 48 s, and at the end."""
     judged_s = []
     monkeypatch.setattr(checks_log, "speed_unit", lambda cells: judged_s.append(round(len(cells.known) * 0.1)))
     checks = checks_log.Checks("ride.csv")

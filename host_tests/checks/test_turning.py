@@ -12,8 +12,8 @@ ONE_REVERSED, EXCHANGED = np.diag([1.0, 1.0, -1.0]), np.eye(3)[[1, 0, 2]]
 
 
 def reported(*left, windows=10, unbiased=True, swing=0.0):
-    """The exchange reported if the mean squares of the residual force (g2) are left [(exchange, g2), ...] and 9
-    otherwise. swing: how much more the gyro as it is leaves in each second window, and how much less in the others."""
+    """Return the exchange reported for these mean squares of the residual force: left [(exchange, g2), ...], 9 g2 for
+    all others. swing: added to the unchanged gyro's residual in every second window, subtracted in the others."""
 
     def unexplained(exchange):
         found = next((g2 for one, g2 in left if np.array_equal(one, exchange)), 9.0)
@@ -35,10 +35,10 @@ def reported(*left, windows=10, unbiased=True, swing=0.0):
         ([(AS_IT_IS, 0.1), (OPPOSITE, 0.02), (ONE_REVERSED, 0.0155), (EXCHANGED, 0.0124)], EXCHANGED),
         ([(AS_IT_IS, 0.0129), (ONE_REVERSED, 0.01)], None),
         ([(AS_IT_IS, 0.0131), (ONE_REVERSED, 0.01)], ONE_REVERSED),
-        # better by 1.25 times in all windows alike
+        # better by a factor of 1.25 in each window
         ([(AS_IT_IS, 0.0124), (OPPOSITE, 0.01)], None),
         ([(AS_IT_IS, 0.0126), (OPPOSITE, 0.01)], OPPOSITE),
-        # by 0.001 g2 at least
+        # better by at least 0.001 g2
         ([(AS_IT_IS, 0.0019), (OPPOSITE, 0.00091)], None),
         ([(AS_IT_IS, 0.0019), (OPPOSITE, 0.00089)], OPPOSITE),
     ],
@@ -50,7 +50,7 @@ def test_the_likelier_mistake_wins_unless_another_fits_better(left, best):
 
 
 def test_where_the_windows_differ_twice_as_good_is_needed():
-    """If the gain of ten windows swings by s, its standard error is s / root 10, and three times this is 0.95 s."""
+    """The gain swings by s over ten windows. Its standard error is s / root 10; three times that is 0.95 s."""
     for g2, swing, clear in ((0.0195, 0.011, False), (0.0195, 0.0099, True), (0.0201, 0.011, True)):
         assert (reported((AS_IT_IS, g2), (OPPOSITE, 0.01), swing=swing) is not None) is clear, (g2, swing)
 

@@ -112,8 +112,8 @@ def test_stalled_processor_keeps_the_lean_right(riding):
 
 
 def test_watchdog_restarts_a_hung_program(riding):
-    """The board restarts within 8.4 s, an ESP32 a second later because it prints the reason. Then it shows the lean
-    again."""
+    """The watchdog resets the board within 8.4 s (an ESP32 a second later, because it prints the reason). Then the lean
+    is shown again."""
     riding.exec("from time import sleep\nfrom kickstand.board import port")
     riding.send(b"port.start_watchdog()\nwhile True: sleep(10)\x04")
     resets = riding.resets

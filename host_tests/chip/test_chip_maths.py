@@ -53,8 +53,8 @@ def on_host():
 
 
 def test_the_same_log_gives_the_same_lean(tmp_path):
-    """The test compares a Pico, the unix port and CPython."""
-    pico()  # skips the test without the emulator
+    """The results agree on a Pico, on the unix port and on CPython."""
+    pico()  # or skip
     from kickstand_emulator.engine import rp2040
 
     with rp2040(iter([records()]), None) as results_of_chip:

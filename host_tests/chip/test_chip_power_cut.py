@@ -43,7 +43,7 @@ def loaded(system, image, directory):
 
 
 def test_old_or_new_wherever_a_save_is_cut(at_prompt, tmp_path):
-    """The power is cut before, during and after each operation of SAVES saves."""
+    """The power is cut before, within and after each operation of SAVES saves."""
     at_prompt.exec(_TOOLS)
     operations = 0
     for value in range(1, SAVES + 1):

@@ -1,4 +1,4 @@
-"""Test `kickstand emulate`, and flash and status with mpremote on the emulated board."""
+"""Tests `kickstand emulate`, and the commands flash and status with mpremote on an emulated board."""
 
 import math
 import queue
@@ -52,7 +52,7 @@ def test_without_its_library_an_esp32_is_refused(words, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("chip", ["rp2040", "esp32"])
 def test_emulate_reports_its_start_at_once(tmp_path, monkeypatch, chip):
-    """If a file is missing, the message says where to get it and where to put it."""
+    """A missing file is reported, too: the message says where to get it and where to put it."""
     monkeypatch.setattr(Path, "home", lambda: tmp_path)
     monkeypatch.setattr(image, "URL", "http://127.0.0.1:9/" + image.NAME)
     monkeypatch.setenv(esp32_library.VARIABLE, str(tmp_path))
@@ -117,8 +117,8 @@ class Emulating(threading.Thread):
 @pytest.mark.nightly  # the page Install has a similar test, and host_tests/deploy tests a fake board
 @pytest.mark.parametrize("chip", ["rp2040", pytest.param("esp32", marks=pytest.mark.esp32)])
 def test_flash_and_status_on_the_emulated_board(monkeypatch, chip):
-    """The board has an older version and an edited config. After the flash the ride begins, and the display says
-    what to do."""
+    """The board has an older version with an edited config. Then the bike's ride begins, and the display shows what to
+    do."""
     name = "esp32" if chip == "esp32" else "pico"
     names = {"rp2040": "Raspberry Pi Pico with RP2040", "esp32": "Generic ESP32 module with ESP32"}
     CHIPS[name]()  # skips the test without the emulator

@@ -26,8 +26,7 @@ def crash_command():
 
 @pytest.fixture
 def installed(tmp_path, monkeypatch):
-    """Return installed(distribution, text of entry_points.txt, name=content of a module), which simulates pip's
-    installation."""
+    """installed(distribution, its entry_points.txt, name=content of its modules): install a package as pip does."""
 
     def install(distribution: str, entry_points: str, **modules: str) -> None:
         info = tmp_path / f"{distribution}-1.0.dist-info"
@@ -103,5 +102,5 @@ def test_users_own_script_is_not_run(tmp_path):
 
 
 def test_a_checkout_has_the_workshops_commands():
-    """The wheel does not contain these commands, as host_tests/deploy/test_cli_package.py tests."""
+    """The wheel does not have these commands, see host_tests/deploy/test_cli_package.py."""
     assert {"bands", "bench", "evaluate"} <= set(main.kickstand.list_commands(None))

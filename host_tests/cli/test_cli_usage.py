@@ -52,7 +52,7 @@ def test_the_convention_of_logs_is_in_the_help():
 
 
 def test_shell_sees_one_line_on_standard_error_and_status_2(tmp_path):
-    """A script sees an empty standard output, one line on standard error, and status 2."""
+    """A script gets an empty standard output, one line on standard error, and exit status 2."""
     arguments = "-m kickstand_tools.cli replay none.csv --calibration x --out y".split()
     done = subprocess.run([sys.executable, *arguments], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (2, "")

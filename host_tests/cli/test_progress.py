@@ -34,7 +34,7 @@ def test_simulating_a_ride_shows_progress(tmp_path, monkeypatch):
 
 
 def test_evaluation_shows_progress_from_the_start(monkeypatch):
-    """A terminal shows progress from 0 %, not only after the first ride. Other outputs get occasional lines."""
+    """On a terminal progress starts at 0 %, not after the first ride. Elsewhere it is printed in occasional lines."""
     monkeypatch.setattr(runs.estimators, "estimate", lambda log, calibration: {})
     arguments = ["evaluate", "--profiles", "parked", "--seeds", 2, "--seconds", 60, "--json"]
     shown = watched(monkeypatch, Watched(), *arguments)

@@ -16,18 +16,18 @@ from kickstand_tools.simulated_board.lcd import shown_lean
 from support.command import run
 from support.terminal import Terminal
 
-HUNG_S = 300  # only a hung process takes this long, even on a busy machine
+HUNG_S = 300  # only a hanging process takes this long, even on a busy machine
 
 
 def demo_command(engine, hand=False):
-    """Return the command line of the demo. By hand its time passes six times as fast."""
+    """Command line of the demo. With --hand its time passes six times as fast."""
     code = f"from kickstand_tools.demo import demo; demo.HAND_SPEED = 6.0; demo.demo({hand}, {engine == 'cpython'})"
     return [sys.executable, "-c", code]
 
 
 @functools.cache
 def printed_by(engine):
-    """Return the demo's output if standard output is not a terminal."""
+    """The demo's output if standard output is not a terminal."""
     done = subprocess.run(
         demo_command(engine),
         stdin=subprocess.DEVNULL,
@@ -44,7 +44,7 @@ def printed_by(engine):
 
 @pytest.fixture(scope="module")
 def printed():
-    """Return the output, which is the same for every engine (test_both_engines_show_the_same)."""
+    """The output that every engine prints, see test_both_engines_show_the_same."""
     return printed_by("cpython")
 
 

@@ -38,7 +38,7 @@ def test_a_clock_with_losses_is_not_measured(overflows, errors):
 
 
 def rested(force=(0.0, 0.0, 1.0), rate=(0.0, 0.0, 0.0), noise_g=0.005, noise_dps=(0.05,) * 3, **other):
-    """Return the findings for a sensor at rest with 4096 counts per g and 65.5 per deg/s."""
+    """The findings for a sensor at rest with 4096 counts per g and 65.5 per deg/s."""
     means = [4096 * value for value in force] + [0.0] + [65.5 * value for value in rate]
     spreads = [4096 * noise_g] * 3 + [0.0] + [65.5 * value for value in noise_dps]
     given = {"samples": 1000, "changes": (900,) * 7, "temperature_c": 25.0, "overflows": 0} | other

@@ -42,14 +42,14 @@ def module(path):
 
 
 def refused(board, *arguments, words):
-    """Assert that the board is refused, its files are unchanged and its port is closed."""
+    """The command is refused, the board's files are unchanged, and its port is closed."""
     line = command.refused(board.root, *arguments, words=words)
     assert board.closed
     return line
 
 
 def broken_off(board, words):
-    """Assert that the command stops half-way and reports the board in one line."""
+    """The command refuses the board in one line, in the middle of its work."""
     result = command.run("flash")
     assert (result.status, result.err.count("\n")) == (2, 1)
     assert words in result.err

@@ -39,7 +39,7 @@ COMMANDS = {
 
 
 class Nonsense(fake_board.FakeBoard):
-    """Answers everything with the same bytes. first: correct answers before that."""
+    """A board that answers everything with the same bytes. first: correct answers before them."""
 
     def __init__(self, root, content, first=0):
         super().__init__(root)
@@ -57,7 +57,7 @@ class Nonsense(fake_board.FakeBoard):
 
 @pytest.fixture
 def plug_in(tmp_path, monkeypatch):
-    """Return a function that makes a board the only connected one."""
+    """A function that replaces the connected boards by one board."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "flash").mkdir()
     (tmp_path / "out").mkdir()

@@ -111,7 +111,7 @@ def test_byte_order_mark_is_never_copied(encode, content, board, tmp_path, monke
     monkeypatch.chdir(tmp_path / "mine")
     command.works("flash", "--config")
     assert own(board)["config.py"] == content
-    put(board, config=encode(content))  # a file already on the board is corrected
+    put(board, config=encode(content))  # a config.py on the board is corrected
     command.works("flash")
     assert own(board)["config.py"] == content
 

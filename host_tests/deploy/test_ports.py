@@ -26,8 +26,8 @@ BOARDS = {"Pico": bytecode.PICO, "Pico 2": 0x1F06, "ESP32": 0x2B06, "ESP32-C3": 
 # 16 and up: instructions that some RISC-V have besides (MicroPython, py/persistentcode.h, ports/esp32/mpconfigport.h).
 ESP32S = {0x2B06: "xtensawin", 0x2F06: "rv32imc", 0x12F06: "rv32imc"}
 
-# Complaints about what has no types on a board: names that start as None or as NoRecorder, the settings, which
-# setattr() makes, viper's pointers, and ticks, which are numbers
+# pyright's complaints about code without types on a board: names that start as None or as NoRecorder, settings made by
+# setattr(), viper's pointers, and ticks, which are numbers
 UNTYPED = '"None"', 'for class "NoRec', 'for class "Settings', 'of type "ptr', "Variable not allowed in", '"_Ticks'
 
 
@@ -123,7 +123,7 @@ def test_only_port_py_knows_the_port():
 
 
 def test_device_works_on_an_esp32(tmp_path):
-    """The ESP32 has its own pins, and its own error number for a device that does not answer."""
+    """The port's pins, and its error number for a device that does not answer, which differs from the Pico's."""
     faults = [["unplug_sensor", [2.0, 1.0]], ["unplug_lcd", [4.0, 0.5]]]
     plan = {"lean": [[0, 25]], "board": {"machine": "esp32"}, "faults": faults, "until": 6}
     record = device_plans.run("cpython", tmp_path, plan)

@@ -55,7 +55,7 @@ MAIN_THEN = b"# 0.2.0\n" * 330
 
 @pytest.fixture
 def plugged(monkeypatch):
-    """Return plugged(board), which makes a board the only connected one."""
+    """plugged(board): make this the only connected board."""
     then = MAIN_THEN, before("nested .py")["/main.py"]
     monkeypatch.setattr(others, "_OWN_MAIN", {hashlib.sha256(text).hexdigest()[:16] for text in then})
 
@@ -205,14 +205,15 @@ def test_a_board_full_of_rides_has_room_for_an_update(which):
 
 
 def test_sources_may_need_rides_to_be_pulled_first():
-    """Sources take twice the space and are meant for computers without mpy-cross. The message says what to do."""
+    """Files in .py form take twice the space and are for computers without mpy-cross. The message says what to do."""
     board = on_board(before("nested .mpy"), flash_ring.RESERVE // BLOCK)
     with pytest.raises(InputError, match="kickstand pull --delete, then flash again"):
         refuse_without_room(plan(wanted(".py"), board, True), board)
 
 
 def test_ring_of_rides_knows_the_size_of_the_firmware():
-    """The size counts littlefs' blocks and its own two. The ring treats everything else in flash as rides."""
+    """The size as littlefs arranges the files, with its own two blocks. The ring treats everything else in flash as
+    rides."""
     board = fresh()
     board.put(wanted(".mpy"))
     taken = board.system.used_block_count * BLOCK

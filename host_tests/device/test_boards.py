@@ -44,7 +44,7 @@ def test_other_boards_measure(machine, board, config, touched, tmp_path):
 
 @pytest.mark.parametrize("machine", WITHOUT)
 def test_a_board_without_usual_pins_touches_none(machine, tmp_path, capsys):
-    """The message names what is missing, also in safe mode with the button held at power-on."""
+    """The message names the missing pins, also in safe mode (button held at power-on)."""
     plan = {"board": {"machine": machine, **WIRED}, "presses": [[0, 2]], "until": 3}
     record = device_plans.run("cpython", tmp_path, plan, capsys)
     assert record.ends == ["returned"]
@@ -95,7 +95,7 @@ def test_a_classic_esp32_keeps_its_flash_and_its_console(machine, name, pin, tmp
 
 
 def test_a_board_with_psram_has_no_usual_pins_for_a_gps_receiver(tmp_path, capsys):
-    """The PSRAM uses these pins. config.py must set others, and the display says so."""
+    """The board's PSRAM uses the usual pins. config.py must set others, and the display says so."""
     plan = {"lean": LEANING, "board": {"machine": "esp32 spiram"}, "config": {"SPEED": "gps"}, "until": 3}
     record = device_plans.run("cpython", tmp_path, plan, capsys)
     assert record.ends == ["returned"]
@@ -145,7 +145,7 @@ def test_a_device_that_hangs_on_an_esp32_is_freed(bits, tmp_path):
     assert record.ends == ["off"]
     assert record.first("Raw   3[1-5]°", 3.2) < 4.0
     shown = {int(line[5:8]) for t_s, line, _ in record.frames if t_s > 1.0 and line.startswith("Raw")}
-    assert shown <= set(range(25, 36))  # no reading from the time of the fault
+    assert shown <= set(range(25, 36))  # readings from that time are never used
 
 
 def on(machine, function, until_s):

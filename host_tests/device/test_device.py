@@ -20,7 +20,7 @@ def test_two_presses_and_a_ride(engine, seed, tmp_path):
     assert record.at(1.9)[0].startswith("Raw")
     assert record.first("On stand: press") < 2.5
     assert record.at(6)[0] == "Now upright:    "
-    # The poses and settling take 8 s. An uncalibrated sensor scales each pose to 1 g, which costs some tilt.
+    # 8 s of poses and settling; the errors of a part change its reading of 1 g in each pose, which also costs tilt
     assert record.first("Aligned!") < 16.0
     tolerance = 2 if seed is None else 7
     for t_s, lean in ((LEFT_S, -30), (RIGHT_S, 40), (STRAIGHT_S, 0)):
@@ -86,9 +86,10 @@ def test_a_refused_alignment_leaves_the_old_one(tmp_path):
 
 
 def test_pages_and_menu(tmp_path):
-    source = (firmware_path.PACKAGE / "ui" / "page_ring.py").read_text(encoding="utf-8")  # importing it needs a board
+    # imported here because the import needs a board
+    source = (firmware_path.PACKAGE / "ui" / "page_ring.py").read_text(encoding="utf-8")
     ring = re.findall(r"pages\.(\w+)", source.partition("MOTORCYCLE = (")[2].partition(")")[0])
-    turns_s = [46.0 + k for k in range(len(ring))]  # through all pages, back to the first
+    turns_s = [46.0 + k for k in range(len(ring))]  # presses through all pages, back to the first one
     menu_s = turns_s[-1] + 1.0
     short = [*turns_s, *(menu_s + after_s for after_s in (2, 3, 7.5, 11, 12, 13, 19))]
     long = [menu_s + after_s for after_s in (0, 4, 9, 14)]
@@ -98,7 +99,7 @@ def test_pages_and_menu(tmp_path):
     def shows(page):
         return record.at(45.7 + ring.index(page))
 
-    assert record.first("Max left +(29|3[0-3])°") == pytest.approx(46.3, abs=0.2)  # the plan rolls the bike instantly
+    assert record.first("Max left +(29|3[0-3])°") == pytest.approx(46.3, abs=0.2)  # the plan changes the lean instantly
     assert record.first("Max right +(39|4[0-3])°") == pytest.approx(46.3, abs=0.2)
     assert shows("acceleration")[0].startswith(("Accel", "Brake")) and shows("acceleration")[1].startswith("pk +0.")
     assert shows("formula")[0].startswith("Formula") and shows("formula")[1].startswith("Filter")
@@ -148,7 +149,7 @@ def test_the_six_positions_calibrate_the_gyro_too(tmp_path):
 
 
 def test_a_fast_turn_is_reported_and_repeated(tmp_path):
-    """Each turn takes a tenth of a second, which is too fast to check any axis of the gyro."""
+    """All turns take a tenth of a second, so no axis of the gyro is verified."""
     plan = six_positions([0.5, 0.6, -0.7])
     steps = plan["poses"]
     for i in range(2, len(steps) - 1, 2):
@@ -162,8 +163,8 @@ def test_a_fast_turn_is_reported_and_repeated(tmp_path):
 
 @pytest.mark.parametrize(("faults", "goes_on"), [([], True), ([["unplug_sensor", [10.8]]], False)])
 def test_a_turn_beyond_the_range_does_not_end_six_positions(faults, goes_on, tmp_path):
-    """Half a turn in 0.3 s is 600 deg/s, more than the range of 500 deg/s. Six positions ends only if the sensor's
-    wire breaks."""
+    """Half a turn in 0.3 s is 600 deg/s, beyond the range of 500. If the sensor's wire is off, the procedure does
+    end."""
     poses = [[0, None], [6, [1, 0, 0]], [10.7, None], [11, [-1, 0.05, 0.05]], [30, None]]
     plan = {"poses": poses, "presses": [[2, 1.2], [4, 0.15], [5, 1.2]], "until": 17, "faults": faults}
     record = device_plans.run("cpython", tmp_path, plan)
@@ -226,14 +227,14 @@ def test_six_positions_shows_the_next_step(tmp_path):
 
 
 def test_a_tilted_upright_pose_is_corrected_on_the_road(tmp_path):
-    """At the press for upright the bike leans 2 degrees to the right. After a ride the device shows the true lean,
-    also after power-off."""
+    """The bike leans two degrees to the right at the upright press. After a ride the display shows the true lean, also
+    after power-off."""
     ride = [["kickstand", 8.0], ["upright", 14.0, 2.0], ["accelerate", 15.0, 6.0]]
     for _ in range(3):
         ride += [["turn", -25.0, 3.0], ["straight", 25.0], ["turn", 25.0, 3.0], ["straight", 25.0]]
     plan = {**ALIGNED, "ride": [*ride, ["brake", 0.0, 6.0], ["wait", 10.0]], "until": 230}
     record = device_plans.run("cpython", tmp_path, plan)
-    assert record.lean_at(20.2) == 0  # the bike leans by 2 degrees, as it did when it was aligned
+    assert record.lean_at(20.2) == 0  # the bike leans by 2 degrees, as at the alignment
     assert record.last[0].startswith("Lean   0°")
     again = device_plans.run("cpython", tmp_path, {"ride": [["upright", 5.0]], "until": 4})
     assert again.lean_at(3.5) == 0

@@ -73,7 +73,7 @@ def test_an_axis_that_dies_in_a_pose_ends_it(spoilt, tmp_path):
 
 
 def test_a_moment_at_the_end_of_the_range_hides_nothing_for_long(spoilt, aligned):
-    """The fault is reported, and the lean is right again at once because the bike is at rest."""
+    """The fault is reported. The lean is correct again at once, because the bike is at rest."""
     spoilt(3, 600.0, FAULT_S, FAULT_S + 0.3)
     record = device_plans.run("cpython", aligned, {"lean": [[0, STATIC]], "until": 10})
     assert record.first("Gyro clips", FAULT_S) < FAULT_S + 0.5
@@ -82,7 +82,7 @@ def test_a_moment_at_the_end_of_the_range_hides_nothing_for_long(spoilt, aligned
 
 
 def test_a_gyro_in_standby_is_set_up_again(aligned, monkeypatch):
-    """PWR_MGMT_2 alone puts the gyro in standby, as a disturbed write would."""
+    """Only PWR_MGMT_2 is wrong, as after a disturbed write."""
     install = simulator.Board.install
 
     def installed(board):

@@ -61,7 +61,7 @@ def forward_error_deg(calibration, seed=None):
 
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
 def test_a_car_finds_its_alignment_and_shows_the_next_step(engine, tmp_path):
-    """This drive runs on MicroPython with its floats and heap. The other drives run on CPython."""
+    """This drive runs on MicroPython, with its floats and its heap. The other drives run on CPython."""
     record = device_plans.run(engine, tmp_path, car("gps", 5, presses=[[60, SHORT], [65, SHORT]]))
     assert record.at(3.0) == ["Brakings   0/5  ", "stop needed     "]
     assert record.first("brake straight") < 8.0
@@ -125,8 +125,8 @@ def test_a_wrong_kickstand_side_is_noticed(unanswered, asked):
     assert asked < POSES_S + 60.0 and stops(asked, POSES_S)
     assert unanswered.at(asked)[1] == "hold = fix      "
     away = unanswered.first("Lean", asked)
-    assert not stops(away, POSES_S)  # the question does not disturb the ride
-    assert unanswered.lean_at(TURN_S) is None  # a lean would have the wrong sign
+    assert not stops(away, POSES_S)  # it does not disturb the ride
+    assert unanswered.lean_at(TURN_S) is None  # a trim would have the wrong sign
     assert unanswered.at(TURN_S) == ["Lean  --        ", "side was wrong? "]
 
 
@@ -191,8 +191,8 @@ def test_a_moved_mount_hides_the_lean_despite_other_messages(tmp_path):
 
 
 def test_a_requested_drive_keeps_the_old_alignment_until_ready(tmp_path):
-    """The rider requests the drive in the menu after remounting the sensor. A sensor fault during the drive does no
-    harm."""
+    """The rider starts the drive in the menu after remounting the sensor. A fault of the sensor during the drive does
+    no harm."""
     device_plans.align(tmp_path)
     old = list(stored(tmp_path).vehicle_from_sensor)
     menu = [[2, LONG], *([4 + t, SHORT] for t in range(4)), [9, LONG]]
@@ -280,7 +280,7 @@ def test_status_shows_the_speed(config, fitted, said, capsys, monkeypatch, tmp_p
 
 
 def test_ctrl_c_keeps_the_worst_for_the_status(tmp_path, monkeypatch, capsys):
-    """Other code used the processor for half a second. The FIFO was full, and one pass of the loop took as long."""
+    """Other code used the processor for half a second: the FIFO overflowed, and one turn of the loop took as long."""
     monkeypatch.chdir(tmp_path)
 
     def interrupt():
@@ -316,7 +316,7 @@ def test_ctrl_c_keeps_the_worst_for_the_status(tmp_path, monkeypatch, capsys):
 
 
 def test_a_press_for_a_page_does_not_answer_a_hidden_question(asked, tmp_path):
-    """The information page covers the question."""
+    """The information page hides the question."""
     plan = bike("gps", 3, kickstand=(12.0,))
     to_info = [[asked - 14.0, LONG], *([asked - 12.0 + t, SHORT] for t in range(3)), [asked - 9.0, LONG]]
     presses = [*POSES, *to_info, [asked + 2.0, LONG]]

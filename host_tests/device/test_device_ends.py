@@ -41,7 +41,7 @@ def test_after_an_error_in_user_py_no_lean_is_shown(kind, boards, tmp_path, monk
 
 @pytest.mark.parametrize("turn", [1, 2, 150, 300])
 def test_ctrl_c_in_a_transfer_leaves_no_lean(turn, boards, tmp_path, monkeypatch):
-    """Ctrl-C comes in the middle of a display line, between the two halves of a byte."""
+    """Ctrl-C comes in the middle of a line of the display, after half of a byte."""
     from kickstand.board import hd44780
 
     calls = []

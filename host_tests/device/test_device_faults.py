@@ -42,7 +42,7 @@ def test_a_lasting_fault_is_shown_until_it_ends(faults, said, aligned):
     assert record.first(said, FAULT_S) < FAULT_S + 0.4
     back = record.first("Lean +25° right", END_S)
     assert back < END_S + RECOVERY_S + 0.1  # the record is taken every 0.1 s
-    assert set(record.leans(0, 10)) == {STATIC}  # no other lean was ever shown
+    assert set(record.leans(0, 10)) == {STATIC}  # no other value was shown as the lean
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_a_sagging_supply_while_the_calibration_is_read(fault, aligned):
     files = {path.name: path.read_bytes() for path in aligned.iterdir()}
     record = device_plans.run("cpython", aligned, standing([[fault, [".cal", 0, 2]]], until=4))
     assert record.first("Not aligned") < math.inf
-    assert {path.name: path.read_bytes() for path in aligned.iterdir()} == files  # no file was rewritten
+    assert {path.name: path.read_bytes() for path in aligned.iterdir()} == files  # the flash is not rewritten
     assert device_plans.run("cpython", aligned, standing([], until=3)).lean_at(2.5) == STATIC
 
 
@@ -118,7 +118,7 @@ def in_turn_300(monkeypatch):
 
 def test_an_exception_is_reported_and_the_board_restarts(aligned, in_turn_300, capsys):
     in_turn_300(lambda: 1 / 0)
-    held = {"presses": [[3.0, 5.0]]}  # the button is held until later, but safe mode is only for power-on
+    held = {"presses": [[3.0, 5.0]]}  # the button is held all that time: safe mode only starts at power-on
     record = device_plans.run("cpython", aligned, standing([], until=12, **held), capsys)
     assert record.first("Error, restarts") < math.inf
     assert record.first("ZeroDivisionErro") < math.inf

@@ -14,9 +14,9 @@ RIDE = [
     *[["turn", 40.0 * (-1) ** k, 0.3] for k in range(8)],
 ]
 TRUE = script.Ride([getattr(script, name)(*more) for name, *more in RIDE])
-OLDEST_S = 0.5 + 0.1 + 0.1  # half a second, one page, and the time between two samples of the display
-HANG_S = 1.46  # the first page after the hang gives its reason and is still shown at the next frame
-NEAR_DEG = 10.0  # readings lost while the bike rolls cost up to 8 degrees until the filter recovers
+OLDEST_S = 0.5 + 0.1 + 0.1  # half a second, a page, and the time between two looks at the display
+HANG_S = 1.46  # the first page after the event, which names the cause, is complete at the next frame
+NEAR_DEG = 10.0  # readings lost while the bike rolls cost up to 8 degrees until the filter has made up for them
 
 STARVED = {
     "flash erase": ([["busy", [FROM_S, 0.4, 6]]], {}),

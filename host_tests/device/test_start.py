@@ -44,7 +44,7 @@ def test_incomplete_firmware_ends_at_the_prompt_and_says_so(module, board, monke
 @pytest.mark.parametrize("charge_us", [0, 7_000, 75_000])
 @pytest.mark.parametrize("held", [False, True])
 def test_a_capacitor_at_the_button_is_no_press_at_power_on(held, charge_us, board, capsys):
-    """The pin's pull-up needs time to charge the capacitor. A held button still starts safe mode."""
+    """The pin's pull-up needs time to charge the capacitor. A button that is held still prevents the start."""
     from kickstand import start
 
     board.button.charge_us = charge_us
@@ -97,7 +97,7 @@ def watch(board):
 
 
 def choose(board, at_s, place):
-    """Return the presses that choose this menu entry within 8 s."""
+    """Return the presses that choose this entry of the menu, within 8 s."""
     for t_s in range(place):
         board.press(at_s + 2 + t_s)
     board.press(at_s, 1.2)
@@ -109,7 +109,7 @@ def choose(board, at_s, place):
     [("align_wizard", ALIGN), ("pose_taker", SIX), ("recorder", RECORD)],
 )
 def test_a_failed_import_of_the_menu_is_reported(module, place, without, board, capsys):
-    """The failure is reported each time the entry is chosen, and never earlier."""
+    """The failure is reported whenever the entry is chosen, and never earlier."""
     from kickstand import start
 
     if module == "pose_taker":
@@ -142,7 +142,7 @@ def test_a_board_that_cannot_record_still_shows_the_lean(module, without, board,
 @pytest.mark.parametrize("module", ["radio", "live"])
 @pytest.mark.parametrize("board", [{"machine": "pico w"}], indirect=True)
 def test_without_lives_modules_the_lean_continues(module, without, board, monkeypatch, capsys):
-    """The failure is reported once, without a restart. The radio is then off."""
+    """The missing module is reported once, without a restart. The radio is then off."""
     from kickstand import settings, start
 
     monkeypatch.setattr(settings, "load", lambda: settings.Settings(type("Config", (), {"LIVE": True})))

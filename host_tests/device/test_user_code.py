@@ -123,7 +123,7 @@ def test_user_py_is_disabled_before_memory_runs_out(run):
 
 
 def test_without_a_user_py_its_module_is_not_loaded(run, tmp_path):
-    """On a board the module would take 3 KB of heap."""
+    """The module would take 3 KB of a board's heap."""
     sys.modules.pop("kickstand.user_code", None)
     device_plans.run("cpython", tmp_path, PLAN | {"until": 1.0})
     assert "kickstand.user_code" not in sys.modules

@@ -128,7 +128,7 @@ def test_the_other_address_is_tried(mine, tmp_path, monkeypatch):
 
 
 def test_a_clock_that_has_the_sensors_address_is_not_set(tmp_path, monkeypatch):
-    """The firmware writes only a register number to the clock, in order to read it."""
+    """The driver only writes the number of the register to read."""
     clocks = []
 
     def fit(board):
@@ -259,7 +259,7 @@ def test_a_nack_does_not_fail_the_set_up(nth, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("wiring", [1, 2, 3, 4])
 def test_status_finds_the_wiring_of_a_backpack(wiring, tmp_path, monkeypatch):
-    """Each wiring is used to show its number. Only the right wiring is readable and lit."""
+    """The board shows the number of each wiring by means of that wiring: only the right one is readable and lit."""
     monkeypatch.chdir(tmp_path)
     board = Board(noisy)
     setattr(board.lcd, "wiring", wiring)  # noqa: B010 - an attribute of Lcd that Oled lacks

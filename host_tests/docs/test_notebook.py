@@ -33,8 +33,8 @@ def test_the_notebook_runs_and_finds_the_lean(monkeypatch, tmp_path, capsys):
     assert (tmp_path / "RIDE-lean.csv").stat().st_size > 5e5
 
 
-def test_each_step_of_the_notebook_is_explained_and_no_output_is_kept():
-    """Readers see the output of their own run."""
+def test_notebook_explains_each_step_and_keeps_no_output():
+    """The stored notebook has no output: readers run it themselves."""
     whole = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
     assert whole[0]["cell_type"] == "markdown" and len(cells("markdown")) >= len(cells("code")) - 1
     assert not any(cell.get("outputs") or cell.get("execution_count") for cell in whole)

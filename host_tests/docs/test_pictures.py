@@ -31,7 +31,7 @@ def test_no_drawing_is_stale(pictures):
 @pytest.mark.nightly  # each draws a whole ride, and host_tests/analysis tests the content of plots
 @pytest.mark.parametrize(("name", "draw"), [("ride.png", ride.draw), ("lean_compared.png", explained.lean_compared)])
 def test_no_plot_of_a_ride_is_stale(name, draw):
-    """The pictures are compared by pixels, because matplotlib's files differ between versions."""
+    """The pixels are compared, because matplotlib's files differ between versions."""
     fresh, kept = (
         np.asarray(Image.open(io.BytesIO(data)).convert("L"), dtype=float)
         for data in (draw(), (PICTURES / name).read_bytes())

@@ -1,4 +1,4 @@
-"""Documents: every link works, and every list matches the files."""
+"""The documents: every link has a target, and every list matches the files."""
 
 import ast
 import re
@@ -15,8 +15,8 @@ BEHIND = sorted(path for folder in ("firmware", "tools") for path in (ROOT / fol
 DISPLAYS, HOW = (ROOT / "firmware" / "docs" / name for name in ("displays.md", "how-it-works.md"))
 PAGES = [FIRST, DEVICE, TOOLS, CONTRIBUTING, ROOT / "firmware/FAQ.md", ROOT / "CHANGELOG.md", *BEHIND]
 MOST_LINES = {FIRST: 130, DEVICE: 250, TOOLS: 200}
-WIDEST = 120  # except tables, pictures and commands
-# Issues, releases and the site, wherever the project is hosted.
+WIDEST = 120  # except for tables, pictures and commands
+# Issues, releases, the site, wherever the project is hosted
 OF_THE_REPOSITORY = re.compile(r"(\.\./){2,}(issues|releases|deployments)\b")
 LINK = re.compile(r'\]\(([^)\s]+)\)|src="([^"]+)"')
 
@@ -78,7 +78,7 @@ def test_every_picture_is_shown():
     assert shown == {path.resolve() for path in (ROOT / "tools" / "pictures").iterdir()}
 
 
-def test_the_first_page_is_short_and_begins_with_a_moving_picture():
+def test_the_first_page_is_short_and_begins_with_an_animation():
     text = text_of(FIRST)
     assert re.findall(r'src="([^"]+)"', text)[0].endswith(".webp")
     assert "    python3 tools/dev.py demo\n" in text

@@ -101,7 +101,7 @@ def test_a_calibrated_accelerometer_keeps_its_parameters(tmp_path):
 
 
 def test_notes_in_a_calibration_are_kept(tmp_path):
-    """The notes give the board and the chip of a recorded ride, for example."""
+    """Notes are, for example, the board and the chip of a recorded ride."""
     log = record(tmp_path / "drive.csv", around(7), MOUNT)
     before = CalibrationFile(notes={"board": "Raspberry Pi Pico", "sensor": "MPU6050"})
     found = fit_drive([log], before).calibration
@@ -110,7 +110,7 @@ def test_notes_in_a_calibration_are_kept(tmp_path):
 
 
 def test_several_logs_of_one_mount_are_combined(tmp_path):
-    """None of the logs is enough alone."""
+    """No single log is enough."""
     logs = [record(tmp_path / f"{k}.csv", around(2), MOUNT) for k in range(3)]
     refused(tmp_path, "braking events in a straight line", logs[0])
     command.works("calibrate", "drive", *logs, "--out", tmp_path / "CAL.json")

@@ -36,7 +36,7 @@ def turned(m, axis, degrees):
 
 @pytest.mark.parametrize("engine", [*ENGINES, "published"])
 def test_a_car_is_aligned(engine):
-    """The published method is tested only on CPython."""
+    """Align a car by the published method, only on CPython."""
     options = {"method": "published"} if engine == "published" else {}
     calls = [("drive", (around(), MOUNT, options | {"gyro_bias": [6.0, -5.0, 1.0]}))]
     [result] = run("cpython" if options else engine, calls)
@@ -87,8 +87,8 @@ def test_camber_at_the_stops_does_not_reach_forward(method, yaw_deg):
 
 
 def test_it_reports_the_missing_step():
-    """It waits for a speed, a stop and a braking event. Then it reports whether the braking event is straight, and
-    when it is ready."""
+    """The alignment waits for a speed, a stop and a braking event. Then it reports whether the braking event is
+    straight, and when the result is ready."""
     legs = [[2.0, 1.0, 0.0], [2.0, -1.0, 0.0], *around(2), [8.0, 1.5, 0.0], [4.0, -2.0, 15.0], *around(6, stands=False)]
     states = drive(legs)["states"]
     assert alignment.DriveAlignment("car").state == alignment.WAITING_FOR_SPEED
@@ -171,7 +171,7 @@ def test_the_first_braking_counts_after_any_late_first_speed(silent_s):
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_silent_source_at_zero_is_no_standstill(engine):
-    """The receiver fails, and the vehicle then drives in long curves with a force as steady as at a stop."""
+    """The vehicle drives off after the receiver has failed, in long curves with a force as steady as at a stop."""
     before = [*around(7), [8.0, -1.0, 0.0], STAND]
     legs = [*before, [4.0, 4.0, 0.0], [30.0, 0.0, 9.0]]
     seconds = sum(leg[0] for leg in before)
@@ -193,7 +193,7 @@ def test_a_silent_source_is_not_a_stuck_one():
 
 
 def test_nothing_is_joined_across_missing_samples():
-    """Gaps of 1.5 s every 25 s do not prevent the alignment."""
+    """A vehicle is still aligned with gaps of 1.5 s every 25 s."""
     drive = alignment.DriveAlignment("car")
     source = driving_runs.SpeedSource()
     gap = 0

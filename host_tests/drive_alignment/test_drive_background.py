@@ -13,8 +13,8 @@ from kickstand_tools.simulated_board.simulator import Board
 
 
 def device(leans=True, counted=9, problem=None, speed_problem=None, state=alignment.TURNING, speed_mps=0.0):
-    """Return a BackgroundAlignment whose drive is in this state. passed: the speeds that the lean filter received."""
-    with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):  # the module needs a board's clock
+    """A BackgroundAlignment whose drive is in this state; passed: the speeds that the lean filter got."""
+    with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):  # imported here because the module needs a board's clock
         from kickstand.drive_alignment.background import BackgroundAlignment
     made: Any = object.__new__(BackgroundAlignment)
     quality = SimpleNamespace(speed_problem=speed_problem)
@@ -28,7 +28,7 @@ def device(leans=True, counted=9, problem=None, speed_problem=None, state=alignm
 @pytest.mark.parametrize(
     ("given", "speed", "used"),
     [
-        ({}, 12.3456, 12.35),  # as a recording has it
+        ({}, 12.3456, 12.35),  # as in a recording
         ({}, 0.0, None),
         ({"counted": MIN_EVENTS_TO_CHECK_SPEED}, 5.0, 5.0),
         ({"counted": MIN_EVENTS_TO_CHECK_SPEED - 1}, 5.0, None),

@@ -1,4 +1,4 @@
-"""An alignment is judged against a drive by angles, and a stuck speed by seconds."""
+"""The verdict on an alignment by its angle to the drive's, and on a stuck speed by its duration."""
 
 from types import SimpleNamespace
 from typing import Any

@@ -22,7 +22,7 @@ def unit(rng):
 
 @pytest.mark.parametrize("off_deg", [0.0, 0.01, 45.0, 89.9, 90.1, 179.99, 180.0])
 def test_rotation_between_is_safe_at_every_angle(off_deg):
-    """The matrix is a rotation from a to b within 1e-12, even if a and b are exactly antiparallel."""
+    """The result is a rotation from a to b within 1e-12, even if a and b are exactly antiparallel."""
     rng = np.random.default_rng(3)
     off = np.radians(off_deg)
     for axis, b in ((0, published.UP), (2, published.UP), (1, published.BACKWARD)):
@@ -50,8 +50,8 @@ def test_dispersion_is_fishers(sigma_deg):
 
 
 def test_history_is_exact_and_wraps_round():
-    """Differences of the integrals match numpy when time and sums wrap round. Outside the history there is no
-    answer."""
+    """Differences of the integrals equal numpy's, also where time and sums wrap. Outside the history there is no
+    result."""
     rng = np.random.default_rng(2)
     history = ForceHistory()
     history.now = MASK - 3_000_000
@@ -216,7 +216,7 @@ def test_a_bend_at_a_stuck_zero_is_no_stop(share, moved):
     [(2.0, 0.0, 0.02, 0), (4.0, 0.0, 0.02, 1), (9.0, 1.0, 0.0, 0), (9.0, 0.0, 0.2, 0)],
 )
 def test_a_stop_requires_stillness_and_time(seconds, speed, shake_g, stops):
-    """The vehicle must stand for three seconds and shake no more than an engine does."""
+    """A stop needs three seconds at rest, with no more shaking than an engine's."""
     standing = StandingVertical()
     for k in range(round(seconds * 10)):
         standing.update([0.0, 1.0, shake_g * (-1) ** k], (0.0, 0.0, 0.0), speed, 0.1)

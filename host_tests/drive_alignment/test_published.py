@@ -64,11 +64,11 @@ def test_the_dispersion_by_hand(turned):
 
 
 def test_directions_without_a_mean_have_the_largest_dispersion():
-    """Two at 1 radian's tangent of 4: d would be 16. Opposite ones: R = 0."""
+    """Two directions, each off by an angle whose tangent is 4, would give d = 16. Opposite directions give R = 0."""
     wide = (1 + 4j) / 17**0.5
     assert circular_dispersion([wide, wide.conjugate()]) == 9.9
     assert circular_dispersion([1.0, -1.0]) == 9.9
-    # a tangent of 3 gives d = 9, which is not limited
+    # tangent 3: d = 9 is not limited
     far = (1 + 3j) / 10**0.5
     assert circular_dispersion([far, far.conjugate()]) == pytest.approx(9.0, rel=1e-9)
 
@@ -94,7 +94,7 @@ class Drive:
                 self.alignment.measure_speed(self.speed)
 
     def brake(self, *forces, seconds=2.0, mps2=-0.3 * G):
-        """Brake from 15 m/s, then continue at a steady speed."""
+        """The braking starts at 15 m/s, then the speed stays constant."""
         self.reach_15_mps()
         self.go(forces or BRAKES, seconds, mps2)
         self.go(STEADY, 2.0)
@@ -170,7 +170,7 @@ def test_a_shaking_of_ten_times_a_second_is_averaged_away():
 @pytest.mark.parametrize(
     ("seconds", "mps2", "counted"),
     [
-        (2.0, -0.74, 0),  # under 1 m/s2 there is no braking, whatever the force
+        (2.0, -0.74, 0),  # below 1 m/s2 it is not a braking, for any force
         (2.0, -0.99, 0),
         (2.0, -1.01, 1),
         (1.0, -1.45, 0),  # less than 1.5 m/s in total

@@ -35,12 +35,12 @@ def log_of(made, speed=True):
 
 
 def mounted(log, rotation):
-    """Return the same ride with the sensor rotated, and its readings with it."""
+    """The same ride with the sensor turned, so all its readings are rotated."""
     return replace(log, accel_g=log.accel_g @ rotation.T, gyro_dps=log.gyro_dps @ rotation.T)
 
 
 def errors_deg(found, true):
-    """Return the errors of pitch, yaw and roll: about left, up and forward."""
+    """The errors of pitch, yaw and roll: about left, up and forward."""
     return np.abs(np.degrees(rotation_vector(found.calibration.vehicle_from_sensor @ true.T)))
 
 
@@ -76,8 +76,8 @@ def test_the_display_shows_the_lean_with_this_alignment():
 
 
 def test_ride_alignment_is_as_good_as_two_poses():
-    """Yaw matters because a kickstand pose hardly determines it, and roll because an accelerometer offset falsifies
-    it."""
+    """It is as good in yaw, which a kickstand pose hardly determines, and in roll, which an offset of the accelerometer
+    falsifies."""
     made = simulated("hills", 22, 240.0)
     kickstand, upright = (api.Log.from_readings(pose, RATE_HZ) for pose in (made.kickstand, made.upright))
     two = errors_deg(api.fit_two_positions(kickstand, upright), made.vehicle_from_sensor)
@@ -126,7 +126,7 @@ def test_phones_mounting_shows_a_reversed_accelerometer():
 
 
 def test_a_phones_mounting_is_a_prior():
-    """The prior has little weight against the ride."""
+    """The prior has little weight compared with the ride."""
     made = simulated()
     tilted = rotation_matrix(np.radians([35.0, 0.0, 0.0])) @ PHONES["flat"][0]
     log = mounted(log_of(made, speed=False), tilted.T @ made.vehicle_from_sensor)
@@ -139,7 +139,7 @@ def test_a_phones_mounting_is_a_prior():
 
 @pytest.mark.parametrize("phone", PHONES)
 def test_a_phones_mounting_is_checked(phone):
-    """The mounting may differ by the usual tilt of a holder."""
+    """The mounting must be within the usual tilt of a holder."""
     made = simulated()
     tilted = rotation_matrix(np.radians([35.0, 10.0, 0.0]))
     for mountings in PHONES.values():
@@ -251,8 +251,8 @@ def test_a_recorded_car_is_refused(shared_data):
 
 
 def test_recorded_motorcycle_is_aligned(shared_data):
-    """The reference is known to a few degrees: forward by braking between the same two lights, up by the first
-    second."""
+    """Forward, known from braking between the same two traffic lights, and up, from the first second, are good to a few
+    degrees."""
     log = api.read_log(shared_data / "motorcycle-ride.csv.gz")
     rough = np.array([[0.9869, 0.1612, 0.0060], [-0.0137, 0.0466, 0.9988], [0.1608, -0.9858, 0.0482]])
     found, without = api.fit_ride(log), api.fit_ride(replace(log, speed_mps=np.full(len(log.t_s), np.nan)))

@@ -75,13 +75,13 @@ def test_report_has_the_smoothed_or_the_live_lean(ride):
         assert data["lean"] == word
         assert said in works("report", log, *option).out
         largest[word] = [data[f"max_{side}_deg"]["value"] for side in ("left", "right")]
-    true = [-np.min(lean), np.max(lean)]  # the largest lean to the left is on the kickstand
+    true = [-np.min(lean), np.max(lean)]  # the lean to the left is on the kickstand
     assert np.max(np.abs(np.subtract(largest["smoothed"], true))) < 1.0
     assert largest["smoothed"] != largest["live"]
 
 
 def test_slow_log_is_reported_with_the_displayed_lean(tmp_path):
-    """The report gives the lean that the display showed, because `smooth` refuses such a log."""
+    """The report contains the lean that the display showed. The command smooth refuses such a log."""
     t_s = np.arange(0.0, 60.0, 0.2)
     noise = np.random.default_rng(1).normal(0.0, 0.01, (len(t_s), 6))
     table = np.column_stack((t_s, noise + [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]))

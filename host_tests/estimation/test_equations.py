@@ -84,8 +84,8 @@ def test_a_warmer_sensor_has_other_offsets():
 
 
 def test_the_jacobian_is_that_of_the_equations():
-    """The derivatives by the states and by every parameter match central differences, with the speed backwards and
-    forwards."""
+    """The derivatives by the states and by every parameter equal central differences, for both directions of the
+    speed."""
     rng, n = np.random.default_rng(3), 30
     force, rate = rng.normal(size=(2, n, 3))
     windows = windows_of(np.linspace(0.0, 6.0, n), force, rate, rng.normal(size=n), rng.normal(size=n))
@@ -122,8 +122,8 @@ def test_a_measured_gyro_is_not_estimated_again():
     assert measured[0] == unmeasured.sigma[of.GYRO][0] == of.SIGMA[of.GYRO][0]
 
 
-def test_the_upright_pose_determines_the_sum_of_rotation_and_offset():
-    """If the pose mistook the sensor's offset for a tilt, the sensor is right at rest, whatever the offset."""
+def test_the_upright_pose_gives_the_sum_of_rotation_and_offset():
+    """A sensor whose offset the pose has taken for a tilt is right at rest, whatever the offset."""
     prior, p = Prior.of_pose(six_done=False), np.zeros(PARAMETERS)
     p[of.ROTATION.stop - 1] = p[of.OFFSET.start] = 0.03  # to the side
     p[of.ROTATION.start], p[of.OFFSET.stop - 1] = 0.02, -0.02  # forward
@@ -136,7 +136,7 @@ def test_the_upright_pose_determines_the_sum_of_rotation_and_offset():
     assert np.all(np.linalg.eigvalsh(information) > 0.0)
 
 
-def test_windows_hold_the_integrals_and_gaps_are_windows_of_their_own():
+def test_windows_hold_the_integrals_and_gaps_are_separate():
     rng = np.random.default_rng(2)
     t = np.cumsum(rng.uniform(0.005, 0.015, 300))
     t[150:] += 5.0
@@ -154,7 +154,7 @@ def test_windows_hold_the_integrals_and_gaps_are_windows_of_their_own():
 
 
 def test_gravity_stays_whole_in_a_window_while_the_bike_rolls():
-    """The bike rolls by 30 degrees in a window. Means along axes that roll are 1 % too small."""
+    """The bike rolls by 30 degrees in a window. Means along the rolling axes are 1 % too small."""
     t = np.arange(400) / 200.0
     lean = np.radians(150.0) * (t - 1.0)
     force = np.column_stack((np.sin(lean), np.cos(lean), np.zeros(400)))

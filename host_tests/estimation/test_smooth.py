@@ -73,8 +73,8 @@ def test_forces_that_are_not_the_bikes_count_less():
 
 @pytest.mark.parametrize(("seed", "mount"), [(2018, "drifting"), (98, "holder")])
 def test_steady_ride_on_a_straight_is_not_a_standstill(seed, mount):
-    """At 22 and at 12 m/s the bike hardly moves for 2 s. When this was treated as a standstill, the smoothed lean
-    was worse than the live one: 0.56 and 0.37 degrees."""
+    """For 2 s both bikes hardly move, at 22 and at 12 m/s. Treated as a standstill, this made the smoothed lean worse
+    than the live one: 0.56 and 0.37 degrees."""
     live, off, _ = judged(drawn_ride(seed, mounts=[mount]))
     assert rms(off) < 0.8 * rms(live)
 
@@ -87,14 +87,14 @@ def test_good_mounts_and_roads_are_not_doubted():
 
 
 def test_side_force_of_tyres_grows_with_the_force_up():
-    """When the side force was treated as a share of gravity alone, bends of unequal lean shifted the whole lean. The
-    error was 0.44 degrees, more than the display's."""
+    """With a side force in proportion to gravity alone, bends of unequal lean shifted the whole lean: by 0.44 degrees,
+    more than the display's error."""
     ride = simulated("sweeper", 304, 200.0)
     assert rms(error(ride)[ride.riding]) < 0.2
 
 
 def test_wheelies_do_not_count_as_a_soft_mount():
-    """When wheelies counted as a soft mount, the error was 0.4 degrees. Treated as slopes, they give 0.16."""
+    """Treated as a soft mount, wheelies caused an error of 0.4 degrees; treated as slopes, 0.16."""
     ride, found = known("wheelie"), smoothed("wheelie")
     assert not np.any(found.doubtful)
     assert rms((found.lean_deg - ride.lean_deg)[ride.riding]) < 0.155
@@ -123,7 +123,7 @@ def test_pose_that_was_not_upright_is_reported(street, wrong_deg):
 
 
 def test_slipping_mount_has_little_effect_afterwards(street):
-    """The mount slips by 1.5 degrees about forward within 0.3 s. The gyro measures this, and afterwards straights
+    """The mount slips by 1.5 degrees about forward within 0.3 s. The gyro measures this, and from then on straights
     seem to lean."""
     log, calibration = street.log, street.calibration
     angle = np.radians(1.5) * np.clip((log.t_s - 65.0) / 0.3, 0.0, 1.0)
@@ -160,7 +160,7 @@ def test_a_mount_that_yields_makes_the_lean_less_sure():
 
 
 def test_a_wind_that_turns_makes_the_lean_less_sure():
-    """A turning wind looks like a wrong upright pose."""
+    """A wind that turns looks like a wrong upright pose."""
     windy, calm = (np.mean(smoothed(name).lean_sigma_deg[-10_000:]) for name in ("crosswind", "street"))
     assert windy > 2.0 * calm
 
@@ -206,8 +206,8 @@ def test_frozen_readings_have_no_lean_and_do_not_harm_the_rest(street):
 
 
 def test_a_pothole_leaves_no_lean_behind(street):
-    """The roll rate is 300 deg/s for 60 ms, with opposite signs on two phones on a scooter. It is not a motion of
-    the bike."""
+    """The roll rate is 300 deg/s for 60 ms. Two phones on a scooter measured such rates with opposite signs, so the
+    bike did not move like this."""
     log, at = street.log, 80.0
     hit = (log.t_s > at) & (log.t_s < at + 0.06)
     rate = log.gyro_dps.copy()
@@ -256,8 +256,8 @@ def test_short_log_has_a_lean_with_a_large_sigma(street, seconds):
 
 
 def test_long_ride_is_estimated_in_parts(street, monkeypatch):
-    """Parts keep the memory constant, and the time grows with the length of the ride. The ends of parts are
-    estimated twice, because they depend on what follows. Remarks count each second once."""
+    """Time grows with the length of the ride, and memory does not. The end of each part is estimated twice, because it
+    depends on the samples after it. Remarks count each second once."""
     whole, sizes, added = smoothed("street"), [], []
     estimated = module.Smoother.estimated
 

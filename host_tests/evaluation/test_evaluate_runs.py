@@ -53,7 +53,7 @@ def test_every_estimator_is_scored(swept):
 
 
 def test_filters_that_trust_the_force_decay_in_a_held_turn(swept):
-    """Riders complain of this decay, and it is the reason for this project."""
+    """Riders complain about this decay: it is the reason for this project."""
     assert swept.scores["complementary"].slope < 0.5
     assert 0.85 < swept.scores["formula"].slope < 1.1
     assert swept.scores["formula 0.3 s"].rms_deg < 0.5 * swept.scores["formula"].rms_deg
@@ -155,8 +155,8 @@ def test_a_recording_without_speed_is_refused():
 
 
 def test_recorded_motorcycle_has_its_known_scores(shared_data):
-    """The known slope of the complementary filter is 0.40, measured with another calibration. With forward from
-    braking and up from the first second, the displayed lean had 2.98 degrees rms and a slope of 1.226."""
+    """The complementary filter's slope on this recording is known to be 0.40 (measured with another calibration). With
+    forward from braking and up from the first second the shown lean had 2.98 degrees rms and a slope of 1.226."""
     made = real_ride.compare(shared_data / "motorcycle-ride.csv.gz")
     scores, leans = made.scores, made.traces
     assert scores["complementary"].slope == pytest.approx(0.40, abs=0.06)
@@ -202,7 +202,7 @@ def test_bands_of_a_recording_without_riding_are_refused(tmp_path):
 
 
 def test_simulate_states_both_leans_on_the_stand(tmp_path):
-    """The pose is at another place than the start of the ride."""
+    """The poses are at another place than the start of the ride."""
     arguments = "--profile", "street", "--seconds", "20", "--pitch-change", "0", "--out", tmp_path
     said = works("simulate", *arguments).out.splitlines()[-1]
     pose, begin = (float(number) for number in re.findall(r"-\d+\.\d", said))
@@ -216,8 +216,8 @@ def test_simulate_states_both_leans_on_the_stand(tmp_path):
 
 
 def test_a_wheelie_is_not_treated_as_a_faulty_sensor():
-    """A wheelie has large innovations, because the equations do not hold. Judged by them, the filter restarted with
-    an error of 4.0 degrees rms."""
+    """A wheelie causes large innovations, because the filter's equations do not hold. A filter that judged by them
+    restarted (4.0 degrees rms)."""
     made = ride("wheelie", 2, 120.0)
     shown = replay(runs.as_log(made), runs.calibrated_by_log(made))
     error = (np.asarray(shown.lean_deg) - made.truth["lean_deg"])[made.truth["speed_mps"] > 5.0]

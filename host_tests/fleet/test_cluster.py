@@ -107,7 +107,7 @@ def test_fleet_on_a_cluster_is_resumed(cluster, fleet, tmp_path, monkeypatch):
     os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + 1_000_000))
     assert run_fleet(periods, tmp_path).new == 1
     assert run_fleet(periods, tmp_path).new == 0
-    # Other options also cause a new run.
+    # other options cause a new computation, too
     assert run_fleet(periods[:1], tmp_path, with_signals=True).new == 1
     written = sorted((tmp_path / "signals").rglob("*.parquet"))
     assert len(written) >= len(periods[0].paths)

@@ -13,7 +13,7 @@ INK = "() => getComputedStyle(document.body).color"
 
 @pytest.fixture(scope="module")
 def page_file(fleet, tmp_path_factory):
-    """Return the page of one aligned vehicle and one whose mount moved."""
+    """The results of an aligned vehicle and of a moved mount."""
     glance = Glance()
     for period in read_manifest(str(fleet.manifest))[1:4:2]:
         glance.add(work_on_period(period))

@@ -39,7 +39,7 @@ def resize(path, kb):
 
 @pytest.fixture(scope="module")
 def results(fleet):
-    """Return the results of three vehicles by name, and their periods."""
+    """The logs of three vehicles, by name, and their periods."""
     periods = read_manifest(str(fleet.manifest))[:3]
     return {period.vehicle: work_on_period(period) for period in periods}, periods
 

@@ -80,7 +80,8 @@ def test_move_between_logs_is_not_found_during_them():
 
 
 def test_one_road_counts_once_for_all_its_intervals():
-    """If the error of the force is constant, only the first interval of a standstill counts."""
+    """The regression uses innovations: if the force's error is constant, only the first interval of a standstill
+    counts."""
     count = 50
     standing = evidence.Intervals(
         np.arange(count, dtype=float),

@@ -121,7 +121,7 @@ def test_no_output_destroys_a_file_of_the_export(tmp_path):
 
 
 def test_remarks_of_an_import_are_in_report_and_page(tmp_path):
-    """The remarks appear once, though the imported log is checked again."""
+    """Each notice appears once, although the imported log is checked again."""
     source = aligned_export(tmp_path / "EXPORT", app_exports.sensor_kinetics(riding().every(4)))
     result = command.works("report", source, "--json", "--live")
     assert [remark["code"] for remark in json.loads(result.out)["remarks"]].count("import-sign") == 1

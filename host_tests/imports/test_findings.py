@@ -23,7 +23,7 @@ def hand(hz=50.0):
 
 
 def lines(form, times=1.0, force=1.0, rates=1.0, head=""):
-    """Return a row for each sample, in a format of seven numbers."""
+    """Write one row per sample, with a format for seven numbers."""
     t, f, w = hand()
     rows = [form.format(*row) for row in np.column_stack((times * t, force * f, rates * w)).tolist()]
     return "\n".join([head, *rows] if head else rows) + "\n"
@@ -157,7 +157,8 @@ def judged(seed, path):
 
 @pytest.mark.parametrize("count", [30, pytest.param(500, marks=pytest.mark.nightly)])
 def test_no_random_table_is_imported_wrongly(tmp_path, count):
-    results = [judged(seed, tmp_path / "log.csv") for seed in range(1, 2 * count, 2)]  # not used in development
+    # odd seeds were not used for development
+    results = [judged(seed, tmp_path / "log.csv") for seed in range(1, 2 * count, 2)]
     assert [result for result in results if result not in ("right", "refused")] == []
     assert results.count("right") >= 0.99 * count
 

@@ -14,7 +14,7 @@ MS = 10**6
 
 
 def sensor(name: str, t_s: np.ndarray, column: np.ndarray | None = None) -> RecordedSensor:
-    """Return a sensor whose values are its times, multiplied by 1, 2 and 3."""
+    """A sensor whose values are the time multiplied by 1, 2 and 3."""
     values = t_s if column is None else column
     return RecordedSensor(name, np.rint(t_s * 1e9).astype(np.int64), np.outer(values, [1.0, 2.0, 3.0]))
 

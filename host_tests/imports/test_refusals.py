@@ -44,7 +44,7 @@ def test_damaged_zip_is_refused(tmp_path, ride, damage):
 
 
 def test_two_recordings_in_one_folder_are_refused(tmp_path, ride):
-    """The recordings come from one app in two folders, from two apps, or from one app under two names."""
+    """The files are from one app in two folders, from two apps, and from one app under two names."""
     monday = app_exports.into(tmp_path / "all" / "monday", app_exports.phyphox(ride))
     app_exports.into(tmp_path / "all" / "tuesday", app_exports.phyphox(ride))
     refused(tmp_path, tmp_path / "all", "holds 2 recordings (monday, tuesday): give one of them")

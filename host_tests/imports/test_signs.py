@@ -62,7 +62,7 @@ def test_acceleration_without_gravity_is_completed_or_refused(tmp_path, app):
 
 
 def test_a_table_without_gravity_is_refused(tmp_path):
-    """The missing gravity is found from the size of the force, without the column's name."""
+    """Gravity is detected by its size, without a name."""
     ride = riding().every(4)
     rows = np.column_stack((ride.t_s, ride.phone_g - ride.gravity_g, ride.phone_rad)).tolist()
     (tmp_path / "log.csv").write_text(app_exports.lines(list("tabcpqr"), rows))
@@ -87,7 +87,7 @@ def test_turns_of_the_track_show_an_unknown_sign(tmp_path, sign):
 
 
 def test_mirrored_export_of_a_known_app_gives_a_remark(tmp_path):
-    """The app's sign is known, so something else is wrong. No sign is changed."""
+    """The app's sign is known, so the cause is something else, and no sign is changed."""
     ride = riding().every(2)
     ride.force_g = -ride.force_g
     found = api.import_recording(app_exports.into(tmp_path / "p.zip", app_exports.phyphox(ride)))

@@ -60,7 +60,7 @@ def test_an_unknown_unit_of_aim_is_refused(tmp_path):
         api.import_recording(app_exports.into(tmp_path / "export", exported(ride, "AiM, row of units", "furlongs")))
 
 
-def test_a_unit_given_for_racebox_is_used_and_another_word_refused(tmp_path):
+def test_a_unit_for_racebox_is_used_and_another_word_refused(tmp_path):
     files = app_exports.into(tmp_path / "export", {"r.csv": app_exports.racebox(app_exports.riding().every(8), 1.0)})
     given = api.import_recording(files, units={"speed": "knots"})
     own = api.import_recording(files)

@@ -104,7 +104,7 @@ HIGH_BYTE = [
 
 @pytest.mark.parametrize(("words", "spoil"), ILL + HIGH_BYTE)
 def test_a_faulty_axis_is_reported_at_once_and_recovers(words, spoil):
-    """The fault is reported within 1.2 s. A stuck high byte shows only when the counts pass through it."""
+    """A fault is reported within 1.2 s. A stuck high byte only shows when the counts pass its value."""
     said = judged(spoil(ride(8)))
     assert [what for _, what in said] == [words, None]
     assert 2.3 < said[0][0] <= (3.7 if (words, spoil) in HIGH_BYTE else 3.2)
@@ -114,8 +114,7 @@ def test_a_faulty_axis_is_reported_at_once_and_recovers(words, spoil):
 @pytest.mark.parametrize("gyro_range", range(4))
 @pytest.mark.parametrize("dlpf", [1, 2, 3, 4, 5, 6])
 def test_the_quietest_chip_at_rest_is_not_faulty(gyro_range, dlpf):
-    """The noise is 100 ug/sqrt(Hz) at 16 g and 0.004 deg/s/sqrt(Hz). Each mean makes the counts as quiet as
-    possible."""
+    """The noise is 100 ug/sqrt(Hz) at 16 g and 0.004 deg/s/sqrt(Hz). The means make the counts as quiet as possible."""
     bandwidth = (None, 188, 98, 42, 20, 10, 5)[dlpf]
     per_g, per_dps = 2048, (131, 65.5, 32.8, 16.4)[gyro_range]
     root = np.sqrt(np.pi / 2 * bandwidth)
@@ -125,7 +124,7 @@ def test_the_quietest_chip_at_rest_is_not_faulty(gyro_range, dlpf):
 
 
 def test_no_axis_is_faulty_in_a_ride(monkeypatch):
-    """The axes look so good that the judge module (2 KB of heap) is never imported."""
+    """The axes also look so good that the module that judges them (2 KB of heap) is not imported."""
     monkeypatch.setattr(AxisWatch, "_load", lambda watch: pytest.fail("not well"))
     for seed in range(4):
         assert judged(ride(20, seed)) == []

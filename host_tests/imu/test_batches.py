@@ -80,8 +80,7 @@ def test_repeated_readings_are_a_frozen_chip(engine):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_a_sample_at_the_end_of_the_range_is_left_out(engine):
-    """A sample with any axis at either end is left out, but the temperature does not matter. The good samples move
-    up."""
+    """Readings at either end of any axis count, but not those of the temperature. The good samples move up."""
     samples = noise(8) // 2
     samples[2, 1], samples[3, 6], samples[5, 0], samples[5, 4], samples[6, 3] = 32700, -32768, -32700, 32767, 32767
     good = samples[[0, 1, 4, 6, 7]]

@@ -17,7 +17,7 @@ MPU6500, MPU6886 = 0x70, 0x19
 
 @pytest.fixture(autouse=True)
 def time():
-    """Give the driver a board's clock, because it waits."""
+    """The clock of a board, on which the driver waits."""
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0)) as board:
         yield board.clock
 
@@ -49,7 +49,7 @@ class Wires:
 
     def readfrom_mem_into(self, address, register, buffer):
         self._expect(address)
-        if register not in (FIFO_R_W, USER_CTRL):  # no unused byte is read, because each takes 25 us
+        if register not in (FIFO_R_W, USER_CTRL):  # only the bytes that are used: each takes 25 us
             assert len(buffer) == {SMPLRT_DIV: 11, 0x3B: 14, FIFO_COUNT_H: 2}.get(register, 1)
         self.registers[FIFO_COUNT_H], self.registers[FIFO_COUNT_H + 1] = divmod(self.waiting, 256)
         if register == FIFO_R_W:
@@ -119,7 +119,7 @@ def test_one_burst_is_one_reading():
 
 
 def test_the_delay_of_each_low_pass():
-    """The delays in seconds are those of the gyro, p. 13."""
+    """The delay of the gyro's low-pass in seconds, p. 13."""
     from kickstand.imu.mpu6050 import GYRO_DELAY_S
 
     assert GYRO_DELAY_S == {dlpf: DLPF_DELAY_US[dlpf] / 1e6 for dlpf in range(1, 7)}
@@ -179,7 +179,7 @@ def test_an_unknown_number_is_an_unknown_chip_unless_accepted():
     wires = Wires(0x55)
     accepted = started(wires, accept=0x55, dlpf=4)
     assert (ACCEL_CONFIG2, 4) in wires.log
-    wires.registers[ACCEL_CONFIG2] = 0  # not every chip has this register
+    wires.registers[ACCEL_CONFIG2] = 0  # a register that the chip may lack
     assert accepted.configured()
     assert accepted.temperature_c(333.87) == pytest.approx(22.0)
     assert Mpu6050(Wires(0x68), accept=0x55).identify() == 0x68
@@ -234,8 +234,7 @@ def test_how_many_frames_are_read_and_left(frames, read, left):
 
 @pytest.mark.parametrize(("who_am_i", "most"), [(0x68, 72), (MPU6500, 35), (0x98, 35), (MPU6886, 35)])
 def test_a_fifo_that_may_have_overflowed_is_emptied(who_am_i, most):
-    """The FIFO has 1024 or 512 bytes (MPU-6500 register map p. 31). It may have overflowed when fewer than 14 are
-    free."""
+    """The FIFO has 1024 bytes, or 512 (MPU-6500 register map p. 31). It is full when fewer than 14 are free."""
     wires = Wires(who_am_i)
     chip = started(wires)
     wires.waiting = 14 * most
@@ -262,7 +261,7 @@ def test_a_frame_that_is_being_written_is_waited_for_once():
         assert (chip.frames_left, chip.overflows) == (left, 0)
     wires.waiting = 33
     assert chip.fetch() == 0
-    wires.waiting = 47  # still odd, because an overflow cut a frame short
+    wires.waiting = 47  # still odd: an overflow has cut off part of a frame
     assert chip.fetch() == 0
     assert (chip.overflows, chip.frames_left) == (1, 0)
     wires.waiting = 5
@@ -272,7 +271,7 @@ def test_a_frame_that_is_being_written_is_waited_for_once():
 
 @pytest.mark.parametrize(("rate_hz", "good"), [(200, 20), (100, 10)])
 def test_readings_that_repeat_for_100_ms_are_frozen(rate_hz, good):
-    """The first reading is new. The count restarts after a set-up."""
+    """The first reading counts as new. The count restarts after a set-up."""
     wires = Wires()
     chip = started(wires, rate_hz=rate_hz)
     wires.waiting = 14

@@ -103,7 +103,7 @@ def test_a_new_chip_is_at_fault_until_its_first_sample(board):
 
 
 def test_a_chip_that_is_prepared_starts_with_the_first_fetch(board):
-    """No earlier samples are waiting."""
+    """No earlier samples are in the FIFO."""
     sensor, chip = made(board)
     for now_ms in range(0, 1000, 15):
         sensor.prepare(now_ms)
@@ -129,7 +129,7 @@ def test_a_failed_set_up_is_repeated_after_50_ms(board):
     for now_ms in (420, 520, 580, 600):
         sensor.fetch(now_ms)
     assert (chip.calls.count("configure"), sensor.restarts) == (3, 1)
-    assert code(sensor) == "unknown-chip"  # until the first sample
+    assert code(sensor) == "unknown-chip"  # the time until the first sample
     sensor.fetch(605)
     assert code(sensor) is None
 
@@ -145,7 +145,7 @@ def test_silence_is_a_fault_after_100_ms(board):
 
 
 def test_an_overflow_is_no_silence(board):
-    """The FIFO was emptied just now, even if the loop has read an earlier time."""
+    """An overflow means that the FIFO was emptied just now, even if the loop read the time earlier."""
     sensor, chip, now_ms = running(board)
     board.clock.advance(now_ms * 1000 + 400_000)
     chip.waiting = [0, 0, 0]
@@ -184,7 +184,7 @@ def test_two_lost_transfers_are_tolerated_and_three_are_a_fault(board):
 
 
 def test_the_fifo_is_emptied_after_a_failed_transfer(board):
-    """The failed transfer may have taken half a frame from the FIFO. It is emptied only once."""
+    """The failed transfer may have taken half a frame. The FIFO is emptied only once."""
     sensor, chip, now_ms = running(board)
     chip.waiting = [OSError(110), 1, 1]
     for k in range(3):
@@ -229,7 +229,7 @@ def test_a_check_that_is_lost_counts_as_a_lost_transfer(board):
 
 
 def test_nothing_is_judged_after_a_lost_transfer(board):
-    """A restart of the FIFO may be incomplete until the next successful transfer."""
+    """The restart of the FIFO may be incomplete. The next successful transfer completes it."""
     sensor, chip, now_ms = running(board)
     chip.waiting, chip.states = [OSError(5)], [False, False]
     sensor.fetch(now_ms + 10)

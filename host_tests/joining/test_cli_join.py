@@ -49,7 +49,7 @@ def test_each_point_is_in_the_nearest_row(tmp_path, log, ride, track):
     assert np.allclose(np.diff(there["t_s"]), 1.0, atol=0.006)
     assert np.allclose(there["utc_s"] - there["t_s"], phone_tracks.START_UTC_S + 0.5, atol=0.2)
     found = api.join_track(log, track).match
-    assert np.all(np.abs(found.ride_s(there["utc_s"]) - there["t_s"]) < 0.0026)  # half of 5 ms
+    assert np.all(np.abs(found.ride_s(there["utc_s"]) - there["t_s"]) < 0.0026)  # half the time between samples, 5 ms
     first = int(np.argmin(np.abs(track.utc_s - there["utc_s"][0])))
     part = slice(first, first + len(there))
     assert np.allclose(there["utc_s"], track.utc_s[part], atol=1e-3)
@@ -68,7 +68,7 @@ def test_nearest_row_may_be_before_or_after():
 
 
 def test_lines_of_the_ride_are_unchanged(tmp_path, log, track):
-    """Every line is kept, and columns are added at its end."""
+    """Every line is kept, with new columns at its end."""
     gpx = phone_tracks.write_gpx(tmp_path / "track.gpx", track)
     packed = tmp_path / "JOINED.csv.gz"
     command.works("join", log, gpx, "--out", packed)
@@ -93,7 +93,7 @@ def test_own_speed_of_the_log_is_kept(tmp_path, ride, track):
 
 
 def test_columns_without_values_are_replaced(tmp_path, log, track):
-    """As written by import: a time in the first row, and a speed column of a phone without speed."""
+    """A log as written by import: a time in the first row, and an empty speed column."""
     head, *rows = log.read_text().splitlines()
     rows = [f"{rows[0]},,1.5", *[row + ",," for row in rows[1:]]]
     log.write_text("\n".join([head + ",speed_mps,utc_s", *rows]) + "\n")

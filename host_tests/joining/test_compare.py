@@ -15,7 +15,7 @@ LATER_S, SLOW = 7.3, 80e-6
 
 
 def shifted(log, later_s, drift):
-    """Return the log of a device that was started later by later_s, with a slow clock."""
+    """The log of a device that was started later_s later and whose clock is slow."""
     kept = log.t_s >= later_s
     t_s = (log.t_s[kept] - later_s) * (1.0 - drift)
     return api.Log(t_s, log.accel_g[kept], log.gyro_dps[kept])
@@ -49,7 +49,7 @@ def test_the_clocks_are_found(found, ride):
 
 
 def test_the_difference_is_that_of_both_errors(found, ride):
-    """Compared with the truth: the error of each, and their difference."""
+    """Both leans are compared with the truth: the error of each, and their difference."""
     for kind, seen in (("live", found.live), ("smoothed", found.smoothed)):
         leans = [found.leans[f"{kind} {name}"] for name in "AB"]
         riding = ~np.isnan(leans[0] + leans[1])
@@ -108,7 +108,7 @@ def test_remark_appears_once(ride):
     stuck = np.where(np.abs(log.t_s - 80.0) < 3.0, np.argmax(log.t_s > 80.0), np.arange(len(log.t_s)))
     frozen = api.Log(log.t_s, log.accel_g[stuck], log.gyro_dps[stuck])
     for said in api.compare_rides(frozen, frozen, calibration, calibration).notices.values():
-        (line,) = [one.line() for one in said]  # both readings of a log find it
+        (line,) = [one.line() for one in said]  # both ways to read a log find it
         assert line.startswith("the readings froze from 77.0 to 83.0 s")
 
 

@@ -26,7 +26,7 @@ def log_of(ride, part: slice = slice(None), slow_ppm: float = 0.0) -> api.Log:
 
 
 def error_s(joined, late_s: float, at_s: float = 0.0) -> float:
-    """Return the time error of the match at a time of the ride."""
+    """The match's time error at a time of the ride."""
     return float(joined.match.ride_s(np.array([phone_tracks.START_UTC_S + late_s + at_s]))[0]) - at_s
 
 
@@ -116,7 +116,7 @@ def test_short_or_straight_ride_is_refused(rides):
 
 
 def test_similar_bends_are_refused_as_ambiguous():
-    """A slalom fits a slalom at every bend."""
+    """A slalom matches another slalom at every bend."""
     t_s = np.arange(0.0, 120.0, 0.01)
     yaw_dps = 25.0 * np.sin(2.0 * np.pi * t_s / 12.0)
     log = api.Log(t_s, np.tile([0.0, 1.0, 0.0], (len(t_s), 1)), np.outer(yaw_dps, [0.0, 1.0, 0.0]))
@@ -145,7 +145,7 @@ def test_frozen_readings_and_gaps_are_left_out(rides):
     joined = api.join_track(broken, phone_tracks.track(ride))
     assert [notice.code for notice in joined.notices] == ["frozen-readings"]
     assert abs(error_s(joined, 0.5)) < 0.2
-    assert joined.match.correlation > 0.97  # with the frozen readings it would be 0.8
+    assert joined.match.correlation > 0.97  # with the frozen readings the value would be 0.8
 
 
 def test_course_turns_are_scaled_by_the_lean():

@@ -54,7 +54,8 @@ def test_speeds_without_their_own_are_means_over_four_steps():
 
 
 def test_segments_have_thirty_steps_and_at_least_eight():
-    """Of 47 good steps 30 and 17, of 7 none; mean and trend are subtracted, so an even bend is nothing."""
+    """47 good steps give segments of 30 and 17; 7 steps give none. Mean and trend are subtracted, so a constant bend
+    gives zeros."""
     n = 55
     good = np.ones(n, dtype=bool)
     good[47] = False

@@ -43,7 +43,7 @@ def test_saved_keys_are_read_back_with_the_same_pin_only(flash):
     assert Bonds("123456").get(1, 0, b"a") == b"\x00\xff"
     assert Bonds("654321").get(1, 0, b"a") is None
     flash.unlink()
-    bonds.save()  # nothing has changed since
+    bonds.save()  # nothing has changed since the last save
     assert not flash.exists()
 
 

@@ -21,7 +21,7 @@ def on_air(tmp_path, monkeypatch, capsys):
     """run(until_s, [(at_s, visit, pin)], **config): the Centrals and the device's Record."""
     monkeypatch.chdir(tmp_path)
     made = []
-    browsers = asyncio._get_running_loop()  # playwright's idle loop, if this process has tested a page before
+    browsers = asyncio._get_running_loop()  # playwright's idle event loop, if this process has tested a page before
     asyncio._set_running_loop(None)
 
     def run(until_s, visits, machine="pico w", **config):
@@ -57,7 +57,7 @@ async def ask_racechrono(central):
 
 def test_racechrono_finds_the_board_filters_and_decodes(on_air):
     (central,), record = on_air(44, [(20, ask_racechrono, None)], RECORD=True)
-    assert central.done.result() == 0  # denied all, it sent nothing
+    assert central.done.result() == 0  # sent nothing, because all packets were denied
     counts = collections.Counter(data[0] for _, _, data in central.heard)
     assert counts.keys() == {1, 2} and 198 <= counts[1] <= 202 and 496 <= counts[2] <= 503
     for t_s in (device_plans.LEFT_S, device_plans.RIGHT_S):

@@ -32,7 +32,8 @@ def run(request, tmp_path, capsys):
 
 
 def test_racechrono_gets_the_requested_packets(run):
-    """Deny all, then two packets at two rates, with the numbers of the display. Then nothing, then everything."""
+    """The phone denies all packets, then asks for two at two rates, which have the numbers of the display. Then it asks
+    for none, then for all."""
     acts = [[20.0, "connect"], [20.1, "write", "filter", [0]], [20.1, "write", "filter", [2, 0, 100, 0, 0, 0, 1]]]
     acts += [[20.2, "write", "filter", [2, 0, 40, 0, 0, 0, 2]], [20.2, "write", "filter", [2, 0, 40, 0, 0, 0, 77]]]
     acts += [[40.0, "write", "filter", [0]], [42.0, "write", "filter", [1, 0, 100]]]
@@ -81,7 +82,7 @@ def test_our_page_gets_every_packet_without_side_effects(run):
 
 
 def test_a_lean_that_is_not_trusted_is_never_a_number(run):
-    """Without an alignment, then without a sensor; RaceChrono gets no lean either."""
+    """There is no alignment, then no sensor. RaceChrono gets no lean either."""
     acts = [[3.0, "connect"], [3.1, "write", "rate", [40, 0]], [3.1, "write", "filter", [1, 0, 40]]]
     faults = [["unplug_sensor", [30.0, 4.0]]]
     plan = {**device_plans.ALIGNED, **LIVE, "phones": [acts], "until": 40}
@@ -109,8 +110,8 @@ def test_a_lean_that_is_not_trusted_is_never_a_number(run):
 
 
 def test_the_second_phone_waits_for_the_first(run):
-    """A second phone waits until the first has disconnected. The requests of the first are forgotten. A phone without
-    requests makes room for another. The display shows which phone is connected."""
+    """The second phone waits until the first has gone, whose requests are then dropped. A phone without requests makes
+    room. The display shows which phone is connected."""
     first = [[22.0, "connect", 1], [22.1, "write", "filter", [1, 0, 100]], [26.0, "leave"]]
     second = [[24.0, "connect", 2], [27.5, "connect", 2], [30.0, "write", "rate", [100, 0]], [33.0, "leave"]]
     third = [[35.0, "connect", 3]]
@@ -129,7 +130,7 @@ def test_the_second_phone_waits_for_the_first(run):
 
 
 def test_the_loop_continues_if_the_phone_is_out_of_reach(run):
-    """The queue of an ESP32 is then full, which only loses packets."""
+    """An ESP32's queue is then full, which only loses packets."""
     acts = ASK + [[25.0, "away", True], [29.0, "away", False]]
     plan = {**device_plans.ALIGNED, **LIVE, "board": {"machine": "esp32"}, "phones": [acts]}
     record = run(plan)
@@ -182,7 +183,7 @@ def test_a_board_without_radio_says_so_and_shows_the_lean(run, machine, config, 
 
 
 def test_the_pin_is_required_once_per_phone(run):
-    """This also holds after power-off. With another PIN the same phone is unknown."""
+    """The phone stays paired after power-off. After a change of the PIN the board does not know it."""
     stranger = [[20.0, "connect", 1], [20.1, "write", "rate", [40, 0]], [20.2, "read", "ride"], [20.3, "read", "board"]]
     stranger += [[20.4, "give_pin", 314159], [20.5, "write", "filter", [1, 0, 40]], [22, "leave"]]
     owner = [[24.0, "connect", 2], [24.1, "give_pin", 271828], [24.2, "write", "rate", [40, 0]], [28.0, "leave"]]

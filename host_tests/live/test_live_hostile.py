@@ -10,7 +10,7 @@ from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 from support.device_runs import standing
 from support.simulated_phones import PLACES, Phone
 
-WARM = 200  # acts until everything is imported and every buffer has its size
+WARM = 200  # number of acts until everything is imported and every buffer has its final size
 ACTS = 400
 GROWTH = 2048  # bytes: the uncertainty of the collector
 
@@ -53,10 +53,10 @@ def act(dice, phone, radio):
         phone.away(bool(dice.randrange(2)))
     elif kind == 2:
         phone.read(dice.choice(sorted(PLACES)))
-    elif kind == 3:  # more than the loop can have read meanwhile
+    elif kind == 3:  # more than the loop can have read in that time
         for _ in range(40):
             phone.write("filter", nonsense(dice))
-    elif kind == 4:  # gone and back between two turns of the loop
+    elif kind == 4:  # disconnected and connected again between two turns of the loop
         phone.leave()
         radio.found = radio.found or b""
         phone.connect(dice.randrange(256))
@@ -65,7 +65,7 @@ def act(dice, phone, radio):
 
 
 def test_random_acts_of_a_phone_do_no_harm():
-    for drops in (True, False):  # packets that cannot be sent are dropped on an ESP32, and kept on a Pico W
+    for drops in (True, False):  # the radio drops packets that it cannot send, as an ESP32, or keeps them, as a Pico W
         board = Board(Sensor(seed=3).world(standing([[0, 10]])))
         board.radio = radio = Radio(board.clock, drops)
         with board:

@@ -1,4 +1,4 @@
-"""Each field of each packet against the tables of firmware/docs/live.md, at its limits too."""
+"""Each field of each packet equals the tables of firmware/docs/live.md, also at its limits."""
 
 import types
 
@@ -53,7 +53,7 @@ def test_too_large_values_are_limited_and_never_unknown(buffer):
     ("data", "asked"),
     [
         ([1, 0, 100], [100, 100, 100]),
-        ([1, 0, 0], [40, 40, 40]),  # as fast as it can
+        ([1, 0, 0], [40, 40, 40]),  # as fast as possible
         ([2, 3, 232, 0, 0, 0, 2], [0, 1000, 0]),
         ([2, 0, 50, 0, 0, 0, 0], [0, 0, 0]),  # no such packet
         ([2, 0, 50, 1, 0, 0, 1], [0, 0, 0]),

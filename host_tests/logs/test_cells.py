@@ -37,7 +37,7 @@ def test_values_out_of_range_are_refused(name, quoted):
     for sign in (1.0, -1.0) if name != "t_s" else (1.0,):
         for factor, good in (1.0, True), (1.001, False):
             rows = []
-            for time in range(5):  # the last of them is extreme
+            for time in range(5):  # the last value is extreme
                 cells = dict.fromkeys(HEADER.split(","), "0") | {"t_s": f"{time}", "az_g": "1"}
                 cells |= {name: f"{sign * factor * limit:.10g}"} if time == 4 else {}
                 rows.append(",".join(cells.values()))

@@ -64,7 +64,7 @@ def test_a_bad_log_is_refused(tmp_path, name):
 
 
 def test_calibration_names_its_bad_capture(tmp_path):
-    """This also holds for a later capture."""
+    """The message also comes if the faulty log is not the first capture."""
     poses = [command.still(tmp_path / f"pose{k}.csv", axis) for k, axis in enumerate(command.AXES.values())]
     poses[2].write_bytes(BAD["nan.csv"][0])
     out = tmp_path / "CAL.json"

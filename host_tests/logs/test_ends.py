@@ -49,7 +49,7 @@ def test_a_cut_line_behind_nul_bytes(tmp_path):
 
 
 def test_a_last_speed_may_be_empty(tmp_path):
-    """A complete last row is kept, for any digits of the previous speed, and without a line feed at its end."""
+    """The last row is whole, for any digits of the previous speed, and without a line feed after it."""
     path = tmp_path / "log.csv"
     rows = [row + ("," if k % 2 else ",5.25") for k, row in enumerate(ROWS)]
     path.write_text("\n".join([f"{command.HEADER},speed_mps", *rows]))

@@ -12,7 +12,8 @@ ROUND = {"down": lambda x: np.floor(x + 1e-9), "to nearest": np.rint}
 
 
 def errors(true, recorded):
-    """Largest relative error of the steps, and of the times without a constant (s): away from the ends."""
+    """The largest relative error of the steps, and the largest error of the times apart from a constant (s), away from
+    the ends."""
     found = even_times(recorded)
     assert np.all(np.diff(found) > 0.0)
     inner = slice(200, -200)
@@ -28,7 +29,7 @@ def test_rounded_times_are_even_again(rate_hz, tick_s, how):
     true = 0.123 + np.arange(5000) / rate_hz
     recorded = ROUND[how](true / tick_s) * tick_s
     step_error, time_error = errors(true, recorded)
-    assert step_error < 0.03  # as recorded over 1: steps of 0 and of twice the right length
+    assert step_error < 0.03  # the error before the repair is over 1: steps of 0 and of twice the right length
     assert time_error < 0.07 * tick_s
     found = even_times(recorded)
     assert np.max(np.abs(found - recorded)) <= 0.6 * tick_s + 1e-9
@@ -87,7 +88,7 @@ def test_example_in_the_docstring_works():
 
 @pytest.mark.parametrize(("gap", "error"), [(4, 0.01), (8, 0.01), (40, 0.01)])
 def test_gaps_do_not_lengthen_the_period(gap, error):
-    """Every 20 samples of 10.4 ms, with times of 10 ms, some are missing."""
+    """Samples come every 10.4 ms, with times in steps of 10 ms. Some of every 20 are missing."""
     numbers = np.concatenate([np.arange(20) + (19 + gap) * k for k in range(60)])
     found = even_times(np.rint(numbers * 1.04) / 100.0)
     steps = np.diff(found).reshape(-1)

@@ -45,7 +45,8 @@ def test_a_freeze_is_marked_to_the_sample(monkeypatch, blocks_of):
     readings = riding(8)
     readings[300:500] = readings[300]
     found = np.flatnonzero(frozen(log_of(readings)))
-    first = 301 if blocks_of == 60_000 else found[0]  # at the end of a block the start may count as a reading
+    # at the end of a block the first frozen samples may count as readings
+    first = 301 if blocks_of == 60_000 else found[0]
     assert found.tolist() == list(range(first, 500))
     assert first < 360
     notices = []
@@ -69,7 +70,7 @@ def test_freezes_at_each_end_and_twice_are_marked():
 @pytest.mark.parametrize("noise", [1.0, 0.3])
 def test_a_vehicle_at_rest_is_not_frozen(digits, noise):
     """A quiet sensor, the engine off, in logs with fewer and fewer digits: with one, most readings are the same."""
-    idling = resting(1, 5, 30.0, digits)  # its engine shakes it
+    idling = resting(1, 5, 30.0, digits)  # a running engine shakes it
     readings = np.vstack((riding(5, 1, digits), idling, resting(20, 2, noise, digits), idling, riding(5, 3, digits)))
     same = np.all(np.diff(readings[600:2600], axis=0) == 0.0, axis=1)
     assert not np.any(frozen(log_of(readings)))
@@ -78,7 +79,7 @@ def test_a_vehicle_at_rest_is_not_frozen(digits, noise):
 
 
 def test_constant_log_is_not_marked_as_frozen():
-    """Such a log has no readings to compare with. A pose of frozen readings is refused, see test_still_pose."""
+    """A whole frozen log has nothing to compare with. A pose of such readings is refused, see test_still_pose."""
     assert not np.any(frozen(log_of(np.tile(REST, (500, 1)))))
 
 
@@ -155,8 +156,8 @@ def test_quiet_phone_in_a_ride_is_not_frozen(digits):
 @pytest.mark.parametrize(("count", "marked"), [(9, 0), (10, 9), (11, 10)])
 @pytest.mark.parametrize("block", [6, 24])
 def test_ten_equal_readings_are_frozen_across_blocks(count, marked, block):
-    """With two readings per second, the number of equal readings decides. Across blocks, only readings of the later
-    blocks are marked."""
+    """At two readings per second the number of equal readings decides. Across blocks only readings of the later blocks
+    are marked."""
     readings = np.insert(riding(24 / HZ), 3, 20.0, axis=1)
     readings[4 : 4 + count] = readings[4]
     finder, found = FrozenFinder(), []
@@ -171,7 +172,7 @@ def test_ten_equal_readings_are_frozen_across_blocks(count, marked, block):
 
 
 @pytest.mark.parametrize(("near_s", "marked"), [(0.2, True), (0.4, False)])
-def test_half_a_second_beside_decides_whether_rounding_hid_the_noise(near_s, marked):
+def test_the_adjacent_half_second_shows_if_rounding_hid_noise(near_s, marked):
     """Digits of 0.01 g: 0.025 g from the mean is near. At 0.1 g for the rest of half a second the mean is 0.06 or 0.02
     off."""
     readings = np.round(np.tile(REST, (400, 1)), 2)

@@ -143,7 +143,7 @@ def test_long_line_is_refused_quickly(tmp_path):
 
 @pytest.mark.parametrize(("blank", "rows"), [("\n", 2), ("\n" * 2_000_000, 2), ("\n", 0), ("\n" * 2_000_000, 0)])
 def test_blank_lines_below_the_header_are_skipped(tmp_path, blank, rows):
-    """Also if they fill more than a block."""
+    """The result is the same if they fill more than a block."""
     header, *given = text_of(2).splitlines(keepends=True)
     (tmp_path / "log.csv").write_text(header + blank + "".join(given[:rows]))
     assert is_log(tmp_path / "log.csv") == (rows > 0)

@@ -124,7 +124,8 @@ def test_stretch_warns_of_another_mounts_calibration(tmp_path):
 
 
 def test_exported_stretch_keeps_its_time_of_day(tmp_path):
-    """A log without a clock ends when it was written. A stretch of it ends earlier by the part left out."""
+    """A log without a clock is assumed to end when its file was written. A stretch of it ends earlier by the omitted
+    part."""
     ride = analysis_rides.short(tmp_path)  # 34 s
     os.utime(ride, (1_700_000_100, 1_700_000_100))
     out = tmp_path / "out.csv"

@@ -157,7 +157,7 @@ def test_file_that_is_not_a_video_of_the_ride_is_refused(tmp_path, ride):
 
 
 def test_stopped_overlay_leaves_nothing(tmp_path, ride):
-    """Neither a file nor a running ffmpeg."""
+    """Neither a file nor a running ffmpeg is left."""
     film = gopro.film(tmp_path / "film.mp4", 5.0)
     (tmp_path / "clip.mov").write_text("an older clip")
     before = command.snapshot(tmp_path)
@@ -200,7 +200,7 @@ def test_gopro_readings_are_in_deg_s_on_the_videos_time(tmp_path):
 
 
 def test_live_option_shows_the_displayed_lean(tmp_path, ride):
-    """At the first lean the two differ: the display did not have the later readings."""
+    """The two differ at the first lean, because the display did not have the later readings."""
     for more in ((), ("--live",)):
         part = "--from", 6, "--to", 9, "--height", 240
         command.works("overlay", ride, *part, *more, "--out", tmp_path / f"clip{len(more)}.webm")

@@ -72,7 +72,7 @@ def test_unknown_values_are_not_drawn(gauge):
 
 
 def test_spot_moves_in_the_direction_of_the_acceleration(gauge):
-    """Up when speeding up, down when braking, to the left in a left turn."""
+    """The dot moves up when speeding up, down when braking, and to the left in a left turn."""
     side = round(1.2 * gauge.height)
 
     def spot(**forces: float) -> np.ndarray:
@@ -121,4 +121,4 @@ def test_values_are_interpolated_but_not_across_gaps():
     assert np.allclose(at.lean_deg, [NAN, 5.0, NAN, NAN, 25.0, NAN], equal_nan=True)
     assert at.speed_mps[1] == pytest.approx(10.1)
     assert np.isnan(at.speed_mps[[0, 5]]).all()
-    assert at.right_deg.tolist() == [0.0, 0.0, 10.0, 10.0, 20.0, 30.0]  # the largest so far
+    assert at.right_deg.tolist() == [0.0, 0.0, 10.0, 10.0, 20.0, 30.0]  # the maxima so far

@@ -54,7 +54,7 @@ def test_brief_or_untrusted_lean_is_no_maximum(ride, monkeypatch):
 
 
 def test_contradicted_calibration_is_reported_by_overlay(ride):
-    """As in every command with a calibration."""
+    """The same holds in every command with a calibration."""
     calibration = api.read_calibration(ride.with_name("RIDE.cal.json"))
     backward = replace(calibration, vehicle_from_sensor=np.diag([-1.0, 1.0, -1.0]))
     for given, codes in ((calibration, []), (backward, ["forward-exchanged"])):
@@ -69,7 +69,7 @@ def test_a_maximum_must_last_and_unknown_leans_count_as_none():
     lean = np.full(60, np.nan)
     assert _maximum(t_s, lean).tolist() == [0.0] * 60
     assert HELD_S == 0.15
-    lean[5:20], lean[30:46] = 30.0, 20.0  # for 15 and for 16 samples
+    lean[5:20], lean[30:46] = 30.0, 20.0  # values after 15 and after 16 samples
     lean[50:] = -5.0
     found = _maximum(t_s, lean)
     assert found.tolist() == [0.0] * 45 + [20.0] * 15

@@ -65,7 +65,7 @@ def with_speed(log, speed):
 
 @pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
 def test_all_engines_give_the_same_lean(tmp_path):
-    """With a speed once a second, a 0 too, that has a say, and a lean that is not always shown."""
+    """The log has a speed once per second, sometimes 0, that affects the lean. The lean is not always shown."""
     plain, cal = ride(tmp_path / "log.csv", seconds=60), command.write_cal(tmp_path / "CAL.json", trim_deg=1.0)
     log = with_speed(plain, [("0" if k % 1000 else "14.0") if k % 100 == 0 else "" for k in range(6000)])
     results = [replayed(log, cal, engine)[0] for engine in ("cpython", "micropython")]
@@ -164,7 +164,7 @@ def test_lean_of_a_real_recording_matches_gravity(tmp_path, shared_data):
 
 
 def test_calibration_beside_the_log_is_used(tmp_path):
-    """Like in report, plot and export. Replay's output is not read as a log."""
+    """This also holds in report, plot and export. Replay's output is not read as a log."""
     log = analysis_rides.short(tmp_path)
     beside = log.with_name(log.name.split(".")[0] + ".cal.json")
     beside.unlink(missing_ok=True)
@@ -185,7 +185,7 @@ def test_calibration_beside_the_log_is_used(tmp_path):
     ):
         command.refused(tmp_path, *arguments, words=words)
     command.refused(tmp_path, "report", exported, words=words.replace("LEAN", "EXPORTED"))
-    (tmp_path / "OTHER.csv").write_bytes(log.read_bytes())  # it may be the one or the other
+    (tmp_path / "OTHER.csv").write_bytes(log.read_bytes())  # either may be right
     (tmp_path / "OTHER.cal.json").write_bytes(beside.read_bytes())
     command.refused(tmp_path, "report", lean, words="give the log that it was made from\n")
 

@@ -48,7 +48,7 @@ def test_fast_loop_equals_the_meter_for_each_sample(known):
     (block,) = read_blocks(log)
     measured, along = block.measured, MeterAlong(calibration)
     assert 0 < len(measured.time_us) < len(block.time_us)
-    cuts = [0, 1, 1, 700, 5000, len(measured.time_us)]  # in blocks, an empty one too
+    cuts = [0, 1, 1, 700, 5000, len(measured.time_us)]  # in blocks, one of them empty
     parts = [along.columns(measured.part(slice(a, b))) for a, b in pairwise(cuts)]
     got, want = np.concatenate(parts), by_steps(log, calibration)[~block.frozen]
     shown = got[:, -1] != replay_engine.NOT_SHOWN
@@ -75,7 +75,8 @@ def test_lean_file_has_values_as_python_writes_them(known, tmp_path):
 
 
 def test_two_processes_write_the_same_file(known, tmp_path, monkeypatch):
-    """As for a long log, with more blocks than are read ahead. If the second process ends, an error is raised."""
+    """A second process reads the blocks, as for a long log, with more blocks than it reads ahead. If it ends, an error
+    is raised."""
     log, calibration = known
     write_log(tmp_path / "log.csv", log)
     monkeypatch.setattr(reader, "BLOCK_BYTES", 50_000)

@@ -106,7 +106,7 @@ def test_a_littlefs_block_begins_with_a_pointer_per_halving(index):
 
 
 def test_the_first_position_is_dropped_if_it_has_no_room():
-    """After the first position, every block keeps room for another one."""
+    """After the first position every block reserves room for one, even if it is almost full."""
     block = RideBlock(5000)
     for sequence in range(3):
         ride_writer.begun(512, sequence, block)

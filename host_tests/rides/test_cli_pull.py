@@ -72,14 +72,14 @@ def test_rides_become_logs_with_their_calibration(board, tmp_path):
     assert cal["vehicle_from_sensor"] == [[0, 1, 0], [0, 0, 1], [1, 0, 0]]
     assert cal["accel_offset_g"] == pytest.approx([0.01, -0.02, 0.03])
     assert (cal["trim_deg"], cal["firmware"], cal["who_am_i"], cal["sample_hz"]) == (1.25, __version__, "0x68", 200)
-    assert len(list(board.root.glob("rides/*/*/*"))) == 3  # nothing was to be deleted
+    assert len(list(board.root.glob("rides/*/*/*"))) == 3  # the command must delete nothing
 
 
 @pytest.mark.parametrize(
     ("vehicle", "by_drive", "said"), [("car", True, "car"), ("car", False, None), ("motorcycle", True, None)]
 )
 def test_the_log_of_a_car_says_that_it_is_a_car(vehicle, by_drive, said, board, tmp_path, monkeypatch):
-    """Its log then shows no lean. A ride aligned by two poses is older than the board's use in the car."""
+    """The log of a car's ride shows no lean. A ride aligned by two poses is from before the board's use in the car."""
     made = ride_writer.calibration()
     made.by_drive = by_drive
     monkeypatch.setattr(ride_writer, "calibration", lambda _trim_deg: made)
@@ -269,7 +269,8 @@ def test_a_folder_that_cannot_be_made_is_named(board, tmp_path, monkeypatch):
 
 
 def copied(monkeypatch, printed, size=6, end=None):
-    """What _read() gives for a board that prints these lines at each try, and what came of it in parts."""
+    """Return the result of _read() for a board that prints these lines at each try, and the parts passed to
+    progress."""
     part, came, tries = pull._Part(3, 1, size, "rides/3.rid"), [], []
 
     def lines(transport, program, silent_s, most_bytes):
@@ -299,16 +300,16 @@ def test_a_file_comes_in_parts_and_is_compared_with_its_sum(monkeypatch):
 @pytest.mark.parametrize(
     ("first", "kept"),
     [
-        (sent(b"abc", b"abcdef"), b"abc"),  # half of it
+        (sent(b"abc", b"abcdef"), b"abc"),  # half of the file
         (sent(b"abcdef", b"abcdeg"), b"abcdef"),  # another byte
         ([b"?", *sent(b"abcdef")[1:]], b"def"),  # a line that is not base64
-        (sent(b"abcdef")[:-1], b"abcdef"),  # without its sum
+        (sent(b"abcdef")[:-1], b"abcdef"),  # without its check sum
     ],
 )
 def test_a_file_that_is_not_whole_is_copied_again(monkeypatch, first, kept):
     content, whole, came, tries = copied(monkeypatch, [first, sent(b"abcdef")])
     assert (content, whole, tries) == (b"abcdef", True, 2)
-    assert sum(count for _, count in came) == len(kept)  # progress does not count the second try
+    assert sum(count for _, count in came) == len(kept)  # progress does not count the second attempt
     content, whole, _, tries = copied(monkeypatch, [first])
     assert (content, whole, tries) == (kept, False, pull._TRIES)
 

@@ -115,7 +115,7 @@ def signals():
 @pytest.mark.parametrize("before", [signal.default_int_handler, signal.SIG_IGN], ids=["shell", "background"])
 @pytest.mark.usefixtures("signals")
 def test_ctrl_c_ends_a_whole_log(before, streaming, tmp_path):
-    """Also if a shell has started it with the signal ignored. The handler is restored afterwards."""
+    """The signal ends it even if a shell has started it with the signal ignored. The handler is restored afterwards."""
     signal.signal(signal.SIGINT, before)
     data, turns = half_seconds(9)
     board = streaming(data[:-1], "ctrl-c", _said(data[-1]))
@@ -226,7 +226,7 @@ def test_an_earlier_recording_is_not_overwritten(name, streaming, tmp_path):
 
 
 def fails(board, error):
-    """The board's next program ends with this."""
+    """The board's next program fails with this error."""
     board.serial.data = b"\x04Traceback (most recent call last):\r\n" + error + b"\r\n\x04>"
 
 
@@ -241,7 +241,7 @@ def test_a_board_without_the_firmware_is_reported_alike(arguments, streaming, tm
 
 @pytest.mark.parametrize("arguments", [["record", "--out", "ride.csv"], ["pull"]])
 def test_a_board_with_an_older_version_must_be_updated(arguments, streaming, tmp_path, monkeypatch):
-    """Like 0.2.0, with all modules in one folder."""
+    """A board with version 0.2.0, which has all modules in one folder."""
     monkeypatch.chdir(tmp_path)
     board = streaming([], None)
     board.modules["kickstand"] = types.SimpleNamespace(settings=types.SimpleNamespace(load=lambda: None))
@@ -269,7 +269,7 @@ def test_the_data_before_a_broken_stream_are_kept(end, words, streaming, tmp_pat
 
 
 def test_a_computer_that_slept_is_reported(streaming, tmp_path, monkeypatch):
-    """The board has stopped streaming. The wait for that is shorter than for a sensor that is off."""
+    """The board has stopped streaming. The command waits less long for this than for a sensor that is off."""
     monkeypatch.setattr(board_console, "_AWAY_SILENT_S", 0.1)
     data, turns = half_seconds(3)
     streaming(data, "asleep")

@@ -78,7 +78,7 @@ def recorder(clock, keeper):
 
 
 def take_stall(recorder):
-    """As the app does it."""
+    """Record a turn as the app does."""
     stalled, recorder.stalled = recorder.stalled, False
     return stalled
 
@@ -108,7 +108,7 @@ def times(keeper):
 
 
 def test_a_ride_after_an_alignment_begins_like_its_replay(keeper):
-    """A replay does not know that the bike has just been posed: the meter starts again without that."""
+    """A replay does not know that the bike was just held upright. So the meter restarts without this knowledge."""
     from kickstand.rides.recording import Recording
 
     settings = SimpleNamespace(SD_SPI=None, RECORD=True, SAMPLE_HZ=200)
@@ -128,7 +128,7 @@ def test_a_ride_after_an_alignment_begins_like_its_replay(keeper):
 
 
 def test_the_second_start_reuses_the_recorder(root, clock):
-    """Also if the menu was open for too short a time to prepare it."""
+    """A recording also starts if the menu was open too briefly to prepare it."""
     from kickstand.rides.recording import Recording
 
     settings = SimpleNamespace(SD_SPI=None, RECORD=False, SAMPLE_HZ=200)
@@ -191,7 +191,7 @@ def test_a_turn_that_fills_a_block_waits_for_the_previous_one(recorder, keeper):
 @pytest.mark.parametrize(("ms", "slow"), [(9, False), (12, True)])
 @pytest.mark.parametrize(("step", "fails"), [("begin", ""), ("begin", "begin"), ("abandon", "begin"), ("write", "")])
 def test_a_step_of_over_10_ms_was_an_erase_of_the_flash(step, fails, ms, slow, stops_interrupts, recorder, keeper):
-    """Also for a ride that could not begin."""
+    """This also holds for a ride that could not begin."""
     keeper.stops_interrupts, keeper.fails = stops_interrupts, fails
     keeper.takes_ms = {step: ms}
     start(recorder)
@@ -241,7 +241,7 @@ def test_a_gap_belongs_to_its_own_ride(recorder, keeper, clock):
 
 
 def test_a_position_and_a_speed_belong_to_the_next_turn_only(recorder, keeper):
-    """A turn may have only one of them. Zero is a valid speed."""
+    """A turn may have either without the other. Zero is a valid speed."""
     start(recorder)
     recorder.add_fix(None, ride_writer.place(0))
     recorder.add_fix(None, ride_writer.place(1))  # the newest one counts

@@ -90,7 +90,7 @@ def test_every_turn_comes_back_exactly():
 
 
 def test_a_ride_of_version_0_3_0_has_no_delay(tmp_path):
-    """In 0.3.0 this byte was the last of the twelve of the firmware's version, and always 0."""
+    """In older rides this byte was the last of twelve of the firmware's version, and always 0."""
     data = bytearray(ride_writer.blocks(1)[0][0])
     data[43] = 0
     data[-4:] = struct.pack("<I", crc32(data[:-4]))

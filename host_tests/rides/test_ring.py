@@ -161,7 +161,7 @@ def test_ending_closes_once_and_abandoning_raises_nothing(root, monkeypatch):
 
 
 def test_free_and_all_bytes_are_blocks_of_the_size_that_counts(monkeypatch):
-    """The results of statvfs: block size, fragment size (the unit of the counts), all, free."""
+    """The results of statvfs: block size, fragment size (the unit of the counts), all fragments, free fragments."""
     monkeypatch.setattr("os.statvfs", lambda path: (512, 4096, 300, 200, 190, 0, 0, 0, 0, 255), raising=False)
     assert flash_ring.free_bytes("") == 200 * 4096
     assert flash_ring.all_bytes("") == 300 * 4096
@@ -214,7 +214,7 @@ def test_no_stray_name_makes_a_ride_overwrite_another(names, root):
     assert len(set(numbers)) == 5
     assert {path: path.read_bytes() for path in before} == before
     found = {ride: size for ride, part, size in ride_paths.parts("rides") if ride in numbers}
-    assert found == {number: 100 + k for k, number in enumerate(numbers)}  # pull lists each
+    assert found == {number: 100 + k for k, number in enumerate(numbers)}  # pull lists every ride
 
 
 def test_an_existing_part_is_never_opened_for_writing(root):

@@ -57,7 +57,7 @@ def test_without_a_card_nothing_waits_for_one(tmp_path):
 
 
 def test_a_card_busy_within_the_specification_loses_nothing(tmp_path):
-    """Busy for 250 ms at each block, every eight seconds: the chip's FIFO lasts longer."""
+    """The card is busy for 250 ms at each block, every eight seconds. The chip's FIFO lasts longer."""
     record = run(tmp_path, {"faults": [[5.0 + 8.0 * i, "busy_next_s", 0.25] for i in range(4)]})
     assert len(blocks(record)) >= 3
     assert missing_s(record) == []
@@ -80,7 +80,7 @@ def test_a_failing_card_ends_the_ride_without_a_restart(fault, tmp_path):
 
 
 def test_a_cards_room_is_counted_before_the_watchdog_runs(tmp_path):
-    """The card has no valid FSINFO, and reading its whole FAT takes longer than the watchdog waits."""
+    """The card's FSINFO is invalid, and reading its whole FAT takes longer than the watchdog waits."""
     record = run(tmp_path, {"sectors": 1 << 24, "read_s": 0.006, "fsinfo": False}, until=40)
     assert record.first("SD card") < 1.0
     assert record.first("Raw   20°") < 30
@@ -108,7 +108,7 @@ def test_an_unusable_card_is_reported_without_a_restart(card, tmp_path):
 
 
 def test_a_card_that_failed_at_the_start_is_not_waited_for_again(tmp_path):
-    """The driver waits for seconds, and the lean would freeze. So the failure is reported, also after a press."""
+    """The driver would wait for seconds, and the lean would freeze. So the failure is reported, also after a press."""
     menu = [[14, 1.2], *([16 + i, 0.15] for i in range(4)), [21, 1.2]]
     plan = {"config": {**PINS, "RECORD": False}, "presses": menu, "lean": [[0, 0], [23, 20]]}
     record = run(tmp_path, {"init_s": None}, **plan)

@@ -83,12 +83,12 @@ def test_a_lean_that_is_wrong_after_a_loss_is_not_shown(run):
     rode = [turn for turn in turns if turn[0] > FROM_S]
     errors = [(t, abs(lean - ride.truth(t)[0]), trusted, dt) for t, lean, trusted, dt, _ in rode]
     assert max(error for _, error, _, _ in errors) > 4  # the gaps cause errors
-    # The result depends on where the gaps are in the bends, which changes with ten microseconds: 0 to 1.6 s for parts 2
-    # to 7
+    # The result depends on the gaps' places in the bends, which change within ten microseconds: 0 to 1.6 s with the
+    # parts 2 to 7
     assert sum(dt for _, error, trusted, dt in errors if trusted and error > 5) < 2.0
     assert max(error for _, error, trusted, _ in errors if trusted) < 12
     assert all(not trusted for _, _, trusted, dt in errors if dt > 0.3)
-    assert sum(dt for _, _, trusted, dt in errors if not trusted) < 0.5 * (UNTIL_S - FROM_S)  # it recovers
+    assert sum(dt for _, _, trusted, dt in errors if not trusted) < 0.5 * (UNTIL_S - FROM_S)  # the lean recovers
 
 
 def test_the_status_shows_the_time_for_a_block(tmp_path, monkeypatch, capsys):

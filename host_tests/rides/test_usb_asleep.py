@@ -38,15 +38,15 @@ def test_the_stream_ends_itself_and_the_lean_continues(engine, tmp_path, capsys)
     record = device_plans.run(engine, tmp_path, plan, capsys)
     assert FROM_S < record.first("USB not read") < FROM_S + 3.0
     assert record.at(39)[0] == "Lean  20° right "
-    assert record.first("Lean  20° right ") < 28  # as soon as without the stream: no more delays
+    assert record.first("Lean  20° right ") < 28  # as early as without the stream: no more delays
     streamed = list(blocks(record.console))
     assert [block.sequence for block in streamed] == list(range(len(streamed)))
     assert 35 < len(streamed) < 42
-    assert record.ends[-1] == "off"  # no watchdog
+    assert record.ends[-1] == "off"  # no reset by the watchdog
 
 
 def test_refusals_do_not_stall_the_loop_repeatedly():
-    """For any repeated failure: one slow print per minute."""
+    """A repeated failure, of any kind, costs at most one slow print per minute."""
     with Board(lambda t_s: (0, 1, 0, 0, 0, 0)) as board:
 
         def main():

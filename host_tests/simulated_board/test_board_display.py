@@ -10,7 +10,7 @@ OLEDS = ("ssd1306", "sh1106")
 KINDS = ("lcd",) + OLEDS
 BUS_HZ = (None, 100_000)
 TURN_MS = 10
-LONGEST_US = 7500  # of a turn's transfers, of 10 ms
+LONGEST_US = 7500  # longest time of the transfers in a turn of 10 ms
 OLD, NEW = ("Lean  19\xdf right", "first"), ("Lean  28\xdf left", "second line")
 
 
@@ -80,13 +80,13 @@ def test_no_turn_delays_the_loop(board, display):
     for k in range(20):
         display.show(f"{k * 1234567:016d}", f"{k * 7654321:016d}")
         longest = turns(board, display, 10)
-        limit = LONGEST_US if not board.lcd.address == 0x27 else 12_800  # dashes first, and then the line
+        limit = LONGEST_US if not board.lcd.address == 0x27 else 12_800  # dashes first, then the new line
         assert longest <= limit, longest
 
 
 @on_each()
 def test_nothing_is_sent_while_nothing_changes(board, display):
-    """Only the check for a connected display uses the bus, five times per second."""
+    """Nothing is sent except a check of the connection, five times per second."""
     address = board.lcd.address
     before = board.lcd_bus.transfers[address]
     for _ in range(20):
@@ -133,7 +133,7 @@ def test_after_any_unplug_it_returns_and_shows_nothing_old(board, display):
 
 @on_each((None,))
 def test_a_transfer_cut_at_any_byte_is_repaired(board, display):
-    """Until then no lean is visible except the old and the new one."""
+    """Before the change is complete, only the old or the new lean is visible."""
     address = board.lcd.address
     good = as_text(OLD)[0], as_text(NEW)[0]
     for byte in range(1, 40, 3):
@@ -156,7 +156,7 @@ def test_a_stuck_bus_is_freed(board, display):
 
 
 def test_the_processor_is_reset_in_the_middle_of_a_part():
-    """The display keeps its power and its text; the next start must replace it."""
+    """The display keeps its power and its text. The next start must replace the text."""
     for kind in KINDS:
         for count in range(1, 12, 2):
 
@@ -258,7 +258,8 @@ def test_no_status_leaves_an_oled_dark():
 
 
 def test_a_panel_of_32_rows_shows_both_lines():
-    """Letters of 16 rows fill it. It moves down by a pixel or two, over rows that letters leave blank."""
+    """Letters of 16 rows fill the display. The picture moves down by a pixel or two, over rows that letters leave
+    blank."""
 
     def run(board):
         display = open_display(board, None, "ssd1306-32")

@@ -58,7 +58,7 @@ def test_an_esp32s_old_driver_waits_longer_than_the_watchdog(board):
 
 @firmware(machine="esp32")
 def test_soft_i2c_does_not_notice_that_sda_is_held(board):
-    """Its clocks free the device. A device that keeps holding SDA reads as zeros."""
+    """The clocks of SoftI2C free the device. A device that keeps holding SDA reads as zeros."""
     i2c = SoftI2C(sda=Pin(21), scl=Pin(22))
     for bits, freed in ((1, True), (8, True), (60, False)):
         board.sensor_bus.hang(bits)
@@ -91,17 +91,18 @@ def edges_in_a_transfer(machine, pulses_per_s):
 
 
 def test_interrupts_of_an_esp32_wait_for_the_end_of_a_transfer():
-    """At most eight, and they see the pin's level of that time. On a Pico they come at once."""
+    """At most eight interrupts are kept, and they see the pin's level after the transfer. On a Pico they come at
+    once."""
     assert edges_in_a_transfer("pico", 300)[0] in (5, 6, 7)
     during, after = edges_in_a_transfer("esp32", 300)
     assert during == 0 and len(after) in (5, 6, 7) and len(set(after)) == 1
     during, after = edges_in_a_transfer("esp32", 1000)
-    assert during == 0 and len(after) in (8, 9)  # one more may have come since
+    assert during == 0 and len(after) in (8, 9)  # one more interrupt may have come since
 
 
 def test_a_classic_esp32_crashes_if_a_flash_pin_is_driven():
     def drive(number):
-        Pin(number)  # this alone does no harm
+        Pin(number)  # this alone is harmless
         Pin(number, Pin.OPEN_DRAIN)
 
     for machine, number, outcome in (
@@ -115,7 +116,7 @@ def test_a_classic_esp32_crashes_if_a_flash_pin_is_driven():
 
     def read(board):
         assert isinstance(raised(drive, 34), ValueError)
-        assert Pin(34, Pin.IN, Pin.PULL_UP).value() == 0  # it floats
+        assert Pin(34, Pin.IN, Pin.PULL_UP).value() == 0  # the pin floats
         assert Pin(33, Pin.IN, Pin.PULL_UP).value() == 1
 
     check(read, machine="esp32")
@@ -131,7 +132,7 @@ def test_a_bus_that_is_too_fast_for_the_display_is_seen():
 
 
 def pulses_until_free(board):
-    """As a driver frees a bus: clock until SDA is high; then STOP."""
+    """Free the bus as a driver does: clock until SDA is high, then STOP."""
     scl = Pin(5, Pin.OPEN_DRAIN, value=1)
     sda = Pin(4, Pin.OPEN_DRAIN, value=1)
     count = 0

@@ -30,7 +30,7 @@ def ready(kind):
 
 
 def lit(oled):
-    """(x, y) of every pixel that glows."""
+    """(x, y) of every lit pixel."""
     pixels = oled.pixels()
     return [(i % 128, i // 128) for i in range(8192) if pixels[i >> 3] & 0x80 >> (i & 7)]
 

@@ -34,7 +34,7 @@ def test_all_four_quarters_of_the_earth_to_two_centimetres():
             (place,) = places_of(rmc("4807.03801," + north, "01131.00009," + east))
             assert place == [DAY, NOON, lat * 288703801, lon * 69100009]
     assert places_of(rmc("0000.00000,S", "00000.00001,W"))[0][2:] == [0, -1]
-    assert places_of(rmc("9000.00000,S", "18000.0000,W")) == []  # 180 degrees is said as 179°59.99999'
+    assert places_of(rmc("9000.00000,S", "18000.0000,W")) == []  # 180 degrees is reported as 179°59.99999'
     assert places_of(rmc("8959.99999,S", "17959.99999,W"))[0][2:] == [-539999999, -1079999999]
 
 
@@ -57,7 +57,7 @@ def test_an_invalid_position_is_none_and_does_no_harm():
 
 
 def test_a_date_that_is_not_known_yet_is_0():
-    for date in ("", "xx1126", "0x1126", "311299"):  # no receiver is older than the last of these dates
+    for date in ("", "xx1126", "0x1126", "311299"):  # no receiver is as old as the last date
         assert places_of(rmc(date=date))[0][:2] == [0, NOON]
     assert places_of(rmc(date="311226"))[0][0] == 26 << 9 | 12 << 5 | 31
 
@@ -87,7 +87,7 @@ def test_an_old_position_is_not_returned_as_new():
         assert gps.place(5000) is None
         gps._uart = Listing(rmc(time="120005.00").encode())
         assert [gps.poll(ms) is None for ms in (5990, 6000)] == [True, False]
-        for ms in (7000, 8000, 9000, 10000):  # then VTG alone, which counts once RMC is 3 s old
+        for ms in (7000, 8000, 9000, 10000):  # then VTG alone, which is used once RMC is 3 s old
             gps._uart = Listing(sentence("GPVTG,84.4,T,,M,19.438,N,36.0,K,A").encode())
             assert (gps.poll(ms) is None) == (ms < 9000), ms
             assert gps.place(ms) is None, ms

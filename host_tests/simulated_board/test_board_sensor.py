@@ -6,7 +6,7 @@ from support.board_access import counts, level, read, write
 
 
 def ramp(t_s):
-    """Every value encodes the time: 1 count per millisecond in the widest gyro range, and so on."""
+    """A motion whose values encode the time: 1 count per millisecond in the widest gyro range."""
     return (t_s, -t_s, 1.0, t_s * 10.0, 0.0, -t_s * 10.0, 25.0)
 
 

@@ -33,7 +33,8 @@ def speeds_of(text, piece=1000, step_ms=10, steps=60):
 
 
 def busy_with_transfers():
-    """Call it in each turn of the loop. It simulates an ESP32's SoftI2C transfers: 1.3 ms, and 12 ms every 100 ms."""
+    """Simulate an ESP32's SoftI2C transfers: 1.3 ms per turn, and 12 ms every 100 ms. Call this in each turn of the
+    loop."""
     from machine import Pin, SoftI2C  # type: ignore[import-not-found]
 
     sensor = SoftI2C(Pin(22), Pin(21), freq=250_000)
@@ -175,7 +176,7 @@ def test_a_delayed_fix_is_rejected_or_has_its_age():
         assert hear(gps, 3, 3700) == ([True], 500)
         assert hear(gps, 4, 6700)[0] == []  # 2.5 s late
         assert hear(gps, 7, 7210) == ([True], 10)
-        assert hear(gps, 30, 8210) == ([True], 0)  # its clock was put right
+        assert hear(gps, 30, 8210) == ([True], 0)  # the receiver's clock was corrected
         assert hear(gps, 31, 9210) == ([True], 0)
 
 
@@ -249,7 +250,7 @@ def test_a_contact_that_bounces_is_counted_once():
 
 
 def test_a_storm_of_pulses_is_reported_and_the_speed_returns():
-    """It lasts twice as long as the pause: the interrupt is tried in the middle of it."""
+    """The storm lasts twice as long as the pause: the interrupt is tried again in its middle."""
     for port, pulses_per_s in (("rp2", 50_000), ("esp32", 6_000)):
 
         def fit(board, pulses_per_s=pulses_per_s):
@@ -286,7 +287,8 @@ def wheel_on_an_esp32(pulses_per_metre, speed_mps, seconds=21.0, **kind):
 
 
 def test_an_esp32_counts_pulses_that_fall_into_a_transfer():
-    """Its interrupts wait meanwhile. If a contact closes and opens, two interrupts see only the open contact."""
+    """Interrupts wait during a transfer. If a contact closes and opens in that time, two interrupts see only the open
+    contact."""
     for pulses, hz in ((0.5, 13.3), (3.0, 149.3), (50.0, 290.0)):
         mean, deviation, faults = wheel_on_an_esp32(pulses, hz / pulses)
         assert abs(mean * pulses - hz) < 0.025 * hz, (pulses, hz, mean)
@@ -295,7 +297,7 @@ def test_an_esp32_counts_pulses_that_fall_into_a_transfer():
 
 
 def test_a_contact_that_bounces_is_counted_once_on_an_esp32_too():
-    """Also if it bounces during a transfer, at any speed and at any time of the loop's turn."""
+    """The contact may bounce during a transfer, at any speed and at any time of the loop's turn."""
     for speed in (1.3, 7.77, 33.3):
         mean, _, _ = wheel_on_an_esp32(0.5, speed, bounce_us=2000)
         assert abs(mean - speed) < 0.01 * speed, (speed, mean)
@@ -468,7 +470,7 @@ def test_a_receiver_stays_silent_for_days():
 
 
 def test_a_wheel_that_stood_for_days_turns_again():
-    """Also a wheel that has never turned."""
+    """This includes a wheel that has never turned."""
 
     class Line:
         IRQ_FALLING = IRQ_RISING = 0

@@ -34,7 +34,7 @@ HILLY = [
 
 
 def test_scripted_motion_matches_the_simulated_kinematics():
-    """test_simulation_kinematics.py shows that those are the derivatives of attitude and place."""
+    """test_simulation_kinematics.py shows that the rates and forces are the derivatives of attitude and position."""
     ride = Ride(HILLY, vibration_g=0.0)
     rate_hz = 1000.0
     t = np.arange(0.0, ride.seconds, 1.0 / rate_hz)

@@ -29,8 +29,8 @@ def in_vehicle(made):
 
 
 def test_each_road_class_is_twice_as_rough(rides):
-    """Each class has four times the power of the one before. On the quietest road the engine adds to it. Roads only
-    change the lean through rider and camber."""
+    """Each road class has four times the power of the one before; on the quietest the engine adds to it. The rides
+    differ only by rider and camber."""
     assert np.array_equal(rides("A").truth["speed_mps"], rides("D").truth["speed_mps"])
     off = rides("C").truth["lean_deg"] - rides().truth["lean_deg"]
     assert 0.1 < np.sqrt(np.mean(off**2)) < 2.0
@@ -40,7 +40,7 @@ def test_each_road_class_is_twice_as_rough(rides):
 
 
 def test_holder_resonates_at_its_frequency():
-    """At its own frequency the gain is 1 over twice the damping; far below it is 1."""
+    """The gain is 1 / (2 damping) at the natural frequency, and 1 far below it."""
     rate_hz, time = 1000.0, np.arange(20_000) / 1000.0
     holder = Holder(np.full(3, 10.0), np.full(3, 0.05), np.zeros(3))
     for hz, least, most in ((1.0, 0.99, 1.03), (10.0, 9.5, 10.5), (50.0, 0.0, 0.12)):
@@ -70,7 +70,7 @@ def test_bad_mount_changes_readings_but_not_the_ride(rides, mount):
 
 
 def test_aliased_engine_vibration_appears_at_low_frequencies(rides):
-    """The road shakes below 25 Hz. Any additional vibration is aliased from above 100 Hz."""
+    """The road shakes the bike below 25 Hz. The additional vibration there is aliased from above 100 Hz."""
     plain, aliased = (bands_of(*in_vehicle(rides("A", mount)), 200.0)[QUANTITIES[1]] for mount in (None, "aliasing"))
     assert aliased[4] > 1.05 * plain[4]
 

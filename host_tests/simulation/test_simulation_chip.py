@@ -57,7 +57,7 @@ def test_readings_stop_at_the_range_and_come_in_counts():
 
 
 def test_the_range_ends_before_the_filter():
-    """Shaken past 8 g on one side only: the mean that is read is not the true one."""
+    """The chip is shaken past 8 g on one side only, so the measured mean differs from the true one."""
     shaken = np.zeros((N, 3))
     shaken[:, 0] = 7.0 + np.where(np.arange(N) % 4 < 2, 4.0, -4.0)
     mean = read(PERFECT, shaken, STILL)[100:, 0].mean()

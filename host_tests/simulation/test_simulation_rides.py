@@ -140,12 +140,12 @@ def test_speed_is_written_once_per_second_if_requested(tmp_path):
 
 @pytest.mark.parametrize(("profile", "seed"), [("hills", 3), ("fall", 1)])
 def test_ride_has_the_requested_length(profile, seed):
-    """Also one that would continue to the end of its bend, and one that ends with a fall."""
+    """This includes a ride that would continue to the end of its bend, and one that ends with a fall."""
     assert len(ride(profile, seed, 120.0, exact=True).readings) == 120 * 200
 
 
 def test_calibration_of_the_previous_ride_is_removed(tmp_path):
-    """`report` would use the old RIDE.cal.json, whose sensor was mounted differently."""
+    """`report` would use this file as RIDE.csv's calibration, but it belongs to a sensor with another mounting."""
     works("simulate", "--profile", "street", "--seconds", 30, "--out", tmp_path)
     (tmp_path / "RIDE.cal.json").write_text("{}")
     works("simulate", "--profile", "street", "--seed", 1, "--seconds", 30, "--out", tmp_path)
@@ -153,7 +153,7 @@ def test_calibration_of_the_previous_ride_is_removed(tmp_path):
 
 
 def test_memory_of_a_ride_is_limited():
-    """An hour has 3.6 million rows at the chip's 1 kHz. What it gives back keeps none of them alive."""
+    """An hour has 3.6 million rows at the chip's 1 kHz. The result keeps none of them in memory."""
     seconds = 400.0
     column = seconds * RATE_HZ * 8  # bytes of one number a row
     tracemalloc.start()

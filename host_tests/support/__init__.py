@@ -1,2 +1,2 @@
-"""Code that the tests share: boards, devices, helpers to run programs and read their output. Some modules also run on
-MicroPython."""
+"""Helpers that the tests share: they run boards, devices and programs, and read their output. Some run on MicroPython
+too."""

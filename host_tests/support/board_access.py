@@ -11,7 +11,7 @@ def level(t_s):
 
 
 def raised(function, *args):
-    """Return the exception that function(*args) raises, or None."""
+    """The exception that function(*args) raises, or None."""
     try:
         function(*args)
     except BaseException as error:
@@ -55,7 +55,7 @@ def on_board(program, until_s=1.0, **fitted):
 
 
 def firmware(until_s=30.0, **fitted):
-    """Decorator: run test(board) as the firmware of a new Board(**fitted). The test must run to its end."""
+    """Decorates test(board): the test runs as the firmware of a new Board(**fitted), and must run to its end."""
 
     def decorated(function):
         def test():

@@ -12,7 +12,7 @@ from kickstand_tools.deploy.check_limits import Finding
 from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor, resting
 
-PRESS_S = 0.5  # after check() asks for the press
+PRESS_S = 0.5  # after the start of the check
 
 
 def part(seed: int = 1, **more: float):
@@ -22,9 +22,8 @@ def part(seed: int = 1, **more: float):
 
 
 class CheckedBoard:
-    """world, fitted: see Board.  config: settings.  presses: [(at_s, for_s), ...]; None: one when it is asked for.
-
-    board: the Board, to plant a defect into before findings().  said: what the rider was told."""
+    """world, fitted: see Board. config: settings. presses: [(at_s, for_s), ...]; None: one press when the check asks
+    for it. board: the Board; plant a defect in it before findings(). said: the messages to the rider."""
 
     def __init__(
         self,
@@ -40,13 +39,13 @@ class CheckedBoard:
         self.free_bytes = 90_000
 
     def findings(self, folder: Path) -> list[Finding]:
-        """Return all findings. folder: the directory used as the board's flash."""
+        """Return all findings. folder: the board's flash."""
         found: list[Finding] = []
         self.run(folder, lambda ask: found.extend(check.measured(ask, self.say)))
         return found
 
     def say(self, text: str) -> None:
-        """Receive a text of check(). Press the button if the text asks for it."""
+        """Called by check(): presses the button when the check asks for it."""
         self.said.append(text)
         if text.startswith("Press") and self._presses is None:
             self.board.press(self.board.clock.now_us / 1e6 + PRESS_S, 0.2)

@@ -32,15 +32,14 @@ def run(*arguments: object, err: io.StringIO | None = None) -> Result:
 
 
 def works(*arguments: object, err: io.StringIO | None = None) -> Result:
-    """Call run() and assert that the command succeeds."""
+    """Run a command that must succeed."""
     result = run(*arguments, err=err)
     assert result.status == 0, result.err
     return result
 
 
 def refused(directory: Path, *arguments: object, words: str = "") -> str:
-    """Call run() and assert that the command fails with one line that contains these words, and leaves directory
-    unchanged. Return the line."""
+    """Run a command that must be refused in one line that contains these words. It must not change `directory`."""
     before = snapshot(directory)
     result = run(*arguments)
     assert result.status == 2, result.out + result.err
@@ -55,7 +54,7 @@ def refused(directory: Path, *arguments: object, words: str = "") -> str:
 
 
 def snapshot(directory: Path) -> dict[str, bytes]:
-    """Return the content of every file of a directory, by path."""
+    """The content of every file of a directory."""
     return {str(p): p.read_bytes() for p in directory.rglob("*") if p.is_file()}
 
 

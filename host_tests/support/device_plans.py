@@ -1,4 +1,4 @@
-"""Runs a device plan on either engine, in a directory used as the board's flash."""
+"""Runs a device plan on either engine, in a directory that simulates the board's flash."""
 
 import functools
 import gc
@@ -24,13 +24,13 @@ RIDE = [
     ["turn", 40.0, 5.0],
     ["straight", 6.0],
 ]
-LEFT_S, RIGHT_S, STRAIGHT_S = 30.0, 38.0, 44.0  # late in each
+LEFT_S, RIGHT_S, STRAIGHT_S = 30.0, 38.0, 44.0  # late in each turn
 PRESSES = [[2, 0.15], [12, 0.15]]
 ALIGNED = {"ride": RIDE, "presses": PRESSES, "until": 46}
 
 
 class Record:
-    """The texts of the display over time."""
+    """The content of the display over time."""
 
     def __init__(self, answer, console):
         self.frames = answer["frames"]
@@ -44,7 +44,7 @@ class Record:
         self.console = console
 
     def at(self, t_s):
-        """Return both lines of the display at t_s."""
+        """Both lines of the display at t_s."""
         shown = ["", ""]
         for start, line1, line2 in self.frames:
             if start <= t_s + 1e-6:
@@ -59,8 +59,7 @@ class Record:
         return math.inf
 
     def lean_at(self, t_s):
-        """Return the displayed lean in degrees, > 0 to the right. None if the display shows no lean, or a half-written
-        one."""
+        """The lean on the display in degrees, > 0 to the right; None if it shows none or a half-written one."""
         match = re.fullmatch(r"Lean +(\d+)° (right|left |     )[ *]", self.at(t_s)[0])
         return match and int(match[1]) * (-1 if match[2] == "left " else 1)
 
@@ -71,12 +70,11 @@ class Record:
 
 
 def run(engine, flash, plan, capsys=None):
-    """Run a plan and return its Record. flash: a directory that keeps its files from run to run, like a board's
-    flash."""
+    """The Record of a plan. flash: a directory, which keeps its content from run to run as a board's flash does."""
     if engine == "cpython":
         before = os.getcwd()
         os.chdir(flash)
-        gc.freeze()  # the app often collects garbage, and scanning the objects of other tests would take minutes
+        gc.freeze()  # the app collects garbage often; scanning the objects of other tests would take minutes
         try:
             answer = json.loads(json.dumps(device_runs.run_device(plan)))
         finally:
@@ -91,12 +89,12 @@ def run(engine, flash, plan, capsys=None):
 
 @functools.cache
 def _aligned_once():
-    """Return a directory with the flash content after a ride of ALIGNED. It exists as long as this process."""
+    """A directory that exists as long as this process: the flash after a ride of ALIGNED."""
     directory = tempfile.TemporaryDirectory()
     run("cpython", directory.name, ALIGNED)
     return directory
 
 
 def align(flash):
-    """Copy the alignment from a ride of ALIGNED into a directory used as a board's flash."""
+    """Write the alignment from a ride of ALIGNED into a directory that serves as a board's flash."""
     shutil.copytree(_aligned_once().name, flash, dirs_exist_ok=True)

@@ -16,11 +16,11 @@ from support import sd_cards, simulated_phones
 from support.page_turner import PageTurner
 
 FRAME_S = 0.1
-PRESS_EVERY_S = 0.4  # between presses that search for a page
+PRESS_EVERY_S = 0.4  # while searching a page
 
 
 class CarRide(script.Ride):
-    """The same ride by car. It has the yaw rate of a motorcycle with this lean, but its body rolls slightly
+    """The same ride by car: it has the yaw rate of a motorcycle with this lean, and its body rolls a little
     outwards."""
 
     ROLL_SHARE = -0.08  # of the lean that a motorcycle would have
@@ -30,11 +30,11 @@ class CarRide(script.Ride):
         return state[:1] + (self.ROLL_SHARE * state[1], self.ROLL_SHARE * state[2]) + state[3:]
 
 
-RAISE_S = 0.3  # time that standing() takes from one lean to the next
+RAISE_S = 0.3  # duration of the change from one lean of standing() to the next
 
 
 def standing(plan):
-    """Return motion(t_s) of a bike that does not ride, and leans as planned. plan: [[from_s, lean_deg], ...]."""
+    """motion(t_s) of a bike at rest at each lean of the plan [[from_s, lean_deg], ...], which moves between them."""
 
     def motion(t_s):
         now = before = plan[0]
@@ -50,8 +50,8 @@ def standing(plan):
 
 
 def poses_of(seed, steps):
-    """Return world(t_s) of the bare sensor in poses. steps: [[from_s, up in the sensor's axes, or None while the sensor
-    is turned], ...]. The sensor is shaken before the first pose and after the last one."""
+    """world(t_s) of a sensor not on a bike. steps: [[from_s, up in the sensor's axes, or None while it is turned],
+    ...]. It is shaken before the first pose and after the last one."""
     part = sensor_errors.Sensor(seed=seed)
     worlds = []
     for i, (start, up) in enumerate(steps):
@@ -77,7 +77,7 @@ def poses_of(seed, steps):
 
 
 def remounted(world, motion, seed, at_s, mounting_seed):
-    """Return world(t_s) of a sensor that is mounted at another angle from at_s on."""
+    """world(t_s) of a sensor whose mounting changes at at_s."""
     part = sensor_errors.Sensor(seed=seed)
     part.vehicle_from_sensor = sensor_errors.random_mounting(mounting_seed)
     later = part.world(motion)
@@ -85,11 +85,11 @@ def remounted(world, motion, seed, at_s, mounting_seed):
 
 
 class Device:
-    """The whole device on a simulated board. First plan its events by the board's methods and the methods below. Then
+    """The whole device on a simulated board. First schedule the events with the board's methods and those below, then
     call run()."""
 
     def __init__(self, world, **fitted):
-        """world(t_s): what the sensor measures. fitted: arguments of Board."""
+        """world(t_s): the motion that the sensor measures. fitted: arguments of Board."""
         self.board = Board(world, **fitted)
         self.frames, self.ends = [], []
         self.phones = []
@@ -97,8 +97,8 @@ class Device:
         self._turner = PageTurner()
 
     def turn_to(self, at_s, name):
-        """From at_s on, press the button until the display shows the view with this name (see kickstand/state.py).
-        run() raises AssertionError if that view never appears."""
+        """From at_s on, press the button until the view has this name: see kickstand/state.py. run() raises
+        AssertionError if this view never appears."""
         self.board.at(at_s, lambda: self._turner.turn_to(name))
 
     def fit_speed(self, source, ride, place=None, **model):
@@ -116,12 +116,13 @@ class Device:
             self.board.at(at_s, lambda attribute=attribute, value=value: setattr(self.board.card, attribute, value))
 
     def run(self, config, off_s, streams=False):
-        """Run the firmware with these settings. off_s: times of power cycles. streams: True to start the firmware as
-        `kickstand record` does."""
+        """Run the firmware with these settings. The power is switched off and on again at each time in off_s. streams:
+        start the app as `kickstand record` does."""
         self.board.every(FRAME_S, self._watch)
         self.board.every(PRESS_EVERY_S, self._turn_page)
         self.board.install()
-        before = take_firmware() if self.board.poses else {}  # poses need firmware that this board imports
+        # imported here because it needs firmware imported on the board
+        before = take_firmware() if self.board.poses else {}
         try:
             from kickstand import settings, start
 
@@ -130,7 +131,7 @@ class Device:
             for until_s in off_s:
                 self._run_until(until_s, _stream if streams else lambda: start.main(self._run_app))
             settings.load = load
-            if self.ends[-1] == "returned":  # the power is still on: keep the last display
+            if self.ends[-1] == "returned":  # before the power is cut: the display's last content
                 self._watch()
             self._turner.check()
         finally:
@@ -148,7 +149,7 @@ class Device:
             self.board.press(for_s=0.15)
 
     def record(self):
-        """Return the record of the run, in types that JSON can hold."""
+        """The record as data for JSON."""
         board = self.board
         seen = {"frames": self.frames, "ends": self.ends, "last": self.frames[-1][1:], "too_fast": board.too_fast}
         seen["touched"] = sorted(board.touched)
@@ -187,13 +188,13 @@ def _stream():
 
 
 def take_firmware():
-    """Remove the imported firmware modules from sys.modules, and return them by name."""
+    """Remove the imported modules of the firmware from Python, and return them by name."""
     names = [name for name in sys.modules if name.split(".")[0] == "kickstand"]
     return {name: sys.modules.pop(name) for name in names}
 
 
 def _world(plan):
-    """Return world(t_s) of a plan, and its ride or None."""
+    """world(t_s) of a plan, and its ride or None."""
     seed = plan.get("seed")
     if "poses" in plan:
         return poses_of(seed, plan["poses"]), None
@@ -210,15 +211,15 @@ def _world(plan):
 
 
 def run_device(plan):
-    """Run a device as described by a plan, which can be sent to another process. Return Device.record().
+    """Device.record() of a run that is described as data, which can be sent to another process.
 
-    plan: "until" (s); "lean" as for standing(), or "ride" [[name of a function in rides, arguments...], ...],
-    or "poses" as for poses_of; "seed" of the part (None: perfect); "presses" [[at_s, for_s], ...];
-    "faults" [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...];
-    "gps", "wheel" and "card": arguments of Device's methods; config "VEHICLE" "car": the ride is a car's; "remount"
-    [at_s, seed of the mounting from then on]; "turn_to" [[at_s, name of a view], ...], as for Device.turn_to();
-    "phones": [[[at_s, what a simulated Phone does, arguments...], ...], ...], one after the other; "stream" True: as
-    `kickstand record` starts it.
+    plan: "until" (s); "lean" as for standing(), or "ride" [[name of a function in rides, arguments...], ...], or
+    "poses" as for poses_of; "seed" of the part (None: perfect); "presses" [[at_s, for_s], ...]; "faults" [[method,
+    arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...]; "gps", "wheel" and "card":
+    arguments of Device's methods; config "VEHICLE" "car": the ride is a car's; "remount" [at_s, seed of the mounting
+    from then on]; "turn_to" [[at_s, name of a view], ...], as for Device.turn_to(); "phones": [[[at_s, action of a
+    simulated Phone, arguments...], ...], ...], one after the other; "stream" True: start the app as `kickstand record`
+    does.
     """
     world, ride = _world(plan)
     device = Device(world, **plan.get("board", {}))

@@ -1,7 +1,7 @@
-"""Runs synthetic drives through the firmware's alignment by driving. Runs on CPython and on MicroPython.
+"""Runs simulated drives through the firmware's alignment by driving. Runs on CPython and on MicroPython.
 
-A drive is a list of legs [seconds, acceleration in m/s^2, yaw rate in deg/s]. The samples are those of a vehicle
-without suspension on a level road.
+A drive is a list of legs [seconds, acceleration in m/s^2, yaw rate in deg/s]. The vehicle has no suspension, and the
+road is level.
 """
 
 import math
@@ -20,8 +20,8 @@ RATE_HZ = 100
 
 
 def around(events=6, braking=-2.0, seconds=3.0, yaw_dps=0.0, pause_s=5.0, stands=True):
-    """Return the legs of a drive that stands first, then speeds up and brakes. events: number of braking events.
-    braking (m/s^2), seconds and yaw_dps describe each of them."""
+    """Legs of a drive: the vehicle stands, then speeds up and brakes `events` times. braking (m/s^2), seconds and
+    yaw_dps: of each braking event."""
     legs = [list(STAND)] if stands else []
     for k in range(events):
         legs.append([4.0 + (6.0 if k == 0 else 0.0), -braking * seconds / 4.0 if k else 1.2, 12.0])
@@ -32,8 +32,8 @@ def around(events=6, braking=-2.0, seconds=3.0, yaw_dps=0.0, pause_s=5.0, stands
 
 
 def samples(legs, vehicle="car", tilt_deg=0.0, noise_g=0.003, start_mps=0.0):
-    """Yields (force, rate, speed) at RATE_HZ in the vehicle's axes. A motorcycle leans into turns. tilt_deg: the camber
-    where the vehicle stands."""
+    """Yields (force, rate, speed) at RATE_HZ in the vehicle's axes. A motorcycle leans into turns. tilt_deg: the road's
+    camber at standstill."""
     seed = 1
     speed = start_mps
     for seconds, acceleration, yaw_dps in legs:
@@ -62,8 +62,8 @@ def mounted(m, vector):
 
 
 class SpeedSource:
-    """A GPS with errors. every_s: interval between speeds. late_s: delay. scale: factor on the speed. step: rounding,
-    m/s. stuck_from_s: the speed no longer changes after this time. silent: (from, to), s, without speeds."""
+    """A GPS that gives a speed every every_s, delayed by late_s, multiplied by scale, rounded to multiples of step
+    (m/s). From stuck_from_s on the speed stays the same. Within silent (from, to; s) there is none."""
 
     def __init__(self, every_s=0.5, late_s=0.0, scale=1.0, step=0.0, stuck_from_s=1e9, silent=(1e9, 1e9)):
         self.every = round(every_s * RATE_HZ)
@@ -136,8 +136,7 @@ def drive(legs, mount, options):
 
 
 def regression(rows, lag):
-    """rows: [seconds, change_g, curve_g, force (3)]. An event ends after every tenth row. Returns forward, level,
-    blocks."""
+    """rows: [seconds, change_g, curve_g, force (3)]; every tenth row ends an event. Returns forward, level, blocks."""
     fitted, fit = ForwardRegression(), Fit()
     for k, (seconds, change, curve, force) in enumerate(rows):
         fitted.add(lag, seconds, change, curve, force)

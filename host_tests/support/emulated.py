@@ -1,4 +1,4 @@
-"""Helpers for tests on the emulated boards."""
+"""Creates the emulated boards for their tests, or skips a test that cannot have one."""
 
 import functools
 import hashlib
@@ -18,12 +18,12 @@ PART = Sensor(seed=1, share=0.5)  # an ordinary sensor, mounted at some angle
 
 
 def need(chip: str) -> None:
-    """Skip the test if the emulator of this chip is missing. chip: "pico" or "esp32"."""
+    """Skip the test if this chip, "pico" or "esp32", cannot be emulated here."""
     if reason := _lacking(chip):
         pytest.skip(reason)
 
 
-@functools.cache  # avoids a download attempt for each test
+@functools.cache  # do not download a missing package for each test
 def _lacking(chip: str) -> str:
     """Return the reason why this chip cannot be emulated, "" if it can."""
     from kickstand_emulator import esp32_library, image
@@ -63,7 +63,7 @@ MPY = {"pico": bytecode.PICO, "esp32": bytecode.ESP32}
 
 @functools.cache
 def firmware(chip: str = "pico") -> dict[str, bytes]:
-    """Return the firmware's files, compiled, because these start in half the time."""
+    """The firmware's files, compiled, which halves the start time."""
     from kickstand_emulator import flash_image
 
     return flash_image.firmware(True, MPY[chip])
@@ -94,20 +94,20 @@ def calibrated(who_am_i: int = 0x68) -> dict[str, bytes]:
 
 
 def begun(pause_s: float) -> tuple[int, str]:
-    """Run a Pico without files for 0.15 s from power-on. Return its cycles and a digest of its memory. pause_s: length
-    of occasional pauses on the host."""
+    """The cycles and a hash of the memory 0.15 s after power-on of a Pico without files. pause_s: pauses of the host in
+    between."""
     with pico() as device:
         device.run(0.15, lambda: time.sleep(pause_s))
         return device.chip.rp2040.core.cycles, hashlib.sha256(bytes(device.chip.rp2040.sram)).hexdigest()
 
 
 def leaning(lean_deg: float) -> Callable[[float], tuple]:
-    """Return world(t_s) of PART on a bike that is held at this lean."""
+    """The readings of PART on a bike held at this lean."""
     return PART.world(Ride([upright(1e6, lean_deg=lean_deg)]).motion)
 
 
 def shows(device, pattern: str, limit_s: float) -> re.Match:
-    """Advance the time until the display matches, and return the match. The pattern sees both lines joined by a bar."""
+    """Advance the time until the display's two lines, joined by a bar, match. Returns the match."""
     return device.run_until(lambda: re.search(pattern, "|".join(device.lcd())), limit_s)
 
 

@@ -1,7 +1,7 @@
 """Offers the emulated Pico's console as the port that mpremote and the tools open. All runs in the test's process.
 
-Emulated time only passes while the tools wait at the port, and all time-outs use emulated time. So a busy computer
-slows a test down but does not change its result. A board that hangs ends the test.
+Emulated time passes only while somebody waits at the port, and every time-out uses it. So a busy machine only makes a
+test longer, and a hanging board ends it.
 """
 
 import types
@@ -13,12 +13,12 @@ NAME = "/dev/emulated"
 
 
 class EmulatedPort:
-    """Takes the place of pyserial's port. device: an emulator.pico.Pico.  meanwhile(): called with each wait."""
+    """Replaces pyserial's port. device: an emulator.pico.Pico. meanwhile(): called during each wait."""
 
     def __init__(self, device, meanwhile=lambda: None):
         self._device, self._meanwhile = device, meanwhile
         self._heard = bytearray()
-        self._awaited = 0  # how many bytes end the wait
+        self._awaited = 0  # number of bytes that end the wait
         self.timeout_s = 0.0
         device.heard = self._hear
 
@@ -30,7 +30,7 @@ class EmulatedPort:
         return len(self._heard)
 
     def read(self, size=1):
-        """Return `size` bytes, or fewer after the time-out."""
+        """Read this number of bytes, or fewer at the time-out."""
         self._let_pass(self.timeout_s, size)
         data = bytes(self._heard[:size])
         del self._heard[:size]
@@ -45,7 +45,7 @@ class EmulatedPort:
         pass
 
     def sleep(self, seconds):
-        """Replace time.sleep(). Output of the board ends it early."""
+        """Replaces time.sleep(); output of the board ends it early."""
         self._let_pass(seconds, len(self._heard) + 1)
 
     def _let_pass(self, seconds, until_bytes):

@@ -1,4 +1,4 @@
-"""A fake board for mpremote's file commands. Their scripts run on the host, with a directory instead of a flash."""
+"""A fake board for mpremote's own file commands: their scripts run on the host, on a directory instead of a flash."""
 
 import builtins
 import contextlib
@@ -19,7 +19,7 @@ PICO_PORT = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
 
 
 def plug_in(monkeypatch: pytest.MonkeyPatch, board: Any) -> Any:
-    """Make this board the only one that is plugged in, and let it restart without a delay. Return it."""
+    """Make this board the only connected one and let it restart at once. Returns the board."""
     monkeypatch.setattr(list_ports, "comports", lambda: [PICO_PORT])
     monkeypatch.setattr(connection, "ConnectedBoard", lambda name, timeout: board)
     monkeypatch.setattr(connection, "_RESTART_S", 0)
@@ -27,11 +27,9 @@ def plug_in(monkeypatch: pytest.MonkeyPatch, board: Any) -> Any:
 
 
 class FakeBoard(Transport):
-    """Replaces SerialTransport.
-
-    root: the directory that is its flash.  written: paths in the order they were opened for writing, or renamed after
-    that.  on_write(path, data): called before each write, returns what really lands on the flash.  before_change():
-    called before each change of the flash.  mpy: as sys.implementation._mpy.
+    """Replaces SerialTransport. root: the directory that serves as its flash. written: paths in the order in which they
+    were opened for writing, or their new names. on_write(path, data): called before each write; returns the bytes that
+    are really written.  before_change(): called before each change of the flash.  mpy: as sys.implementation._mpy.
     """
 
     def __init__(self, root: Path, python: str = "micropython", answers: bool = True, mpy: int = PICO) -> None:
@@ -54,14 +52,14 @@ class FakeBoard(Transport):
                 return self.modules[name]
             if name == "kickstand":
                 return self._kickstand()
-            if name.startswith("kickstand."):  # hides the package that is installed on the host
+            if name.startswith("kickstand."):  # not the module installed on the host
                 raise ImportError(f"no module named '{name}'")
             return __import__(name, *rest)
 
         self._globals = {"__builtins__": vars(builtins) | {"__import__": imports, "open": self._open}}
 
     def wait(self, seconds: float) -> None:
-        """Wait by the tools' clock, which a test may have replaced."""
+        """Uses the clock that a test may have set for the tools."""
         board_console.time.sleep(seconds)
 
     def enter_raw_repl(self, soft_reset: bool = True, timeout_overall: int = 10) -> None:
@@ -155,7 +153,7 @@ class FakeBoard(Transport):
 
 
 class Serial:
-    """The port: data that waits to be read, and what was written."""
+    """The port: data to be read, and data written."""
 
     def __init__(self) -> None:
         self.data = b""
@@ -191,5 +189,5 @@ def _implementation(name: str, mpy: int) -> types.SimpleNamespace:
 
 
 def files(root: Path) -> dict[str, bytes]:
-    """Return the content of all files on the board, by path."""
+    """Return {path on the board: content} of all files on it."""
     return {"/" + p.relative_to(root).as_posix(): p.read_bytes() for p in root.rglob("*") if p.is_file()}

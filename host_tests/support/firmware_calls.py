@@ -72,12 +72,12 @@ def transform(offset, slope, matrix, sums, n):
 
 
 def add_up(batches, limit):
-    """Add up batches of 14-byte frames, by the board's code and in Python. Return for each batch [number of good
-    frames, their sums, the good frames, the watch]."""
+    """For each batch of frames of 14 bytes: [number of good frames, their sums, the good frames, the watch], by the
+    board's machine code and by Python."""
     out = []
     for function in (fifo_frames.add_up, fifo_frames.add_up_python):
         watch = fifo_frames.AxisWatch(200, 3, 1, 3, limit).notes
-        sums = array("i", [99] * 7)  # arbitrary earlier content
+        sums = array("i", [99] * 7)  # the buffer's earlier content must not matter
         answers = []
         for batch in batches:
             data = bytearray()
@@ -90,7 +90,7 @@ def add_up(batches, limit):
 
 
 def decode(batch):
-    """Return the counts of each 14-byte frame, decoded by the board's code and in Python."""
+    """The counts of each frame of 14 bytes, by the board's machine code and by Python."""
     data = b"".join([bytes(frame) for frame in batch])
     out = []
     for function in (fifo_frames.decode, fifo_frames.decode_python):

@@ -22,7 +22,7 @@ for name in sorted(dir(module)):
 
 
 def run_tests(module: Path, heap: str = "64M") -> None:
-    """Run every test of a module in one MicroPython process. The module must only import what MicroPython has."""
+    """Run all tests of a module that needs only MicroPython, in one process."""
     assert "test_" in run_mpy(_TESTS, str(module.parent), module.stem, heap=heap)
 
 
@@ -33,8 +33,8 @@ def run_mpy(
     stdin: str = "",
     directory: Path | None = None,
 ) -> str:
-    """Run a script (its text, or a Path) and return its standard output. directory: working directory, None for a new,
-    empty one. Skips the test without MicroPython. Raises AssertionError if the script fails."""
+    """The standard output of a script (text, or Path). Skips the test without MicroPython. Raises AssertionError if the
+    script fails. directory: its working directory; by default an empty one."""
     if not unix_port.available():
         pytest.skip("no MicroPython unix port for this system")
     environment = unix_port.environment()
@@ -55,8 +55,8 @@ def run_mpy(
             timeout=300,
         )
     said = done.stdout + done.stderr
-    # The package's main() does not always pass on the exit status, so search for a traceback. A script with input ends
-    # with JSON, and the board's console output before it may contain tracebacks.
+    # The package's main() does not return every exit status. Scripts that take data print JSON at their end. Before
+    # that, a board's console may print tracebacks.
     came_to_its_end = done.returncode == 0 and (bool(stdin) or "Traceback (most recent" not in said)
     assert came_to_its_end, f"MicroPython says:\n{said}"
     return done.stdout

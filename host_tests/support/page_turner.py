@@ -4,14 +4,14 @@ MOST_PRESSES = 20  # twice the number of pages
 
 
 class PageTurner:
-    """Decides when to press the button, until the wanted views have been shown in order."""
+    """Decides when to press the button, until each wanted view has been shown in turn."""
 
     def __init__(self):
         self._wanted = []
         self._seen = []  # the views at the presses for the first of _wanted
 
     def turn_to(self, name):
-        """Want the view with this name next: see kickstand/state.py."""
+        """Wait for the view with this name next: see kickstand/state.py."""
         self._wanted.append(name)
 
     def presses(self, view):

@@ -1,4 +1,4 @@
-"""Decodes radio packets only by firmware/docs/live.md, with its equations for RaceChrono and its byte tables."""
+"""Decodes the radio's packets by firmware/docs/live.md alone: its equations for RaceChrono and its tables of bytes."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,7 @@ PAGE = Path(__file__).resolve().parents[2] / "firmware" / "docs" / "live.md"
 _SECTION = PAGE.read_text(encoding="utf-8")
 SERVICE = re.findall(r"is `([0-9a-f-]{36})`", _SECTION)[0]
 
-# {channel name up to the first comma: (packet, equation)}
+# {channel, its text before the first comma: (packet, equation)}
 EQUATIONS = {
     name.split(",")[0]: (int(packet), equation)
     for name, packet, equation in re.findall(r"^\| ([^|]+) \| (\d) \| `(.+)` \|$", _SECTION, re.MULTILINE)
@@ -30,7 +30,7 @@ def channels(data):
 
 
 def _rows(title):
-    """[(first byte, last byte, kind, words, value for unknown or None)] of a table."""
+    """Parse a table: [(first byte, last byte, kind, text, value for unknown or None)]."""
     table = _SECTION.split(f"\n`{title}`, ")[1].split("\n\n")[1]
     rows = []
     for line in table.splitlines()[2:]:
@@ -42,7 +42,7 @@ def _rows(title):
 
 
 def own(title, data):
-    """Return {name: integer in the table's unit, None for unknown} of a packet of Kickstand's own service."""
+    """Decode a packet of our own: {quantity: integer in the table's unit, None for unknown}."""
     rows = _rows(title)
     assert len(data) == rows[-1][1] + 1
     found = {}

@@ -1,17 +1,17 @@
 """Formats the simulated board's SD card before a run and reads it afterwards, with MicroPython's own FAT."""
 
 # pyright: reportAttributeAccessIssue=false
-# os is MicroPython's module
+# imported here, because this needs MicroPython's os
 
 import binascii
 import os
 
 MOUNT = "/sd"
-READER = "/reader"  # as a computer has it
+READER = "/reader"  # as on a computer
 
 
 def format_card(card, formatted=True, fsinfo=True):
-    """Format the card with FAT. fsinfo: False to leave out the count of free clusters."""
+    """Create a card with a FAT file system. Without fsinfo the card has no count of its free space."""
     if formatted:
         os.VfsFat.mkfs(card)
     if not fsinfo:
@@ -20,7 +20,7 @@ def format_card(card, formatted=True, fsinfo=True):
 
 
 def eject():
-    """Unmount everything, as a reset does."""
+    """Unmount the card, as a reset does."""
     if hasattr(os, "umount") and MOUNT[1:] in os.listdir("/"):
         os.umount(MOUNT)
 

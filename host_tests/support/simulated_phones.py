@@ -1,5 +1,5 @@
-"""A simulated phone for the simulated board, without a radio stack. It follows a plan and stores what it receives. Runs
-on CPython and MicroPython."""
+"""A phone beside the simulated board, without a radio stack. It follows a plan and keeps what it receives. Runs on
+CPython and MicroPython."""
 
 CHRONO, FILTER = (0x1FF8, 0x0001), (0x1FF8, 0x0002)
 _OWN = "7b6f000%d-3c1e-4d5a-9a55-6b69636b7374"
@@ -27,7 +27,7 @@ class Phone:
         return {"packets": self.packets, "said": self.said}
 
     def handle(self, name):
-        """Of a characteristic, by what the board has registered."""
+        """The handle of a characteristic, from the board's registered services."""
         service, kind = PLACES[name]
         for uuid, made in self._board.radio.services:
             for found, _, handle in made:

@@ -1,4 +1,4 @@
-"""Runs a command in a terminal of 80 by 24 characters, sends keys and reads the output."""
+"""Runs a command in a terminal of 80 by 24 characters: sends keys and reads the output."""
 
 import contextlib
 import os
@@ -7,7 +7,7 @@ import subprocess
 import time
 
 SILENT_S = 120.0
-DRAWN = 4_000_000  # characters: more than a minute of continuous drawing
+DRAWN = 4_000_000  # characters: more than the output of a minute of continuous drawing
 
 
 class Terminal:
@@ -33,10 +33,9 @@ class Terminal:
         os.close(self._master)
 
     def wait_for(self, pattern: str) -> re.Match:
-        """Wait until a text that matches appears; drop the output up to then and return the match.
-
-        The amount of output limits the wait, because the time depends on the computer's load. A command without output
-        for SILENT_S is treated as dead.
+        """Wait until a matching text appears. Drop the output up to its end and return the match. The wait is limited
+        by the amount of output, because times depend on how busy the machine is. A command that draws nothing for
+        SILENT_S counts as dead.
         """
         drawn, heard_s = 0, time.monotonic()
         while not (found := re.search(pattern, self._seen)):
@@ -51,8 +50,7 @@ class Terminal:
         return found
 
     def end(self) -> int:
-        """Wait for the end and return the exit status. Read the remaining output, because a full buffer would block the
-        command."""
+        """Return the exit status. Remaining output is read, because the command could not end otherwise."""
         heard_s = time.monotonic()
         while self.process.poll() is None:
             self._read()

@@ -1,5 +1,5 @@
-"""The simulated board's radio as a peripheral of bumble's virtual radio, and a central there: a whole Bluetooth LE
-stack on either side. Their time is that of the board's clock, and they run when it passes."""
+"""Connects the simulated board's radio, as a peripheral, to bumble's virtual radio, with a central on the other side.
+Both sides have a whole Bluetooth LE stack. The stacks use the board's clock and run when its time advances."""
 
 import asyncio
 import contextlib
@@ -13,7 +13,7 @@ from bumble.host import Host
 from kickstand_tools.simulated_board import radio as model
 
 PUMP_S = 0.005
-ROUNDS = 12  # turns of the stacks' loop each time: a packet passes several layers
+ROUNDS = 12  # turns of the stacks' loop per call, because a packet passes several layers
 ADDRESSES = "F0:00:00:00:00:01", "F1:00:00:00:00:02"
 ASKED = {model.READ_PAIRED: "READ", model.WRITE_PAIRED: "WRITE"}
 
@@ -29,7 +29,7 @@ class BoardLoop(asyncio.SelectorEventLoop):
         return self._board_clock.now_us / 1e6
 
     def pump(self):
-        """Run the callbacks that are due, without waiting."""
+        """Run the tasks that are due, without waiting."""
         for _ in range(ROUNDS):
             self.call_soon(self.stop)
             self.run_forever()
@@ -40,7 +40,7 @@ def uuid_of(value):
 
 
 class _Pin(pairing.PairingDelegate):
-    """pin(): what is shown on this side, or typed into it."""
+    """pin(): returns the PIN shown or typed on this side."""
 
     def __init__(self, pin, capability):
         super().__init__(capability)
@@ -57,8 +57,8 @@ class _Pin(pairing.PairingDelegate):
 
 
 class Air:
-    """Connects board.radio to the virtual radio. central(): returns a Device that can scan and connect. task: runs in
-    parallel with the board."""
+    """Connects board.radio to the virtual radio. central(): a Device that can scan and connect. task: runs beside the
+    board."""
 
     def __init__(self, board):
         self.radio = board.radio
@@ -99,7 +99,7 @@ class Air:
         return self.loop.run_until_complete(make()) if not self.loop.is_running() else None
 
     def central(self, pin=None):
-        """A Device. pin: what its rider types in."""
+        """Create a central. pin: the PIN that its rider types."""
         device = self._make("central")
         if pin is not None:
             delegate = _Pin(lambda: pin, pairing.PairingDelegate.KEYBOARD_INPUT_ONLY)
@@ -162,7 +162,7 @@ class Air:
             self.radio.disconnect()
         self._advertised = None
 
-    # What the model of the radio asks of a phone
+    # the interface of a phone that the radio's model uses
 
     def heard(self, handle, data):
         if self._connection:
@@ -186,7 +186,7 @@ class Central:
         self.connection: Any = None
 
     def at(self, at_s, visit):
-        """Run the coroutine visit(self) from at_s on. Its result, or what it raised, is in done."""
+        """Run the coroutine visit(self) from at_s on. `done` holds its result or its exception."""
 
         async def run():
             await asyncio.sleep(max(0.0, at_s - self.air.loop.time()))

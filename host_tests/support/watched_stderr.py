@@ -6,7 +6,7 @@ from support import command
 
 
 class Watched(io.StringIO):
-    """closed_after: how many characters can be written before writing fails."""
+    """closed_after: number of characters that can be written before writing fails."""
 
     closed_after = 10**9
 
@@ -20,6 +20,6 @@ class Watched(io.StringIO):
 
 
 def watched(monkeypatch, terminal: Watched, *arguments: object) -> str:
-    """Run a command that must succeed, and return its output to such a terminal."""
+    """The output of a successful command to such a terminal."""
     monkeypatch.setenv("TERM", "xterm")
     return command.works(*arguments, err=terminal).err

@@ -1,4 +1,4 @@
-"""The gyro's bias after the two presses."""
+"""The two presses measure the gyro's bias."""
 
 from types import SimpleNamespace
 

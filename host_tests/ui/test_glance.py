@@ -1,4 +1,4 @@
-"""The pictures of the pages, by what is drawn: numbers, bars, marks and words at their places."""
+"""The pictures of the pages: numbers, bars, marks and words are drawn at their places."""
 
 from types import SimpleNamespace
 
@@ -15,7 +15,7 @@ def glance():
 
 
 class Canvas:
-    """Records the drawing: digits {column: digit} of the number's row, and the other calls in order."""
+    """Records the drawing: digits {column: digit} of the number's row; the other calls in their order."""
 
     def __init__(self, glance):
         self._glyphs = glance._GLYPHS
@@ -84,7 +84,7 @@ def test_an_acceleration_is_drawn_as_number_and_bar(glance, forward_g, digits, w
     ],
 )
 def test_a_lean_is_drawn_as_number_arc_and_side(glance, lean_deg, digits, columns, side):
-    """A column for each degree, 60 at most; the upper edge is a circle of 100: at 60 columns 102 - 80."""
+    """One column per degree, 60 at most. The upper edge is a circle of radius 100: at 60 columns 102 - 80."""
     canvas = drawn(glance, glance.lean, lean_deg=lean_deg)
     assert canvas.calls[0] == ("scale", 0, 0)
     assert canvas.digits == digits

@@ -11,7 +11,7 @@ from kickstand.ui import messages
 from kickstand_tools.calibration import drive_refusals, pose_refusals
 from kickstand_tools.common import firmware_path
 
-POSES = {"CaptureError", "SickSensor", "CalibrationError", "GyroError"}  # raised by what the tools run as well
+POSES = {"CaptureError", "SickSensor", "CalibrationError", "GyroError"}  # the tools raise these codes, too
 
 CLASSES = {name for name in vars(errors) if name[0].isupper()}
 # Codes from a name or a call, not from a text beside the class
@@ -36,7 +36,7 @@ VALUES |= {"speed-late": (2.5,), "aligned": (9.9,)}
 
 
 def codes():
-    """Every code used with one of the classes in errors.py, by class."""
+    """All codes used with each class in errors.py, by class."""
     found = {}
     for path in firmware_path.PACKAGE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -108,7 +108,7 @@ def test_a_notice_is_worded_like_a_refusal():
 
 
 def test_no_mathematics_knows_the_display():
-    """The degree sign of its character ROM, and its sixteen columns, are for ui/ and the driver alone."""
+    """Only ui/ and the driver use the display's degree sign and its width of sixteen columns."""
     for path in Path(firmware_path.PACKAGE).rglob("*.py"):
         if path.parent.name not in ("ui", "board"):
             assert "\\xdf" not in path.read_text(encoding="utf-8"), path

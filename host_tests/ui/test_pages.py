@@ -13,7 +13,8 @@ FULL = "#"
 
 
 def bar(lean_deg):
-    """The bar as text: # a full cell, 1 to 4 its columns from the left, a to d from the right, a space nothing."""
+    """The bar as text: # is a full cell, 1 to 4 the columns filled from the left, a to d from the right, a space an
+    empty cell."""
     names = {0x20: " ", 0xFF: FULL, **{i: str(i + 1) for i in range(4)}, **{4 + i: "abcd"[i] for i in range(4)}}
     return "".join(names[code] for code in pages.lean_bar(lean_deg))
 
@@ -163,7 +164,7 @@ def test_the_formula_is_shown_beside_the_filter():
 
 
 def test_before_alignment_tilt_and_g_are_the_sensors_own():
-    """Two seconds each: "Not aligned", and the next step."""
+    """ "Not aligned" and the next step are shown alternately, two seconds each."""
     shown = meter(smooth_force=[0.5, 0.866, -0.25])
     lines = [pages.not_aligned(shown, seconds) for seconds in range(5)]
     assert {line for line, _ in lines} == {f"Raw   30{DEGREE} -0.25g"}

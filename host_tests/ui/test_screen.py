@@ -53,7 +53,7 @@ def first_line(screen, now_ms):
 
 
 def test_a_cancelled_alignment_gets_no_more_samples(screen):
-    """Not even during the 100 ms until the next page: the last sample would save it."""
+    """Samples are not used even during the 100 ms until the next page: the last one would save the alignment."""
     screen.press(LONG, 0)
     screen.press(LONG, 100)
     assert screen.wizard is not None
@@ -168,7 +168,7 @@ def test_the_problem_of_a_pose_is_known_until_the_next_pose(screen):
 def test_a_menu_ends_20_s_after_the_last_press(screen):
     screen.press(LONG, 0)
     screen.press(SHORT, 15_000)
-    assert first_line(screen, 34_900).startswith("\x7e")  # the arrow before an entry
+    assert first_line(screen, 34_900).startswith("\x7e")  # arrow before the chosen entry
     assert first_line(screen, 35_000).startswith("Lean")
     assert screen.menu is None
 

@@ -1,4 +1,4 @@
-"""The gyro's bias from the six positions on the display."""
+"""The six positions on the display measure the gyro's bias."""
 
 from types import SimpleNamespace
 

@@ -32,7 +32,7 @@ def test_every_document_is_a_page():
 
 
 def test_every_link_of_a_page_leads_somewhere(files):
-    """Without the project's address its other files are named, but no links."""
+    """If the project's address is unknown, the pages name its other files without links."""
     assert "config.py</a>" not in files["docs/settings.html"].decode()
     for name, text in pages(files).items():
         for link in re.findall(r'(?:href|src)="([^"]+)"', text):
@@ -44,7 +44,7 @@ def test_every_link_of_a_page_leads_somewhere(files):
             assert not anchor or f'id="{anchor}"' in files[target].decode(), (name, link)
 
 
-def test_a_link_leads_to_the_projects_files_where_its_home_is_known():
+def test_links_lead_to_the_projects_files_if_its_home_is_known():
     made = {name: data.decode() for name, data in documents.document_files(HOME).items() if name.endswith(".html")}
     assert f'href="{HOME}/blob/main/firmware/config.py"' in made["docs/settings.html"]
     assert f'href="{HOME}/tree/main/firmware/examples"' in made["docs/your-own-code.html"]
@@ -63,7 +63,7 @@ def test_a_page_lists_all_documents_and_its_own_headings(files):
 
 
 def test_one_page_has_all_the_words(files):
-    """All documents are on one page, for searching and printing. Each anchor's name occurs once."""
+    """The page with all documents can be searched and printed. Each anchor's name occurs once."""
 
     def words(text):
         return re.sub(r"<[^>]+>", " ", re.findall("<article>(.*?)</article>", text, re.S)[0]).split()
@@ -76,7 +76,7 @@ def test_one_page_has_all_the_words(files):
 
 
 def test_a_documents_own_marks_do_no_harm():
-    """Quotes in a table, an empty head, an angle bracket, a link that leads nowhere."""
+    """The page handles quotes in a table, an empty head, an angle bracket and a broken link."""
     made = converted('# A & B\n\n"one" < two\n\n| | b |\n|---|---|\n| [c](d.md) | `<x>` |\n', lambda link: None, str)
     assert (made.title, made.about) == ("A & B", '"one" < two')
     assert "<td></td>" in made.html and "<th>b</th>" in made.html
@@ -109,7 +109,7 @@ def test_on_a_phone_a_heading_is_two_touches_away(chromium, address):
 
 def test_on_paper_there_is_the_text_alone(chromium, address):
     rider = Rider(chromium, address + LOOKED_AT[0], **LAPTOP)
-    rider.page.set_viewport_size({"width": 673, "height": 1000})  # of A4 within its margins
+    rider.page.set_viewport_size({"width": 673, "height": 1000})  # A4 without its margins
     rider.page.emulate_media(media="print", color_scheme="dark")
     hidden = rider.page.locator("header, footer, main nav, .quick").all()
     assert hidden and not any(one.is_visible() for one in hidden)

@@ -15,7 +15,7 @@ SLOWED = 4  # times
 
 @pytest.mark.long
 def test_a_first_visit(chromium, address, tmp_path):
-    """One test covers all, because it runs in real time. test_guide.py tests a power cut."""
+    """One test for all steps, because they run in real time. test_guide.py tests the steps after a power cut."""
     rider = Rider(chromium, address, viewport={"width": 1000, "height": 700})
     first_minute(rider)
     pull_the_wire(rider)
@@ -31,7 +31,7 @@ def test_a_first_visit(chromium, address, tmp_path):
 
 
 def first_minute(rider):
-    """From nothing to a lean within two degrees of the true one, to both sides."""
+    """From an empty page to a lean within two degrees of the true one, on both sides."""
     rider.align()
     rider.reads("Aligned!")
     rider.click("#do")  # ride
@@ -66,8 +66,8 @@ def pull_the_wire(rider):
 
 
 def is_what_the_firmware_shows(rider, flash):
-    """The display's memories, frame by frame, with the same orders at the same instants to kickstand.start.main() on
-    MicroPython for Linux."""
+    """The display's memory is the same, frame by frame, as with kickstand.start.main() on MicroPython for Linux, with
+    the same orders at the same times."""
     displays, orders = rider.seen("displays"), rider.seen("orders")
     assert len(displays) > 60  # a display that changes all the time is sent ten times per second or less
     given = json.dumps({"orders": orders, "until_s": displays[-1][0] + 0.001})

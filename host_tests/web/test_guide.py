@@ -1,5 +1,5 @@
-"""The guide's next step, from what the firmware really shows: the page's device runs here as fast as it can, is
-steered as a person would, and what was to be seen is shown to the page's own guide, step by step."""
+"""The guide's next step for the displays of the real firmware. The page's device runs here at full speed, steered like
+by a person. The page's own guide gets each state that was visible."""
 
 import json
 from pathlib import Path
@@ -70,7 +70,7 @@ RIDING = [*ALIGN, RIDE, ("wait", 12), ("lean", 30), ("wait", 6)]
 
 @pytest.fixture(scope="module")
 def guide(chromium, address):
-    """The page's modules, without its board: what LOOK gives for a list of ticks."""
+    """Run the page's modules without its board: returns the result of LOOK for a list of ticks."""
     page = chromium.new_page()
     page.goto(address + "licences.txt")
     yield lambda ticks: page.evaluate(LOOK, ticks)
@@ -79,7 +79,7 @@ def guide(chromium, address):
 
 @pytest.fixture
 def drive(guide, tmp_path):
-    """By stage of a drive: what was last said in it (words beside the true lean, number, text, action)."""
+    """The last texts in each stage of a drive: (words beside the true lean, number, text, action)."""
 
     def drive(orders):
         done = run_mpy(DRIVE, stdin=json.dumps(orders), directory=tmp_path)
@@ -90,7 +90,7 @@ def drive(guide, tmp_path):
 
 @pytest.fixture
 def stages(drive):
-    """Each with its orders, and at its end words, number, part of the text, and action."""
+    """Each case has its orders and, for its end, the words, number, part of the text and action."""
 
     def check(*table):
         last = drive([orders for orders, *_ in table])
@@ -170,7 +170,8 @@ def test_the_power_goes_in_a_save_or_by_its_switch(stages):
 
 
 def test_it_rides_straight_until_the_meter_is_sure(stages):
-    """Leaned too early it says what is missing; as late as it says, no bend makes the lean go."""
+    """If the rider leans too early, the guide says what is missing. After the time that it names, a bend no longer
+    hides the lean."""
     stages(
         ([*ALIGN, RIDE, ("wait", 5)], "not sure", 4, "It rides straight for ten seconds", ""),
         ([("lean", 30), ("wait", 2)], "not sure", 4, "needs ten seconds straight on", "straight"),
@@ -179,8 +180,8 @@ def test_it_rides_straight_until_the_meter_is_sure(stages):
     )
 
 
-def test_after_power_on_in_a_steady_bend_it_says_what_ends_the_doubt(stages):
-    """Riding on does not: nothing in such a bend separates the lean from an error of the sensor."""
+def test_after_power_on_in_a_bend_the_guide_ends_the_doubt(stages):
+    """Riding on in such a bend does not help: nothing in it separates the lean from an error of the sensor."""
     power = [("power", False), ("wait", 0.5), ("power", True)]
     stages(
         ([*RIDING, ("lean", -8), ("wait", 4)], "not sure", 5, "That is all", ""),
@@ -192,7 +193,7 @@ def test_after_power_on_in_a_steady_bend_it_says_what_ends_the_doubt(stages):
 
 
 def test_it_rides_straight_is_not_said_of_a_bike_that_leans(guide):
-    """This holds before the first lean and after it."""
+    """Neither before nor after the first lean."""
     tick = {"powered": True, "plugged": True, "pose": "ride", "phase": "ride", "stage": 0}
     tick.update(t_s=1.0, lean_deg=-7.5)
     said = [
@@ -224,7 +225,7 @@ def view_of(code):
 
 
 def test_each_refusal_and_fault_has_its_step(guide):
-    """Codes that the simulated board never reaches are included."""
+    """Includes the codes that the simulated board never reaches on its own."""
     tick = {"powered": True, "plugged": True, "pose": "kickstand", "phase": "kickstand", "t_s": 1.0, "stage": 0}
     spoilt = ("refused", "The meter says why it has not taken this pose. Press the button: once more.")
     unlike = ("refused", "The meter says why it takes neither pose. Press the button, and begin with the stand.")

@@ -69,7 +69,8 @@ def lean_reads(rider, pattern):
 
 
 def test_lean_fills_the_screen_and_returns(on_the_bar, tmp_path):
-    """In a left turn of 30 degrees: shown large, lost, "--", back, stopped, saved."""
+    """In a left turn of 30 degrees the page shows the lean, loses the board and shows "--". The connection returns, is
+    stopped, and the ride is saved."""
     rider, bridge = on_the_bar
     page = rider.page
     page.evaluate("boardThere = false")

@@ -12,11 +12,11 @@ from support.web.serial_line import SerialLine
 LEAN_DEG = 20.0
 
 
-@pytest.mark.nightly  # `flash` onto the same board, and the page with an imagined one, are tried each time
+@pytest.mark.nightly  # the usual tests cover `flash` on the same board, and the page with a fake one
 @pytest.mark.chip
 def test_board_is_updated_and_watched(chromium, address, tmp_path):
-    """Its calibration is kept. The lean on the page equals that on its display, and the log equals that of `kickstand
-    record`."""
+    """The board keeps its calibration. The page shows the same lean as the display, and saves the same log as
+    `kickstand record`."""
     line = SerialLine(chromium, address + "install.html")
     rider = line.rider
     old = {path: b"old" if path == "/kickstand/lean/meter.mpy" else data for path, data in firmware().items()}
@@ -40,7 +40,7 @@ def test_board_is_updated_and_watched(chromium, address, tmp_path):
         rider.page.click("#stop")
         rider.page.wait_for_selector("#files li", timeout=120_000)
     assert rider.text("#live-said") == "Stopped."
-    rider.page.wait_for_function("document.querySelector('#lean').textContent === '--'")  # it is soon outdated
+    rider.page.wait_for_function("document.querySelector('#lean').textContent === '--'")  # the value is soon outdated
     blocks = streamed(bytes(line.said))
     assert len(blocks) > 1
     assert list(saved(rider, tmp_path).values()) == recorded(blocks)
@@ -90,7 +90,7 @@ def test_a_board_is_checked_on_the_page(chromium, address):
     with pico(part(4, share=0.3), modules()) as device:
         device.run(0.5)
         line.plug_in(device)
-        for k in range(1, 5):  # one of them comes while it is asked for
+        for k in range(1, 5):  # one sample arrives during the request
             device.board.press(device.time_s + 1.5 * k, 0.2)
         shown = line.check().strip().split("\n")
     assert shown[0].startswith("ok   board") and "Raspberry Pi Pico" in shown[0]

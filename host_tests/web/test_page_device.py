@@ -1,4 +1,4 @@
-"""The loop that the page turns is the firmware's own: what the display shows is the same, at the same instants."""
+"""The page runs the firmware's own loop: the display shows the same content at the same times."""
 
 import json
 from pathlib import Path
@@ -31,6 +31,6 @@ def test_the_page_turns_the_loop_as_the_firmware_does(tmp_path):
 
 
 def test_a_press_that_comes_with_its_release_counts(tmp_path):
-    """As after a stall of the browser, which lasted longer than the press."""
+    """For example after the browser stalled for longer than the press."""
     page = run("page", [[1.0, "button", True], [1.0, "button", False]], tmp_path / "page")
     assert any(display["text"][0].startswith("Stand: hold") for _, display in page["displays"])

@@ -1,4 +1,4 @@
-"""The display that the page Try gives its board: another one takes its place while the board runs."""
+"""The page Try can replace the display of its running board by another type."""
 
 import json
 

@@ -87,7 +87,7 @@ def test_riders_settings_are_shown_and_kept(line, board):
 
 
 def test_each_board_has_its_own_default_pins(line, board):
-    """The fields were filled for a Pico before."""
+    """The fields above are filled in from a Pico."""
     other(board, _machine="Generic ESP32 module with ESP32")
     board.modules["sys"].platform = "esp32"
     line.plug_in(RawPrompt(board))
@@ -122,7 +122,7 @@ def test_pulled_cable_leaves_a_board_that_starts_nothing(line, board):
 
 
 def test_a_check_of_a_board_without_the_firmware_is_refused(line, board):
-    """A board without the firmware is refused; the rest is tried with an emulated Pico, in test_page_board.py."""
+    """A board without the firmware is refused. test_page_board.py tests the rest with an emulated Pico."""
     line.plug_in(RawPrompt(board))
     assert line.check().startswith("the firmware on the board at this port is of another version or not whole")
     assert line.rider.page.is_visible("#check") and line.rider.axe() == []
@@ -167,7 +167,7 @@ def test_unsuitable_board_is_not_changed(line, board, differs, platform, words):
 
 
 def test_file_that_is_no_esp32_image_is_not_written(line, board, tmp_path):
-    """Nor an image for another chip; no chip answers here at all."""
+    """The page refuses an image for another chip, too. No chip answers here at all."""
     page = line.rider.page
     page.click("a[href='#micropython']")
     page.click("text=ESP32: a file that ends in .bin")
@@ -217,14 +217,14 @@ def test_setting_of_0_is_not_shown_as_the_default(line):
 
 
 def test_browser_without_serial_ports_is_told_so(chromium, address):
-    """The notice is at the top, and the page offers nothing that needs a serial port."""
+    """The message is at the top, and the page offers no action that needs a serial port."""
     rider = Rider(chromium, address, script="delete Navigator.prototype.serial")
     for name in ("install.html", "live.html"):
         rider.page.goto(address + name)
         first = rider.page.locator("main section:visible").first
         assert first.get_attribute("id") == "unable"
         assert "in Chrome or Edge on a computer" in first.inner_text() and "Firefox, Safari" in first.inner_text()
-        if name == "install.html":  # each step is there, with what a terminal does in its place
+        if name == "install.html":  # each step is shown, with the terminal command that replaces it
             assert rider.page.locator("main h2:visible").count() == 5
             assert rider.text("#here") == address + name
             rider.page.evaluate("document.querySelectorAll('details').forEach((one) => (one.open = true))")
@@ -245,7 +245,7 @@ def test_browser_without_serial_ports_is_told_so(chromium, address):
 
 
 def test_the_board_is_chosen_first_and_the_steps_around_it_open(chromium, address):
-    """On a phone's and on a laptop's first screen. There the first step is open; a link opens its step."""
+    """The steps fit on the first screen of a phone and of a laptop. The first step is open; a link opens its step."""
     rider = Rider(chromium, address + "install.html", **PHONE)
     rider.page.evaluate("document.documentElement.dataset.serial = 'yes'")
     page = rider.page
@@ -287,7 +287,7 @@ def test_the_wiring_is_that_of_the_boards_own_pins(line):
 
 
 def test_each_board_has_its_own_page_for_micropython(line):
-    """A link that opens a new tab when it is clicked."""
+    """Click a link that opens a new tab."""
     links = line.rider.page.locator("a[href^='https:']")
     assert links.evaluate_all("links => links.map((one) => [one.target, one.rel])") == 10 * [["_blank", "noopener"]]
     names = links.evaluate_all("links => links.map((one) => one.href)")

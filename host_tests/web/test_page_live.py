@@ -61,7 +61,7 @@ def test_pulled_cable_leaves_the_log(line, rider, board, tmp_path):
 
 
 def test_car_shows_g_instead_of_a_lean(line, rider, board, tmp_path, monkeypatch):
-    """So does its log, by the calibration. The next motorcycle gets its gauge again."""
+    """The calibration in its log says so as well. For the next motorcycle the gauge appears again."""
     monkeypatch.setattr(ride_writer, "turns", braking_in_a_left_bend)
     line.plug_in(RawPrompt(board, half_seconds(3)[0], vehicle="car"))
     rider.page.click("#start")
@@ -83,7 +83,7 @@ def test_car_shows_g_instead_of_a_lean(line, rider, board, tmp_path, monkeypatch
 
 
 def braking_in_a_left_bend(count, seed=0):
-    """As ride_writer.turns(), of a car: 0.2 and 0.3 g."""
+    """Like ride_writer.turns(), but for a car: 0.2 and 0.3 g."""
     for _ in range(count):
         yield [2 * mean for mean in (-851, 1324, 4096, 0, 0, 98, 0)], 2, 10_000
 
@@ -97,7 +97,7 @@ def test_failed_loading_of_tools_can_be_repeated(chromium, address, board):
     line = SerialLine(chromium, address + "live.html", service_workers="block")
     rider = line.rider
     line.plug_in(RawPrompt(board, half_seconds(3)[0]))
-    for name in ("python.mjs", "pyodide.asm.wasm"):  # Pyodide itself does not report that the second is missing
+    for name in ("python.mjs", "pyodide.asm.wasm"):  # Pyodide itself does not report that the second file is missing
         rider.page.route(f"**/{name}", lambda route: route.abort())
         rider.page.click("#start")
         rider.page.wait_for_selector("#live-said:has-text('Is there a network? Press the button again')")
@@ -195,7 +195,7 @@ def test_port_without_signals_is_closed_again(line):
 
 
 def test_port_with_a_stuck_stream_is_closed(line):
-    """Otherwise it could not be opened again."""
+    """The port is closed; otherwise it could not be opened again."""
     script = """async () => {
       const { SerialLine } = await import("./cable/cable.mjs");
       const said = [];
@@ -212,7 +212,7 @@ def test_port_with_a_stuck_stream_is_closed(line):
 
 
 def test_line_continues_after_a_disturbed_byte(line):
-    """Like Web Serial: the stream fails, and the port gets another one until the cable is pulled."""
+    """As with Web Serial, the stream fails, and the port gets a new stream until the cable is pulled."""
     script = """async () => {
       const { SerialLine } = await import("./cable/cable.mjs");
       const streams = [1, 2].map((byte) => {

@@ -1,4 +1,4 @@
-"""The page for everyone: axe-core finds nothing, in the light and in the dark, on a phone and on a laptop."""
+"""The pages are accessible: axe-core finds no problem, in the light and the dark style, on a phone and on a laptop."""
 
 import pytest
 from support.web.rider import LAPTOP, PHONE, Rider
@@ -8,7 +8,7 @@ PAGES = {"": "Try", "install.html": "Install", "live.html": "Live"}
 
 @pytest.mark.parametrize("name", PAGES)
 def test_axe_finds_nothing(chromium, address, name):
-    """Colours and names are the same on a laptop: its own arrangement is looked at on the page with most in it."""
+    """Colours and names are the same on a laptop. So its layout is only checked on the page with the most content."""
     rider = Rider(chromium, address + name, **PHONE)
     assert rider.text("nav [aria-current]") == PAGES[name]
     if not name:
@@ -20,7 +20,7 @@ def test_axe_finds_nothing(chromium, address, name):
     rider.context.close()
 
 
-def test_on_a_phone_everything_for_the_first_minute_is_on_its_first_screen(chromium, address):
+def test_a_phones_first_screen_has_all_for_the_first_minute(chromium, address):
     rider = Rider(chromium, address, **PHONE)
     tops = rider.page.eval_on_selector_all("main > section", "all => all.map((one) => one.getBoundingClientRect().top)")
     assert tops == sorted(tops), "what arrives first is seen first, or the page moves while it loads"
@@ -42,8 +42,9 @@ def test_on_a_phone_everything_for_the_first_minute_is_on_its_first_screen(chrom
     rider.context.close()
 
 
-def test_a_phone_leans_the_motorcycle_and_a_tablet_without_motion_data_says_so(chromium, address):
-    """The page also says what it is. A click by a screen reader, without a pointer, presses the button, too."""
+def test_a_phone_leans_the_motorcycle_if_it_has_motion_data(chromium, address):
+    """The page's introduction is visible, too. A screen reader's click, which comes without a pointer, also presses the
+    button."""
     rider = Rider(chromium, address, **PHONE)
     rider.page.set_viewport_size({"width": 820, "height": 1180})
     rider.reads("Raw")
@@ -71,7 +72,7 @@ def test_a_phone_leans_the_motorcycle_and_a_tablet_without_motion_data_says_so(c
 
 
 def test_nothing_is_below_the_choice_of_the_display(chromium, address):
-    """This also holds in a narrow window of a computer, whose help names keys."""
+    """The same holds in a narrow window of a computer, where the page also explains the keys."""
     rider = Rider(chromium, address, viewport={"width": 390, "height": 844})
     for width in (360, 390, 420, 480, 512, 560, 800):
         rider.page.set_viewport_size({"width": width, "height": 844})
@@ -86,7 +87,7 @@ def test_nothing_is_below_the_choice_of_the_display(chromium, address):
 
 
 def test_motorcycle_is_seen_in_the_dark(chromium, address):
-    """Mirrors, frame and tyre have another colour than the road behind them."""
+    """Mirrors, frame and tyre differ in colour from the road behind them."""
     rider = Rider(chromium, address, color_scheme="dark", **LAPTOP)
     rider.page.wait_for_selector(".mirror")
     colours = (

@@ -54,7 +54,7 @@ def test_the_charts_are_those_of_the_command(page, ride, calibration):
     assert "Plotly.newPlot" in html and "src=" not in html.split("<body>")[0].rpartition("</script>")[2]
     assert '<script src="' not in html and "<h1>RIDE</h1>" in html
     frame = page.page.locator("#plot").bounding_box()
-    assert frame["height"] > 900  # as high as its charts: nothing to scroll within
+    assert frame["height"] > 900  # as high as its charts, so nothing scrolls inside it
 
 
 def test_the_lean_of_each_sample_is_that_of_the_command(page, ride, calibration, tmp_path):
@@ -89,7 +89,7 @@ def test_page_does_not_wait_for_impossible_charts(page, ride, calibration):
 
 
 def test_too_short_ride_is_reported_at_the_top(page, calibration, tmp_path):
-    """In the words of the command. A standing bike with a running engine is not riding."""
+    """The page uses the words of the command. A standing bike with a running engine is not riding."""
     random = np.random.default_rng(1)
     readings = random.normal(0.0, [0.03] * 3 + [1.0] * 3, (1200, 6)) + [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
     rows = [",".join(f"{value:.4f}" for value in (k / 100.0, *row)) for k, row in enumerate(readings.tolist())]
@@ -131,7 +131,7 @@ def test_values_at_the_pointer_are_in_one_line(page, ride, calibration):
     raise AssertionError("nothing is said")
 
 
-@pytest.mark.nightly  # the page Install, which is made in the same way, is tried each time
+@pytest.mark.nightly  # the usual tests cover the page Install, which is built in the same way
 def test_once_used_it_works_without_a_network(chromium, address, ride, calibration):
     rider = Rider(chromium, address + "rides.html", **LAPTOP)
     page = Rides(rider)
@@ -146,7 +146,7 @@ def test_once_used_it_works_without_a_network(chromium, address, ride, calibrati
 
 
 def test_long_work_can_be_stopped(page, ride, calibration):
-    """Then other files are used instead."""
+    """After the stop, the page can read other files."""
     page.give()
     page.page.set_input_files("#files", [ride, calibration])
     page.page.click("#stop")
@@ -178,7 +178,7 @@ def test_axe_finds_nothing(page, ride, calibration, kind):
 
 @pytest.mark.nightly
 def test_page_responds_while_reading_thirty_megabytes(chromium, address, calibration, tmp_path):
-    """Over half an hour at 200 samples a second: the page answers meanwhile, and its memory hardly grows."""
+    """Over half an hour at 200 samples per second: the page stays responsive, and its memory hardly grows."""
     short = app_exports.riding()
     readings = np.column_stack((short.force_g, short.rates_dps))
     lines = [",".join(f"{value:.7f}" for value in row) for row in readings.tolist()]
@@ -199,6 +199,6 @@ def test_page_responds_while_reading_thirty_megabytes(chromium, address, calibra
 
 
 def rss_mb(process):
-    """Memory of a process, by its number."""
+    """The memory of a process, by its id."""
     lines = Path(f"/proc/{process}/status").read_text().splitlines()
     return sum(int(line.split()[1]) for line in lines if line.startswith("VmRSS")) / 1024.0

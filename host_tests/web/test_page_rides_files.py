@@ -34,7 +34,7 @@ def test_cut_gzip_file_is_shown_with_a_warning(page, ride, calibration, tmp_path
 
 
 def test_a_log_alone_asks_for_its_calibration(page, ride, calibration):
-    """It may be added later, or found from the ride if that is long enough."""
+    """The calibration may be added later, or computed from a ride that is long enough."""
     assert "has no calibration with it" in page.give(ride)
     assert page.page.is_hidden("#report")
     page.page.click("#align")
@@ -44,7 +44,7 @@ def test_a_log_alone_asks_for_its_calibration(page, ride, calibration):
 
 
 def test_the_export_of_a_phone_becomes_a_log(page, tmp_path):
-    """As `import` makes it; with a calibration it is a ride."""
+    """The log is the one that `import` writes. With a calibration it is a ride."""
     path = app_exports.into(tmp_path / "phone.zip", app_exports.phyphox(app_exports.riding().every(4)))
     assert "phone.zip has no calibration with it" in page.give(path)
     (tmp_path / "phone.cal.json").write_text(json.dumps(PHONE_MOUNTED))
@@ -68,7 +68,8 @@ def test_one_of_several_rides_is_chosen(page, ride, calibration, tmp_path):
         files[-1].write_bytes(calibration.read_bytes())
     page.give(*files)
     first = page.report()[0]
-    with page.page.expect_download(timeout=WAIT_MS) as lean:  # downloads even if another ride is chosen meanwhile
+    # the report appears although another ride was chosen meanwhile
+    with page.page.expect_download(timeout=WAIT_MS) as lean:
         page.page.evaluate("document.querySelector('#save-lean').click()")
         page.page.select_option("#ride", "B.csv")
     assert lean.value.suggested_filename == "A.lean.csv"
@@ -125,7 +126,7 @@ def test_files_are_added_and_removed_in_any_order(page, ride, calibration, tmp_p
     assert page.page.inner_text("#calibration") == "RIDE.cal.json"
     other = tmp_path / "other.csv"
     other.write_bytes(ride.read_bytes())
-    assert "other.csv has no calibration" in page.add(other)  # it is beside another ride
+    assert "other.csv has no calibration" in page.add(other)  # the calibration is beside another ride
     bike = tmp_path / "bike.json"
     bike.write_bytes(calibration.read_bytes())
     assert page.add(bike) == ""
@@ -187,7 +188,8 @@ def test_a_track_joins_a_ride_without_gps(page, tmp_path, write):
 
 
 def test_sample_ride_is_shown_as_simulated(page):
-    """Before, a drawing of it is beside the place for files; then the charts are beside the figures."""
+    """Before that, a drawing of a report is beside the place for files. Afterwards the charts are beside the
+    figures."""
     page.give()
     drop, drawn = (page.page.locator(one).bounding_box() for one in ("#drop", ".sample svg"))
     assert drop["height"] > 300 and drawn["y"] + drawn["height"] < page.page.viewport_size["height"]
@@ -206,7 +208,7 @@ def test_sample_ride_is_shown_as_simulated(page):
 
 
 def test_browser_without_a_store_is_told_so(chromium, address):
-    """In a private window some browsers refuse their store."""
+    """In a private window some browsers refuse to store data."""
     rider = Rider(chromium, address + "licences.txt", **LAPTOP)
     rider.context.add_init_script("IDBFactory.prototype.open = () => { throw new DOMException('', 'SecurityError'); }")
     rider.page.goto(address + "rides.html#pulled")

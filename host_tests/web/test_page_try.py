@@ -9,7 +9,7 @@ ACTIVE = "document.activeElement.id || document.activeElement.value"
 
 
 def tab_to(rider, name):
-    """Go on with the Tab key until this control has the focus."""
+    """Press the Tab key until this control has the focus."""
     for _ in range(20):
         rider.page.keyboard.press("Tab")
         if rider.page.evaluate(ACTIVE) == name:

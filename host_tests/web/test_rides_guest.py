@@ -55,12 +55,12 @@ def test_ride_that_exceeds_the_memory_is_reported():
 
 
 def rides_of(tmp_path, monkeypatch, files):
-    """{log: calibration} of these files, {name: text}."""
+    """Return {log: calibration} for these files, {name: text}."""
     for folder in ("given", "here"):
         (tmp_path / folder).mkdir()
     for name, text in files.items():
         text = json.dumps(analysis_rides.CALIBRATION) if name.endswith(".json") else text
         (tmp_path / "given" / name).write_text(text)
-    monkeypatch.chdir(tmp_path / "here")  # where all else is deleted
+    monkeypatch.chdir(tmp_path / "here")  # the folder in which all other files are deleted
     found = json.loads(rides_guest.rides(str(tmp_path / "given"), json.dumps(list(files))))
     return {one["log"]: one["calibration"] for one in found["rides"]}

@@ -53,7 +53,7 @@ def test_site_is_written_to_a_folder(files, built, tmp_path):
 
 
 def test_site_built_on_github_knows_its_home(monkeypatch):
-    """A site built elsewhere names none."""
+    """A site built without the project's address contains no such link."""
     core = pytest.importorskip("hatchling.metadata.core")
     manager = pytest.importorskip("hatchling.plugin.manager")
 
@@ -73,7 +73,7 @@ def test_site_is_served_and_opened(files, built, monkeypatch):
     monkeypatch.setattr("webbrowser.open", opened.append)
 
     def look(server):
-        """Called instead of serving until Ctrl-C."""
+        """Replaces the server that runs until Ctrl-C."""
         threading.Thread(target=server.handle_request, daemon=True).start()
         seen.append(urllib.request.urlopen(opened[0]).read())
         raise KeyboardInterrupt
@@ -126,14 +126,14 @@ def test_site_is_small(files):
 
 
 def test_browser_without_serial_ports_offers_the_firmware(files):
-    """As a folder that mpremote copies."""
+    """The files form a folder that mpremote can copy."""
     archive = zipfile.ZipFile(io.BytesIO(files["firmware.zip"]))
     there = {name.removeprefix("kickstand-firmware/"): archive.read(name) for name in archive.namelist()}
     assert there == {name.lstrip("/"): path.read_bytes() for name, path in firmware_files().items()}
 
 
 def test_each_board_gets_its_own_machine_code(files):
-    """Three modules contain some; everything else is the same for every board."""
+    """Three modules contain machine code; all other files are the same for every board."""
     names = zipfile.ZipFile(io.BytesIO(files["install.zip"])).namelist()
     made = {
         one: {name.split("/", 2)[2] for name in names if name.startswith(f"compiled/{one}/")} for one in ARCHITECTURES
@@ -245,7 +245,7 @@ def test_strange_or_slow_requests_do_not_stop_the_server(monkeypatch, capsys):
 
 
 def test_trickling_connections_are_ended_for_others(monkeypatch):
-    """They have sent a byte in time, but never a whole request."""
+    """These clients send a byte in time, but never a whole request."""
     monkeypatch.setattr(serve, "MOST", 4)
     monkeypatch.setattr(serve, "FULL_S", 0.2)
     with serve.server({"index.html": b"the page"}, 0) as server:
@@ -263,7 +263,7 @@ def test_trickling_connections_are_ended_for_others(monkeypatch):
 
 
 def test_silent_connections_do_not_hold_the_page():
-    """190 of them, with the real limits: each one beyond the limit ends the oldest without a request."""
+    """190 connections with the real limits: each one above the limit closes the oldest one without a request."""
     with serve.server({"index.html": b"the page"}, 0) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         port = server.server_address[1]
@@ -278,7 +278,7 @@ def test_silent_connections_do_not_hold_the_page():
 
 
 def test_pages_get_no_other_installed_packages(tmp_path, monkeypatch):
-    """numpy and rich are beside it then."""
+    """The tools are installed beside numpy and rich here."""
     shutil.copytree(firmware_path.TOOLS / "kickstand_tools", tmp_path / "kickstand_tools")
     for name in "numpy", "rich":
         (tmp_path / name).mkdir()

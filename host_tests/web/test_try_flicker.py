@@ -1,4 +1,4 @@
-"""The page Try never shows a half-written display. The test samples it every 20 ms."""
+"""The page Try never shows a half-written display, sampled every 20 ms."""
 
 import json
 import re
@@ -52,7 +52,7 @@ WHOLE = re.compile(
     r"|Formula +-?\d+° *$| *-?\d\.\d\d *-?\d\.\d\d *-?\d\.\d\dg *$"
 )
 STARTED_S = 1.0
-LASTING_S = 0.08  # the firmware writes a page every 0.1 s, so a shorter text was not a page
+LASTING_S = 0.08  # the firmware writes a page every 0.1 s: text that disappears sooner was not a page
 LOOK = """(seconds) => new Promise((done) => {
   const seen = [], until = performance.now() + 1000 * seconds;
   const look = () => {

@@ -97,7 +97,7 @@ class EmulatedChip:
             end.cancel()
 
     def stop(self) -> None:
-        """End run() after this instruction."""
+        """Make run() return after the current instruction."""
         self.stopped = True
 
     def reset(self) -> None:

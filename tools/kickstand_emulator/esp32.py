@@ -78,7 +78,7 @@ class Sink:
         self._flash = Path(self._directory.name, "flash")
         self._process: subprocess.Popen | None = None
         self._link = socket.socket()
-        self._begun_us = 0  # when it was switched on
+        self._begun_us = 0  # time of power-on
         self._end_us = 0  # of run()
         self._waiting = bytearray()  # for its console
         self._sending = False
@@ -171,7 +171,7 @@ class Sink:
     # Messages: see esp32_machine.py
 
     def _command(self, kind: int, a: int = 0, b: int = 0, value: int = 0) -> None:
-        with contextlib.suppress(OSError):  # _serve() says why
+        with contextlib.suppress(OSError):  # see _serve() for the reason
             self._link.sendall(COMMAND.pack(kind, a, b, value))
 
     def _serve(self) -> None:

@@ -75,7 +75,7 @@ class Pico(EmulatedDevice):
         self.chip.reset()
 
     def stop(self) -> None:
-        """End run() after this instruction."""
+        """Make run() return after the current instruction."""
         self.chip.stop()
 
     def stall(self, seconds: float) -> None:

@@ -1,4 +1,4 @@
-"""The command `kickstand fleet`: many vehicles at once."""
+"""The command `kickstand fleet`, which processes many vehicles at once."""
 
 from typing import Any
 
@@ -38,7 +38,7 @@ def fleet_command(manifests: tuple[str, ...], out: str, vehicle: str, **how: Any
     from .run import run_fleet
 
     manifest = manifests[0]
-    if len(manifests) > 1:  # the shell has replaced a pattern by names
+    if len(manifests) > 1:  # the shell has replaced a pattern by file names
         raise click.UsageError("One manifest, or one pattern in quotation marks.")
     periods = by_pattern(manifest, vehicle) if is_pattern(manifest) else read_manifest(manifest)
     try:

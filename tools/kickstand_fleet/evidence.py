@@ -58,11 +58,11 @@ class Intervals:
 
 @dataclass
 class Blocks(Table):
-    """m consecutive blocks of intervals in one or several logs.
+    """Consecutive blocks (m) of intervals in one or several logs.
 
     square (m, 4, 4), product (m, 4, 3): sums of terms x terms and of terms x force, the road's slope filtered out (see
-    _without_road()). sway (m, 3, 3): mean of the intervals' divided by its trace, because a rough road must count no
-    more than another. log (m): index of the log; t_s, end_s (m): begin and end in it.
+    _without_road()). sway (m, 3, 3): mean of the intervals' sway, divided by its trace, because a rough road must not
+    count more than a smooth one. log (m): index of the log; t_s, end_s (m): begin and end in it.
     """
 
     square: Array
@@ -160,8 +160,8 @@ def frame_of(up: Array, ahead: Array) -> Array:
 
 
 def handedness(found: Array, varied: Array) -> float:
-    """The ratio of the lateral force in bends to the one that the yaw rate requires. It is about 1; about -1 if the
-    gyro's signs or the axes are mirrored; 0 without bends and on a motorcycle, which leans into them."""
+    """The lateral force in bends divided by the force that the yaw rate requires. The ratio is about 1, or about -1 if
+    the gyro's signs or the axes are mirrored. It is 0 without bends, and on a motorcycle, which leans into them."""
     if varied[1] < 0.05:
         return 0.0
     level, forward, left = found[:3]

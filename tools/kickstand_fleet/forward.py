@@ -18,7 +18,7 @@ from .evidence import Intervals
 
 SENSOR_DEG = 0.3  # standard deviation of forward caused by scale errors of 1 % between the sensor's axes
 CORRELATION = 0.5  # between the errors of both methods: they use the same braking
-APART_SIGMAS = 2.0  # if the two differ by more, forward's standard error grows with the difference
+APART_SIGMAS = 2.0  # above this difference of the two methods, forward's standard error grows
 # The arm is left out: it only helps to compare parts of a drive. Over a whole drive it absorbs other effects too: with
 # it, one of three recorded drives was 2 degrees off; without it, none was off by more than 0.6.
 _TERMS = 3

@@ -44,7 +44,7 @@ class Journal:
                 if not self._note(line) and line.strip():
                     self.damaged += 1
                     self._file.seek(self._end)
-                    self._file.write(b" " * (len(line) - 1) + b"\n")  # overwritten, to count it only once
+                    self._file.write(b" " * (len(line) - 1) + b"\n")  # count a damaged line only once
                 self._end += len(line)
             self._file.flush()
         except OSError as error:

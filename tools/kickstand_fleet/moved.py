@@ -89,7 +89,8 @@ def _search(logs: list[Intervals], whole: Blocks, share: float) -> list[Move]:
         score = move.sigmas / share / (BETWEEN_SIGMAS if between else SUDDEN_SIGMAS if tilted else WITHIN_SIGMAS)
         if move.angle_deg < LEAST_DEG or score < 1.0 or (best and score <= best[0]):
             continue
-        if not between and tilted and abs(turn[1]) < WITHIN_SIGMAS * sigma[1]:  # a slope of the road causes no yaw
+        # a slope of the road does not change yaw
+        if not between and tilted and abs(turn[1]) < WITHIN_SIGMAS * sigma[1]:
             moment = _moment_of_jump(logs[move.log], move)
             if moment is None:
                 continue

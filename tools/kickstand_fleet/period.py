@@ -60,7 +60,7 @@ def work_on_period(period: Period, signals_to: str | None = None) -> PeriodResul
 
     signals_to: a directory for each log's accelerations along the vehicle's axes, None for none. Problems of the data
     are part of the result: a log that cannot be used adds a row of errors. If no log is left, the status is "error" or
-    "refused". Never raises, because one vehicle must not stop a fleet.
+    "refused". Raises nothing, because one vehicle must not stop a fleet.
 
     >>> found = work_on_period(Period("bus 12", "", "car", ("no-such-file.csv",)))
     >>> found.alignment["status"], found.errors[0]["message"]

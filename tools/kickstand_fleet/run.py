@@ -98,7 +98,7 @@ def run_fleet(
                     write_results(directory, journal.results(keys), len(keys))
                     last_s = time.monotonic()
                     pause_s = max(_WRITE_S, _SHARE * (last_s - before_s))
-        except BaseException:  # also when the user stops it
+        except BaseException:  # also runs when the user stops the run
             with contextlib.suppress(InputError):  # the first error already reports a full disk
                 if next(journal.results(keys), None):
                     write_results(directory, journal.results(keys), len(keys))

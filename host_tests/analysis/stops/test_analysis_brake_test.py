@@ -65,7 +65,7 @@ def truth(time: np.ndarray, speed: np.ndarray, stop: Stop) -> tuple[float, float
     """Return (initial speed, distance from the start found, MFDD), computed from the true speed around this stop."""
     near = (time > stop.start_s - 1.0) & (time < stop.stop_s + 1.0)
     t, v = time[near], speed[near]
-    first = len(v) - 1 - int(np.argmax(v[::-1] > np.max(v) - 0.01))  # the last sample at the speed before braking
+    first = len(v) - 1 - int(np.argmax(v[::-1] > np.max(v) - 0.01))  # last sample at the earlier speed
     t, v = t[first:], v[first:]
     distance = np.concatenate(([0.0], np.cumsum(np.diff(t) * (v[1:] + v[:-1]) / 2.0)))
     kmh = v * 3.6
@@ -122,7 +122,8 @@ def test_stops_without_a_speed_match_the_truth(ride):
 
 
 def test_mfdd_follows_its_definition():
-    """A constant deceleration is its own MFDD. Speeds above 0.8 v0 and below 0.1 v0 do not count."""
+    """The MFDD of a constant deceleration is that deceleration. Braking before 0.8 v0 and after 0.1 v0 does not
+    count."""
     v = np.linspace(20.0, 0.0, 2001)
     assert mfdd_mps2(v, (20.0**2 - v * v) / (2 * 5.0)) == pytest.approx(5.0, rel=1e-9)
     # decelerate at 3 m/s2 down to 0.8 v0, then at 8 and 5, then at 3 again

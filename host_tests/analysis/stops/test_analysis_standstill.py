@@ -32,7 +32,7 @@ def without_speed(whole: Channels) -> Channels:
 
 
 def test_fast_smooth_track_is_not_a_standstill(track):
-    """This also holds for a sensor without the six positions, because the ride shows its weight at rest."""
+    """This also holds for a sensor without six positions: the force that it reads at rest is known from the ride."""
     still = standing(without_speed(track))
     assert np.max(track.speed_mps[still]) < 0.5
     assert np.mean(still[track.speed_mps == 0.0]) > 0.9
@@ -61,7 +61,7 @@ def test_stop_at_a_false_standstill_is_not_shown(track, monkeypatch):
     ("mps", "side_m", "heading_deg"), [(80.0, 0.0, 0.0), (20.0, -20.0, 0.0), (20.0, 20.0, 0.0), (20.0, 0.0, -40.0)]
 )
 def test_implausible_bend_or_speed_is_not_a_stop(mps, side_m, heading_deg):
-    """These stops rest on integrated readings alone: 288 km/h, 20 m beside the line, or a heading that changes by 40
+    """Integrated readings alone do not prove a stop with 288 km/h, 20 m beside the line, or a heading change of 40
     degrees."""
     assert brake_test.plausible(60.0, 10.0, 20.0)
     assert not brake_test.plausible(mps, side_m, heading_deg)

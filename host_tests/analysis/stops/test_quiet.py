@@ -42,7 +42,7 @@ def maybe(**changed: float) -> Channels:
 
 
 def share(ride: Channels) -> float:
-    """Return the share of the middle that is found to be a standstill. Fails if any other part is."""
+    """Return the share of the middle that counts as a standstill. The riding before and after must not count."""
     still = standing(ride)
     t = ride.t_s
     assert not still[(t < 5.0) | (t > END_S + 0.5)].any()
@@ -54,8 +54,8 @@ def share(ride: Channels) -> float:
     [
         ({"pitch_rate_dps": 0.14}, {"pitch_rate_dps": 0.16}),  # 15 % of the shaking while riding
         ({"yaw_rate_dps": 0.14}, {"yaw_rate_dps": 0.16}),
-        ({"up_g": 0.19}, {"up_g": 0.21}),  # 20 % of the shaking while riding
-        ({"engine": 3.0}, {"pitch_rate_dps": 1.0}),  # an idling engine shakes as much, but faster
+        ({"up_g": 0.19}, {"up_g": 0.21}),  # 20 % of it
+        ({"engine": 3.0}, {"pitch_rate_dps": 1.0}),  # idling: as strong, but faster
         ({"pitching": 0.95}, {"pitching": 1.05}),  # 1 deg/s
         ({"pitching": -0.95}, {"pitching": -1.05}),
         ({"yawing": 0.95}, {"yawing": 1.05}),
@@ -98,8 +98,8 @@ def test_standstill_needs_a_second_of_quiet(seconds, stands):
 
 
 def test_rest_of_the_filter_is_extended_back():
-    """On a road without shaking: braking until 12 s, a fork that rebounds for 0.3 s, and a rest found from 13.5 s
-    on."""
+    """The road does not shake the bike. It brakes until 12 s, the fork rebounds for 0.3 s, and the filter finds a rest
+    from 13.5 s on."""
     road = Road((8.0, 0.0), (4.0, -4.0), (4.0, 0.0))
     ride = road.channels(resting=(road.t_s >= 13.5).astype(float))
     ride.forward_g += 0.03

@@ -31,7 +31,7 @@ def conditioned(part, speed, acceleration, delay_s):
     knots = time[-1] - 0.5 * np.arange(count)
     back = np.arange(count)
     covariance = 0.05**2 + 0.1**2 * 0.5 * np.minimum(back[:, None], back[None, :])
-    slopes = []  # change of the speed at a sample in m/s, for each slope
+    slopes = []  # effect of each of them on the speed at a sample, m/s
     for k in range(count):
         hat = np.interp(-time, -knots, np.eye(count)[k])
         steps = np.append(np.diff(time) * (hat[1:] + hat[:-1]) / 2.0, 0.0)

@@ -32,7 +32,7 @@ def test_limits_of_a_stop(mps, mps2, counts):
 
 @pytest.mark.parametrize("speed", ["log", "integrated"])
 def test_every_figure_of_a_stop_is_right(speed):
-    """From 20 m/s at 5 m/s2 a stop takes 4 s and 40 m, straight ahead."""
+    """A stop from 20 m/s at 5 m/s2 takes 4 s and 40 m, straight ahead."""
     road = braking(20.0, 5.0)
     ride = road.channels()
     if speed == "log":
@@ -52,9 +52,8 @@ def test_every_figure_of_a_stop_is_right(speed):
 
 
 def test_rebound_of_the_fork_does_not_change_the_end():
-    """Below a fiftieth of the speed an even stop is assumed, because there the sensor is thrown back and forth.
-
-    60 m/s at 5 m/s2: 12 s and 360 m.
+    """Below a fiftieth of the speed a constant deceleration is assumed, because the fork throws the sensor back and
+    forth. A stop from 60 m/s at 5 m/s2 takes 12 s and 360 m.
     """
     road = braking(60.0, 5.0)
     ride = road.channels()
@@ -66,7 +65,7 @@ def test_rebound_of_the_fork_does_not_change_the_end():
 
 
 def test_jerk_is_the_steepest_change_of_the_force():
-    """Braking grows by 10 m/s3 to 6 m/s2, stays, and is released at 20 m/s3 until 3 m/s are left."""
+    """Braking grows by 10 m/s3 to 6 m/s2, stays constant, and falls by 20 m/s3 at the end, from 3 m/s on."""
     t = np.arange(0.0, 30.0, 1.0 / RATE_HZ)
     braked = np.interp(t, [15.0, 15.6, 17.6, 17.9, 19.0], [0.0, 6.0, 6.0, 0.0, 0.0])
     lost = np.concatenate(([0.0], np.cumsum((braked[1:] + braked[:-1]) / 2.0 / RATE_HZ)))[-1]
@@ -91,7 +90,7 @@ def test_jerk_is_the_steepest_change_of_the_force():
     ],
 )
 def test_start_of_braking_is_found(engine_mps2, mps2, earlier_s):
-    """The brakes are applied after 4 s of slowing down by the engine alone."""
+    """Before the brakes, the engine alone slows the bike for 4 s."""
     mps = 18.0
     seconds = (mps - 4.0 * engine_mps2) / mps2
     road = Road((REST_S, 0.0), (6.0, 3.0), (3.0, 0.0), (4.0, -engine_mps2), (seconds, -mps2), (REST_S, 0.0))
@@ -101,7 +100,7 @@ def test_start_of_braking_is_found(engine_mps2, mps2, earlier_s):
 
 @pytest.mark.parametrize(("pause_s", "counts"), [(0.26, True), (0.56, False)])
 def test_brief_pause_before_the_standstill_is_bridged(pause_s, counts):
-    """A short pause does not end a stop. A longer pause ends it, and the rest is then too slow to count."""
+    """A stop continues after a short pause. A longer pause ends it, and the rest is too slow to count."""
     road = Road(*((REST_S, 0.0), (5.0, 4.0), (3.0, 0.0), (3.9, -5.0), (pause_s, 0.0), (0.1, -5.0), (REST_S, 0.0)))
     found = find_stops(road.channels())
     assert len(found) == counts
@@ -110,14 +109,15 @@ def test_brief_pause_before_the_standstill_is_bridged(pause_s, counts):
 
 
 def test_no_stop_is_longer_than_a_minute():
-    """From 67.6 m/s at 1.04 m/s2 a stop takes 65 s, but only the last 60 s are used."""
+    """A stop from 67.6 m/s at 1.04 m/s2 takes 65 s. Only its last 60 s are used."""
     (stop,) = find_stops(braking(67.6, 1.04).channels())
     assert stop.initial_speed_mps == pytest.approx(1.04 * 60.0, rel=0.005)
 
 
 @pytest.mark.parametrize(("missing_s", "initial_mps"), [(0.46, 20.0), (0.56, 12.2)])
 def test_missing_readings_are_bridged_for_half_a_second(missing_s, initial_mps):
-    """Up to half a second is bridged. After a longer gap the stop begins: 14 + 1 s and the gap after the start."""
+    """A gap of up to half a second is bridged. A stop begins after a longer gap: 14 + 1 s and the gap after the log's
+    start."""
     road = braking(20.0, 5.0)
     there = (road.t_s < 15.001) | (road.t_s > 15.0 + missing_s - 1e-6)
     (stop,) = find_stops(road.channels().part(there))
@@ -125,7 +125,7 @@ def test_missing_readings_are_bridged_for_half_a_second(missing_s, initial_mps):
 
 
 def test_only_readings_after_the_last_gap_are_integrated():
-    """With two gaps, integration begins after the last one."""
+    """The ride has two gaps. Only the last one counts."""
     road = braking(20.0, 2.0)
     there = ~((road.t_s > 14.5) & (road.t_s < 15.4)) & ~((road.t_s > 17.0) & (road.t_s < 17.9))
     (stop,) = find_stops(road.channels().part(there))
@@ -171,7 +171,7 @@ class TestStandstill:
 
 @pytest.mark.parametrize("up", [-0.33, 0.33])
 def test_steep_road_does_not_change_the_figures(up):
-    """The road has the slope of the steepest streets, 19 degrees. The force at standstill shows it."""
+    """The slope is the sine of 19 degrees, as in the steepest streets. The force at standstill shows it."""
     road = braking(20.0, 5.0)
     (stop,) = find_stops(road.channels(forward_g=road.mps2 / STANDARD_GRAVITY + up))
     assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.002)
@@ -179,7 +179,7 @@ def test_steep_road_does_not_change_the_figures(up):
 
 @pytest.mark.parametrize(("samples", "counts"), [(10, 0), (11, 1)])
 def test_brief_standstill_shows_no_slope(samples, counts):
-    """Only a longer standstill shows the slope of the road, here 10 % downhill."""
+    """A longer standstill shows the slope of a road that falls by 10 %."""
     road = braking(20.0, 5.0)
     still = (road.t_s >= 18.0 - 1e-6) & (road.t_s < 18.0 + samples / RATE_HZ - 1e-6)
     found = stops_of(road.channels(forward_g=road.mps2 / STANDARD_GRAVITY - 0.1), still)
@@ -219,7 +219,8 @@ def test_bend_is_not_a_dive(side):
 
 
 def test_deviation_from_the_straight_line_is_right():
-    """0.5 deg/s to the left over the 4 s: the integral of (20 - 5 t) sin(0.5 deg/s t), with t from braking's begin."""
+    """The bike turns left at 0.5 deg/s for 4 s. The deviation is the integral of (20 - 5 t) sin(0.5 deg/s t), with t
+    from the start of braking."""
     road = braking(20.0, 5.0)
     ride = road.channels(yaw_rate_dps=np.where((road.t_s >= 14.0) & (road.t_s < 18.0), 0.5, 0.0))
     (stop,) = find_stops(ride)
@@ -244,15 +245,13 @@ def test_each_stop_begins_after_the_previous_standstill():
 
 @pytest.mark.parametrize(("off_g", "counts"), [(0.11, True), (0.15, False)])
 def test_stop_with_an_open_speed_is_rejected(off_g, counts):
-    """An error of 0.15 g over 8.8 s of riding gives 13 m/s at the earlier standstill. The limit is 3 m/s + 0.7 m/s
-    per second."""
+    """An error of 0.15 g over 8.8 s of riding would give 13 m/s at the previous standstill. The limit is 3 m/s plus 0.7
+    m/s per second."""
     road = braking(20.0, 5.0, before_s=4.0)
     ride = road.channels()
     ride.forward_g[(road.t_s > 5.0) & (road.t_s < 14.0)] -= off_g
     assert len(find_stops(ride)) == counts
-    assert closes(40.0, seconds=40.0) and not closes(
-        40.0, seconds=20.0
-    )  # after a long ride an integrated speed proves nothing
+    assert closes(40.0, seconds=40.0) and not closes(40.0, seconds=20.0)  # an old speed proves nothing
 
 
 def test_rolling_out_is_not_braking():
@@ -273,7 +272,7 @@ def test_speed_in_the_log_corrects_the_integral():
 
 @pytest.mark.parametrize(("mps2", "counts"), [(1.45, False), (1.55, True)])
 def test_hard_stop_is_shown_by_the_speed_alone(mps2, counts):
-    """From 1.5 m/s2 and 10 km/h on it is surely a stop."""
+    """A stop counts from 1.5 m/s2 on and from more than 10 km/h."""
     road = braking(20.0, mps2)
     ride = road.channels()
     ride.speed_mps[::50] = road.mps[::50]
@@ -288,7 +287,8 @@ def test_hard_stop_is_shown_by_the_speed_alone(mps2, counts):
     ("hard", "easy", "counts"), [((4.0, -4.0), (8.0, -0.5), True), ((4.0, -9.0), (16.0, -0.25), False)]
 )
 def test_stop_by_speed_alone_takes_at_most_15_seconds(hard, easy, counts):
-    """A stop from 20 m/s within 12 s counts. A stop from 40 m/s within 20 s does not, because it takes over 15 s."""
+    """Braking from 20 m/s within 12 s is a stop. From 40 m/s within 20 s it is not, because the last 15 s do not show
+    it."""
     top_mps = -hard[0] * hard[1] - easy[0] * easy[1]
     road = Road((REST_S, 0.0), (top_mps / 4.0, 4.0), (3.0, 0.0), hard, easy, (REST_S, 0.0))
     ride = road.channels()
@@ -316,8 +316,8 @@ def test_log_may_begin_on_the_move():
 
 
 def test_stops_are_searched_at_50_samples_per_second():
-    """A log with 200 samples per second is averaged over four samples: times of 13.88, 13.885, 13.89 and 13.895 s
-    become one."""
+    """The log has 200 samples per second. Each value is the mean of four, for example at 13.88, 13.885, 13.89 and
+    13.895 s."""
     road = Road((REST_S, 0.0), (5.0, 4.0), (4.0, 0.0), (4.0, -5.0), (REST_S, 0.0), rate_hz=200.0)
     (stop,) = find_stops(road.channels())
     assert stop.start_s == pytest.approx(13.8875, abs=1e-6)
@@ -325,8 +325,8 @@ def test_stops_are_searched_at_50_samples_per_second():
 
 
 def test_the_straight_line_is_the_direction_just_before_braking():
-    """The direction is averaged over the first tenth of a second of the stop. The vehicle turns by half a degree in
-    it."""
+    """The line is the mean direction over the first tenth of a second of the stop. Here the vehicle turns by half a
+    degree in that time, so the mean is a quarter of a degree from both ends."""
     road = braking(20.0, 5.0)
     begin = 14.0 - 0.12
     ride = road.channels(yaw_rate_dps=np.where((road.t_s > begin - 0.01) & (road.t_s < begin + 0.09), 5.0, 0.0))
@@ -338,15 +338,16 @@ def test_the_straight_line_is_the_direction_just_before_braking():
     ("hard", "easy", "earlier_s"), [((2.0, -6.0), (1.4, -2.0), 0.71), ((10.0 / 9.0, -9.0), (2.4, -2.0), 4.08)]
 )
 def test_full_deceleration_is_from_the_last_two_seconds(hard, easy, earlier_s):
-    """A quarter of them at 6 m/s2 is enough before it is eased to 2: 15 % are 0.9, more than the engine's 0.8. What is
-    over before them does not count: 15 % are 0.3, and it began with the engine's."""
+    """The brake is eased from 6 to 2 m/s2. If 6 m/s2 fill a quarter of the last two seconds, 15 % are 0.9 m/s2, more
+    than the engine's 0.8. If they end earlier they do not count: 15 % are 0.3 m/s2, and the stop begins with the
+    engine's braking."""
     legs = (REST_S, 0.0), (6.0, 3.0), (3.0, 0.0), (4.0, -0.8), hard, easy, (REST_S, 0.0)
     (stop,) = find_stops(Road(*legs).channels())
     assert REST_S + 6.0 + 3.0 + 4.0 - stop.start_s == pytest.approx(earlier_s, abs=0.025)
 
 
 def test_rolling_out_after_braking_is_left_out():
-    """The last metre per second is lost at 0.4 m/s2: the brakes are released, and the stop ends before."""
+    """The last metre per second is lost at 0.4 m/s2, with released brakes. The stop ends before that."""
     legs = (REST_S, 0.0), (5.0, 4.0), (3.0, 0.0), (3.9, -5.0), (1.25, -0.4), (REST_S, 0.0)
     (stop,) = find_stops(Road(*legs).channels())
     assert stop.initial_speed_mps == pytest.approx(20.0, rel=1e-3)

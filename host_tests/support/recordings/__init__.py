@@ -1,1 +1,1 @@
-"""Generates rides, logs and app exports for the tests: valid, random or broken."""
+"""Creates rides, logs and exports of apps for the tests: whole, random or broken."""

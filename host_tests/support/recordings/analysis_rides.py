@@ -1,4 +1,4 @@
-"""Simulated rides for the tests of the analysis. The sensor is perfect, and its axes are the vehicle's."""
+"""Simulated rides for the tests of the analysis, with a perfect sensor whose axes are the vehicle's."""
 
 import functools
 import json
@@ -20,7 +20,7 @@ CALIBRATION = {
 
 
 def calibration(path: Path, **changed) -> Path:
-    """Write CALIBRATION with these changes; return the path."""
+    """Write the file CALIBRATION with these changes; return its path."""
     path.write_text(json.dumps(CALIBRATION | changed))
     return path
 

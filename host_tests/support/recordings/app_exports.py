@@ -1,7 +1,7 @@
-"""Writes a known ride in the formats of apps and loggers. Each writer follows the published description of its format.
+"""Writes a known ride as apps and loggers export it. Each small writer follows the documentation of the format's maker.
 
-Links to the descriptions are in the modules of kickstand_tools.imports.apps and in the tests. Nothing is copied from a
-real export.
+Addresses are in the modules of kickstand_tools.imports.apps and in the tests. No data in this module is copied from an
+export.
 """
 
 import functools
@@ -37,7 +37,7 @@ class Riding:
     lean_deg: np.ndarray
 
     def every(self, steps: int, offset: int = 0) -> "Riding":
-        """Return every steps-th sample, starting at index offset."""
+        """Keep one sample of every `steps`, starting at the index `offset`."""
         return Riding(*(getattr(self, name)[offset::steps] for name in self.__dataclass_fields__))
 
     def each_second(self) -> "Riding":
@@ -61,14 +61,15 @@ class Riding:
 
     @property
     def gravity_g(self) -> np.ndarray:
-        """Return the phone's estimate of gravity: a specific force along up, in the phone's axes."""
+        """The gravity that a phone reports: the direction up in its axes, as a specific force, on an upright or leaned
+        bike."""
         lean = np.radians(self.lean_deg)
         return np.column_stack((np.sin(lean), np.cos(lean), np.zeros(len(lean)))) @ PHONE.T
 
 
 @functools.cache
 def riding(rate_hz: int = 200) -> Riding:
-    """Return a ride of half a minute: stand, set off, a turn to each side, a stop. Its positions begin in Berlin."""
+    """Half a minute: stand, set off, turn to each side, stop. The positions begin in Berlin."""
     parts = [script.upright(3), script.accelerate(14, 4), script.turn(-25, 4), script.straight(1)]
     ride = script.Ride([*parts, script.turn(35, 4), script.straight(1), script.brake(0, 3), script.wait(2)], 0.02)
     t_s = np.arange(round(ride.seconds * rate_hz)) / rate_hz
@@ -135,8 +136,7 @@ def phyphox(ride: Riding, separator: str = ",", comma: bool = False) -> dict[str
 
 
 def sensor_logger(ride: Riding, platform: str = "android", standard: bool = False) -> dict[str, str]:
-    """Write one CSV per sensor, with columns in the order z, y, x and times in ns since 1970. An iPhone has no
-    TotalAcceleration."""
+    """One CSV per sensor, columns in the order z, y, x, times in ns since 1970. An iPhone has no TotalAcceleration."""
     sign = -1.0 if platform == "ios" and not standard else 1.0
     gyro = ride.every(2, 1)
     head = ["time", "seconds_elapsed", "z", "y", "x"]
@@ -170,8 +170,7 @@ def sensor_logger(ride: Riding, platform: str = "android", standard: bool = Fals
 
 
 def sensorlog(ride: Riding, separator: str = ",", accelerometer: bool = True) -> str:
-    """Write the wide CSV with Core Motion's values. Rows repeat old values until new ones come. GPS comes once per
-    second."""
+    """The wide CSV: Core Motion's values, rows that repeat old values, a fix once per second."""
     boot_s = 86_400.0
     names = ["loggingTime(txt)", "loggingSample(N)", "locationTimestamp_since1970(s)", "locationLatitude(WGS84)"]
     names += ["locationLongitude(WGS84)", "locationSpeed(m/s)"]
@@ -197,8 +196,7 @@ def sensorlog(ride: Riding, separator: str = ",", accelerometer: bool = True) ->
 
 
 def sensor_kinetics(ride: Riding, semicolon: bool = False) -> dict[str, str]:
-    """Write NAME_accm.csv, NAME_gyrm.csv, NAME_lacm.csv and NAME_grvm.csv. Times have four decimals, and some occur
-    twice."""
+    """NAME_accm.csv, NAME_gyrm.csv, NAME_lacm.csv, NAME_grvm.csv: times have four decimals, and some occur twice."""
     head = ["time", "X_value", "Y_value", "Z_value"]
 
     def table(part: Riding, values: np.ndarray) -> str:
@@ -266,8 +264,7 @@ def racebox(ride: Riding, per_mps: float = 3.6, laps: bool = False) -> str:
 
 
 def vbo(ride: Riding, speed: str = "kmh") -> str:
-    """Write a file in sections. Positions are in minutes, west positive. The channels of an IMU04 have its own
-    signs."""
+    """A file with sections: positions in minutes, positive in the west, and an IMU04's channels in their own signs."""
     per_mps = {"kmh": 3.6, "knots": 3600.0 / 1852.0}[speed]
     names = ["sats", "time", "lat", "long", "velocity", "heading", "height"]
     units = ["g", "g", "g", "deg/s", "deg/s", "deg/s"]
@@ -289,8 +286,7 @@ def vbo(ride: Riding, speed: str = "kmh") -> str:
 
 
 def aim(ride: Riding, quoted: bool = True, up_sign: float = -1.0) -> str:
-    """Axes: forward, right, down. quoted: True for quotation marks around every cell, False for a file saved again by a
-    spreadsheet."""
+    """The axes are forward, right, down. Every cell is in quotation marks, or saved by a spreadsheet."""
     names = ["Time", "GPS Speed", "GPS Nsat", "GPS Latitude", "GPS Longitude", "InlineAcc", "LateralAcc", "VerticalAcc"]
     names += ["RollRate", "PitchRate", "YawRate", "GPS InlineAcc"]
     units = ["s", "km/h", "#", "deg", "deg", "g", "g", "g", "deg/s", "deg/s", "deg/s", "g"]
@@ -315,7 +311,7 @@ ANY_NAMES: dict[str, str] = dict(
 
 
 def any_table(ride: Riding, separator: str = ",", comma: bool = False) -> str:
-    """Write the table of an unknown logger, in ms, m/s2, rad/s and km/h."""
+    """An unknown logger: ms, m/s2, rad/s, km/h."""
     names = ["Millis", "Acc_X", "Acc_Y", "Acc_Z", "Gyro_X", "Gyro_Y", "Gyro_Z", "Speed_kmh", "Note"]
     rows = []
     for k, t in enumerate(ride.t_s.tolist()):

@@ -16,7 +16,7 @@ SIZES = (0.0, 1e-3, 1e-6, 9.80665, 57.29578, 1000.0, 1e6, 1e12, -1.0)
 
 
 def _of_lines(way):
-    """Turn a function that breaks a list of lines into one that breaks a text."""
+    """Convert a function that breaks a list of lines to one that breaks a text."""
 
     @functools.wraps(way)
     def of_text(text: bytes, chance: random.Random) -> bytes:
@@ -27,7 +27,7 @@ def _of_lines(way):
 
 
 def _of_cells(way):
-    """Turn a function that breaks lists of cells in place into one that breaks a text."""
+    """Convert a function that changes lists of cells in place to one that breaks a text."""
 
     @functools.wraps(way)
     def of_text(text: bytes, chance: random.Random) -> bytes:
@@ -184,7 +184,7 @@ def nearly_nothing(text: bytes, chance: random.Random) -> bytes:
 
 
 def pack(text: bytes, chance: random.Random) -> bytes:
-    """Compress with gzip, with any file name."""
+    """Gzip's first bytes, whatever the file's name."""
     return gzip.compress(text, 1, mtime=0)
 
 
@@ -196,7 +196,7 @@ WAYS = [
 
 
 def broken(bases: list[bytes], number: int) -> tuple[str, bytes, str]:
-    """Break a log in one to three ways. Return the name and content of the file, and these ways."""
+    """Return the name and content of a broken file, and the one to three ways in which it was broken."""
     chance = random.Random(number)
     text = chance.choice(bases)
     ways = [WAYS[number % len(WAYS)], *chance.choices(WAYS, k=chance.choice((0, 0, 1, 2)))]

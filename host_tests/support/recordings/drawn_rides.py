@@ -1,9 +1,7 @@
-"""Draws rides at random: road, bike, rider, mount and sensor, each within real limits. They check the results of the
-first simulator.
-
-They use the second simulator (other_bike.py), which shares no code with kickstand_tools.simulation. With sheet=True,
-the sensor and its six positions come from kickstand_tools.simulation. Parameters of the estimators are fitted with
-even seeds only, and figures are reported of odd ones:
+"""Rides whose road, bike, rider, mount and sensor are drawn at random from realistic values. They use the second
+simulator (other_bike.py), which shares nothing with kickstand_tools.simulation. The only exception is the data sheet's
+sensor with its six positions, if a caller asks for it. Parameters of the estimators are fitted with even seeds only,
+and figures are reported for odd ones:
 
     OMP_NUM_THREADS=1 PYTHONPATH=host_tests .venv/bin/python -m support.recordings.drawn_rides odd 100
 """
@@ -23,7 +21,7 @@ from kickstand_tools.simulation.physics.chip import GYRO_DPS_PER_G, Chip
 from support.recordings.other_bike import FINE_HZ, KINDS, G, _about, _course, _mounting, _noise, _readings, _tolerances
 from support.recordings.smoothed_rides import Known, rms
 
-# Probability of each mount. "foreign": something else than the bike shakes or bends the mount
+# The share of each mount. "foreign": accelerations of the mount itself, which shakes or bends
 MOUNTS = {"firm": 0.5, "holder": 0.1, "aliasing": 0.1, "clipping": 0.1, "drifting": 0.1, "foreign": 0.1}
 ROUGH = {"track": (4e-6, 32e-6)}  # m^3 at 0.1 cycles/m, of ISO 8608; others from a new motorway to a patched lane
 USUALLY_ROUGH = 8e-6, 512e-6
@@ -32,8 +30,8 @@ WAVES_PER_M = 0.03, 4.0
 
 @dataclass
 class DrawnRide:
-    """logs: of each device on the bike (n samples each, on its own clock); calibrations likewise. Truth (m): time_s,
-    lean_deg, speed_mps. kind, mounts: as drawn or as passed."""
+    """logs: one per device on the bike (n samples each, on its own clock); calibrations: one per device. Truth (m):
+    time_s, lean_deg, speed_mps. kind, mounts: the drawn kind of ride and mounts."""
 
     logs: list
     calibrations: list
@@ -81,7 +79,7 @@ def city(chance):
 
 
 def hills(chance):
-    """Like street(), but slower. The ride's conditions add the slopes."""
+    """Like street(), but slower; the ride's conditions add the slopes."""
     return [(s, lean, 0.7 * v) for s, lean, v in street(chance)]
 
 
@@ -89,9 +87,9 @@ DRAWN = {**KINDS, "street": street, "city": city, "hills": hills}
 
 
 def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
-    """mounts: one per device on the bike, None to draw one for a single device. kind: None to draw it. sheet: True for
-    a sensor with all errors of its data sheet, calibrated by one log of the six positions and by two poses. Otherwise
-    the sensor only has the errors that remain after calibration."""
+    """mounts: one per device on the bike; None: one device with a random mount. kind: None: at random. sheet: the
+    sensor has all errors of its data sheet, and is calibrated by one log of the six positions and by two poses.
+    Otherwise it only has the errors that remain after a calibration."""
     chance = np.random.default_rng([seed, 24])
     drawn = str(chance.choice(list(DRAWN)))
     kind = kind or drawn
@@ -105,7 +103,7 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
     time, lean, v = _course([*kept, (8.0, 0.0, 15.0)])
     n = len(time)
     riding = np.clip((v - 1.0) / 3.0, 0.0, 1.0)
-    # The balance lean, and the chassis lean, which differs: wide tyres, a banked road, and a rider who moves
+    # The lean of balance, and the chassis's deviation from it: wide tyres on a tilted road, and a rider who moves
     wander = chance.uniform(0.2, 0.8) * _noise(chance, n, chance.uniform(0.5, 1.5)) * riding
     balance = np.radians(lean + wander)
     tilt = np.radians(chance.uniform(-2.5, 2.5) + chance.uniform(0.3, 1.0) * _noise(chance, n, 8.0))
@@ -115,7 +113,7 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
     rider = np.radians(np.exp(chance.uniform(np.log(0.3), np.log(1.5))) * _noise(chance, n, chance.uniform(0.7, 3.0)))
     hung = chance.uniform(-0.02, 0.06)
     chassis = balance + (flank + rider - hung * balance) * riding
-    # The roll balance: falling into a lean takes turning the other way first
+    # The roll balance: to lean over, a bike first steers the other way
     falling = chance.uniform(0.6, 0.75) * _twice(balance) / np.cos(balance)
     yaw_rate = np.where(v > 0.5, (falling - G * np.tan(balance)) / np.maximum(v, 3.0), 0.0)
     steep = chance.uniform(1.5, 4.0) if kind == "hills" else chance.uniform(0.3, 1.5)
@@ -151,8 +149,8 @@ def _dive(chance, push):
 
 
 def _device(chance, mount, force, rates, v, engine, turns, sensor):
-    """What a sensor on the bike reads, and its calibration by six positions and two poses that were not quite right.
-    sensor: the source of randomness for one with all errors of its data sheet, or None."""
+    """The readings of a sensor on the bike, and its calibration by six positions and two inexact poses. sensor: the
+    random source for a sensor with all errors of its data sheet, or None."""
     n, rough = len(v), np.clip(v / 5.0, 0.1, 1.0)[:, None]
     for order in (1.0, 2.0):
         phases, weights = chance.uniform(0.0, 2.0 * np.pi, 6), chance.uniform(0.2, 1.0, 6)
@@ -165,7 +163,7 @@ def _device(chance, mount, force, rates, v, engine, turns, sensor):
             np.column_stack([_through(column, *spring) for column, spring in zip(values.T, springs)])
             for values in (force, rates)
         )
-        # It sags by the forces, which the gyro sees
+        # The forces make the mount sag, and the gyro measures that
         sagged = np.radians(chance.uniform(0.1, 0.3)) * (10.0 / hz[0]) ** 2 * np.clip(force[:, 0], -2.0, 2.0)
         rates[:, 2] -= np.degrees(np.gradient(sagged) * FINE_HZ)
         force[:, 0] -= sagged * force[:, 1]
@@ -207,7 +205,8 @@ def _device(chance, mount, force, rates, v, engine, turns, sensor):
 
 def _of_the_sheet(chance, time, force, rates, mounting):
     """The log and the calibration of a sensor that turns these true forces and rates in its own axes into readings with
-    all errors of the data sheet. The upright pose is 1.5 degrees off, as is the pitch between both by up to 1."""
+    all errors of the data sheet. The upright pose is 1.5 degrees off. The pitch between the two poses is up to 1 degree
+    off."""
     chip, home_c = Chip.random(chance), chance.uniform(18.0, 25.0)
     hand = Hand(detour_deg=chance.uniform(5.0, 30.0), push_g=chance.uniform(0.03, 0.2))
     six = hands.procedure(chance, chip, np.array(list(poses.ups(chance))), home_c, hand)
@@ -253,7 +252,7 @@ def _spring(hz, damping, by_its_foot=False):
 
 
 def _through(x, hz, a, b):
-    """x through a mass on a spring: the exact gain at each frequency; the ends are held."""
+    """Filter x by a mass on a spring, with the exact gain at each frequency. The values at both ends are held."""
     pad = 4 * FINE_HZ
     size = 1 << int(np.ceil(np.log2(len(x) + 2 * pad)))
     padded = np.pad(x, (pad, size - len(x) - pad), mode="edge")
@@ -293,7 +292,7 @@ FORM = "%5d %-9s %-9s %5.2f %5.1f %4.0f%%  %5.2f %5.1f %4.0f%% %4.0f%% %5.2f"
 
 
 def main(which, count):
-    """Print the figures of so many seeds as they come, then those of all, by mount."""
+    """Print the figures of each of `count` seeds, then those of all seeds, by mount."""
     seeds, rows = range(which == "odd", 2 * int(count), 2), []
     print(" seed kind      mount      live worst shown  smooth worst  1 s  2 s sigma")
     for row in map(figures, seeds):

@@ -11,7 +11,7 @@ SCALE = 3755  # scale of the gyro's integers in HERO cameras
 
 
 def film(path: Path, seconds: float, fps: int = 10, size: str = "320x240", colour: str = "green") -> Path:
-    """A video of one colour, with sound."""
+    """Create a video of one colour, with sound."""
     sources = ["-f", "lavfi", "-i", f"color={colour}:size={size}:rate={fps}:duration={seconds}"]
     sources += ["-f", "lavfi", "-i", f"sine=duration={seconds}"]
     command = [imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error", *sources, "-pix_fmt", "yuv420p", str(path)]
@@ -35,7 +35,7 @@ def with_telemetry(video: Path, rate_dps: np.ndarray, rate_hz: float) -> Path:
     content = video.read_bytes()
     moov = _find(content, b"moov")
     head, inner, rest = content[: moov.start], content[moov.start + 8 : moov.stop], content[moov.stop :]
-    assert not rest  # the data before it must not move
+    assert not rest  # the data before it keeps its place
     length = 8 + len(inner) + len(_track(packets, 0))
     grown = inner + _track(packets, len(head) + length + 8)
     video.write_bytes(head + _box(b"moov", grown) + _box(b"mdat", b"".join(packets)))
@@ -72,7 +72,7 @@ def _find(content: bytes, name: bytes) -> slice:
 
 
 def _track(packets: list[bytes], begin: int) -> bytes:
-    """Return an MP4 track with one packet per second. begin: offset of the first packet in the file."""
+    """An MP4 track with one packet per second. begin: offset of the first packet in the file."""
     count, seconds = len(packets), 1000 * len(packets)
     matrix = struct.pack(">9i", 65536, 0, 0, 0, 65536, 0, 0, 0, 1 << 30)
     tkhd = struct.pack(">IIIIII8xHHHH", 7, 0, 0, 3, 0, seconds, 0, 0, 0, 0) + matrix + struct.pack(">II", 0, 0)

@@ -1,8 +1,7 @@
-"""How near the lean comes to what it should reach: sensors with all errors of the data sheet, calibrated by one log of
-the six positions, the upright pose 1.5 degrees off, bikes of any dive, with and without a measured speed.
-
-On both simulators. Parameters are fitted with even seeds only, and figures are reported of odd ones. As a program: a
-line per simulator, profile and mount, in 20 s per ride on one processor:
+"""Compares the error of the lean with its targets. Sensors have all errors of the data sheet and are calibrated by one
+log of the six positions. The upright pose is 1.5 degrees off. Bikes have any dive, and rides are with and without a
+measured speed. Both simulators are used. Parameters are fitted with even seeds only; figures are reported for odd
+seeds. As a program: a line per simulator, profile and mount, in 20 s per ride on one processor:
 
     OMP_NUM_THREADS=1 PYTHONPATH=host_tests .venv/bin/python -m support.recordings.limit_rides odd 4
 """
@@ -39,7 +38,7 @@ class Measured(Known):
         n = len(at)
         true, lean = (np.interp(at - late, time, values) for values in (self.speed_mps, self.lean_deg))
         if kind == "wheel":
-            # The tyre is worn, has a smaller radius when leaned, and slips with the driving force
+            # The tyre is worn, has a smaller radius when the bike leans, and slips in proportion to the driving force
             push = np.gradient(true, at) / 9.8
             shrunk = 1.0 - 0.28 * (1.0 - np.cos(np.radians(lean)))
             seen = true * chance.uniform(0.98, 1.02) / shrunk * (1.0 + 0.05 * np.clip(push, -0.3, 0.5))
@@ -105,7 +104,7 @@ def shares(error, sigma):
 
 
 def line(name, rides):
-    """The figures of some rides together."""
+    """Pool the figures of some rides."""
     live, live_sigma, smoothed, sigma = (
         np.concatenate([getattr(one, field) for one in rides])
         for field in ("live", "live_sigma", "smoothed", "smoothed_sigma")
@@ -131,7 +130,7 @@ HEAD = " " * 24 + " rides live worst shown  1 s  2 s   smooth worst 1 s  2 s wor
 
 
 def main(which, count, *mounts):
-    """So many seeds of each profile and simulator. mounts: in place of a firm one, or "all"."""
+    """Score `count` seeds of each profile and simulator. mounts: used instead of a firm one, or "all"."""
     print(HEAD, flush=True)
     for simulator, known in (("simulate", SIMULATED_MOUNTS), ("drawn", DRAWN_MOUNTS)):
         for profile in TARGETS:

@@ -1,8 +1,9 @@
-"""A second simulator of rides. It shares no code with kickstand_tools.simulation, and checks parameters fitted to that.
+"""A second simulator of rides, which shares nothing with kickstand_tools.simulation. It checks parameters that were
+fitted with that simulator.
 
-A path and an attitude are drawn as curves, the place of the sensor follows from them, and its readings are numerical
-derivatives: of the place for the force, of the attitude's matrix for the rates. The bike is in exact balance, but for a
-rider who moves; the vibration is white. World axes: x, y level, z up. Vehicle axes: left, up, forward.
+Path and attitude are random curves, which determine the sensor's position. Its readings are numerical derivatives: the
+force of the position, the rates of the attitude's matrix. The bike is in exact balance except for a rider who moves.
+The vibration is white noise. World axes: x, y level, z up. Vehicle axes: left, up, forward.
 """
 
 import numpy as np
@@ -12,9 +13,9 @@ from kickstand_tools.signals import rotation_matrix
 
 G = 9.80665
 FINE_HZ, RATE_HZ = 800, 200
-UP_ERROR_DEG, PITCH_ERROR_DEG, STAND_DEG = 1.5, 1.0, 11.0  # of the two poses, and the tilt between them
+UP_ERROR_DEG, PITCH_ERROR_DEG, STAND_DEG = 1.5, 1.0, 11.0  # errors of the two poses, and the tilt between them
 VIBRATION_G, VIBRATION_DPS = 0.12, 1.5  # rms of white noise in each sample
-RIDER_DEG = 2.0  # rms by which the rider, moving about, makes the bike's lean differ from the one of balance
+RIDER_DEG = 2.0  # rms difference between the bike's lean and the lean of balance, caused by the rider's movements
 
 
 def sweepers(chance):
@@ -50,8 +51,8 @@ KINDS = {"sweepers": sweepers, "held": held, "track": track}
 def other_ride(kind, seed, seconds, height_m=0.0, speed=False):
     """Log (n samples), calibration by two sloppy poses, and the truth (n): lean in degrees, speed in m/s.
 
-    seconds: no longer than this, to whole legs. height_m: of the sensor above the roll axis. speed: give it once a
-    second, 0.4 s late."""
+    seconds: the longest duration, in whole legs. height_m: of the sensor above the roll axis. speed: True to record it
+    once per second, 0.4 s late."""
     chance = np.random.default_rng([seed, *kind.encode()])
     legs = KINDS[kind](chance)
     legs = [leg for leg, end in zip(legs, np.cumsum([leg[0] for leg in legs])) if end <= seconds]
@@ -73,7 +74,7 @@ def other_ride(kind, seed, seconds, height_m=0.0, speed=False):
     drift = np.cumsum(chance.standard_normal((count, 3)), axis=0) * 0.004 / np.sqrt(RATE_HZ)
     rates = rates @ gyro.T + chance.uniform(-0.3, 0.3, 3) + drift
     force = force @ accel.T + chance.uniform(-0.005, 0.005, 3)
-    # The upright pose was off by roll, and in yaw by what a change of pitch between the poses makes of it
+    # The upright pose has an error in roll; a change of pitch between the poses causes an error in yaw
     roll, yaw = np.radians(UP_ERROR_DEG), np.radians(PITCH_ERROR_DEG) / np.tan(np.radians(STAND_DEG))
     roll, yaw = roll * chance.choice((-1.0, 1.0)), yaw * chance.choice((-1.0, 1.0))
     wrong = _about(2, roll) @ _about(1, yaw)
@@ -96,7 +97,7 @@ def _tolerances(chance):
 
 
 def _mounting(chance):
-    """Return a random rotation as the sensor's mounting."""
+    """The mounting of a sensor: a random rotation."""
     mounting, _ = np.linalg.qr(chance.standard_normal((3, 3)))
     return mounting * np.linalg.det(mounting)
 
@@ -114,8 +115,8 @@ def _course(legs):
 def _readings(v, yaw_rate, slope, lean, pitch, height_m, slip=0.0, heave_m=0.0, ahead_m=0.0):
     """Specific force (g) and rates (rad/s) along left, up, forward, by differences of place and attitude.
 
-    slip: angle (rad, to the left) from where the bike points to where it goes. heave_m: of the roll axis at the rear
-    wheel. height_m, ahead_m: of the sensor above this axis, and in front of that wheel."""
+    slip: angle (rad, to the left) from the bike's heading to its direction of travel. heave_m: of the roll axis at the
+    rear wheel. height_m, ahead_m: of the sensor above this axis, and in front of that wheel."""
     heading = np.cumsum(yaw_rate) / FINE_HZ
     course = heading + slip
     direction = np.cos(slope) * np.cos(course), np.cos(slope) * np.sin(course), np.sin(slope)
@@ -143,7 +144,7 @@ def _about(axis, angle):
 
 
 def _smooth(values, seconds):
-    """Apply a moving mean twice, for motion as smooth as a hand's."""
+    """Apply a moving mean twice, which makes a movement as smooth as a hand's."""
     width = max(1, round(seconds * FINE_HZ))
     window = np.full(width, 1.0 / width)
     for _ in range(3):
@@ -153,7 +154,7 @@ def _smooth(values, seconds):
 
 
 def _noise(chance, n, seconds):
-    """Return smooth noise of rms 1 that changes within this number of seconds."""
+    """Smooth noise of rms 1 that changes within `seconds`."""
     knots = chance.standard_normal(int(n / FINE_HZ / seconds) + 3)
     values = _smooth(np.interp(np.arange(n) / FINE_HZ / seconds, np.arange(len(knots)), knots), 0.5 * seconds)
     return values / np.std(values)

@@ -1,4 +1,4 @@
-"""Simulates the tracks that a phone records on a ride, and writes them to files."""
+"""Simulates the tracks that a phone records on a ride, and writes them as files."""
 
 import datetime
 import struct
@@ -27,11 +27,9 @@ def track(
     speed: bool = True,
     pace: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Track:
-    """Return one point per second, from before the ride until after it.
-
-    Positions err by error_m (1 sigma), which changes within changes_s. Their total delay is late_s, and smooth_s of it
-    is the mean delay of a low-pass. pace: the same road at another speed: for each sample of the ride, its new time in
-    s and the factor on its speed.
+    """One point per second, from before the ride until after it. Positions have an error of error_m (1 sigma), which
+    changes within changes_s. Their total delay is late_s; smooth_s of that is the mean delay of a low-pass. pace: the
+    same road at another speed: for each sample of the ride its new time (s) and the factor on its speed.
     """
     chance = np.random.default_rng(seed)
     step_s = 1.0 / ride.rate_hz
@@ -63,7 +61,7 @@ def _low_pass(values: np.ndarray, delay_s: float, step_s: float) -> np.ndarray:
 
 
 def _wander(chance: np.random.Generator, count: int, sigma_m: float, changes_s: float) -> np.ndarray:
-    """Return an error with correlation time changes_s, plus a little noise."""
+    """A correlated error, which decays within changes_s, and a little noise."""
     kept, values = np.exp(-1.0 / changes_s), [chance.normal(0.0, sigma_m)]
     for push in chance.normal(0.0, sigma_m * np.sqrt(1.0 - kept * kept), count - 1):
         values.append(kept * values[-1] + push)

@@ -1,4 +1,4 @@
-"""Measures how often the gyro check of the two presses refuses a good sensor, and how often it misses a faulty one.
+"""Measures how often the gyro check of the two presses refuses a sound sensor, and how often it misses a faulty one.
 
 Sensors with all errors of the data sheet, calibrated by the six positions or not, mounted at any angle. Hands raise the
 bike from its stand at once or after a while, shake it and turn it about the vertical. As a program:
@@ -25,8 +25,8 @@ FAULTS = ("dead", "half", "mirrored", "double")
 
 
 def presses(chance, chip, mounting):
-    """Readings (n, 7) at 200 Hz from the pose on the kickstand to that upright, the first and last POSE of them still;
-    and the tilt between both in degrees."""
+    """Readings (n, 7) at 200 Hz from the pose on the kickstand to the upright pose, and the tilt between the two in
+    degrees. The first and last POSE samples are at rest."""
     wait_s, raise_s = np.exp(chance.uniform(*np.log((0.3, 40.0)))), chance.uniform(0.8, 4.0)
     n, still = int((wait_s + raise_s + 1.0) * RATE_HZ), POSE * RATE_HZ // 200
     tilt = chance.uniform(6.0, 18.0)
@@ -58,7 +58,7 @@ def presses(chance, chip, mounting):
 
 
 def refusal(chance, fault=None, six_done=False, axis=0):
-    """Return the code of the refusal, or None. fault: a fault of the gyro's `axis`."""
+    """The code of the refusal, or None. fault: the fault of the gyro's axis `axis`."""
     chip, mounting = Chip.random(chance), random_rotation(chance)
     readings, _ = presses(chance, chip, mounting)
     factor = {"dead": 0.0, "half": 0.5, "mirrored": -1.0, "double": 2.0, None: 1.0}[fault]
@@ -88,7 +88,7 @@ def refusal(chance, fault=None, six_done=False, axis=0):
 
 
 def main(count):
-    """Print the share of good sensors that are refused, then the share for each fault."""
+    """Print the share of refusals for `count` sound sensors, then for each fault."""
     for six_done in (False, True):
         codes = [refusal(np.random.default_rng([k, 31]), None, six_done)[0] for k in range(int(count))]
         found = {str(code): codes.count(code) for code in set(codes)}

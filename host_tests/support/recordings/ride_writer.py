@@ -1,4 +1,4 @@
-"""Writes rides with the firmware's own recorder, as in a board's flash."""
+"""Rides written by the firmware's own recorder, as in a board's flash."""
 
 import math
 import random
@@ -45,7 +45,7 @@ def turns(count, seed=0):
 
 
 def place(k):
-    """The k-th position, as Gps.place() has it: from 17.9 s before the new year's midnight on, one in 0.1 s."""
+    """The k-th position in the form of Gps.place(): one per 0.1 s, from 17.9 s before the new year's midnight."""
     day_ms, date = 86_382_100 + 100 * k, 26 << 9 | 12 << 5 | 31
     if day_ms >= 86_400_000:
         day_ms, date = day_ms - 86_400_000, 27 << 9 | 1 << 5 | 1
@@ -57,7 +57,7 @@ def blocks(
 ):
     """`count` full blocks, and the turns of the loop that they hold: (sums of six, n, dt_us).
 
-    speed: each hundredth turn has one. places_every: turns from one position to the next, 0 for none."""
+    speed: True for a speed in every hundredth turn. places_every: number of turns between positions, 0 for none."""
     block = RideBlock(5000)
     body = pack(CHIP.who_am_i, CHIP.accel_range_g, calibration(trim_deg))
     written, held = [], []
@@ -79,7 +79,7 @@ def blocks(
 
 
 def begun(length, sequence=0, block=None):
-    """Return an empty block of ride 1. Reuse the RideBlock if one is passed."""
+    """An empty block of ride 1. It reuses a RideBlock if one is passed."""
     block = block or RideBlock(5000)
     block.begin(length, 1, sequence, 0, CHIP, 200, bytes(80))
     return block

@@ -1,4 +1,4 @@
-"""Rides of both simulators with sloppy calibrations, and the lean that the display shows in them. As a program it
+"""Rides of both simulators with inexact calibrations, and the lean that the display shows in them. As a program it
 prints the table of tools/docs/accuracy.md: errors of the shown and of the smoothed lean."""
 
 from dataclasses import dataclass
@@ -33,12 +33,13 @@ class Known:
         return live[self.riding], (found.lean_deg - self.lean_deg)[self.riding], found.lean_sigma_deg[self.riding]
 
     def part(self, kept):
-        """The samples where kept (n) is True."""
+        """Keep only the samples for which kept (n) is True."""
         return Known(self.log.part(kept), self.calibration, self.lean_deg[kept], self.riding[kept])
 
 
 def simulated(profile, seed, seconds):
-    """By kickstand_tools.simulation; the upright pose was off by 1.5 degrees, the pitch between both by 1."""
+    """A ride by kickstand_tools.simulation. The upright pose is 1.5 degrees off, the pitch between the two poses 1
+    degree."""
     made = ride(profile, seed, seconds, 1.5 * (1, -1)[seed % 2], 1.0 * (1, -1)[seed // 2 % 2])
     riding = np.cumsum(made.truth["speed_mps"] > 0.5) > 0
     return Known(as_log(made), calibrated_by_poses(made), made.truth["lean_deg"], riding)

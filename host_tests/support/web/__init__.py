@@ -1,2 +1,2 @@
-"""Tests of the pages in a browser: a simulated user, and fake ports and radios connected to boards in the test's
+"""Helpers to test the pages in a browser: a user who clicks, and ports and radios connected to boards in the test's
 process."""

@@ -17,7 +17,7 @@ FAKE = Path(__file__).with_name("fake_bluetooth.js").read_text()
 
 
 class Bridge:
-    """plan: of device_runs. From begin_s on the board's time passes as the host's."""
+    """plan: see device_runs. From begin_s on the board runs in real time."""
 
     def __init__(self, plan, begin_s, directory):
         self._requests = queue.Queue()
@@ -55,7 +55,7 @@ class Bridge:
                 try:
                     answer.set_result(await getattr(self, "_" + name)(central, kind, data))
                 except (Exception, asyncio.CancelledError) as error:
-                    # bumble cancels tasks that wait for a lost connection: report the loss to the page and continue
+                    # bumble cancels calls that wait for a lost connection: the page must receive the error and continue
                     task = asyncio.current_task()
                     if task is not None and task.cancelling():
                         raise
@@ -102,7 +102,7 @@ class Bridge:
         self.air.radio._clock.at(0, self.air.dropped)
 
     def silence(self, on):
-        """Out of reach, and back."""
+        """Move the board out of reach, and back."""
         self.air.radio.away = on
 
     def end(self):

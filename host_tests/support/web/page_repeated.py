@@ -1,8 +1,9 @@
-"""The board of the page, and the same board with the firmware's own loop, with the same orders. CPython, MicroPython.
+"""Runs the page's board, or the same board with the firmware's own loop, with the same orders. Runs on CPython and
+MicroPython.
 
 As a script, with "page" or "loop" as its argument: reads {"until_s": s, "orders": [[s, name, value], ...]} as JSON from
 standard input, runs that in the current directory (the board's flash) and prints as JSON on the last line:
-{"orders": as they were carried out, "displays": [[s, what the display showed from then on], ...]}.
+{"orders": as carried out, "displays": [[s, content of the display from then on], ...]}.
 """
 
 import json
@@ -12,7 +13,7 @@ from kickstand_tools.web.device import Device, PageDevice
 
 
 def page(orders, until_s):
-    """Run the board like worker.mjs, but in slices of other lengths."""
+    """Run the page's loop as worker.mjs does, but in slices of other lengths."""
     device = PageDevice()
     done, slice_s, now_s = [], 0.007, 0.0
     for at_s, name, value in orders:
@@ -26,7 +27,7 @@ def page(orders, until_s):
 
 
 def loop(orders, until_s):
-    """Run the board with kickstand.start.main() and its own loop."""
+    """Run kickstand.start.main() with its own loop."""
     device = Device()
     from kickstand.start import main
 

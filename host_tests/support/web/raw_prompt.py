@@ -1,4 +1,5 @@
-"""A fake board for a SerialLine. It speaks MicroPython's raw prompt byte by byte, and runs code on a FakeBoard."""
+"""A fake board at the other end of a SerialLine: it simulates MicroPython's raw prompt, byte by byte, for a
+FakeBoard."""
 
 import base64
 
@@ -8,9 +9,9 @@ _RAW_PASTE = b"\x05A\x01"
 
 
 class RawPrompt:
-    """Has the part of the emulated Pico's interface that SerialLine uses. board: a FakeBoard, on which the code is run.
-    streams: blocks that the app sends each time that it is started, in place of being run; it goes on, and sends no
-    more, until Ctrl-C.  vehicle: in its config.py.  deaf: says nothing at all."""
+    """Has the part of emulator.pico.Pico that SerialLine uses. board: a FakeBoard, on which the code runs. streams: the
+    blocks that the app sends whenever it is started. The app does not really run; after these blocks it waits silently
+    for Ctrl-C. vehicle: in its config.py. deaf: True for a board that never answers."""
 
     def __init__(self, board, *streams, vehicle="motorcycle", deaf=False):
         self.board, self._deaf = board, deaf
@@ -25,7 +26,7 @@ class RawPrompt:
         """It takes no time."""
 
     def stop(self):
-        """It is never under way."""
+        """Nothing runs that must be stopped."""
 
     def send(self, data):
         """What is typed."""
@@ -37,7 +38,7 @@ class RawPrompt:
                     self.heard(b"\x04\x04>")
             elif byte == _CTRL_A and self._typed + b"\x01" == _RAW_PASTE:
                 self._typed = b""
-                self.heard(b"R\x00")  # raw paste is understood, but not supported
+                self.heard(b"R\x00")  # understood, but not supported
             elif byte == _CTRL_A:
                 self._typed = b""
                 self.heard(_PROMPT)
@@ -63,7 +64,7 @@ class RawPrompt:
 
 
 def said(blocks):
-    """Return blocks in the form in which usb_stream prints them."""
+    """Format blocks as usb_stream prints them."""
     return b"".join(
         b"".join(base64.b64encode(block[at : at + 256]) + b"\r\n" for at in range(0, len(block), 256)) + b".\r\n"
         for block in blocks

@@ -1,4 +1,4 @@
-"""A simulated rider who uses the page by real clicks and keys, and reads what it shows."""
+"""A rider who uses the page with real clicks and keys, and reads what it shows."""
 
 import os
 from pathlib import Path
@@ -8,20 +8,20 @@ import pytest
 
 PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
 LAPTOP: dict[str, Any] = {"viewport": {"width": 1440, "height": 900}}
-READ_S = 120  # longest wait for the page, long enough for a busy computer
+READ_S = 120  # longest wait for the page to show something; a busy machine is slow
 
-# Stores the messages of the board's worker for the tests, and makes the page draw less often
+# Keeps the messages of the board's worker, for tests to check and repeat, and makes the page draw less often
 KEEP = Path(__file__).with_name("keep.js").read_text()
 
-# Of a file whose address ends so the site gives nothing but this status; window.given() again fetches all. The service
-# worker is passed by.
+# Makes the site answer with this status for files whose address ends so, until window.given() is called. The service
+# worker is bypassed.
 MISSING = Path(__file__).with_name("missing.js").read_text()
 
 
 class Rider:
-    """browser: of playwright. asked: the addresses that the page has fetched; errors: what went wrong in it. policy:
-    whether the page's content security policy holds, which forbids playwright's wait_for_function() but on the page
-    Rides. script: runs before those of each page."""
+    """browser: playwright's. asked: the addresses that the page has requested; errors: the errors in it. policy: True
+    to enforce the page's content security policy, which forbids playwright's wait_for_function() except on the page
+    Rides. script: runs before each page's own scripts."""
 
     def __init__(self, browser, address, policy=False, script="", **kind):
         self._browser = browser
@@ -37,7 +37,7 @@ class Rider:
         self.page.goto(address)
 
     def reads(self, text):
-        """Wait until the display's first line starts with this text."""
+        """Wait until the first line of the display shows this text."""
         self.page.wait_for_function(
             "text => seen.last && document.querySelector('#display').ariaLabel.startsWith(`Display: ${text}`)",
             arg=text,
@@ -48,7 +48,7 @@ class Rider:
         self.page.wait_for_function("text => document.querySelector('#todo').textContent.includes(text)", arg=text)
 
     def wait(self, seconds):
-        """Wait until this time has passed on the board's clock."""
+        """Wait until this much of the board's time has passed."""
         self.page.wait_for_function(
             "until => seen.last.t_s >= until", arg=self.seen("last")["t_s"] + seconds, timeout=1000 * (seconds + READ_S)
         )
@@ -58,28 +58,28 @@ class Rider:
             self.page.keyboard.press(key)
 
     def hold(self, seconds):
-        """Press the space bar for this time."""
+        """Hold the space bar down for this time."""
         self.page.keyboard.down("Space")
         self.wait(seconds)
         self.page.keyboard.up("Space")
-        self.wait(0.3)  # a finger also waits between presses
+        self.wait(0.3)  # a finger does not press again at once either
 
     def click(self, selector):
         self.page.click(selector)
 
     def seen(self, what):
-        """Return messages of the board, by a name in KEEP."""
+        """The messages of the board, by a name in KEEP."""
         return self.page.evaluate(f"seen.{what}")
 
     def text(self, selector):
         return self.page.inner_text(selector)
 
     def leans(self):
-        """Return the (true, shown) lean from the page's text, degrees, > 0 to the right."""
+        """The true and the shown lean on the page, degrees, > 0 to the right."""
         return tuple(_lean_deg(self.text(selector)) for selector in ("#true-lean", "#shown-lean"))
 
     def align(self):
-        """Do the two presses that the guide asks for."""
+        """Do the two presses when the guide asks for them."""
         self.guide_says("Press the button")
         self.click("#press")
         self.reads("Now upright")
@@ -88,7 +88,7 @@ class Rider:
         self.click("#press")
 
     def axe(self):
-        """Return axe-core's findings in light and dark mode, one line per finding."""
+        """The findings of axe-core, in the light and the dark style: one line each."""
         axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
         found = []
         for scheme in ("light", "dark"):
@@ -102,16 +102,16 @@ class Rider:
         return self.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
     def strangers(self):
-        """Return the requested addresses outside the site."""
+        """The requested addresses outside the site."""
         home = "/".join(self.asked[0].split("/")[:3]) + "/"
         return [url for url in self.asked if not url.startswith((home, f"blob:{home}", "data:"))]
 
     def slow(self, times):
-        """Slow down the page's main thread by this factor."""
+        """Limit the page's own thread to this share of the processor."""
         self.context.new_cdp_session(self.page).send("Emulation.setCPUThrottlingRate", {"rate": times})
 
     def processes(self):
-        """The numbers of the browser's processes."""
+        """The ids of the browser's processes."""
         info = self._browser.new_browser_cdp_session().send("SystemInfo.getProcessInfo")
         return [process["id"] for process in info["processInfo"]]
 

@@ -1,4 +1,4 @@
-"""Drives the page Rides, and compares numbers in its output."""
+"""Uses the page Rides in a browser, and compares numbers."""
 
 from pathlib import Path
 
@@ -12,25 +12,25 @@ PHONE_MOUNTED = analysis_rides.CALIBRATION | {"vehicle_from_sensor": app_exports
 
 
 class Rides:
-    """Drives the page Rides in a browser: gives it files, and returns what it says."""
+    """Uses the page Rides in a browser: chooses files, and returns the page's texts."""
 
     def __init__(self, rider):
         self.rider, self.page = rider, rider.page
 
     def give(self, *files):
-        """Replace all earlier files by these. Return the page's final text."""
+        """Replace all files by these; return the page's final message."""
         while self.held():
             self.remove("#held li:first-child button")
             self.said()
         return self.add(*files)
 
     def show(self, *files):
-        """Give these files to the page, unless their report is already shown."""
+        """Choose these files, unless their report is already shown."""
         if set(self.held()) != {file.name for file in files} or self.page.is_hidden("#report"):
             assert self.give(*files) == ""
 
     def add(self, *files):
-        """Choose files and return the page's final text."""
+        """Choose files; return the page's final message."""
         self.page.set_input_files("#files", files)
         return self.said()
 
@@ -40,7 +40,7 @@ class Rides:
         self.page.click(button)
 
     def held(self):
-        """{name: what the page says of it} of the files that it has."""
+        """{name: the page's text about it} for each chosen file."""
         cells = "rows => rows.map((row) => [row.children[0].textContent, row.children[1].textContent])"
         return dict(self.page.eval_on_selector_all("#held li", cells))
 
@@ -49,7 +49,7 @@ class Rides:
         return self.page.inner_text("#said")
 
     def saved(self, selector) -> bytes:
-        """Return the file that a button downloads."""
+        """The file that a button offers for download."""
         with self.page.expect_download(timeout=WAIT_MS) as download:
             self.page.click(selector)
         return Path(download.value.path()).read_bytes()
@@ -71,7 +71,7 @@ def near(found, wanted, by):
 
 
 def assert_near(found, wanted):
-    """Check that the JSON is equal, except for the last digit of numbers."""
+    """Assert that both JSON values are equal, except for the last digit of their numbers."""
     if isinstance(wanted, dict):
         assert found.keys() == wanted.keys()
         for key in wanted:

@@ -1,4 +1,4 @@
-"""A serial port of the browser that leads to an emulated Pico in the test's own process.
+"""A serial port in the browser, connected to an emulated Pico in the test's own process.
 
 Emulated time passes only while the page listens.
 """
@@ -15,10 +15,10 @@ FAKE = Path(__file__).with_name("fake_serial.js").read_text()
 
 
 class SerialLine:
-    """rider: at a page with this port.  said: all that the board has said.  cut_after: so many bytes to the board the
-    cable is pulled; None for never."""
+    """rider: uses a page with this port. said: all output of the board. cut_after: the cable is pulled after this
+    number of bytes to the board; None: never."""
 
-    STEP_S = 0.04  # of emulated time at most, until the page may speak again
+    STEP_S = 0.04  # longest emulated time until the page may send again
 
     def __init__(self, browser, address, **kind):
         self.rider = rider = Rider(browser, address, script=FAKE, **kind)
@@ -26,7 +26,7 @@ class SerialLine:
         rider.page.expose_function("boardHears", self._hears)
 
     def plug_in(self, device):
-        """device: an emulator.pico.Pico, which is given time, or a RawPrompt."""
+        """device: an emulator.pico.Pico, whose time this line advances, or a RawPrompt."""
         self.rider.page.evaluate(f"boardAnswersAtOnce = {json.dumps(isinstance(device, RawPrompt))}")
         self._device = device
         self._said, self.said = bytearray(), bytearray()
@@ -58,23 +58,23 @@ class SerialLine:
         return self.connected
 
     def look(self):
-        """Click, and return the page's text about the board."""
+        """Click; return the page's text about the board."""
         self.rider.page.click("#look")
         return self._said_by("#look")
 
     def install(self):
-        """Click, and return the page's final text."""
+        """Click; return the page's final message."""
         self.rider.page.click("#install")
         return self._said_by("#look")
 
     def status(self):
-        """Click, and return the status on the page, or the reason for its absence."""
+        """Click; return the status that the page shows, or the reason for none."""
         self.rider.page.click("#status")
         why = self._said_by("#status", "#status-said")
         return self.rider.text("#status-text") if self.rider.page.is_visible("#status-text") else why
 
     def check(self):
-        """Click, and return the text of the check on the page, or the reason for its absence."""
+        """Click; return the text of the check that the page shows, or the reason for none."""
         self.rider.page.click("#check")
         why = self._said_by("#check", "#status-said")
         return self.rider.text("#status-text") if self.rider.page.is_visible("#status-text") else why

@@ -70,7 +70,7 @@ class Panel:
             ((x, _),) = self._places([(value, 0.0)])
             axes.append(element("path", d=path([(x, self._top), (x, self._bottom)]), stroke=_RULE))
             words = self.words(value)
-            middle = min(x, self.x + self.width - 0.5 * _LETTER * len(words))  # all of it is in the picture
+            middle = min(x, self.x + self.width - 0.5 * _LETTER * len(words))  # keep the whole text in the picture
             axes.append(element("text", words, x=middle, y=self._bottom + 14.0, text_anchor="middle", fill=_QUIET))
         for value in ticks(*self.along, 5):
             ((_, y),) = self._places([(0.0, value)])

@@ -165,7 +165,7 @@ def _stages(run: dict[str, Any]) -> dict[str, np.ndarray]:
     columns = dict(zip(run["figures"]["stages"], run["stages"].T, strict=True))
     sampled = columns["decode and sum"] > 0
     watch = run["figures"]["stopwatch_us"]
-    fetch = columns["fetch"] - 3 * watch  # it contains two transfers and add_up()
+    fetch = columns["fetch"] - 3 * watch  # this stage contains two transfers and add_up()
     meter = columns["meter"] - 2 * watch
     stages = {
         "read": columns["read"],

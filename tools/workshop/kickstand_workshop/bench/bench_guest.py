@@ -27,7 +27,7 @@ class Config:
 
 
 class Done(Exception):
-    """The measuring time is over."""
+    """Raised when the measuring time is over."""
 
 
 class Canary:

@@ -77,7 +77,7 @@ def _micropython_s(kind: Kind, files: dict[str, bytes]) -> float:
     """Time until MicroPython runs main.py, s."""
     begun: list[bytes] = []
     with kind(files={**files, "/main.py": f"{kind.SINK}Sink().write(b'main')\n".encode()}) as device:
-        device.listen(begun.append)  # not over USB: a Pico starts it after main.py
+        device.listen(begun.append)  # not over USB on a Pico: USB starts later than main.py
         device.run_until(lambda: begun, _LIMIT_S, 0.001)
         return device.time_s
 

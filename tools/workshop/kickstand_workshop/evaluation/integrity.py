@@ -254,7 +254,7 @@ def evaluate(jobs: list[FaultJob], done: Callable[[], None] = lambda: None) -> l
         job = jobs[k]
         return (job.seed, str(job.profile), str(job.road), str(job.mount))
 
-    order = sorted(range(len(jobs)), key=ride_of)  # jobs of the same ride are neighbours, to simulate it once
+    order = sorted(range(len(jobs)), key=ride_of)  # jobs of the same ride are adjacent, so the ride is simulated once
     found: dict[int, Outcome] = {}
     for k, outcome in zip(order, on_all_processors(run, [jobs[k] for k in order], chunk=8), strict=True):
         found[k] = outcome

@@ -33,8 +33,8 @@ def rms(error: NDArray) -> float:
 
 
 def slope(shown: NDArray, true: NDArray, beyond: float = LEANED_DEG) -> float:
-    """Fit the slope of shown over true lean by least squares through the origin. Only true leans over `beyond` degrees
-    count. Returns NaN without such leans."""
+    """The ratio of shown to true lean where the true lean exceeds `beyond` degrees: least squares through the origin.
+    NaN if undefined."""
     leaned = np.abs(true) > beyond
     square = float(np.sum(true[leaned] ** 2))
     return float(np.sum(shown[leaned] * true[leaned]) / square) if square > 0.0 else float("nan")

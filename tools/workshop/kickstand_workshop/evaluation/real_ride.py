@@ -24,7 +24,7 @@ from .estimators import calibrated, estimate
 from .metrics import rms, slope
 
 AVERAGE_S = 1.0
-_RIDING_MPS = 2.0  # scored at higher speeds
+_RIDING_MPS = 2.0  # only higher speeds are scored
 _LEANED_DEG = 5.0  # the slope is fitted above this: the reference is rarely over 10 degrees
 
 

@@ -28,7 +28,8 @@ ROOT = Path(__file__).resolve().parents[4]
 
 def main() -> int:
     options = _options()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit("stopped"))  # sys.exit() removes the copy
+    # turn the signal into an exit, so the copy is removed
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit("stopped"))
     package = PACKAGES[options.package]
     with tempfile.TemporaryDirectory(prefix="mutants-") as directory:
         copy = Path(directory) / "project"

@@ -87,7 +87,7 @@ class Tests:
                 os.killpg(child, signal.SIGKILL)
                 _, status = os.waitpid(child, 0)
         with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(child, signal.SIGKILL)  # also ends processes that its tests started
+            os.killpg(child, signal.SIGKILL)  # also end the processes that the tests started
         if os.WIFSIGNALED(status):
             return TIMED_OUT
         return SURVIVED if os.WEXITSTATUS(status) == 0 else KILLED

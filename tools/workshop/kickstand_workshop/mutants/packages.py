@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import NamedTuple
 
-UNTESTABLE = ("_viper.py", "_guest.py")  # these files only run on a board or on MicroPython
+UNTESTABLE = ("_viper.py", "_guest.py")  # these files run only on a board or on MicroPython
 
 
 class Package(NamedTuple):
@@ -28,7 +28,7 @@ PACKAGES = {
     ),
     "lean": _package(
         "firmware/kickstand/lean/*.py",
-        "lean/test_known_ride lean/test_filter_states lean/test_[bkmru]* lean/test_formula",  # the other takes longer
+        "lean/test_known_ride lean/test_filter_states lean/test_[bkmru]* lean/test_formula",  # the others take longer
     ),
     "drive_alignment": _package(
         "firmware/kickstand/drive_alignment/*.py", "drive_alignment/test_parts drive_alignment/test_drive*"

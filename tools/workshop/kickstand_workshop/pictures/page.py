@@ -23,7 +23,8 @@ _MOST = 100  # pictures
 _LEANS = (("ArrowRight", 7), ("ArrowLeft", 14))  # keys of 5 degrees each
 _HELD_S = 3.0
 _BASE = ("../templates/base.html", "../../common/theme.css")
-_DRAWN = (*_BASE, "index.html", "style.css", "bike.mjs", "road.mjs", "display.mjs", "guide.mjs")  # files for its look
+# files that determine the page's look
+_DRAWN = (*_BASE, "index.html", "style.css", "bike.mjs", "road.mjs", "display.mjs", "guide.mjs")
 _SAYS = "text => document.querySelector('#display').ariaLabel.includes(text)"
 _ASKS = "text => document.querySelector('#todo').textContent.includes(text)"
 

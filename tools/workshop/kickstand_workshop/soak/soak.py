@@ -1,7 +1,7 @@
 """Runs trips on the simulated board, keeps tallies of them, and records broken invariants.
 
-Invariants: the calibration is not lost, memory does not grow, and the program neither ends nor hangs. watch.py checks
-others. __main__.py prints the figures, and fails if an invariant was broken.
+Invariants: the calibration is not lost, memory does not grow, the program neither ends nor hangs, and those of
+watch.py. __main__.py prints the figures and fails if an invariant was broken.
 """
 
 import gc
@@ -191,7 +191,7 @@ def _blocks() -> int:
 
 
 def _check_calibration(bike: SoakBoard, watch: Watch, figures: Tallies) -> None:
-    """Check that a power cut never loses the calibration: the old or the new one must be in flash."""
+    """Check that the board has its old calibration or a new one after a power cut at any moment."""
     calibration = bike.store().load()
     if bike.aligned and not calibration.aligned:
         watch.found.append("the alignment is lost")

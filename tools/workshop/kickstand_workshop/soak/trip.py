@@ -7,7 +7,7 @@ from typing import Any
 from kickstand_tools.simulation.scripted import script
 
 SHORT_S, LONG_S = 0.15, 1.2
-KICKSTAND_S, UPRIGHT_S = 14.0, 12.0  # the stay in each pose, long enough for an alignment through the menu
+KICKSTAND_S, UPRIGHT_S = 14.0, 12.0  # time in each pose, long enough for an alignment through the menu
 QUIET_S = 12.0  # from the end of a fault to the next one
 SENSOR, LCD = 0x68, 0x27
 
