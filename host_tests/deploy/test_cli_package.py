@@ -159,7 +159,7 @@ def test_old_python_is_refused_in_one_line(dev, monkeypatch):
 def test_dev_lists_its_commands():
     done = subprocess.run([sys.executable, str(ROOT / "tools" / "dev.py"), "fly"], capture_output=True, text=True)
     assert done.returncode != 0
-    assert done.stderr.startswith("dev.py: say what to do")
+    assert done.stderr.startswith("dev.py: no task is named")
     assert done.stderr.count("\n") == 1
 
 

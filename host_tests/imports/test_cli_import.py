@@ -21,7 +21,7 @@ def test_import_reports_its_choices_and_the_next_step(tmp_path):
     for part in ("m/s2", "80 Hz", "+1 g up, on every phone", "rad/s", "40 Hz", "Location.csv: Velocity"):
         assert part in words
     assert f"written: {out}, 2598 samples in 35.0 s" in result.out
-    assert " samples in 35.0 s, 80 a second, 1 gap of 2.5 s in all\n" in result.out
+    assert " samples in 35.0 s, 80 per second, 1 gap of 2.5 s in all\n" in result.out
     assert f"next: kickstand calibrate ride {out} --out {tmp_path / 'RIDE.cal.json'}\n" in result.out
     assert f"kickstand report {out}\n" in result.out and f"kickstand plot {out} --out plots\n" in result.out
     assert result.err == ""
@@ -38,7 +38,7 @@ def test_report_reads_an_export_directly(tmp_path, name):
     before = command.snapshot(tmp_path)
     result = command.works("report", source, "--json")
     assert command.snapshot(tmp_path) == before
-    assert result.err.startswith(f"{source}: imported from phyphox, 4199 samples, 50 a second; aligned by its bends")
+    assert result.err.startswith(f"{source}: imported from phyphox, 4199 samples, 50 per second; aligned by its bends")
     data = json.loads(result.out)
     assert data["max_left_deg"]["value"] == pytest.approx(25.0, abs=1.5)
     assert data["max_right_deg"]["value"] == pytest.approx(35.0, abs=1.5)

@@ -146,7 +146,7 @@ def test_uncertain_table_gives_a_command_line_that_works(tmp_path, monkeypatch):
     typed = line.partition("type: kickstand ")[2]
     assert typed.startswith("import 'my log.csv' --out RIDE.csv --columns t=Millis,ax=Acc_X,")
     result = command.works(*shlex.split(typed))
-    assert "written: RIDE.csv, 119 samples in 2.4 s, 50 a second" in result.out
+    assert "written: RIDE.csv, 119 samples in 2.4 s, 50 per second" in result.out
     assert api.read_log("RIDE.csv").accel_g[0] == pytest.approx(riding().phone_g[0], abs=1e-4)
 
 

@@ -124,7 +124,8 @@ def test_every_engine_gets_frozen_readings_as_a_gap(engine):
     found = replay(log_of(readings), CalibrationFile(aligned=True), engine)
     assert np.flatnonzero(np.isnan(found.lean_deg)).tolist() == list(range(201, 400))
     gap = replay(without_frozen(log_of(readings)), CalibrationFile(aligned=True))
-    assert np.array_equal(found.lean_deg[400:], gap.lean_deg[201:])
+    # MicroPython has the covariance in 32 bits, CPython in 64
+    assert np.max(np.abs(found.lean_deg[400:] - gap.lean_deg[201:])) < 0.02
 
 
 def test_calibrate_drive_does_not_use_a_freeze_as_a_stop():

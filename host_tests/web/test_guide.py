@@ -180,7 +180,7 @@ def test_it_rides_straight_until_the_meter_is_sure(stages):
     )
 
 
-def test_after_power_on_in_a_bend_the_guide_ends_the_doubt(stages):
+def test_after_power_on_in_a_bend_it_says_what_ends_the_doubt(stages):
     """Riding on in such a bend does not help: nothing in it separates the lean from an error of the sensor."""
     power = [("power", False), ("wait", 0.5), ("power", True)]
     stages(

@@ -1,13 +1,13 @@
-// Chooses the rider's next step from what the firmware shows: in the first minute, and after a fault.
+// What to do next, from what the firmware shows: the first minute, and what to look at after a fault.
 
 import { shows } from "./shows.mjs";
 
-const RIDE_S = 3; // for so long the lean must be held before the last step counts as done
+const RIDE_S = 3; // that the lean is held before the last step counts as done
 const WELL_DEG = 15;
-const SURE_S = 7; // after a lean was shown for so long on a straight, a bend does not make the firmware doubt it again
-const STRAIGHT_DEG = 3; // a smaller lean counts as upright
+const SURE_S = 7; // that a lean is shown straight on, until a bend does not make the firmware doubt it again
+const STRAIGHT_DEG = 3; // a smaller lean is seen as none
 
-// The pose that the firmware asks for; after a refusal it is still the previous pose
+// The pose that the firmware wants; after a refusal it is still the one before
 const WANTED = {
   unaligned: "kickstand",
   "ask-stand": "kickstand",
@@ -38,19 +38,19 @@ export class Guide {
   #heldSince = null;
   #ridden = false;
   #shownSince = null;
-  #sure = false; // true once the firmware was sure of the lean since power-on
-  #cut = false; // true after a power cut during a save, until the next ride or alignment
+  #sure = false; // since the power came on
+  #cut = false; // the power has gone in a save, and since then nothing has been ridden or aligned
 
-  /** The power was cut. inSave: true if during a save. */
+  /** The power has gone. inSave: in the middle of one. */
   dark(inSave) {
     this.#cut = inSave;
     this.#sure = false;
   }
 
   /**
-   * Return the step to show, or null to keep the current step. view: as for shows(). shown: the lean on the display, or
-   * null. pose: "kickstand", "upright", "ride". standing: true if the bike has come to rest in its pose. state:
-   * {powered, plugged, armed (the next save will be cut), time (s), lean_deg: the true lean}.
+   * The step that fits, or null for the one before. view: as shows() takes it; shown: the lean that it shows, or null.
+   * pose: "kickstand", "upright", "ride"; standing: it has come to rest in it. state: {powered, plugged, armed (a save
+   * will be cut), time (s), lean_deg: the true one}.
    */
   next(view, shown, pose, standing, state) {
     const { kind } = shows(view) ?? {};
@@ -66,7 +66,7 @@ export class Guide {
   #fault(kind, state) {
     if (!state.powered) {
       const how = this.#cut
-        ? "The power was cut when 40 bytes of the calibration were written. Is the old one still there?"
+        ? "The power went when 40 bytes of the calibration were written. Is the old one still there?"
         : "The board has no power: the display is dark.";
       return step(0, how, ["Switch it on", "power"]);
     }
@@ -84,7 +84,7 @@ export class Guide {
             : "The sensor’s wire is out. The meter says so, and shows no lean that it does not know.";
       return step(0, how, ["Plug it in", "wire"]);
     }
-    if (kind === "stopped") return step(0, "The wire was unplugged, so the meter has stopped the alignment.");
+    if (kind === "stopped") return step(0, "The wire was out: the meter has stopped the alignment.");
     if (kind === "fault") return step(0, "The sensor is there again: the firmware sets it up anew.");
     return null;
   }
@@ -95,15 +95,15 @@ export class Guide {
     const there = stand ? ON_STAND : UPRIGHT;
     const right = pose === this.#wanted;
     if (kind === "six" || (kind === "spoilt" && this.#wanted === "six")) {
-      return step(0, "For the six positions the sensor is turned by hand, which this page cannot show. Hold the button to leave.");
+      return step(0, "For these the sensor is turned by hand: not on this page. Hold the button to leave.");
     }
     switch (kind) {
       case "unaligned":
       case "ask-stand":
         if (!right) return step(1, "Put the motorcycle on its stand first.", ON_STAND);
         if (!standing) return step(1, "The motorcycle goes onto its stand.");
-        if (this.#cut) return step(1, "The meter does not use a half-written calibration. Press the button to begin again.");
-        return step(1, "The motorcycle leans on its stand, and the sensor is mounted at some angle. Press the button.");
+        if (this.#cut) return step(1, "Nothing that was half written is believed: begin again. Press the button.");
+        return step(1, "The motorcycle leans on its stand, the sensor sits on it at any angle. Press the button.");
       case "ask-upright":
         if (!right) return step(2, "The meter knows the stand. Now hold the motorcycle upright.", UPRIGHT);
         return step(2, standing ? "Press the button once more." : "The motorcycle comes upright.");
@@ -128,7 +128,7 @@ export class Guide {
         }
         return step(1, "The meter says why it takes neither pose. Press the button, and begin with the stand.");
       case "aligned":
-        return step(3, "Done: the meter knows the angle of the sensor. Ride!", pose === "ride" ? null : RIDE);
+        return step(3, "Done: the meter knows how the sensor sits. Ride!", pose === "ride" ? null : RIDE);
       default:
         return null;
     }
@@ -138,7 +138,7 @@ export class Guide {
     if (kind !== "lean" && kind !== "menu" && !PAGES[kind]) return null;
     if (state.armed) return this.#save(kind, view, pose);
     if (kind === "menu") {
-      return step(0, "The menu is open. A press goes to the next entry, a long press chooses it. It closes after 20 seconds.");
+      return step(0, "The menu: a press goes to the next entry, a long one takes it. It closes after 20 seconds.");
     }
     if (kind === "info") return step(0, `This page shows ${PAGES.info}. A press leaves it.`);
     const riding = pose === "ride";
@@ -146,46 +146,46 @@ export class Guide {
     if (kind !== "lean") return step(number, `This page shows ${PAGES[kind]}. Press for the next.`, riding ? null : RIDE);
     if (riding) return this.#ride(shown, state);
     if (!this.#cut) return step(number, "The meter is aligned. Ride!", RIDE);
-    return step(number, "The old alignment is still there, because the meter does not use half-written data. Ride!", RIDE);
+    return step(number, "The old alignment is still there: nothing half written is believed. Ride!", RIDE);
   }
 
-  /** Return the step that makes the firmware save a calibration, because that save will be cut. */
+  /** How to have the firmware save a calibration, which is to be cut. */
   #save(kind, view, pose) {
     if (pose !== "kickstand") {
-      return step(0, "The power will be cut in the middle of the next save. Stop for a new alignment.", ON_STAND);
+      return step(0, "The power goes in the middle of the next save. Stop for a new alignment.", ON_STAND);
     }
-    if (kind !== "menu") return step(0, "Hold the button for a second to open the menu.");
-    if (view.entry === "Align the bike") return step(0, "Hold the button once more to choose “Align the bike”.");
+    if (kind !== "menu") return step(0, "Hold the button for a second: the menu comes.");
+    if (view.entry === "Align the bike") return step(0, "Hold the button once more: “Align the bike” is chosen.");
     return step(0, "Press until the menu says “Align the bike”, then hold the button for a second.");
   }
 
   #ride(shown, state) {
     if (!this.#sure && !this.#ridden) return this.#straight(shown, state);
     if (shown === null) {
-      // In a steady bend no reading separates a lean from an error of the sensor, so riding on does not help
+      // In a bend that never changes no reading tells a lean from an error of the sensor: riding on is no help there
       if (Math.abs(state.lean_deg) > STRAIGHT_DEG) {
         return step(4, "Not sure yet, and not in a steady bend: ride straight, or lean the other way.", STRAIGHT);
       }
-      return step(4, "Not sure yet. The meter shows no lean rather than a wrong one: ride straight for some seconds.");
+      return step(4, "Not sure yet, and rather no lean than a wrong one: ride straight for some seconds.");
     }
     if (Math.abs(shown) < WELL_DEG) this.#heldSince = null;
     else this.#heldSince ??= state.time;
     if (this.#heldSince !== null && state.time - this.#heldSince > RIDE_S) this.#ridden = true;
-    if (this.#ridden) return step(5, "That is all. Press to see the other pages. Now break something, or build one: see Install.");
+    if (this.#ridden) return step(5, "That is all. A press turns the pages. Now break something, or build one: see Install.");
     return step(4, "Lean it: drag the motorcycle or the slider. Compare both figures.");
   }
 
-  /** Return the step to show until the firmware is sure of the lean. */
+  /** Until the firmware is sure of the lean. */
   #straight(shown, state) {
     if (shown === null) this.#shownSince = null;
     else this.#shownSince ??= state.time;
     this.#sure = this.#shownSince !== null && state.time - this.#shownSince > SURE_S;
     if (Math.abs(state.lean_deg) > STRAIGHT_DEG) {
-      return step(4, "Not yet: the meter needs ten seconds straight on to find the errors of its sensor.", STRAIGHT);
+      return step(4, "Not yet: the meter needs ten seconds straight on, to find the errors of its sensor.", STRAIGHT);
     }
     if (shown === null) {
-      return step(4, "It rides straight. The meter is not sure yet, and says so instead of showing a wrong lean.");
+      return step(4, "It rides straight: the meter is not sure yet. It says so, rather than show a wrong lean.");
     }
-    return step(4, "It rides straight for ten seconds. Meanwhile the meter finds the errors of its sensor.");
+    return step(4, "It rides straight for ten seconds, in which the meter finds the errors of its sensor.");
   }
 }
