@@ -66,10 +66,7 @@ def share(ride: Channels) -> float:
         ({"rolling": 4.0}, {"rolling": 6.0}),  # the filter finds rest in half of a second
         ({"heavier": 0.115}, {"heavier": 0.125}),  # 0.12 g, of a sensor without six positions
         ({"heavier": -0.115}, {"heavier": -0.125}),
-        (
-            {"heavier": 0.145, "rested": 1.1},
-            {"heavier": 0.155, "rested": 1.1},
-        ),  # 0.05 g from the force at a rest
+        ({"heavier": 0.145, "rested": 1.1}, {"heavier": 0.155, "rested": 1.1}),  # 0.05 g from a rest's force
         ({"heavier": 0.055, "rested": 1.1}, {"heavier": 0.045, "rested": 1.1}),
     ],
 )

@@ -85,9 +85,9 @@ class Outcome:
     """The result of a ride. Only the time from setting off counts.
 
     misleading_s: time with a misleading lean. hidden, available: shares of the riding time. hidden_after_s,
-    named_after_s: since the fault's
-    start, NaN for never. recovered: True if the lean is right RECOVERY_S after the fault ends, None for a fault that
-    does not end. diagram: seconds (len(CLAIMS), len(ERROR_EDGES) - 1) for each claim and error.
+    named_after_s: since the fault's start, NaN for never. recovered: True if the lean is right RECOVERY_S after the
+    fault ends, None for a fault that does not end. diagram: seconds (len(CLAIMS), len(ERROR_EDGES) - 1) for each claim
+    and error.
     """
 
     job: FaultJob
