@@ -40,7 +40,7 @@ def leans_on(record, since_s):
 
 
 def test_a_card_records_without_loss_in_little_time(tmp_path):
-    """With the driver's default clock a block would take 25 ms, and the FAT of a card of 32 GB 25 s."""
+    """With the driver's default clock, a block would take 25 ms, and the FAT of a 32 GB card would take 25 s."""
     record = run(tmp_path)
     assert record.card_hz >= 8_000_000
     assert len(blocks(record)) >= 3

@@ -134,8 +134,11 @@ def blocks(logs: list[Intervals]) -> Blocks:
 
 
 def fits(square: Array, product: Array) -> tuple[Array, Array]:
-    """Solve k normal equations of t terms. Returns (k, t, 3), the coefficients level, forward, left, arm, and (k, 2),
-    the variation of a and c, g^2 s."""
+    """Solve k normal equations of t terms. Return two arrays.
+
+    (k, t, 3): the coefficients, which are level, forward, left and, if t is 4, arm. (k, 2): how much the regressors a
+    and c of the module's docstring varied, g^2 s.
+    """
     ridge = np.diag([1e-9] + [1e-6] * (square.shape[-1] - 1)) * np.maximum(square[..., :1, :1], 1e-3)
     found = np.asarray(np.linalg.solve(square + ridge, product), dtype=float)
     seconds = np.maximum(square[..., 0, 0], 1e-9)[..., None]

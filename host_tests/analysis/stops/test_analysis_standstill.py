@@ -32,7 +32,7 @@ def without_speed(whole: Channels) -> Channels:
 
 
 def test_fast_smooth_track_is_not_a_standstill(track):
-    """This also holds for a sensor without six positions: the force that it reads at rest is known from the ride."""
+    """A sensor need not be calibrated by six positions for this, because the ride shows its force at rest."""
     still = standing(without_speed(track))
     assert np.max(track.speed_mps[still]) < 0.5
     assert np.mean(still[track.speed_mps == 0.0]) > 0.9

@@ -267,7 +267,8 @@ def _twice(x):
 
 
 def judged(ride, k=0):
-    """Errors (n, riding) of device k in degrees: live (NaN where not shown), smoothed, its standard deviation."""
+    """Return three arrays in degrees for device k, only while riding: the live lean's error (NaN where not shown), the
+    smoothed lean's error, and the standard deviation that smoothing gives."""
     return Known(ride.logs[k], ride.calibrations[k], ride.true_lean(k), ride.riding(k)).judged()
 
 

@@ -55,8 +55,8 @@ class Estimate:
         self._use_own_noise()
 
     def unknowns(self, number: Ints, states: Array) -> Array:
-        """(STATES + PARAMETERS, k): states and parameters in the form of equations.py. number (k): the window's index
-        for each row of states (k, STATES)."""
+        """Return states and parameters (STATES + PARAMETERS, k), in the order of equations.py, one column per row of
+        states. states: (k, STATES). number: (k), the index of each row's window."""
         return np.concatenate((states.T, self.parameters[number // self._length].T))
 
     def sigma(self) -> Array:

@@ -30,14 +30,15 @@ JOLTED_RADPS, JOLTED_S = np.radians(150.0), 0.06
 JOLT = 4.0  # sigmas: a larger residual of the process model is a jolt to the sensor, and down-weighted (Cauchy)
 
 # Measurement noise, 1 sigma, each with the time (..._S) that such an error lasts
-SLIDE_MPS, SLIDE_SHARE, SLIDE_S = 0.15, 0.01, 0.5  # wheels' sideways velocity: m/s, and share of speed x tan(lean)
-# wheels' upward velocity: m/s, and pitch of the chassis relative to the road
+# wheels' sideways velocity: a constant part, and a part in proportion to speed x tan(lean)
+SLIDE_MPS, SLIDE_SHARE, SLIDE_S = 0.15, 0.01, 0.5
+# wheels' upward velocity: a constant part, and the pitch of the chassis relative to the road
 DIVE_MPS, DIVE_RAD, DIVE_S = 0.1, np.radians(2.5), 0.5
-# wheels' upward velocity due to slopes: m/s, and the road's slope
+# wheels' upward velocity due to slopes: a constant part, and the road's slope
 SLOPE_MPS, SLOPE_RAD, SLOPE_S = 0.1, np.radians(2.0), 4.0
 STEEP = np.radians(10.0)  # at this pitch DIVE_RAD and SLOPE_RAD double: roads are less steep, wheelies steeper
 BALANCE_G, BALANCE_S = 0.011, 3.0  # force to the side, due to wind, camber and the rider
-# Further noise of the force to the side: g, times sin(lean), and g s2/rad, times the roll acceleration
+# Further noise of the force to the side: a part times sin(lean), and a part (g s2/rad) times the roll acceleration
 BALANCE_LEANED_G, BALANCE_ROLLING = 0.045, 0.05
 BALANCE_MIN_MPS = 4.0  # at lower speeds, steering and feet also balance the bike
 ANY_MPS, ANY_S = 20.0, 60.0  # difference of the speed from USUAL_MPS, for a ride in which nothing else shows the speed

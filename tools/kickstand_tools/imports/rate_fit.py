@@ -158,7 +158,8 @@ def _in_cells(seconds: Array, force: Array, rates: Array) -> tuple[Array, Array]
 
 
 def _levi_civita() -> Array:
-    """(3, 3, 3) e[i, l, a]: component a of (l x i), with l the direction of gravity, and i the axis of the rate."""
+    """Return e (3, 3, 3). e[i, l, a] is component a of the cross product of the unit vectors of axis l (of gravity) and
+    axis i (of the rate), in this order."""
     e = np.zeros((3, 3, 3))
     for first, second, third in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         e[second, first, third] = 1.0

@@ -20,7 +20,7 @@ _COMMANDS = (
 
 
 def draw() -> bytes:
-    """The plot as PNG; 10 s. Needs what `pip install -e ".[rides]"` installs."""
+    """Return the plot as PNG. Drawing takes 10 s. Needs what `pip install -e ".[rides]"` installs."""
     with tempfile.TemporaryDirectory() as directory:
         for command in _COMMANDS:
             poses = " ".join(sorted(str(p.relative_to(directory)) for p in Path(directory).glob("ride/POSE_*.csv")))
