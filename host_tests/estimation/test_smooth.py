@@ -206,8 +206,8 @@ def test_frozen_readings_have_no_lean_and_do_not_harm_the_rest(street):
 
 
 def test_a_pothole_leaves_no_lean_behind(street):
-    """The roll rate is 300 deg/s for 60 ms. Two phones on one scooter measured such rates in one hit, but with
-    opposite signs: so the phones moved, not the scooter."""
+    """The roll rate is 300 deg/s for 60 ms. Two phones on one scooter measured such rates with opposite
+    signs: so the phones moved, not the scooter."""
     log, at = street.log, 80.0
     hit = (log.t_s > at) & (log.t_s < at + 0.06)
     rate = log.gyro_dps.copy()

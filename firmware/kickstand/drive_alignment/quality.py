@@ -27,8 +27,8 @@ _MOVED_DEG = const(30.0)  # difference of forward; a long banked motorway curve,
 PITCH_DEG = 7.0  # a road of 6 % uphill and then downhill causes less
 ROLL_DEG = 7.0  # the banked curve caused 6. Not used on a motorcycle, because it leans
 # The mount moved if an event's forward differs by over _EVENT_OFF_DEG from the overall one. An event is
-# only judged if its weight is at least _MIN_EVENT_WEIGHT, and its force at least _MIN_EVENT_FORWARD times the force that
-# the change of speed requires. On recorded drives no such event differed by more than 40 degrees.
+# only judged if its weight is at least _MIN_EVENT_WEIGHT, and its force at least _MIN_EVENT_FORWARD times that of the
+# change of speed. On recorded drives no such event differed by more than 40 degrees.
 _EVENT_OFF_DEG = const(80.0)
 _MIN_EVENT_WEIGHT = const(0.012)  # g^2 s
 _MIN_EVENT_FORWARD = const(0.5)  # g per g

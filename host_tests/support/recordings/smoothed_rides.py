@@ -27,7 +27,8 @@ class Known:
         return replay(self.log, self.calibration).lean_deg
 
     def judged(self):
-        """Errors (n, riding) in degrees: live (NaN where not shown), smoothed, its standard deviation."""
+        """Return three arrays in degrees, only while riding: the live lean's error (NaN where not shown), the smoothed
+        lean's error, and the standard deviation that smoothing gives."""
         shown, found = replay(self.log, self.calibration), smooth(self.log, self.calibration)
         live = np.where(np.isnan(shown.lean_sigma_deg), np.nan, shown.lean_deg - self.lean_deg)
         return live[self.riding], (found.lean_deg - self.lean_deg)[self.riding], found.lean_sigma_deg[self.riding]
