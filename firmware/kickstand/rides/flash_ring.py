@@ -16,7 +16,7 @@ _ENOSPC = const(28)  # MicroPython's errno does not define it
 PART_BLOCKS = 16  # ride blocks in a part in flash
 _CARD_PART_BLOCKS = const(256)  # ride blocks in a part on a card: 85 files for a day's ride, not 1300
 FIRMWARE = 103 * BLOCK  # room for the compiled firmware: each file takes whole blocks, each folder two
-RESERVE = 64 * BLOCK  # the most that an update of compiled firmware needs, plus a margin
+RESERVE = 63 * BLOCK  # the most that an update of compiled firmware needs, plus a margin
 
 
 def free_bytes(path):
