@@ -1,5 +1,6 @@
 """The covariance's sparse arithmetic against the textbook's matrices, and its machine code against exact sums."""
 
+from copy import deepcopy
 from math import inf, isnan, nan
 
 import numpy as np
@@ -75,6 +76,15 @@ def test_a_state_that_is_set_has_no_correlation_left():
     matrix[4] = matrix[:, 4] = 0.0
     matrix[4, 4] = 0.25
     np.testing.assert_allclose(p.rows, matrix, rtol=0, atol=1e-12)
+
+
+def test_a_copy_is_independent_of_its_original():
+    p, matrix = some()
+    copied = deepcopy(p)
+    p.set_variance(4, 0.25)
+    copied.add_noise(0, 1.0)
+    matrix[0, 0] += 1.0
+    np.testing.assert_allclose(copied.rows, matrix, rtol=0, atol=1e-12)
 
 
 def test_a_variance_never_reaches_zero():

@@ -54,14 +54,24 @@ class Covariance:
         n = self.n = len(variances)
         self._zeros = array(_KIND, [0.0] * n)
         self._p = array(_KIND, [0.0] * n * n)
-        every = memoryview(self._p)
-        # Parts of _p. The type checker takes the elements of a memoryview for integers.
-        self.rows = [every[n * i : n * (i + 1)] for i in range(n)]  # type: list
+        self._divide()
         for i, variance in enumerate(variances):
             self._p[i * n + i] = variance
         self.correction, self._column, self._gain = [array(_KIND, self._zeros) for _ in range(3)]
         self._factor = array(_KIND, [0.0])
         self.misfit = 0.0  # see update()
+
+    def _divide(self):
+        n, every = self.n, memoryview(self._p)
+        # Parts of _p. The type checker takes the elements of a memoryview for integers.
+        self.rows = [every[n * i : n * (i + 1)] for i in range(n)]  # type: list
+
+    def __getstate__(self):  # for copy and pickle on a computer, which cannot copy a memoryview
+        return {name: value for name, value in self.__dict__.items() if name != "rows"}
+
+    def __setstate__(self, state):
+        self.__dict__.update(state)
+        self._divide()
 
     def set_variance(self, i, variance):
         """Set the variance of state i, and its covariances with the other states to 0."""
