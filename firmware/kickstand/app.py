@@ -26,7 +26,7 @@ from .ui.screen import Screen
 from .units import const
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
-_COLLECT_TURNS = const(40)  # turns between two garbage collections: they use 80 KB of heap, of 105 free while recording
+_COLLECT_TURNS = const(40)  # turns between two garbage collections: they use 80 KB of heap, of 109 free while recording
 # The same while aligning by driving, with an OLED, a phone or user.py: 80 KB are free
 _COLLECT_TURNS_DRIVING = const(23)
 _PLAN_EVERY = const(4)  # collections between two looks at the free heap, which take 3 ms on an ESP32

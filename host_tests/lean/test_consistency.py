@@ -58,7 +58,7 @@ def test_a_force_to_the_side_and_a_steep_pitch_do_not_last():
 
 
 def test_a_pitch_without_its_force_does_not_last():
-    """On a real slope gravity is in the forward force. Who accelerates down a slope also brakes on it."""
+    """On a real slope gravity is in the forward force. A rider who accelerates down a slope soon brakes on it."""
     judge = Consistency()
     assert not windows(judge, 30.0, pitch=radians(10.0))
     pitch = radians(10.0)

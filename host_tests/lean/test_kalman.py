@@ -103,7 +103,7 @@ def test_noise_is_added_to_one_state():
 
 
 def added(cases):
-    """What the machine code makes of each case: out, factors, source and rows."""
+    """Return `out` as the machine code leaves it, for each case (out, factors, source, rows)."""
     script = (
         "from array import array\n"
         "from math import inf, nan\n"
@@ -118,7 +118,7 @@ def added(cases):
 
 @pytest.mark.parametrize("decades", [0, 3, 12])
 def test_machine_code_rounds_a_sum_once(decades):
-    """To the nearest float, within what 30 bits of the larger term leave open."""
+    """The sum is rounded to the nearest float. The larger of its two terms has 30 bits, so the rest may be lost."""
     chance = np.random.default_rng(decades)
     size = chance.normal(size=(3, 400)) * 10.0 ** chance.uniform(-decades, decades, (3, 400))
     size[0, ::3] = -size[1, ::3] * size[2, ::3] * (1.0 + 1e-3 * chance.normal(size=134))  # nearly cancelled
@@ -139,7 +139,8 @@ def test_machine_code_keeps_a_matrix_symmetric():
 
 
 def test_machine_code_at_the_ends_of_the_range():
-    """What is too small counts as 0; what is too large, infinite or not a number makes the sum not-a-number."""
+    """Values that are too small count as 0. A value that is infinite or not a number, or a sum that is too large, gives
+    not-a-number."""
     cases = {
         (0.0, 1e-30, 1e-30): 0.0,
         (2.5, 1e-30, 1e-30): 2.5,

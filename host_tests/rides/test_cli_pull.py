@@ -79,7 +79,7 @@ def test_rides_become_logs_with_their_calibration(board, tmp_path):
     ("vehicle", "by_drive", "said"), [("car", True, "car"), ("car", False, None), ("motorcycle", True, None)]
 )
 def test_the_log_of_a_car_says_that_it_is_a_car(vehicle, by_drive, said, board, tmp_path, monkeypatch):
-    """The log of a car's ride shows no lean. A ride aligned by two poses is from before the board's use in the car."""
+    """The log of a car's ride shows no lean. A ride aligned by two poses is older than the board's use in the car."""
     made = ride_writer.calibration()
     made.by_drive = by_drive
     monkeypatch.setattr(ride_writer, "calibration", lambda _trim_deg: made)

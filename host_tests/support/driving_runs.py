@@ -63,7 +63,7 @@ def mounted(m, vector):
 
 class SpeedSource:
     """A GPS that gives a speed every every_s, delayed by late_s, multiplied by scale, rounded to multiples of step
-    (m/s). From stuck_from_s on the speed stays the same. Within silent (from, to; s) there is none."""
+    (m/s). From stuck_from_s on the speed stays the same. Within silent (from, to; s) no speed arrives."""
 
     def __init__(self, every_s=0.5, late_s=0.0, scale=1.0, step=0.0, stuck_from_s=1e9, silent=(1e9, 1e9)):
         self.every = round(every_s * RATE_HZ)

@@ -27,9 +27,10 @@ def track(
     speed: bool = True,
     pace: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Track:
-    """One point per second, from before the ride until after it. Positions have an error of error_m (1 sigma), which
-    changes within changes_s. Their total delay is late_s; smooth_s of that is the mean delay of a low-pass. pace: the
-    same road at another speed: for each sample of the ride its new time (s) and the factor on its speed.
+    """One point per second. The track begins earlier than the ride and ends later. Positions have an error of error_m
+    (1 sigma), which changes within changes_s. Their total delay is late_s; smooth_s of that is the mean delay of a
+    low-pass. pace: the same road at another speed: for each sample of the ride its new time (s) and the factor on its
+    speed.
     """
     chance = np.random.default_rng(seed)
     step_s = 1.0 / ride.rate_hz

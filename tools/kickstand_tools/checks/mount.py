@@ -5,7 +5,7 @@ braking and speeding up in a straight line change the force along the forward ax
 the log's speed. The bends of a motorcycle show forward without a speed: leaning to the right means yawing more to the
 right, so minus the change of the yaw rate correlates with the rate about forward.
 
-If `calibrate two` was told the wrong side of the kickstand, or if two poses were swapped, forward and backward are
+If `calibrate two` got the wrong side of the kickstand, or if two poses were swapped, forward and backward are
 exchanged, and so are left and right. The force alone does not show this, because braking then looks like speeding up.
 
 In simulated and recorded rides with a correct calibration, up is found within 8 degrees and forward within 5.
