@@ -29,7 +29,8 @@ LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
 _COLLECT_TURNS = const(40)  # turns between two garbage collections: they use 80 KB of heap, of 109 free while recording
 # The same while aligning by driving, with an OLED, a phone or user.py: 80 KB are free
 _COLLECT_TURNS_DRIVING = const(23)
-_PLAN_EVERY = const(4)  # collections between two looks at the free heap, which take 3 ms on an ESP32
+# Collections between two looks at the free heap, which take 3 ms on an ESP32. In a smaller heap each collection looks.
+_PLAN_EVERY = const(4)
 SINGLE_GAPS = 300  # single free heap blocks that a collection leaves
 _PAGE_MS = const(100)
 # A page shows no lean if its own delay and the age of the readings still in the FIFO add up to more: so a lean on the
@@ -130,8 +131,8 @@ class App:
         self._watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
         gc.threshold(-1)
         self._due_us = ticks_us()
-        self._planned_turns = self._turns_left = self._turns_to_collect()
         self._collections = 0
+        self._plan_collection()
 
     def step(self):
         """One pass of the loop, LOOP_US long: turn(), collect garbage if it is time, feed the watchdog, wait."""
@@ -140,10 +141,7 @@ class App:
         if self._turns_left <= 0:  # here, not in the middle of a sample: the FIFO keeps the samples meanwhile
             gc.collect()
             fill_gaps(SINGLE_GAPS)
-            self._collections += 1
-            if self._collections % _PLAN_EVERY == 0:
-                self._planned_turns = self._turns_to_collect()
-            self._turns_left = self._planned_turns
+            self._plan_collection()
             if self.user:
                 self.user.check_memory()
         if self._watchdog:
@@ -168,9 +166,12 @@ class App:
 
         return state(self)
 
-    def _turns_to_collect(self):
-        few = self.drive or self.lcd.draws or self.live or self.user
-        return port.turns_to_collect(_COLLECT_TURNS_DRIVING if few else _COLLECT_TURNS)
+    def _plan_collection(self):
+        small = self.drive or self.lcd.draws or self.live or self.user
+        if small or self._collections % _PLAN_EVERY == 0:
+            self._planned_turns = port.turns_to_collect(_COLLECT_TURNS_DRIVING if small else _COLLECT_TURNS)
+        self._collections += 1
+        self._turns_left = self._planned_turns
 
     def turn(self):
         """Process the samples in the FIFO and one press, and do at most one transfer to the display. It never waits."""
