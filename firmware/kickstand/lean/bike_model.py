@@ -7,13 +7,13 @@ State                                       Measured (a vector with [3] has the 
     q  PITCH  of road and suspension, nose up   w_m  rate of rotation [3]
     v  SPEED  forward
     b  BIAS_LEFT, BIAS_UP, BIAS_FORWARD: change of the gyro's bias since the calibration
-    psi  YAW_ERROR of the alignment. Pitch in the kickstand pose causes it, 1/tan(tilt of the stand) times as large:
-         5 degrees per degree of pitch at 11 degrees of tilt, 11 at 5
+    psi  YAW_ERROR of the alignment. Pitch in the kickstand pose causes it: psi is this pitch over tan(tilt of the
+         stand). A degree of pitch causes 5 degrees of yaw error at 11 degrees of tilt, and 11 degrees at 5.
     s_x, c_xy        SCALE_LEFT, CROSS_LEFT_UP: scale error of the gyro's left axis, and its reading of a rate about up
-    c_zx, c_zy, s_z  CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD: the same of its forward axis
-The data sheet allows 3 % of scale error and 2 % of cross-axis sensitivity. A filter without these states mistakes them
-for bias in a long turn, and for lean in a quick roll. The up axis has no such states: without a measured speed its
-scale and the speed are not separately observable.
+    c_zx, c_zy, s_z  CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD: the same for its forward axis
+The data sheet allows 3 % of scale error and 2 % of cross-axis sensitivity. A filter without these states would mistake
+them for bias in a long turn, and for lean in a quick roll. The up axis has no such states: without a measured speed its
+scale error cannot be told from an error of the speed.
 
 Equations, with ' for the derivative by time
     rates, corrected         w = w_m - b,  then  w_z -= c_zx w_x + c_zy w_y + s_z w_z,  w_x -= s_x w_x + c_xy w_y
@@ -25,17 +25,17 @@ Equations, with ' for the derivative by time
     roads are level          0 = q + psi sin t  on average                             (6)
     lean of the bike itself  t - psi cos t (tan q + 1/2 psi sin t)                     (7)
 
-t and q refer to the sensor's axes, which psi has turned: they contain a part of the bike's own pitch, q + psi sin t. On
-a slope of 10 % a yaw error of 5 degrees causes half a degree of lean. (7) is correct to second order in psi. On a level
-road q is -psi sin t, and (7) agrees with tan(lean of the bike) = tan t / cos psi.
+t and q refer to the sensor's axes, which psi has turned. So t contains a part of the bike's own pitch, which is
+q + psi sin t. On a slope of 10 % a yaw error of 5 degrees causes half a degree of lean. (7) removes it, to second order
+in psi. On a level road q is -psi sin t, and (7) agrees with tan(lean of the bike) = tan t / cos psi.
 
-d is the part of the pitch rate q' from the springs and not from the road: the wheels do not rise with it. Braking
-causes most of it; dive.py has (8).
+d is the springs' part of the pitch rate q': the wheels do not rise with it. Braking causes most of d; see (8) in
+dive.py. h is the height of the sensor above the roll axis.
 
-h is the height of the sensor above the roll axis. (4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a
-steady turn (4) and (5) cannot separate lean from speed, because their derivatives by lean and by speed are in the same
-proportion. There the ratio of two rates gives the lean: pitch does not change, by (6), so that by (2) w_x / w_y is
-tan t. At the beginning of a turn the earlier speed is still valid, and (4) with this speed gives the lean.
+(4) and (5) are A. Nicolae's (22) and (23) with s = v w / g. In a steady turn they cannot separate lean from speed,
+because their derivatives by lean and by speed are in the same proportion. There the ratio of two rates gives the lean:
+by (6) the pitch does not change, so by (2) w_x / w_y is tan t. At the beginning of a turn the earlier speed is still
+valid, and with it (4) gives the lean.
 """
 
 from math import cos, radians, sin, sqrt, tan
@@ -52,21 +52,21 @@ CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD = 9, 10, 11
 MAX_PITCH = 1.2  # rad. No motorcycle reaches it, but a sensor in the hand may. At 90 degrees lean has no meaning.
 MIN_PITCH = -MAX_PITCH  # a constant, because a negation in each sample would take heap and time
 
-# Where the yaw rate of a bike in balance replaces the measured one. Comments in the form of measurements.py.
+# turn_rates() uses the yaw rate of a bike in balance if the speed is above _BALANCE_MIN_SPEED, the lean's standard
+# deviation is below BALANCE_SIGMA, and the measured rate differs by less than
+# _BALANCE_RATE + _BALANCE_SHARE x |balanced rate|. Comments in the form of measurements.py.
 _BALANCE_MIN_SPEED = const(4.0)  # m/s. Larger: the balanced rate is not used in slow turns.
-# The balanced rate is used where the measured one is within _BALANCE_RATE + _BALANCE_SHARE x |balanced rate| of it.
-_BALANCE_RATE = const(0.1)  # rad/s: constant part of that tolerance. Larger: it is used with a wrong lean or speed.
-_BALANCE_SHARE = const(0.5)  # ratio: part of that tolerance per rate. Larger: it is used with a wrong lean or speed.
-# rad: the lean's standard deviation must be smaller. Larger: the balanced rate is used with a more uncertain lean.
-BALANCE_SIGMA = radians(20.0)
-_BALANCE_MIN_COS = const(0.3)  # ratio: lower bound of cos(lean). Larger: too little rate about left in deep leans.
+_BALANCE_RATE = const(0.1)  # rad/s. Larger: the balanced rate is used with a wrong lean or speed.
+_BALANCE_SHARE = const(0.5)  # ratio. Larger: as for _BALANCE_RATE.
+BALANCE_SIGMA = radians(20.0)  # rad. Larger: the balanced rate is used with a more uncertain lean.
+_BALANCE_MIN_COS = const(0.3)  # ratio: lower bound of cos(lean). Larger: too small a rate about left in deep leans.
 
 
 def predict(x, force, rate, seconds, sums):
     """Integrate (1) to (3) in the state x (STATES values) over one sample of force (3 values, g) and rate (3, rad/s).
 
-    sums (9 values) grows by the sample's values. Divided by the number of samples at the end of a window (the samples
-    of a fifth of a second, which make one update of the filter) they are the window's means:
+    The sample's values are added to sums (9 values). A window is a fifth of a second, one update of the filter. Divided
+    by its number of samples, the sums are the window's means:
         0       innovation of (4) without its terms in h and d, at the state before the step, in g
         1       innovation of (5) without its terms in h and d, at the same state, in g
         2 to 4  corrected rates about left, up, forward, in rad/s
@@ -116,12 +116,12 @@ def possible_pitch(pitch):
 
 
 def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
-    """Rates about left and up, for products of a state and a rate: those of a bike in balance at this lean and speed
-    (v w_y / g = -cos q sin t) if the measured rate about up is close to them, else the measured ones. speed: 0 for the
-    measured ones in any case.
+    """Return the rates about left and up (rad/s) for derivatives that multiply a rate by a state.
 
-    The noise of a measured rate would be squared in such products, and the estimates of speed and lean would be too
-    small (the problem of errors in variables).
+    They are the rates of a bike in balance at this lean and speed, v w_y / g = -cos q sin t, if the measured rate about
+    up is close to the balanced one. Otherwise, and with a speed of 0, they are the measured rates. The noise of a
+    measured rate would be squared in such products and make the estimated speed and lean too small (errors in
+    variables).
     """
     if speed > _BALANCE_MIN_SPEED:
         balanced = -STANDARD_GRAVITY * cos_pitch * sin_lean / speed
@@ -131,12 +131,13 @@ def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
 
 
 class Linearisation:
-    """(1) to (6) about the state x, at a window's means of the corrected rates (3 values) and of the forward force.
-    lean_variance: rad^2. Over BALANCE_SIGMA^2 the lean is not used for the turn rate of a bike in balance.
+    """The partial derivatives of (1) to (6) at the state x. rates (3 values) and forward: a window's means of the
+    corrected rates and of the forward force. lean_variance: rad^2, see turn_rates().
 
-    Each ..._row of the Jacobians is ((state, partial derivative), ...): lean, pitch and speed of the rates of change
-    (1) to (3), left and up of the forces (4) and (5), level of (6). Derivatives that are zero are left out, and terms
-    that are small because pitch, yaw error, scale and cross-axis errors are. The other attributes are values of terms.
+    Each row is ((state, partial derivative), ...). lean_row, pitch_row and speed_row belong to the rates of change (1)
+    to (3), left_row and up_row to the forces (4) and (5), level_row to (6). Zero derivatives are left out, and terms
+    that are small because a pitch, yaw error, scale error or cross-axis error is small. The other attributes are values
+    that several terms share.
     """
 
     def __init__(self, x, rates, forward, lean_variance=0.0):
@@ -193,6 +194,6 @@ class Linearisation:
         self.pitching = per_rate * self.pitch_rate  # in g
 
     def lean_by_pitch(self, x):
-        """(7): the part of the state's lean (rad) that is the bike's own pitch, seen as lean because of the yaw
-        error."""
+        """Return the part of the state's lean (rad) that (7) subtracts: the yaw error makes the bike's own pitch look
+        like lean."""
         return x[YAW_ERROR] * self.cos_lean * (tan(x[PITCH]) + 0.5 * x[YAW_ERROR] * self.sin_lean)

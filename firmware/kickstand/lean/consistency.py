@@ -2,24 +2,27 @@
 
 A filter's covariance does not show a partly failed sensor, but its innovations do. The square of an innovation over its
 expected variance, the normalised innovation squared, is 1 on average if everything fits (Y. Bar-Shalom and others,
-Estimation with Applications to Tracking and Navigation, section 5.4). Here the mean is of its root, with its sign.
-Vibration and bumps, which a good sensor has too, cancel in this mean. A dead or mirrored axis, half of the scale, a
-step of the bias and a slipped mount do not cancel. The forces to the left and up each have a short mean, which shows
-large errors within a second or two, and a long one, which shows small errors after some seconds.
+Estimation with Applications to Tracking and Navigation, section 5.4). This module averages the root instead, with the
+innovation's sign. Vibration and bumps, which a good sensor has too, cancel in this mean. A dead or mirrored axis, a
+halved scale, a step of the bias and a slipped mount do not cancel. The forces to the left and up have two means each.
+The short mean shows large errors within two seconds; the long one shows small errors after some seconds.
 
-Three more means are of quantities that never last long on a real ride: a force to the side, because a bike is in
-balance, a steep pitch, and a pitch without its force. On a real slope the forward force has gravity's part, sin(pitch).
-If that part is missing, wrong rates have made the pitch, and the filter takes the difference for an acceleration: up
-the slope it seems to brake, down the slope to accelerate. Real bikes do so for a few seconds only.
+Three more means are of quantities that never last long on a real ride:
+    a force to the side, because a bike is in balance
+    a steep pitch
+    a pitch without its force
+On a real slope the forward force contains gravity's part, sin(pitch). If that part is missing, wrong rates have caused
+the pitch. The filter takes the difference for an acceleration: uphill the bike seems to brake, downhill to accelerate.
+A real bike does so only for a few seconds.
 
-Each mean is judged by its own spread, as in Student's t: on a road that is rougher than the filter expects the
-innovations are large, of either sign, and so are their means.
+Each mean is compared with its own spread, as in Student's t-test. On a road rougher than the filter expects, single
+innovations are large, and their means vary more.
 
-One more check follows a doubt. With a gyro that is wrong about up, a straight seems to be an endless bend, and all
-forces are as expected. So after a doubt a lean that has stayed on one side for long is not shown.
+After a doubt there is one more check. If the gyro's rate about up is wrong, a straight can look like an endless bend,
+with all forces as expected. So a lean that has long been on one side is not shown.
 
-After a misfit the lean is doubted, and hidden until everything has fitted for a while. Repeated misfits are a fault of
-the sensor.
+After a misfit the lean is doubted: it is hidden until everything has fitted for a while. Repeated misfits mean a faulty
+sensor.
 """
 
 from math import sqrt
@@ -29,48 +32,52 @@ from ..units import const
 # Symbol = default  # unit: what it is. "Larger:" says what raising it does.
 _SHORT_S = const(3.0)  # s: time constant of the short means. Larger: fewer leans are hidden, and later.
 _LONG_S = const(10.0)  # s: time constant of the other means. Larger: as for the short means.
-_MOST = const(4.0)  # standard deviations: a larger innovation counts as this. Larger: a blow counts for more.
-# Limits of the means. Larger, each: fewer leans are hidden, good and wrong ones. On rides without a fault, on good and
-# bad roads and mounts, they reach .4, .25, .7, .25, .12, 8 degrees and .096, the last on a recorded ride.
-LEFT_SHORT, LEFT_LONG = 0.75, 0.5  # standard deviations
-UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations
-# ratio: the limits of up are wider by this without the six positions, as the data sheet allows the accelerometer
-# 3 % of scale error and 80 mg of offset, and only rest shows them. Larger: fewer leans are hidden.
+_MOST = const(4.0)  # standard deviations: larger innovations are limited to this. Larger: a blow counts for more.
+# Limits of the means. Larger: fewer leans are hidden, both right and wrong ones. The comments give the largest mean of
+# rides without a fault, on good and bad roads and mounts.
+LEFT_SHORT, LEFT_LONG = 0.75, 0.5  # standard deviations: .4 and .25 without a fault
+UP_SHORT, UP_LONG = 0.9, 0.35  # standard deviations: .7 and .25 without a fault
+# ratio: factor on the limits of up without the six positions. The data sheet allows the accelerometer 3 % of scale
+# error and 80 mg of offset, which otherwise only rest shows. Larger: fewer leans are hidden.
 _UNMEASURED = const(2.0)
-_SIDEWAYS = const(0.15)  # ratio: force to the side over force up, less the trim
-_STEEP = const(0.21)  # rad: pitch
-_SLOPE = const(0.12)  # rad: a pitch without its force, the root of the short mean of its square
-# The limits of left and up grow with the spread, the root of this mean square: half the square of the change between
-# windows. Larger: more is hidden on the roughest roads.
-_SPREAD = const(0.4)  # standard deviations, squared
+_SIDEWAYS = const(0.15)  # ratio: force to the side over force up, less the trim: .12 without a fault
+_STEEP = const(0.21)  # rad: pitch: .14 without a fault
+_SLOPE = const(0.12)  # rad: root mean square of a pitch without its force: .096 on a recorded ride without a fault
+# standard deviations, squared: above this spread the limits of left and up grow with its root. The spread is the mean
+# of half the squared change between windows. Larger: more is hidden on the roughest roads.
+_SPREAD = const(0.4)
 # rad: limit of a steady mean lean after a doubt. Larger: less is hidden in bends, and on straights that seem bends.
 _ONE_SIDE = const(0.13)
-# rad: a larger steady lean is hidden only after _LONG_S, because the force up confirms it. Smaller: as for _ONE_SIDE.
+# rad: a larger steady lean is hidden only after _LONG_S, because the force up confirms it. Smaller: less is hidden.
 _SURE_LEAN = const(0.3)
-# ratio: of the mean square of the lean, above which it has been steady. Larger: as _ONE_SIDE.
+# ratio: the lean is steady if its squared mean exceeds this share of its mean square. Larger: less is hidden.
 _STEADY = const(0.75)
-_MOST_SIDEWAYS = const(0.5)  # ratio: more counts as this. Larger: a blow counts for more.
+_MOST_SIDEWAYS = const(0.5)  # ratio: larger forces to the side are limited to this. Larger: a blow counts for more.
 _STRICT = const(0.85)  # ratio: share of the limits after a doubt. Larger: a lasting fault is detected later.
-# ratio: share of the limits in which the means have to stay while doubted. Larger: shown again sooner.
+# ratio: while doubted, the means fit within this share of their limits. Larger: the lean is shown again sooner.
 _FIT = const(0.6)
-# s: time for which everything must fit after the first doubt, the second and so on. Larger: after a fault the lean
-# stays hidden for longer.
+# s: everything must fit for this time after the first doubt, the second and so on. Larger: after a fault the lean stays
+# hidden for longer.
 HOLDS_S = (3.0, 4.0, 4.0, 20.0, 60.0)
 _GAP_S = const(4.5)  # s: the same after a gap in the readings. Larger: after a gap the lean stays hidden for longer.
-MILD = 3  # doubts. With more of them only turns count as fitting, because on a straight nearly everything fits.
-# s: least time between doubts after MILD of them, so that rest is found. Larger: changed errors are found later.
+# doubts: with more of them only time in turns counts as fitting, because on a straight nearly everything fits.
+MILD = 3
+# s: least time between doubts after MILD of them, so that rest can be detected. Larger: changed errors are found later.
 _AGAIN_S = const(12.0)
 _TURNING = const(0.05)  # rad/s: least yaw rate of a turn. Larger: the lean stays hidden for longer.
-FORGET_S = 60.0  # s: after fitting for this time one doubt is forgotten. Larger: a repeated fault is hidden for longer.
+FORGET_S = 60.0  # s: one doubt is forgotten after fitting this long. Larger: a repeated fault is hidden for longer.
 
 last_odd = None  # the last code of `odd`, for `kickstand status`
 
 
 class Consistency:
-    """Read-only attributes. doubt: the lean must not be shown. doubts: number of misfits minus the forgotten ones. odd:
-    None, or the code of repeated misfits: "odd-left", "odd-up" (forces) or "odd-pitch".
+    """Judges the innovations of each window. six_done: the six positions have measured the accelerometer.
 
-    six_done: the six positions have measured the accelerometer."""
+    Read-only attributes:
+        doubt   True if the lean must not be shown
+        doubts  number of misfits, less the forgotten ones
+        odd     None, or the code of repeated misfits: "odd-left", "odd-up" (the forces) or "odd-pitch"
+    """
 
     def __init__(self, six_done=True):
         self._up_share = 1.0 if six_done else _UNMEASURED
@@ -88,8 +95,8 @@ class Consistency:
         self._left_before = self._up_before = self._left_square = self._up_square = 0.0
 
     def gap(self, in_rest=True):
-        """Doubt until everything has fitted for a while, because the filter has just begun. in_rest: rest counts as
-        fitting."""
+        """Doubt until everything has fitted for a while, because the filter has restarted. in_rest: time at rest counts
+        as fitting."""
         self.doubt = True
         self._in_rest = in_rest
         self._fits_s = 0.0
@@ -104,9 +111,10 @@ class Consistency:
         return lean < _SURE_LEAN or self._mean_s >= _LONG_S
 
     def add(self, left, up, sideways, pitch, push, lean, yaw_rate, seconds):
-        """Take a window of `seconds` while riding. left, up: the normalised innovations of these forces. sideways:
-        force to the side over force up. pitch and lean in rad, yaw_rate in rad/s. push: estimated forward
-        acceleration, g. Return True if a misfit has just begun."""
+        """Take a window of `seconds` while riding. Return True if a misfit has just begun.
+
+        left, up: innovations of these forces in standard deviations. sideways: force to the side over force up. pitch,
+        lean: rad. push: estimated forward acceleration, g. yaw_rate: rad/s."""
         gain, long_gain = min(1.0, seconds / _SHORT_S), min(1.0, seconds / _LONG_S)
         left, up = max(-_MOST, min(_MOST, left)), max(-_MOST, min(_MOST, up))
         self._left += gain * (left - self._left)

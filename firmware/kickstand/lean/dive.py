@@ -1,29 +1,30 @@
 """Suspension dive: estimates while riding how far braking and acceleration pitch the bike on its springs.
 
-Under braking a telescopic fork dives, under acceleration the rear sits down: on a superbike by 2.8 and 1.3 degrees per
-g. The wheels do not rise with it, so this pitch rate times the speed is not an acceleration. The springs' pitch is
-nearly proportional to the forward acceleration a, and its rate is
+In braking a telescopic fork dives, by 2.8 degrees per g on a superbike. In acceleration the rear sits down, by 1.3
+degrees per g. The wheels do not rise, so this pitch rate times the speed is not an acceleration. The springs' pitch is
+nearly proportional to the forward acceleration a. With ' for the derivative by time, its rate is
 
     dive' = share a'                                                                  (8)
 
-If the road's slope changes without braking, the pitch rate is independent of a'. A regression of the pitch rate on a'
-therefore gives the share: sum(a' pitch rate) / sum(a'^2), each sum with a prior.
+The pitch rate of the road itself does not depend on a'. So a regression of the pitch rate on a' gives the share:
+sum(a' pitch rate) / sum(a'^2). Each sum begins with a prior.
 """
 
 from ..units import STANDARD_GRAVITY, const
 
 # Symbol = default  # unit: what it is. "Larger:" says what raising it does.
 PRIOR_SHARE = 0.026  # rad per g: 1.5 degrees per g. Larger: before the share is found, more pitch counts as dive.
-# (g/s)^2: weight of that prior in the sum of a'^2. Larger: the share is found later, and steadier.
+# (g/s)^2: weight of that prior in the sum of a'^2. Larger: the share is found later, and varies less.
 _PRIOR_SQUARE = const(5.3)
 _MIN_SHARE = const(-0.035)  # rad per g: anti-dive forks lift the nose a little
-_MAX_SHARE = const(0.14)  # rad per g: 8 degrees per g, as of soft long forks
-_MIN_SPEED = const(5.0)  # m/s. Larger: braking to a stop tells less.
-_MAX_JERK = const(3.0)  # g/s. Larger: bumps and lost readings count as braking.
+_MAX_SHARE = const(0.14)  # rad per g: 8 degrees per g, as soft, long forks have
+_MIN_SPEED = const(5.0)  # m/s: slower windows do not count. Larger: the share is found later.
+_MAX_JERK = const(3.0)  # g/s: a larger a' does not count. Larger: bumps and lost readings count as braking.
 
 
 class Dive:
-    """The effect of braking on the pitch. share (read-only): rad per g; nose down in braking > 0. Fixed memory."""
+    """Estimates how braking pitches the bike, in fixed memory. share (read-only): rad per g, > 0 if the nose goes down
+    in braking."""
 
     def __init__(self):
         self.share = PRIOR_SHARE

@@ -20,8 +20,8 @@ def static_lean_deg(force):
 
 
 def centripetal_g(left_g, up_g, yaw_rate):
-    """s in g by (26): its size from the force, its sign from the yaw rate about up (left turn > 0; without
-    a yaw rate 0)."""
+    """Return s, the centripetal acceleration in g, by (26). The force gives its size, the yaw rate its sign, > 0 in a
+    left turn. Without a yaw rate s is 0."""
     excess = left_g * left_g + up_g * up_g - 1.0
     if excess <= 0.0 or yaw_rate == 0.0:
         return 0.0
@@ -29,8 +29,9 @@ def centripetal_g(left_g, up_g, yaw_rate):
 
 
 def formula_lean_deg(force, yaw_rate):
-    """Nicolae's lean (25)-(26) in degrees, > 0 to the right; 0 in free fall (under 0.1 g). force: left, up, forward
-    in g. yaw_rate: in any unit, only its sign counts.
+    """Return Nicolae's lean by (25) and (26), in degrees, > 0 to the right. In free fall (under 0.1 g) it is 0.
+
+    force: left, up, forward in g. yaw_rate: in any unit, because only its sign counts.
 
     It is right on average, but noisy near upright, where 1 % of vibration causes an error of 8 degrees.
     """

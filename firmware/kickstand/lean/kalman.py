@@ -11,17 +11,19 @@ from math import sqrt
 from ..errors import NO_MACHINE_CODE, checked
 from ..units import const
 
-_MIN_VARIANCE = const(1e-10)  # rounding in 32-bit floats could make a variance negative
-_TERMS_PER_STEP = const(3)  # terms of a Jacobian's row between two yields: without machine code they take a millisecond
-_GATE = const(25.0)  # 5 sigma, squared. An innovation beyond it is not dropped, because the state may be what is wrong.
+_MIN_VARIANCE = const(1e-10)  # a lower bound, because rounding in 32-bit floats could make a variance negative
+# Terms of a Jacobian's row between two yields. Without machine code three terms take a millisecond.
+_TERMS_PER_STEP = const(3)
+# Variances: larger squared innovations (over 5 sigma) get less weight. They are used, because the state may be wrong.
+_GATE = const(25.0)
 
 
 def add_products_python(out, factors, source, n, rows):
     """Add factors[i] * source[k] to out[i * n + k], for i below rows and k below n.
 
-    rows: 1, or n for a symmetric matrix: then only half of it is computed, and copied to the other half. All others are
-    arrays of floats. On the board, add_products() is the machine code of kalman_viper.py, for array("f"); elsewhere it
-    is this function.
+    out, factors, source: arrays of floats. rows: 1, or n for a symmetric matrix. Half of a symmetric matrix is computed
+    and copied to the other half. On the board add_products() is the machine code of kalman_viper.py, for array("f").
+    Elsewhere it is this function.
     """
     for i in range(rows):
         factor = factors[i]
@@ -37,7 +39,7 @@ try:
 except NO_MACHINE_CODE:
     add_products = add_products_python
 else:
-    # Sums that grow, vanish, change their sign and are rounded; their products are exact in 32 bits
+    # Some of these sums grow, vanish, change their sign or are rounded. Their products are exact in 32 bits.
     _TRIAL = array("f", (0.65625, 0, 0, -0.75, 8388609, 0, 1e-9, 3e9, -0.984))
     _FACTORS, _SOURCE = array("f", (1.5, -2.6875, 0.75)), array("f", (-0.4375, 98304.5, 1.3125))
     add_products = checked(add_products, add_products_python, _TRIAL, _FACTORS, _SOURCE, 3, 3)
@@ -47,7 +49,11 @@ _KIND = "d" if add_products is add_products_python else "f"  # of the arrays
 class Covariance:
     """P, the covariance of n states, and the correction of these states by measurements.
 
-    variances: n initial variances, uncorrelated. rows: P, n rows of n floats; correction: n floats.
+    variances: n initial variances of uncorrelated states.
+    Attributes:
+        rows        P, n rows of n floats
+        correction  n floats, which the owner adds to the states
+        misfit      the last innovation, in standard deviations
     """
 
     def __init__(self, variances):
@@ -59,14 +65,14 @@ class Covariance:
             self._p[i * n + i] = variance
         self.correction, self._column, self._gain = [array(_KIND, self._zeros) for _ in range(3)]
         self._factor = array(_KIND, [0.0])
-        self.misfit = 0.0  # see update()
+        self.misfit = 0.0
 
     def _divide(self):
         n, every = self.n, memoryview(self._p)
         # Parts of _p. The type checker takes the elements of a memoryview for integers.
         self.rows = [every[n * i : n * (i + 1)] for i in range(n)]  # type: list
 
-    def __getstate__(self):  # for copy and pickle on a computer, which cannot copy a memoryview
+    def __getstate__(self):  # copy and pickle on a computer cannot copy a memoryview
         return {name: value for name, value in self.__dict__.items() if name != "rows"}
 
     def __setstate__(self, state):
@@ -87,8 +93,8 @@ class Covariance:
     def propagate_row(self, i, derivatives, seconds, noise):
         """Compute P = F P F^T for one row of F, plus process noise. A generator.
 
-        derivatives: of state i's rate of change, ((j, d rate_i / d state_j), ...) with j other than i. seconds: length
-        of the step. noise: added to state i's variance.
+        derivatives: ((j, d rate_i / d state_j), ...), where rate_i is the rate of change of state i. j is never i.
+        seconds: length of the step. noise: added to state i's variance.
         """
         rows, factor, n = self.rows, self._factor, self.n
         row = rows[i]
@@ -108,10 +114,9 @@ class Covariance:
     def update(self, derivatives, innovation, variance):
         """Apply one scalar measurement: K = P H^T / (H P H^T + R), correction += K innovation, P -= K H P. A generator.
 
-        derivatives: H, ((state, d measurement / d state), ...).  innovation: measured minus expected, for the states
-        before this window's corrections.  variance: R, in the measurement's unit squared. Beyond _GATE the
-        innovation's variance is raised until the innovation equals it. misfit is then the innovation in standard
-        deviations.
+        derivatives: H, ((state, d measurement / d state), ...). innovation: the measured value minus the value expected
+        from the states before this window's corrections. variance: R, in the measurement's unit squared. Beyond _GATE
+        the innovation's expected variance is raised until the innovation is at the gate.
         """
         p, rows, column, gain, factor = self._p, self.rows, self._column, self._gain, self._factor
         correction, n = self.correction, self.n

@@ -1,8 +1,8 @@
-"""kalman.py's add_products_python() for 32-bit floats as machine code, which takes no heap.
+"""Computes kalman.py's add_products_python() for 32-bit floats in machine code, without heap.
 
-Floats are taken apart and put together as integers. IEEE 754 binary32: a sign, 8 bits of exponent and 23 of the
-mantissa, whose first bit is not stored. Each sum is rounded once, to the nearest float. A float below 1.2e-38 counts as
-0. What is infinite, or would exceed 3.4e38, is not-a-number.
+The code takes floats apart and computes with integers. A 32-bit float (IEEE 754 binary32) has a sign, 8 bits of
+exponent and 23 bits of mantissa; the mantissa's first bit is always 1 and not stored. Each sum is rounded once, to the
+nearest float. A float below 1.2e-38 counts as 0. An infinite sum, or one over 3.4e38, becomes not-a-number.
 """
 
 import micropython
@@ -16,7 +16,7 @@ def add_products(out: ptr32, factors: ptr32, source: ptr32, n: int, rows: int): 
         if a_exponent == 0:
             continue
         if a_exponent == 255:
-            a_exponent = 1024  # whatever it is multiplied by
+            a_exponent = 1024  # then every product is too large
         a_exponent -= 126
         a_high = ((a >> 12) & 0x7FF) | 0x800  # the mantissa in halves of 12 bits: a product must fit in 31 bits
         a_low = a & 0xFFF
@@ -25,8 +25,8 @@ def add_products(out: ptr32, factors: ptr32, source: ptr32, n: int, rows: int): 
             b = source[k]
             exponent = (b >> 23) & 255
             if exponent:
-                # Mantissas have 30 bits from here on: six more than a float's. That of the product begins with 01 or 1.
-                # A value is mantissa x 2^(exponent - 156).
+                # From here on mantissas have 30 bits, six more than a float's. The product's mantissa begins with 01
+                # or 1. A value is mantissa x 2^(exponent - 156).
                 if exponent == 255:
                     exponent = 1024
                 exponent += a_exponent

@@ -1,10 +1,10 @@
 """The estimator of lean: an extended Kalman filter on the equations of bike_model.py, with the parameters of
 measurements.py.
 
-predict     every sample moves lean, pitch and speed on; the innovations, measured minus expected force, are summed up
-linearise   five times a second: the model's partial derivatives at the means of that window
-update      with them the covariance is propagated over the window and corrected by each of its measurements
-inject      the corrections that were found go into the state
+predict     with each sample: integrate lean, pitch and speed, and sum the innovations, measured minus expected force
+linearise   five times per second: compute the model's partial derivatives at the means of the window
+update      propagate the covariance over the window, and apply each measurement of the window
+inject      add the corrections to the state
 
 The steps from linearise to inject take longer than one sample. They are a generator, spread over the samples of the
 next window: each sample runs it to its next yield. Forces are in g, speeds in m/s, angles in rad.
@@ -37,17 +37,16 @@ _FIRST_WINDOW_US = const(50_000)
 WORK_STEPS = 21  # steps of the work on a window; a test counts them
 _SLOW_STEP_US = const(12_000)  # samples that are further apart leave time for all steps at once
 DELAY_S = 0.0048  # delay of the MPU6050's gyro at DLPF 3
-# m/s: the filter restarts above it. A board that lies on its nose seems to accelerate, but its standstill is detected
-# before it gets there.
+# m/s: above this speed the filter restarts. A board that lies on its nose seems to accelerate, but standstill is
+# detected long before.
 _MAX_SPEED = const(250.0)
 
 
 class LeanFilter:
-    """Estimates lean from force and rate in the vehicle's axes. Fixed memory.
+    """Estimates lean from force and rate in the vehicle's axes, in fixed memory.
 
-    delay_s: delay of the gyro's low-pass; lean is extrapolated to now. trim: rad, see UprightTrim.
-    posed: see LeanMeter.use(). gyro_variances: of the priors of its scale and cross-axis errors, the last five
-    states, if the six positions have measured them. six_done: they have measured the accelerometer.
+    delay_s: delay of the gyro's low-pass, by which lean is extrapolated. trim: rad, see UprightTrim. posed: see
+    LeanMeter.use(). gyro_variances: see gyro_variances(). six_done: the six positions have measured the accelerometer.
     """
 
     def __init__(self, delay_s=DELAY_S, trim=0.0, posed=False, gyro_variances=None, six_done=False):
@@ -56,13 +55,13 @@ class LeanFilter:
         self._posed = posed
         self._gyro_variances = gyro_variances
         self._p = None
-        # error of the accelerometer's magnitude (bias and scale factor together), as a share of the force: found at
-        # rest, where it should read 1 g
+        # Relative error of the accelerometer's magnitude, from bias and scale error. Rest shows it, where the magnitude
+        # should be 1 g.
         self._force_error = 0.0
         self.dive = Dive()
         self.consistency = Consistency(six_done)
-        self._failed = False  # just now the readings do not fit any more
-        # the sensor's errors (from BIAS_LEFT on) some time ago, and less long ago, while all fitted
+        self._failed = False  # a misfit has just begun
+        # The sensor's errors (the states from BIAS_LEFT on) at two earlier times while everything fitted
         self._good = self._next_good = [0.0] * (STATES - BIAS_LEFT)
         self._good_s = 0.0
         self._kept_speed = None  # (speed, variance) for the next start
@@ -84,13 +83,13 @@ class LeanFilter:
         self._p = None
         self._upright = self.trim.angle  # LEAN of a bike that is upright
         self._rest = RestDetector(not self._kept)
-        # _speed: the latest measured speed, until a window takes it; _last_speed: the one before; _speed_s: seconds
-        # since that; _straight_s: seconds since straight_or_prior_speed()
+        # _speed: the latest measured speed, until a window uses it. _last_speed: the speed used last. _speed_s: seconds
+        # since then. _straight_s: seconds since straight_or_prior_speed() was used.
         self._speed = self._last_speed = None
         self._speed_s = self._straight_s = 0.0
-        self._moving_s = 0.0  # for so long a measured speed still says that the bike does not stand
-        self._work = None  # the generator of _process() while it is not finished
-        self._steps = 1  # steps of it that each sample runs
+        self._moving_s = 0.0  # for this time a measured speed still proves that the bike moves
+        self._work = None  # the generator of _process() until it is finished
+        self._steps = 1  # steps of _work that each sample runs
         self._sums = [0.0] * 9  # see predict()
         self._count = self._window_us = 0
         self._astray_s = 0.0  # how long the lean has been impossible
@@ -102,7 +101,7 @@ class LeanFilter:
         p = self._p
         if p is None:
             return
-        for _ in self._work or ():  # it changes the covariance: end it first
+        for _ in self._work or ():  # finish the work on the covariance first
             pass
         self._work = None
         p.add_noise(LEAN, (measurements.SIGMA_LOST_RATE * seconds) ** 2)
@@ -212,7 +211,7 @@ class LeanFilter:
             return
         if not (abs(x[LEAN]) < 2 * pi and x[SPEED] < _MAX_SPEED):  # also not-a-number
             self.consistency.gap()
-            self._forget()  # the sensor's errors may be no numbers either
+            self._forget()  # the sensor's errors may be not-a-number too
             return
         if self._impossible(means, seconds):
             self.consistency.fail("odd-up")
@@ -248,11 +247,11 @@ class LeanFilter:
     def _start(self, means):
         """Set the first state and its covariance from the means of the first window."""
         wx, wy, wz, fx, fy, fz = means[2:8]
-        # A long turn is as calm as standing, and gives no force to the side: only the yaw rate separates them.
+        # A long turn is as calm as a standstill and has no force to the side. Only the yaw rate shows the difference.
         turning = max(abs(wx), abs(wy), abs(wz)) > measurements.START_MAX_RATE
         moving = turning or abs(sqrt(fx * fx + fy * fy + fz * fz) - 1.0) > measurements.START_MAX_FORCE
         variances = [sigma * sigma for sigma in measurements.SIGMA_START]
-        posed, self._posed = self._posed, False  # a later start with nothing kept may come much later
+        posed, self._posed = self._posed, False  # only the first start comes right after the poses
         if posed:
             variances[BIAS_LEFT : BIAS_LEFT + 3] = [measurements.SIGMA_FRESH_BIAS**2] * 3
         if self._gyro_variances:
@@ -260,7 +259,7 @@ class LeanFilter:
         if moving:
             variances[LEAN] = measurements.SIGMA_START_LEAN_MOVING**2
             if self._gap:
-                self.consistency.gap()  # in a bend the covariance of a filter that begins may be too good to be true
+                self.consistency.gap()  # in a bend the covariance is too small just after a restart
         self._gap = False
         self._p = Covariance(variances)
         for i, variance in self._kept:
@@ -283,7 +282,7 @@ class LeanFilter:
         x, p = self._x, self._p
         rates = [abs(means[2 + i] + x[BIAS_LEFT + i]) for i in range(3)]
         if max(rates) > MAX_BIAS_RADPS:
-            # The rates are a bias that has changed much since the calibration, or those of a long, smooth bend
+            # Either the bias has changed much since the calibration, or the bike is in a long, smooth bend
             self.consistency.gap(False)
         x[LEAN] = atan2(fx, fy)
         x[PITCH] = possible_pitch(atan2(fz, sqrt(fx * fx + fy * fy)))
@@ -320,7 +319,7 @@ class LeanFilter:
         self._inject(model)
 
     def _update_ride(self, model, means, seconds, roll_acceleration):
-        """Update with the window's forces, the level road, and the measured speed, or without a new speed with
+        """Apply the window's forces, the level road, and the measured speed. Without a new measured speed apply
         straight_or_prior_speed(). Update the trim if speed and lean are certain enough. A generator."""
         p, x = self._p, self._x
         push = means[7] - model.sin_pitch
@@ -335,7 +334,7 @@ class LeanFilter:
         if abs(means[7]) < measurements.MOST_FORWARD * abs(means[6]):  # else the sensor is on no bike
             up_misfit = p.misfit
             if abs(x[PITCH]) > 2 * measurements.STEEP:
-                misfit = up_misfit = 0.0  # in a wheelie the equations do not hold: only its length is judged
+                misfit = up_misfit = 0.0  # in a wheelie the equations do not hold: only its duration is judged
             lean = x[LEAN] - self._upright
             pitch, turning = x[PITCH], model.yaw_rate
             self._failed = self.consistency.add(misfit, up_misfit, sideways, pitch, push, lean, turning, seconds)
@@ -345,8 +344,8 @@ class LeanFilter:
         self._speed_s += seconds
         self._straight_s = min(self._straight_s, seconds) + seconds
         if measured is not None and (self._last_speed is None or self._speed_s > measurements.MEASURED_SPEED_EVERY_S):
-            # From the measured speeds alone: a pitch error would bias the estimated acceleration.
-            acceleration, since = 0.0, 2 * measurements.SPEED_SCALE_S  # of the first: its errors count once
+            # The acceleration comes from measured speeds only, because a pitch error would bias the estimated one
+            acceleration, since = 0.0, 2 * measurements.SPEED_SCALE_S  # so the first speed's errors count once
             if self._last_speed is not None:
                 acceleration, since = (measured - self._last_speed) / self._speed_s, self._speed_s
             self._speed, self._last_speed, self._speed_s = None, measured, 0.0
@@ -361,8 +360,8 @@ class LeanFilter:
             self.trim.update(sideways, x[LEAN], model.yaw_rate, seconds)
 
     def _inject(self, model):
-        """Add the corrections to the state, and adapt the sums of innovations, which were computed with the old
-        state."""
+        """Add the corrections to the state. Adapt the next window's sums of innovations, because they were computed
+        with the old state."""
         p, x, sums = self._p, self._x, self._sums
         for j, h in model.left_row:
             sums[0] -= self._count * h * p.correction[j]
@@ -372,7 +371,7 @@ class LeanFilter:
             x[i] += p.take_correction(i)
         x[SPEED] = max(0.0, x[SPEED])
         x[PITCH] = possible_pitch(x[PITCH])
-        # At rest the force shows the lean, and the estimated yaw error of a sensor in the hand may be anything
+        # Not at rest: there the force shows the lean, and a sensor in the hand makes the yaw error meaningless
         if not self._rest.resting:
             self._upright = self.trim.angle + model.lean_by_pitch(x)
         if x[LEAN] > pi:

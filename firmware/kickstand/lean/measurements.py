@@ -1,12 +1,12 @@
 """The measurements of the lean filter in a window, their noise, and every parameter of the filter.
 
-A measurement has the arguments of Covariance.update(): ((state, d measurement / d state), ...), the innovation
+Each function returns the arguments of Covariance.update(): ((state, d measurement / d state), ...), the innovation
 (measured minus expected) and the variance of its noise. model: a Linearisation. x: the state. means: see
 bike_model.predict().
 
-SIGMA_... are standard deviations (1 sigma). A disturbance that lasts tau seconds, measured once in each window of T
-seconds, gets the variance sigma^2 2 tau / T, because measurements that share an error must not count as independent.
-Standing still and the trim have their own parameters in rest.py and upright_trim.py, in the same form.
+SIGMA_... are standard deviations (1 sigma). If a disturbance lasts tau seconds, measurements share it, and must not
+count as independent. So its variance in windows of T seconds is sigma^2 2 tau / T. The parameters of standstill and
+trim are in rest.py and upright_trim.py, in the same form.
 """
 
 from math import radians
@@ -19,7 +19,7 @@ from .bike_model import BIAS_LEFT, LEAN, PITCH, SCALE_LEFT, SPEED, YAW_ERROR
 # The start: before anything is measured
 START_MAX_RATE = 0.02  # rad/s: largest rate that counts as standing. Larger: riding is mistaken for standing.
 START_MAX_FORCE = 0.05  # g: largest deviation from 1 g that counts as standing. Larger: riding is mistaken for it.
-# Standard deviations of the prior. Larger: this state is found sooner, but takes up errors that belong to other states.
+# Standard deviations of the prior. Larger: this state is found sooner, but absorbs the errors of other states.
 SIGMA_START = (
     radians(1.5),  # rad: lean of a bike that stands, by the force
     radians(5.0),  # rad: pitch
@@ -28,34 +28,34 @@ SIGMA_START = (
     radians(1.0),  # rad/s: up
     radians(1.0),  # rad/s: forward
     radians(5.0),  # rad: yaw error of the kickstand pose
-    0.020,  # ratio: scale error of the gyro's left axis less that of its up axis; the data sheet allows 0.03 to each
-    0.014,  # ratio: left axis' reading of a rate about up, over that rate; the data sheet allows 0.02
-    0.014,  # ratio: forward axis' reading of a rate about left
-    0.014,  # ratio: forward axis' reading of a rate about up
+    0.020,  # ratio: scale error of the gyro's left axis less the up axis' error. The data sheet allows 0.03 for each.
+    0.014,  # ratio: what the left axis reads of a rate about up. The data sheet allows 0.02.
+    0.014,  # ratio: what the forward axis reads of a rate about left
+    0.014,  # ratio: what the forward axis reads of a rate about up
     0.014,  # ratio: scale error of the forward axis
 )
-# If the readings no longer fit (consistency.py), the filter restarts. The first two times it keeps the speed and the
-# sensor's errors of REMEMBER_S to twice as long ago, later nothing.
+# If the readings no longer fit (consistency.py), the filter restarts. The first two times it keeps the speed, and the
+# sensor's errors as estimated REMEMBER_S to 2 x REMEMBER_S earlier. Later it keeps nothing.
 REMEMBER_S = 10.0  # s. Larger: the remembered errors are older.
 SIGMA_GOOD_BIAS = radians(0.6)  # rad/s: of a remembered bias. Larger: a changed bias is found sooner.
-GOOD_SHARE = 0.7  # ratio: of SIGMA_START, for the other remembered errors. Larger: changed errors are found sooner.
-SIGMA_GOOD_SPEED = 3.0  # m/s: added to the speed's standard deviation. Larger: less is kept of the speed.
+GOOD_SHARE = 0.7  # ratio: share of SIGMA_START for other remembered errors. Larger: changed errors are found sooner.
+SIGMA_GOOD_SPEED = 3.0  # m/s: added to the speed's standard deviation. Larger: the kept speed counts for less.
 # rad/s: of a bias without prior knowledge. Larger: a stepped bias is found sooner.
 SIGMA_DOUBT_BIAS = radians(2.5)
-# A lean above the first, which the force does not confirm for the second, is impossible. Larger: a wrong filter
+# A lean above IMPOSSIBLE_LEAN that the force contradicts for IMPOSSIBLE_S is impossible. Larger: a wrong filter
 # restarts later.
 IMPOSSIBLE_LEAN = radians(80.0)  # rad
 IMPOSSIBLE_S = 1.0  # s
-# After a measured speed above the first, the bike does not stand for the second.
+# For MOVING_S after a measured speed above MOVING_SPEED the bike is not at rest.
 MOVING_SPEED = 2.0  # m/s. Larger: slow riding on a smooth road is taken for rest.
 MOVING_S = 2.5  # s. Larger: a stop is detected later.
-# A bike is in balance above this speed, if the speed's standard deviation is below the second value.
+# A bike is in balance above BALANCE_SPEED if the speed's standard deviation is below SIGMA_BALANCE_SPEED.
 BALANCE_SPEED = 2.0  # m/s. Larger: a slipped mount is detected at fewer speeds.
 SIGMA_BALANCE_SPEED = 12.0  # m/s. Larger: a pushed bike is mistaken for a ridden one.
 # ratio: largest force forward over force up on a bike. Larger: a board on a table is mistaken for a faulty sensor.
 MOST_FORWARD = 1.5
-# ratio: change of the gyro's errors with temperature since the six positions have measured them; the data sheet allows
-# 2 % from -40 to 85 C. Larger: the measured errors count for less.
+# ratio: change of the gyro's scale and cross-axis errors with temperature since the six positions. The data sheet
+# allows 2 % from -40 to 85 C. Larger: the measured errors count for less.
 _SIGMA_GYRO_DRIFT = const(0.002)
 # rad/s: of a bias that the pose on the kickstand has just measured. Larger: the first lean is shown later.
 SIGMA_FRESH_BIAS = radians(0.2)
@@ -69,39 +69,42 @@ NOISE_ANGLE = radians(0.24)  # rad: vibration of the gyro. Larger: lean follows 
 NOISE_SPEED = 0.35  # m/s. Larger: speed follows turns sooner, and is less steady on straights.
 NOISE_BIAS = radians(0.01)  # rad/s: 0.6 deg/s in five minutes of warming up. Larger: long turns are mistaken for bias.
 # Lost readings
-# rad/s: process noise over lost readings. So far may the roll rate have been from the rate measured after the gap, and
-# the pitch rate a quarter of it. Larger: after a gap the lean is hidden longer.
+# rad/s: unknown roll rate during lost readings. The unknown pitch rate is a quarter of it. Larger: after a gap the lean
+# is hidden for longer.
 SIGMA_LOST_RATE = radians(30.0)
-SIGMA_LOST_FORCE = 0.3  # g: the same for the forward force. Larger: after a gap the lean is hidden longer.
+SIGMA_LOST_FORCE = 0.3  # g: unknown forward force during lost readings. Larger: as for SIGMA_LOST_RATE.
 
 # Measurement noise while riding
 _SIGMA_LEFT = const(0.04)  # g: force to the left. Larger: lean follows it less, and the gyro and level roads more.
 _SIGMA_UP = const(0.07)  # g: upward force, which bumps disturb. Larger: in held turns scale errors are found later.
-# ratio: the noise of the upward force (1 sigma) is this times speed x pitch rate / g, that of the force to the left
-# sin(lean) times as much. The springs pitch the bike, but its wheels do not rise. Larger: braking disturbs less.
+# ratio: speed x pitch rate / g times this ratio is the noise (1 sigma) of the upward force. The force to the left has
+# sin(lean) times this noise. Reason: the springs pitch the bike, but its wheels do not rise. Larger: braking disturbs
+# less.
 _PITCHING_SHARE = const(2.0)
-# ratio: part of the samples' variance by vibration that stays in a window's mean, and is added to the noise of the
-# force to the left. Larger: forces count less on rough roads.
+# ratio: share of the vibration's variance that stays in a window's mean. It is added to the noise of the force to the
+# left. Larger: forces count less on rough roads.
 _SHAKEN_SHARE = const(0.1)
 # m: h, the sensor's height above the roll axis. Larger: rolling explains more of the force.
 _ROLL_HEIGHT_M = const(0.4)
 _SIGMA_ROLL_HEIGHT_M = const(0.4)  # m: standard deviation of h. Larger: forces count less while the bike rolls quickly.
 _SIGMA_MEASURED_SPEED = const(1.0)  # m/s: speed by a receiver or a wheel sensor. Larger: it counts for less.
-# ratio: scale error of that speed, by the tyre, which is smaller where the bike leans, by slip, and by the gyro's up
-# axis: speed x yaw rate has both errors. Larger: measured speeds count for less, most where the bike is fast.
+# ratio: scale error of the measured speed. A leaning tyre has a smaller radius, and slips. The scale error of the
+# gyro's up axis adds to it, because speed x yaw rate has both. Larger: measured speeds count for less, most at high
+# speed.
 _SIGMA_SPEED_SCALE = const(0.05)
-_MEASURED_SPEED_S = const(4.0)  # s: how long the first of these errors lasts. Larger: measured speeds count for less.
-# s: how long the scale error lasts: a wheel is smaller during a whole bend. Larger: measured speeds count for less,
-# most in long bends.
+_MEASURED_SPEED_S = const(4.0)  # s: how long _SIGMA_MEASURED_SPEED lasts. Larger: measured speeds count for less.
+# s: how long the scale error lasts. A wheel's radius is smaller during a whole bend. Larger: measured speeds count for
+# less, most in long bends.
 SPEED_SCALE_S = 40.0
 # s: possible delay of the speed. Larger: it counts for less during acceleration and braking.
 _MEASURED_SPEED_LATE_S = const(1.0)
-# s: least time between two used speeds, so that straights count between them. Larger: the used speeds are older.
+# s: least time between two speeds in use. Between them straight_or_prior_speed() is used. Larger: speeds in use are
+# older.
 MEASURED_SPEED_EVERY_S = 0.3
 
-# ratio: standard deviation of the lean's errors over that of the covariance. The noises above are set wide, because
-# disturbances last, so the covariance is too large. On rides of both simulators, even seeds, two thirds of the errors
-# are within this share. Larger: the stated sigma is larger. The lean does not change.
+# ratio: standard deviation of the lean's errors over the covariance's standard deviation. The noises above are wide,
+# because disturbances last, so the covariance is too large. On simulated rides two thirds of the errors are within this
+# share. Larger: the stated sigma is larger, and the lean is the same.
 SIGMA_SHARE = 0.46
 
 # Assumptions that take the place of measurements
@@ -116,11 +119,12 @@ STRAIGHT_MAX_RATE = radians(2.5)  # rad/s, about the vertical. Larger: the lean 
 STRAIGHT_MIN_SPEED = 4.0  # m/s. Larger: drift on slow straights is not removed.
 SIGMA_STRAIGHT = radians(0.8)  # rad: lean on straights, by wind and camber. Larger: drift is removed later.
 _STRAIGHT_S = const(3.0)  # s: how long such a lean lasts. Larger: drift is removed later.
-_SIGMA_PRIOR_SPEED = const(20.0)  # m/s: speed less PRIOR_SPEED. Larger: less pull towards PRIOR_SPEED.
-_PRIOR_SPEED_S = const(60.0)  # s: how long a speed lasts. Larger: less pull towards PRIOR_SPEED.
+_SIGMA_PRIOR_SPEED = const(20.0)  # m/s: difference from PRIOR_SPEED. Larger: PRIOR_SPEED counts for less.
+_PRIOR_SPEED_S = const(60.0)  # s: how long a speed lasts. Larger: PRIOR_SPEED counts for less.
 
 # Standing still
-SIGMA_STAND = radians(0.5)  # rad: lean and pitch by the force on coming to rest. Larger: later forces count more.
+# rad: lean and pitch, as set from the force when the bike comes to rest. Larger: later forces count more.
+SIGMA_STAND = radians(0.5)
 SIGMA_REST_RATE = radians(0.1)  # rad/s: rates of a bike that feet hold. Larger: bias is found later.
 _SIGMA_REST_FORCE = const(0.02)  # g: force at rest, with the engine idling. Larger: lean settles later.
 # ratio: weight of a window in the mean magnitude of the force at rest. Larger: the mean is found sooner, and varies
@@ -140,10 +144,10 @@ SIGMA_TRIM_LEAN = radians(1.4)  # rad
 
 
 def gyro_variances(sigma, r):
-    """The priors' variances of the last five states if the six positions have measured the gyro, else None.
+    """Return the prior variances of the last five states, or None if the six positions have not measured the gyro.
 
-    sigma (9): standard errors of the entries of its matrix in the sensor's axes, taken as independent, or zeros. r (9):
-    vehicle_from_sensor."""
+    sigma (9): standard errors of the gyro matrix' entries in the sensor's axes, treated as independent, or zeros. r
+    (9): vehicle_from_sensor."""
     if not any(sigma):
         return None
 
@@ -160,20 +164,20 @@ def gyro_variances(sigma, r):
 
 
 def forces(model, means, roll_acceleration, force_error, dive=0.0):
-    """Two measurements: the force to the left, (4), and up, (5). roll_acceleration: rad/s^2. force_error:
-    relative error of the accelerometer's magnitude, found at rest. dive: see Dive.update(), in g."""
-    rolling = roll_acceleration / STANDARD_GRAVITY  # g in a metre of height, as is square below
+    """Return two measurements: the force to the left, (4), and up, (5). roll_acceleration: rad/s^2. force_error:
+    relative error of the accelerometer's magnitude, as found at rest. dive: see Dive.update(), in g."""
+    rolling = roll_acceleration / STANDARD_GRAVITY  # g per metre of height, like `square` below
     uncertain = _SIGMA_ROLL_HEIGHT_M * rolling
     left = means[0]
     shaken = max(0.0, means[8] - left * left)
-    # If the springs pitch the bike, its wheels do not rise: v times that pitch rate is not an acceleration. dive is the
-    # part of it that braking explains, (8). The rest is noise.
+    # If the springs pitch the bike, its wheels do not rise: v times this pitch rate is not an acceleration. Braking
+    # explains a part of it: dive, by (8). The rest is noise.
     pitching = _PITCHING_SHARE * model.pitching
     sideways = pitching * model.sin_lean
     left_variance = _SIGMA_LEFT**2 + _SHAKEN_SHARE * shaken + uncertain**2 + sideways * sideways
     left += _ROLL_HEIGHT_M * rolling * model.cos_lean + dive * model.sin_lean
-    # In a held turn the upward force, 1 / cos(lean), makes the lean observable without the gyro's scale factor. One
-    # window says little, but a minute says much, unless an error of this force keeps its sign.
+    # In a steady turn the upward force, 1 / cos(lean), shows the lean without the gyro's scale factor. A window shows
+    # little of it, a minute much. An error of this force that keeps its sign must therefore be removed: force_error.
     square = means[4] * means[4] / STANDARD_GRAVITY
     up = means[1] + _ROLL_HEIGHT_M * square - force_error * means[6] + dive * model.cos_lean
     up_variance = (
@@ -186,22 +190,23 @@ def forces(model, means, roll_acceleration, force_error, dive=0.0):
 
 
 def level_road(model, x, seconds):
-    """The measurement of (6): roads are level on average. Its noise grows with the pitch, which may be a wheelie."""
+    """Return the measurement of (6): roads are level on average. Its noise grows with the pitch, in case of a
+    wheelie."""
     innovation = -x[PITCH] - x[YAW_ERROR] * model.sin_lean
     steep = innovation / STEEP
     return model.level_row, innovation, SIGMA_SLOPE**2 * (1.0 + steep * steep) * 2 * _SLOPE_S / seconds
 
 
 def straight_or_prior_speed(lean, speed, yaw_rate, seconds):
-    """The measurement of a lean of 0 while the bike rides straight, else of PRIOR_SPEED."""
+    """Return the measurement of a lean of 0 if the bike rides straight, otherwise of PRIOR_SPEED."""
     if abs(lean) < STRAIGHT_MAX_LEAN and abs(yaw_rate) < STRAIGHT_MAX_RATE and speed > STRAIGHT_MIN_SPEED:
         return ((LEAN, 1.0),), -lean, SIGMA_STRAIGHT**2 * 2 * _STRAIGHT_S / seconds
     return ((SPEED, 1.0),), PRIOR_SPEED - speed, _SIGMA_PRIOR_SPEED**2 * 2 * _PRIOR_SPEED_S / seconds
 
 
 def measured_speed(measured, speed, acceleration, seconds):
-    """The measurement of speed by a receiver or a wheel sensor. acceleration: m/s^2; with the delay it adds noise.
-    seconds: since the previous measured speed. Ten speeds per second count as much as one."""
+    """Return the measurement of speed by a receiver or a wheel sensor. acceleration: m/s^2, which adds noise, because
+    the speed may be late. seconds: since the previous measured speed. Ten speeds per second count as much as one."""
     late = _MEASURED_SPEED_LATE_S * acceleration
     scale = _SIGMA_SPEED_SCALE * measured
     variance = (_SIGMA_MEASURED_SPEED**2 + late * late) * max(1.0, 2 * _MEASURED_SPEED_S / seconds)
@@ -209,8 +214,8 @@ def measured_speed(measured, speed, acceleration, seconds):
 
 
 def at_rest(model, means, speed, axis):
-    """The four measurements of a bike at rest (zero-velocity update): its speed is 0; the gyro's reading about `axis`
-    (0 to 2) is bias; the left and forward forces are from gravity."""
+    """Return the four measurements of a bike at rest (zero-velocity update): the speed is 0, the gyro's reading about
+    `axis` (0 to 2) is bias, and the forces to the left and forward come from gravity."""
     return (
         (((SPEED, 1.0),), -speed, SIGMA_REST_SPEED**2),
         (((BIAS_LEFT + axis, 1.0),), means[2 + axis], SIGMA_REST_RATE**2),

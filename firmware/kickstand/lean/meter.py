@@ -21,18 +21,23 @@ _WHEELIE_DEG = const(20.0)  # pitch. No road is so steep, and the filter's equat
 
 
 class LeanMeter:
-    """Lean and acceleration of the vehicle. leans: False for a car, whose lean stays 0. delay_s: delay of the gyro's
-    low-pass.
+    """Computes lean and acceleration of the vehicle. leans: False for a car, whose lean stays 0. delay_s: delay of the
+    gyro's low-pass.
 
-    After update() or update_sum(): force (left, up, forward, in g), rate (about these axes, in rad/s), lean_deg (the
-    filter's, > 0 right), smooth_force (g, for display; of an aligned motorcycle left and up are NaN), fallen, and the
-    maxima since reset_maxima(). suppressed_reason: why the lean is not shown, from distrust(), or None.
+    Attributes after update_sum():
+        force              left, up, forward, in g
+        rate               about these axes, in rad/s
+        lean_deg           from the filter, > 0 to the right
+        smooth_force       g, for the display. Left and up are NaN for an aligned motorcycle.
+        fallen             True if the bike has fallen
+        max_..._deg, _g    the maxima since reset_maxima()
+        suppressed_reason  the reason from distrust() why the lean is not shown, or None
     """
 
     def __init__(self, calibration, leans=True, delay_s=DELAY_S):
         self._leans = leans
         self._delay_s = delay_s
-        # Lists, because on a board reading an element of an array takes heap
+        # Lists, because on a board each read of an array's element takes heap
         self.force = [0.0] * 3
         self.rate = [0.0] * 3
         self.smooth_force = [0.0] * 3
@@ -42,9 +47,8 @@ class LeanMeter:
         self.use(calibration)
 
     def use(self, calibration, posed=False):
-        """Take a calibration, its scale set, and restart the filter. suppressed_reason is cleared if the calibration
-        has changed. posed: the bike was still for its poses, and the kickstand pose has just measured the gyro's
-        bias."""
+        """Use a calibration whose scale is set, and restart the filter. Another calibration clears suppressed_reason.
+        posed: the alignment's poses have just ended, so the bike is still and the gyro's bias is freshly measured."""
         if calibration is not self.calibration:
             self.suppressed_reason = None
         self.calibration = calibration
@@ -90,7 +94,7 @@ class LeanMeter:
 
     @property
     def trim_deg(self):
-        """The roll-misalignment correction estimated so far, > 0 right; see keep_trim() for the calibration's."""
+        """The trim estimated so far, > 0 to the right. keep_trim() copies it to the calibration."""
         return degrees(self.filter.trim.angle)
 
     @property
@@ -107,8 +111,8 @@ class LeanMeter:
         return 0.0 <= lean.variance <= (MAX_VARIANCE if doubts <= MILD else DOUBTED_VARIANCE)
 
     def keep_trim(self):
-        """If the bike is at rest and the trim is certain and has changed, copy it to the calibration and return
-        True."""
+        """Copy the trim to the calibration if the bike is at rest and the trim is certain and has changed. Return True
+        if it was copied."""
         angle = self.trim_deg
         certain = self.at_rest and self.filter.trim.variance <= TRIM_MAX_VARIANCE
         if not certain or abs(angle - self.calibration.trim_deg) < _TRIM_STEP_DEG:
@@ -124,7 +128,7 @@ class LeanMeter:
         return formula_lean_deg(self.force, self.rate[1])
 
     def measure_speed(self, speed_mps):
-        """Take a measured speed, which improves the lean. Optional. A negative value means no speed and is ignored."""
+        """Use a measured speed for the lean. Optional. A negative value means that there is none."""
         if speed_mps >= 0.0:
             self.filter.measure_speed(speed_mps)
 
@@ -151,7 +155,7 @@ class LeanMeter:
                 self.filter.inflate_covariance(dt_us * 1e-6)
         if self._fresh:
             self._fresh = False
-            dt_us, gain = 0, 1.0  # nothing was before: the same on the board and in a replay
+            dt_us, gain = 0, 1.0  # there is no previous sample: the same on the board and in a replay
         else:
             gain = dt_us / (_SMOOTH_US + dt_us)
         force, smooth = self.force, self.smooth_force
@@ -176,9 +180,9 @@ class LeanMeter:
 
     def _hold_again(self):
         """Restart the timing of a lean above its maximum, because it is within its maxima or not trusted."""
-        # _over_us: time for which the lean has exceeded a maximum; starts again from 0 after each HELD_US.
-        # _least: smallest lean in that time. _least_before: the same in the HELD_US before, 0 if the lean was within
-        # its maxima then.
+        # _over_us: time for which the lean has exceeded a maximum. After each HELD_US it starts again from 0.
+        # _least: smallest lean in this time. _least_before: smallest lean in the previous HELD_US, or 0 if the lean was
+        # within its maxima then.
         self._over_us = 0
         self._least = 180.0
         self._least_before = 0.0

@@ -4,8 +4,7 @@ averages out."""
 from ..units import const
 
 # Symbol = default  # unit: what it is. "Larger:" says what raising it does.
-# Largest deviation of a window's mean from the recent average, for forces and for rates. Larger: smooth roads are
-# mistaken for rest.
+# Largest deviation of a window's mean from the recent average. Larger: smooth roads are mistaken for rest.
 _MAX_FORCE_G = const(0.010)  # g
 _MAX_RATE_RADPS = const(0.009)  # rad/s (0.5 deg/s)
 MAX_BIAS_RADPS = 0.02  # rad/s (1.2 deg/s): mean rate that may be bias. Larger: smooth turns are mistaken for rest.
@@ -13,7 +12,7 @@ MAX_BIAS_RADPS = 0.02  # rad/s (1.2 deg/s): mean rate that may be bias. Larger: 
 # are mistaken for rest.
 _MAX_FIRST_BIAS_RADPS = const(0.1)
 _REST_S = const(1.5)  # s: stillness for this time is rest. Larger: rest is detected later and more reliably.
-_REST_ROLLING_S = const(10.0)  # s: the same if the bike seems to move or brake: no road is smooth for so long.
+_REST_ROLLING_S = const(10.0)  # s: the same if the bike seems to move or brake. No road is smooth for this long.
 _AVERAGE_S = const(0.5)  # s: time constant of the recent average. Larger: rest is detected later after a movement.
 
 
@@ -32,9 +31,9 @@ class RestDetector:
         self._max_bias = _MAX_FIRST_BIAS_RADPS if first else MAX_BIAS_RADPS
 
     def update(self, rates, force, bias, seconds, rolling=False, moving=False):
-        """Take the means over a window of `seconds`: rates (rad/s) less the estimated bias, that bias (rad/s), and
-        force (g). rolling: other evidence shows that the bike moves. moving: a measured speed shows that the bike is
-        certainly not at rest."""
+        """Take the means over a window of `seconds`. rates: 3, rad/s, less the estimated bias. bias: 3, rad/s, the
+        estimated bias. force: 3, g. rolling: other evidence suggests that the bike moves. moving: a measured speed
+        proves that it moves."""
         readings = [rates[i] + bias[i] for i in range(3)] + force
         if self._average is None:
             self._average = readings

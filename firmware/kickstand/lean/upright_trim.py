@@ -1,9 +1,9 @@
-"""Estimates the roll-misalignment correction (the trim), because the upright pose of the alignment was not quite
+"""Estimates the trim: the correction of the roll misalignment, because the alignment's upright pose was not quite
 upright.
 
-A bike in balance has no specific force to the side. The mean measured on straights is the roll misalignment plus the
-accelerometer's drift. Both are subtracted from the lean. In turns wide tyres and a rider who hangs off add to it; the
-common part of left and right turns is again the trim.
+A bike in balance has no specific force to the side. The mean force measured on straights comes from the roll
+misalignment and from the accelerometer's drift, so both are subtracted from the lean. In turns wide tyres and a rider
+who hangs off add a force that changes its sign with the turn. What left and right turns have in common is the trim.
 """
 
 from math import radians, sin
@@ -12,19 +12,18 @@ from ..units import const
 
 MAX_TRIM = radians(3.5)  # rad: a pose off by 2 degrees, and the rest of the accelerometer's errors
 # Symbol = default  # unit: what it is. "Larger:" says what raising it does.
-SIGMA_START = radians(2.5)  # rad: prior of a new pose's trim. Larger: the trim is found sooner, and less steady.
-SIGMA_KEPT = radians(0.7)  # rad: prior of a trim kept from an earlier, colder or hotter ride. Larger: as above.
-SIGMA_STRAIGHT = radians(1.5)  # rad: force to the side over up on straights: rider, camber, wind. Larger: found later.
-# times sin(lean): prior of the bike's own force to the side in turns, by its tyres and rider. Larger: turns to one side
-# count less.
+SIGMA_START = radians(2.5)  # rad: prior of the trim after new poses. Larger: it is found sooner, and varies more.
+SIGMA_KEPT = radians(0.7)  # rad: prior of a trim from an earlier, colder or hotter ride. Larger: as for SIGMA_START.
+# rad: force to the side over force up on straights, by rider, camber and wind. Larger: the trim is found later.
+SIGMA_STRAIGHT = radians(1.5)
+# times sin(lean): prior of the force to the side in turns, by tyres and rider. Larger: turns to one side count less.
 _SIGMA_LEAN_SHARE = const(0.15)
-# times sin(lean): how much that force differs from turn to turn, because the rider hangs off or does not. Larger: turns
-# count less.
+# times sin(lean): how much this force differs from turn to turn, because of the rider. Larger: turns count less.
 _SIGMA_TURN = const(0.04)
 _SIGMA_YAW_S = const(0.03)  # rad per rad/s: further measurement noise, times the yaw rate. Larger: turns count less.
-# times the upward force: largest innovation. Larger: a sensor in a hand counts as a balanced bike.
+# ratio: larger innovations do not count. Larger: a sensor in a hand counts as a balanced bike.
 _MAX_SIDEWAYS = const(0.1)
-_DISTURBANCE_S = const(2.0)  # s: how long such a disturbance lasts. Larger: the trim is found later, and steadier.
+_DISTURBANCE_S = const(2.0)  # s: how long wind or camber lasts. Larger: the trim is found later, and varies less.
 NOISE = radians(0.01)  # rad per square root of a second: process noise. Larger: changes are followed sooner.
 
 
@@ -38,7 +37,7 @@ class UprightTrim:
     def __init__(self, angle):
         self.angle = angle
         self.variance = (SIGMA_START if angle == 0.0 else SIGMA_KEPT) ** 2
-        # The second state: wide tyres and riders lean a bike more or less than balance would, alike to both sides
+        # The second state: tyres and rider make a bike lean more or less than balance requires, equally on both sides
         self._lean_share = 0.0  # times sin(lean)
         self._share_variance = _SIGMA_LEAN_SHARE**2
         self._covariance = 0.0
