@@ -1,4 +1,4 @@
-"""Measures speed from pulses. They come from a reed contact or Hall switch at a wheel, or from a vehicle's speed signal.
+"""Measures speed from pulses of a reed contact or Hall switch at a wheel, or of a vehicle's speed signal.
 
 The interrupt only counts pulses and stores the time of the last pulse. It uses integers, because a hard interrupt must
 take no heap. A storm of pulses, for example from an ignition cable, would leave no time for anything else. In a storm
