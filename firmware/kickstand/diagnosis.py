@@ -43,7 +43,7 @@ def wire_fault(sda, scl):
             fault = fault or Notice("wire-low", name, pin)
     open_wires = [wire for wire in wires if not _level(wire[1], Pin.PULL_DOWN)]
     for _, pin in wires:
-        Pin(pin, Pin.IN, None)  # removes the pull-down, which an ESP32 would keep
+        Pin(pin, Pin.IN, None)  # remove the pull-down, because an ESP32 would keep it
     if fault or not open_wires:
         return fault
     return Notice("no-pull-ups", sda, scl) if len(open_wires) == 2 else Notice("no-pull-up", *open_wires[0])
