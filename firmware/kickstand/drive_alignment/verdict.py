@@ -1,6 +1,6 @@
 """Checks whether an earlier alignment, from two poses or another drive, fits this drive.
 
-If the kickstand is not on the side in the settings, forward and backward are exchanged. The poses cannot show this
+If SIDE in the settings is not the side of the kickstand, forward and backward are exchanged. The poses cannot show this
 error, but the first braking events do. A change of pitch between the poses causes a yaw error of a few degrees. This
 error is corrected after enough braking events. Any other difference means that the mount has moved.
 """
