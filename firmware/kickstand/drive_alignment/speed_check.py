@@ -14,8 +14,8 @@ _TURNING_DPS = const(5.0)  # a second with a larger yaw rate is ignored, because
 # least the share _STUCK_SHARE of all seconds since its last change. Four braking events together have 8 lively seconds.
 _STUCK_S = const(8)
 _STUCK_SHARE = const(0.15)
-# Limits of the ratio of change of force to change of speed. It should be 1. The pitch of a braking vehicle and a
-# coarsely rounded speed shift it by 0.2.
+# Limits of the ratio between the change of force and the change of speed. The ratio should be 1. The pitch of a braking
+# vehicle and a coarsely rounded speed shift it by 0.2.
 MIN_FORCE_RATIO, MAX_FORCE_RATIO = 0.75, 1.35
 MAX_LAG_S = 1.9
 

@@ -138,8 +138,8 @@ class Sensor:
         return good
 
     def _no_sample(self, now_ms):
-        """Report a fault if the FIFO has held no sample for too long. After an overflow the limit is longer, because
-        the FIFO was just emptied."""
+        """Report a fault if no sample was read for too long. After an overflow the limit is longer, because the FIFO
+        was just emptied."""
         if self._overflows != self.chip.overflows:
             self._overflows = self.chip.overflows
             if self._sample_ms != self._emptied_ms:  # at least one sample was read since the last overflow

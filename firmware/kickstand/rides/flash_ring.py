@@ -17,7 +17,7 @@ PART_BLOCKS = 16  # number of ride blocks in a part in flash
 # Number of ride blocks in a part on a card. A day's ride then takes 85 files. With PART_BLOCKS it would take 1300.
 _CARD_PART_BLOCKS = const(256)
 FIRMWARE = 103 * BLOCK  # space for the compiled firmware; each file takes whole blocks, each folder takes two
-RESERVE = 63 * BLOCK  # the most that an update of compiled firmware needs, plus a margin
+RESERVE = 63 * BLOCK  # largest free space that an update of compiled firmware needs, plus a margin
 
 
 def free_bytes(path):
