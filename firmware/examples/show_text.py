@@ -24,7 +24,7 @@ start_ms = ticks_ms()
 while True:
     now_ms = ticks_ms()
     seconds = ticks_diff(now_ms, start_ms) // 1000
-    # stores the text, sends nothing yet; for a degree sign write "\xdf"
+    # this stores the text and sends nothing yet; for a degree sign write "\xdf"
     lcd.show("Hello, rider!", "on for %d s" % seconds)
     lcd.tick(now_ms)  # sends the changes, at most one line at a time
     sleep_ms(10)

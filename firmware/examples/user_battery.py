@@ -1,12 +1,12 @@
-"""A page with the voltage of the bike's battery, which needs neither sensor nor alignment.
+"""A page with the voltage of the bike's battery. It needs neither sensor nor alignment.
 
 Copy it to the board as user.py, and restart (the firmware must be on the board; an update leaves user.py alone):
 
     mpremote cp firmware/examples/user_battery.py :user.py
     mpremote reset
 
-Wiring: battery + through 100 kOhm to GPIO 26 (ADC 0 of a Pico; GPIO 34 on an ESP32), from there 10 kOhm and 100 nF to
-ground. 12 V must never reach a pin without the divider. Without a board:
+Wiring: connect the battery's + through 100 kOhm to GPIO 26 (ADC 0 of a Pico; GPIO 34 on an ESP32). Connect 10 kOhm and
+100 nF from this pin to ground. 12 V must never reach a pin without the divider. Without a board:
 kickstand try firmware/examples/user_battery.py
 """
 

@@ -17,13 +17,15 @@ def page(app):
     if not app.trusted:  # there is no reliable lean
         return "Load     --", "not sure yet"
     meter = app.meter
-    times = 1.0 / cos(radians(meter.lean_deg))  # weight and cornering force together, in a balanced turn
+    times = 1.0 / cos(radians(meter.lean_deg))  # force on the tyres in a balanced turn, as a multiple of the weight
     line1, line2 = "Load    %5.2f x" % times, "Lean %3d deg" % round(abs(meter.lean_deg))
     return line1, line2, (draw, line1, line2, min(128, round(64 * times)))
 
 
 def draw(canvas, line1, line2, length):
-    """canvas: a framebuf.FrameBuffer of 128x64 pixels, which also has tall(line, page) for letters of 8x16 pixels."""
+    """Draw the picture.
+
+    canvas is a framebuf.FrameBuffer of 128x64 pixels. It also has tall(line, page) for letters of 8x16 pixels."""
     canvas.tall(line1, 1)
     canvas.text(line2, 0, 32, 1)
     canvas.fill_rect(0, 48, length, 12, 1)

@@ -1,5 +1,6 @@
-"""Sends the lean to another controller over a wire, ten lines per second: 23.4 to the right, -23.4 to the left, ? while
-the lean is not trusted.
+"""Sends the lean to another controller over a wire, in ten lines per second.
+
+A line is 23.4 for a lean to the right, -23.4 for a lean to the left, and ? while the lean is not trusted.
 
 Copy it to the board as user.py, and restart (the firmware must be on the board; an update leaves user.py alone):
 
@@ -16,5 +17,6 @@ uart = UART(0, baudrate=115_200, tx=Pin(0), rx=Pin(1))
 
 
 def on_lean(lean_deg, trusted, meter):
-    """Called ten times per second. After a ? the receiver must not use the last number any more."""
+    """Send the lean. The firmware calls this ten times per second. After a ? the receiver must not use the last
+    number."""
     uart.write("%.1f\n" % lean_deg if trusted else "?\n")

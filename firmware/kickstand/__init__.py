@@ -10,7 +10,9 @@ from .units import __version__ as __version__
 def status(wirings=False):
     """Print the board's status: versions, settings, sensor, display, calibration.
 
-    wirings: if True, show the number of each known backpack wiring on the character display for some seconds."""
+    Args:
+        wirings: True to show the number of each known backpack wiring on the character display for some seconds.
+    """
     from . import status_report
 
     status_report.report(wirings)

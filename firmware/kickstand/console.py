@@ -1,18 +1,18 @@
-"""The sentences for the board's USB console, by code (see errors.py).
+"""The sentences for the board's USB console. Each code (see errors.py) has one sentence.
 
-Imported only when there is something to print: on most boards never.
+This module is imported only when there is something to print. On most boards that is never the case.
 """
 
 from .units import const
 
-# A print that takes longer is slow. Most take a few ms, but 500 ms if the computer on USB sleeps; then the sensor's
-# FIFO overflows.
+# A print that takes longer than this is slow. Most prints take a few ms. If the computer on USB sleeps, a print takes
+# 500 ms, and the sensor's FIFO overflows.
 _SLOW_MS = const(100)
 _QUIET_MS = const(60_000)  # after a slow print no refusal is printed for this time
 
 _slow_ms = None  # ticks_ms() of the last slow print
 
-# code|sentence. {0}, {1} ... are the refusal's values; for a SettingsError {0} is the setting's name
+# Each row is code|sentence. {0}, {1} ... are the refusal's values. For a SettingsError {0} is the setting's name.
 _SENTENCES = """
 not-written|calibration not saved: {0}; the old one is kept
 read-back|calibration not saved: it reads back differently; the old one is kept
@@ -68,17 +68,17 @@ no-such-pin|config.py: {0} = {1} is no pin of this board ({2})
 i2c-pins|config.py: {1}_SDA = {2} and {1}_SCL = {3} do not belong to I2C {4} ({5})
 uart-pins|config.py: GPS_TX = {1} and GPS_RX = {2} do not belong to UART {3} ({4})
 """
-_RECORDING_STOPPED = "recording stopped: {0}"  # for every fault of a recording; only the display tells them apart
+_RECORDING_STOPPED = "recording stopped: {0}"  # the same for every fault of a recording; the display names the fault
 
 
 def sentence(refusal):
-    """Return the sentence for a Refusal, one line."""
+    """Return the sentence for a Refusal or a Notice, in one line."""
     return refusal.words(_SENTENCES, _RECORDING_STOPPED)
 
 
 def say(text, end="\n"):
-    """Print text; return True if that took over _SLOW_MS."""
-    from time import ticks_diff, ticks_ms  # imported here, because the host's tools need only the words
+    """Print a text. Return True if the print was slow."""
+    from time import ticks_diff, ticks_ms  # imported here, because the tools on a computer need only the words
 
     global _slow_ms
     begun_ms = ticks_ms()
@@ -90,7 +90,7 @@ def say(text, end="\n"):
 
 
 def tell(refusal):
-    """Print a Refusal's sentence, unless a print was slow in the last _QUIET_MS."""
+    """Print the sentence for a Refusal or a Notice, unless a print was slow in the last _QUIET_MS."""
     from time import ticks_diff, ticks_ms
 
     if _slow_ms is None or not 0 <= ticks_diff(ticks_ms(), _slow_ms) < _QUIET_MS:

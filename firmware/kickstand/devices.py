@@ -1,4 +1,4 @@
-"""Opens the display, the sensor and the button on the pins set in config.py. settings: a Settings."""
+"""Opens the display, the sensor and the button on the pins set in config.py. The argument `settings` is a Settings."""
 
 from machine import Pin
 
@@ -11,8 +11,11 @@ from .imu.sensor import Sensor
 
 
 def open_lcd(settings, wiring=None):
-    """Open the Display. wiring: the wiring of a character display's backpack; the default is LCD_WIRING. Its tick()
-    raises SettingsError for pins that the I2C controller cannot use."""
+    """Open the Display. The Display's tick() raises SettingsError for pins that the I2C controller cannot use.
+
+    Args:
+        wiring: the wiring of a character display's backpack. By default it is LCD_WIRING.
+    """
     return Display(
         lambda hz: open_bus(settings, "LCD", hz),
         settings.LCD_BUS_HZ,
@@ -25,7 +28,8 @@ def open_lcd(settings, wiring=None):
 
 
 def open_sensor(settings):
-    """Open the chip as a Sensor. Its fetch() raises SettingsError for pins that the I2C controller cannot use."""
+    """Open the chip as a Sensor. The Sensor's fetch() raises SettingsError for pins that the I2C controller cannot
+    use."""
     ranges = settings.ACCEL_RANGE_G, settings.GYRO_RANGE_DPS
     rates = settings.DLPF, settings.SAMPLE_HZ
     chip = Mpu6050(None, settings.SENSOR_ADDRESS, *ranges, *rates, settings.ACCEPT_WHO_AM_I)
@@ -37,7 +41,7 @@ def open_sensor(settings):
         said = []
 
         def look():
-            # imported late: takes 6 KB of heap, and most boards never need it
+            # imported here, because it takes 6 KB of heap and most boards never need it
             from .diagnosis import explain_sensor, fifo_fault
 
             if error is None:
@@ -63,10 +67,15 @@ def open_button(settings):
 
 
 def open_bus(settings, name, hz):
-    """Open a machine.I2C. name: "SENSOR" or "LCD", the beginning of the names of its settings."""
+    """Open a machine.I2C. Raises SettingsError for pins that the I2C controller cannot use.
+
+    Args:
+        name: "SENSOR" or "LCD", the beginning of the names of the bus's settings.
+        hz: clock rate of the bus.
+    """
     controller = getattr(settings, name + "_I2C")
     sda, scl = getattr(settings, name + "_SDA"), getattr(settings, name + "_SCL")
     try:
         return i2c_bus.open_i2c(controller, sda, scl, hz)
-    except (ValueError, TypeError) as error:  # Pin(None), for a pin that is not set, raises TypeError on a Pico
+    except (ValueError, TypeError) as error:  # a pin that is not set raises TypeError on a Pico
         raise SettingsError("i2c-pins", name + "_SDA / SCL", name, sda, scl, controller, str(error))

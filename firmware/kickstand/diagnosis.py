@@ -1,7 +1,10 @@
-"""Finds out why the sensor or the display cannot be used, and which devices answer on an I2C bus. Imported after a
-fault, and by kickstand.status() and kickstand check.
+"""Finds out why the sensor or the display cannot be used, and which devices answer on an I2C bus.
 
-sda, scl: GPIO numbers.  reopen(): frees the bus and returns it as a machine.I2C.  chip: an Mpu6050.
+This module is imported after a fault, and by kickstand.status() and kickstand check. These arguments have the same
+meaning in all functions:
+* sda, scl: the GPIO numbers of the bus.
+* reopen: reopen() frees the bus and returns it as a machine.I2C.
+* chip: an Mpu6050.
 """
 
 from time import sleep_ms, sleep_us
@@ -16,19 +19,23 @@ from .imu.other_chips import MOTION, OTHER, SUPPORTED, name_of, who_am_i
 
 _SENSOR_ADDRESSES = const((0x68, 0x69))
 MOTION_ADDRESSES = _SENSOR_ADDRESSES + (0x6A, 0x6B)
-_NOTHING = (0x00, 0xFF, -1)  # no chip of the MPU6050's family has these values of WHO_AM_I
-_FIRST, _LAST = 0x08, 0x77  # addresses for devices (UM10204, table 4)
-_SETTLE_US = 100  # an internal pull-up of 80 kOhm charges the 400 pF allowed for a bus in 32 us
+_NOTHING = (0x00, 0xFF, -1)  # values of WHO_AM_I that no chip of the MPU6050's family has
+_FIRST, _LAST = 0x08, 0x77  # range of the addresses for devices (UM10204, table 4)
+# Time for a pull-up to charge a wire. An internal pull-up of 80 kOhm charges 400 pF, the most that a bus may have, in
+# 32 us.
+_SETTLE_US = 100
 _SLOW_HZ = 100_000
 _TIMEOUT_US = 1000
-_INT_ENABLE = const(0x38)  # register map p. 27: bit 0, a sample is ready
+_INT_ENABLE = const(0x38)  # register map p. 27; bit 0 enables the signal that a sample is ready
 _INT_STATUS = const(0x3A)  # p. 28
-_PERIODS = 4  # sample periods that the FIFO gets to fill
+_PERIODS = 4  # number of sample periods to wait while the FIFO fills
 
 
 def wire_fault(sda, scl):
-    """Return a Notice if a wire stays low or nothing pulls it up, else None. The pull-ups are on the modules: without a
-    pull-up a wire is open or the module has no power. The test uses the pins' own weak pull-ups and pull-downs."""
+    """Return a Notice if a wire stays low or nothing pulls it up, else None.
+
+    The pull-ups are on the modules. Without a pull-up a wire is open, or the module has no power. The test uses the
+    weak pull-ups and pull-downs inside the pins."""
     wires = (("SDA", sda), ("SCL", scl))
     fault = None
     for name, pin in wires:
@@ -36,7 +43,7 @@ def wire_fault(sda, scl):
             fault = fault or Notice("wire-low", name, pin)
     open_wires = [wire for wire in wires if not _level(wire[1], Pin.PULL_DOWN)]
     for _, pin in wires:
-        Pin(pin, Pin.IN, None)  # removes the pull-down, which an ESP32 would keep
+        Pin(pin, Pin.IN, None)  # remove the pull-down, because an ESP32 would keep it
     if fault or not open_wires:
         return fault
     return Notice("no-pull-ups", sda, scl) if len(open_wires) == 2 else Notice("no-pull-up", *open_wires[0])
@@ -62,17 +69,24 @@ def answering(i2c, addresses=range(_FIRST, _LAST + 1)):
 
 
 def exchanged(sda, scl, addresses):
-    """Return True if one of these addresses answers with SDA and SCL exchanged."""
+    """Return True if one of the addresses answers when SDA and SCL are exchanged."""
     i2c = SoftI2C(Pin(sda), Pin(scl), freq=_SLOW_HZ, timeout=_TIMEOUT_US)  # its SCL comes first
     return bool(answering(i2c, addresses))
 
 
 def scan(sda, scl, reopen, addresses):
-    """Examine a bus. Return (notice, devices). notice: a Notice for a fault of the wires, or None. devices: a list of
-    (address, name, kind) of those that answer, see other_chips.name_of(). addresses: where the missing device may
-    answer.
+    """Examine a bus. This takes 0.1 s and leaves the bus open.
 
-    Takes 0.1 s, and leaves the bus open. Raises what reopen() raises, except OSError."""
+    Args:
+        addresses: the addresses at which the missing device may answer.
+
+    Returns:
+        notice: a Notice for a fault of the wires, or None.
+        devices: list of (address, name, kind) of each device that answers, see other_chips.name_of().
+
+    Raises:
+        What reopen() raises, except OSError.
+    """
     notice = wire_fault(sda, scl)
     devices = []
     try:
@@ -88,10 +102,18 @@ def scan(sda, scl, reopen, addresses):
 
 
 def explain_sensor(sda, scl, reopen, chip, error):
-    """Explain a failed set-up. Return (notice, addresses): the reason, a Notice, and the I2C addresses that answer on
-    the bus.
+    """Explain a failed set-up.
 
-    error: the OSError or UnknownChip that the set-up raised. Raises what reopen() raises, except OSError."""
+    Args:
+        error: the OSError or UnknownChip that the set-up raised.
+
+    Returns:
+        notice: a Notice with the reason.
+        addresses: sorted list of the I2C addresses that answer on the bus.
+
+    Raises:
+        What reopen() raises, except OSError.
+    """
     notice, devices = scan(sda, scl, reopen, MOTION_ADDRESSES)
     if not notice:
         kept = not isinstance(error, NotKept)
@@ -102,8 +124,13 @@ def explain_sensor(sda, scl, reopen, chip, error):
 
 
 def _judged(devices, i2c, kept):
-    """Return a Notice if a device on the sensor's bus explains the fault, else None. kept: False if the first device is
-    a chip that does not keep its settings."""
+    """Return a Notice if a device on the sensor's bus explains the fault, else None.
+
+    Args:
+        devices: the devices from scan().
+        i2c: a machine.I2C.
+        kept: False if the first device is a chip that does not keep its settings.
+    """
     if not kept and devices and devices[0][2] != MOTION and devices[0][1] != "clock":
         return Notice("not-kept", devices[0][0])
     for address, name, kind in devices:
@@ -123,12 +150,12 @@ def _judged(devices, i2c, kept):
 
 
 def fifo_fault(chip):
-    """Return the Notice "sensor-fifo" if the chip measures but its FIFO does not work, else None. values[0]: the fault
-    in words.
+    """Return the Notice "sensor-fifo" if the chip measures but its FIFO does not work, else None.
 
-    The test takes up to 0.3 s and leaves the FIFO empty. Raises OSError from the bus."""
+    values[0] of the Notice is the fault in words. The test takes up to 0.3 s and leaves the FIFO empty. Raises OSError
+    from the bus."""
     chip.restart_fifo()
-    left = chip.waiting()  # not 0 if a sample arrived meanwhile
+    left = chip.waiting()  # may already hold a sample that arrived after the restart
     chip.write_register(_INT_ENABLE, 1)
     before = _reading(chip)
     sleep_ms(_PERIODS * chip.period_ms)
@@ -164,22 +191,32 @@ def _repeats(chip):
 
 
 def bus_line(name, sda, scl, devices):
-    """Return one line of text about the devices that scan() found. name: the name of the bus."""
+    """Return one line of text about the devices that scan() has found.
+
+    Args:
+        name: the name of the bus.
+        devices: the devices from scan().
+    """
     words = ", ".join([("0x%02x %s" % (address, found)).strip() for address, found, _ in devices])
     return "%-13sSDA %d, SCL %d: %s" % (name + " bus", sda, scl, words or "nothing answers")
 
 
 def show_wirings(open_lcd, count, show_ms):
-    """Show the number of each wiring on a character display. Each number is sent with its own wiring, so only the right
-    one is readable.
+    """Show the number of each wiring on a character display.
 
-    open_lcd(number): returns a Display."""
+    Each number is sent with its own wiring. So the user can read only the number of the display's real wiring.
+
+    Args:
+        open_lcd: open_lcd(number) returns a Display for this wiring.
+        count: number of wirings.
+        show_ms: time to show each number.
+    """
     for number in range(1, count + 1):
         lcd = open_lcd(number)
         lcd.show("This is readable", "LCD_WIRING = %d" % number)
         lcd.flush()
         print("%-13sLCD_WIRING = %d is shown for %d s" % ("", number, show_ms // 1000))
         sleep_ms(show_ms)
-        lcd.show("", "")  # blank the display now: with the next wiring it may not react
+        lcd.show("", "")  # blank the display now, because it may not react to the next wiring
         lcd.flush()
     print("%-13sput the line that it has shown into config.py; if it has shown none: its contrast, or 5 V" % "")

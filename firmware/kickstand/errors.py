@@ -1,28 +1,38 @@
 """Errors and notices. Each has a code and the values for its sentence.
 
-A code is a name for programs and is never shown. ui/messages.py has its words for the display (2 x 16 characters),
-console.py its sentence for the USB console, and the host's tools have its words for a terminal.
+A code is a name for programs and is never shown. Three modules have words for each code:
+* ui/messages.py for the display, in two lines of 16 characters
+* console.py for the USB console, in one sentence
+* the tools on the computer for a terminal
 """
 
 import gc
 import sys
 
-# Raised when machine code is imported that cannot run: on CPython or a port without viper, on an ESP32 without enough
-# free memory, or on a chip of another kind than it was compiled for.
+# The exceptions that the import of machine code can raise. It cannot run on CPython, on a port without viper, on an
+# ESP32 without enough free memory, or on a kind of chip that it was not compiled for.
 NO_MACHINE_CODE = (ImportError, NameError, SyntaxError, MemoryError, ValueError)
 
 
 class Notice:
-    """Something to report. code: a name for programs. values: the numbers and names that the sentences for this code
-    use, in order."""
+    """Something to report.
+
+    Attributes:
+        code: a name for programs.
+        values: the numbers and names for the sentence of this code, in the sentence's order.
+    """
 
     def __init__(self, code, *values):
         self.code = code
         self.values = values
 
     def words(self, table, other=""):
-        """Return the words for this code from a table, with the values filled in. table: text with one line code|words
-        per code. other: the words for a code that is not in the table."""
+        """Return the words for this code, with the values filled in.
+
+        Args:
+            table: a text with one line code|words per code.
+            other: the words for a code that is not in the table.
+        """
         start = table.find("\n%s|" % self.code)
         if start >= 0:
             start += len(self.code) + 2
@@ -42,8 +52,8 @@ class Refusal(Exception):
 
 
 def report(refusal):
-    """Print a refusal on the console, unless a recent print was slow. Prints only the code if the module with the
-    sentences cannot be loaded (flash or heap has failed)."""
+    """Print a Refusal or Notice on the console, unless a recent print was slow. If the module with the sentences cannot
+    be loaded, print only the code."""
     try:
         from .console import tell
 
@@ -53,7 +63,7 @@ def report(refusal):
 
 
 def attempt(function, *arguments):
-    """Call the function with tried(). Report and return the Notice, if any."""
+    """Call a function as tried() does. If tried() returns a Notice, report it. Return the Notice or None."""
     problem = tried(function, *arguments)
     if problem:
         report(problem)
@@ -62,8 +72,10 @@ def attempt(function, *arguments):
 
 def tried(function, *arguments):
     """Call a function that may import modules. Return None, or a Notice if memory is short or the firmware is
-    incomplete. After a failure, remove the modules that the function began to import: MicroPython would keep a
-    half-imported one."""
+    incomplete.
+
+    After a failure, remove the modules that the function began to import, because MicroPython would keep a
+    half-imported module."""
     before = None
     try:
         before = tuple(sys.modules)
@@ -77,9 +89,16 @@ def tried(function, *arguments):
 
 
 def checked(machine_code, plain, *arguments):
-    """Return the function machine_code if it gives the same results as the function plain for copies of these
-    arguments. Else return plain, and report the difference on the console. Some boards' MicroPython compilers had
-    bugs."""
+    """Check the machine code of a function. Some releases of MicroPython had bugs in the compiler for some boards.
+
+    Args:
+        machine_code: the function in machine code.
+        plain: the same function in Python.
+        arguments: the arguments for one call of each. The second call gets copies.
+
+    Returns:
+        machine_code if both functions give the same results. Otherwise plain, after a report on the console.
+    """
     copies = [a if isinstance(a, (int, bytes)) else a[:] for a in arguments]
     same = machine_code(*arguments) == plain(*copies)
     for a, b in zip(arguments, copies):
@@ -123,8 +142,10 @@ class LiveError(Refusal):
 
 
 class SettingsError(Refusal):
-    """A value in config.py cannot be used. values[0]: the name of the setting.
+    """A value in config.py cannot be used. values[0] is the name of the setting.
 
-    settings: if settings.load() raises it, a Settings with the valid values, for opening the display."""
+    Attributes:
+        settings: a Settings with the valid values, for opening the display. Only settings.load() sets it.
+    """
 
     settings = None

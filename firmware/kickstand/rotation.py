@@ -1,7 +1,7 @@
 """3-vectors and 3x3 rotation matrices in preallocated float32 arrays.
 
-A vector is array('f', 3); a matrix is array('f', 9), row by row. Results are written into the array `out`, which must
-not be one of the inputs. Indices of a vector in the vehicle frame (A. Nicolae): 0 left, 1 up, 2 forward.
+A vector is an array('f', 3). A matrix is an array('f', 9), row by row. Results are written into the array `out`, which
+must not be one of the inputs. A vector in the vehicle's axes (A. Nicolae) has the entries 0 left, 1 up, 2 forward.
 """
 
 from array import array
@@ -9,7 +9,7 @@ from math import atan2, degrees, sqrt
 
 
 def vector(x=0.0, y=0.0, z=0.0):
-    """A new vector."""
+    """Return a new vector."""
     return array("f", (x, y, z))
 
 
@@ -19,24 +19,24 @@ def matrix(values=(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)):
 
 
 def dot(a, b):
-    """The dot product a . b"""
+    """Return the dot product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(out, a, b):
-    """out = a x b, the cross product (Nicolae's equation 4; as printed it gives zero)."""
+    """Write the cross product a x b into out (Nicolae's equation 4, which gives zero as printed)."""
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
 def norm(a):
-    """The length |a|"""
+    """Return the length of a vector."""
     return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 
 def normalize(a):
-    """Scale a to length 1 in place; return its earlier length. Raises ValueError for a null vector."""
+    """Scale a vector to length 1 in place. Return its earlier length. Raises ValueError for a null vector."""
     length = norm(a)
     if not length > 1e-9:  # also catches NaN
         raise ValueError("null vector has no direction")
@@ -47,7 +47,8 @@ def normalize(a):
 
 
 def rotate(out, m, a):
-    """out = M a (Nicolae's equation 15: from the sensor's axes to the vehicle's). Here out may be a."""
+    """Write the product M a into out (Nicolae's equation 15, from the sensor's axes to the vehicle's). Here out may be
+    a."""
     x, y, z = a[0], a[1], a[2]
     out[0] = m[0] * x + m[1] * y + m[2] * z
     out[1] = m[3] * x + m[4] * y + m[5] * z
@@ -55,14 +56,14 @@ def rotate(out, m, a):
 
 
 def product(out, a, b):
-    """out = A B, of two matrices."""
+    """Write the product of two matrices A B into out."""
     for i in (0, 3, 6):
         for k in range(3):
             out[i + k] = a[i] * b[k] + a[i + 1] * b[3 + k] + a[i + 2] * b[6 + k]
 
 
 def is_identity(m):
-    """True if M is exactly the identity."""
+    """Return True if a matrix is exactly the identity."""
     for i in range(9):
         if m[i] != (1.0 if i % 4 == 0 else 0.0):
             return False
@@ -70,8 +71,16 @@ def is_identity(m):
 
 
 def frame(out, up, forward):
-    """Fill the matrix out with the rows left, up, forward. up: length 1. The third row is the part of `forward` that is
-    perpendicular to up, scaled to length 1. Raises ValueError if that part is zero."""
+    """Write the matrix with the rows left, up, forward into out.
+
+    The third row is the part of `forward` that is perpendicular to up, scaled to length 1. Raises ValueError if that
+    part is zero.
+
+    Args:
+        out: the matrix for the result.
+        up: a vector of length 1.
+        forward: a vector of any length.
+    """
     left, ahead = vector(), vector()
     cross(left, up, forward)
     normalize(left)
@@ -81,15 +90,16 @@ def frame(out, up, forward):
 
 
 def angle_deg(a, b):
-    """The angle between two vectors, 0 to 180 degrees. Uses atan2, because acos of a 32-bit float is useless near 0 and
-    180."""
+    """Return the angle between two vectors, from 0 to 180 degrees. It uses atan2, because acos of a 32-bit float is
+    useless near 0 and 180 degrees."""
     c = vector()
     cross(c, a, b)
     return degrees(atan2(norm(c), dot(a, b)))
 
 
 def is_rotation(m, tolerance=1e-4):
-    """True if M is a rotation: every entry of M M^T - I is within tolerance, and the determinant is positive."""
+    """Return True if a matrix M is a rotation. Every entry of M M^T - I must be within the tolerance, and the
+    determinant must be positive."""
     for i in (0, 3, 6):
         for j in (0, 3, 6):
             product = m[i] * m[j] + m[i + 1] * m[j + 1] + m[i + 2] * m[j + 2]

@@ -1,7 +1,7 @@
-"""The settings of config.py, each with its default and its check. settings.py removes this module after use, to free
-heap.
+"""The settings of config.py, each with its default and its check.
 
-To add a setting, write a line in _TABLE or _PINS here, and a line in config.py with its purpose.
+settings.py removes this module after use, to free heap. To add a setting, write a line in _TABLE or _PINS, and a line
+with its purpose in config.py.
 """
 
 from .board import port
@@ -36,13 +36,13 @@ def _pin(value):
 
 
 _INPUT = _pin, "a number from 0 to 48, no pin of the chip's own USB, flash or console"
-# a button needs a pull-up, which input-only pins do not have
+# A button needs a pull-up. Pins that are only inputs do not have one.
 _PIN = (lambda v: _pin(v) and v not in port.INPUT_PINS), _INPUT[1] + ", and none that is an input only"
 _SD_PINS = ("SD_SCK", "SD_MOSI", "SD_MISO", "SD_CS")
-# The pin settings of each speed source
+# For each speed source, the names of its pin settings
 _SPEED_PINS = {None: (), "gps": ("GPS_TX", "GPS_RX"), "wheel": ("WHEEL_PIN",)}
 
-# name: default, (check, what is allowed in words)
+# Each entry maps the name of a setting to its default and a tuple of two: the check, and the allowed values in words
 _TABLE = {
     "SIDE": ("left", _one_of("left", "right")),
     "SAMPLE_HZ": (200, (lambda v: isinstance(v, int) and v in MIN_DLPF, "50, 100, 125 or 200")),
@@ -71,7 +71,7 @@ _TABLE = {
     "GPS_BAUD": (9600, _whole(4800, 115_200)),
     "PULSES_PER_METRE": (0.5, (_pulses, "pulses along a metre of road, from 0.1 to 100")),
 }
-# The same for pins. A wrong pin is replaced by None, because the default pin may be connected to something else
+# The same table for pins. A wrong pin is replaced by None, because the default pin may be connected to something else.
 _PINS = {
     "SENSOR_SDA": (port.SENSOR_PINS[0], _PIN),
     "SENSOR_SCL": (port.SENSOR_PINS[1], _PIN),
@@ -90,8 +90,15 @@ _NAMES = set(_TABLE) | set(_PINS)
 
 
 def fill(settings, config, refusal):
-    """Check the values of the module config and set them in `settings`, a Settings. A wrong value is replaced by its
-    default, a wrong pin by None. Raises SettingsError, or refusal if it is not None."""
+    """Check the values of config.py and set them in a Settings.
+
+    A wrong value is replaced by its default. A wrong pin is replaced by None. Raises SettingsError for a wrong value.
+
+    Args:
+        settings: the Settings.
+        config: the module config, or None for the defaults.
+        refusal: an exception to raise at the end, or None.
+    """
     for table in (_TABLE, _PINS):
         for name, (default, (check, allowed)) in table.items():
             value = getattr(config, name, default)

@@ -19,9 +19,9 @@ def load():
 
 
 def _line_of(error):
-    """Return the place of an error in config.py: "line 3: ", or "" if the traceback does not have it."""
+    """Return the place of an error in config.py, such as "line 3: ", or "" if the traceback does not show it."""
     text = StringIO()
-    # the type checker's stubs have neither a StringIO's type nor its getvalue
+    # the stubs for the type checker do not accept a StringIO here
     sys.print_exception(error, text)  # type: ignore[arg-type]
     traceback = text.getvalue()  # type: ignore[attr-defined]
     _, found, rest = traceback.rpartition('config.py", line ')
@@ -29,10 +29,15 @@ def _line_of(error):
 
 
 class Settings:
-    """The settings, one attribute per name in setting_table.py. config: the module config, or None for the defaults.
-    refusal: the SettingsError to raise if config.py cannot be read, else None. Raises SettingsError.
+    """The settings. There is one attribute per name in setting_table.py. Raises SettingsError.
 
-    one_bus: True if sensor and display share one I2C bus. leans: True if the vehicle leans (a motorcycle).
+    Args:
+        config: the module config, or None for the defaults.
+        refusal: the SettingsError to raise if config.py cannot be read, else None.
+
+    Attributes:
+        one_bus: True if sensor and display share one I2C bus.
+        leans: True if the vehicle leans (a motorcycle).
     """
 
     def __init__(self, config=None, refusal=None):
@@ -43,6 +48,6 @@ class Settings:
         except SettingsError as error:
             error.settings = self
             raise
-        finally:  # the table takes 8 KB of heap
+        finally:  # remove the table, which takes 8 KB of heap
             if sys.modules.pop("kickstand.setting_table", None):
                 del sys.modules["kickstand"].setting_table  # type: ignore[attr-defined]

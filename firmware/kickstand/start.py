@@ -1,7 +1,7 @@
 """Starts the lean meter. main.py runs it when the board gets power.
 
-Safe mode: if the button is held at power-on nothing is started, and new firmware can always be copied. After a reset
-the button is ignored: a press while an error is shown must not leave the rider without a display.
+Safe mode: if the button is held at power-on, nothing is started. So new firmware can always be copied. After a reset
+the button is ignored. Otherwise a press while an error is shown could leave the rider without a display.
 """
 
 import gc
@@ -20,7 +20,8 @@ from .units import __version__, const
 _CHARGE_MS = const(100)
 
 # The modules that the app imports, in this order. Between two imports the set-up of display and chip advances by a
-# step. MicroPython has no hook between imports, so this list repeats the import statements. A test compares both.
+# step. MicroPython cannot run code between the imports of other modules, so this list repeats them. A test compares the
+# list with the import statements.
 STEPS = (
     "calibration.parameters calibration.store calibration.active calibration.transform lean.bike_model lean.kalman "
     "lean.measurements lean.rest lean.upright_trim lean.dive lean.lean_filter lean.meter ui.messages ui.pages "
@@ -35,9 +36,10 @@ def _show(lcd, line1, line2=""):
 
 
 def _held(button):
-    """Return True if the button is pressed now and a moment later. The pin's weak pull-up must first charge any
-    capacitor
-    between pin and ground, such as one for debouncing (1 uF through 80 kOhm takes 75 ms)."""
+    """Return True if the button is pressed now and a moment later.
+
+    A capacitor for debouncing between pin and ground would look like a press at power-on. The pin's weak pull-up must
+    charge it first. 1 uF through 80 kOhm takes 75 ms."""
     if button.held():
         sleep_ms(_CHARGE_MS)
     return button.held()
@@ -45,7 +47,11 @@ def _held(button):
 
 def main(loop=None):
     """Run until Ctrl-C, power-off or a reset. An exception is reported on display and console, then the board restarts.
-    loop: called with the App in place of App.run(), for a simulation that calls App.begin() and App.step() later."""
+
+    Args:
+        loop: a function that is called with the App instead of App.run(), or None. A simulation uses it to call
+            App.begin() and App.step() later.
+    """
     lcd = None
     try:
         chosen = settings.load()
@@ -72,7 +78,7 @@ def main(loop=None):
         if lcd:
             lcd.end(*STOPPED)
         print("Kickstand stopped. Ctrl-D starts it again; import kickstand; kickstand.status() reports how it is.")
-    except ImportError as error:  # an interrupted update: a restart would not help
+    except ImportError as error:  # an update was interrupted, so a restart would not help
         port.rest_watchdog()
         print("Kickstand stopped: incomplete firmware (%s). Run kickstand flash." % error)
         _last_words(lcd, "Incomplete:", "flash it again")
@@ -84,20 +90,23 @@ def main(loop=None):
 
 
 def _last_words(lcd, line1, line2):
-    """Show two lines when the firmware ends. lcd: the Display; None if it is not open yet: then open it on the default
-    pins."""
+    """Show two lines when the firmware ends.
+
+    Args:
+        lcd: the Display, or None if it is not open yet. Then it is opened on the default pins.
+    """
     try:
         if lcd is None:
             sys.modules.pop("config", None)  # config.py itself may have used up the memory
             gc.collect()
             lcd = open_lcd(settings.Settings())
         _show(lcd, line1, line2)
-    except Exception:  # no memory, or no file: the console already has the message
+    except Exception:  # memory or a file may be missing; the console already has the message
         pass
 
 
 def _live(function, *arguments):
-    """Do a step of LIVE. Return None, or the error to report: the lean meter continues, without a restart."""
+    """Do a step of LIVE, and report an error. Return the error or None. The lean meter continues in any case."""
     try:
         problem = tried(function, *arguments)
     except LiveError as error:
@@ -126,9 +135,15 @@ def _attach(opened, app):
 
 
 def run(chosen, lcd, loop=None):
-    """Run the app, or call loop with it: see main()."""
+    """Run the app.
+
+    Args:
+        chosen: the Settings.
+        lcd: the Display.
+        loop: as for main().
+    """
     radio = []
-    # The radio comes first: an ESP32-C3 may crash if its radio is switched on after 40 KB are allocated
+    # The radio comes first, because an ESP32-C3 may crash if its radio is switched on after 40 KB are allocated
     problem = _live(_open_radio, radio, chosen.LIVE_PIN) if chosen.LIVE else None
     sensor = open_sensor(chosen)
     for name in STEPS + ["app"]:

@@ -1,17 +1,22 @@
 """The app's state as data for other programs, such as a simulation or a test."""
 
-STEPS = ("ask", "take", "notice", "refused", "result", "ended", "compute")  # indices: the states of ui/wizard.py
+STEPS = ("ask", "take", "notice", "refused", "result", "ended", "compute")  # names of the states 0 to 6 of ui/wizard.py
 
 
 def state(app):
-    """Return a dictionary with plain values. It describes what the display last got, at most 100 ms ago:
+    """Return the state of an App as a dictionary of plain values. The display got this state at most 100 ms ago.
 
-    view: "notice", "align", "six", "menu", "info", "fault", "question", or the name of a page (see PageRing.name).
-    code: the code of the notice, fault, question or refusal in view, or None (see errors.py).
-    step: the step of an alignment or the six positions, from STEPS. pose: the pose of an alignment, "kickstand" or
-    "upright". entry: the name of the menu entry that is shown.
-    trusted: True if the lean may be shown; lean_deg: that lean, > 0 to the right, or None.
-    aligned, recording: True or False. fault: the code of the sensor's fault, or None.
+    Returns:
+        view: "notice", "align", "six", "menu", "info", "fault", "question", or the name of a page (see PageRing.name).
+        code: the code of the notice, fault, question or refusal that is shown, or None (see errors.py).
+        step: the step of an alignment or of the six positions, from STEPS, or None.
+        pose: the pose of an alignment, "kickstand" or "upright", or None.
+        entry: the name of the menu entry that is shown, or None.
+        trusted: True if the lean may be shown.
+        lean_deg: the lean in degrees, positive to the right, or None if it may not be shown.
+        aligned: True if the sensor is aligned.
+        recording: True while a ride is being recorded.
+        fault: the code of the sensor's fault, or None.
     """
     screen, fault, trusted = app.screen, app.sensor.fault, app.trusted
     view = screen.front

@@ -1,4 +1,4 @@
-"""Prints the report of kickstand.status(): settings, sensor, display, speed source and calibration of this board."""
+"""Prints the report of kickstand.status() about settings, sensor, display, speed source and calibration of a board."""
 
 import gc
 import os
@@ -17,12 +17,12 @@ from .ui import messages
 from .units import __version__, const
 
 _LISTEN_MS = const(3500)
-# By the code of lean/consistency.py: the reading that did not fit
+# For each code of lean/consistency.py, the name of the reading that did not fit
 MEASURED = {"odd-left": "force to the left", "odd-up": "force up", "odd-pitch": "pitch"}
 _WIRINGS = const(4)  # number of values of LCD_WIRING
 _WIRING_MS = const(4000)  # time for which each wiring is shown
 _WATCH_MS = const(1400)  # time to set the sensor up and judge its axes twice
-_TRIAL = "trial.tmp"  # a file to measure the flash with, removed afterwards
+_TRIAL = "trial.tmp"  # a file that is written to measure the flash, and then removed
 
 
 def _print(label, words, *values):
@@ -30,8 +30,11 @@ def _print(label, words, *values):
 
 
 def report(wirings=False):
-    """Print the whole report. Stop the app first, because this function opens sensor and display itself. wirings: as in
-    status()."""
+    """Print the whole report. Stop the app first, because this function opens sensor and display.
+
+    Args:
+        wirings: as for kickstand.status().
+    """
     release = ".".join(str(n) for n in sys.implementation.version[:3])
     machine_name = getattr(sys.implementation, "_machine", sys.platform)
     print("Kickstand %s on %s, MicroPython %s" % (__version__, machine_name, release))
@@ -62,8 +65,8 @@ def report(wirings=False):
 
 
 def _write_ms():
-    """Return the time in ms to erase and write a flash block. If it is longer than the chip's FIFO lasts, readings are
-    lost."""
+    """Return the time in ms to erase and write a flash block. Readings are lost if the chip's FIFO overflows in this
+    time."""
     begun_ms = ticks_ms()
     with open(_TRIAL, "wb") as file:
         file.write(bytes(4096))
@@ -73,7 +76,7 @@ def _write_ms():
 
 
 def _sensor(sensor, settings):
-    """Print the sensor and the other devices on its bus. Return its WHO_AM_I, or 0 without a sensor."""
+    """Print the sensor and the other devices on its bus. Return the sensor's WHO_AM_I, or 0 without a sensor."""
     chip = sensor.chip
     fault = None
     try:
@@ -98,7 +101,7 @@ def _sensor(sensor, settings):
 
 
 def _axes(sensor):
-    """Print the faults of the sensor's axes, found in their counts during a second."""
+    """Watch the counts of the sensor's axes for over a second, and print their faults."""
     for _ in range(_WATCH_MS // 10):
         sensor.fetch(ticks_ms())
         sleep_ms(10)
@@ -127,7 +130,7 @@ def _display(lcd, settings):
 
 
 def _speed(settings):
-    """Print the speed or the fault of the speed source after _LISTEN_MS, long enough to detect each of its faults."""
+    """Print the speed or the fault of the speed source after _LISTEN_MS. Each fault is detected within this time."""
     if settings.SPEED is None:
         _print("Speed", "no source: SPEED is not set, alignment by driving is off")
         return
@@ -151,7 +154,11 @@ def _speed(settings):
 
 
 def _worst(chip):
-    """Print the app's worst values if it has run since the board started. chip: an Mpu6050."""
+    """Print the worst values of the app if it has run since the board started.
+
+    Args:
+        chip: an Mpu6050.
+    """
     judge = sys.modules.get("kickstand.lean.consistency")
     if judge and judge.last_odd:
         words = "the readings did not fit, again and again: %s. Sensor, alignment or mount: align again"

@@ -1,16 +1,17 @@
 """Runs the owner's code, the file user.py on the board. Updates do not touch this file. It may define these functions:
 
-setup(app)                          once, before the lean meter runs
-page(app), page_battery(app) ...    while this page is shown: two lines of 16 characters and, for a display that draws,
-                                    optionally a picture, see board/display.py. Each name that begins with page is a
-                                    page
-on_lean(lean_deg, trusted, meter)   ten times per second. trusted: False while the lean must not be used
-on_press(event)                     after each press: board.button.SHORT or LONG
+setup(app)                          is called once, before the lean meter runs
+page(app), page_battery(app) ...    is called while its page is shown. It returns two lines of 16 characters and, for a
+                                    display that draws, optionally a picture, see board/display.py. Each function whose
+                                    name begins with page is a page.
+on_lean(lean_deg, trusted, meter)   is called ten times per second. While trusted is False the lean must not be used.
+on_press(event)                     is called after each press. The event is board.button.SHORT or LONG.
 
-A function is disabled, with a notice on display and console, if it raises, takes longer than _TOO_SLOW_MS, or takes
-longer than _SLOW_MS for _MOST_SLOW times in a row. Importing user.py and setup() may take any time. A MemoryError
-anywhere disables all of user.py.
-Imported only if there is a user.py.
+A function is disabled in three cases: it raises, it takes longer than _TOO_SLOW_MS, or _MOST_SLOW successive calls take
+longer than _SLOW_MS. A notice on display and console says so. The import of user.py and setup() may take any time. A
+MemoryError in any of them disables all of user.py.
+
+This module is imported only if there is a user.py.
 """
 
 import gc
@@ -20,16 +21,18 @@ from time import ticks_diff, ticks_ms
 from .errors import Notice, report
 from .units import const
 
-_SLOW_MS = const(50)  # a slower call is reported once per function
-_TOO_SLOW_MS = const(300)  # the sensor does not keep its samples for longer
-_MOST_SLOW = const(5)  # successive calls longer than _SLOW_MS; after more, the loop could not catch up with the samples
-_LEAST_FREE = const(20_000)  # bytes of free heap: with less, the lean meter itself would fail next
+_SLOW_MS = const(50)  # a call that takes longer is reported, once per function
+_TOO_SLOW_MS = const(300)  # longest time of a call, because the sensor does not keep its samples for longer
+# Number of successive calls longer than _SLOW_MS that disable a function. After more such calls the loop could not
+# catch up with the samples.
+_MOST_SLOW = const(5)
+_LEAST_FREE = const(20_000)  # smallest free heap in bytes; with less the lean meter would soon fail too
 _CALLED = ("setup", "on_lean", "on_press")
 
 
 def _functions_of(name):
-    """Return the functions of a module that the firmware calls, by name. The module's __dir__() or __getattr__() may
-    raise."""
+    """Import a module. Return a dictionary of the functions that the firmware calls, with their names as keys. The
+    module's code may raise anything."""
     module = __import__(name)
     found = {}
     for name in dir(module):
@@ -41,7 +44,11 @@ def _functions_of(name):
 
 
 class UserCode:
-    """The owner's code for an App. pages: one function without arguments per page, which returns its lines."""
+    """The owner's code for an App.
+
+    Attributes:
+        pages: list with one function per page. It takes no arguments and returns the page's lines.
+    """
 
     def __init__(self, app):
         self._app = app
@@ -49,7 +56,8 @@ class UserCode:
         self._functions["import"] = _functions_of  # _call() also guards the import
         self._slow = {}  # number of slow calls in a row, per function
         self._problems = []
-        # stored once: each access would make a new bound method, and the display compares them
+        # Stored once, because each access to self._draw creates a new bound method. The display would then treat an
+        # unchanged picture as a new one.
         self._drawn = self._draw
         sys.modules.pop("user", None)
         self._functions.update(self._call("import", "user") or {})
@@ -62,12 +70,16 @@ class UserCode:
         return self._problems.pop(0) if self._problems else None
 
     def lean(self, trusted):
-        """Call on_lean, ten times per second. trusted: the lean is also shown."""
+        """Call the owner's on_lean(). This happens ten times per second.
+
+        Args:
+            trusted: True if the lean may be shown.
+        """
         meter = self._app.meter
         self._call("on_lean", meter.lean_deg, trusted, meter)
 
     def press(self, event):
-        """Call on_press, after each press."""
+        """Call the owner's on_press() after a press."""
         self._call("on_press", event)
 
     def check_memory(self):
@@ -76,7 +88,7 @@ class UserCode:
             self._forget("memory")
 
     def _call(self, name, *arguments):
-        """Call a function and return its result; None if it is missing, disabled or fails."""
+        """Call a function of the owner and return its result, or None if it is missing, disabled or fails."""
         function = self._functions.get(name)
         if function is None:
             return None
@@ -130,7 +142,7 @@ class UserCode:
             return "user.py " + name, "not two lines"
 
     def _draw(self, canvas, name, draw, *values):
-        """Return the lines of a page whose own function has failed."""
+        """Draw the picture of a page with the owner's function. If that function fails, disable the page."""
         self._functions["picture"] = draw
         self._call("picture", canvas, *values)
         if "picture" not in self._functions:

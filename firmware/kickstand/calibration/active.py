@@ -6,16 +6,18 @@ from ..errors import StoreError, report
 from ..units import const
 from .store import Store
 
-_TRIM_MS = const(60_000)  # least time between two saves of the trim, because writing wears the flash
+_TRIM_MS = const(60_000)  # shortest time between two saves of the trim, because writing wears the flash
 
 
 class ActiveCalibration:
-    """The Calibration in use, and its store. meter: the LeanMeter that uses it. changed(replaced): called after each
-    change.
-    replaced: True for another alignment, after which maxima and the results of driving are discarded; False for a small
-    correction.
+    """The Calibration in use, and its store.
 
-    The trim (the roll-misalignment correction, in degrees) is estimated while riding: see Calibration.
+    The trim is the correction of the roll misalignment, in degrees. It is estimated while riding: see Calibration.
+
+    Args:
+        meter: the LeanMeter that uses the Calibration.
+        changed: a function that is called as changed(replaced) after each change. `replaced` is True for another
+            alignment. Then maxima and the results of driving must be discarded. It is False for a small correction.
     """
 
     def __init__(self, meter, changed):
@@ -36,8 +38,11 @@ class ActiveCalibration:
         return self.value.aligned
 
     def chip_started(self, chip):
-        """Load the stored calibration of `chip` (an Mpu6050 that runs), unless it is already in use. Return True if it
-        was loaded."""
+        """Load the stored calibration of a chip, unless it is already in use. Return True if it was loaded.
+
+        Args:
+            chip: an Mpu6050 that runs.
+        """
         if self._store and self._store.who_am_i == chip.who_am_i:
             return False
         self._chip = chip
@@ -46,36 +51,42 @@ class ActiveCalibration:
         return True
 
     def save(self, calibration, posed=False):
-        """Save a calibration from the rider's poses to flash, then use it. posed: see LeanMeter.use(). Raises
-        StoreError."""
+        """Save a calibration from the rider's poses to flash, then use it. Raises StoreError.
+
+        Args:
+            calibration: the new Calibration.
+            posed: as for LeanMeter.use().
+        """
         self._store.save(calibration)
         self._use(calibration, True, posed)
 
     def refine(self, calibration):
-        """Like save(), for an alignment from driving: maxima and the results of driving are kept. Raises StoreError."""
+        """Save and use an alignment from driving. Unlike save(), keep the maxima and the results of driving. Raises
+        StoreError."""
         self._store.save(calibration)
         self._use(calibration, False)
 
     def restart(self):
-        """Save the current trim, then restart the meter with the values in flash. A replay of the ride starts from the
-        same values."""
+        """Save the current trim, then restart the meter with the calibration in flash. A replay of the ride starts with
+        the same calibration."""
         self._save_trim()
         self._meter.use(self.value)
 
     def keep_trim(self, now_ms):
-        """Save the trim if the bike is at rest and _TRIM_MS have passed since the last save. Call this about every 100
-        ms."""
+        """Save the trim if the bike is at rest and _TRIM_MS have passed since the last save.
+
+        Call this method about every 100 ms."""
         if ticks_diff(now_ms, self._trim_due_ms) >= 0:
             saved = self.value.aligned and self._save_trim()
             self._trim_due_ms = ticks_add(now_ms, _TRIM_MS if saved else 0)
 
     def _save_trim(self):
-        """Save the trim if it has changed enough; return True if so."""
+        """Save the trim if it has changed enough. Return True if it was saved."""
         if not self._meter.keep_trim() or not self._store.unchanged():
             return False
         try:
             self._store.save(self.value)
-        except StoreError as error:  # not fatal: the next ride estimates the trim again
+        except StoreError as error:  # not fatal, because the next ride estimates the trim again
             report(error)
         return True
 

@@ -1,5 +1,8 @@
-"""The parameters that convert counts to specific force (g) and angular rate (deg/s), and sensor axes to vehicle
-axes."""
+"""The parameters of a calibration and an alignment.
+
+The calibration converts counts to specific force (g) and angular rate (deg/s). The alignment rotates the sensor's axes
+into the vehicle's axes.
+"""
 
 from ..rotation import is_identity, matrix, product, rotate, vector
 
@@ -7,7 +10,7 @@ from ..rotation import is_identity, matrix, product, rotate, vector
 # exceed both.
 MAX_OFFSET_G = 0.5
 MIN_SLOPE, MAX_SLOPE = 0.8, 1.2
-MAX_MATRIX_ERROR = 0.15  # largest difference of an entry of accel_matrix or gyro_matrix from the identity
+MAX_MATRIX_ERROR = 0.15  # largest difference between an entry of accel_matrix or gyro_matrix and the identity matrix
 MAX_GYRO_SIGMA = 0.05
 _UNKNOWN = (0.0,) * 9
 
@@ -15,13 +18,26 @@ _UNKNOWN = (0.0,) * 9
 class Calibration:
     """The parameters of one mounted sensor. The defaults change nothing: offset 0, slope 1, bias 0, identity matrices.
 
-    accel_offset (3, g) and accel_slope (3): calibrated = slope * reading + offset, Nicolae's equations 18-20.
-    gyro_bias (3, deg/s): the gyro's reading at rest. accel_matrix, gyro_matrix (9, row-major): the remaining errors,
-    force = accel_matrix * calibrated, and rate = gyro_matrix * (reading - bias). gyro_sigma (9): standard error of each
-    entry of gyro_matrix, 0 if not measured. vehicle_from_sensor (9, row-major, rows left, up, forward): the alignment,
-    a rotation matrix. trim_deg: the roll-misalignment correction found while riding: degrees by which the lean would
-    read too far to the right. six_done: offset and slope were measured. aligned:
-    vehicle_from_sensor was measured. by_drive: the alignment was measured or refined by driving.
+    The parameters are used as follows (Nicolae's equations 18-20, extended by two matrices):
+
+        force = accel_matrix * (accel_slope * reading + accel_offset)
+        rate = gyro_matrix * (reading - gyro_bias)
+
+    All matrices are lists of 9 numbers, row by row.
+
+    Attributes:
+        accel_offset: offset of each axis of the accelerometer (3 values), in g.
+        accel_slope: slope of each axis of the accelerometer (3 values).
+        accel_matrix: cross-axis errors of the accelerometer.
+        gyro_bias: the gyro's reading at rest (3 values), in deg/s.
+        gyro_matrix: scale and cross-axis errors of the gyro.
+        gyro_sigma: standard error of each entry of gyro_matrix (9 values); 0 if not measured.
+        vehicle_from_sensor: the alignment, a rotation matrix with the rows left, up, forward.
+        trim_deg: the correction of the roll misalignment, found while riding. Without it the lean would read this many
+            degrees too far to the right.
+        six_done: True if offset and slope were measured.
+        aligned: True if vehicle_from_sensor was measured.
+        by_drive: True if the alignment was measured or refined by driving.
     """
 
     def __init__(self):
@@ -38,8 +54,11 @@ class Calibration:
         self.set_scale(1.0, 1.0)
 
     def with_alignment(self, vehicle_from_sensor, gyro_bias, trim_deg=0.0, by_drive=False):
-        """Return a new Calibration with the same offset, slope and matrices, aligned by vehicle_from_sensor (9).
-        gyro_bias: 3, deg/s."""
+        """Return a new Calibration with the same offset, slope and matrices, and with another alignment.
+
+        Args:
+            vehicle_from_sensor, gyro_bias, trim_deg, by_drive: the attributes of the new Calibration.
+        """
         new = Calibration()
         new.set_accel(self.accel_offset, self.accel_slope)
         new.set_matrices(self.matrices())
@@ -52,18 +71,18 @@ class Calibration:
         return new
 
     def set_scale(self, accel_lsb_per_g, gyro_lsb_per_dps):
-        """Set the counts per unit of the next readings. By default 1: readings are in g and deg/s."""
+        """Set the counts per g and per deg/s of the next readings. Before the first call both are 1."""
         self._accel_lsb = accel_lsb_per_g
         self.set_accel(self.accel_offset, self.accel_slope)
         self._gyro_scale = 1.0 / gyro_lsb_per_dps
 
     def set_accel(self, offset, slope):
-        """Set offset (3, g) and slope (3)."""
+        """Set accel_offset and accel_slope."""
         self.accel_offset, self.accel_slope = vector(*offset), vector(*slope)
         self._scale = vector(*[value / self._accel_lsb for value in slope])
 
     def parameters(self):
-        """The 19 measured numbers: offset (3), slope (3), gyro bias (3), matrix (9), trim."""
+        """Return 19 numbers: accel_offset (3), accel_slope (3), gyro_bias (3), vehicle_from_sensor (9), trim_deg."""
         measured = list(self.accel_offset) + list(self.accel_slope) + list(self.gyro_bias)
         return measured + list(self.vehicle_from_sensor) + [self.trim_deg]
 
@@ -80,7 +99,7 @@ class Calibration:
         return any(self.gyro_sigma) or not (is_identity(self.accel_matrix) and is_identity(self.gyro_matrix))
 
     def matrices(self):
-        """accel_matrix, gyro_matrix and gyro_sigma: 27 numbers."""
+        """Return 27 numbers: accel_matrix (9), gyro_matrix (9), gyro_sigma (9)."""
         return list(self.accel_matrix) + list(self.gyro_matrix) + list(self.gyro_sigma)
 
     def set_matrices(self, values):
@@ -89,27 +108,38 @@ class Calibration:
         self.gyro_sigma = matrix(values[18:27])
 
     def correct(self, accel):
-        """Calibrate a mean accelerometer reading (3, g); return a new array."""
+        """Calibrate a mean reading of the accelerometer (3 values, in g). Return the force as a new array."""
         out = vector()
         rotate(out, self.accel_matrix, [self.accel_slope[i] * accel[i] + self.accel_offset[i] for i in range(3)])
         return out
 
     def correct_rate(self, gyro):
-        """Calibrate a mean gyro reading (3, deg/s); return a new array."""
+        """Calibrate a mean reading of the gyro (3 values, in deg/s). Return the rate as a new array."""
         out = vector()
         rotate(out, self.gyro_matrix, [gyro[i] - self.gyro_bias[i] for i in range(3)])
         return out
 
     def scales(self):
-        """Return g per count of each accelerometer axis (3), including slope, and deg/s per count of the gyro."""
+        """Return the units of one count.
+
+        Returns:
+            accel: g per count of each axis of the accelerometer (3 values), including the slope.
+            gyro: deg/s per count of the gyro.
+        """
         return self._scale, self._gyro_scale
 
     def in_vehicle(self):
-        """Return calibration and alignment together, as matrices and offsets for raw counts.
+        """Return calibration and alignment combined, as matrices and offsets for raw counts.
 
-        Four lists: matrix (9) and offset (3) of force = matrix * counts + offset, in g; the same for the rate, in
-        deg/s. The lists combine Nicolae's equations (18)-(20), accel_matrix and gyro_matrix, and equation (15). A
-        reading then takes 18 multiplications."""
+        The results combine Nicolae's equations (18)-(20), accel_matrix and gyro_matrix, and equation (15). With them a
+        reading takes 18 multiplications: force = force_matrix * counts + force_offset, and the same for the rate.
+
+        Returns:
+            force_matrix: 9 values, in g per count.
+            force_offset: 3 values, in g.
+            rate_matrix: 9 values, in deg/s per count.
+            rate_offset: 3 values, in deg/s.
+        """
         of_force, of_rate = matrix(), matrix()
         product(of_force, self.vehicle_from_sensor, self.accel_matrix)
         product(of_rate, self.vehicle_from_sensor, self.gyro_matrix)
@@ -120,8 +150,13 @@ class Calibration:
         return force, force_offset, [value * self._gyro_scale for value in of_rate], rate_offset
 
     def apply(self, reading, force, rate):
-        """Fill force (3, g) and rate (3, deg/s), both in the sensor's axes, from a reading (7, the chip's order:
-        accelerometer, temperature, gyro)."""
+        """Calibrate one reading. The results are in the sensor's axes.
+
+        Args:
+            reading: 7 counts in the chip's order: accelerometer (3), temperature, gyro (3).
+            force: list of 3 for the resulting force, in g.
+            rate: list of 3 for the resulting rate, in deg/s.
+        """
         scale, offset, bias, gyro_scale = self._scale, self.accel_offset, self.gyro_bias, self._gyro_scale
         force[0] = scale[0] * reading[0] + offset[0]
         force[1] = scale[1] * reading[1] + offset[1]
@@ -135,10 +170,15 @@ class Calibration:
 
 
 def six_position_calibration(offset, slope, gyro_bias, matrices=None):
-    """Return a new Calibration with the result of the six positions: offset (3, g), slope (3), gyro_bias (3, deg/s).
-    matrices: the 27 numbers of Calibration.matrices(), if the gyro was measured too.
+    """Return a new Calibration with the result of the six positions.
 
-    It is not aligned, because the sensor was not on the vehicle for the six poses.
+    The new Calibration is not aligned, because the sensor was not on the vehicle for the six poses.
+
+    Args:
+        offset: accel_offset, 3 values in g.
+        slope: accel_slope, 3 values.
+        gyro_bias: 3 values in deg/s.
+        matrices: the 27 numbers of Calibration.matrices() if the gyro was measured too, else None.
     """
     new = Calibration()
     new.set_accel(offset, slope)

@@ -9,18 +9,24 @@ _GIVE_UP_MS = const(10_000)  # longest time to wait for stillness
 
 # The states that step() returns
 SETTLING = 0  # waiting for stillness
-SETTLED = 1  # for one sample: the sensor has been still for _SETTLE_MS, and averaging begins
+SETTLED = 1  # returned once, when the sensor has been still for _SETTLE_MS and averaging begins
 AVERAGING = 2
-DONE = 3  # returned for one sample: the pose is complete
+DONE = 3  # returned once, when the pose is complete
 _ENDED = 4
 
 
 class PoseTaker:
     """Takes one pose from successive samples.
 
-    chip: an Mpu6050, for its scale and range. rate_hz: samples per second. seconds: duration of the average.
-    settled: from SETTLED on, the mean reading (3, g) of the half second before averaging. pose: the StillPose, finished
-    at DONE.
+    Args:
+        chip: an Mpu6050, for its scale and range.
+        rate_hz: samples per second.
+        seconds: duration of the average.
+
+    Attributes:
+        settled: the mean reading of the accelerometer (3 values, in g) in the half second before averaging. It is
+            available from SETTLED on.
+        pose: the StillPose. It is finished at DONE.
     """
 
     def __init__(self, chip, rate_hz, seconds):
@@ -38,8 +44,8 @@ class PoseTaker:
         self.pose = self._new(self._settle_count)
 
     def step(self, counts):
-        """Take one sample (7 counts, the chip's order); return one of the states above. Raises CaptureError, which ends
-        the pose."""
+        """Take one sample of 7 counts in the chip's order. Return one of the states above. Raises CaptureError, which
+        ends the pose."""
         if self._state == SETTLING:
             return self._settle(counts)
         if self._state == AVERAGING:
@@ -53,7 +59,7 @@ class PoseTaker:
 
     @property
     def restless(self):
-        """True if the wait for stillness is already longer than a sensor at rest needs."""
+        """True if the wait for stillness is already longer than a sensor at rest would need."""
         return self._state == SETTLING and self._waited > 2 * self._settle_count
 
     def progress(self):

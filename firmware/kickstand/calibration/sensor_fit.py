@@ -1,10 +1,14 @@
-"""Calibrates accelerometer and gyro from still poses and the turns between them: least squares with 18 unknowns.
+"""Calibrates accelerometer and gyro from still poses and the turns between them, by least squares.
 
-Accelerometer: force = (I + N) (slope * reading + offset), N symmetric with a diagonal of 0, 9 unknowns. Gyro: rate =
-(I + X) (reading - bias), 9 unknowns. For each pose the force must have a length of 1 g. For each turn, the force of the
-pose before, rotated by the turn, must equal the force of the pose after. The priors come from the data sheet. The fit
-takes five Gauss-Newton steps in 32-bit floats. To save memory, the lower triangle of the normal equations (171 numbers)
-is factorised in place (A.-L. Cholesky).
+The 18 unknowns are those of two models:
+
+    force = (I + N) (slope * reading + offset)      accelerometer; N is symmetric with a diagonal of 0; 9 unknowns
+    rate = (I + X) (reading - bias)                 gyro; X is any 3x3 matrix; 9 unknowns
+
+In each pose the force must have a length of 1 g. Each turn rotates the force of the first pose into the axes of the
+second pose. There it must equal the force of the second pose. The priors come from the data sheet. The fit takes five
+Gauss-Newton steps in 32-bit floats. To save memory, the lower triangle of the normal equations (171 numbers) is
+factorised in place (A.-L. Cholesky).
 """
 
 from array import array
@@ -16,27 +20,29 @@ from ..units import AXES, const
 from .turn import rotated
 
 _UNKNOWNS = const(18)
-_GYRO = 9  # index of the gyro's first unknown, after offset (3), slope (3), N (3: yz, xz, xy)
+_GYRO = 9  # index of the gyro's first unknown; it follows offset (3), slope (3) and N (3, in the order yz, xz, xy)
 _STEPS = const(5)
-_SIGMA_FORCE = const(0.0015)  # g: standard deviation of a pose's force
-_SIGMA_TURN = const(0.0015)  # rad: standard deviation of a turn, due to the poses at its ends
-# deg/s per sqrt(s): random walk of the gyro's bias during a turn. The poses at both ends measure the bias, so the
-# angle's variance is walk^2 seconds^3 / 12.
+_SIGMA_FORCE = const(0.0015)  # standard deviation of a pose's force, in g
+_SIGMA_TURN = const(0.0015)  # standard deviation of a turn's angle that the poses at its ends cause, in rad
+# Random walk of the gyro's bias during a turn, in deg/s per sqrt(s). The poses at both ends measure the bias, so the
+# variance of the angle is walk^2 seconds^3 / 12.
 _BIAS_WALK_DPS = const(0.008)
-# The priors: offset (g), slope, N, the diagonal of X (scale) and the rest of X (cross-axis). The data sheet allows 0.03
-# and 0.02; the accelerometer's axes may also be rotated against the gyro's.
+# Standard deviations of the priors. SIGMA_OFFSET is in g. SIGMA_SKEW is for N, SIGMA_SCALE for the diagonal of X, and
+# SIGMA_CROSS for the rest of X. The data sheet allows errors of 0.03 in the gyro's scale and of 0.02 between its axes.
+# The accelerometer's axes may also be rotated against the gyro's.
 SIGMA_OFFSET, SIGMA_SLOPE, SIGMA_SKEW = 0.1, 0.1, 0.012
 SIGMA_SCALE, SIGMA_CROSS = 0.03, 0.02
 # Limits for accepting the fit
-_MAX_SCALE_ERROR = const(0.10)  # of the gyro: no working chip has a larger error
-_MAX_CROSS_ERROR = const(0.06)  # of the gyro's axes: twice the data sheet's value; more means that one axis is late
-_MAX_MISFIT = const(0.012)  # rad: largest misfit of a turn after the fit
-# rad: largest misfit of a turn before the fit; the errors in the data sheet add up to 0.2 in half a turn
+_MAX_SCALE_ERROR = const(0.10)  # largest scale error of a working gyro
+# Largest cross-axis error of the gyro, three times the data sheet's value. A larger error means that one axis is late.
+_MAX_CROSS_ERROR = const(0.06)
+_MAX_MISFIT = const(0.012)  # largest misfit of a turn after the fit, in rad
+# Largest misfit of a turn before the fit, in rad. The errors in the data sheet add up to 0.2 in half a turn.
 _GROSS_MISFIT = const(0.25)
-# possible readings of an axis at a rate of 1, tried to find a single wrong axis
+# Factors between the reading of a faulty axis and the true rate. They are tried to find a single wrong axis.
 _READS = const((-1.0, 0.25, 0.5, 0.75, 1.3, 2.0, 4.0))
-_DEAD_RAD = const(0.2)  # an axis that measured less than this in every turn is dead
-# largest standard error of a scale: above it, no turn about this axis has measured the scale
+_DEAD_RAD = const(0.2)  # an axis that measured less than this angle in every turn is dead
+# Largest standard error of a measured scale. If it is larger, no turn about this axis has measured the scale.
 _PROOF_SIGMA = const(0.025)
 
 
@@ -45,11 +51,21 @@ def _triangle(i):
 
 
 class SensorFit:
-    """One fit. poses: mean readings (3, g) in chronological order. turns: the turns between the poses, each as
-    (Turn.packed(), seconds), or None if the turn cannot be used. offset (g), slope: the first guess.
+    """One fit.
 
-    run() computes: offset (3, g), slope (3), accel_matrix (9), gyro_matrix (9), gyro_sigma (9: the standard error of
-    each entry of gyro_matrix), unproved (names of axes that no turn has measured).
+    Args:
+        poses: mean readings of the accelerometer, each of 3 values in g, in chronological order.
+        turns: the turn after each pose but the last, as (Turn.packed(), seconds); None if the turn cannot be used.
+        offset: first guess of the offset, 3 values in g.
+        slope: first guess of the slope, 3 values.
+
+    Attributes, after run():
+        offset: 3 values in g.
+        slope: 3 values.
+        accel_matrix: 9 values.
+        gyro_matrix: 9 values.
+        gyro_sigma: standard error of each entry of gyro_matrix, 9 values.
+        unproved: names of the axes that no turn has measured.
     """
 
     def __init__(self, poses, turns, offset, slope):
@@ -62,8 +78,8 @@ class SensorFit:
         self._g = [0.0] * _UNKNOWNS
 
     def run(self):
-        """Fit, as a generator of short steps, because on a board the whole fit takes longer than the chip's FIFO lasts.
-        Raises GyroError if a working gyro cannot have measured these turns."""
+        """Fit, as a generator of short steps. On a board the whole fit takes longer than the chip's FIFO can keep the
+        samples. Raises GyroError if a working gyro cannot have measured these turns."""
         self._check_gross()
         for _ in range(_STEPS):
             yield from self._accumulate()
@@ -82,11 +98,11 @@ class SensorFit:
             pass
 
     def matrices(self):
-        """The 27 numbers of Calibration.matrices()."""
+        """Return the 27 numbers of Calibration.matrices()."""
         return list(self.accel_matrix) + list(self.gyro_matrix) + self.gyro_sigma
 
     def force(self, k):
-        """The force (3, g) of pose k."""
+        """Return the force of pose k by the current unknowns, 3 values in g."""
         m, p, a = self._accel(), self._p, self._poses[k]
         g = [p[3 + i] * a[i] + p[i] for i in range(3)]
         return [m[3 * i] * g[0] + m[3 * i + 1] * g[1] + m[3 * i + 2] * g[2] for i in range(3)]
@@ -96,8 +112,16 @@ class SensorFit:
         return 1.0, xy, xz, xy, 1.0, yz, xz, yz, 1.0
 
     def _misfit(self, k, x):
-        """Return the misfit of turn k (3, rad) and the turned force. The misfit is the turned force of the pose before
-        minus the force of the pose after, in the axes of the pose before. x: the 9 entries of X, row by row."""
+        """Compare the forces at both ends of a turn, in the axes of the pose before the turn.
+
+        Args:
+            k: index of the turn.
+            x: the 9 entries of X, row by row.
+
+        Returns:
+            misfit: `before` minus the force of the pose after the turn, which R rotates back; 3 values in rad.
+            before: the force of the pose before the turn, corrected for the gyro's errors; 3 values in g.
+        """
         turn = self._turns[k][0]
         turned = [0.0] * 3
         for a in range(3):
@@ -145,7 +169,7 @@ class SensorFit:
                 yield
 
     def _force_columns(self, k):
-        """d force / d (offset, slope, N) of pose k: 3 rows of 9."""
+        """Return the derivatives of the force of pose k by offset, slope and N: 3 rows of 9."""
         m, p, a = self._accel(), self._p, self._poses[k]
         x, y, z = [p[3 + i] * a[i] + p[i] for i in range(3)]
         out = []
@@ -157,7 +181,7 @@ class SensorFit:
         return out
 
     def _add(self, row, n, residual, weight):
-        """Add the measurement residual = row . change to the normal equations. The row has n entries."""
+        """Add the equation `residual = row . change` to the normal equations. The row has n entries."""
         h, g = self._h, self._g
         at = 0
         for i in range(n):
@@ -193,8 +217,10 @@ class SensorFit:
         return out
 
     def _finish(self):
-        """Set the results. The gyro's unknowns come last, so the last rows of L give their covariance. Its diagonal is
-        the squared lengths of the columns of that block's inverse."""
+        """Set the results.
+
+        The gyro's unknowns come last, so the last 9 rows and columns of L give their covariance. The variance of an
+        unknown is the squared length of its column in the inverse of that block."""
         h, p = self._h, self._p
         self.offset, self.slope = p[0:3], p[3:6]
         self.accel_matrix = matrix(self._accel())
@@ -212,7 +238,7 @@ class SensorFit:
         self.unproved = [AXES[i] for i in range(3) if self.gyro_sigma[4 * i] > _PROOF_SIGMA]
 
     def _check_gross(self):
-        """Raise GyroError if the gyro's turn differs much from gravity's turn."""
+        """Raise GyroError if a turn by the gyro differs much from the turn that gravity shows."""
         worst = self._cost([0.0] * 9)[1]
         if worst > _GROSS_MISFIT**2:
             raise self._ill(worst)
@@ -239,7 +265,7 @@ class SensorFit:
         return GyroError("gyro-scale", AXES[axis], 100.0 * (reads - 1.0))
 
     def _turned(self, axis):
-        """Return the largest rotation about an axis (rad) that the gyro measured in any turn."""
+        """Return the largest rotation about an axis that the gyro measured in any turn, in rad."""
         most = 0.0
         for turn in self._turns:
             if turn is not None:
@@ -248,7 +274,7 @@ class SensorFit:
         return most
 
     def _cost(self, x):
-        """The sum and the maximum of the turns' squared misfits."""
+        """Return the sum and the maximum of the squared misfits of all turns."""
         total = most = 0.0
         for k in range(len(self._turns)):
             if self._turns[k] is not None:

@@ -1,9 +1,10 @@
-"""Computes accelerometer offset and slope from six still poses, one on each side (A. Nicolae, section 4).
+"""Computes offset and slope of the accelerometer from six still poses, one on each side (A. Nicolae, section 4).
 
-The closed form, equations 16-17, assumes that each axis points exactly up or down: a pose that is 10 degrees off causes
+The closed form, equations 16-17, assumes that each axis points exactly up or down. A pose that is 10 degrees off causes
 an error of 0.6 degrees of lean. fit() uses the same six mean readings, but only assumes that each calibrated reading
 has a length of 1 g. That is true in any pose. The fit starts from the closed form and takes a few Gauss-Newton steps.
-Its error is near 0.1 degrees.
+The error of the fit is about 0.1 degrees.
+
 Six poses determine six numbers exactly, so their residual proves nothing. Only a seventh, free pose can verify the
 result.
 """
@@ -16,13 +17,18 @@ from .parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE
 
 SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")  # the axis that points up, in the order of the six poses
 _MAX_TILT_DEG = const(20.0)  # largest angle between a side's axis and the vertical
-FREE_TILT_DEG = 20.0  # a free pose nearer to a side adds little information
-# Largest error of a free pose. It is not smaller, because six numbers cannot describe the 2 % of cross-axis sensitivity
+FREE_TILT_DEG = 20.0  # smallest tilt of the free pose; a pose nearer to a side adds little information
+# Largest error of the free pose. A good sensor can have this error, because six numbers cannot describe its cross-axis
+# sensitivity of 2 %.
 _FREE_MAX_G = const(0.028)
 
 
 def side_of(accel):
-    """Return the index in SIDES of the side that is up. accel: a mean reading (3, g)."""
+    """Return the index in SIDES of the side that is up.
+
+    Args:
+        accel: mean reading of the accelerometer, 3 values in g.
+    """
     axis = 0
     for i in (1, 2):
         if abs(accel[i]) > abs(accel[axis]):
@@ -31,8 +37,11 @@ def side_of(accel):
 
 
 def tilt_deg(force):
-    """Return the angle in degrees between the vertical and the axis nearest to it. force: 3, any unit; a null vector
-    gives 90."""
+    """Return the angle in degrees between the vertical and the axis nearest to it.
+
+    Args:
+        force: 3 values in any unit. For a null vector the result is 90.
+    """
     size = sum(f * f for f in force) ** 0.5
     if not size > 1e-6:
         return 90.0
@@ -40,8 +49,15 @@ def tilt_deg(force):
 
 
 def closed_form(poses):
-    """Compute offset (3, g) and slope (3) by equations 16-17. poses: six mean readings (3, g) in the order of SIDES.
-    Raises CalibrationError for an axis that does not change."""
+    """Compute offset and slope by equations 16-17. Raises CalibrationError for an axis that does not change.
+
+    Args:
+        poses: six mean readings of the accelerometer, each of 3 values in g, in the order of SIDES.
+
+    Returns:
+        offset: 3 values in g.
+        slope: 3 values.
+    """
     offset, slope = [0.0] * 3, [0.0] * 3
     for i in range(3):
         high, low = poses[2 * i][i], poses[2 * i + 1][i]
@@ -53,8 +69,9 @@ def closed_form(poses):
 
 
 def fit(poses):
-    """Compute offset (3, g) and slope (3) so that all six calibrated readings have a length of 1 g. poses: as for
-    closed_form(). Raises CalibrationError."""
+    """Compute the offset and slope for which all six calibrated readings have a length of 1 g.
+
+    Arguments and results are those of closed_form(). Raises CalibrationError."""
     offset, slope = closed_form(poses)
     rows = [[0.0] * 7 for _ in range(6)]
     for _ in range(8):  # 3 to 5 steps are enough
@@ -90,8 +107,15 @@ def check_plausible(offset, slope, poses):
 
 
 def check_free_pose(offset, slope, accel):
-    """Return the difference (g) of the calibrated reading of a seventh, slanted pose from 1 g. accel: its mean reading
-    (3, g). Raises CalibrationError beyond _FREE_MAX_G."""
+    """Verify offset and slope with a seventh, slanted pose. Return by how much its force exceeds 1 g.
+
+    Args:
+        offset, slope: as returned by fit().
+        accel: mean reading of the accelerometer in the seventh pose, 3 values in g.
+
+    Raises:
+        CalibrationError: the force differs from 1 g by more than _FREE_MAX_G.
+    """
     force = [slope[i] * accel[i] + offset[i] for i in range(3)]
     error = sum(f * f for f in force) ** 0.5 - 1.0
     if not abs(error) <= _FREE_MAX_G:
@@ -100,8 +124,14 @@ def check_free_pose(offset, slope, accel):
 
 
 def _solve(rows):
-    """Solve six linear equations in place (Gauss-Jordan elimination with partial pivoting). rows: six lists of six
-    coefficients and the right-hand side, which the solution replaces. Return False for singular equations."""
+    """Solve six linear equations in place, by Gauss-Jordan elimination with partial pivoting.
+
+    Args:
+        rows: six lists. Each has six coefficients and the right-hand side, which the solution replaces.
+
+    Returns:
+        False if the equations are singular.
+    """
     for k in range(6):
         pivot = k
         for r in range(k + 1, 6):

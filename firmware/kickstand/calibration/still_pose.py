@@ -1,36 +1,44 @@
 """Averages the readings of one pose, and checks that the sensor was still.
 
-A faulty sensor must not pass as a still one. Each axis must change by a count from time to time, because a working axis
-has noise. A gyro axis must not be too noisy.
+A dead sensor must not be accepted as a still one. So each axis must change by a count from time to time, because a
+working axis has noise. A gyro axis must not be too noisy.
 
-Sums are kept as integers until the end: 32-bit floats would lose the digits that averaging gains.
+The sums are integers, because 32-bit floats would lose the digits that averaging gains.
 """
 
 from ..errors import CaptureError, SickSensor
 from ..units import AXES, const
 
-# Largest difference of a sample from the first one; a larger one is a knock. This is ten times the chip's noise with
-# its widest filter.
+# Largest difference between a sample and the first sample. A larger difference is a knock. These limits are ten times
+# the chip's noise with its widest filter.
 _PEAK_G = const(0.08)
 _PEAK_DPS = const(5.0)
-# Largest noise of a gyro axis, from the differences between successive samples; a slow sway of the hand does not change
-# these. This is fifteen times the chip's noise with its usual filter.
+# Largest noise of a gyro axis, fifteen times the chip's noise with its usual filter. The noise is computed from the
+# differences between successive samples. A slow sway of the hand hardly changes these differences.
 _NOISE_DPS = const(0.6)
-_SPREAD_G = const(0.02)  # largest standard deviation: stillness matters more than the exact angle
-_DRIFT_G = const(0.007)  # largest difference between the means of the two halves: 0.4 degrees of slow tilt
+_SPREAD_G = const(0.02)  # largest standard deviation of an axis of the accelerometer
+_DRIFT_G = const(0.007)  # largest difference between the means of the two halves, equal to a tilt of 0.4 degrees
 _MAX_REST_RATE_DPS = const(45.0)  # the data sheet allows 20 deg/s of gyro offset, plus 20 over temperature
 _MIN_SAMPLES = const(20)
 
-_AXES = (0, 1, 2, 4, 5, 6)  # accelerometer and gyro in the chip's order; 3 is the temperature
+_AXES = (0, 1, 2, 4, 5, 6)  # indices of accelerometer and gyro in a sample; index 3 is the temperature
 
 
 class StillPose:
     """Averages the samples of one pose.
 
-    accel_lsb_per_g, gyro_lsb_per_dps: counts per unit. accel_limit: |counts| from which an axis is saturated. expected:
-    number of samples in the pose; the check for drift compares its two halves.
-    count: samples taken. Do not use a pose after a CaptureError.
-    After finish(): accel (3, g, sensor's axes, uncalibrated), gyro (3, deg/s).
+    Do not use a pose after a CaptureError.
+
+    Args:
+        accel_lsb_per_g: counts per g.
+        gyro_lsb_per_dps: counts per deg/s.
+        accel_limit: absolute counts from which an axis of the accelerometer is saturated.
+        expected: number of samples in the pose. The check for drift compares the two halves of the pose.
+
+    Attributes:
+        count: number of samples taken so far.
+        accel: the mean force, 3 values in g, in the sensor's axes, uncalibrated; None before finish().
+        gyro: the mean rate, 3 values in deg/s; None before finish().
     """
 
     def __init__(self, accel_lsb_per_g, gyro_lsb_per_dps, accel_limit, expected):
@@ -42,17 +50,18 @@ class StillPose:
         gyro_peak = int(_PEAK_DPS * gyro_lsb_per_dps)
         self._peaks = (accel_peak, accel_peak, accel_peak, 0, gyro_peak, gyro_peak, gyro_peak)
         self._first = [0] * 7
-        self._sums = [0] * 7  # sums of the deviations from the first sample: small integers
-        self._early = [0] * 7  # the sums at half time
-        self._squares = [0] * 7
-        self._last = [0] * 7  # the last sample's deviations, and the sums of their squared changes
-        self._changes = [0] * 7
+        # A deviation is the difference between a sample and the first sample, a small integer.
+        self._sums = [0] * 7  # sums of the deviations
+        self._early = [0] * 7  # sums of the deviations in the first half
+        self._squares = [0] * 7  # sums of the squared deviations
+        self._last = [0] * 7  # deviations of the last sample
+        self._changes = [0] * 7  # sums of the squared differences between successive deviations
         self.count = 0
         self.accel = None
         self.gyro = None
 
     def add(self, counts):
-        """Take one sample (7 integers, the chip's order). Raises CaptureError."""
+        """Take one sample of 7 counts in the chip's order. Raises CaptureError."""
         if self.count == 0:
             for i in range(7):
                 self._first[i] = counts[i]

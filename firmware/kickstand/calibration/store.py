@@ -1,9 +1,14 @@
-"""Stores the calibration in flash. Two files are written alternately: after a power cut one of them is still valid.
+"""Stores the calibration in flash. Two files are written alternately, so one is still valid after a power cut.
 
-Each file holds a record: magic, version, length, sequence number, the chip's WHO_AM_I and range, flags, 19 floats (in
-version 2 another 27 for the matrices), and the CRC32 of everything before it. A calibration without matrices is written
-as version 1, which all releases read. load() uses the newest valid record. save() overwrites the other record and reads
-it back. A failed read never leads to a write, because a good file can read as empty while the voltage sags.
+Each file holds a record with these parts:
+* magic, version, length, sequence number
+* the chip's WHO_AM_I and range, flags
+* 19 floats; version 2 adds 27 floats for the matrices
+* the CRC32 of everything before it
+
+A calibration without matrices is written as version 1, because all releases of the firmware read version 1. load() uses
+the newest valid record. save() overwrites the other record and reads it back. A failed read never causes a write,
+because a good file can read as empty while the voltage sags.
 """
 
 import struct
@@ -17,26 +22,31 @@ from .parameters import MAX_GYRO_SIGMA, MAX_MATRIX_ERROR, MAX_OFFSET_G, MAX_SLOP
 
 FILES = ("kickstand_a.cal", "kickstand_b.cal")
 _VERSION = const(1)
-_WHOLE_VERSION = const(2)  # with the matrices
+_WHOLE_VERSION = const(2)  # version of a record with the matrices
 _MAGIC = b"KSTD"
 _HEAD = "<4sHHI"  # magic, version, length of the whole record in bytes, sequence number
-_BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, how aligned; offset, slope, gyro bias, matrix, trim
+_BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, how aligned; the 19 numbers of parameters()
 _NOT_ALIGNED, _BY_POSES, _BY_DRIVE = 0, 1, 2  # the values of "how aligned"
 _WHOLE = "<27f"  # accel_matrix, gyro_matrix, gyro_sigma
 BODY_LENGTH = struct.calcsize(_BODY)
 WHOLE_BODY_LENGTH = BODY_LENGTH + struct.calcsize(_WHOLE)
 _HEAD_LENGTH = struct.calcsize(_HEAD)
 _LENGTHS = {_VERSION: _HEAD_LENGTH + BODY_LENGTH + 4, _WHOLE_VERSION: _HEAD_LENGTH + WHOLE_BODY_LENGTH + 4}
-MAX_BIAS_DPS = 60.0  # deg/s of the gyro
+MAX_BIAS_DPS = 60.0  # largest plausible bias of the gyro
 MAX_TRIM_DEG = 3.6  # the limit in lean/upright_trim.py plus a margin for 32-bit rounding
 
 
 class Store:
-    """Calibration records of one chip.
+    """Reads and writes the calibration records of one chip.
 
-    who_am_i, accel_range_g: those of the chip in use. Records of another chip are invalid. Records of another range are
-    valid, because offset and slope hardly depend on it.  directory: the directory of the files, "" for the current one.
-    message: after load(), a few words about the record in use, or why there is none.
+    Args:
+        who_am_i: WHO_AM_I of the chip in use. Records of another chip are invalid.
+        accel_range_g: accelerometer range of the chip in use. Records of another range are valid, because offset and
+            slope hardly depend on the range.
+        directory: the directory of the files, "" for the current one.
+
+    Attributes:
+        message: after load(), a few words about the record in use, or the reason why no record is valid.
     """
 
     def __init__(self, who_am_i, accel_range_g, directory=""):
@@ -48,8 +58,8 @@ class Store:
         self._problems = []  # faults of the invalid records, in words
 
     def load(self):
-        """Return the newest valid Calibration, or a default one if no record is valid. Raises nothing and writes
-        nothing."""
+        """Return the newest valid Calibration, or a default Calibration if no record is valid. Raises nothing and
+        writes nothing."""
         sequence, calibration, problems = self._newest()
         self._sequence, self._problems = sequence, problems
         if calibration is None:
@@ -59,14 +69,16 @@ class Store:
         return calibration
 
     def unchanged(self):
-        """Return True if both files read the same as in load() or save(). If not, a file was misread, for example in a
-        voltage sag. Then the loaded record may be the older one, and the newer one must not be overwritten."""
+        """Return True if both files read the same as in load() or save().
+
+        If they do not, a file was misread, for example in a voltage sag. Then the loaded record may be the older of the
+        two, and the newer record must not be overwritten."""
         sequence, _, problems = self._newest()
         return sequence == self._sequence and problems == self._problems
 
     def save(self, calibration):
-        """Write calibration over the older record and read it back. Raises StoreError. The record in use is never
-        damaged."""
+        """Write a Calibration over the older record and read it back. The record in use is never damaged. Raises
+        StoreError."""
         sequence, _, _ = self._newest()
         record = self._pack(calibration, sequence + 1)
         path = self._path(FILES[(sequence + 1) % 2])
@@ -82,8 +94,13 @@ class Store:
         self._sequence, _, self._problems = self._newest()
 
     def _newest(self):
-        """Return (sequence, calibration, problems) of the newest valid record, or (0, None, problems) if no record is
-        valid."""
+        """Find the newest valid record.
+
+        Returns:
+            sequence: its sequence number, or 0 if no record is valid.
+            calibration: its Calibration, or None if no record is valid.
+            problems: list of the faults of the invalid records, in words.
+        """
         newest, calibration, problems = 0, None, []
         for name in FILES:
             try:
@@ -109,7 +126,13 @@ class Store:
         return record + struct.pack("<I", crc32(record))
 
     def _unpack(self, record):
-        """Return (sequence, calibration, None) for a record's bytes, or (0, None, the fault in words)."""
+        """Decode the bytes of a record.
+
+        Returns:
+            sequence: its sequence number, or 0 if it is invalid.
+            calibration: its Calibration, or None if it is invalid.
+            problem: None, or the fault in words if it is invalid.
+        """
         if len(record) not in _LENGTHS.values():
             whole = len(record) >= 6 and record[4] == _WHOLE_VERSION
             length = _LENGTHS[_WHOLE_VERSION if whole else _VERSION]
@@ -128,8 +151,16 @@ class Store:
 
 
 def pack(who_am_i, accel_range_g, calibration):
-    """Pack a Calibration and its chip into BODY_LENGTH bytes, or WHOLE_BODY_LENGTH with matrices. accel_range_g: a
-    whole number of g."""
+    """Pack a Calibration and its chip into bytes.
+
+    Args:
+        who_am_i: WHO_AM_I of the chip.
+        accel_range_g: accelerometer range of the chip, an integer.
+        calibration: the Calibration.
+
+    Returns:
+        BODY_LENGTH bytes, or WHOLE_BODY_LENGTH bytes with matrices.
+    """
     how = (_BY_DRIVE if calibration.by_drive else _BY_POSES) if calibration.aligned else _NOT_ALIGNED
     body = struct.pack(_BODY, who_am_i, accel_range_g, calibration.six_done, how, *calibration.parameters())
     return body + struct.pack(_WHOLE, *calibration.matrices()) if calibration.whole else body
@@ -148,7 +179,7 @@ def unpack(data):
 
 
 def plausible(calibration):
-    """Return True if a real sensor can have every parameter of the Calibration."""
+    """Return True if all parameters of the Calibration are within the limits of a real sensor."""
     for i in range(3):
         if not abs(calibration.accel_offset[i]) < MAX_OFFSET_G:  # "not <" also rejects NaN
             return False

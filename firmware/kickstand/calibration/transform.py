@@ -1,10 +1,11 @@
-"""Converts the chip's counts to the vehicle's force and rate in one step: calibration and alignment combined.
+"""Converts the chip's counts to the vehicle's force and rate, by calibration and alignment combined in one step.
 
     force = R A (slope * counts / lsb + offset)        Nicolae's equations (18)-(20), then (15)
-    rate  = R G (counts / lsb - bias)                  R: vehicle_from_sensor; A, G: accel_matrix, gyro_matrix
+    rate  = R G (counts / lsb - bias)
 
-One step takes 18 products per sample instead of 27. On the board a product of floats takes 12 us and 32 bytes of heap.
-So the board's machine code multiplies integers, with an error of at most 0.03 degrees of lean.
+R is vehicle_from_sensor, A is accel_matrix, and G is gyro_matrix. The combined step takes 18 products per sample
+instead of 27. On the board a product of floats takes 12 us and 32 bytes of heap. So the board's machine code multiplies
+integers. The rounding causes an error of at most 0.03 degrees of lean.
 """
 
 from array import array
@@ -13,15 +14,20 @@ from math import radians
 from ..errors import NO_MACHINE_CODE, checked
 from ..units import const
 
-# The integer for the largest scale: its product with the sum of eight samples still fits in 32 bits
+# The integer that represents the largest scale. Its product with the sum of eight samples still fits in 32 bits.
 _ONE = const(2048)
 
 
 def products_python(matrices, sums, n, out):
-    """Compute out[0:3] = A (sums[0:3], n) and out[3:6] = B (sums[4:7], n), where n multiplies the offsets.
+    """Compute out[0:3] = A (sums[0:3], n) and out[3:6] = B (sums[4:7], n). The last column of A and B has the offsets.
 
-    matrices: array('i', 24), the 3x4 matrices A and B by rows.  sums: array('i', 7).  out: array('i', 6). On the board,
-    products() is the machine code of transform_viper.py; elsewhere it is this function.
+    On the board, products() is the machine code of transform_viper.py. On a computer it is this function.
+
+    Args:
+        matrices: the 3x4 matrices A and B, row by row, array('i', 24).
+        sums: sums of counts in the chip's order, array('i', 7).
+        n: number of samples in the sums.
+        out: array('i', 6) for the result.
     """
     for i in range(6):
         first = 0 if i < 3 else 4
@@ -40,8 +46,9 @@ else:
 
 
 class Transform:
-    """Applies a Calibration to sums of counts. Call the Calibration's set_scale() first. Later changes to the
-    Calibration have no effect."""
+    """Applies a Calibration to sums of counts.
+
+    Call the Calibration's set_scale() first. Changes to the Calibration after that have no effect."""
 
     def __init__(self, calibration):
         force, force_offset, rate, rate_offset = calibration.in_vehicle()
@@ -55,10 +62,14 @@ class Transform:
         self._force_unit, self._rate_unit = force_unit, radians(rate_unit)
 
     def apply_sum(self, sums, n, force, rate):
-        """Compute the mean force and rate of n samples (at most 8) into force and rate.
+        """Compute the mean force and the mean rate of some samples.
 
-        sums: array('i', 7), sums of the samples' counts in the chip's order.  force: 3, left, up, forward, in g.  rate:
-        3, about the same axes, in rad/s."""
+        Args:
+            sums: sums of the samples' counts in the chip's order, array('i', 7).
+            n: number of samples, at most 8.
+            force: list of 3 for the mean force to the left, up and forward, in g.
+            rate: list of 3 for the mean rate about left, up and forward, in rad/s.
+        """
         p = self._products
         products(self._integers, sums, n, p)
         unit = self._force_unit / n

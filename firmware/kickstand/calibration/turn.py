@@ -1,10 +1,13 @@
 """Computes from the gyro how a sensor turned between two still poses, and how the gyro's errors change the result.
 
-Gravity in the poses before and after shows the same turn, so the poses calibrate the gyro. A Turn keeps R (3x3) and S
-(3x12). R rotates vectors from the sensor's axes now to its axes at the start. S gives the effect of errors: a true rate
-of (I + X) rate + c turns the sensor by exp([S x]) R, where x has row i of X, then c_i, in 4 i to 4 i + 3. D. Tedaldi,
-A. Pretto, E. Menegatti, "A robust and easy to implement method for IMU calibration", ICRA 2014, keeps all samples
-instead.
+Gravity in the poses before and after shows the same turn, so the poses calibrate the gyro. A Turn keeps two matrices:
+
+* R (3x3) rotates vectors from the sensor's axes now to its axes at the start.
+* S (3x12) gives the effect of the gyro's errors. If the true rate is (I + X) rate + c, the true rotation is
+  exp([S x]) R. The vector x has row i of X and then c_i in the entries 4 i to 4 i + 3, for i from 0 to 2.
+
+With R and S no samples need to be kept. The method of D. Tedaldi, A. Pretto, E. Menegatti, "A robust and easy to
+implement method for IMU calibration", ICRA 2014, keeps all samples.
 """
 
 from array import array
@@ -12,19 +15,26 @@ from math import cos, radians, sin
 
 from ..units import const
 
-_STEP_RAD = const(0.02)  # a step ends after a rotation by this about one axis; a larger value is less exact
+_STEP_RAD = const(0.02)  # a step ends when the sensor has turned by this angle about one axis; smaller is more exact
 _STEP_US = const(60_000)  # a step also ends after this time
-# Counts, 0.95 of the gyro's range: the chip's low-pass hides single conversions that reached its end
+# 0.95 of the gyro's range, in counts. It is less than the full range, because the chip's low-pass hides single
+# conversions that were at the end of the range.
 _QUICK = const(31_000)
 
 
 class Turn:
-    """Integrates the gyro from start() to end(). Fixed memory.
+    """Integrates the gyro from start() to end(), with fixed memory.
 
-    lsb_per_dps: counts per deg/s. period_us: nominal time between two samples. quick: |counts| of a rate that is too
-    fast.
-    quick (attribute): True if the rate came near the end of the gyro's range since start(). lost: True if readings were
-    missing since start(). seconds: duration of the turn, after end().
+    Args:
+        lsb_per_dps: counts per deg/s.
+        period_us: nominal time between two samples.
+        quick: absolute counts of a rate that is too fast.
+
+    Attributes:
+        quick: True if the rate was too fast at any time since start().
+        lost: True if readings were missing since start().
+        seconds: duration of the turn, after end().
+        running: True between start() and end().
     """
 
     def __init__(self, lsb_per_dps, period_us, quick=_QUICK):
@@ -32,11 +42,15 @@ class Turn:
         self._lsb = lsb_per_dps
         self._period_us = period_us
         self._quick = quick
-        self._step_counts = int(_STEP_RAD / self._rad / period_us)  # _STEP_RAD as a sum of counts
+        self._step_counts = int(_STEP_RAD / self._rad / period_us)  # sum of counts that equals _STEP_RAD
         self.running = False
 
     def start(self, bias):
-        """Begin at a still pose. bias: 3, deg/s."""
+        """Begin a turn at a still pose.
+
+        Args:
+            bias: the gyro's bias in this pose, 3 values in deg/s.
+        """
         self._bias = [value * self._lsb for value in bias]
         self.r = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
         self.s = [0.0] * 36
@@ -47,9 +61,15 @@ class Turn:
         self.running = True
 
     def add(self, sums, n, dt_us, hold=False):
-        """Take n samples: their sums (7, counts, the chip's order), and the microseconds since the previous samples.
-        hold: True if the samples belong to a still pose that ends the turn. If that pose fails, they are added to the
-        turn later."""
+        """Take n samples.
+
+        Args:
+            sums: sums of the samples' counts in the chip's order, 7 values.
+            n: number of samples.
+            dt_us: microseconds since the previous samples.
+            hold: True if the samples belong to a still pose that may end the turn. They are added to the turn only if
+                that pose fails.
+        """
         if not self.running:
             return
         if hold and not self._held and self._n:
@@ -72,14 +92,18 @@ class Turn:
             self._step()
 
     def end(self):
-        """End at a still pose."""
+        """End the turn at a still pose."""
         if self._n and not self._held:
             self._step()
         self.running = False
 
     def attitude(self, bias, share):
-        """Return R as a list of 9. Its bias is interpolated between that of start() (share 0) and `bias` (3, deg/s;
-        share 1)."""
+        """Return R as a list of 9, corrected for a bias that differs from the bias of start().
+
+        Args:
+            bias: the gyro's bias in another pose, 3 values in deg/s.
+            share: weight of `bias` in the mean of the two biases. At 0 the bias of start() is used, at 1 `bias`.
+        """
         turned, out = [0.0] * 3, self.r[:]
         for i in range(3):
             error = radians(share * (self._bias[i] / self._lsb - bias[i]))
@@ -92,8 +116,14 @@ class Turn:
         return out
 
     def packed(self, bias):
-        """Return the turn as array('f', 36): R (9), then S (27) without the columns of the bias. bias: 3, deg/s, of the
-        pose at the end. The turn uses the mean of the biases at both ends."""
+        """Return the turn for SensorFit, with the mean of the biases at both ends.
+
+        Args:
+            bias: the gyro's bias in the pose at the end, 3 values in deg/s.
+
+        Returns:
+            array('f', 36): R (9 values), then S without the columns of the bias (27 values).
+        """
         out = array("f", self.attitude(bias, 0.5))
         for i in range(36):
             if i % 4 != 3:
@@ -101,7 +131,7 @@ class Turn:
         return out
 
     def angle(self):
-        """Return the angle of the turn in rad, as the gyro measured it."""
+        """Return the angle of the turn by the gyro, in rad."""
         total = 0.0
         for a in range(0, 36, 12):
             turned = self.s[a] + self.s[a + 5] + self.s[a + 10]
@@ -109,8 +139,10 @@ class Turn:
         return total**0.5
 
     def _step(self):
-        """Advance R and S by the sums of counts. A row of R times [w] is row x w. The half step makes the integration
-        second-order."""
+        """Advance R and S by the sums of counts.
+
+        [w] is the cross-product matrix of the rotation w. A row of R times [w] is the cross product of the row and w.
+        The half step makes the integration second-order."""
         share, own, bias, n = self._rad * self._us / self._n, self._sums, self._bias, self._n
         x, y, z = [share * (own[i] - n * bias[i]) for i in range(3)]
         seconds = self._us * 1e-6
@@ -135,7 +167,12 @@ class Turn:
 
 
 def rotated(turned, vector):
-    """Rotate a vector (3) by the rotation vector `turned` (3, rad); return a new list. O. Rodrigues' formula."""
+    """Rotate a vector by O. Rodrigues' formula. Return a new list.
+
+    Args:
+        turned: the rotation vector, 3 values in rad.
+        vector: 3 values.
+    """
     x, y, z = turned
     p, q, t = vector
     square = x * x + y * y + z * z

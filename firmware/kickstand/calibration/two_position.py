@@ -1,8 +1,9 @@
 """Aligns the sensor by two still poses, on the kickstand and upright (A. Nicolae, section 2).
 
-Differences from the paper: Equation (4) is the cross product of the upright and the tilted reading; as printed it is
-zero. Equation (5) takes y from the upright reading and divides y by its own length. If the kickstand is on the right, x
-and z would point right and backward, so both signs are changed.
+Three things differ from the paper:
+* Equation (4) is the cross product of the upright and the tilted reading. As printed, the product is zero.
+* Equation (5) takes y from the upright reading and divides y by its own length.
+* If the kickstand is on the right, the paper's x and z point right and backward. So both signs are changed.
 """
 
 from math import atan2, degrees
@@ -11,38 +12,51 @@ from ..errors import AlignmentError, GyroError
 from ..rotation import cross, dot, frame, matrix, norm, normalize, rotate, vector
 from ..units import const
 
-# Least tilt between the poses. At a tilt of 5 degrees, one degree of pitch between the poses causes a yaw error of 11
-# degrees; at 8 degrees, of 7.
+# Smallest tilt between the poses. If the pitch changes by one degree between the poses, the yaw error is 11 degrees at
+# a tilt of 5 degrees, and 7 degrees at a tilt of 8 degrees.
 _MIN_TILT_DEG = const(5.0)
 WARN_TILT_DEG = 8.0
 _MAX_TILT_DEG = const(60.0)
 _SAME_POSE_DEG = const(1.0)
-# Largest difference of a reading at rest from 1 g. The data sheet allows 80 mg of offset and 3 % of scale, plus drift.
-# After the six positions only 35 mg of drift over temperature remain.
+# Largest difference between a reading at rest and 1 g. The data sheet allows 80 mg of offset and 3 % of scale error,
+# plus drift. After the six positions only 35 mg of drift over temperature remain.
 _UNCALIBRATED_TOLERANCE_G = const(0.15)
 _CALIBRATED_TOLERANCE_G = const(0.05)
-# Largest difference between the gyro's turn and the tilt between the poses. The limit is the sum of: a constant (rad);
-# a share of the tilt, for uncalibrated sensors and the gyro's scale; a share of the whole turn, for cross-axis errors,
-# for example while the bike is pushed about; drift (rad/s) and random walk (rad/s per sqrt(s), 3 sigma) of the gyro's
-# bias
+# Largest difference between the turn by the gyro and the tilt between the poses. The limit is the sum of these terms:
+# * GYRO_RAD, a constant in rad
+# * GYRO_TILT_SHARE times the tilt, for uncalibrated sensors and the gyro's scale error
+# * GYRO_TURN_SHARE times the whole turn, for cross-axis errors, for example while the bike is pushed about
+# * GYRO_DRIFT, the drift of the gyro's bias in rad/s, times the duration
+# * a term with GYRO_WALK, the random walk of the gyro's bias in rad/s per sqrt(s), 3 sigma
 GYRO_RAD, GYRO_TILT_SHARE, GYRO_TURN_SHARE = 0.02, 0.15, 0.04
 GYRO_DRIFT, GYRO_WALK = 0.0005, 0.0002
 
 
 def check_one_g(force, tolerance_g, pose):
-    """Raise AlignmentError unless the length of force (3, g) is within tolerance_g of 1. pose: "kickstand" or
-    "upright"."""
+    """Raise AlignmentError unless the length of the force is within tolerance_g of 1 g.
+
+    Args:
+        force: 3 values in g.
+        tolerance_g: the largest difference from 1 g.
+        pose: "kickstand" or "upright", for the message.
+    """
     size = norm(force)
     if not abs(size - 1.0) <= tolerance_g:
         raise AlignmentError("not-one-g", pose, size)
 
 
 def two_position(out, kickstand, upright, side="left", tolerance_g=_UNCALIBRATED_TOLERANCE_G):
-    """Compute the rotation from sensor to vehicle axes into out (9, rows left, up, forward); return the tilt between
-    the poses in degrees. Equations 3-8.
+    """Compute the rotation from sensor axes to vehicle axes by equations 3-8. Raises AlignmentError.
 
-    kickstand, upright: mean specific force of each pose (3, g, sensor's axes). side: "left" or "right", the side to
-    which the kickstand leans the bike. Raises AlignmentError.
+    Args:
+        out: array of 9 for the rotation matrix, with the rows left, up, forward.
+        kickstand: mean specific force on the kickstand, 3 values in g, in the sensor's axes.
+        upright: mean specific force in the upright pose, 3 values in g, in the sensor's axes.
+        side: "left" or "right", the side to which the kickstand leans the bike.
+        tolerance_g: largest difference between each force and 1 g.
+
+    Returns:
+        The tilt between the poses in degrees.
     """
     check_one_g(kickstand, tolerance_g, "kickstand")
     check_one_g(upright, tolerance_g, "upright")
@@ -65,11 +79,18 @@ def two_position(out, kickstand, upright, side="left", tolerance_g=_UNCALIBRATED
 
 
 def align(calibration, kickstand, upright, side):
-    """Return a new Calibration, aligned by two finished poses (StillPose each), and the tilt between them in degrees.
+    """Align a Calibration by two poses. Raises AlignmentError.
 
-    calibration: a Calibration with offset and slope. side: "left" or "right", the side to which the kickstand leans the
-    bike. The gyro's bias is taken from the kickstand pose: a stand holds the bike stiller than a rider does. Raises
-    AlignmentError.
+    The gyro's bias is taken from the kickstand pose, because a stand holds the bike stiller than a rider does.
+
+    Args:
+        calibration: a Calibration with offset and slope.
+        kickstand, upright: the two finished poses, each a StillPose.
+        side: "left" or "right", the side to which the kickstand leans the bike.
+
+    Returns:
+        calibration: a new, aligned Calibration.
+        tilt: the tilt between the poses in degrees.
     """
     vehicle_from_sensor = matrix()
     poses = calibration.correct(kickstand.accel), calibration.correct(upright.accel)
@@ -79,11 +100,15 @@ def align(calibration, kickstand, upright, side):
 
 
 def check_turn(calibration, kickstand, upright, turn):
-    """Raise GyroError unless the gyro's turn between the two poses (StillPose each) agrees with the tilt between them.
-    turn: the Turn, ended; calibration: as for align().
+    """Raise GyroError unless the gyro's turn between the two poses agrees with the tilt between them.
 
-    The longer the turn took, the weaker is the check: after a minute it hardly checks a tilt of 12 degrees. If readings
-    were lost, nothing is checked.
+    The check is weaker if the turn took longer. After a minute it hardly checks a tilt of 12 degrees. If readings were
+    lost, nothing is checked.
+
+    Args:
+        calibration: a Calibration with offset and slope.
+        kickstand, upright: the two finished poses, each a StillPose.
+        turn: the ended Turn between them.
     """
     if turn.lost:
         return
@@ -94,8 +119,7 @@ def check_turn(calibration, kickstand, upright, turn):
     cross(axis, u, v)
     tilt = atan2(norm(axis), dot(u, v))
     misfit = 9.9
-    # first with the bias of the stand, which is stiller than the upright pose; then with an even drift of the
-    # bias
+    # Try two biases: that of the kickstand pose, which is the stiller one, and the mean of both poses for a drift.
     for share in (0.0, 0.5):
         r = turn.attitude(upright.gyro, share)
         rotate(back, r, v)

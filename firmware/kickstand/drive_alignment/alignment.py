@@ -4,9 +4,9 @@ This improves the published method. Forward comes from a regression of force on 
 regression absorbs forces that are not braking. Bends are excluded, the lag of the speed is estimated, and the result
 has a standard error.
 
-    drive = DriveAlignment("car")                  # or ("motorcycle", up), up from two poses
-    drive.update(force, rate, dt_us)               # about 100 times per second, sensor's axes
-    drive.measure_speed(speed_mps, age_us)         # each new value of the speed source, 1 to 10 per second
+    drive = DriveAlignment("car")                  # or ("motorcycle", up) with the vertical from two poses
+    drive.update(force, rate, dt_us)               # about 100 times per second, in the sensor's axes
+    drive.measure_speed(speed_mps, age_us)         # for each new value of the speed source, 1 to 10 times per second
     if drive.ready: drive.matrix(out)
 
 To show the progress, use `state`, `counted`, `needed` and, in the state REFUSED, `problem`. A problem is a fault of the
@@ -27,8 +27,8 @@ from .vertical import COUNTS_S, MAX_CHANGE_DEG, MOVED_MPS, SETTLE_S, StandingVer
 CAR, MOTORCYCLE = "car", "motorcycle"
 
 # state
-WAITING_FOR_SPEED = 0  # no speed yet, or no new one for STALE_US
-WAITING_FOR_STOP = 1  # only for a car: the vertical and the gyro's bias come from standing
+WAITING_FOR_SPEED = 0  # there is no speed yet, or no new speed for STALE_US
+WAITING_FOR_STOP = 1  # only for a car, because its vertical and the gyro's bias are measured at a stop
 WAITING_FOR_BRAKING = 2  # braking must be in a straight line
 BRAKING = 3  # during a braking event
 TURNING = 4  # during a braking event in a bend, which will not count
@@ -40,13 +40,21 @@ STEP_US = 12_000  # an update does one step of work, plus one step for each whol
 
 
 class DriveAlignment:
-    """One drive. vehicle: CAR or MOTORCYCLE. up: the vertical in the sensor's axes (unit vector) from two poses, for a
-    motorcycle. If up is None, the vertical comes from riding straight. bias: the gyro's bias (3 values, deg/s),
-    subtracted until a stop gives a newer bias; zeros for rates that are already corrected. Without a bias no braking
-    event counts before the first stop.
+    """One drive.
 
-    standing: the StandingVertical, which also has the gyro's bias; vertical: the Vertical; events: the DrivingEvents;
-    quality: the DrivingQuality; needed: number of counted events required.
+    Args:
+        vehicle: CAR or MOTORCYCLE.
+        up: for a motorcycle, the vertical from two poses, a unit vector in the sensor's axes. If it is None, the
+            vertical comes from riding straight.
+        bias: the gyro's bias, 3 values in deg/s, or None. It is subtracted until a stop measures a newer bias. Pass
+            zeros if the rates are already corrected. Without a bias no braking event counts before the first stop.
+
+    Attributes:
+        standing: the StandingVertical, which also has the gyro's bias.
+        vertical: the Vertical.
+        events: the DrivingEvents.
+        quality: the DrivingQuality.
+        needed: number of counted events that an alignment needs.
     """
 
     def __init__(self, vehicle, up=None, bias=None):
@@ -59,10 +67,10 @@ class DriveAlignment:
         self.quality = DrivingQuality(self.events, self.vertical)
         self._speed_check = SpeedCheck()
         self._bias_given = bias is not None
-        self._judged = (0, 0)  # numbers of events and stops that quality includes
+        self._judged = (0, 0)  # numbers of events and stops at the last judgement of the quality
         self._sums = [0.0] * 6  # integrals of force and rate over the current bin
         self._sums_us = 0
-        self._speed_mps = -1.0  # negative: no speed yet
+        self._speed_mps = -1.0  # negative before the first speed
         self._top_mps = 0.0
         self._silent_us = 0  # time since the last speed
         self._means = None  # means of the last bin, None after they are processed
@@ -70,7 +78,7 @@ class DriveAlignment:
 
     @property
     def counted(self):
-        """The number of counted events, at most `needed`."""
+        """The number of events that count for the alignment."""
         return self.events.counted
 
     @property
@@ -80,12 +88,12 @@ class DriveAlignment:
 
     @property
     def quality_deg(self):
-        """The standard error of forward's direction in degrees; 180 before the first estimate."""
+        """The standard error of forward's direction in degrees. It is 180 before the first estimate."""
         return self.quality.quality_deg
 
     @property
     def state(self):
-        """One of the constants above."""
+        """The state of the drive, one of the constants above."""
         if self.problem is not None:
             return REFUSED
         if self.ready:
@@ -105,7 +113,7 @@ class DriveAlignment:
 
     @property
     def problem(self):
-        """The fault of speed or mount that more driving cannot resolve: an AlignmentError, or None."""
+        """The fault of the speed or of the mount that more driving cannot resolve, an AlignmentError, or None."""
         if self._speed_check.problem is None and self.standing.moved and not self._leans:
             return AlignmentError("mount-moved", "between-stops", MAX_CHANGE_DEG)
         if self.counted < self.needed:
@@ -114,13 +122,18 @@ class DriveAlignment:
 
     @property
     def reason(self):
-        """Why matrix() gives no alignment: the problem or, without one, the result of missing(). An AlignmentError."""
+        """The reason why matrix() gives no alignment, an AlignmentError. It is the problem, or else the result of
+        missing()."""
         return self.problem or self.missing(self.counted, self.needed, self.turned)
 
     def missing(self, counted, needed, turned):
-        """Return the driving that is still needed, as an AlignmentError, for a drive without a problem. counted,
-        needed, turned: the numbers of counted events, of required events, and of braking events that did not count
-        because of a bend."""
+        """Return an AlignmentError that says which driving is still needed. The drive must not have a problem.
+
+        Args:
+            counted: number of counted events.
+            needed: number of events that an alignment needs.
+            turned: number of braking events that did not count because of a bend.
+        """
         if self._speed_mps < 0.0:
             return AlignmentError("no-speed")
         if self._top_mps < MOVED_MPS:
@@ -135,8 +148,13 @@ class DriveAlignment:
         return AlignmentError("uncertain", min(quality.quality_deg, 180.0), self.events.braking_count)
 
     def update(self, force, rate, dt_us):
-        """Take a sample and do a step of the work. force (3, g), rate (3, deg/s): calibrated, sensor's axes; dt_us:
-        microseconds since the previous sample (an integer)."""
+        """Take a sample and do a step of the work.
+
+        Args:
+            force: calibrated force in the sensor's axes, 3 values in g.
+            rate: calibrated rate in the sensor's axes, 3 values in deg/s.
+            dt_us: microseconds since the previous sample, an integer.
+        """
         if dt_us > GAP_US:
             self.interrupt()
             return
@@ -168,8 +186,12 @@ class DriveAlignment:
             self._do_step()
 
     def measure_speed(self, speed_mps, age_us=0):
-        """Take a new value of the speed source. age_us: the known age of the value; a further delay is estimated from
-        the drive."""
+        """Take a new value of the speed source.
+
+        Args:
+            speed_mps: the speed in m/s.
+            age_us: the known age of the value. The drive estimates any further delay.
+        """
         self._speed_check.measure(speed_mps)
         if not speed_mps >= 0.0:
             speed_mps = 0.0
@@ -181,8 +203,11 @@ class DriveAlignment:
         self.events.measure_speed(speed_mps, self._history.now + self._sums_us - age_us)
 
     def matrix(self, out):
-        """Write the rotation from sensor to vehicle into out (9, rows left, up, forward). Raises AlignmentError while
-        not ready."""
+        """Write the rotation from sensor axes to vehicle axes into out. Raises AlignmentError while not ready.
+
+        Args:
+            out: array of 9 for the rotation matrix, with the rows left, up, forward.
+        """
         if not self.ready:
             raise self.reason
         up = vector()
@@ -213,7 +238,7 @@ class DriveAlignment:
         axis, bias = self.vertical.turn_axis, self.standing.bias
         yaw_dps = (rate[0] - bias[0]) * axis[0] + (rate[1] - bias[1]) * axis[1] + (rate[2] - bias[2]) * axis[2]
         self._history.add(sums, yaw_dps * seconds * 1e5, n)
-        if self._silent_us < STALE_US:  # a silent source is not a stuck one
+        if self._silent_us < STALE_US:  # a silent source must not be reported as a stuck source
             self._speed_check.update(force, yaw_dps, n)
         self._means = (force, rate, seconds)
         self._silent_us = min(STALE_US + 1, self._silent_us + n)

@@ -1,6 +1,6 @@
-"""Aligns by driving, in the background: feeds a DriveAlignment and saves its result.
+"""Aligns by driving, in the background. It feeds a DriveAlignment and saves the result.
 
-This always runs if there is a speed source. If the sensor is not aligned, or after a request in the menu, the drive's
+It always runs if there is a speed source. If the sensor is not aligned, or after a request in the menu, the drive's
 alignment is used as soon as it is ready. Otherwise the drive checks and refines the earlier alignment. Flash is written
 only at standstill.
 """
@@ -14,28 +14,39 @@ from .alignment import BRAKING, CAR, MOTORCYCLE, TURNING, DriveAlignment
 from .quality import MIN_EVENTS_TO_CHECK_SPEED
 from .verdict import MOVED, REFINED, REVERSED, SAME, compare, turn_round
 
-_FEED_TURNS = const(2)  # passes of the loop whose counts are summed as integers, because floats take time
-_GAP_MS = const(300)  # a longer time between two readings means that some are missing
-_LOOK_MS = const(1000)
-_FRESH_MS = const(3000)  # an older speed does not prove a standstill
+# Number of passes of the loop whose counts are added up before they are converted to floats, to save time
+_FEED_TURNS = const(2)
+_GAP_MS = const(300)  # a longer time between two readings means that readings are missing
+_LOOK_MS = const(1000)  # time between two calls of _look()
+_FRESH_MS = const(3000)  # a speed older than this does not prove a standstill
 _AWAY_MPS = const(2.0)  # above this speed the vehicle has driven off
 
-_KNOWN_BIAS = (0.0, 0.0, 0.0)  # zero, because the bias that was measured with the alignment is already subtracted
+# The bias in the corrected rates of an aligned sensor, because the bias of its poses is already subtracted
+_KNOWN_BIAS = (0.0, 0.0, 0.0)
 STAND_SIDE, MOUNT_MOVED = "other-side", "mount-moved"
-_QUESTIONS = (STAND_SIDE, MOUNT_MOVED)  # codes of messages that hide the lean until they are answered
+_QUESTIONS = (STAND_SIDE, MOUNT_MOVED)  # codes of the messages that hide the lean until the rider answers
 
 
 class BackgroundAlignment:
-    """Runs the alignment by driving. leans: True for a motorcycle, False for a car.  speed: a Speed.  meter: a
-    LeanMeter.  calibration: the ActiveCalibration.
+    """Runs the alignment by driving.
 
     The loop calls poll() and feed() in each turn, and begin() after a change of calibration. The menu calls ask(), and
     a press calls answer().
 
-    speed: the Speed.  drive: the current DriveAlignment, read-only.  state: the state to show (see alignment.py).
-    shown: True if the progress has its own page (ui/drive_page.py).  result: the Notice or AlignmentError at the end of
-    the last drive, or None.  message: None, or an AlignmentError, StoreError or Notice. It is shown before everything
-    else, until answer() or until the vehicle drives off.
+    Args:
+        leans: True for a motorcycle, False for a car.
+        speed: a Speed.
+        meter: a LeanMeter.
+        calibration: the ActiveCalibration.
+
+    Attributes:
+        speed: the Speed.
+        drive: the current DriveAlignment, read-only.
+        state: the state to show (see alignment.py).
+        shown: True if the progress has its own page (ui/drive_page.py).
+        result: the Notice or AlignmentError at the end of the last drive, or None.
+        message: an AlignmentError, StoreError or Notice to show before everything else, or None. It is shown until
+            answer() is called or the vehicle drives off.
     """
 
     def __init__(self, leans, speed, meter, calibration):
@@ -51,8 +62,11 @@ class BackgroundAlignment:
         self.begin()
 
     def begin(self, asked=False):
-        """Start a new drive after a change of calibration, from flash or from a wizard. The drive checks the alignment
-        or, if `asked`, replaces it."""
+        """Start a new drive after a change of calibration, from flash or from a wizard.
+
+        Args:
+            asked: True if the drive must replace the alignment. Otherwise the drive checks it.
+        """
         self._asked = asked
         self._answered = []  # codes of messages not to show again
         self.message = None
@@ -60,7 +74,7 @@ class BackgroundAlignment:
 
     def _restart(self):
         old = self._meter.calibration
-        self._calibration = old  # applies to all samples of this drive, even if another one is saved meanwhile
+        self._calibration = old  # applies to all samples of this drive, even if another calibration is saved meanwhile
         trusted = self._leans and old.aligned and not self._asked
         up = old.vehicle_from_sensor[3:6] if trusted else None
         self.drive = DriveAlignment(MOTORCYCLE if self._leans else CAR, up, _KNOWN_BIAS if old.aligned else None)
@@ -69,8 +83,8 @@ class BackgroundAlignment:
         self._clear_sums()
 
     def ask(self):
-        """Start a drive that replaces the alignment, on the rider's request (the sensor was remounted). The current
-        drive is lost."""
+        """Drop the current drive and start one that replaces the alignment. The rider requests this after remounting
+        the sensor."""
         self.shown = True
         self.begin(True)
 
@@ -80,8 +94,11 @@ class BackgroundAlignment:
             self._total[i] = 0
 
     def poll(self, now_ms):
-        """Read the speed source, and once per second handle the drive's result. Call it once per pass of the loop.
-        Return a new speed (m/s) for a recording, or None."""
+        """Read the speed source. Once per second, handle the drive's result. Call this in each pass of the loop.
+
+        Returns:
+            A new speed in m/s for a recording, or None.
+        """
         speed = self.speed.poll(now_ms)
         if speed is not None:
             self._speed_mps = speed
@@ -92,23 +109,28 @@ class BackgroundAlignment:
             self._look_ms = ticks_add(now_ms, _LOOK_MS)
             self.fresh_speed(now_ms)
             if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > _LOOK_MS:
-                self._begin_again()  # now, because after 6 days without a reading ticks_diff() is negative
+                self._begin_again()  # done now, because after 6 days without a reading ticks_diff() is negative
             self._look(now_ms)
         return speed
 
     def fresh_speed(self, now_ms):
-        """The last speed (m/s), or None if it is old."""
+        """Return the last speed in m/s, or None if it is old."""
         if self._speed_ms is not None and ticks_diff(now_ms, self._speed_ms) >= _FRESH_MS:
-            # forget the time: after 6 days ticks_diff() is negative and the speed would seem fresh
+            # forget the time, because after 6 days ticks_diff() is negative and the speed would seem new
             self._speed_ms = None
         return self._speed_mps if self._speed_ms is not None else None
 
     def _share(self, speed):
-        """Pass a speed (m/s) to the lean filter if it is reliable. Return the speed, rounded as in a recording, or None
-        if it was not passed.
+        """Pass a speed to the lean filter if it is reliable.
 
         A speed that no braking event has confirmed is not passed, because a wheel may have two magnets. Zero is not
         passed either, because a broken wire also reads zero. The filter detects a standstill on its own.
+
+        Args:
+            speed: in m/s.
+
+        Returns:
+            The speed, rounded as in a recording, or None if it was not passed. A car's speed is returned unchanged.
         """
         if not self._leans:
             return speed
@@ -121,8 +143,14 @@ class BackgroundAlignment:
         return speed
 
     def feed(self, sums, n, dt_us, now_ms):
-        """Take the n samples of a pass of the loop. sums (7): their sums in counts, in the chip's order. dt_us: the
-        time that they cover. Call it once per pass with samples."""
+        """Take the samples of a pass of the loop. Call this once per pass with samples.
+
+        Args:
+            sums: sums of the samples' counts in the chip's order, 7 values.
+            n: number of samples.
+            dt_us: microseconds since the previous samples.
+            now_ms: ticks_ms().
+        """
         if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > _GAP_MS:
             self._begin_again()
         self._fed_ms = now_ms
@@ -172,7 +200,7 @@ class BackgroundAlignment:
                 self._meter.distrust(None)
 
     def _away(self):
-        """True while the vehicle drives. A faulty speed source may report zero forever, so the lean filter's own
+        """Return True while the vehicle drives. A faulty speed source may report zero forever, so the lean filter's own
         estimate of the speed counts too."""
         faulty = self.drive.problem is not None or (self.message is not None and self.message.code not in _QUESTIONS)
         return self._speed_mps > _AWAY_MPS or (faulty and self._meter.speed_mps > _AWAY_MPS)
@@ -192,8 +220,11 @@ class BackgroundAlignment:
                 self._meter.distrust(message.code)
 
     def answer(self, agreed):
-        """Clear the message after the rider has read it. agreed: True to do what the message offers (for STAND_SIDE:
-        reverse forward)."""
+        """Clear the message after the rider has read it.
+
+        Args:
+            agreed: True to do what the message offers. STAND_SIDE offers to exchange forward and backward.
+        """
         code, self.message = self.message.code, None
         self._answered.append(code)
         if code in _QUESTIONS:
@@ -207,7 +238,11 @@ class BackgroundAlignment:
                 self._meter.reset_maxima()
 
     def _adopt(self, anew):
-        """Save the drive's alignment. anew: True if the sensor was remounted, so trim and maxima are reset."""
+        """Save the drive's alignment.
+
+        Args:
+            anew: True if the sensor was remounted. Then trim and maxima are reset.
+        """
         found = matrix()
         self.drive.matrix(found)
         if not self._save(found, 0.0 if anew else self._meter.trim_deg):
@@ -219,10 +254,10 @@ class BackgroundAlignment:
             self._meter.reset_maxima()
 
     def _save(self, vehicle_from_sensor, trim_deg):
-        """Save this alignment; return True, or False with the reason in `message`."""
+        """Save an alignment. Return True on success. On failure return False and set `message` to the reason."""
         old, used = self._meter.calibration, self._calibration
-        # the bias of `used` was already subtracted from the drive's rates, and the drive measured the remainder: add
-        # both
+        # The bias of `used` was subtracted from the drive's rates. The drive measured the remaining bias. Their sum is
+        # the whole bias.
         bias = [used.gyro_bias[i] + self.drive.standing.bias[i] for i in range(3)]
         try:
             self._active.refine(old.with_alignment(vehicle_from_sensor, bias, trim_deg, True))
@@ -233,6 +268,6 @@ class BackgroundAlignment:
 
     @property
     def state(self):
-        """The drive's state, but BRAKING instead of TURNING at walking pace, where a bend cannot be recognised."""
+        """The drive's state. At walking pace a bend cannot be recognised, so TURNING is replaced by BRAKING."""
         state = self.drive.state
         return BRAKING if state == TURNING and self._speed_mps < _AWAY_MPS else state

@@ -1,6 +1,6 @@
 """Finds braking and acceleration events, and decides which of them were in a straight line.
 
-For each possible lag of the speed, each change of speed is compared with the force and yaw rate of the same interval.
+The lag of the speed is unknown. So each change of speed is compared with force and yaw rate once for each possible lag.
 """
 
 from math import pi
@@ -13,27 +13,33 @@ from .regression import LAG_STEP_US, LAGS, Fit, ForwardRegression
 # An event begins above BEGIN_MPS2, ends below END_MPS2, and changes the speed by at least _CHANGE_MPS.
 BEGIN_MPS2, END_MPS2 = 0.8, 0.4
 _CHANGE_MPS = const(1.5)
-_MAX_ACCELERATION_EVENTS = const(2)  # further ones do not count, because braking shows forward better
-# shorter intervals only have noisier differences: a GPS at 10 Hz has no more information than at 2 Hz
+_MAX_ACCELERATION_EVENTS = const(2)  # most acceleration events that count, because braking shows forward better
+# Shortest interval between two speeds. In a shorter interval the change of speed is noisier, and speeds at 10 Hz do not
+# carry more information than at 2 Hz.
 MIN_INTERVAL_US = 400_000
-MAX_INTERVAL_US = 2_200_000  # allows one missing value of a GPS at 1 Hz
-_MAX_WAITING = const(4)  # intervals that can wait while an earlier one is processed
-# A larger yaw rate is a bend. At 10 m/s this rate causes a lateral force of 0.036 g, a fifth of the force of braking;
-# the regression removes most of it.
+MAX_INTERVAL_US = 2_200_000  # longest interval; it allows one missing value of a GPS at 1 Hz
+_MAX_WAITING = const(4)  # number of intervals that can wait while an earlier interval is processed
+# A larger yaw rate is a bend. At 10 m/s this rate causes a lateral force of 0.036 g, a fifth of the force of braking.
+# The regression removes most of the lateral force.
 _STRAIGHT_DPS = const(2.0)
-_MIN_SPEED_MPS = const(1.0)  # at lower speeds steering angles are large, and a stop ends with a jerk
-_MAX_FORCE_G = const(3.0)  # a larger mean force of an interval is a knock
+_MIN_SPEED_MPS = const(1.0)  # slower intervals are not used: steering angles are large, and a stop ends with a jerk
+_MAX_FORCE_G = const(3.0)  # if the mean force of an interval is larger, the interval contains a knock
 
 
 class EventFinder:
     """Finds braking and acceleration events from the speed alone.
 
-    going_on: True during an event. change: the change of speed in the current or else the last event (m/s, < 0:
-    braking). The change that was straight is kept for each lag of the speed, because it depends on the lag.
+    Args:
+        lags: number of possible lags of the speed.
+
+    Attributes:
+        going_on: True during an event.
+        change: the change of speed in the current event or, between events, in the last event. It is in m/s and
+            negative for braking.
     """
 
     def __init__(self, lags):
-        self._straight_change = [0.0] * lags  # the part of change that was straight
+        self._straight_change = [0.0] * lags  # for each lag, the change of speed while driving straight
         self.interrupt()
 
     def interrupt(self):
@@ -44,8 +50,16 @@ class EventFinder:
             self._straight_change[lag] = 0.0
 
     def update(self, change_mps, seconds, straight):
-        """Take one change of speed. straight: for each lag, True if the vehicle drove straight during it. Return True
-        if an event has just ended."""
+        """Take the change of speed in one interval.
+
+        Args:
+            change_mps: the change of speed in m/s.
+            seconds: length of the interval.
+            straight: for each lag, True if the vehicle drove straight in the interval.
+
+        Returns:
+            True if an event has just ended.
+        """
         acceleration = change_mps / seconds
         if self.going_on and (acceleration if self.change > 0.0 else -acceleration) < END_MPS2:
             self.going_on = False
@@ -62,12 +76,13 @@ class EventFinder:
         return False
 
     def was_straight(self, lag):
-        """True if the straight part of the last event is large enough for an event."""
+        """Return True if the change of speed while driving straight was large enough for an event."""
         return abs(self._straight_change[lag]) >= _CHANGE_MPS
 
 
 class LastEvent:
-    """Estimates forward from the latest event and the vertical: immediately, but only within about 10 degrees."""
+    """Estimates forward from the latest event and the vertical. The estimate is immediate, but exact only to about 10
+    degrees."""
 
     def __init__(self):
         self._force = [0.0] * 3
@@ -80,7 +95,7 @@ class LastEvent:
             self._force[i] = 0.0
 
     def add(self, seconds, change_g, force):
-        """Add a straight interval of the event. Arguments: see ForwardRegression.add()."""
+        """Add a straight interval of the event. The arguments are those of ForwardRegression.add()."""
         a = change_g / seconds
         self._weight += a * change_g
         self._change += change_g
@@ -88,18 +103,34 @@ class LastEvent:
             self._force[i] += a * force[i]
 
     def forward(self, out, level):
-        """Write forward into out (3, g per g). level (3, g): the vertical. Return forward's weight (g^2 s)."""
+        """Estimate forward.
+
+        Args:
+            out: list of 3 for forward, in g per g.
+            level: the vertical, 3 values in g.
+
+        Returns:
+            The weight of the estimate, in g^2 s.
+        """
         for i in range(3):
             out[i] = (self._force[i] - self._change * level[i]) / max(self._weight, 1e-6)
         return self._weight
 
 
 class DrivingEvents:
-    """The events of a drive. history: the ForceHistory of the same drive.
+    """The events of a drive.
 
-    braking_count, acceleration_count: numbers of straight events so far; turning_count: number of braking events that
-    were not straight; lag_s: lag of the speed; lag: index of the regression's lag nearest to it; regression: the
-    ForwardRegression of all straight driving; last: the LastEvent.
+    Args:
+        history: the ForceHistory of the same drive.
+
+    Attributes:
+        braking_count: number of straight braking events so far.
+        acceleration_count: number of straight acceleration events so far.
+        turning_count: number of braking events that were not straight.
+        lag_s: lag of the speed, in seconds.
+        lag: index of the regression's lag that is nearest to lag_s.
+        regression: the ForwardRegression of all straight driving.
+        last: the LastEvent.
     """
 
     def __init__(self, history):
@@ -111,14 +142,13 @@ class DrivingEvents:
         self._history = history
         self._finder = EventFinder(LAGS)
         self._fit = Fit()
-        # for each lag: the history's integrals at the end of the last interval, True if they were known, and True if
-        # that interval was straight
-        self._ends = [[0] * COLUMNS for _ in range(LAGS)]
-        self._known = [False] * LAGS
-        self._straight = [False] * LAGS
+        # The next three have one entry per lag. They describe the last interval.
+        self._ends = [[0] * COLUMNS for _ in range(LAGS)]  # the history's integrals at its end
+        self._known = [False] * LAGS  # True if these integrals were known
+        self._straight = [False] * LAGS  # True if the vehicle drove straight
         self._end = [0] * COLUMNS
         self._before = (0.0, 0)  # speed and time at the end of the last interval
-        self._waiting = []  # speed and time at the ends of the intervals to be processed
+        self._waiting = []  # speed and time at the end of each interval that is not processed yet
 
     @property
     def straight_count(self):
@@ -127,7 +157,8 @@ class DrivingEvents:
 
     @property
     def counted(self):
-        """The number of events that count for an alignment: all straight braking, and the first few accelerations."""
+        """The number of events that count for an alignment: all straight braking events, and at most
+        _MAX_ACCELERATION_EVENTS straight acceleration events."""
         return self.braking_count + min(self.acceleration_count, _MAX_ACCELERATION_EVENTS)
 
     @property
@@ -163,8 +194,12 @@ class DrivingEvents:
         return bool(self._waiting) and difference(self._history.now, self._waiting[0][1]) >= 0
 
     def follow(self, use):
-        """Process the next interval, as a generator of short steps. use: True if the gyro's bias is known, because only
-        then straight driving and bends can be distinguished."""
+        """Process the next interval, as a generator of short steps.
+
+        Args:
+            use: True if the gyro's bias is known. Otherwise the interval is not used, because straight driving and
+                bends cannot be distinguished.
+        """
         before, before_us = self._before
         speed, time_us = self._before = self._waiting.pop(0)
         length_us = difference(time_us, before_us)
@@ -227,8 +262,9 @@ class DrivingEvents:
 
 
 def _peak(values, i):
-    """Return the position of the peak of a parabola through values[i], the largest, and its neighbours: -0.5 to 0.5
-    from i."""
+    """Return the position of the peak of the parabola through values[i] and its two neighbours, relative to i.
+
+    values[i] must be the largest value. The result is from -0.5 to 0.5."""
     if i == 0 or i == len(values) - 1:
         return 0.0
     before, at, after = values[i - 1], values[i], values[i + 1]

@@ -1,4 +1,4 @@
-"""Keeps force and yaw rate of the last seconds, to compare a late speed with the readings of its own time.
+"""Keeps force and yaw rate of the last seconds. A speed arrives late and must be compared with earlier readings.
 
 The history stores running integrals as integers that wrap. The difference of two integers stays exact in a long drive,
 while float32 sums lose digits as they grow. Integers also need no heap.
@@ -7,10 +7,10 @@ while float32 sums lose digits as they grow. Integers also need no heap.
 from array import array
 
 BIN_US = 100_000
-SIZE = 64  # bins: enough for a late speed, the interval before it, and the time to process both
+SIZE = 64  # number of bins, enough for the lag of a speed, the interval before it, and the time to process both
 MASK = 0x1FFFFFFF
 _HALF = 0x10000000
-COLUMNS = 4  # integrals of force (3, in 1e-6 g s) and of the yaw rate (in 1e-5 degrees)
+COLUMNS = 4  # three integrals of the force in 1e-6 g s, and one of the yaw rate in 1e-5 degrees
 
 
 def difference(a, b):
@@ -19,8 +19,11 @@ def difference(a, b):
 
 
 class ForceHistory:
-    """A ring of running integrals of force and yaw rate, one entry at the end of each bin. now: the end of the newest
-    bin in us, the sum of the bins' lengths; wraps at MASK."""
+    """A ring of running integrals of force and yaw rate, with one entry for the end of each bin.
+
+    Attributes:
+        now: the time at the end of the newest bin in us. It is the sum of all bins' lengths and wraps at MASK.
+    """
 
     def __init__(self):
         self._times = array("i", [0] * SIZE)
@@ -31,11 +34,17 @@ class ForceHistory:
         self.now = 0
 
     def clear(self):
-        """Drop all entries, because samples are missing: no difference may span the gap."""
+        """Drop all entries, because samples are missing. A difference of integrals must not span the gap."""
         self._count = 1
 
     def add(self, force_us, yaw, dt_us):
-        """Add a bin of length dt_us: the integrals of force (3, g us) and of the yaw rate (1e-5 degrees) over it."""
+        """Add a bin.
+
+        Args:
+            force_us: integral of the force over the bin, 3 values in g us.
+            yaw: integral of the yaw rate over the bin, in 1e-5 degrees.
+            dt_us: length of the bin.
+        """
         self.now = (self.now + dt_us) & MASK
         total = self._total
         total[0] = (total[0] + round(force_us[0])) & MASK
@@ -49,12 +58,19 @@ class ForceHistory:
         self._count = min(SIZE, self._count + 1)
 
     def at(self, out, time_us):
-        """Fill out (COLUMNS integers) with the integrals up to time_us, interpolated within its bin. Return False if
-        that time is not in the history."""
+        """Look up the integrals at a time, interpolated within its bin.
+
+        Args:
+            out: list of COLUMNS integers for the integrals.
+            time_us: the time on the clock of `now`.
+
+        Returns:
+            False if the time is not in the history.
+        """
         behind = difference(self.now, time_us)
         if behind < 0 or behind >= difference(self.now, self._times[(self._newest - self._count + 1) % SIZE]):
             return False
-        # first guess of the bin: a bin may be longer than BIN_US, but hardly twice as long
+        # A bin may be longer than BIN_US, but hardly twice as long. So start the search this many bins back.
         i = self._newest
         step = behind // (2 * BIN_US)
         if step < self._count:

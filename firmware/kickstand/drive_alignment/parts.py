@@ -1,10 +1,10 @@
 """Compares forward and the vertical between two parts of a drive. If they differ, the mount may have moved between
 them.
 
-The time of a move is unknown, so the drive is split in two after each block in turn. The difference expected
-by chance follows from the scatter of forward between the blocks within each part. The variance of a part's forward
-falls with the part's weight, but not below the effect of camber and wind on one long stretch of road. A few blocks give
-a poor sample variance, so it is averaged with a prior of PRIOR_FREEDOM degrees of freedom.
+The time of a move is unknown, so the drive is split in two after each block in turn. The scatter of forward between the
+blocks within each part shows which difference is likely by chance. The variance of a part's forward falls with the
+part's weight, but not below the effect of camber and wind on one long stretch of road. A few blocks give a poor sample
+variance, so it is averaged with a prior of PRIOR_FREEDOM degrees of freedom.
 """
 
 from array import array
@@ -15,30 +15,43 @@ from .regression import BLOCKS
 
 PRIOR_DEG = 1.0  # prior of the standard deviation of forward, at a weight of 1 g^2 s
 PRIOR_FREEDOM = 4
-STRETCH_DEG = 1.5  # standard deviation of forward due to camber and wind on one stretch of road, whatever its weight
-_MIN_WEIGHT = const(0.1)  # g^2 s: least weight of a part whose forward is compared
-_MIN_S = const(20.0)  # least straight driving in a part whose vertical is compared
-_MIN_BLOCKS = const(4)  # least number of blocks in the drive for a comparison of forward
+# Standard deviation of forward that camber and wind cause on one stretch of road. It does not depend on the weight.
+STRETCH_DEG = 1.5
+_MIN_WEIGHT = const(0.1)  # smallest weight of a part whose forward is compared, in g^2 s
+_MIN_S = const(20.0)  # shortest straight driving in a part whose vertical is compared
+_MIN_BLOCKS = const(4)  # smallest number of blocks in a drive whose forward is compared
 
 
 def angle_between(a, b):
-    """Return the angle between two directions, 0 to pi. a, b: the directions as angles in rad."""
+    """Return the angle between two directions in rad, from 0 to pi.
+
+    Args:
+        a, b: the directions as angles in rad.
+    """
     angle = abs(a - b)
     return min(angle, 2 * pi - angle)
 
 
 def blend_prior(variance, weight, freedom):
-    """Return the variance (deg^2) of forward: the sample variance, with `freedom` degrees of freedom, averaged with the
-    prior variance. weight (g^2 s): of the events that forward was computed from."""
+    """Average the sample variance of forward with its prior variance. Return the result in deg^2.
+
+    Args:
+        variance: the sample variance in deg^2.
+        weight: weight of the events that forward was computed from, in g^2 s.
+        freedom: degrees of freedom of the sample variance.
+    """
     return (freedom * variance + PRIOR_FREEDOM * PRIOR_DEG * PRIOR_DEG / weight) / (freedom + PRIOR_FREEDOM)
 
 
 class DriveParts:
-    """Call clear(), add() each block in chronological order, and run compare() to its end.
+    """Compares the parts of a drive. Call clear(), add() each block in chronological order, and run compare() to its
+    end.
 
-    Results for the split with the most significant difference of forward: forward_deg, the difference; sigmas, the
-    difference in standard deviations. Results over all splits: roll_deg, pitch_deg, the largest differences of the
-    vertical.
+    Attributes, after compare():
+        forward_deg: difference of forward between the two parts, for the split with the most significant difference.
+        sigmas: the same difference in standard deviations.
+        roll_deg, pitch_deg: largest differences of the vertical between the two parts, over all splits.
+        count: number of blocks.
     """
 
     def __init__(self):
@@ -51,8 +64,15 @@ class DriveParts:
         self.forward_deg = self.sigmas = self.roll_deg = self.pitch_deg = 0.0
 
     def add(self, across, along, roll_g, pitch_g, weight, seconds):
-        """Add one block of events. across, along: the components of its forward to the left of and along the whole
-        drive's forward; roll_g, pitch_g: the same components of its vertical; weight (g^2 s), seconds: see Fit."""
+        """Add one block of events.
+
+        The components are relative to forward of the whole drive.
+
+        Args:
+            across, along: the components of the block's forward to the left and forward, in g per g.
+            roll_g, pitch_g: the components of the block's vertical to the left and forward, in g.
+            weight, seconds: as in the block's Fit.
+        """
         block = self._blocks[self.count]
         self.count += 1
         block[0], block[1] = weight * across, weight * along
@@ -77,7 +97,7 @@ class DriveParts:
             yield
             scatter += self._scatter(angle_two, split, self.count)
             yield
-            freedom = self.count - 2  # two means are taken from the blocks
+            freedom = self.count - 2  # two means were computed from the blocks
             variance = STRETCH_DEG * STRETCH_DEG * (one[6] / (one[4] * one[4]) + two[6] / (two[4] * two[4]))
             sampled = blend_prior(scatter / one[4] / freedom, one[4], freedom)
             sampled += blend_prior(scatter / two[4] / freedom, two[4], freedom)
@@ -89,7 +109,8 @@ class DriveParts:
             yield
 
     def _sum(self, sums, first, last):
-        """Write into sums (7) the sums of add()'s values over blocks first to last - 1, and of the squared weights."""
+        """Add up the blocks from first to last - 1. Write the 6 sums of their values and the sum of the squared weights
+        into sums."""
         for i in range(7):
             sums[i] = 0.0
         for k in range(first, last):
@@ -99,7 +120,8 @@ class DriveParts:
             sums[6] += block[4] * block[4]
 
     def _scatter(self, angle, first, last):
-        """The sum of weight times squared deviation (deg^2) of forward from angle, over blocks first to last - 1."""
+        """Return the scatter of forward about an angle, over the blocks from first to last - 1. It is the sum of weight
+        times squared deviation in deg^2."""
         total = 0.0
         for k in range(first, last):
             block = self._blocks[k]

@@ -1,8 +1,8 @@
-"""Judges a drive: the standard error of forward, its limits, and faults of the speed or of the mount.
+"""Judges a drive by the standard error of forward, and finds faults of the speed or of the mount.
 
 A block has the sums of a few braking and acceleration events (a regression block, see regression.py). The halves of a
 drive are the first and the second half of its blocks. The parts of a drive are the blocks before and after one boundary
-between two blocks; parts.py tries every boundary.
+between two blocks. parts.py tries every boundary.
 """
 
 from math import atan2, degrees, sqrt
@@ -18,29 +18,38 @@ from .vertical import MAX_CHANGE_DEG
 MIN_EVENTS = 5  # number of straight braking and acceleration events needed for an alignment
 MIN_EVENTS_TO_CHECK_SPEED = 2
 # Each pair of limits is a hysteresis against flicker: the limit to become ready, and the limit to stay ready.
-READY_DEG, STAY_READY_DEG = 1.5, 2.5  # standard error of forward; one drive in ten is off by twice as much
-AGREE_DEG, STAY_AGREE_DEG = 4.0, 6.0  # largest difference of forward between halves, and between parts
-# the difference between parts may instead be within so many standard deviations
+READY_DEG, STAY_READY_DEG = 1.5, 2.5  # largest standard error of forward; one drive in ten is off by twice as much
+AGREE_DEG, STAY_AGREE_DEG = 4.0, 6.0  # largest difference of forward between the halves, and between the parts
+# A larger difference between the parts is allowed if it is within this number of standard deviations
 AGREE_SIGMAS, STAY_AGREE_SIGMAS = 3.0, 4.0
-# A larger difference between two parts means that the mount moved
+# If two parts differ by more than the next three limits, the mount moved
 _MOVED_DEG = const(30.0)  # difference of forward; a long banked motorway curve, treated as straight, caused 15
-PITCH_DEG = 7.0  # a road of 6 % uphill and then downhill causes less
-ROLL_DEG = 7.0  # the banked curve caused 6. Not used on a motorcycle, because it leans
-# The mount moved if an event's forward differs by over _EVENT_OFF_DEG from the overall one. An event is
-# only judged if its weight is at least _MIN_EVENT_WEIGHT, and its force at least _MIN_EVENT_FORWARD times that of the
-# change of speed. On recorded drives no such event differed by more than 40 degrees.
+PITCH_DEG = 7.0  # difference of pitch; a road of 6 % uphill and then downhill causes less
+ROLL_DEG = 7.0  # difference of roll; the banked curve caused 6; not used on a motorcycle, because it leans
+# The mount moved if forward from one event differs by over _EVENT_OFF_DEG from forward of the whole drive. An event is
+# judged only if its weight and the length of its forward exceed the two limits below. On recorded drives no such event
+# differed by more than 40 degrees.
 _EVENT_OFF_DEG = const(80.0)
-_MIN_EVENT_WEIGHT = const(0.012)  # g^2 s
-_MIN_EVENT_FORWARD = const(0.5)  # g per g
+_MIN_EVENT_WEIGHT = const(0.012)  # in g^2 s
+_MIN_EVENT_FORWARD = const(0.5)  # change of force per change of speed, in g per g
 
 
 class DrivingQuality:
-    """The quality of a drive. events: its DrivingEvents; vertical: its Vertical.
+    """The quality of a drive.
 
-    fit: the Fit of all straight driving so far; quality_deg: standard error of its forward, 180 before the first
-    estimate; halves_deg: angle between the forwards of the two halves of the drive; parts: the DriveParts; agree: True
-    if halves and parts agree about forward; good: True if the quality is enough for an alignment; speed_problem,
-    mount_problem: an AlignmentError, or None.
+    Args:
+        events: the DrivingEvents of the drive.
+        vertical: the Vertical of the drive.
+
+    Attributes:
+        fit: the Fit of all straight driving so far.
+        quality_deg: standard error of the fit's forward in degrees; 180 before the first estimate.
+        halves_deg: angle in degrees between forward from the first half and from the second half of the drive.
+        parts: the DriveParts.
+        agree: True if forward is the same in both halves and in all parts, within the limits.
+        good: True if the quality is good enough for an alignment.
+        speed_problem: an AlignmentError for a fault of the speed, or None.
+        mount_problem: an AlignmentError for a fault of the mount, or None.
     """
 
     def __init__(self, events, vertical):
@@ -87,8 +96,8 @@ class DrivingQuality:
             yield
         if blocks < 2 or weights <= 0.0:
             return
-        # Jackknife: the variance of forward is computed from its changes when each block in turn is left out. The
-        # formal error of the regression is too small early in a drive.
+        # Jackknife. Each block in turn is left out, and the changes of forward give its variance. The formal error of
+        # the regression is not used, because it is too small early in a drive.
         freedom = blocks - 1
         variance = degrees(degrees(squares)) * freedom / blocks  # rad^2 to deg^2
         self.quality_deg = sqrt(blend_prior(variance, self.fit.weight, freedom))
@@ -105,8 +114,12 @@ class DrivingQuality:
                 self._decide(ratios / weights, angle_deg(level, part.level))
 
     def _decide(self, force_ratio, level_change_deg):
-        """Set agree, good and the problems. force_ratio: change of force per change of speed; level_change_deg: angle
-        between the verticals of the two halves."""
+        """Set agree, good and the problems.
+
+        Args:
+            force_ratio: change of force per change of speed.
+            level_change_deg: angle between the verticals of the two halves in degrees.
+        """
         self.speed_problem = self.mount_problem = None
         self.good = False
         counted = self._events.counted
@@ -137,8 +150,7 @@ class DrivingQuality:
         return None
 
     def _is_last_event_off(self):
-        """True if forward from the latest event that can be judged differs by over _EVENT_OFF_DEG from the overall
-        one."""
+        """Return True if the latest event that can be judged shows another forward than the whole drive."""
         forward, last = vector(), self._events.last
         if last.forward(forward, self.fit.level) > _MIN_EVENT_WEIGHT and norm(forward) > _MIN_EVENT_FORWARD:
             self._event_off = angle_deg(forward, self.fit.forward) > _EVENT_OFF_DEG

@@ -2,15 +2,15 @@
 
     f = level + forward a + left c        a = dv/dt / g, c = v (yaw rate) / g
 
-All vectors are in the sensor's own axes, and each interval is weighted by its length. The intercept, level, is the
-vertical of straight driving. It is fitted too, so an error of the vertical does not affect forward. The term of c
-absorbs the lateral force of slight bends. On a motorcycle, which leans into bends, the coefficient of c is about zero.
-|forward| is 1 if the speed is in m/s, 1/3.6 if it is in km/h. With the right lag the regression explains most of the
-force.
+All vectors are in the sensor's own axes, and each interval is weighted by its length. The intercept, `level`, is the
+vertical of straight driving. It is fitted too, so an error of the vertical does not affect `forward`. The term of c
+absorbs the lateral force of slight bends. A motorcycle leans into bends, so there the coefficient of c is about zero.
+The length of `forward` is 1 if the speed is in m/s, and 1/3.6 if it is in km/h. With the right lag the regression
+explains the largest part of the force.
 
-A regression block has the sums of a few events (braking or acceleration), so parts of the drive can be compared. When
-all blocks are in use, they are joined in pairs, so memory is fixed. From then on at least half of the blocks are in
-use.
+A regression block has the sums of a few events (braking or acceleration). So parts of the drive can be compared. When
+all blocks are in use, they are joined in pairs, so memory is fixed. After that at least half of the blocks are always
+in use.
 """
 
 from array import array
@@ -18,18 +18,25 @@ from array import array
 from ..units import const
 
 BLOCKS = 8
-LAG_STEP_US = 250_000
-LAGS = 11
-# The sums of one regression block: time in s, and integrals of a, c, a a, a c, c c, f (3), a f (3), c f (3) over it
+LAG_STEP_US = 250_000  # difference between two successive lags
+LAGS = 11  # number of lags, from 0 to 2.5 s
+# Indices of the sums of one regression block: the time in s, and the integrals of a, c, a a, a c, c c, f, a f and c f
+# over this time. The last three have 3 values each.
 _TERMS = const(15)
 SECONDS, A, C, AA, AC, CC, F, AF, CF = 0, 1, 2, 3, 4, 5, 6, 9, 12
-_RIDGE = const(1e-6)  # g^2: keeps the coefficient of c at zero if the drive had no curve
+_RIDGE = const(1e-6)  # in g^2; it keeps the coefficient of c at zero if the drive had no curve
 
 
 class Fit:
-    """A result of the regression. forward (3, g per g), level (3, g); weight (g^2 s): variation of the change of speed,
-    a measure of the information about forward; seconds: duration of the straight driving; explained (g^2 s): the part
-    of the force's variation that forward explains; found: False if there was nothing to fit.
+    """A result of the regression.
+
+    Attributes:
+        forward: 3 values in g per g.
+        level: 3 values in g.
+        weight: variation of the change of speed in g^2 s. It measures the information about forward.
+        seconds: duration of the straight driving.
+        explained: the part of the force's variation that forward explains, in g^2 s.
+        found: False if there was nothing to fit.
     """
 
     def __init__(self):
@@ -37,11 +44,15 @@ class Fit:
         self.level = [0.0] * 3
         self.weight = self.seconds = self.explained = 0.0
         self.found = False
-        self.total = [0.0] * _TERMS  # each Fit has its own sums, because two Fits can be computed at the same time
+        self.total = [0.0] * _TERMS  # each Fit has its own sums, because two Fits may be computed at the same time
 
 
 class ForwardRegression:
-    """The regression of a drive. blocks: number of regression blocks in use; the last one is still being filled."""
+    """The regression of a drive.
+
+    Attributes:
+        blocks: number of regression blocks in use. The last block is still being filled.
+    """
 
     def __init__(self):
         self._sums = [array("f", [0.0] * (BLOCKS * _TERMS)) for _ in range(LAGS)]
@@ -50,8 +61,15 @@ class ForwardRegression:
         self.blocks = 1
 
     def add(self, lag, seconds, change_g, curve_g, force):
-        """Add one interval for one lag. seconds: its length; change_g: change of speed over it (g s); curve_g: its mean
-        c; force: integral of the force over it (3, g s)."""
+        """Add one interval for one lag.
+
+        Args:
+            lag: index of the lag.
+            seconds: length of the interval.
+            change_g: change of speed in the interval, in g s.
+            curve_g: mean of c in the interval, in g.
+            force: integral of the force over the interval, 3 values in g s.
+        """
         sums = self._sums[lag]
         k = (self.blocks - 1) * _TERMS
         a = change_g / seconds
@@ -91,14 +109,23 @@ class ForwardRegression:
         return self.blocks if self._events_in_last else self.blocks - 1
 
     def fit(self, out, lag, first=0, last=BLOCKS):
-        """Fit blocks first to last - 1 into out (a Fit), at once. Return False if there is nothing to fit."""
+        """Fit the blocks from first to last - 1 at once. Return False if there is nothing to fit.
+
+        Args:
+            out: the Fit for the result.
+            lag: index of the lag.
+            first, last: the range of the blocks.
+        """
         for _ in self.fitting(out, lag, first, last):
             pass
         return out.found
 
     def fitting(self, out, lag, first=0, last=BLOCKS, without=-1):
-        """Like fit(), but as a generator of short steps that returns True or False. without: index of a block to leave
-        out."""
+        """Do the same as fit(), as a generator of short steps. The generator returns True or False.
+
+        Args:
+            without: index of a block to leave out, or -1.
+        """
         sums, total = self._sums[lag], out.total
         out.found = False
         for k in range(_TERMS):

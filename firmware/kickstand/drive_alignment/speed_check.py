@@ -5,29 +5,37 @@ from math import sqrt
 from ..errors import AlignmentError
 from ..units import const
 
-_NEGATIVE_MPS = const(-0.5)  # a speed above this is noise around zero, not negative
-# A second is lively if its mean force differs by this much from the previous second. At standstill no second is lively;
-# while driving most are.
+_NEGATIVE_MPS = const(-0.5)  # speeds from this value up to zero are noise of a standing vehicle
+# A second is lively if its mean force differs by this much from that of the previous second. At standstill no second is
+# lively. While driving, most seconds are lively.
 _LIVELY_G = const(0.03)
-_TURNING_DPS = const(5.0)  # a second in a bend is ignored, because it is lively even at constant speed
-# The speed is stuck if it has not changed for at least _STUCK_S lively seconds, and these are at least _STUCK_SHARE of
-# all seconds since its last change. Four braking events have so many lively seconds at their beginnings and ends.
+_TURNING_DPS = const(5.0)  # a second with a larger yaw rate is ignored, because a bend is lively at constant speed too
+# The speed is stuck if two conditions hold. It has not changed for at least _STUCK_S lively seconds, and these are at
+# least the share _STUCK_SHARE of all seconds since its last change. Four braking events together have 8 lively seconds.
 _STUCK_S = const(8)
 _STUCK_SHARE = const(0.15)
-# Limits of the change of force per change of speed, which should be 1. The pitch of a braking vehicle and a coarsely
-# rounded speed shift it by 0.2.
+# Limits of the ratio between the change of force and the change of speed. The ratio should be 1. The pitch of a braking
+# vehicle and a coarsely rounded speed shift it by 0.2.
 MIN_FORCE_RATIO, MAX_FORCE_RATIO = 0.75, 1.35
 MAX_LAG_S = 1.9
 
 
 def speed_unit_problem(force_ratio):
-    """Return the AlignmentError for changes of speed that do not fit the force. force_ratio: change of force per change
-    of speed."""
+    """Return the AlignmentError for changes of speed that do not fit the force.
+
+    Args:
+        force_ratio: change of force per change of speed.
+    """
     return AlignmentError("speed-unit", min(1.0 / max(force_ratio, 0.01), 99.9))
 
 
 def fit_problem(lag_s, force_ratio):
-    """Return the fault of the speed that the fit of force on changes of speed shows: an AlignmentError, or None."""
+    """Return an AlignmentError if the regression of force on change of speed shows a fault of the speed, else None.
+
+    Args:
+        lag_s: lag of the speed in seconds.
+        force_ratio: change of force per change of speed.
+    """
     if lag_s >= MAX_LAG_S:
         return AlignmentError("speed-late", lag_s)
     if not MIN_FORCE_RATIO < force_ratio < MAX_FORCE_RATIO:
@@ -36,7 +44,11 @@ def fit_problem(lag_s, force_ratio):
 
 
 class SpeedCheck:
-    """Finds a negative or stuck speed without knowing forward. problem: an AlignmentError, or None."""
+    """Finds a negative or stuck speed. It does not need to know forward.
+
+    Attributes:
+        problem: an AlignmentError, or None.
+    """
 
     def __init__(self):
         self.problem = None
@@ -60,7 +72,13 @@ class SpeedCheck:
             self._start_count()
 
     def update(self, force, yaw_dps, dt_us):
-        """Take the mean force (3, g) and yaw rate (deg/s) over the last dt_us."""
+        """Take the means over the last dt_us.
+
+        Args:
+            force: mean force, 3 values in g.
+            yaw_dps: mean yaw rate in deg/s.
+            dt_us: microseconds.
+        """
         sums = self._force_us
         for i in range(3):
             sums[i] += force[i] * dt_us
@@ -74,7 +92,12 @@ class SpeedCheck:
                 sums[i] = 0.0
 
     def update_second(self, force, yaw_dps=0.0):
-        """Take the mean force (3, g) and the mean absolute yaw rate (deg/s) over the last second."""
+        """Take the means over the last second.
+
+        Args:
+            force: mean force, 3 values in g.
+            yaw_dps: mean absolute yaw rate in deg/s.
+        """
         before, self._force_before = self._force_before, list(force)
         turning = max(yaw_dps, self._yaw_dps_before) > _TURNING_DPS
         self._yaw_dps_before = yaw_dps

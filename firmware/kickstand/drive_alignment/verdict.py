@@ -1,8 +1,8 @@
 """Checks whether an earlier alignment, from two poses or another drive, fits this drive.
 
-If the kickstand is not on the side in the settings, forward and backward are exchanged. The poses cannot show this
-error, but the first braking events do. A change of pitch between the poses causes a yaw error of a few degrees. Enough
-braking events correct it. Any other difference means that the mount has moved.
+If SIDE in the settings is not the side of the kickstand, forward and backward are exchanged. The poses cannot show this
+error, but the first braking events do. A change of pitch between the poses causes a yaw error of a few degrees. This
+error is corrected after enough braking events. Any other difference means that the mount has moved.
 """
 
 from math import atan2, degrees
@@ -13,20 +13,26 @@ from .regression import Fit
 
 UNKNOWN = 0  # not enough events yet
 SAME = 1
-REFINED = 2  # a yaw error of a few degrees: use the DriveAlignment's matrix()
-REVERSED = 3  # forward points backward: use turn_round()
-MOVED = 4  # the mount has moved: align again
+REFINED = 2  # there is a yaw error of a few degrees, and the DriveAlignment's matrix() is better
+REVERSED = 3  # forward points backward, and turn_round() corrects the matrix
+MOVED = 4  # the mount has moved, and the sensor must be aligned again
 
-_MIN_EVENTS_TO_REVERSE = const(2)  # least number of straight events, all of which must agree
-_SAME_DEG = const(1.0)
-# Largest yaw error: 2 degrees of pitch cause 22 at the smallest allowed tilt between two poses
+_MIN_EVENTS_TO_REVERSE = const(2)  # smallest number of straight events that can show REVERSED; all must agree
+_SAME_DEG = const(1.0)  # yaw errors below this limit are not corrected
+# Largest yaw error of two poses. At the smallest allowed tilt, 2 degrees of pitch between the poses cause 22 degrees.
 _REFINED_DEG = const(30.0)
-_REVERSED_DEG = const(135.0)
-_UPRIGHT_DEG = const(8.0)  # largest difference of up: an inexact upright pose and the road's camber cause less
+_REVERSED_DEG = const(135.0)  # smallest yaw error that means REVERSED
+# Largest difference between the two verticals. An inexact upright pose and the road's camber cause less.
+_UPRIGHT_DEG = const(8.0)
 
 
 def compare(drive, matrix):
-    """Return UNKNOWN, SAME, REFINED, REVERSED or MOVED. drive: a DriveAlignment; matrix: 9, rows left, up, forward."""
+    """Compare an earlier alignment with a drive. Return UNKNOWN, SAME, REFINED, REVERSED or MOVED.
+
+    Args:
+        drive: a DriveAlignment.
+        matrix: the earlier alignment, 9 values with the rows left, up, forward.
+    """
     events, quality = drive.events, drive.quality
     if quality.speed_problem is not None or events.straight_count < _MIN_EVENTS_TO_REVERSE:
         return UNKNOWN
@@ -45,13 +51,20 @@ def compare(drive, matrix):
 
 
 def yaw_deg(fit, matrix):
-    """The yaw error of the matrix: the angle from its forward to a Fit's forward about the matrix's up; > 0 to the
-    left."""
+    """Return the yaw error of a matrix in degrees.
+
+    It is the angle from the matrix's forward to the Fit's forward, about the matrix's up. It is positive if the Fit's
+    forward is farther to the left."""
     return degrees(atan2(dot(matrix[0:3], fit.forward), dot(matrix[6:9], fit.forward)))
 
 
 def _all_backward(events, matrix):
-    """True if each block of the drive shows forward as backward. events: its DrivingEvents."""
+    """Return True if in each block of a drive the matrix's forward points backward.
+
+    Args:
+        events: the DrivingEvents of the drive.
+        matrix: the alignment.
+    """
     regression, part = events.regression, Fit()
     for block in range(regression.filled):
         if regression.fit(part, events.lag, block, block + 1) and abs(yaw_deg(part, matrix)) < 90.0:
@@ -60,6 +73,6 @@ def _all_backward(events, matrix):
 
 
 def turn_round(matrix):
-    """Reverse forward and left in place: the result of the same poses with the other side set."""
+    """Reverse forward and left in place. The same poses give this alignment if SIDE is the other side."""
     for i in (0, 1, 2, 6, 7, 8):
         matrix[i] = -matrix[i]

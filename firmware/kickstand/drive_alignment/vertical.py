@@ -1,43 +1,51 @@
-"""Finds the vertical in the sensor's axes: StandingVertical from stops, Vertical from the best source so far.
+"""Finds the vertical in the sensor's axes. StandingVertical uses stops, and Vertical uses the best source so far.
 
-The vertical from standing is the mean direction of gravity over many stops, because no city is all uphill (ViriCiti).
-Each stop counts once, however long it was. At a stop the gyro reads only its bias, which is measured too.
+The vertical from standing is the mean direction of gravity over many stops. The slopes of many stops average out
+(ViriCiti). Each stop counts once, independent of its duration. At a stop the gyro reads only its bias, which is
+measured too.
 
-A motorcycle's stops are not level sideways. Its vertical comes from the upright pose, or else from riding straight: a
-balanced bike has no lateral force. A car's vertical comes in equal shares from its stops and from driving straight,
-because the road's camber and slope tilt both in the same way.
+At a stop a motorcycle may lean to a side. So its vertical comes from the upright pose or, without this pose, from
+riding straight, because a balanced bike has no lateral force. A car's vertical comes in equal shares from its stops and
+from driving straight, because the road's camber and slope tilt both in the same way.
 """
 
 from ..errors import AlignmentError
 from ..rotation import angle_deg, norm, normalize, vector
 from ..units import const
 
-_STANDING_MPS = const(0.5)  # a lower speed counts as standing, because a GPS at rest shows up to this speed
-MOVED_MPS = 2.0  # after a higher speed the next stop is a new one
-SETTLE_S = 1.0  # for this time a vehicle rocks after braking
-COUNTS_S = 2.0  # after settling, a stop must last this long to count
+_STANDING_MPS = const(0.5)  # lower speeds count as standing, because a GPS at rest shows speeds up to this one
+MOVED_MPS = 2.0  # if the speed was higher than this, the next stop is a new one
+SETTLE_S = 1.0  # time for which a vehicle rocks after braking
+COUNTS_S = 2.0  # time that a stop must last after SETTLE_S to count
 # Largest difference at a stop between a mean over 0.1 s and a mean with the time constant _AVERAGE_S. An idling diesel,
 # wind and passengers cause less.
 _STILL_G = const(0.06)
 _STILL_DPS = const(3.0)
 _AVERAGE_S = const(0.5)
-_SAME_STOP_DEG = const(1.5)  # doors and passengers tilt a standing vehicle by less
-# a sensor that is still at another angle for longer was rotated, because a late speed of zero would have ended earlier
+_SAME_STOP_DEG = const(1.5)  # doors and passengers tilt a standing vehicle by less than this angle
+# If the sensor is still at another angle for longer than this, it was rotated. The other explanation is a late speed of
+# zero while the vehicle drives again, but that ends earlier.
 _TURNED_S = const(6.0)
-# A rate that differs by more from the bias at the last stop means a bend, so a speed of zero is wrong. Warming up
-# changes the bias by less.
+# If a rate differs by more than this from the bias at the last stop, the vehicle drives in a bend and a speed of zero
+# is wrong. Warming up changes the bias by less.
 TURNING_DPS = 10.0
-_MEAN_S = const(60.0)  # time constant of the mean force, which serves as the vertical until a better one is known
-# largest difference of two verticals due to the road's slope (14 %); a larger one means that the mount moved
+_MEAN_S = const(60.0)  # time constant of the mean force, which is used until a better vertical is known
+# Largest difference of two verticals that the road's slope can cause (14 %). If it is larger, the mount moved.
 MAX_CHANGE_DEG = 8.0
 
 
 class StandingVertical:
     """Measures the vertical at stops. Call update() with each mean over about 0.1 s.
 
-    stops: number of stops; up: the vertical in the sensor's axes (unit vector), None before the first stop; bias: the
-    gyro's bias (3, deg/s) at the last stop; standing: True during a stop; moved: True if the verticals of two stops
-    differ so much that the mount must have moved.
+    Args:
+        bias: the gyro's bias until the first stop, 3 values in deg/s.
+
+    Attributes:
+        stops: number of stops that count.
+        up: the vertical, a unit vector in the sensor's axes; None before the first stop.
+        bias: the gyro's bias at the last stop, 3 values in deg/s.
+        standing: True during a stop.
+        moved: True if the verticals of two stops differ so much that the mount must have moved.
     """
 
     def __init__(self, bias=(0.0, 0.0, 0.0)):
@@ -59,7 +67,14 @@ class StandingVertical:
         self._still_s = 0.0
 
     def update(self, force, rate, speed_mps, seconds):
-        """Take force (3, g) and rate (3, deg/s): means over the last `seconds`; speed_mps: the source's last value."""
+        """Take the means over the last `seconds`.
+
+        Args:
+            force: mean force, 3 values in g.
+            rate: mean rate, 3 values in deg/s.
+            speed_mps: the last value of the speed source.
+            seconds: duration of the means.
+        """
         if speed_mps > MOVED_MPS and self._force is not None:
             if self._counted:
                 for i in range(3):
@@ -82,7 +97,8 @@ class StandingVertical:
         self._average(force, rate, seconds)
 
     def _is_still(self, force, rate, seconds):
-        """True if force and rate are near their running means, and rate near the bias of the last stop."""
+        """Return True if force and rate are near their running means, and the rate is near the bias of the last
+        stop."""
         if self._force is None:
             self._force, self._rate = list(force), list(rate)
         gain = min(1.0, seconds / _AVERAGE_S)
@@ -120,8 +136,12 @@ class StandingVertical:
 
 
 class Vertical:
-    """The best vertical so far. is_car: True to use stops. from_pose: unit vector of the upright pose (a motorcycle's),
-    or None. standing: the StandingVertical of the same drive.
+    """The best vertical so far.
+
+    Args:
+        is_car: True for a car, whose stops are used.
+        from_pose: for a motorcycle, the vertical of the upright pose, a unit vector, or None.
+        standing: the StandingVertical of the same drive.
     """
 
     def __init__(self, is_car, from_pose, standing):
@@ -132,7 +152,7 @@ class Vertical:
         self._mean_s = 0.0
 
     def update(self, force, seconds):
-        """Take force (3, g): the mean over the last `seconds`."""
+        """Take the mean force over the last `seconds`, 3 values in g."""
         self._mean = self._mean or vector()
         self._mean_s = min(_MEAN_S, self._mean_s + seconds)
         gain = seconds / self._mean_s
@@ -141,14 +161,17 @@ class Vertical:
 
     @property
     def turn_axis(self):
-        """The axis of the yaw rate (3, length about 1), known from the first update() on."""
+        """The axis of the yaw rate, 3 values with a length of about 1. It is known after the first update()."""
         return (self.is_car and self._standing.up) or self._from_pose or self._mean
 
     def known(self, out, fit=None):
-        """Write the vertical into out (a unit vector). Return False if it is not known yet. In a car it is
-        unknown until the first stop.
+        """Write the vertical into out, as a unit vector. Return False if it is not known yet.
 
-        fit: the Fit of all straight driving, or None.
+        In a car it is unknown until the first stop.
+
+        Args:
+            out: array of 3.
+            fit: the Fit of all straight driving, or None.
         """
         if self.is_car:
             best = self._standing.up
@@ -164,8 +187,12 @@ class Vertical:
         return True
 
     def problem(self, level):
-        """Return an AlignmentError if the vertical of straight driving is far from that of the stops or the upright
-        pose, else None. level (3): the vertical of straight driving, from the Fit of all of it."""
+        """Return an AlignmentError if the vertical of straight driving is wrong for the stops or the upright pose, else
+        None.
+
+        Args:
+            level: the vertical of all straight driving, from its Fit, 3 values.
+        """
         before = self._standing.up if self.is_car else self._from_pose
         change_deg = 0.0 if before is None else angle_deg(before, level)
         if change_deg > MAX_CHANGE_DEG:

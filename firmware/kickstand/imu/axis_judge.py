@@ -1,8 +1,8 @@
 """Finds faulty axes from the notes of add_up(). It is imported only when an axis looks suspicious.
 
 An axis is faulty in three cases:
-* Its counts have at most two values, or their lowest bits do not change: it is dead, or its low byte is stuck.
-* Its counts wrap around within 256 while the high byte stays the same: the high byte is stuck.
+* Its counts have at most two values, or their lowest bits do not change. The axis is dead, or its low byte is stuck.
+* Its low byte wraps around while its high byte stays the same. The high byte is stuck.
 * Its counts equal those of another axis.
 """
 
@@ -21,10 +21,10 @@ _SEEN = const(19)
 _HIGH_BYTE = const(0x10000)
 _WRAPPED = const(0x20000)
 
-# An axis that is quiet for so many looks is faulty. Columns: dlpf 1 to 6. The gyro has a row for each range, from 250
-# deg/s up. With the noise of the quietest chip (accelerometer 100 ug/sqrt(Hz), at 16 g; gyro 0.004 deg/s/sqrt(Hz)) a
-# working axis at rest is quiet for so long only once in 1e12 looks. 0 means that the noise is too far below one count
-# to decide.
+# The number of successive quiet looks that make an axis faulty. The columns are dlpf 1 to 6. The gyro has a row for
+# each range, from 250 deg/s up. The limits are for the noise of the quietest chip: 100 ug/sqrt(Hz) of the
+# accelerometer, at 16 g, and 0.004 deg/s/sqrt(Hz) of the gyro. With this noise a working axis at rest reaches its limit
+# only once in 1e12 looks. 0 means that the noise is too far below one count to decide.
 _ACCEL_LOOKS = (1, 1, 1, 4, 15, 80)
 _GYRO_LOOKS = (
     (1, 1, 1, 3, 5, 11),
@@ -33,33 +33,43 @@ _GYRO_LOOKS = (
     (1, 2, 14, 0, 0, 0),
 )
 _COLUMNS = (0, 1, 2, 4, 5, 6)  # the axes' columns in a frame
-_WRAP_LOOKS = const(2)  # after so many looks with a wrap the high byte counts as stuck
-_WELL_LOOKS = const(2)  # after so many successive looks without a fault the fault is cleared
-_CLIP_LOOKS = const(2)  # successive looks with half of the samples at the end of the range that make a fault
-_RAIL_LOOKS = const(5)  # the same with all samples at the end: the axis is the cause, not vibration
-_SETUP_LOOKS = const(25)  # looks between two set-ups of a chip with a faulty axis
+_WRAP_LOOKS = const(2)  # number of looks with a wrap that prove a stuck high byte
+_WELL_LOOKS = const(2)  # number of successive looks without a fault that clear the fault
+# If half of the samples are at the end of the range in this many successive looks, the axis is faulty
+_CLIP_LOOKS = const(2)
+# If all samples are at the end of the range in this many successive looks, the axis is the cause, not vibration
+_RAIL_LOOKS = const(5)
+_SETUP_LOOKS = const(25)  # number of looks between two set-ups of a chip with a faulty axis
 _QUIET_LOOKS = const(150)  # number of looks before the same notice is shown again
 
 
 class AxisJudge:
     """Decides from the notes of an AxisWatch which axes are faulty.
 
-    gyro_range: 0 (250 deg/s) to 3 (2000). dlpf: see Mpu6050.
+    Args:
+        gyro_range: 0 (250 deg/s) to 3 (2000 deg/s).
+        dlpf: the low-pass, as for Mpu6050.
     """
 
     def __init__(self, gyro_range, dlpf):
         self._limits = _ACCEL_LOOKS[dlpf - 1], _GYRO_LOOKS[gyro_range][dlpf - 1]
-        # For each column: successive quiet looks; looks with a wrap since the high byte changed
+        # _quiet: number of successive quiet looks, per column
+        # _wrapped: number of looks with a wrap since the high byte last changed, per column
         self._quiet, self._wrapped = bytearray(7), bytearray(7)
-        # numbers of successive looks: with clipping; without a fault; with a faulty axis
+        # numbers of successive looks with clipping, without a fault, and with a faulty axis
         self._clips = self._well = self._ill = 0
-        self._noticed = {}  # by code: the number of the look at which the notice was last shown
+        self._noticed = {}  # maps a notice's code to the number of the look that last showed the notice
 
     def look(self, watch, samples):
-        """Judge the axes for AxisWatch.look(), after this many samples. Set fault, notice and clipped of watch, an
-        AxisWatch.
+        """Judge the axes for AxisWatch.look(). Set the fault, notice and clipped of the watch.
 
-        Return True if the chip should be set up."""
+        Args:
+            watch: the AxisWatch.
+            samples: number of samples since the last look.
+
+        Returns:
+            True if the chip should be set up.
+        """
         notes = watch.notes
         lost, gyro = notes[_CLIPPED], notes[_GYRO_CLIPPED]
         watch.clipped += lost
@@ -99,12 +109,12 @@ class AxisJudge:
                 equal |= 1 << i | 1 << (i - 1 if i & 3 else i + 2)
             seen = notes[_SEEN + i]
             values = seen & 0xFFFF
-            more = values & (values - 1)  # with the lowest 1 cleared: 0 if there was only one value
+            more = values & (values - 1)  # clears the lowest bit; the result is 0 if there was only one value
             if not (more & (more - 1) and values & 0x5555 and values & 0xAAAA):
                 if quiet[i] < 255:
                     quiet[i] += 1
                 if quiet[i] < limit or not limit:
-                    continue  # too early to judge: collect the values of more looks
+                    continue  # too early to judge, so collect the values of more looks
                 dead |= 1 << i
             else:
                 quiet[i] = 0
@@ -125,8 +135,12 @@ class AxisJudge:
 
 
 def _ill(axes, how=None):
-    """Return the Notice for these axes, one bit per column. It names the gyro's axes if there are any, else the
-    accelerometer's."""
+    """Return the Notice for faulty axes. It names the gyro's faulty axes, or the accelerometer's if the gyro has none.
+
+    Args:
+        axes: one bit per column of a frame.
+        how: the kind of fault. By default "dead" for the gyro and "stuck" for the accelerometer.
+    """
     gyro = axes >> 4
     names = "".join([AXES[i] for i in range(3) if (gyro or axes) >> i & 1])
     return Notice("axis-ill", "Gyro" if gyro else "Accel", names, how or ("dead" if gyro else "stuck"))

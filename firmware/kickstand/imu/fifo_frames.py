@@ -1,8 +1,8 @@
 """Decodes frames of the chip's FIFO, adds them up, and watches the counts of each axis.
 
-A frame is one sample: 14 bytes, seven big-endian int16 in the order ax ay az temperature gx gy gz (register map
-RM-MPU-6000A rev 4.2, pp. 29 to 31). On the board, decode() and add_up() are the machine code of fifo_frames_viper.py.
-Elsewhere they are decode_python() and add_up_python(), which give the same results.
+A frame is one sample of 14 bytes. It holds seven big-endian int16 in the order ax ay az temperature gx gy gz (register
+map RM-MPU-6000A rev 4.2, pp. 29 to 31). On the board, decode() and add_up() are the machine code of
+fifo_frames_viper.py. On a computer they are decode_python() and add_up_python(). Both pairs give the same results.
 """
 
 import gc
@@ -13,59 +13,60 @@ from micropython import const
 from ..errors import NO_MACHINE_CODE, Notice, checked, tried
 
 FRAME = const(14)  # bytes
-SATURATED = const(32700)  # |counts| from which a reading is at the end of its range
-LOOK_MS = const(400)
+SATURATED = const(32700)  # a reading with this absolute value or more is at the end of its range
+LOOK_MS = const(400)  # time between two looks
 
-# Indices in array('i', 33), the notes of add_up(). The machine code uses the numbers. In this order: the hash of the
-# last frame; the number of its repetitions in a row; the repetitions that make a frame dead; the number of frames at
-# the end of the range in this call; the number of such frames in a row until now.
-_HASH = const(0)
-_REPEATS = const(1)
-_LIMIT = const(2)
-LOST = const(3)
-_ROW = const(4)
-# Since the last look, in this order: one bit per column that was at the end of its range; the number of frames with
-# such a column; the number of frames with such a column of the gyro; bits for axes that differed: y from x (bits 1 and
-# 5), z from y (2 and 6), z from x (0 and 4). Then the number of samples until the next look.
-_ENDS = const(5)
-_CLIPPED = const(6)
-_GYRO_CLIPPED = const(7)
-_DIFFER = const(8)
-DUE = const(9)
-# |counts| of the accelerometer that hard vibration reaches, and the number of frames that reached it since the last
-# look.
-_HARD = const(10)
-_SHAKEN = const(11)
-# Each of these is the first of seven entries, in the frame's order: the counts of the last frame; one bit for each
-# value that their lowest four bits had since the last look; the largest |counts| since power-on.
-_LAST = const(12)
-_SEEN = const(19)
-_PEAK = const(26)
-_HIGH_BYTE = const(0x10000)  # in _SEEN: the high byte has changed
-_WRAPPED = const(0x20000)  # in _SEEN: the counts jumped by _JUMP or more, but the high byte stayed
+# Indices in the notes of add_up(), an array('i', 33). The machine code repeats these numbers.
+_HASH = const(0)  # hash of the last frame
+_REPEATS = const(1)  # number of successive repetitions of the last frame
+_LIMIT = const(2)  # number of repetitions that make a frame dead
+LOST = const(3)  # number of frames with an axis at the end of its range, in this call
+_ROW = const(4)  # number of successive frames with an axis at the end of its range
+# The next four describe the frames since the last look
+_ENDS = const(5)  # one bit per column that was at the end of its range
+_CLIPPED = const(6)  # number of frames with an axis at the end of its range
+_GYRO_CLIPPED = const(7)  # number of frames with an axis of the gyro at the end of its range
+_DIFFER = const(8)  # bits for axes that differed: y from x (bits 1 and 5), z from y (2 and 6), z from x (0 and 4)
+DUE = const(9)  # number of samples until the next look
+_HARD = const(10)  # absolute counts of the accelerometer that show hard vibration
+_SHAKEN = const(11)  # number of frames that reached _HARD since the last look
+# Each of the next three is the index of the first of seven entries, in the order of a frame
+_LAST = const(12)  # counts of the last frame
+_SEEN = const(19)  # bits 0 to 15; bit n is set if the lowest four bits of the counts were n since the last look
+_PEAK = const(26)  # largest absolute counts since power-on
+_HIGH_BYTE = const(0x10000)  # bit in _SEEN that is set when the high byte changes
+_WRAPPED = const(0x20000)  # bit in _SEEN that is set when the counts jump by _JUMP or more within one high byte
 _JUMP = const(192)
 
-# Half of the range of 8 g or 16 g. The low-pass hides most of a vibration. If this much is left, the vibration was
-# clipped before the low-pass, and the mean of unevenly clipped readings is wrong. A range below 8 g has no such limit,
-# because bends reach half of that range.
+# Half of the range of 8 g or 16 g. The low-pass hides most of a vibration. If half of the range is left after the
+# low-pass, the vibration was clipped before it. Then the mean is wrong, because the readings are clipped unevenly. A
+# range below 8 g has no limit for vibration, because bends alone reach half of that range.
 _HARD_COUNTS = const(16384)
 _COLUMNS = (0, 1, 2, 4, 5, 6)  # the axes' columns in a frame
 _ALL_DIFFER = const(0x77)
 
 
 def decode_python(frames, at, counts):
-    """Decode the frame that begins at byte `at` of frames into counts, array('h', 7)."""
+    """Decode the frame that begins at byte `at` of frames into counts, an array('h', 7)."""
     for i in range(7):
         counts[i] = _int16(frames, at + 2 * i)
 
 
 def add_up_python(frames, n, sums, watch):
-    """Add n frames into sums, array('i', 7). Return the number of frames added.
+    """Add up the counts of n frames, and update the notes of the AxisWatch.
 
     A frame with an axis at the end of its range is skipped and counted in watch[LOST]. The good frames move to the
-    beginning of `frames`. The function stops at the first dead frame. Then the result and watch[LOST] add up to less
-    than n. A frame is dead if the six bytes of its force are all 0x00 or all 0xFF, or if it is the same as too many
-    frames before it. watch: AxisWatch.notes.
+    beginning of `frames`. The function stops at the first dead frame. A frame is dead if the six bytes of its force are
+    all 0x00 or all 0xFF, or if it repeats the previous frame too often.
+
+    Args:
+        frames: bytearray of FRAME bytes per frame.
+        n: number of frames.
+        sums: array('i', 7) for the result, in the order of a frame.
+        watch: AxisWatch.notes.
+
+    Returns:
+        The number of frames added. After a dead frame this number plus watch[LOST] is less than n.
     """
     for i in range(7):
         sums[i] = 0
@@ -88,7 +89,7 @@ def add_up_python(frames, n, sums, watch):
         watch[_HASH] = mark
         if watch[_REPEATS] >= watch[_LIMIT]:
             return good
-        ends = shaken = 0  # ends: a bit for each column at the end of its range
+        ends = shaken = 0  # ends has a bit for each column at the end of its range
         for i in range(7):
             value, last = _int16(frames, at + 2 * i), watch[_LAST + i]
             watch[_LAST + i] = value
@@ -136,12 +137,21 @@ class AxisWatch:
     """Watches each axis for faults. The noise of a working axis always changes its counts (product specification
     PS-MPU-6000A rev 3.4, sections 6.1 and 6.2). If an axis looks suspicious, axis_judge.py is imported and judges it.
 
-    rate_hz: samples per second. accel_range, gyro_range: 0 (2 g, 250 deg/s) to 3 (16 g, 2000 deg/s). dlpf: see Mpu6050.
-    repeats: repetitions that make a frame dead.
+    A look is a check of all samples since the previous look, LOOK_MS earlier.
 
-    notes: the notes of add_up(). fault: None, or a Notice: an axis is faulty, or half of the samples are at the end of
-    the range. notice: None, or a Notice to show for a moment; the caller that shows it sets it to None. clipped:
-    samples skipped since power-on because an axis was at the end of its range. looks: number of looks.
+    Args:
+        rate_hz: samples per second.
+        accel_range: 0 (2 g) to 3 (16 g).
+        gyro_range: 0 (250 deg/s) to 3 (2000 deg/s).
+        dlpf: the low-pass, as for Mpu6050.
+        repeats: number of repetitions that make a frame dead.
+
+    Attributes:
+        notes: the notes of add_up().
+        fault: a Notice while an axis is faulty or half of the samples are at the end of the range, else None.
+        notice: a Notice to show for a moment, or None. The caller that shows the Notice sets it to None.
+        clipped: number of samples skipped since power-on because an axis was at the end of its range.
+        looks: number of looks.
     """
 
     def __init__(self, rate_hz, accel_range, gyro_range, dlpf, repeats):
@@ -171,13 +181,21 @@ class AxisWatch:
         return Notice("clips", "Gyro" if notes[_ENDS] > 7 else "Accel")
 
     def shaken(self):
-        """Return the largest |counts| of the accelerometer's axes (3) and the share of lost samples, both since
-        power-on."""
+        """Return how hard the sensor was shaken since power-on.
+
+        Returns:
+            peaks: the largest absolute counts of the three axes of the accelerometer.
+            share: the share of samples that were skipped, from 0 to 1.
+        """
         return self.notes[_PEAK : _PEAK + 3], self.clipped / max(1, self.looks * self._look)
 
     def look(self):
-        """Judge the samples since the last look. Call it when notes[DUE] is 0 or less. Return True if the chip should
-        be set up, which may repair an axis. That is the case once when a fault begins, then from time to time."""
+        """Judge the samples since the last look. Call this method when notes[DUE] is 0 or less.
+
+        Returns:
+            True if the chip should be set up, because that may repair an axis. The result is True once when a fault
+            begins, and then every 10 s while the fault lasts.
+        """
         samples = self._look - self.notes[DUE]
         self.notes[DUE] = self._look
         self.looks += 1
@@ -197,7 +215,7 @@ class AxisWatch:
             return False
         for i in _COLUMNS:
             seen = notes[_SEEN + i]
-            more = seen & (seen - 1) & 0xFFFF  # without its lowest 1: 0 if there was only one value
+            more = seen & (seen - 1) & 0xFFFF  # clears the lowest bit; the result is 0 if there was only one value
             if not (more & (more - 1) and seen & 0x5555 and seen & 0xAAAA and (seen & _HIGH_BYTE or seen < _WRAPPED)):
                 return False
         for i in _COLUMNS:
@@ -206,7 +224,7 @@ class AxisWatch:
         return True
 
     def _load(self):
-        gc.collect()  # otherwise lasting objects would be placed behind garbage
+        gc.collect()  # otherwise the new objects, which last, would be placed behind garbage
         from .axis_judge import AxisJudge
 
         self._judge = AxisJudge(*self._settings)
@@ -219,7 +237,7 @@ except NO_MACHINE_CODE:
 else:
     _FRAME = b"\x7f\x00\x80\xff\xff\xff\x80\x00\x80\xff\x01\x00\xab\xcd"
     decode = checked(decode, decode_python, _FRAME, 0, array("h", range(7)))
-    # Eight frames: numbers 2 and 4 are at the ends of the range, the last one repeats the previous one
+    # Eight frames. Frames 2 and 4 are at the ends of the range, and the last frame repeats the previous one.
     _TRIAL = bytearray(_FRAME * 8)
     for _k in range(7):
         _TRIAL[14 * _k + 1] = _TRIAL[14 * _k + 9] = 250 - 40 * _k

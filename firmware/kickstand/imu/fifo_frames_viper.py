@@ -1,6 +1,7 @@
-"""fifo_frames.py's decode_python() and add_up_python() as machine code. decode() takes 7 us instead of 140.
+"""The functions decode_python() and add_up_python() of fifo_frames.py as machine code.
 
-Both pairs must give the same results: host_tests/imu/test_batches.py compares them.
+decode() takes 7 us instead of 140. Both versions must give the same results. host_tests/imu/test_batches.py compares
+them.
 """
 
 import micropython
@@ -53,7 +54,7 @@ def add_up(frames: ptr8, n: int, sums: ptr32, watch: ptr32) -> int:  # noqa: F82
                 ends |= 1 << i
             if value >= watch[10] and i < 3:
                 shaken = 1
-            # written and read again like the last value: on 64-bit computers both are then unsigned
+            # Read the value back from the array, as `last` was read. Then both are unsigned on a 64-bit computer.
             value = watch[12 + i]
             seen = 1 << (value & 15)
             if value >> 8 != last >> 8:

@@ -24,34 +24,43 @@ from micropython import const
 
 from .fifo_frames import FRAME, SATURATED, AxisWatch, add_up, decode
 
-# setup() writes the registers from here on one by one: SMPLRT_DIV (p. 11), CONFIG with DLPF_CFG (p. 13),
-# GYRO_CONFIG (p. 14), ACCEL_CONFIG (p. 15) and, if the chip has it, ACCEL_CONFIG2, the accelerometer's own low-pass
+# setup() writes the registers from SMPLRT_DIV on one by one: SMPLRT_DIV (p. 11), CONFIG with DLPF_CFG (p. 13),
+# GYRO_CONFIG (p. 14), ACCEL_CONFIG (p. 15) and, if the chip has it, ACCEL_CONFIG2. ACCEL_CONFIG2 sets the low-pass of
+# the accelerometer alone.
 _SMPLRT_DIV = const(0x19)
 _FIFO_EN = const(0x23)  # p. 16
-_ACCEL_XOUT_H = const(0x3B)  # p. 29: the fourteen bytes from here belong to one sampling instant
+_ACCEL_XOUT_H = const(0x3B)  # p. 29; the fourteen bytes from this register on belong to one sampling instant
 _USER_CTRL = const(0x6A)  # p. 38
 _PWR_MGMT_1 = const(0x6B)  # p. 40
-_FIFO_COUNT_H = const(0x72)  # p. 43: reading it latches the low byte, which follows
+_FIFO_COUNT_H = const(0x72)  # p. 43; reading this register latches the low byte in the next register
 _FIFO_R_W = const(0x74)  # p. 44
 _WHO_AM_I = const(0x75)  # p. 45
 
 _RESET = const(0x80)  # bit of PWR_MGMT_1
-_STANDBY = const(0x3F)  # bits of PWR_MGMT_2 (p. 42), which follows PWR_MGMT_1: each turns an axis off
-_CLOCK_PLL_GYRO_X = const(0x01)  # in PWR_MGMT_1: accurate to 1 %; the oscillator used after a reset is off by up to 5 %
-_FIFO_ALL = const(0xF8)  # in FIFO_EN: temperature, gyro, accelerometer: the fourteen bytes of a burst
+_STANDBY = const(0x3F)  # bits of PWR_MGMT_2 (p. 42), the register after PWR_MGMT_1; each bit turns an axis off
+# Value of PWR_MGMT_1. This clock is accurate to 1 %. The oscillator that runs after a reset is off by up to 5 %.
+_CLOCK_PLL_GYRO_X = const(0x01)
+_FIFO_ALL = const(0xF8)  # value of FIFO_EN for the fourteen bytes of temperature, gyro and accelerometer
 _FIFO_ENABLE = const(0x40)  # bit of USER_CTRL
 _FIFO_RESET = const(0x04)  # bit of USER_CTRL
 
 ACCEL_LSB_PER_G = {2: 16384, 4: 8192, 8: 4096, 16: 2048}  # counts per g for each range in g (p. 29)
 GYRO_LSB_PER_DPS = {250: 131.0, 500: 65.5, 1000: 32.8, 2000: 16.4}  # counts per deg/s for each range in deg/s (p. 31)
-# by rate_hz: the widest low-pass (98, 44 or 21 Hz) below half of that rate (p. 13)
+# For each sample rate in Hz, the dlpf of the widest low-pass (98, 44 or 21 Hz) below half of the rate (p. 13)
 MIN_DLPF = {50: 4, 100: 3, 125: 3, 200: 2}
-GYRO_DELAY_S = {1: 0.0019, 2: 0.0028, 3: 0.0048, 4: 0.0083, 5: 0.0134, 6: 0.0186}  # delay by dlpf (p. 13)
+# For each dlpf, the delay of the gyro in seconds (p. 13)
+GYRO_DELAY_S = {1: 0.0019, 2: 0.0028, 3: 0.0048, 4: 0.0083, 5: 0.0134, 6: 0.0186}
 
-# The chips known to work, by WHO_AM_I: name (at most 12 characters); temperature counts per degree C; degrees C at 0
-# counts; True if the chip has ACCEL_CONFIG2 (0x1D); usable size of its FIFO in bytes; bits of FIFO_EN that must read
-# back. Also add a new chip to VARIANTS in tools/kickstand_tools/simulated_board/mpu6050.py and to the parts in the
-# README. A chip with other registers (LSM6DS3, BMI160) needs a driver with the same methods, opened by open_sensor().
+# The supported chips. The key is the chip's WHO_AM_I. The values are, in this order:
+# * its name, at most 12 characters
+# * temperature counts per degree C
+# * the temperature in degrees C at 0 counts
+# * True if the chip has the register ACCEL_CONFIG2 (0x1D)
+# * usable size of its FIFO in bytes
+# * bits of FIFO_EN that must read back as written
+# Also add a new chip to VARIANTS in tools/kickstand_tools/simulated_board/mpu6050.py and to the parts in the README.
+# A chip with other registers (LSM6DS3, BMI160) needs a driver with the same methods. open_sensor() must open that
+# driver.
 CHIPS = {
     0x68: ("MPU6050", 340.0, 36.53, False, 1024, 0xF8),
     0x70: ("MPU6500", 333.87, 21.0, True, 512, 0xF8),
@@ -69,34 +78,46 @@ _ZERO_C = const(2)
 _HAS_ACCEL_CONFIG2 = const(3)
 _FIFO_EN_BITS = const(5)
 
-_MAX_FRAMES = const(8)  # the most frames in one transfer, used to catch up: 3 ms at 400 kHz
-# The limit while fewer than _MAX_FRAMES wait, so one slow pass of the loop does not slow the next pass
+_MAX_FRAMES = const(8)  # most frames in one transfer when there are many to catch up; takes 3 ms at 400 kHz
+# Most frames in one transfer while fewer than _MAX_FRAMES are in the FIFO. Because of this limit, one slow pass of the
+# loop does not slow the next pass.
 _FEW_FRAMES = const(3)
-# Readings that stay equal for longer are a fault: in a working chip, noise changes every sample
+# Readings that stay equal for longer than this are a fault, because noise changes every sample of a working chip
 _FROZEN_MS = const(100)
 
 
 class UnknownChip(Exception):
-    """The chip that answers is not in CHIPS. args[0]: its WHO_AM_I."""
+    """The chip that answers is not in CHIPS. args[0] is its WHO_AM_I."""
 
 
 class NotKept(OSError):
-    """A chip answers, but registers do not read back as written. args[0]: which registers, in words."""
+    """A chip answers, but registers do not read back as written. args[0] says in words which registers."""
 
 
 class Mpu6050:
     """One chip on one bus.
 
-    i2c: a machine.I2C.  address: where to look first, 0x68, or 0x69 with AD0 high.  accel_range_g: 2, 4, 8 or 16.
-    gyro_range_dps: 250, 500, 1000 or 2000 deg/s.  dlpf: DLPF_CFG, the low-pass, from 1 (184 Hz) to 6 (5 Hz). rate_hz:
-    samples per second, 1000 divided by 1 to 256.  accept: a WHO_AM_I that is not in CHIPS, to be treated as an MPU6500.
+    Args:
+        i2c: a machine.I2C.
+        address: the I2C address to try first, 0x68, or 0x69 with AD0 high.
+        accel_range_g: 2, 4, 8 or 16.
+        gyro_range_dps: 250, 500, 1000 or 2000.
+        dlpf: DLPF_CFG, the low-pass, from 1 (184 Hz) to 6 (5 Hz).
+        rate_hz: samples per second. It must be 1000 divided by an integer from 1 to 256.
+        accept: a WHO_AM_I that is not in CHIPS. A chip with this number is treated as an MPU6500.
 
-    address: where the chip answers. Until a set-up succeeds, each set-up also tries the other address. who_am_i: the
-    chip's answer, 0 before setup().  counts: array('h', 7) of the last read() or take(), ax ay az temperature gx gy gz.
-    sums: array('i', 7) of the last add_up(), in the same order.  accel_lsb_per_g and gyro_lsb_per_dps: counts per g and
-    per deg/s.  period_ms: time from one sample to the next.  gyro_delay_s: delay of the gyro by the low-pass.
-    overflows: number of times that the FIFO was emptied and samples were lost.  frames_left: samples that the last
-    fetch() left in the FIFO.  axes: an AxisWatch, which judges each axis.
+    Attributes:
+        address: the I2C address of the chip. Until a set-up succeeds, each set-up also tries the other address.
+        who_am_i: the content of the chip's WHO_AM_I; 0 before setup().
+        counts: the counts of the last read() or take(), array('h', 7): ax ay az temperature gx gy gz.
+        sums: the sums of the last add_up(), array('i', 7), in the same order.
+        accel_lsb_per_g: counts per g.
+        gyro_lsb_per_dps: counts per deg/s.
+        period_ms: time from one sample to the next.
+        gyro_delay_s: delay of the gyro that the low-pass causes.
+        overflows: number of times that the FIFO was emptied and samples were lost.
+        frames_left: number of samples that the last fetch() left in the FIFO.
+        axes: an AxisWatch, which judges each axis.
     """
 
     SATURATED = SATURATED
@@ -113,18 +134,19 @@ class Mpu6050:
         self.period_ms = 1000 // rate_hz
         accel_bits = (2, 4, 8, 16).index(accel_range_g) << 3
         gyro_bits = (250, 500, 1000, 2000).index(gyro_range_dps) << 3
-        self._configuration = bytes((self.period_ms - 1, dlpf, gyro_bits, accel_bits, dlpf))  # from SMPLRT_DIV on
+        # values of the five registers from SMPLRT_DIV on
+        self._configuration = bytes((self.period_ms - 1, dlpf, gyro_bits, accel_bits, dlpf))
         self._one, self._two, self._three = bytearray(1), bytearray(2), bytearray(3)
         self._readback = bytearray(_FIFO_EN - _SMPLRT_DIV + 1)
         self._frames = bytearray(FRAME * _MAX_FRAMES)
-        # For each n: the first n frames. Created once, because each slice takes heap.
+        # Entry n holds the first n frames. The views are created once, because each slice takes heap.
         self._some_frames = [memoryview(self._frames)[: FRAME * n] for n in range(_MAX_FRAMES + 1)]
         self.frames_left = self.overflows = 0
         self._most = 0  # largest number of bytes found in the FIFO
         self._odd = False  # the last fetch() found an incomplete frame
-        self._settled = False  # True once a chip was started at this address: do not try the other address
+        self._settled = False  # True once a chip was started at this address, so the other is no longer tried
         self._started = False  # True once setup() is complete and the FIFO fills
-        self._full = 0  # from this number of bytes on the FIFO may have overflowed
+        self._full = 0  # if the FIFO holds more bytes than this, it may have overflowed
         self.counts, self.sums = array("h", [0] * 7), array("i", [0] * 7)
         self.axes = AxisWatch(rate_hz, accel_bits >> 3, gyro_bits >> 3, dlpf, rate_hz * _FROZEN_MS // 1000)
 
@@ -134,7 +156,7 @@ class Mpu6050:
         return self._chip()[_NAME] if self.who_am_i in CHIPS else "WHO 0x%02X" % self.who_am_i
 
     def connect(self, i2c):
-        """Use this machine.I2C from now on."""
+        """Use another machine.I2C from now on."""
         self._i2c = i2c
 
     def identify(self):
@@ -153,7 +175,7 @@ class Mpu6050:
 
     def _identify(self):
         self.who_am_i = self.read_register(_WHO_AM_I)
-        # Read twice, because with a misread number the calibration of another chip would be used.
+        # Read twice, because a misread number would select the calibration of another chip.
         if self.read_register(_WHO_AM_I) != self.who_am_i:
             raise OSError("MPU6050 WHO_AM_I reads differently each time")
         if self.who_am_i not in CHIPS and self.who_am_i != self._accept:
@@ -163,15 +185,22 @@ class Mpu6050:
         return self.who_am_i
 
     def setup(self):
-        """Identify, reset and configure the chip and start its FIFO, in 0.2 s. Raises UnknownChip, or OSError from the
-        bus, or NotKept."""
+        """Identify, reset and configure the chip, and start its FIFO. This takes 0.2 s.
+
+        Raises:
+            UnknownChip: the chip is not in CHIPS.
+            NotKept: registers do not read back as written.
+            OSError: a transfer on the bus failed.
+        """
         for wait_ms in self.configure():
             sleep_ms(wait_ms)
         self.start()
 
     def configure(self):
-        """Do the steps of setup() except start(), as a generator. It yields the milliseconds to wait before the next
-        step; meanwhile the caller can do other work. Raises the same errors."""
+        """Do the steps of setup() except start(), as a generator.
+
+        Before each pause the generator yields the milliseconds to wait. The caller can do other work meanwhile. Raises
+        the same errors as setup()."""
         self._started = False
         self.identify()
         self.write_register(_PWR_MGMT_1, _RESET)
@@ -209,11 +238,17 @@ class Mpu6050:
         self.take(0)
 
     def fetch(self):
-        """Read samples from the FIFO and return their number: _MAX_FRAMES if so many wait, else at most _FEW_FRAMES.
-        Sets frames_left. Raises OSError from the bus, or as restart_fifo() does.
+        """Read samples from the FIFO, and set frames_left.
 
         After an overflow the frames no longer begin at multiples of 14 bytes. This method then empties the FIFO,
         increments overflows and returns 0. It also returns 0 while the chip is writing a frame.
+
+        Returns:
+            The number of samples read. It is _MAX_FRAMES if the FIFO holds at least that many, else at most
+            _FEW_FRAMES.
+
+        Raises:
+            OSError: a transfer on the bus failed, or restart_fifo() failed.
         """
         self._i2c.readfrom_mem_into(self.address, _FIFO_COUNT_H, self._two)
         waiting = self._two[0] << 8 | self._two[1]
@@ -241,22 +276,22 @@ class Mpu6050:
         return max(0, self._full + FRAME - self._most) // FRAME
 
     def take(self, k):
-        """Put sample k of the last fetch() into counts; 0 is the oldest. Takes no heap."""
+        """Put sample k of the last fetch() into counts. Sample 0 is the oldest. Takes no heap."""
         decode(self._frames, k * FRAME, self.counts)
 
     def add_up(self, n):
-        """Add the first n samples of the last fetch() into sums; return the number added. Takes no heap.
+        """Add up the first n samples of the last fetch() into sums. Return the number of samples added. Takes no heap.
 
-        Samples at the end of the range are skipped and counted in axes.notes[LOST]; take() then returns only the other
-        samples. The method stops at a sample that only a dead chip sends: all bits of the force are 0 or all are 1, or
-        the reading did not change for _FROZEN_MS."""
+        Samples at the end of the range are skipped and counted in axes.notes[LOST]. Afterwards take() returns only the
+        other samples. The method stops at a sample that only a dead chip sends: all bits of the force are 0 or all are
+        1, or the reading did not change for _FROZEN_MS."""
         return add_up(self._frames, n, self.sums, self.axes.notes)
 
     def restart_fifo(self):
         """Empty the FIFO and start it again, after an overflow or an incomplete transfer. Raises OSError from the bus,
         or NotKept."""
         self.write_register(_FIFO_EN, 0)
-        self.write_register(_USER_CTRL, _FIFO_RESET)  # works only while the FIFO is disabled (p. 38)
+        self.write_register(_USER_CTRL, _FIFO_RESET)  # the reset works only while the FIFO is disabled (p. 38)
         self.write_register(_USER_CTRL, _FIFO_ENABLE)
         self.write_register(_FIFO_EN, _FIFO_ALL)
         self._odd = False
@@ -269,7 +304,7 @@ class Mpu6050:
         return fifo_en & bits == bits and user_ctrl & _FIFO_ENABLE != 0
 
     def temperature_c(self, counts):
-        """The temperature in degrees C from its counts (p. 30, and the data sheets of the other chips)."""
+        """Convert counts of the temperature to degrees C (p. 30, and the data sheets of the other chips)."""
         chip = self._chip()
         return counts / chip[_LSB_PER_C] + chip[_ZERO_C]
 
@@ -277,15 +312,15 @@ class Mpu6050:
         return CHIPS.get(self.who_am_i, CHIPS[0x70])  # an accepted chip that is not in CHIPS is treated as an MPU6500
 
     def waiting(self):
-        """The number of bytes in the FIFO. Raises OSError from the bus."""
+        """Return the number of bytes in the FIFO. Raises OSError from the bus."""
         self._read_into(_FIFO_COUNT_H, self._two)
         return self._two[0] << 8 | self._two[1]
 
-    # A failed register transfer is tried once more. Otherwise a moment of bad contact would require a whole set-up. A
-    # read of the FIFO is not repeated, because the chip has already dropped the bytes.
+    # A failed transfer of a register is tried once more. Otherwise a moment of bad contact would require a whole set-up
+    # of the chip. A failed read of the FIFO is not repeated, because the chip has already dropped the bytes.
 
     def read_register(self, register):
-        """The content of a register. Raises OSError from the bus."""
+        """Return the content of a register. Raises OSError from the bus."""
         self._read_into(register, self._one)
         return self._one[0]
 

@@ -1,7 +1,7 @@
-"""Identifies the chips on the sensor's bus. Imported after a fault, and by kickstand.status().
+"""Identifies the chips on the sensor's bus. This module is imported after a fault, and by kickstand.status().
 
-Sources: the chips' data sheets and the register maps of their makers' drivers. Registers are only read: a write could
-set a clock or damage another chip's calibration.
+Sources: the chips' data sheets and the register maps of their makers' drivers. The module only reads registers, because
+a write could set a clock or damage another chip's calibration.
 """
 
 from .mpu6050 import CHIPS
@@ -9,10 +9,11 @@ from .mpu6050 import CHIPS
 _WHO_AM_I = 0x75
 _PWR_MGMT_1 = 0x6B
 _AS_AN_MPU = (0x40, 0x41, 0x01)  # values of PWR_MGMT_1 in chips like the MPU6050, after power-on and after a set-up
-OTHER, MOTION, SUPPORTED = 0, 1, 2  # kinds of devices: MOTION is a sensor that this firmware does not know
-_TIME_BYTES = 10  # registers to read from a clock: its time takes seven, from register 0 or 3 on
+OTHER, MOTION, SUPPORTED = 0, 1, 2  # kinds of devices; MOTION is a motion sensor without support in this firmware
+_TIME_BYTES = 10  # number of registers to read from a clock; the time is in seven of them, from register 0 or 3 on
 
-# chips that identify themselves: addresses in hexadecimal, register, its content, name
+# Chips with an identification register. The columns are two addresses, the register, its content (all in hexadecimal)
+# and the name.
 _MOTION = """
 68 69 75 47 ICM-42688
 68 69 75 db ICM-42688-V
@@ -47,7 +48,7 @@ _MOTION = """
 18 19 0f 33 LIS3DH
 1d 53 00 e5 ADXL345
 """
-# addresses, name
+# Other devices. The columns are the first address, the last address (in hexadecimal) and the name.
 _OTHERS = """
 76 77 barometer
 1e 1e compass
@@ -63,10 +64,18 @@ _OTHERS = """
 
 
 def name_of(i2c, address):
-    """Return (name, kind) of the device that answers at this address, or ("", OTHER) if it is unknown. i2c: a
-    machine.I2C."""
+    """Identify the device that answers at an address.
+
+    Args:
+        i2c: a machine.I2C.
+        address: the I2C address.
+
+    Returns:
+        name: the device's name, "" if it is unknown.
+        kind: OTHER, MOTION or SUPPORTED; OTHER if it is unknown.
+    """
     at_mpu = address & 0xFE == 0x68
-    # register 0 of a chip like the MPU6050 can hold any number
+    # register 0 of a chip like the MPU6050 can hold any number, so it does not identify a chip
     skipped = 0x00 if at_mpu and _reads(i2c, address, _PWR_MGMT_1) in _AS_AN_MPU else -1
     mark = " %02x " % address
     for line in _MOTION.split("\n"):
@@ -88,19 +97,19 @@ def name_of(i2c, address):
 
 
 def who_am_i(i2c, address):
-    """Return the value of the MPU6050's register WHO_AM_I, or -1 without an answer."""
+    """Return the value of the register that is WHO_AM_I in an MPU6050, or -1 without an answer."""
     return _reads(i2c, address, _WHO_AM_I)
 
 
 def is_clock(i2c, address):
-    """Return True if the first registers hold a time. The clocks DS1307, DS3231 and PCF8523 have the sensor's
-    address."""
+    """Return True if the first registers hold a time. The clocks DS1307, DS3231 and PCF8523 have the same address as
+    the sensor."""
     try:
         time = i2c.readfrom_mem(address, 0, _TIME_BYTES)
     except OSError:
         return False
-    # seconds, minutes, hours, then day of the week, date, month; a PCF8523 begins at register 3 and has the date before
-    # the day of the week
+    # The registers hold seconds, minutes, hours, day of the week, date, month and year. In a PCF8523 they begin at
+    # register 3, and the date comes before the day of the week.
     return _is_time(time, 0, 4, 3) or _is_time(time, 3, 6, 7)
 
 

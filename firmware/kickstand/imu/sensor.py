@@ -1,5 +1,5 @@
-"""Keeps the chip working: finds it, sets it up, watches it, and sets it up again after a fault. SampleClock computes
-the times of the samples."""
+"""Keeps the chip working. Sensor finds the chip, sets it up, watches it, and sets it up again after a fault.
+SampleClock computes the times of the samples."""
 
 from time import ticks_add, ticks_diff, ticks_ms
 
@@ -9,26 +9,33 @@ from .fifo_frames import DUE, LOST
 from .mpu6050 import UnknownChip
 
 _RETRY_MS = const(50)  # time between two attempts to set the chip up
-_FAILURES = const(3)  # so many failed transfers in a row are a fault; one or two NACKs are tolerated
-_SILENT_MS = const(100)  # time without a sample that is a fault
-_STALE_MS = const(500)  # the same while overflows lose all samples because the board has no time to read
-_SETTLED_MS = const(1000)  # if a fault returns sooner than this, the set-up did not help
-_FRUITLESS = const(3)  # after this many such faults in a row the FIFO is tested
-# The first explanation follows this many failed set-ups in a row, each further one this many later (about a second)
+_FAILURES = const(3)  # number of successive failed transfers that are a fault; one or two NACKs are tolerated
+_SILENT_MS = const(100)  # longest time without a sample; a longer time is a fault
+# The same limit while the FIFO overflows because the board has no time to read it
+_STALE_MS = const(500)
+_SETTLED_MS = const(1000)  # if a fault returns within this time, the set-up did not help
+_FRUITLESS = const(3)  # number of successive set-ups that did not help before the FIFO is tested
+# The fault is explained after EXPLAINED successive failed set-ups, and again every EXPLAINED_EVERY set-ups (about 1 s)
 EXPLAINED, EXPLAINED_EVERY = 3, 20
 _CORRECTION_SHIFT = const(4)  # SampleClock.emptied() corrects by 1/16 of the difference between the two clocks
 
 
 class Sensor:
-    """Samples of one chip, which may fail at any time. _missed() handles every failed transfer (NACK or time-out).
+    """Reads the samples of one chip, which may fail at any time.
 
-    chip: an Mpu6050.  reopen(): frees the bus and returns it as a machine.I2C.  explain(chip, error): returns a Notice
-    with the reason for a failed set-up, and the addresses that answer. explain(chip, None) tests the FIFO: the first
-    value is then a Notice if the FIFO is broken, else None. explain may be None.
-    found: list of the addresses on the bus at the last explanation.
-    fault: the Notice of a fault, or None.  restarts: number of gaps in the samples: after a set-up, after
-    _STALE_MS without a sample, after a faulty axis.  clipped: samples that fetch() skipped because an axis was at the
-    end of its range; the caller sets it to 0.
+    Args:
+        chip: an Mpu6050.
+        reopen: reopen() frees the bus and returns it as a machine.I2C.
+        explain: a function, or None. explain(chip, error) returns a Notice with the reason for a failed set-up, and
+            the addresses that answer. explain(chip, None) tests the FIFO. It returns a Notice if the FIFO is broken,
+            else None, and the addresses.
+
+    Attributes:
+        found: list of the addresses that answered at the last explanation.
+        fault: the Notice of a fault, or None.
+        restarts: number of gaps in the samples. A gap is a set-up, _STALE_MS without a sample, or a faulty axis.
+        clipped: number of samples that fetch() skipped because an axis was at the end of its range. The caller resets
+            it to 0.
     """
 
     def __init__(self, chip, reopen, explain=None):
@@ -36,33 +43,42 @@ class Sensor:
         self.reopen = reopen
         self.explain = explain
         self.found = []
-        self._refused = 0  # set-ups that failed in a row
-        self._fruitless = 0  # set-ups in a row with a fault within _SETTLED_MS after them
+        self._refused = 0  # number of successive set-ups that failed
+        self._fruitless = 0  # number of successive set-ups that were followed by a fault within _SETTLED_MS
         self._started_ms = 0
-        self._failures = 0  # transfers that failed in a row
+        self._failures = 0  # number of successive transfers that failed
         self._overflows = 0  # number of the chip's overflows handled so far
         self._due_ms = ticks_ms()  # time of the next step of the set-up
         self._steps = None  # the steps of the set-up, a generator
         self._ready = False  # True while the chip is set up but its FIFO is not started
-        self._sample_ms = 0  # when the last sample was read, or the FIFO was emptied after an overflow
-        # _emptied_ms: when the FIFO last overflowed; _read_ms: when the last sample before that overflow was read
+        self._sample_ms = 0  # time when the last sample was read, or the FIFO was emptied after an overflow
+        # _emptied_ms: time of the last overflow of the FIFO
+        # _read_ms: time when the last sample before that overflow was read
         self._emptied_ms = self._read_ms = 0
         self.restarts = self.clipped = 0
         self.fault = Notice("starting")
         self._running = False
 
     def set_up(self):
-        """Free the bus and set the chip up. Takes 0.2 s. Raises UnknownChip, OSError, or SettingsError for wrong
+        """Free the bus and set the chip up. This takes 0.2 s. Raises UnknownChip, OSError, or SettingsError for wrong
         pins."""
         self.chip.connect(self.reopen())
         self.chip.setup()
 
     def fetch(self, now_ms):
-        """Read the waiting samples; return their number, at most eight. now_ms: ticks_ms().
+        """Read the samples in the FIFO. Afterwards chip.sums holds their sums, and chip.take(k) returns each sample.
 
-        chip.sums has their sum, chip.take(k) returns each of them. The number is 0 while an axis is faulty. If the chip
-        does not run, the calls of 0.2 s set it up first. Raises SettingsError for pins that cannot be used, and nothing
-        else."""
+        If the chip does not run, each call does a step of its set-up. The whole set-up takes 0.2 s.
+
+        Args:
+            now_ms: ticks_ms().
+
+        Returns:
+            The number of samples, at most eight. It is 0 while an axis is faulty or the chip does not run.
+
+        Raises:
+            SettingsError: the pins cannot be used. This method raises nothing else.
+        """
         if not self._running:
             self.prepare(now_ms)
             if self._ready:
@@ -88,9 +104,15 @@ class Sensor:
         return self._judge(good, waiting, now_ms)
 
     def _judge(self, good, waiting, now_ms):
-        """Set the fault. Return the number of usable samples: good, or 0 while an axis is faulty.
+        """Set the fault.
 
-        good: number of samples in the sums. waiting: number of samples that were waiting."""
+        Args:
+            good: number of samples in the sums.
+            waiting: number of samples that were read from the FIFO.
+
+        Returns:
+            The number of usable samples: `good`, or 0 while an axis is faulty.
+        """
         axes = self.chip.axes
         if good:
             self.fault = None
@@ -116,13 +138,13 @@ class Sensor:
         return good
 
     def _no_sample(self, now_ms):
-        """Report a fault if the FIFO has held no sample for too long. After an overflow the limit is longer, because
-        the FIFO was just emptied."""
+        """Report a fault if no sample was read for too long. After an overflow the limit is longer, because the FIFO
+        was just emptied."""
         if self._overflows != self.chip.overflows:
             self._overflows = self.chip.overflows
             if self._sample_ms != self._emptied_ms:  # at least one sample was read since the last overflow
                 self._read_ms = self._sample_ms
-            # now_ms may be older than the long pause that led to the overflow
+            # now_ms may have been read before the long pause that caused the overflow
             self._sample_ms = self._emptied_ms = ticks_ms()
             if ticks_diff(self._emptied_ms, self._read_ms) > _STALE_MS:
                 self.fault = self._fifo_fault() or Notice("readings-lost")
@@ -131,7 +153,7 @@ class Sensor:
             self._fail_again("sensor-silent", now_ms)
 
     def _fail_again(self, code, now_ms):
-        """Fail. If set-ups do not help, test the FIFO and report it if it is broken."""
+        """Report a fault and set the chip up again. If set-ups do not help, test the FIFO and report a broken FIFO."""
         self._fruitless = self._fruitless + 1 if ticks_diff(now_ms, self._started_ms) < _SETTLED_MS else 1
         fault = self._fifo_fault() if self._fruitless % _FRUITLESS == 0 else self._named_fifo()
         self._fail(code, now_ms)
@@ -139,19 +161,24 @@ class Sensor:
             self.fault = fault
 
     def _named_fifo(self):
-        """Return the fault if it is that of a broken FIFO, else None. This fault stays until a sample arrives."""
+        """Return the current fault if it says that the FIFO is broken, else None. This fault stays until a sample
+        arrives."""
         return self.fault if self.fault is not None and self.fault.code == "sensor-fifo" else None
 
     def _fifo_fault(self):
-        """Return a Notice if the chip measures but its FIFO does not work, else None. The test runs once and takes up
-        to 0.3 s."""
+        """Return a Notice if the chip measures but its FIFO does not work, else None. The test takes up to 0.3 s. It
+        is skipped if the current fault already says that the FIFO is broken."""
         return self._named_fifo() or (self.explain(self.chip, None)[0] if self.explain else None)
 
     def check(self, now_ms):
-        """Check that the chip is still configured. A supply dip during a transfer can corrupt half a sample: call this
-        before readings are shown. It takes 0.6 ms. Raises nothing. now_ms: ticks_ms().
+        """Check that the chip is still configured. Call this before readings are shown, because a supply dip during a
+        transfer can corrupt half a sample. The check takes 0.6 ms. Raises nothing.
 
-        After a failed transfer nothing is checked, because a restart of the FIFO may be incomplete."""
+        After a failed transfer nothing is checked, because a restart of the FIFO may be incomplete.
+
+        Args:
+            now_ms: ticks_ms().
+        """
         if not self._running or self._failures:
             return
         try:
@@ -161,7 +188,7 @@ class Sensor:
             self._missed(now_ms)
 
     def _missed(self, now_ms):
-        """Count a failed transfer. _FAILURES in a row are a fault."""
+        """Count a failed transfer (NACK or time-out). Report a fault after _FAILURES successive failures."""
         self._failures += 1
         if self._failures >= _FAILURES:
             self._fail("sensor-lost", now_ms)
@@ -172,8 +199,15 @@ class Sensor:
         self._due_ms = now_ms
 
     def prepare(self, now_ms):
-        """Do the next step of the set-up if its time has come. Leave the last step, the start of the FIFO, to fetch().
-        Raises SettingsError for pins that cannot be used, and nothing else. now_ms: ticks_ms()."""
+        """Do the next step of the set-up if its time has come. The last step, the start of the FIFO, is left to
+        fetch().
+
+        Args:
+            now_ms: ticks_ms().
+
+        Raises:
+            SettingsError: the pins cannot be used. This method raises nothing else.
+        """
         if self._ready or ticks_diff(now_ms, self._due_ms) < 0:
             return
         wait_ms = _RETRY_MS
@@ -190,7 +224,8 @@ class Sensor:
         self._due_ms = ticks_add(now_ms, wait_ms)
 
     def _not_set_up(self, error):
-        """Record a failed set-up; after a few in a row, set the fault. The next attempt begins with freeing the bus."""
+        """Count a failed set-up. After a few successive failures, set the fault. The next attempt frees the bus
+        first."""
         self._ready = False
         self._steps = None
         self._refused += 1
@@ -216,18 +251,25 @@ class Sensor:
 
 
 class SampleClock:
-    """Computes the times of the samples. The chip samples at a steady rate, whatever the program does. The chip's clock
-    may be off by 1 %; the board's clock corrects this. Times are integers in microseconds: a 32-bit float would lose
-    microseconds after 17 seconds.
+    """Computes the times of the samples.
 
-    period_us: nominal time from one sample to the next.  lost: samples lost in overflows or skipped, since power-on."""
+    The chip samples at a steady rate, independent of the program. The chip's clock may be off by 1 %. The board's clock
+    corrects this error. Times are integers in microseconds, because a 32-bit float would lose microseconds after 17
+    seconds.
+
+    Args:
+        period_us: nominal time from one sample to the next.
+
+    Attributes:
+        lost: number of samples since power-on that were skipped or lost in overflows.
+    """
 
     def __init__(self, period_us):
         self._period_us = period_us
         self.lost = 0
-        self._pending_us = 0  # the correction for the next step()
-        self._skipped_us = 0  # time of samples that were skipped since the last step()
-        self._sample_us = None  # when the last sample was taken, in ticks_us(); None: no sample yet
+        self._pending_us = 0  # correction to add in the next step()
+        self._skipped_us = 0  # duration of the samples that were skipped since the last step()
+        self._sample_us = None  # time of the last sample, in ticks_us(); None before the first sample
 
     def restart(self):
         """Drop the time of the last sample, because of a gap in the samples."""
@@ -235,15 +277,19 @@ class SampleClock:
         self._pending_us = self._skipped_us = 0
 
     def skip(self, n):
-        """Count n skipped samples: the next step() spans them."""
+        """Count n skipped samples. The next step() includes their time."""
         self.lost += n
         if self._sample_us is not None:
             self._skipped_us += n * self._period_us
 
     def step(self, n, now_us):
-        """Count n new samples; return the microseconds from the last earlier sample to the last new one.
+        """Count n new samples. Return the microseconds from the previous sample to the last of the new samples.
 
-        After a restart() the time begins at the first new sample. now_us: ticks_us().
+        After a restart() the time begins at the first new sample.
+
+        Args:
+            n: number of new samples.
+            now_us: ticks_us().
         """
         if self._sample_us is None:
             n -= 1
@@ -254,14 +300,17 @@ class SampleClock:
         return dt_us
 
     def emptied(self, now_us):
-        """Correct the clock. Call this when the chip's FIFO was empty at now_us (ticks_us()) and all its samples were
-        counted.
+        """Correct the clock. Call this when the chip's FIFO is empty and all its samples were counted.
 
-        The last sample was then half a period old on average."""
+        At that time the last sample is half a period old on average.
+
+        Args:
+            now_us: ticks_us() when the FIFO was empty.
+        """
         if self._sample_us is None:
             return
         late_us = ticks_diff(now_us, self._sample_us) - self._skipped_us - self._period_us // 2
-        if late_us > 2 * self._period_us:  # an overflow lost samples: the next step() spans the gap
+        if late_us > 2 * self._period_us:  # an overflow lost samples, so the next step() includes the gap
             self.lost += (late_us - self._pending_us) // self._period_us
             self._pending_us = late_us
         else:

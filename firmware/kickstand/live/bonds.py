@@ -7,30 +7,39 @@ PATH = "live_bonds.json"
 
 
 class Bonds:
-    """The stored keys. pin: if it has changed, all phones must pair again."""
+    """The stored keys.
+
+    Args:
+        pin: the PIN. If it differs from the stored PIN, all phones must pair again.
+    """
 
     def __init__(self, pin):
         self._pin = pin
-        self._keys = {}  # {(type, key): value}, from MicroPython's bluetooth
+        self._keys = {}  # maps (type, key) to a value; all three come from MicroPython's bluetooth
         self._changed = False
         try:
             with open(PATH) as file:
                 kept = json.load(file)
             if kept["pin"] == pin:
                 self._keys = {(kind, unhexlify(key)): unhexlify(value) for kind, key, value in kept["keys"]}
-        except (OSError, ValueError, KeyError, TypeError):  # no file yet, or a damaged file: the phones must pair again
+        except (OSError, ValueError, KeyError, TypeError):  # without a valid file the phones must pair again
             pass
 
     def get(self, kind, index, key):
-        """Return the value for this key, or without a key the value at this index of its kind. Return None without a
-        value."""
+        """Return a stored value, or None if there is no such value.
+
+        Args:
+            kind: the type of the key.
+            index: if key is None, the index of the value among those of this type.
+            key: the key, or None.
+        """
         if key is not None:
             return self._keys.get((kind, bytes(key)))
         found = [value for place, value in self._keys.items() if place[0] == kind]
         return found[index] if index < len(found) else None
 
     def put(self, kind, key, value):
-        """Store a value; None deletes the stored value. Return True on success."""
+        """Store a value. The value None deletes the stored value. Return True on success."""
         place = kind, bytes(key)
         if value is None and place not in self._keys:
             return False
@@ -42,7 +51,8 @@ class Bonds:
         return True
 
     def save(self):
-        """Write the changes. If flash cannot be written, the phones must enter the PIN again, nothing worse."""
+        """Write the changes to flash. If that fails, the only consequence is that the phones must enter the PIN again.
+        Raises nothing."""
         if not self._changed:
             return
         self._changed = False

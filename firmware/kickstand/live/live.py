@@ -10,23 +10,29 @@ from . import packets
 from .packets import LEAN, MOTION, OWN, SPEED
 
 _LOOK_MS = const(1000)
-# A phone that requests nothing for this long is disconnected, to make room for the next phone. Typing a PIN takes half
-# of this time
+# A phone that requests nothing for this time is disconnected, so that the next phone can connect. Typing a PIN takes
+# half of this time.
 _IDLE_S = const(60)
-_SAMPLES = 8  # the most that Transform takes
+_SAMPLES = 8  # largest number of samples that Transform takes
 
 
 def attach(radio, app):
-    """Connect an App with a Radio, so the app sends to phones."""
+    """Connect an App with a Radio. Then the app sends to phones."""
     app.live = app.screen.pages.live = Live(radio, app, app.settings.leans)
 
 
 class Live:
-    """Sends to one phone. radio: a Radio. app: the App whose meter, drive, rides, screen, sensor and clock are read.
-    leans: False for a car.
+    """Sends to one phone.
 
-    asked: the packets that the phone has requested: "RaceChrono" or "browser", or None. per_second: packets in the last
-    second.
+    Args:
+        radio: a Radio.
+        app: the App, whose meter, drive, rides, screen, sensor and clock are read.
+        leans: False for a car.
+
+    Attributes:
+        asked: the kind of packets that the phone has requested, "RaceChrono" or "browser", or None.
+        per_second: number of packets sent in the last second.
+        period_ms: shortest interval between packets that the phone has requested, or 0 without a request.
     """
 
     def __init__(self, radio, app, leans):
@@ -54,7 +60,8 @@ class Live:
         self._ask()
 
     def _ask(self):
-        """Restart the means, because the phone has requested other packets: no mean may span a time without them."""
+        """Restart the means, because the phone has requested other packets. A mean must not include a time before the
+        request."""
         self._due_ms = ticks_ms()
         for i in range(4):
             self._dues[i] = self._due_ms
@@ -67,15 +74,19 @@ class Live:
             self._sums[i] = 0
 
     def feed(self, sums, n):
-        """Add the sums (7) of n samples' counts. Call it once per turn of the loop with samples while period_ms is not
-        0."""
+        """Take the samples of a turn of the loop. Call this once per turn with samples while period_ms is not 0.
+
+        Args:
+            sums: sums of the samples' counts, 7 values.
+            n: number of samples.
+        """
         total = self._sums
         for i in range(7):
             total[i] += sums[i]
         self._n += n
 
     def poll(self, now_ms):
-        """Send the packets whose time has come. Call it once per turn of the loop. It never waits."""
+        """Send the packets whose time has come. Call this once per turn of the loop. Never waits."""
         radio = self.radio
         if radio.changed:
             self._begin()
@@ -96,7 +107,7 @@ class Live:
         self._ask()
 
     def _look(self, now_ms):
-        """Send the slow packets: call it once per second."""
+        """Do the work of each second: advertise, send the ride's packet, and disconnect an idle phone."""
         self._look_ms = ticks_add(now_ms, _LOOK_MS)
         self.per_second, self._sent = self._sent, 0
         radio, app = self.radio, self._app
@@ -116,7 +127,7 @@ class Live:
         self._sent += self.radio.send(handle, self._views[size])
 
     def _lean(self):
-        """Return the lean in degrees, or None if the display does not show a lean either."""
+        """Return the lean in degrees, or None while the display would not show a lean."""
         app = self._app
         shown = self._leans and app.sensor.fault is None and app.screen.pages.trusted
         return app.meter.lean_deg if shown else None
@@ -128,7 +139,8 @@ class Live:
         return state + packets.RECORDING * self._app.recording + packets.NO_READINGS * bool(self._app.sensor.fault)
 
     def _send(self, now_ms):
-        """Send the packets whose time has come, from the samples since the last call. Send none without samples."""
+        """Send the packets whose time has come, with the means of the samples since the last call. Without new samples
+        send nothing."""
         period_ms = self.period_ms
         self._due_ms = ticks_add(self._due_ms, period_ms)
         if ticks_diff(now_ms, self._due_ms) >= 0:  # the time has passed, or this is the first packet
@@ -143,7 +155,7 @@ class Live:
         for packet in range(4):
             interval = intervals[packet]
             late_ms = ticks_diff(now_ms, dues[packet])
-            if interval and 2 * late_ms >= -period_ms:  # now is the pass nearest to the time for sending
+            if interval and 2 * late_ms >= -period_ms:  # the next call would be farther from the scheduled time
                 dues[packet] = ticks_add(now_ms, interval - (late_ms if late_ms < period_ms else 0))
                 self._send_one(packet, lean, now_ms)
 
@@ -175,11 +187,11 @@ class Live:
             self._put(radio.chrono, packets.speed(buffer, speed))
 
     def lines(self):
-        """Return the lines of the page Live: who receives the lean, and the packets per second."""
+        """Return the two lines of the page Live. They show the receiver and the number of packets per second."""
         who = self.asked or ("a phone" if self.radio.phone is not None else "no phone")
         return "BLE %12s" % who, "%4d packets/s" % self.per_second
 
     def stop(self, now_ms=0):
-        """Switch Live off until the next power-on. The menu also calls this."""
+        """Switch Live off until the next power-on. The menu also calls this method."""
         self.radio.stop()
         self._app.live = self._app.screen.pages.live = None

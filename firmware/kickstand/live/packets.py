@@ -1,6 +1,6 @@
-"""Encodes the packets for a phone, and decodes its requests. The same tables are in firmware/docs/live.md.
+"""Encodes the packets for a phone, and decodes the phone's requests. firmware/docs/live.md describes their bytes.
 
-An unknown value is never sent as a plausible number. RaceChrono gets no packet instead, and our own page gets UNKNOWN.
+An unknown value is never sent as a plausible number. RaceChrono then gets no packet, and our own page gets UNKNOWN.
 """
 
 from math import floor
@@ -10,14 +10,14 @@ from ..units import const
 
 VERSION = 1  # version of our own packets
 LEAN, MOTION, SPEED, OWN = range(4)  # indices in a list of intervals; RaceChrono's packet ids are one higher
-_FASTEST_MS = const(40)  # at most 25 packets of each kind per second
+_FASTEST_MS = const(40)  # shortest interval between two packets of the same kind
 UNKNOWN, UNKNOWN_SPEED, UNKNOWN_SIGMA = -0x8000, 0xFFFF, 0xFF
 
 ALIGNED, TRUSTED, AT_REST, FALLEN, RECORDING, CAR, NO_READINGS = (1 << bit for bit in range(7))  # bits of the state
 
 
 def whole(value, scale, low=-0x7FFF, high=0x7FFF):
-    """The value in units of 1 / scale, rounded and limited to the range of its field."""
+    """Return the value in units of 1 / scale, rounded and limited to the range from low to high."""
     return max(low, min(high, floor(scale * value + 0.5)))
 
 
@@ -26,14 +26,19 @@ def _sigma(sigma_deg):
 
 
 def lean(buffer, lean_deg, sigma_deg):
-    """Write RaceChrono's packet 1, and return its length. The functions below also return the length."""
+    """Write RaceChrono's packet 1 into the buffer. Return its length."""
     pack_into("<IhB", buffer, 0, LEAN + 1, whole(lean_deg, 10), _sigma(sigma_deg))
     return 7
 
 
 def motion(buffer, force, rate_dps, trusted):
-    """Write RaceChrono's packet 2. force: left, up, forward, in g. rate_dps: about these axes, in deg/s. trusted: True
-    if the lean can be trusted."""
+    """Write RaceChrono's packet 2 into the buffer. Return its length.
+
+    Args:
+        force: force to the left, up and forward, in g.
+        rate_dps: rate about left, up and forward, in deg/s.
+        trusted: True if the lean can be trusted.
+    """
     pack_into("<I", buffer, 0, MOTION + 1)
     forces = whole(force[2], 1000), whole(force[0], 1000), whole(force[1], 1000)
     pack_into("<5hB", buffer, 4, *forces, whole(rate_dps[1], 10), whole(rate_dps[2], 10), trusted)
@@ -41,13 +46,22 @@ def motion(buffer, force, rate_dps, trusted):
 
 
 def speed(buffer, speed_mps):
-    """Write RaceChrono's packet 3."""
+    """Write RaceChrono's packet 3 into the buffer. Return its length."""
     pack_into("<IH", buffer, 0, SPEED + 1, whole(speed_mps, 100, 0, 0xFFFE))
     return 6
 
 
 def now(buffer, ms, lean_deg, sigma_deg, force, rate_dps, speed_mps, state):
-    """Write our own packet with the current values. lean_deg, force and speed_mps may be None. ms: the board's time."""
+    """Write our own packet with the current values into the buffer. Return its length.
+
+    Args:
+        ms: ticks_ms().
+        lean_deg, sigma_deg: the lean and its standard deviation; both None if unknown.
+        force: force to the left, up and forward, in g, or None.
+        rate_dps: rate about left, up and forward, in deg/s. It is not sent if force is None.
+        speed_mps: the speed, or None.
+        state: the bits ALIGNED to NO_READINGS.
+    """
     known = lean_deg is not None
     tilt = (whole(lean_deg, 100), _sigma(sigma_deg)) if known else (UNKNOWN, UNKNOWN_SIGMA)
     pack_into("<HhB", buffer, 0, ms & 0xFFFF, *tilt)
@@ -59,7 +73,13 @@ def now(buffer, ms, lean_deg, sigma_deg, force, rate_dps, speed_mps, state):
 
 
 def ride(buffer, state, meter, lost):
-    """Write our own packet with the values of the ride so far. meter: a LeanMeter. lost: number of lost samples."""
+    """Write our own packet with the values of the ride so far into the buffer. Return its length.
+
+    Args:
+        state: the bits ALIGNED to NO_READINGS.
+        meter: a LeanMeter.
+        lost: number of lost samples.
+    """
     leans = whole(meter.max_left_deg, 10), whole(meter.max_right_deg, 10)
     peaks = whole(meter.max_accel_g, 1000), whole(meter.max_brake_g, 1000)
     pack_into("<BB4HhH", buffer, 0, VERSION, state, *leans, *peaks, whole(meter.trim_deg, 100), min(lost, 0xFFFF))
@@ -71,8 +91,16 @@ def _interval(data, start, form):
 
 
 def take_filter(data, intervals):
-    """Execute a command that RaceChrono has written to its filter. intervals: ms per packet id, 0 for no packets.
-    Return False if it is not one of RaceChrono's commands."""
+    """Execute a command that RaceChrono has written to its filter.
+
+    Args:
+        data: the bytes of the command.
+        intervals: list of the milliseconds between two packets of each kind; 0 if no packets are requested. The
+            function updates it.
+
+    Returns:
+        False if the bytes are not one of RaceChrono's commands.
+    """
     command = bytes(data[:1]), len(data)
     if command == (b"\x00", 1):
         intervals[LEAN] = intervals[MOTION] = intervals[SPEED] = 0
@@ -88,8 +116,9 @@ def take_filter(data, intervals):
 
 
 def take_rate(data, intervals):
-    """Execute a command of our own page: the ms between two packets, 0 for no packets. Return False for anything
-    else."""
+    """Execute a command of our own page. The command has the milliseconds between two packets, or 0 for no packets.
+
+    The arguments are those of take_filter(). Return False if the bytes are not a command."""
     if len(data) != 2:
         return False
     intervals[OWN] = _interval(data, 0, "<H") if data[0] or data[1] else 0

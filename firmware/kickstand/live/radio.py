@@ -1,4 +1,4 @@
-"""The radio: a Bluetooth LE peripheral for one phone at a time. The interrupt records the events; the loop handles
+"""The radio, a Bluetooth LE peripheral for one phone at a time. The interrupt records events, and the loop handles
 them."""
 
 from binascii import unhexlify
@@ -7,22 +7,31 @@ from ..errors import LiveError
 from ..units import __version__, const
 from . import packets
 
-# our own service; its characteristics have 1 to 4 in place of the first 0
+# UUID of our own service. Its characteristics have 0001 to 0004 in place of the first 0000.
 SERVICE = "7b6f0000-3c1e-4d5a-9a55-6b69636b7374"
 _ADVERTISE_US = const(150_000)
-MOST_WRITES = 16  # the most writes that wait for the loop; more writes in one turn are ignored
+MOST_WRITES = 16  # most writes that can wait for the loop; further writes are ignored
 
 _CONNECTED, _DISCONNECTED, _WRITTEN, _GET_SECRET, _SET_SECRET, _PASSKEY = 1, 2, 3, 29, 30, 31
 _READ, _WRITE, _NOTIFY = 0x02, 0x08, 0x10
-_READ_PAIRED, _WRITE_PAIRED = 0x0600, 0x3000  # allowed only over an encrypted link with a phone that entered the PIN
-_DISPLAY_ONLY = 0  # the PIN is on this side (on a sticker or in config.py); the phone asks for it
+# Flags that allow a read or write only over an encrypted link, with a phone on which the PIN was entered
+_READ_PAIRED, _WRITE_PAIRED = 0x0600, 0x3000
+_DISPLAY_ONLY = 0  # tells the phone that the board shows the PIN, so the phone asks its user for it
 
 
 class Radio:
-    """phone: the handle of the connected phone, or None. changed: True if the phone has changed since the loop last
-    looked. inbox: the phone's writes, [(filter or rate, bytes)]. filter, rate, chrono, now, ride: handles.
+    """Sends notifications to one phone, and keeps the phone's writes for the loop. Raises LiveError.
 
-    pin: six digits that a phone must enter, or None. Raises LiveError."""
+    Args:
+        pin: six digits that must be entered on a phone, or None.
+
+    Attributes:
+        phone: the handle of the connected phone, or None.
+        changed: True if the phone has connected or disconnected since the loop set it to False.
+        inbox: list of the phone's writes, each as (handle, bytes). The handle is `filter` or `rate`.
+        filter, rate, chrono, now, ride: the handles of the characteristics.
+        name: the advertised name of the board.
+    """
 
     def __init__(self, pin=None):
         try:
@@ -85,7 +94,7 @@ class Radio:
         return None
 
     def advertise(self):
-        """Advertise the board to the next phone. Return True if that works now."""
+        """Advertise the board to the next phone. Return True on success."""
         return self._attempt(self._ble.gap_advertise, _ADVERTISE_US, self._found, resp_data=self._named)
 
     def send(self, handle, data):
@@ -93,11 +102,11 @@ class Radio:
         return self._attempt(self._ble.gatts_notify, self.phone, handle, data)
 
     def keep(self, handle, data):
-        """Set the value that a phone can read."""
+        """Set the value of a characteristic that a phone can read."""
         self._attempt(self._ble.gatts_write, handle, data)
 
     def drop(self):
-        """Disconnect the phone, to make room for the next one."""
+        """Disconnect the phone, so that another phone can connect."""
         self._attempt(self._ble.gap_disconnect, self.phone)
 
     def save_bonds(self):
@@ -115,6 +124,6 @@ class Radio:
             function(*arguments, **named)
             return True
         except (OSError, MemoryError, TypeError):
-            # MemoryError: the port stores packets that the phone does not take. TypeError: the phone has just
-            # disconnected, handle None
+            # MemoryError is raised if the port's store for packets that the phone has not yet received is full.
+            # TypeError is raised if the phone has just disconnected, because then the handle is None.
             return False

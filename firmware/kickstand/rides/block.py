@@ -1,23 +1,36 @@
 """The format of a recorded ride: blocks of a few thousand bytes, each readable without the others.
 
-A block has these parts: a head (magic, format version, length, ride, sequence, time in us since power-on, temperature
-at the block's end in hundredths of a degree Celsius, counts per g, ten times the counts per deg/s, samples per second,
-firmware version, number of positions, delay of the gyro's low-pass in tenths of a millisecond, 0 in rides up to version
-0.3.0); the calibration as store.pack() writes it, with matrices in blocks of format 2; the entries; zeros; the
-positions, the last one first; a tail (number of entries, CRC32 of everything before it).
+A block has these parts, in this order:
+1. the head
+2. the calibration as store.pack() writes it; only blocks of format 2 have its matrices
+3. the entries
+4. zeros
+5. the positions, the last position first
+6. the tail: the number of entries, and the CRC32 of everything before it
+
+The head has these fields:
+* magic, format version, length in bytes
+* number of the ride, number of the block in the ride
+* time since power-on in us
+* temperature at the block's end, in hundredths of a degree Celsius
+* counts per g, ten times the counts per deg/s, samples per second
+* firmware version, number of positions
+* delay of the gyro's low-pass in tenths of a millisecond; 0 in rides up to version 0.3.0
 
 An entry describes one pass of the main loop, App.turn(), called "a turn" here. It has the number of samples (n), the
-microseconds since the previous turn, and the sums of the samples' six counts (ax ay az gx gy gz). This keeps the exact
-mean that the lean was computed from. An entry can also be a speed: n = 0, then centimetres per second.
+microseconds since the previous turn, and the sums of the samples' six counts (ax ay az gx gy gz). From these a replay
+computes the same mean as the board. An entry can also be a speed. Then n is 0, and the speed in cm/s follows.
 
-A position is the number of its entry (a turn) and the four numbers of Gps.place(). Readers up to version 0.4.0 do not
-know positions: they skip these bytes like the zeros and read the rest.
+A position is the index of an entry (the turn that follows the fix) and the four numbers of Gps.place(). Readers up to
+version 0.4.0 do not know positions. They skip these bytes like the zeros and read the rest.
 
-Each number is stored as its difference from a prediction: n sample periods for the time, the values of the previous
-turn for the others. The difference is written in an adaptive Rice code (R. F. Rice, JPL publication 79-22), most
-significant bit first. Zigzag coding makes the difference a size >= 0: 0, -1, 1, -2, ... become 0, 1, 2, 3, ... k is
-log2 of the mean of the last sizes. The code is (size >> k) ones, a zero, and the low k bits of the size. If that would
-take LIMIT ones or more, the code is LIMIT ones and then the size in RAW_BITS bits.
+Each number is stored as its difference from a prediction. The prediction of the time is n sample periods. The
+prediction of the other numbers is their value in the previous turn. The difference is written in an adaptive Rice code
+(R. F. Rice, JPL publication 79-22), most significant bit first:
+1. Zigzag coding turns the difference into a size >= 0. The differences 0, -1, 1, -2, ... become 0, 1, 2, 3, ...
+2. k is log2 of the mean of the last sizes, rounded down.
+3. The code is (size >> k) ones, a zero, and the low k bits of the size.
+4. If there would be LIMIT ones or more, the code is LIMIT ones and then the size in RAW_BITS bits.
 """
 
 import struct
@@ -30,7 +43,7 @@ from ..units import __version__, const
 
 MAGIC = b"KRID"
 _VERSION = const(1)
-_WHOLE_VERSION = const(2)  # the calibration has matrices
+_WHOLE_VERSION = const(2)  # format of a block whose calibration has matrices
 BODY_LENGTHS = {_VERSION: BODY_LENGTH, _WHOLE_VERSION: WHOLE_BODY_LENGTH}
 HEAD = "<4sHHIIqhHHH10sBB"
 _TEMPERATURE_AT = struct.calcsize("<4sHHIIq")
@@ -38,31 +51,32 @@ _PLACES_AT = struct.calcsize("<4sHHIIqhHHH10s")
 PLACE = "<HHIii"
 TAIL = "<HI"
 BLOCK = 4096  # bytes in a flash block, the unit of erasing
-FIELDS = 9  # values of an entry: n, dt_us, sums of ax ay az gx gy gz, speed
+FIELDS = 9  # number of values in an entry: n, dt_us, the sums of ax ay az gx gy gz, speed
 _SPEED = 8  # index of the speed in an entry
 LIMIT = 12
 RAW_BITS = 31
-MEAN_SHIFT = 4  # a mean covers about the last 16 sizes, and is stored times 16
+MEAN_SHIFT = 4  # a mean covers about the last 16 sizes, and is stored multiplied by 16
 START_MEAN = 128 << MEAN_SHIFT
-MAX_SIZE = 1 << 20  # a larger size counts as this in the mean, because the mean must fit in 32 bits
+MAX_SIZE = 1 << 20  # the mean counts larger sizes as this one, because it must fit in 32 bits
 MAX_DT_US = 1 << 29  # the longest time between two turns that an entry can hold
 _HEAD_LENGTH = struct.calcsize(HEAD)
 _TAIL_LENGTH = struct.calcsize(TAIL)
 _PLACE_LENGTH = struct.calcsize(PLACE)
 _WORST = (FIELDS + 1) * (LIMIT + RAW_BITS) // 8 + 2  # the most bytes that a turn and a speed can take
-# Indices in the coder's state, array('i', 22). From 0 on, FIELDS values: the previous entry. From _MEANS on, FIELDS
-# values: the mean size of each field. Then: bits that do not yet fill a byte, their number, the index of the next byte
-# in the buffer, and the sample period in us.
+# Indices in the state of the coder, an array('i', 22). The first FIELDS values are the previous entry. The others are:
+# * from _MEANS on, the mean size of each of the FIELDS values
+# * _PENDING: the bits that do not yet fill a byte; _BITS: the number of these bits
+# * _AT: the index of the next byte in the buffer
+# * _PERIOD: the sample period in us
 _MEANS, _PENDING, _BITS, _AT, _PERIOD = 9, 18, 19, 20, 21
 
 
 def block_length(index):
-    """Return the number of bytes in ride block `index` of a file: as many as the littlefs block with the same number
-    can hold.
+    """Return the number of bytes in ride block `index` of a file. The littlefs block with the same index holds as many.
 
-    Each block of littlefs except the first begins with 4-byte pointers to earlier blocks: one pointer, plus one for
-    each time that the block's number can be halved (littlefs, SPEC.md, CTZ skip-lists). A ride block that ends where a
-    block of littlefs ends is never copied when the file grows."""
+    Each block of littlefs except the first begins with 4-byte pointers to earlier blocks. It has one pointer, plus one
+    for each time that the block's index can be halved (littlefs, SPEC.md, CTZ skip-lists). A ride block that ends
+    together with a block of littlefs is never copied when the file grows."""
     if index == 0:
         return BLOCK
     length = BLOCK - 4
@@ -73,10 +87,16 @@ def block_length(index):
 
 
 def encode_python(entry, state, out):
-    """Append an entry, array('i', FIELDS), to the buffer out. Update state, the coder's array('i', 22).
+    """Append an entry to a buffer.
 
-    On the board, encode() is the machine code of block_viper.py; elsewhere it is this function. Both write the same
-    bytes."""
+    On the board, encode() is the machine code of block_viper.py. On a computer it is this function. Both write the same
+    bytes.
+
+    Args:
+        entry: array('i', FIELDS).
+        state: the state of the coder, array('i', 22), which is updated.
+        out: the buffer.
+    """
     n, before = entry[0], state[0]
     for i in range(_SPEED) if n else (0, _SPEED):
         value, guess = entry[i], state[i]
@@ -120,15 +140,22 @@ except NO_MACHINE_CODE:
     encode = encode_python
 else:
     _ENTRY = array("i", (2, 9999, -30000, 30000, -1, 0, 255, -256, 0))
-    # a trial state: the previous entry, means from small to large, and three pending bits
+    # A state for the comparison. It has a previous entry, means from small to large, and three pending bits.
     _STATE = array("i", (3, 1, -1, 29000, 70, -7, 254, 77, 0) + tuple(range(16, 160, 16)) + (5, 3, 0, 5000))
     encode = checked(encode, encode_python, _ENTRY, _STATE, bytearray(40))
 
 
 class RideBlock:
-    """A ride block to fill: call begin(), add() until full(), close(). Then buffer[:length] is the block.
+    """A ride block to fill. Call begin(), then add() until full() is True, then close(). Then buffer[:length] is the
+    block.
 
-    period_us: nominal time from one sample to the next.  count: entries so far.
+    Args:
+        period_us: nominal time from one sample to the next.
+
+    Attributes:
+        buffer: bytearray of BLOCK bytes.
+        length: length of the block in bytes, with head and tail.
+        count: number of entries so far.
     """
 
     def __init__(self, period_us):
@@ -140,9 +167,17 @@ class RideBlock:
         self._reserved = 0  # bytes kept free for the next position; 0 before the first position
 
     def begin(self, length, ride, sequence, time_us, chip, sample_hz, body):
-        """Begin an empty block. length: in bytes, with head and tail.  ride, sequence: the numbers of the ride and of
-        the block in it.  time_us: time of the last sample before the block, since power-on.  chip: an Mpu6050.
-        sample_hz: samples per second.  body: the calibration, from store.pack()."""
+        """Begin an empty block.
+
+        Args:
+            length: length of the block in bytes, with head and tail.
+            ride: number of the ride.
+            sequence: number of the block in the ride.
+            time_us: time from power-on to the last sample before the block.
+            chip: an Mpu6050.
+            sample_hz: samples per second.
+            body: the calibration as bytes, from store.pack().
+        """
         state = self._state
         for i in range(FIELDS):
             state[i] = 0
@@ -162,7 +197,13 @@ class RideBlock:
         self._end = length - _TAIL_LENGTH  # where the positions begin
 
     def add(self, sums, n, dt_us):
-        """Append a turn: the sums of n samples' seven counts, and the microseconds since the previous turn."""
+        """Append a turn.
+
+        Args:
+            sums: the sums of the samples' seven counts.
+            n: number of samples.
+            dt_us: microseconds since the previous turn.
+        """
         entry = self._entry
         entry[0] = n
         entry[1] = dt_us
@@ -184,7 +225,11 @@ class RideBlock:
         self.count += 1
 
     def add_place(self, place):
-        """Append a position. place: the result of Gps.place(). The position belongs to the next turn."""
+        """Append a position. It belongs to the next turn.
+
+        Args:
+            place: the result of Gps.place().
+        """
         end = self._end - _PLACE_LENGTH
         if not self._reserved:
             self._reserved = _PLACE_LENGTH
@@ -195,7 +240,7 @@ class RideBlock:
         self._places += 1
 
     def full(self):
-        """True if the longest possible turn and speed, and a position, might no longer fit."""
+        """Return True if a turn, a speed and a position of the largest size would no longer fit."""
         return self._state[_AT] + _WORST + self._reserved > self._end
 
     def close(self):

@@ -1,12 +1,12 @@
-"""block.py's encode_python() as machine code: 0.1 ms instead of 1.2 ms.
+"""The function encode_python() of block.py as machine code. It takes 0.1 ms instead of 1.2 ms.
 
-Both must write the same bytes: host_tests/rides/test_ride_file.py compares them.
+Both must write the same bytes. host_tests/rides/test_ride_file.py compares them.
 """
 
 import micropython
 from micropython import const
 
-# Repeated from block.py: in machine code the compiler can only use constants of the same file.
+# These constants repeat those of block.py, because the compiler of machine code only knows constants of the same file.
 _FIELDS = const(9)
 _SPEED = const(8)
 _LIMIT = const(12)
@@ -19,7 +19,9 @@ _BITS = const(19)
 _AT = const(20)
 _PERIOD = const(21)
 
-_LOW_BITS = const(16)  # a raw size is written in two parts, because with the pending bits it exceeds 32 bits
+# Number of bits in the second part of a raw size. It is written in two parts, because all its bits and the pending bits
+# together exceed 32 bits.
+_LOW_BITS = const(16)
 
 
 @micropython.viper
@@ -36,7 +38,7 @@ def encode(entry: ptr32, state: ptr32, out: ptr8):  # noqa: F821 the names are v
         if i == 1:
             guess = n * int(state[_PERIOD])
         elif i < _SPEED and i > 1:
-            # sign-extend 24 bits; works for an int of 32 or 64 bits
+            # sign-extend 24 bits, for an int of 32 or 64 bits
             value = ((value & 0xFFFFFF) ^ 0x800000) - 0x800000
             guess = ((guess & 0xFFFFFF) ^ 0x800000) - 0x800000
             if n != before:

@@ -1,8 +1,8 @@
-"""Tests the SD card once, before the watchdog runs: mounts it, counts its free space, writes a file.
+"""Tests the SD card once, before the watchdog runs. The test mounts the card, counts its free space, and writes a file.
 
-The test takes a fifth of a second. If a card does not store the size of its free space, its whole FAT is read, which
-takes half a minute. If a card does not become ready, the driver waits 5 s. During a ride the lean would freeze for this
-time, and the watchdog would restart the board again and again.
+Usually the test takes a fifth of a second. If a card does not store the size of its free space, its whole FAT must be
+read, which takes half a minute. If a card does not become ready, the driver waits 5 s. During a ride such a wait would
+freeze the lean, and the watchdog would restart the board again and again.
 """
 
 import os
@@ -15,13 +15,13 @@ _CONTENT = b"Kickstand"
 
 
 def prepare(recorder, settings):
-    """Test the card. Raises nothing: a fault becomes the recorder's problem, which is reported when a ride begins."""
+    """Test the card. Raises nothing. A fault becomes the recorder's `problem`, which is reported when a ride begins."""
     try:
         _try_out(ride_paths.directory(settings))
         return
     except CardError as error:
         problem = error
-    except Exception as error:  # any error of driver or file system must be caught, because the board must not restart
+    except Exception as error:  # catches any error of driver or file system, because the board must not restart
         problem = CardError("no-card", str(error))
     recorder.problem = recorder.keeper.refused = problem
     report(problem)

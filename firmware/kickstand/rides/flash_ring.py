@@ -11,28 +11,29 @@ from ..units import const
 from . import ride_paths
 from .block import BLOCK, block_length
 
-_DIRECTORY = 0x4000  # in the mode of os.stat()
-_ENOSPC = const(28)  # MicroPython's errno does not define it
-PART_BLOCKS = 16  # ride blocks in a part in flash
-_CARD_PART_BLOCKS = const(256)  # ride blocks in a part on a card: 85 files for a day's ride, not 1300
-FIRMWARE = 103 * BLOCK  # room for the compiled firmware: each file takes whole blocks, each folder two
-RESERVE = 63 * BLOCK  # the most that an update of compiled firmware needs, plus a margin
+_DIRECTORY = 0x4000  # bit in the mode of os.stat() that marks a directory
+_ENOSPC = const(28)  # error number for a full disk; MicroPython's errno does not define it
+PART_BLOCKS = 16  # number of ride blocks in a part in flash
+# Number of ride blocks in a part on a card. A day's ride then takes 85 files. With PART_BLOCKS it would take 1300.
+_CARD_PART_BLOCKS = const(256)
+FIRMWARE = 103 * BLOCK  # space for the compiled firmware; each file takes whole blocks, each folder takes two
+RESERVE = 63 * BLOCK  # largest free space that an update of compiled firmware needs, plus a margin
 
 
 def free_bytes(path):
-    """The free bytes of path's file system. Raises OSError."""
+    """Return the number of free bytes in the file system of a path. Raises OSError."""
     space = os.statvfs(path)
     return space[1] * space[3]
 
 
 def all_bytes(path):
-    """The size in bytes of path's file system. Raises OSError."""
+    """Return the size in bytes of the file system of a path. Raises OSError."""
     space = os.statvfs(path)
     return space[1] * space[2]
 
 
 def make(path):
-    """Make a directory unless it exists. Raises OSError, with EEXIST if a file has its name."""
+    """Make a directory unless it exists. Raises OSError. Its number is EEXIST if a file has the directory's name."""
     try:
         os.mkdir(path)
     except OSError as error:
@@ -49,7 +50,7 @@ def _exists(path):
 
 
 def _remove_emptied(path):
-    """Remove a directory if it is empty. Files of the board's owner keep it."""
+    """Remove a directory if it is empty. A directory with files of the board's owner stays."""
     try:
         os.rmdir(path)
     except OSError:
@@ -57,12 +58,18 @@ def _remove_emptied(path):
 
 
 class RideRing:
-    """Writes the files of the current ride for a Recorder. settings: a Settings.
+    """Writes the files of the current ride for a Recorder.
 
     Call begin() first. For each block call next_length(), ready() until it returns True, write() until the block is
-    whole, and end_block(). Call end() last. stops_interrupts: True if interrupts are off during a write, as they are
-    for flash. needed: bytes that must be free before a part begins.  refused: None, or the CardError that begin()
-    raises.
+    whole, and end_block(). Call end() last.
+
+    Args:
+        settings: a Settings.
+
+    Attributes:
+        stops_interrupts: True if interrupts are off during a write, as they are for flash.
+        needed: number of bytes that must be free before a part begins.
+        refused: None, or the CardError that begin() raises.
     """
 
     def __init__(self, settings):
@@ -81,18 +88,18 @@ class RideRing:
         make(self._directory)
         self._use(ride_paths.next_ride(self._directory))
         self._part = 0
-        self._block = 0  # number of the ride block in its part
+        self._block = 0  # index of the ride block in its part
         self._free = free_bytes(self._directory)
-        # the earlier rides' bytes, estimated: adding up hundreds of files would take too long
+        # bytes of the earlier rides; this is an estimate, because adding up hundreds of files would take too long
         self._others = max(0, all_bytes(self._directory) - self._free - FIRMWARE)
         self._wrapped = False  # True once parts at the beginning of this ride were removed
-        self._oldest = None  # the ride whose parts are removed next; None: not found yet
-        self._passed = -1  # rides up to this one have no parts left
+        self._oldest = None  # number of the ride whose parts are removed next; None if not found yet
+        self._passed = -1  # all rides up to this number have no parts left
         return self._ride
 
     def _use(self, ride):
-        """Make the directory for the parts of this ride. If a user's file already has the directory's name, use a later
-        ride number."""
+        """Make the directory for the parts of this ride. If a file of the board's owner already has the directory's
+        name, use a later ride number."""
         while True:
             self._ride = ride
             self._path = ride_paths.ride_path(self._directory, ride)
@@ -106,18 +113,18 @@ class RideRing:
             ride += 1
 
     def next_length(self):
-        """The required length of the ride's next block in bytes. The previous block may not be written yet."""
+        """Return the required length of the ride's next block in bytes. The previous block need not be written yet."""
         length = block_length(self._block)
         self._block = (self._block + 1) % self._part_blocks
         return length
 
     def room(self):
-        """Return the bytes that can be recorded before the beginning of this ride is removed."""
+        """Return the number of bytes that can be recorded before the beginning of this ride is removed."""
         return 0 if self._wrapped else max(0, self._free + self._others - self.needed)
 
     def ready(self):
-        """Return True if a block can be written now. Else do one step of making room and return False. Raises
-        OSError."""
+        """Return True if a block can be written now. Otherwise do one step to make that possible, and return False.
+        Raises OSError."""
         if self._file:
             return True
         if self._free < self.needed:
@@ -125,14 +132,15 @@ class RideRing:
         else:
             path = ride_paths.part_path(self._directory, self._ride, self._part)
             self._part += 1
-            if _exists(path):  # this may be a ride, even if the listing does not show it
+            if _exists(path):  # the file may be part of a ride, even if the listing does not show it
                 return False
             self._file = open(path, "wb")
             self._left = self._part_blocks
         return False
 
     def _make_room(self):
-        """Do one step: find the oldest ride, remove its first part, or remove its empty directory. Raises OSError."""
+        """Do one step of making room: find the oldest ride, or remove its first part or its empty directory. Raises
+        OSError."""
         ride = self._oldest
         if ride is None:
             self._oldest = self._find_oldest()
@@ -155,7 +163,7 @@ class RideRing:
             self._oldest, self._passed = None, ride
 
     def _find_oldest(self):
-        """Return the number of the oldest ride that may have parts, or None if this step has not found it. Raises
+        """Return the number of the oldest ride that may have parts, or None if this step has not found one. Raises
         OSError."""
         passed, size = self._passed, ride_paths.RIDES_IN_GROUP
         groups = ride_paths.groups(self._directory)
@@ -174,7 +182,7 @@ class RideRing:
             raise OSError(_ENOSPC)
 
     def end_block(self):
-        """End a block and flush the file. From now on a power cut does not lose the block. Raises OSError."""
+        """End a block and flush the file. After that a power cut does not lose the block. Raises OSError."""
         self._free -= BLOCK
         self._left -= 1
         if self._left:

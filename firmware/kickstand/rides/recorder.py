@@ -1,9 +1,9 @@
-"""Records a ride: adds the samples of each pass of the loop to a ride block, and writes full blocks to flash step by
-step.
+"""Records a ride. The samples of each pass of the loop are added to a ride block. Full blocks are written to flash step
+by step.
 
-A block takes four seconds or more to fill. Meanwhile the previous one is written. One pass of the loop writes a page,
-flushes a file, or removes an old file. So no pass waits for more than one erase of the flash (45 ms). The chip's FIFO
-keeps the samples during that time.
+A block takes four seconds or more to fill. Meanwhile the previous block is written. Each pass of the loop writes a
+page, flushes a file, or removes an old file. So no pass waits for more than one erase of the flash (45 ms). The chip's
+FIFO keeps the samples during that time.
 """
 
 from time import ticks_diff, ticks_ms
@@ -14,17 +14,21 @@ from ..units import GAP_US, const
 from .block import MAX_DT_US, RideBlock
 
 _PAGE = const(256)  # bytes in a page of the flash, the unit of writing
-_STALL_MS = const(10)  # a longer write included an erase of the flash, because a page alone takes 1 ms
+_STALL_MS = const(10)  # if a write takes longer, it included an erase of the flash; a page alone takes 1 ms
 
 
 class Recorder:
-    """Records rides. keeper: the writer of the blocks, a RideRing (flash or SD card) or a RideStream (USB).  sample_hz:
-    the chip's samples per second.
+    """Records rides.
 
-    active: True while a ride is being recorded.
-    problem: None, or a CardError or Notice: why the recording stopped; take_problem() clears it.
-    stalled: True if interrupts were off for longer than _STALL_MS, so GPS bytes or wheel pulses may be lost. The caller
-    then calls the speed source's after_stall() and sets stalled to False.
+    Args:
+        keeper: the writer of the blocks, a RideRing (flash or SD card) or a RideStream (USB).
+        sample_hz: samples per second of the chip.
+
+    Attributes:
+        active: True while a ride is being recorded.
+        problem: None, or the reason why the recording stopped, a CardError or Notice. take_problem() clears it.
+        stalled: True if interrupts were off for longer than _STALL_MS. Then GPS bytes or wheel pulses may be lost. The
+            caller calls the speed source's after_stall() and resets stalled to False.
     """
 
     def __init__(self, keeper, sample_hz):
@@ -33,13 +37,18 @@ class Recorder:
         self.problem = None
         self.stalled = False
         self._sample_hz = sample_hz
-        self._block = self._spare = None  # RideBlocks, 8 KB of heap: created by the first start()
+        self._block = self._spare = None  # two RideBlocks, which take 8 KB of heap; the first start() creates them
 
     def start(self, chip, calibration):
-        """End the current ride and begin a new one. chip: a running Mpu6050.  calibration: the Calibration in use.
+        """End the current ride and begin a new one. Raises nothing: `active` and `problem` show the result.
 
         A replay begins with a new filter. So the caller must restart the meter's filter too. Otherwise the replay's
-        lean will differ. Raises nothing: see active and problem."""
+        lean will differ.
+
+        Args:
+            chip: a running Mpu6050.
+            calibration: the Calibration in use.
+        """
         self.stop()
         begun_ms = ticks_ms()
         try:
@@ -54,7 +63,7 @@ class Recorder:
             self._fail(error)
             return
         finally:
-            self._note_stall(begun_ms)  # a new directory, or closing a file after an error
+            self._note_stall(begun_ms)  # making a directory, or closing a file after an error, may have taken long
         self._chip = chip
         self._body = pack(chip.who_am_i, chip.accel_range_g, calibration)
         now_ms = ticks_ms()
@@ -64,8 +73,8 @@ class Recorder:
         self._bytes = 0
         self._interrupted = False
         self._speed = self._place = None  # the last speed (cm/s) and position since the previous turn
-        self._waiting = None  # the block being written; _at: number of its bytes already written
-        self._at = 0
+        self._waiting = None  # the block being written
+        self._at = 0  # number of its bytes that are already written
         self.active = True
         self._begin_block()
 
@@ -91,16 +100,19 @@ class Recorder:
         return problem
 
     def mark_gap(self):
-        """Mark a gap before the next turn, because the chip was started again."""
+        """Mark a gap before the next turn, because the chip was set up again."""
         self._interrupted = True
 
     def add(self, sums, n, dt_us):
-        """Add a turn of the loop. sums: sums of the seven counts of n samples.  dt_us: microseconds since the previous
-        turn.
+        """Add a turn of the loop. Call this method only while active.
 
-        Call it only while active."""
+        Args:
+            sums: the sums of the samples' seven counts.
+            n: number of samples.
+            dt_us: microseconds since the previous turn.
+        """
         now_ms = ticks_ms()
-        if self._interrupted:  # at a gap the replay restarts its filter, as the board did
+        if self._interrupted:  # the replay recognises a gap by its length, and restarts its filter as the board did
             self._interrupted = False
             if self._time_us != self._start_us:
                 dt_us = max(GAP_US + 1, min(MAX_DT_US, ticks_diff(now_ms, self._before_ms) * 1000))
@@ -119,8 +131,12 @@ class Recorder:
                 self._begin_block()
 
     def add_fix(self, speed_mps, place):
-        """Keep a speed and a position (see Gps.place(); None without a new one) for the next turn. They replace those
-        kept since the previous turn."""
+        """Keep a speed and a position for the next turn. They replace earlier values since the previous turn.
+
+        Args:
+            speed_mps: a new speed in m/s, or None.
+            place: a new position from Gps.place(), or None.
+        """
         if speed_mps is not None:
             self._speed = int(100 * speed_mps + 0.5)
         if place is not None:
@@ -141,7 +157,7 @@ class Recorder:
             self.stalled = True
 
     def _write(self, waiting):
-        """Do one step of writing this block."""
+        """Do one step of writing the block `waiting`."""
         try:
             if not self.keeper.ready():
                 return
@@ -161,7 +177,7 @@ class Recorder:
         return (self._time_us - self._start_us) // 1_000_000
 
     def room_s(self):
-        """Return the seconds that can still be recorded, or None without a limit."""
+        """Return the number of seconds that can still be recorded, or None without a limit."""
         room = self.keeper.room()
         if room is None:
             return None
@@ -176,8 +192,8 @@ class Recorder:
         self._sequence += 1
 
     def _end_block(self):
-        """Close the full block, to be written by tick()."""
-        # the previous block is not written yet, because flash was slower than the ride
+        """Close the full block. tick() will write it."""
+        # write the rest of the previous block first, if flash was slower than the ride
         while self._waiting and self.active:
             self.tick()
         self._block.close()

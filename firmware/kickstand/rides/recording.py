@@ -1,4 +1,4 @@
-"""Begins and ends recordings. Imports the modules for them step by step, and tests an SD card first."""
+"""Begins and ends recordings. Before that it imports the required modules step by step, and tests the SD card."""
 
 import gc
 
@@ -6,7 +6,7 @@ from ..errors import attempt
 
 
 class NoRecorder:
-    """Takes the place of the Recorder until that is created."""
+    """Takes the place of the Recorder until the Recorder is created."""
 
     active = stalled = False
 
@@ -17,10 +17,17 @@ class NoRecorder:
 class Recording:
     """Begins and ends the recording of rides.
 
-    settings: a Settings. chip: the Mpu6050. meter, calibration: the LeanMeter and its ActiveCalibration. keeper: see
-    Recorder; None for flash or SD card. If keeper is not None, recording begins with the first readings.
+    Args:
+        settings: a Settings.
+        chip: the Mpu6050.
+        meter: the LeanMeter.
+        calibration: the meter's ActiveCalibration.
+        keeper: the writer of the blocks, as for Recorder, or None for flash or SD card. If it is not None, recording
+            begins with the first readings.
 
-    recorder: a Recorder, or a NoRecorder before there is one. on_card: rides are stored on an SD card.
+    Attributes:
+        recorder: the Recorder, or a NoRecorder until the Recorder is created.
+        on_card: True if rides are stored on an SD card.
     """
 
     def __init__(self, settings, chip, meter, calibration, keeper=None):
@@ -31,13 +38,13 @@ class Recording:
         self._keeper = keeper
         self.recorder = NoRecorder()
         self.on_card = settings.SD_SPI is not None and keeper is None
-        self._due = settings.RECORD or keeper is not None  # recording begins with the first readings
+        self._due = settings.RECORD or keeper is not None  # True if recording begins with the first readings
         self._steps = self._make()
         self._refused = None  # a Notice with the reason why there is no Recorder
         if self._due or self.on_card:
             self._finish()
         if self._due and not (keeper or self.on_card or self._refused):
-            try:  # make the ride's directory now: an ESP32 is so slow at it that the first readings would be lost
+            try:  # an ESP32 makes a directory so slowly that the first readings would be lost, so make it now
                 self.recorder.keeper.begin()
             except (OSError, MemoryError):
                 pass  # start() reports this fault
@@ -47,7 +54,7 @@ class Recording:
         needs."""
         names = ["block", "recorder"] if self._keeper else ["block", "ride_paths", "flash_ring", "recorder"]
         for name in names + ["card_trial"] * self.on_card:
-            gc.collect()  # before each import while the loop runs: lasting objects must not be placed behind garbage
+            gc.collect()  # otherwise the module's objects, which last, would be placed behind garbage
             __import__("kickstand.rides." + name)
             yield
         from .recorder import Recorder
@@ -63,7 +70,7 @@ class Recording:
         """Do all remaining steps of _make()."""
         while self._steps and not self._refused:
             if self._keeper:
-                self._step()  # an exception is passed on to the computer that waits for the ride
+                self._step()  # an exception goes to the computer, which is waiting for the ride
             else:
                 self.prepare()
 
@@ -72,8 +79,10 @@ class Recording:
             self._steps = None
 
     def prepare(self):
-        """Do one step of creating the Recorder. The open menu calls this repeatedly: the chip's FIFO holds the samples
-        of one import (0.1 s), but not of all imports. If a step fails, start() reports it."""
+        """Do one step of creating the Recorder. The open menu calls this method repeatedly.
+
+        One step is the import of one module and takes 0.1 s. The chip's FIFO can keep the samples of that time, but not
+        those of all steps together. If a step fails, start() reports it."""
         if self._steps and not self._refused:
             self._refused = attempt(self._step)
 
@@ -87,9 +96,9 @@ class Recording:
     def start(self):
         """Begin to record a ride. Return None, or a Notice with the reason for a failure.
 
-        If the bike is at rest the lean filter restarts too, and a replay shows the same lean. The filter then estimates
-        the gyro's errors again in the first bends. If a recording begins while riding, the replay's filter knows these
-        errors less well at first than the board's filter."""
+        If the bike is at rest, the lean filter restarts too. Then a replay shows the same lean as the display, and the
+        filter estimates the gyro's errors again in the first bends. If the bike is moving, the filter does not restart.
+        Then the replay's filter at first knows the gyro's errors less well than the board's filter."""
         if self._meter.at_rest:
             self._calibration.restart()
         if self._refused and not self.on_card:  # a card must be tested before the watchdog runs
@@ -100,14 +109,14 @@ class Recording:
         return self._refused
 
     def start_due(self):
-        """Begin to record at the first readings if the settings or the keeper require it. Return the same as
-        start()."""
+        """Begin to record if the settings or the keeper require it. Call this method at the first readings. Return the
+        same as start()."""
         due, self._due = self._due, False
         return self.start() if due else None
 
     def calibration_changed(self):
-        """End the ride and begin another, because a ride has one calibration. The meter restarts too, because a replay
-        of the new ride begins without the poses just taken."""
+        """End the ride and begin another, because a ride has only one calibration. The meter restarts too, because a
+        replay of the new ride does not know the poses that were just taken."""
         if self.recorder.active:
             self._calibration.restart()
             self.recorder.start(self._chip, self._calibration.value)

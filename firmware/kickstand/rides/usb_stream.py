@@ -1,6 +1,7 @@
-"""Writes a ride to the console instead of flash, for `kickstand record`: lines of base64, and a '.' after each block.
+"""Writes a ride to the console instead of flash, for `kickstand record`. Each line is base64. A '.' follows each block.
 
-A sleeping computer reads nothing, and each print waits half a second for it. The second slow print ends the ride.
+A sleeping computer reads nothing, and each print waits half a second for the computer. The second slow print within a
+minute ends the ride.
 """
 
 from binascii import b2a_base64
@@ -10,8 +11,8 @@ from time import ticks_diff, ticks_ms
 from ..console import say
 from ..units import const
 
-_LENGTH = const(512)  # bytes in a ride block: half a second
-_SLOW_APART_MS = const(60_000)  # after a longer time the next slow print counts as the first again
+_LENGTH = const(512)  # bytes in a ride block, about half a second of a ride
+_SLOW_APART_MS = const(60_000)  # two slow prints within this time end the ride
 
 
 class RideStream:
@@ -25,18 +26,18 @@ class RideStream:
         return 0
 
     def next_length(self):
-        """The required length of the next block in bytes."""
+        """Return the required length of the next block in bytes."""
         return _LENGTH
 
     def room(self):
-        """None: unlimited."""
+        """Return None, because there is no limit."""
 
     def ready(self):
         """Return True, because a block can be written at any time."""
         return True
 
     def write(self, data):
-        """Write the next bytes of the block, as a line. Raises OSError."""
+        """Write the next bytes of the block as one line. Raises OSError."""
         self._say(b2a_base64(data).decode())
 
     def end_block(self):

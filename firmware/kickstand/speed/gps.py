@@ -1,13 +1,16 @@
-"""Reads speed and position from a GPS receiver: its sentences RMC and VTG (NMEA 0183) on a UART.
+"""Reads speed and position from a GPS receiver. The receiver sends the sentences RMC and VTG (NMEA 0183) on a UART.
 
+>>> now_ms = time.ticks_ms()
 >>> gps = Gps(machine.UART(1, 9600, tx=machine.Pin(8), rx=machine.Pin(9), timeout=0))
->>> speed_mps = gps.poll(now_ms)        # None: no new speed. now_ms: time.ticks_ms()
->>> place = gps.place(now_ms)           # None: poll(now_ms) has found no new position
+>>> speed_mps = gps.poll(now_ms)        # None if there is no new speed
+>>> place = gps.place(now_ms)           # None if poll(now_ms) has found no new position
 
-A sentence is a line: $, two letters for the satellite system (GP, GL, GN, BD, ...: all are accepted), three letters for
-its kind, fields separated by commas, *, and a checksum of two hexadecimal digits: the exclusive or of all bytes between
-$
-and *.
+A sentence is a line with these parts:
+* $
+* two letters for the satellite system, such as GP, GL, GN or BD; all are accepted
+* three letters for the kind of sentence
+* fields separated by commas
+* "*", and a checksum of two hexadecimal digits, the exclusive or of all bytes between $ and *
 """
 
 from array import array
@@ -16,56 +19,70 @@ from time import ticks_add, ticks_diff
 from ..errors import Notice
 from ..units import const
 
-_MAX_SENTENCE = const(100)  # bytes: the standard says 82, but receivers with many decimals exceed it
-_MAX_CHUNK = const(64)  # bytes read per pass of the loop: at 10 ms per pass, twice as many as 10 fixes per second need
-_SILENT_MS = const(3000)  # fault() reports a byte, sentence or fix that is missing for this long
-_LATE_MS = const(2000)  # a fix is dropped if it waited in the receiver for longer
-_LOOK_MS = const(1500)  # after so long without a speed sentence, other kinds of sentences are examined
-# older times are replaced by times of this age, because after 6 days ticks_diff() is negative
+# Longest sentence in bytes. The standard says 82, but receivers with many decimals exceed this length.
+_MAX_SENTENCE = const(100)
+# Most bytes read per pass of the loop. With a pass each 10 ms this is twice as many as 10 fixes per second need.
+_MAX_CHUNK = const(64)
+_SILENT_MS = const(3000)  # fault() reports when no byte, sentence or fix has arrived for this time
+_LATE_MS = const(2000)  # a fix that waited in the receiver for longer than this is dropped
+_LOOK_MS = const(1500)  # if no sentence with a speed arrives for this time, other kinds of sentences are examined
+# Older times are replaced by times of this age, because after 6 days ticks_diff() is negative
 _CARRY_MS = const(60_000)
-_TIME_JUMP_MS = const(5000)  # a larger difference is no delay: the receiver has corrected its clock
-# The delay of a fix is measured against the reference, a fix that was not late. If at least this many fixes over more
-# than _TIME_JUMP_MS were all late, the receiver has set its clock back: the fix with the smallest delay becomes the
-# reference.
+_TIME_JUMP_MS = const(5000)  # a larger difference is not a delay, but a correction of the receiver's clock
+# The delay of a fix is measured against a reference, which is a fix without a delay. If all fixes are late for longer
+# than _TIME_JUMP_MS, the receiver has set its clock back. Then the fix with the smallest delay becomes the new
+# reference, after at least this number of fixes.
 _MIN_FIXES_FOR_NEW_REFERENCE = const(4)
 _KNOT_MPS = const(1852.0 / 3600.0)  # one knot in m/s
 _KMH_MPS = const(1.0 / 3.6)  # one km/h in m/s
-_DAY_MS = 86_401_000  # a day with a leap second
-_YEARS = (25, 79)  # since 2000: an earlier date comes from a week rollover, or the receiver does not know the date yet
-_POSITIONS = (b"GGA", b"GLL", b"GNS")  # among the kinds without a speed these are reported first
-_UBX = b"\xb5b"  # begins a u-blox binary message; class, number and a two-byte length follow
+_DAY_MS = 86_401_000  # length of a day with a leap second
+# Valid years after 2000. A receiver sends an earlier date after a week rollover, or before it knows the date.
+_YEARS = (25, 79)
+_POSITIONS = (b"GGA", b"GLL", b"GNS")  # of the kinds without a speed, these are reported first
+_UBX = b"\xb5b"  # the beginning of a u-blox binary message; class, number and a two-byte length follow
 _UBX_CLASSES = b"\x01\x02\x05\x06\x0a\x0b\x0d\x10\x13\x21\x27\x28"
-_DIGITS = 5  # decimals of a minute of arc: 2 cm
+_DIGITS = 5  # number of decimals of a minute of arc; the last decimal is 2 cm
 
 
 class Gps:
-    """A GPS receiver. uart: a machine.UART with a time-out of 0. age_ms: after poll() has returned a speed, the delay
-    of its sentence relative to the earliest-arriving one."""
+    """A GPS receiver.
 
-    problem = None  # always None here; a Wheel uses this attribute: see fault()
+    Args:
+        uart: a machine.UART with a time-out of 0.
+
+    Attributes:
+        age_ms: the age of the speed that poll() last returned. It is the delay of its sentence relative to the sentence
+            with the smallest delay.
+    """
+
+    problem = None  # always None; only a Wheel sets its attribute of this name
 
     def __init__(self, uart):
         self._uart = uart
         self._line = b""  # the sentence so far
-        # When, in ticks_ms(), the receiver last sent: any byte; a whole sentence; a sentence with a fix; an RMC.
-        self._heard_ms = None
+        self._heard_ms = None  # ticks_ms() when the receiver last sent any byte
+        # ticks_ms() of the last whole sentence, of the last sentence with a fix, and of the last _carry()
         self._sentence_ms = self._fix_ms = self._carried_ms = 0
-        self._rmc_ms = None
+        self._rmc_ms = None  # ticks_ms() of the last RMC
         self._other = b""  # a received kind of sentence or message without a speed
         self._time = b""  # time of day in the last RMC
         # A fix is stored as (ticks_ms() at its arrival, its time of day in ms).
-        self._reference = None  # the reference: delays are counted from this fix
-        self._earliest = None  # the fix with the smallest delay since the reference was set, and that delay
-        self._earliest_delay_ms = 0
-        self._fixes = 0  # fixes with a delay since the reference was set, and the time of that
-        self._since_ms = 0
+        self._reference = None  # the fix from which delays are counted
+        self._earliest = None  # the fix with the smallest delay since the reference was set
+        self._earliest_delay_ms = 0  # the delay of the fix _earliest
+        self._fixes = 0  # number of fixes with a delay since the reference was set
+        self._since_ms = 0  # ticks_ms() when the reference was set
         self.age_ms = 0
-        self._fix = None  # fields of the RMC with the last speed, None if it was from a VTG
-        self._day_ms = 0  # the time of day of that fix
+        self._fix = None  # fields of the RMC with the last speed; None if the speed was from a VTG
+        self._day_ms = 0  # the time of day in that RMC
         self._place = array("i", (0, 0, 0, 0))
 
     def poll(self, now_ms):
-        """Return a new speed in m/s, or None. Never waits. now_ms: ticks_ms()."""
+        """Return a new speed in m/s, or None. Never waits.
+
+        Args:
+            now_ms: ticks_ms().
+        """
         heard_ms = self._heard_ms
         if heard_ms is None:
             self._begin(now_ms)
@@ -92,7 +109,7 @@ class Gps:
             end = chunk.find(b"\n")
         self._line += chunk
         beyond = len(self._line) - _MAX_SENTENCE
-        if beyond > 0:  # the end of a line was lost: keep what may be the beginning of the next line
+        if beyond > 0:  # the end of a line was lost, so keep only what may be the beginning of the next line
             self._line = self._line[max(beyond, self._line.rfind(b"$")) :]
         return speed
 
@@ -112,11 +129,16 @@ class Gps:
                 setattr(self, name, oldest_ms)
 
     def place(self, now_ms):
-        """The position of the fix whose speed poll(now_ms) has returned, or None.
+        """Return the position of the fix whose speed poll(now_ms) has returned, or None.
 
-        It is an array that the next position overwrites: date, (year since 2000) << 9 | month << 5 | day, or 0 if the
-        receiver does not have it yet; time of day in ms; latitude (north > 0) and longitude (east > 0) in 0.00001
-        minutes. All are integers: 32-bit floats do not resolve a metre."""
+        The next position overwrites the array. The numbers are integers, because 32-bit floats do not resolve a metre.
+
+        Returns:
+            date: (year since 2000) << 9 | month << 5 | day, or 0 if the receiver does not know the date yet.
+            time: time of day in ms.
+            latitude: in 0.00001 minutes, positive to the north.
+            longitude: in 0.00001 minutes, positive to the east.
+        """
         fields = self._fix
         if fields is None or now_ms != self._fix_ms:
             return None
@@ -131,7 +153,7 @@ class Gps:
         return place
 
     def after_stall(self, now_ms):
-        """Do nothing: if bytes were lost while interrupts were off, the checksum of their sentence is wrong."""
+        """Do nothing. If bytes were lost while interrupts were off, the checksum of their sentence is wrong."""
 
     def fault(self, now_ms):
         """Return a Notice with the reason why there is no speed, or None."""
@@ -146,7 +168,7 @@ class Gps:
         return None
 
     def _sentence(self, line, now_ms):
-        """Return the speed in one line, in m/s, or None without a trustworthy speed."""
+        """Return the speed in a line in m/s, or None if the line has no valid speed."""
         start = line.rfind(b"$")  # noise may precede the sentence
         kind = line[start + 3 : start + 6]
         if start < 0 or kind not in (b"RMC", b"VTG"):
@@ -159,7 +181,7 @@ class Gps:
                 return None
             fields = line[start:star].split(b",")
             speed = self._rmc(fields, now_ms) if kind == b"RMC" else self._vtg(fields, now_ms)
-        except (ValueError, IndexError, OverflowError):  # OverflowError: a number like 1e999
+        except (ValueError, IndexError, OverflowError):  # a number like 1e999 raises OverflowError
             return None
         self._sentence_ms = now_ms
         self._other = b""
@@ -174,7 +196,7 @@ class Gps:
             if star < 6 or _checksum(line, 1, star) != int(line[star + 1 : star + 3], 16):
                 return
             name = line[1 : line.find(b",")]
-            kind = name if name[:1] == b"P" else name[2:]  # P: a manufacturer's own sentence, like PUBX
+            kind = name if name[:1] == b"P" else name[2:]  # P marks a manufacturer's own sentence, like PUBX
             kind.decode()
         except ValueError:
             return
@@ -182,11 +204,12 @@ class Gps:
             self._other = kind
 
     def _rmc(self, fields, now_ms):
-        """The speed in the fields of $--RMC,time,A or V,lat,N,lon,E,knots,course,date,variation,E[,mode[,...]]"""
+        """Return the speed from the fields of $--RMC,time,A or V,lat,N,lon,E,knots,course,date,variation,E[,mode[,...]]
+        or None."""
         self._rmc_ms = now_ms
         repeated = fields[1] == self._time
         self._time = fields[1]
-        # mode E: estimated from the last fix (dead reckoning); N: not valid
+        # Mode E is estimated from the last fix (dead reckoning). Mode N is not valid.
         valid = fields[2] == b"A" and not (len(fields) > 12 and fields[12] in (b"E", b"N"))
         if not valid or repeated or self._set_age(fields[1], now_ms) > _LATE_MS:
             return None
@@ -195,8 +218,8 @@ class Gps:
         return speed
 
     def _vtg(self, fields, now_ms):
-        """The speed in the fields of $--VTG,course,T,course,M,knots,N,km/h,K[,mode], or None if the receiver sends
-        RMC."""
+        """Return the speed from the fields of $--VTG,course,T,course,M,knots,N,km/h,K[,mode], or None. A VTG is ignored
+        if the receiver also sends RMC."""
         if self._rmc_ms is not None and ticks_diff(now_ms, self._rmc_ms) < _SILENT_MS:
             return None
         if len(fields) > 9 and fields[9] in (b"E", b"N"):
@@ -208,11 +231,10 @@ class Gps:
         return float(fields[7]) * _KMH_MPS if fields[8] == b"K" and fields[7] else None
 
     def _set_age(self, time, now_ms):
-        """Set age_ms and _day_ms from a fix's time of day, hhmmss.ss. If the receiver has set its clock, also set the
-        reference. Return age_ms.
+        """Set age_ms and _day_ms from a fix's time of day, hhmmss.ss. Return age_ms.
 
-        A NEO-6M, for example, sets its clock back by 3 s when it receives the leap seconds. Raises ValueError if the
-        field is not a time of day."""
+        If the receiver has set its clock, the fix also becomes the new reference. A NEO-6M, for example, sets its clock
+        back by 3 s when it receives the leap seconds. Raises ValueError if the field is not a time of day."""
         day_ms = (int(time[0:2]) * 60 + int(time[2:4])) * 60_000 + int(float(time[4:]) * 1000.0 + 0.5)
         if not 0 <= day_ms <= _DAY_MS:
             raise ValueError
@@ -234,12 +256,13 @@ class Gps:
 
 
 def _minutes(field, degrees, negative):
-    """Convert an angle in NMEA's form, (d)ddmm.mmmm, to 0.00001 minutes. More decimals are cut off. Return None if it
-    is not an angle, or exceeds `degrees` degrees."""
+    """Convert an angle in NMEA's form, (d)ddmm.mmmm, to units of 0.00001 minutes.
+
+    More decimals are cut off. Return None if the field is not an angle, or if it exceeds `degrees` degrees."""
     whole = part = 0
     digits = -1  # number of decimals so far, -1 before the point
     for byte in field:
-        if byte == 46 and digits < 0:  # the point
+        if byte == 46 and digits < 0:  # 46 is the decimal point
             digits = 0
         elif not 48 <= byte <= 57:
             return None
@@ -258,7 +281,8 @@ def _minutes(field, degrees, negative):
 
 
 def _date(field):
-    """The date ddmmyy in the form of place(), or 0 if it does not exist or its year is outside _YEARS."""
+    """Convert a date ddmmyy to the form of place(). Return 0 if the date does not exist or its year is outside
+    _YEARS."""
     try:
         date = int(field)
     except ValueError:
@@ -277,7 +301,7 @@ def _has_ubx(data):
 
 
 def _checksum(line, start, end):
-    """The exclusive or of the bytes from start up to end."""
+    """Return the exclusive or of the bytes from start to end - 1."""
     total = 0
     for i in range(start, end):
         total ^= line[i]

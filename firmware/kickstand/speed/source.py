@@ -13,31 +13,44 @@ from ..errors import SettingsError
 from ..units import const
 
 _MAX_MPS = const(100.0)
-_MAX_CHANGE_MPS2 = const(15.0)  # no tyre has enough grip for more
-_NOISE_MPS = const(2.0)  # a speed may exceed that limit by this much
-_GIVE_UP_MS = const(3000)  # after rejecting speeds for this long, the last accepted one is considered wrong
-_RX_BUFFER = const(512)  # bytes: half a second at 9600 baud, enough while flash is written or the sensor is set up
+_MAX_CHANGE_MPS2 = const(15.0)  # largest change of speed per second; no tyre has enough grip for more
+_NOISE_MPS = const(2.0)  # noise by which a change of speed may exceed this limit
+_GIVE_UP_MS = const(3000)  # if all speeds are rejected for this time, the last accepted speed was wrong
+# Bytes of half a second at 9600 baud. That is enough while flash is written or the sensor is set up.
+_RX_BUFFER = const(512)
 
 
 class Speed:
-    """Reads plausible speeds. source: a Gps or a Wheel. The source's place() belongs to the last speed read, even if
-    poll() has rejected that speed. age_us: the age of the speed that poll() last returned."""
+    """Reads plausible speeds.
+
+    The source's place() belongs to the last speed that was read, even if poll() has rejected that speed.
+
+    Args:
+        source: a Gps or a Wheel.
+
+    Attributes:
+        age_us: the age of the speed that poll() last returned.
+    """
 
     def __init__(self, source):
         self.source = source
-        self._last = None  # the last accepted speed in m/s, and its time
-        self._last_ms = 0
+        self._last = None  # the last accepted speed in m/s
+        self._last_ms = 0  # ticks_ms() of the last accepted speed
         self.age_us = 0
 
     def poll(self, now_ms):
         """Return a new speed in m/s and set age_us. Return None without a new speed, or if it is rejected.
 
         A speed outside 0 to _MAX_MPS is rejected. A speed that no vehicle could have reached from the last accepted
-        speed is also rejected, but only for _GIVE_UP_MS. Call this in each turn of the loop. now_ms: ticks_ms()."""
+        speed is also rejected, but only for _GIVE_UP_MS. Call this in each turn of the loop.
+
+        Args:
+            now_ms: ticks_ms().
+        """
         speed = self.source.poll(now_ms)
         if self._last is not None:
             waited_ms = ticks_diff(now_ms, self._last_ms)
-            # checked without a new speed too, because after 6 days ticks_diff() is negative
+            # This check is needed even without a new speed, because after 6 days ticks_diff() is negative
             if waited_ms >= _GIVE_UP_MS:
                 self._last = None
         if speed is None or not 0.0 <= speed <= _MAX_MPS:
@@ -58,8 +71,8 @@ class Speed:
 
 
 def open_speed(settings):
-    """Open the Speed of these settings. Their SPEED must not be None. Raises SettingsError for pins that cannot be
-    used."""
+    """Open the speed source of a Settings and return a Speed. SPEED must not be None. Raises SettingsError for pins
+    that cannot be used."""
     if settings.SPEED == "gps":
         from .gps import Gps
 
@@ -71,7 +84,8 @@ def open_speed(settings):
 
 def _open_uart(settings):
     pins = settings.GPS_TX, settings.GPS_RX
-    try:  # nothing is sent, but a UART takes two pins, and rp2's default TX is a pin of the sensor
+    # Nothing is sent. But a UART takes two pins, and rp2's default TX is one of the sensor's pins.
+    try:
         tx, rx = Pin(pins[0]), Pin(pins[1])
         return UART(settings.GPS_UART, settings.GPS_BAUD, tx=tx, rx=rx, rxbuf=_RX_BUFFER, timeout=0)
     except ValueError as error:

@@ -1,11 +1,11 @@
-"""Measures speed from pulses: a reed contact or Hall switch to ground at a wheel, or a vehicle's speed signal.
+"""Measures speed from pulses of a reed contact or Hall switch at a wheel, or of a vehicle's speed signal.
 
-The interrupt only counts pulses and stores the time of the last one, in integers: a hard interrupt must take no heap. A
-storm of pulses, for example from an ignition cable, would leave no time for anything else. The interrupt then turns
-itself off, and poll() turns it on again later.
+The interrupt only counts pulses and stores the time of the last pulse. It uses integers, because a hard interrupt must
+take no heap. A storm of pulses, for example from an ignition cable, would leave no time for anything else. In a storm
+the interrupt turns itself off, and poll() turns it on again later.
 
 >>> wheel = Wheel(machine.Pin(14, machine.Pin.IN, machine.Pin.PULL_UP), 0.5, {"hard": True})
->>> speed_mps = wheel.poll(time.ticks_ms())     # None: no new speed
+>>> speed_mps = wheel.poll(time.ticks_ms())     # None if there is no new speed
 """
 
 from time import ticks_add, ticks_diff, ticks_us
@@ -16,17 +16,17 @@ from ..errors import Notice
 from ..units import const
 
 _MAX_MPS = const(100.0)  # pulses that imply a higher speed are interference
-# a contact that was open for less than this, or for less than a quarter of the shortest period, is bouncing
+# A contact bounces if it was open for less than this time, and for less than a quarter of the shortest period
 _BOUNCE_US = const(3000)
 _STOPPED_MPS = const(0.5)  # a wheel slower than this counts as standing
 MIN_STOP_MS, MAX_STOP_MS = 500, 1800  # limits of the time without a pulse after which the wheel counts as standing
-_REPORT_MS = const(100)  # least time between two speeds from poll()
-_STANDING_MS = const(200)  # least time between two speeds of zero
-# This many edges in less than STORM_US are a storm: over 8,000 per second. The interrupt takes 33 us on a Pico, so at
-# 30,000 per second nothing else would run. The interrupt ends such a storm after 2 ms, less than the time-out of a
-# transfer. 50 pulses per metre at 70 m/s are no storm.
+_REPORT_MS = const(100)  # shortest time between two speeds from poll()
+_STANDING_MS = const(200)  # shortest time between two speeds of zero from poll()
+# STORM_EDGES edges in less than STORM_US are a storm, over 8,000 edges per second. The interrupt takes 33 us on a Pico,
+# so at 30,000 edges per second nothing else would run. The interrupt ends such a storm after 2 ms, which is less than
+# the time-out of a transfer. 50 pulses per metre at 70 m/s are not a storm.
 STORM_EDGES, STORM_US = 64, 8_000
-_STORM_PAUSE_MS = const(5000)  # after a storm the interrupt is off for this long, and again if the storm continues
+_STORM_PAUSE_MS = const(5000)  # time for which the interrupt is off after a storm
 _SOFT_PERIOD_US = const(3333)  # at shorter periods soft interrupts, such as an ESP32's, lose over 2 % of the pulses
 # Counts and times wrap at 30 bits. The interrupt subtracts times with this mask, because ticks_diff() would be negative
 # after nine minutes of standing.
@@ -34,27 +34,31 @@ _TICKS = _COUNT = 0x3FFFFFFF
 
 
 class Wheel:
-    """A speed sensor with pulses. pin: a machine.Pin with pull-up.  pulses_per_metre: pulses per metre of road.  irq:
-    dict of more arguments of Pin.irq().
+    """A speed sensor with pulses.
 
-    age_ms: the age of the speed that poll() last returned.  problem: None, or a Notice to show once; the caller that
-    shows it sets problem to None.
+    Args:
+        pin: a machine.Pin with pull-up.
+        pulses_per_metre: number of pulses per metre of road.
+        irq: dictionary of further arguments of Pin.irq().
+
+    Attributes:
+        age_ms: the age of the speed that poll() last returned.
+        problem: a Notice to show once, or None. The caller that shows it sets problem to None.
     """
 
     def __init__(self, pin, pulses_per_metre, irq):
         shortest_us = int(1e6 / (pulses_per_metre * _MAX_MPS))
         self._shortest_us = shortest_us
         self._open_us = min(_BOUNCE_US, shortest_us // 4)
-        self._metre_us = 1e6 / pulses_per_metre  # the speed in m/s is this divided by the period in us
+        self._metre_us = 1e6 / pulses_per_metre  # divided by the period in us this gives the speed in m/s
         self._stop_ms = min(MAX_STOP_MS, max(MIN_STOP_MS, int(1000.0 / (pulses_per_metre * _STOPPED_MPS))))
-        self.count = 0  # pulses counted by the interrupt; _pulse_us: time of the last one
-        self._pulse_us = ticks_us()
-        self._opened_us = ticks_us()  # when the contact last opened
-        # _seen: the count at the last report; _seen_us: the time of its last pulse, None if no period begins there
-        self._seen = 0
-        self._seen_us = None
-        self._report_ms = None  # when poll() last returned a speed
-        self._moved_ms = None  # when poll() last saw a pulse
+        self.count = 0  # number of pulses that the interrupt has counted
+        self._pulse_us = ticks_us()  # time of the last pulse
+        self._opened_us = ticks_us()  # time when the contact last opened
+        self._seen = 0  # the count at the last report
+        self._seen_us = None  # time of the last pulse at the last report; None if no period begins with that pulse
+        self._report_ms = None  # time when poll() last returned a speed
+        self._moved_ms = None  # time when poll() last found a new pulse
         self.age_ms = 0
         self._pin = pin
         self._irq = irq
@@ -66,15 +70,14 @@ class Wheel:
 
     def _listen(self):
         """Turn the interrupt on."""
-        self._off = False  # True after the interrupt has turned itself off; _off_ms: when poll() noticed it
-        self._off_ms = None
-        self._edges = STORM_EDGES  # edges until the time since _edges_us is compared with STORM_US
+        self._off = False  # True after the interrupt has turned itself off
+        self._off_ms = None  # time when poll() noticed that the interrupt is off
+        self._edges = STORM_EDGES  # number of edges until the time since _edges_us is compared with STORM_US
         self._edges_us = ticks_us()
-        # For soft interrupts. _level: the pin's level at the last one. _same: True if that was the first of two that
-        # found the level unchanged. _usual_us: the usual time from pulse to pulse, 0 if unknown
-        self._level = None
-        self._same = False
-        self._usual_us = 0
+        # The next three are used for soft interrupts only
+        self._level = None  # level of the pin at the last interrupt
+        self._same = False  # True after the first of two interrupts that find the level unchanged
+        self._usual_us = 0  # usual time from pulse to pulse, 0 if unknown
         self._pin.irq(self._soft_edge if self._soft else self._edge, Pin.IRQ_FALLING | Pin.IRQ_RISING, **self._irq)
 
     def _edge(self, pin):
@@ -84,7 +87,7 @@ class Wheel:
             self._edges = STORM_EDGES
             if (now - self._edges_us) & _TICKS < STORM_US:
                 self._off = True
-                pin.irq(None)  # done here, because in a storm the loop may get no time at all; takes no heap
+                pin.irq(None)  # takes no heap; done here, because in a storm the loop may get no time at all
             self._edges_us = now
         if pin.value():
             self._opened_us = now
@@ -93,9 +96,11 @@ class Wheel:
             self.count = (self.count + 1) & _COUNT
 
     def _soft_edge(self, pin):
-        """Handle a soft interrupt, which waits during transfers to sensor or display. If a contact closes and opens
-        meanwhile, two interrupts find the level unchanged. They count as a pulse too, unless they come so early that
-        the contact is bouncing."""
+        """Handle a soft interrupt.
+
+        During a transfer to sensor or display the interrupt waits. If the contact closes and opens meanwhile, two
+        interrupts find the level unchanged. These two count as a pulse, unless they come so early that the contact is
+        bouncing."""
         level = pin.value()
         if level != self._level or self._edges == 1:
             self._level, self._same = level, False
@@ -111,7 +116,11 @@ class Wheel:
                 self.count = (self.count + 1) & _COUNT
 
     def poll(self, now_ms):
-        """Return a new speed in m/s, or None. now_ms: ticks_ms()."""
+        """Return a new speed in m/s, or None.
+
+        Args:
+            now_ms: ticks_ms().
+        """
         if self._off:
             return self._wait(now_ms)
         if self._report_ms is None:
@@ -126,12 +135,12 @@ class Wheel:
         if pulses:
             return self._pulses(pulses, count, pulse_us, now_ms)
         if self._moved_ms is None or ticks_diff(now_ms, self._moved_ms) < self._stop_ms or waited_ms < _STANDING_MS:
-            # never moved: keep the time recent, because after 6 days ticks_diff() is negative
+            # keep _report_ms recent, because after 6 days ticks_diff() is negative
             if waited_ms > MAX_STOP_MS:
                 self._report_ms = ticks_add(now_ms, -MAX_STOP_MS)
             return None
         self._report_ms = now_ms
-        self._moved_ms = ticks_add(now_ms, -self._stop_ms)  # also kept recent
+        self._moved_ms = ticks_add(now_ms, -self._stop_ms)  # kept recent for the same reason as _report_ms above
         self._noisy = False
         self._usual_us = 0
         self._seen_us = None  # the next period begins with the next pulse
@@ -151,7 +160,14 @@ class Wheel:
             self._listen()
 
     def _pulses(self, pulses, count, pulse_us, now_ms):
-        """Return the speed in m/s from this many new pulses. pulse_us: the time of the last pulse."""
+        """Return the speed in m/s, or None.
+
+        Args:
+            pulses: number of new pulses.
+            count: number of all pulses.
+            pulse_us: time of the last pulse.
+            now_ms: ticks_ms().
+        """
         before_us = self._seen_us
         self._seen, self._seen_us = count, pulse_us
         self._report_ms = self._moved_ms = now_ms
@@ -173,14 +189,14 @@ class Wheel:
         """Return None, because a wheel has no position."""
 
     def after_stall(self, now_ms):
-        """Begin the next period with the next pulse, because pulses may be lost or late after interrupts were off."""
+        """Begin the next period with the next pulse. While interrupts were off, pulses may have been lost or late."""
         if self._seen_us is not None or self._seen != self.count:
             self._moved_ms = now_ms
         self._seen = self.count
         self._seen_us = None
 
     def fault(self, now_ms):
-        """Return a Notice if no pulse has ever arrived (a wire may be loose), else None."""
+        """Return a Notice for a storm, for pulses that are too fast, or if no pulse has ever arrived, else None."""
         if self._noisy:
             return Notice("wheel-storm")
         if self._too_quick:

@@ -1,4 +1,5 @@
-"""Guides the rider through the two poses, first on the kickstand, then upright, and saves the alignment."""
+"""Guides the rider through the two poses and saves the alignment. The first pose is on the kickstand, the second is
+upright."""
 
 from time import ticks_diff
 
@@ -8,15 +9,18 @@ from . import messages, pages
 from .wizard import ASKING, RESULT, Wizard
 
 _RESULT_MS = const(4000)
-# For this time the gyro's bias from the kickstand pose is valid; later the bias may have drifted
-_FRESH_MS = const(90_000)
+_FRESH_MS = const(90_000)  # time after the kickstand pose in which its bias of the gyro is valid; later it may drift
 _ASK = (("On the stand,", "press button"), ("Now upright:", "hold it, press"))
 _TAKING = ("Stand: hold", "Upright: hold")
 
 
 class AlignWizard(Wizard):
-    """chip, rate_hz, calibration: see Wizard. side: "left" or "right", the side to which the kickstand leans the bike.
-    pressed: the rider has already pressed the button for the kickstand pose.
+    """The guided alignment.
+
+    Args:
+        chip, rate_hz, calibration: as for Wizard.
+        side: "left" or "right", the side to which the kickstand leans the bike.
+        pressed: True if the rider has already pressed the button for the kickstand pose.
     """
 
     name = "align"
@@ -30,7 +34,7 @@ class AlignWizard(Wizard):
 
     @property
     def upright(self):
-        """Return True after the kickstand pose: the upright pose is next."""
+        """True after the kickstand pose, when the upright pose is next."""
         return self._kickstand is not None
 
     def _start(self):
@@ -48,8 +52,13 @@ class AlignWizard(Wizard):
         self._show(ASKING, messages.lines(problem), problem)  # the next press takes the pose again
 
     def _pose_done(self, pose, now_ms):
-        """Keep the first pose. After the second pose compute and save the alignment. Raises AlignmentError if the poses
-        do not fit together, GyroError if the gyro does not fit them, StoreError if it cannot be saved."""
+        """Keep the first pose. After the second pose compute and save the alignment.
+
+        Raises:
+            AlignmentError: the two poses do not fit together.
+            GyroError: the gyro's turn does not fit the two poses.
+            StoreError: the alignment cannot be saved.
+        """
         if not self.upright:
             self._kickstand, self._kickstand_ms = pose, now_ms
             self._turn.start(pose.gyro)

@@ -1,4 +1,4 @@
-"""The page for alignment by driving: its state, progress and result."""
+"""The page for alignment by driving. It shows the state, the progress and the result."""
 
 from ..drive_alignment import alignment
 from . import messages
@@ -13,8 +13,12 @@ _WAITS = {
 
 
 def lines(background, now_ms):
-    """Return two lines of 16 characters. background: a BackgroundAlignment. The function reads its drive, state, result
-    and speed fault."""
+    """Return the two lines of the page.
+
+    Args:
+        background: a BackgroundAlignment.
+        now_ms: ticks_ms().
+    """
     drive = background.drive
     if drive.problem is not None:
         return messages.lines(drive.problem)

@@ -1,7 +1,7 @@
-"""The pages as pictures of 128x64 pixels, for a display that draws. The values to read at a glance are large.
+"""The pages as pictures of 128x64 pixels, for a display that draws. Large digits can be read at a glance.
 
-page_ring.py looks up the picture of a page here. A picture is a tuple, see board/display.py. Rows 0 and 1 stay blank,
-because an OLED shifts its picture.
+page_ring.py looks up the picture of a page in PICTURES. board/display.py says what a picture is. Rows 0 and 1 stay
+blank, because an OLED shifts its picture.
 """
 
 from binascii import a2b_base64
@@ -11,12 +11,12 @@ import framebuf
 from . import pages
 
 DIGIT_WIDTH, DIGIT_HEIGHT = 24, 40
-_PITCH = 28  # columns from one digit to the next
-_ARC_RADIUS, _ARC_DEG, _ARC_WIDTH = 100, 60, 7  # one degree is one column wide
+_PITCH = 28  # number of columns from one digit to the next
+_ARC_RADIUS, _ARC_DEG, _ARC_WIDTH = 100, 60, 7  # one degree of lean is one column of the arc
 _G_PIXELS = 60  # length of the bar for 1 g
-_SMALL_Y = 56  # top row of the last line, in letters of 8x8
+_SMALL_Y = 56  # top row of the last line, which has letters of 8x8 pixels
 
-# The ten digits, drawn for this display: each 5 bands of 24 bytes; a byte has 8 rows of a column, the topmost in bit 0
+# The ten digits. Each digit has 5 bands of 24 bytes. A byte has 8 rows of one column, with the top row in bit 0.
 DIGITS = a2b_base64(
     b"AADA4PD4/Pz+/n5+fn7+/vz8+PDgwAAAAP///////wMAAAAAAAAAAAP///////8AAP///////wAAAAAAAAAAAAD///////8AAP//////"
     b"/8AAAAAAAAAAAMD///////8AAAADBw8fPz9/f35+fn5/fz8/Hw8HAwAAAAAAAICAwODw+Pz8/v7+/PgAAAAAAAAAAAAEHx8/Hx8PB///"
@@ -39,12 +39,12 @@ _GLYPHS = [
     framebuf.FrameBuffer(bytearray(DIGITS[at : at + 120]), DIGIT_WIDTH, DIGIT_HEIGHT, framebuf.MONO_VLSB)
     for at in range(0, 1200, 120)
 ]
-# The row of the arc's upper edge; index: columns from the middle
+# For each number of columns from the middle, the row of the arc's upper edge
 _ARC = bytes(2 + _ARC_RADIUS - int((_ARC_RADIUS**2 - x * x) ** 0.5 + 0.5) for x in range(_ARC_DEG + 1))
 
 
 def _scale():
-    """Return the arc without a lean. It is drawn once: drawing it for each page would take 6 ms."""
+    """Return the arc without a lean. It is drawn only once, because this takes 6 ms."""
     scale = framebuf.FrameBuffer(bytearray(128 * 4), 128, 32, framebuf.MONO_VLSB)
     for x in range(_ARC_DEG + 1):
         for column in (64 + x, 64 - x):
@@ -56,7 +56,7 @@ _SCALE = _scale()
 
 
 def _number(canvas, value, x, y, digits=0):
-    """Draw a number with at least this many digits; return the column where it ends."""
+    """Draw a number with at least `digits` digits. Return the column where it ends."""
     for character in "%0*d" % (digits, value):
         canvas.blit(_GLYPHS[ord(character) - 48], x, y)
         x += _PITCH
@@ -64,14 +64,18 @@ def _number(canvas, value, x, y, digits=0):
 
 
 def _triangle(canvas, x, y, direction):
-    """Draw an arrow 24 columns wide with its point at x. direction: -1 to the left, 1 to the right."""
+    """Draw an arrow 24 columns wide, with its point at x, y.
+
+    Args:
+        direction: -1 to the left, 1 to the right.
+    """
     for i in range(24):
         half = i * 14 // 23
         canvas.vline(x - direction * i, y - half, 2 * half + 1, 1)
 
 
 def lean(meter, recording):
-    """Draw the lean with its side, and an arc that ends at 60 degrees."""
+    """Return the picture of the lean with its side, and of an arc that ends at 60 degrees."""
     deg = meter.lean_deg
     return _lean, int(abs(deg) + 0.5), pages.side_name(deg), int(deg + (0.5 if deg > 0 else -0.5)), recording
 
@@ -81,7 +85,7 @@ def _lean(canvas, number, side, deg, recording):
     for x in range(min(_ARC_DEG, abs(deg)) + 1):
         canvas.vline(64 + x if deg > 0 else 64 - x, _ARC[x], _ARC_WIDTH, 1)
     x = _number(canvas, number, 52 if number < 10 else 38, 16)
-    for side_x in (0, 5):  # the columns of the degree sign's two sides
+    for side_x in (0, 5):  # the left and the right side of the degree sign
         canvas.vline(x - 3 + side_x, 17, 4, 1)
         canvas.hline(x - 2, 16 + side_x, 4, 1)
     if side == "left":
@@ -95,7 +99,7 @@ def _lean(canvas, number, side, deg, recording):
 
 
 def unsure(line1, line2):
-    """Draw dashes instead of a lean, and the reason as dark letters in a bright band."""
+    """Return the picture of dashes instead of a lean, with the reason as dark letters in a bright band."""
     return _unsure, line2
 
 
@@ -108,7 +112,7 @@ def _unsure(canvas, reason):
 
 
 def maxima(meter, recording):
-    """Draw the largest lean to each side."""
+    """Return the picture of the largest lean to each side."""
     return _maxima, int(meter.max_left_deg + 0.5), int(meter.max_right_deg + 0.5)
 
 
@@ -120,7 +124,7 @@ def _maxima(canvas, left, right):
 
 
 def acceleration(meter, recording):
-    """Draw braking or acceleration as a number and a bar, and the peaks of both."""
+    """Return the picture of braking or acceleration as a number and a bar, with the peaks of both."""
     peaks = pages.acceleration(meter)[1]
     forward, most, least = meter.smooth_force[2], meter.max_accel_g, meter.max_brake_g
     return _acceleration, round(100 * forward), round(_G_PIXELS * most), round(_G_PIXELS * least), peaks

@@ -1,4 +1,5 @@
-"""The menu, opened by a long press. A short press shows the next entry, a long one chooses it."""
+"""The menu. A long press opens it. In the menu a short press shows the next entry, and a long press chooses the
+entry."""
 
 from time import ticks_add, ticks_diff
 
@@ -10,8 +11,13 @@ _TIMEOUT_MS = const(20_000)
 
 
 class Menu:
-    """The open menu. entries: a list of (name, function). name: at most 15 characters. function: called with now_ms
-    when the rider chooses the entry."""
+    """The open menu.
+
+    Args:
+        entries: tuple of (name, function) per entry. The name has at most 15 characters. The function is called as
+            function(now_ms) when the rider chooses the entry.
+        now_ms: ticks_ms().
+    """
 
     name = "menu"
 
@@ -23,7 +29,7 @@ class Menu:
 
     @property
     def entry(self):
-        """Return the name of the entry that is shown."""
+        """The name of the entry that is shown."""
         return self._entries[self._at][0]
 
     def lines(self, now_ms):

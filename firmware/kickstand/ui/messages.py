@@ -1,9 +1,9 @@
-"""The display's words for every refusal and fault: two lines of 16 characters, by code (see errors.py)."""
+"""The display's words for every refusal and fault. Each code (see errors.py) has two lines of 16 characters."""
 
-DEGREE = "\xdf"  # in the display's character ROM
+DEGREE = "\xdf"  # code of the degree sign in the display's character ROM
 
-# code|first line|second line; {0}, {1} ... are the refusal's values. As one text the words take 3 KB of heap; as a
-# dictionary they would take 7.
+# Each row is code|first line|second line. {0}, {1} ... are the refusal's values. As one text the words take 3 KB of
+# heap. As a dictionary they would take 7 KB.
 _LINES = """
 moved|Moved!|Hold it still
 vibration|Moved!|Hold it still
@@ -106,7 +106,8 @@ mount-moved|Mount has moved|Align again
 side-fixed|Side corrected|Set SIDE too
 aligned|Aligned by drive|error about {0:.1f}\xdf
 """
-# Shown instead of the lean. Keys: LeanMeter.suppressed_reason while the alignment is in doubt, and LeanMeter.odd
+# The words that are shown instead of the lean. The keys are values of LeanMeter.suppressed_reason while the alignment
+# is in doubt, and of LeanMeter.odd.
 NO_LEAN = {
     "other-side": "side was wrong?",
     "mount-moved": "mount has moved",
@@ -114,10 +115,10 @@ NO_LEAN = {
     "odd-up": "sensor odd: up",
     "odd-pitch": "sensor odd: tilt",
 }
-_OTHER_SETTING = "config.py: wrong|{0}"  # {0}: the setting's name; the console says what is wrong with it
+_OTHER_SETTING = "config.py: wrong|{0}"  # {0} is the setting's name; the console says what is wrong with its value
 
 
 def lines(refusal):
-    """Return the two lines for a Refusal or a Notice, neither padded nor cut. A code without a line belongs to a
-    setting."""
+    """Return the two lines for a Refusal or a Notice, neither padded nor cut. A code without a row in _LINES belongs to
+    a wrong setting."""
     return tuple(refusal.words(_LINES, _OTHER_SETTING).split("|"))

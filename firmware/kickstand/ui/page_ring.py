@@ -1,4 +1,4 @@
-"""The ring of pages: a short press shows the next one. A page is a function in pages.py. To add a page called load,
+"""The ring of pages. A short press shows the next page. A page is a function in pages.py. To add a page called load,
 write pages.load, add it to MOTORCYCLE or CAR, and add a row to the table of pages in firmware/docs/displays.md."""
 
 from ..board.button import SHORT
@@ -11,13 +11,24 @@ CAR = (pages.acceleration, pages.cornering, pages.raw)
 
 
 class PageRing:
-    """The current page, as a view (see screen.py). leans: False for a car. meter, calibration, drive, rides: the
-    LeanMeter, the ActiveCalibration, the BackgroundAlignment or None, and the Recording, all read-only. align(): called
-    for a short press without an alignment; the press means that the bike is on its kickstand.
+    """The current page, as a view (see screen.py).
 
-    name: the name of the page that is shown: its function in pages.py, or "drive", "live" or "own". late: True if the
-    lean is too old for the next page. live: None, or a Live, which adds its page. draws: True if the display shows
-    pictures. own: the owner's pages, functions that return two lines each.
+    Args:
+        leans: False for a car.
+        meter: the LeanMeter, read-only.
+        calibration: the ActiveCalibration, read-only.
+        drive: the BackgroundAlignment, read-only, or None.
+        rides: the Recording, read-only.
+        align: a function that is called after a short press without an alignment. The press means that the bike is on
+            its kickstand.
+
+    Attributes:
+        name: the name of the page that is shown. It is the name of its function in pages.py, or "drive", "live" or
+            "own".
+        late: True if the lean is too old for the next page.
+        live: the Live whose page is added, or None.
+        draws: True if the display shows pictures.
+        own: list of the owner's pages, which are functions that return two lines.
     """
 
     def __init__(self, leans, meter, calibration, drive, rides, align):
@@ -29,21 +40,21 @@ class PageRing:
         self._pages = MOTORCYCLE if leans else CAR
         self.first()
         self.late = self.draws = False
-        self._glance = None  # the module glance, imported once a display draws
+        self._glance = None  # the module glance, which is imported when a display that draws is found
         self._glance_tried = False
         self.name = "not_aligned"
         self.live = None
         self.own = []
 
     def show_own(self, now_ms):
-        """Go to the first of the owner's pages. The menu calls this function. Without an alignment there is no other
-        way to these pages."""
+        """Go to the first of the owner's pages. The menu calls this method. Without an alignment only the menu leads to
+        these pages."""
         self._own_at = 0
 
     def first(self):
         """Go back to the first page."""
         self._at = 0
-        self._own_at = None  # index of the owner's page on display
+        self._own_at = None  # index of the owner's page that is shown, or None if another page is shown
 
     def drive(self):
         """Go to the page for alignment by driving."""
@@ -64,11 +75,12 @@ class PageRing:
 
     @property
     def _driving(self):
-        """Return True while alignment by driving has a page: the first one without an alignment, else the last."""
+        """True while alignment by driving has a page. Without an alignment it is the first page. With an alignment it
+        follows the usual pages."""
         return self._drive is not None and self._drive.shown
 
     def _drive_lines(self, now_ms):
-        from . import drive_page  # only with a speed source
+        from . import drive_page  # imported here, because only boards with a speed source need it
 
         self.name = "drive"
         return drive_page.lines(self._drive, now_ms)
@@ -89,7 +101,7 @@ class PageRing:
             return pages.not_aligned(self._meter, now_ms // 1000, "drive and brake")
         more = len(self._pages) + self._driving
         count = more + (self.live is not None) + self._rides.recorder.active
-        if self._at >= count:  # the last page was removed; the other pages keep their places
+        if self._at >= count:  # after the last page the owner's pages follow, then the first page
             self._at = 0
             if self.own:
                 self._own_at = 0
@@ -106,7 +118,7 @@ class PageRing:
 
     @property
     def trusted(self):
-        """Return True if the lean may be shown."""
+        """True if the lean may be shown."""
         meter = self._meter
         shown = meter.trusted and not meter.fallen and abs(meter.lean_deg) <= FALLEN_DEG
         return shown and self._calibration.aligned and not self.late
@@ -129,7 +141,7 @@ class PageRing:
 
     @property
     def _pictures(self):
-        """Return the module glance if the display draws and the module can be loaded, else None."""
+        """The module glance if the display draws and the module can be loaded, else None."""
         if self.draws and not self._glance_tried:
             self._glance_tried = True
             attempt(self._load)

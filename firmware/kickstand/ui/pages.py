@@ -7,11 +7,11 @@ from ..rotation import vector
 from . import messages
 from .messages import DEGREE
 
-ARROW = "\x7e"  # a code of the display's character ROM
+ARROW = "\x7e"  # code of an arrow in the display's character ROM
 RECORDING = "*"
-_BLOCK = 0xFF
+_BLOCK = 0xFF  # code of a full cell in the display's character ROM
 _HALF_BAR = 8  # number of character cells on each side of the middle
-_DEG_PER_COLUMN = 1.5  # 8 cells of 5 dot columns each: the bar ends at 60 degrees
+_DEG_PER_COLUMN = 1.5  # lean per dot column; the bar ends at 60 degrees, because it has 8 cells of 5 columns
 
 FALLEN = ("Fallen over?", "Lean over 65" + DEGREE)
 
@@ -19,13 +19,19 @@ _bar = bytearray(16)
 
 
 def unsure(reason):
-    """Return the two lines that replace a lean that is not trusted. reason: the code of the reason, or None."""
+    """Return the two lines that replace a lean that is not trusted.
+
+    Args:
+        reason: the code of the reason, or None.
+    """
     return "Lean  --", messages.NO_LEAN.get(reason, "not sure yet")
 
 
 def lean_bar(lean_deg):
-    """Return a bar from the middle to the side of the lean, as 16 character codes. The glyphs 0 to 3 have 1 to 4 dot
-    columns filled from the left, 4 to 7 from the right."""
+    """Return a bar from the middle to the side of the lean, as 16 character codes.
+
+    The codes 0 to 3 are glyphs with 1 to 4 dot columns filled from the left. The codes 4 to 7 are glyphs with 1 to 4
+    dot columns filled from the right."""
     columns = min(5 * _HALF_BAR, int(abs(lean_deg) / _DEG_PER_COLUMN + 0.5))
     right = columns if lean_deg > 0 else 0
     left = columns if lean_deg < 0 else 0
@@ -43,7 +49,7 @@ def _cell(columns, first_glyph):
 
 
 def progress_bar(done, total):
-    """Return a bar of up to 16 full cells for `done` of `total`."""
+    """Return a bar that has 16 full cells when `done` reaches `total`."""
     filled = 16 * done // total if total else 0
     return "\xff" * min(16, filled)
 
@@ -54,19 +60,19 @@ def side_name(lean_deg):
 
 
 def lean(meter):
-    """The lean with its side, and its bar."""
+    """The page with the lean, its side and its bar."""
     shown = meter.lean_deg
     return "Lean %3d%s %s" % (int(abs(shown) + 0.5), DEGREE, side_name(shown)), lean_bar(shown)
 
 
 def recorded(line):
     """Return the line with the recording mark in its last column."""
-    # padded by hand: MicroPython's %-15s counts a degree sign as two bytes
+    # padded by hand, because MicroPython's %-15s counts a degree sign as two bytes
     return line + " " * (15 - len(line)) + RECORDING
 
 
 def recording(recorder):
-    """The duration of the recording, and the time until its beginning is erased."""
+    """The page with the duration of the recording, and the time until its beginning is erased."""
     seconds, room_s = recorder.seconds(), recorder.room_s()
     if room_s is None:
         room = "to USB"
@@ -78,33 +84,33 @@ def recording(recorder):
 
 
 def maxima(meter):
-    """The largest lean to each side since the last reset of the maxima."""
+    """The page with the largest lean to each side since the last reset of the maxima."""
     left, right = int(meter.max_left_deg + 0.5), int(meter.max_right_deg + 0.5)
     return "Max left   %3d%s" % (left, DEGREE), "Max right  %3d%s" % (right, DEGREE)
 
 
 def acceleration(meter):
-    """Acceleration or braking in g, and the peaks of both."""
+    """The page with acceleration or braking in g, and the peaks of both."""
     forward = meter.smooth_force[2]
     word = "Brake" if forward < -0.005 else "Accel"
     return "%s   %5.2f g" % (word, abs(forward)), "pk +%.2f / -%.2f" % (meter.max_accel_g, meter.max_brake_g)
 
 
 def cornering(meter):
-    """Lateral and vertical g of a car."""
+    """The page with the lateral and the vertical g of a car."""
     left = meter.smooth_force[0]
     side = "Left" if left > 0.005 else "Right"
     return "%-5s   %5.2f g" % (side, abs(left)), "Up      %5.2f g" % meter.smooth_force[1]
 
 
 def formula(meter):
-    """The lean by Nicolae's formula as published, and the filter's lean for comparison."""
+    """The page with the lean by Nicolae's formula as published, and the filter's lean for comparison."""
     leans = round(meter.lean_formula_deg), round(meter.lean_deg)
     return "Formula   %4d%s" % (leans[0], DEGREE), "Filter    %4d%s" % (leans[1], DEGREE)
 
 
 def raw(meter):
-    """Calibrated readings in the sensor's own axes."""
+    """The page with the calibrated readings in the sensor's own axes."""
     force, rate = vector(), vector()
     meter.calibration.apply(meter.reading, force, rate)
     rates = "%4d%4d%4d %s/s" % (int(rate[0]), int(rate[1]), int(rate[2]), DEGREE)
@@ -112,8 +118,12 @@ def raw(meter):
 
 
 def not_aligned(meter, seconds, todo="On stand: press"):
-    """Before alignment: tilt and g in the sensor's own axes, which are not the bike's (Nicolae's figure 3). todo: the
-    next step; the page alternates between it and "Not aligned"."""
+    """The page before the alignment, with tilt and g in the sensor's own axes (Nicolae's figure 3).
+
+    Args:
+        seconds: any time in seconds. Every two seconds the second line changes between "Not aligned" and `todo`.
+        todo: the next step for the rider.
+    """
     from ..lean.formula import static_lean_deg  # imported here, because an aligned bike does not need it
 
     tilt = static_lean_deg(meter.smooth_force)
@@ -122,9 +132,22 @@ def not_aligned(meter, seconds, todo="On stand: press"):
 
 
 def sensor_info(sensor, lost, meter, seconds):
-    """The chip's name and temperature. The second line shows in turn: the calibrated parts, the numbers of FIFO
-    overflows and of set-ups of the chip, the number of samples lost in overflows (lost), and the chip's address. During
-    a fault of the sensor: the fault, and the addresses that answer on its bus, in turn."""
+    """The page with information about the sensor. It changes every two seconds.
+
+    The first line has the chip's name and temperature. The second line shows these in turn:
+    * which parts are calibrated
+    * the number of overflows of the FIFO, and the number of set-ups of the chip
+    * the number of lost samples
+    * the chip's I2C address
+
+    During a fault of the sensor the page shows the fault and the addresses that answer on its bus, in turn.
+
+    Args:
+        sensor: the Sensor.
+        lost: number of lost samples.
+        meter: the LeanMeter.
+        seconds: any time in seconds.
+    """
     if sensor.fault is not None:
         if seconds // 2 % 2 == 0:
             return messages.lines(sensor.fault)

@@ -1,7 +1,9 @@
-"""A stack of views. The display shows the front view, and that view gets the presses of the button.
+"""A stack of views. The display shows the front view, and the front view gets the presses of the button.
 
-A view has lines(now_ms), which returns two lines of 16 characters, or None while it has nothing to show, and
-press(event, now_ms), which returns True if it used the press. Its name tells programs which view it is.
+A view has these attributes:
+* lines(now_ms) returns two lines of 16 characters, or None while the view has nothing to show.
+* press(event, now_ms) returns True if the view used the press.
+* name is the view's name for programs.
 """
 
 import gc
@@ -17,8 +19,11 @@ _NOTICE_MS = const(2000)
 
 
 class NoticeView:
-    """Shows two lines for two seconds. A press ends the notice early and is passed to the view below. code: the code of
-    the Notice, or None."""
+    """Shows two lines for two seconds. A press ends the notice early and is passed to the view below.
+
+    Attributes:
+        code: the code of the Notice, or None.
+    """
 
     name = "notice"
 
@@ -27,7 +32,7 @@ class NoticeView:
         self._until_ms = 0
 
     def show(self, lines, now_ms, code=None):
-        """Show two lines for _NOTICE_MS from now on."""
+        """Show two lines for _NOTICE_MS."""
         self._lines = lines
         self.code = code
         self._until_ms = ticks_add(now_ms, _NOTICE_MS)
@@ -43,7 +48,7 @@ class NoticeView:
 
 
 class View:
-    """A view made of two functions, lines and press."""
+    """A view that consists of a name and two functions, lines and press."""
 
     def __init__(self, name, lines, press):
         self.name = name
@@ -52,12 +57,22 @@ class View:
 
 
 class Screen:
-    """The views of the device. settings: a Settings. sensor, clock, meter: the Sensor, its SampleClock and the
-    LeanMeter to show. calibration: the ActiveCalibration. drive: the BackgroundAlignment or None. rides: the Recording,
-    which the menu can start and stop.
+    """The views of the device.
 
-    wizard: the current AlignWizard or SixWizard, which takes every sample, or None. menu: the open Menu, or None.
-    pages: the PageRing. front: the view that the display shows.
+    Args:
+        settings: a Settings.
+        sensor: the Sensor.
+        clock: the SampleClock.
+        meter: the LeanMeter.
+        calibration: the ActiveCalibration.
+        drive: the BackgroundAlignment, or None.
+        rides: the Recording, which the menu can start and stop.
+
+    Attributes:
+        wizard: the current AlignWizard or SixWizard, which takes every sample, or None.
+        menu: the open Menu, or None.
+        pages: the PageRing.
+        front: the view that the display shows.
     """
 
     def __init__(self, settings, sensor, clock, meter, calibration, drive, rides):
@@ -70,14 +85,14 @@ class Screen:
         self.wizard = None
         self.menu = None
         self._notice = NoticeView()
-        # says why readings are missing
+        # the view with the reason why readings are missing
         self._fault = View(
             "fault", lambda now_ms: sensor.fault and messages.lines(sensor.fault), lambda event, now_ms: False
         )
         self._clock = clock
         self._info_open = False
         self._info = View("info", self._info_lines, self._press_info)
-        # a report of alignment by driving, or a question to the rider
+        # the view with a report of alignment by driving, or a question to the rider
         self._question = View(
             "question", lambda now_ms: drive and drive.message and messages.lines(drive.message), self._press_question
         )
@@ -85,13 +100,20 @@ class Screen:
         self.front = self.pages
 
     def lines(self, now_ms):
-        """The content for the display: two lines and, if it draws, a picture. Call it about every 100 ms."""
+        """Return the content of the display: two lines and, for a display that draws, a picture. Call this about every
+        100 ms."""
         self.front, lines = self._update_front(now_ms)
         return lines
 
     def press(self, event, now_ms):
-        """React to a press. event: SHORT or LONG. A long press that the front view does not use opens the menu. If the
-        press needs missing modules or too much memory, the rider gets a notice and the ride continues."""
+        """React to a press. A long press that the front view does not use opens the menu.
+
+        If the press needs missing modules or too much memory, the rider gets a notice and the ride continues.
+
+        Args:
+            event: SHORT or LONG.
+            now_ms: ticks_ms().
+        """
         problem = attempt(self._press, event, now_ms)
         if problem:
             self.notify(problem, now_ms)
@@ -102,17 +124,17 @@ class Screen:
 
     def _press(self, event, now_ms):
         view = self._update_front(now_ms)[0]
-        if view is self._notice:  # a press ends the notice and is passed to the view below it,
+        if view is self._notice:  # the press ends the notice and is passed to the view below
             self._notice.press(event, now_ms)
             view = self._update_front(now_ms)[0]
-            if view is self._question:  # except to a question, which the rider has not seen yet
+            if view is self._question:  # the rider has not seen the question yet, so the press is not its answer
                 return
         if not view.press(event, now_ms) and event == LONG:
             self._open_menu(now_ms)
         self._drop_ended()
 
     def _info_lines(self, now_ms):
-        """Show the chip's name, its temperature and the calibrated parts, until a short press."""
+        """Return the lines about the sensor until a short press closes them."""
         if not self._info_open:
             return None
         return pages.sensor_info(self._sensor, self._clock.lost, self._meter, now_ms // 1000)
@@ -135,15 +157,21 @@ class Screen:
             self._notice.show(("Calibration", "stopped: fault"), now_ms, "stopped")
 
     def _update_front(self, now_ms):
-        """Return the view in front and its two lines. The front is the first view in the order below that has something
-        to show. Drop a wizard or menu that has ended. Go back to the first page when a question is shown."""
+        """Find the front view, the first view in the order below that has something to show.
+
+        Also drop a wizard or menu that has ended, and go back to the first page when a question is shown.
+
+        Returns:
+            view: the front view.
+            lines: its lines.
+        """
         for view in (self._notice, self.wizard, self.menu, self._info, self._fault, self._question, self.pages):
             lines = view.lines(now_ms) if view else None
             if lines:
                 break
         self._drop_ended()
         if view is self._question:
-            self.pages.first()  # shown after the rider's answer
+            self.pages.first()  # the first page will be shown after the rider's answer
         return view, lines
 
     def _drop_ended(self):
@@ -159,7 +187,7 @@ class Screen:
         self.menu = Menu(self._entries(), now_ms)
 
     def _entries(self):
-        """Return the entries of the menu: (name, function to call with now_ms)."""
+        """Return the entries of the menu as a tuple of (name, function), see Menu."""
         align = (("Align the bike", self._align),)
         drive = (("Align by drive", self._align_by_drive),) if self._drive else ()
         rest = (("Six positions", self._six), ("Reset maxima", self._reset), ("Sensor info", self._show_info))
@@ -182,12 +210,12 @@ class Screen:
             self._begin_align(False)
 
     def _align_now(self):
-        """Start the AlignWizard as if the button had been pressed for the kickstand pose."""
+        """Start the AlignWizard with the kickstand pose, because the rider has just pressed the button for it."""
         self._begin_align(True)
 
-    # The wizards are imported when needed, because with their own imports they take 12 KB of heap. Garbage is collected
-    # before the import: otherwise lasting objects would be placed at the far end of the heap and make each later
-    # collection longer.
+    # The wizards are imported only when needed, because with their own imports they take 12 KB of heap. Garbage is
+    # collected before the import. Otherwise the new modules, which last, would be placed at the far end of the heap and
+    # make each later collection longer.
 
     def _begin_align(self, pressed):
         gc.collect()

@@ -1,6 +1,7 @@
-"""Guides the rider through the six positions (each side up once, in any order) and a slanted pose that verifies them.
+"""Guides the rider through the six positions and a slanted pose that verifies them.
 
-The turns of the sensor between the poses calibrate the gyro: see calibration/sensor_fit.py.
+In the six positions each side of the sensor is up once, in any order. The turns of the sensor between the poses
+calibrate the gyro: see calibration/sensor_fit.py.
 """
 
 from ..calibration import six_position
@@ -13,20 +14,20 @@ from .wizard import COMPUTING, NOTICE, RESULT, TAKING, Wizard
 _NOTICE_MS = const(1500)
 _RESULT_MS = const(6000)
 _ROUGH_TILT_DEG = const(30.0)  # largest tilt of a side in uncalibrated readings; the fit has a stricter limit
-_MAX_POSES = const(12)  # six sides, a slanted pose, and repetitions after unusable turns
+_MAX_POSES = const(12)  # most poses: six sides, a slanted pose, and repetitions after unusable turns
 
 
 class SixWizard(Wizard):
-    """See Wizard."""
+    """The guided six positions. The arguments are those of Wizard."""
 
     name = "six"
 
     def _start(self):
-        self._sides = [-1] * 6  # the number of each side's pose, -1 until it is taken
-        self._poses, self._turns = [], []  # the input of SensorFit
-        self._bias = [0.0] * 3
-        self._fitted = None  # offset and slope, after all six poses
-        self._unproved = None  # the axis about which another turn is needed
+        self._sides = [-1] * 6  # index of the pose of each side; -1 until the pose is taken
+        self._poses, self._turns = [], []  # the arguments of SensorFit
+        self._bias = [0.0] * 3  # sum of the gyro's readings in all poses
+        self._fitted = None  # offset and slope; None until all six poses are taken
+        self._unproved = None  # name of the axis about which another turn is needed, or None
         self._work = self._fit = None
         self._told = False  # True once the rider was told that the current turn cannot be used
         self._turn.running = False
@@ -71,11 +72,11 @@ class SixWizard(Wizard):
 
     @property
     def _spoilt_turn(self):
-        """Return True if the turn since the last pose cannot be used."""
+        """True if the turn since the last pose cannot be used."""
         return self._turn.running and (self._turn.quick or self._turn.lost)
 
     def bears(self, fault, now_ms):
-        """Return True for rates at the end of the range: turning the sensor too fast is not a defect."""
+        """Return True for rates at the end of the range, because turning the sensor too fast is not a defect."""
         if fault is None or fault.code != "clips" or fault.values[0] != "Gyro" or not self._turn.running:
             return False
         self._turn.quick = True
@@ -84,10 +85,11 @@ class SixWizard(Wizard):
 
     def _followed(self, now_ms):
         if self.state == COMPUTING:
-            if next(self._work, True):  # a yield gives None, the end gives True
+            if next(self._work, True):  # None while the work continues, True at its end
                 self._computed(now_ms)
         elif self._spoilt_turn and not self._told and self.state in (TAKING, NOTICE):
-            self._told = True  # readings at the end of the range were dropped, so they count as lost
+            # Readings may also be lost because they were at the end of the range. So the message fits both cases.
+            self._told = True
             self._notice(now_ms, "Turned too fast:", "turn it slower")
 
     def _pose_done(self, pose, now_ms):
@@ -117,7 +119,7 @@ class SixWizard(Wizard):
 
     def _prove(self, pose):
         """Begin to fit the whole sensor if the slanted pose confirms the six positions. Raises CalibrationError."""
-        from ..calibration.sensor_fit import SensorFit  # 5 KB of heap
+        from ..calibration.sensor_fit import SensorFit  # imported only when needed, because it takes 5 KB of heap
 
         offset, slope = self._fitted
         self._error = six_position.check_free_pose(offset, slope, pose.accel)
@@ -126,8 +128,8 @@ class SixWizard(Wizard):
         self._show(COMPUTING, ("Computing...", ""))
 
     def _computed(self, now_ms):
-        """Save the result, or ask for another pose if the sensor did not turn enough about an axis. Raises GyroError,
-        StoreError."""
+        """Save the result of the fit. If the sensor did not turn enough about an axis, ask for another pose instead.
+        Raises GyroError, StoreError."""
         fit = self._fit
         self._work = self._fit = None
         self._unproved = fit.unproved[0] if fit.unproved else None

@@ -1,5 +1,7 @@
-"""The base of both wizards: a view that takes one pose after another, with a few named states. Between two poses the
-wizard integrates the gyro's rates. The result must match the turn between the two measured poses."""
+"""The base of both wizards, a view that takes one pose after another.
+
+Between two poses the wizard integrates the gyro's rates. The result must agree with the turn that gravity shows between
+the two poses."""
 
 from time import ticks_add, ticks_diff
 
@@ -21,12 +23,18 @@ COMPUTING = 6  # computes one step in each pass of the main loop
 
 
 class Wizard:
-    """A view (see screen.py) that also takes each sample, until it has ended.
+    """A view (see screen.py) that also takes each sample until it has ended.
 
-    chip, rate_hz: see PoseTaker. calibration: the ActiveCalibration. A subclass defines which poses it asks for, how it
-    uses them, and how long a pose takes if not POSE_SECONDS.
+    A subclass defines which poses it asks for and how it uses them. It may also set POSE_SECONDS, the duration of a
+    pose.
 
-    state: one of the states above. problem: the Refusal that is shown, or None.
+    Args:
+        chip, rate_hz: as for PoseTaker.
+        calibration: the ActiveCalibration.
+
+    Attributes:
+        state: one of the states above.
+        problem: the Refusal that is shown, or None.
     """
 
     POSE_SECONDS = 2
@@ -39,7 +47,7 @@ class Wizard:
 
     @property
     def ended(self):
-        """Return True after the end of the wizard."""
+        """True after the end of the wizard."""
         return self.state == _ENDED
 
     def sample(self, counts, now_ms):
@@ -62,8 +70,14 @@ class Wizard:
             self._refuse(problem)
 
     def follow(self, sums, n, dt_us, now_ms):
-        """Take the sums of the n samples that sample() has just taken. dt_us: the microseconds since the previous
-        samples."""
+        """Take the sums of the samples that sample() has just taken.
+
+        Args:
+            sums: sums of the samples' counts in the chip's order, 7 values.
+            n: number of samples.
+            dt_us: microseconds since the previous samples.
+            now_ms: ticks_ms().
+        """
         self._turn.add(sums, n, dt_us, self.state == TAKING and self._taker.averaging)
         try:
             self._followed(now_ms)
@@ -71,19 +85,26 @@ class Wizard:
             self._refuse(problem)
 
     def bears(self, fault, now_ms):
-        """Return True if the wizard continues despite this fault of the sensor. fault: a Notice. The default is
-        False."""
+        """Return True if the wizard continues despite a fault of the sensor.
+
+        By default the wizard continues only without a fault.
+
+        Args:
+            fault: a Notice, or None without a fault.
+            now_ms: ticks_ms().
+        """
         return fault is None
 
     def _refuse(self, problem):
-        """Show the reason until a press. A fault of the gyro is also printed, because another sensor is needed."""
+        """Show the reason of a refusal until a press. A fault of the gyro is also printed, because another sensor is
+        needed."""
         if isinstance(problem, GyroError):
             report(problem)
         self._turn.running = False
         self._show(_REFUSED, messages.lines(problem), problem)
 
     def _followed(self, now_ms):
-        """Called in each pass of the main loop. May raise a Refusal, which is shown."""
+        """Do the work of one pass of the main loop. May raise a Refusal, which is shown."""
 
     def _start(self):
         """Ask for the first pose."""
@@ -92,16 +113,26 @@ class Wizard:
         """Begin the next pose."""
 
     def _settled(self, accel, now_ms):
-        """Called when the sensor has been still for half a second. accel: the mean reading (3, g)."""
+        """React when the sensor has been still for half a second.
+
+        Args:
+            accel: mean reading of the accelerometer in this time, 3 values in g.
+            now_ms: ticks_ms().
+        """
 
     def _progress(self, done, total):
-        """Show the progress: `done` of `total` samples of the pose."""
+        """Show that `done` of `total` samples of the pose are taken."""
 
     def _spoilt(self, problem, now_ms):
-        """Called when the pose was rejected. problem: a CaptureError."""
+        """React when the pose was rejected.
+
+        Args:
+            problem: a CaptureError.
+            now_ms: ticks_ms().
+        """
 
     def _pose_done(self, pose, now_ms):
-        """Called with each complete StillPose. May raise a Refusal, which is shown."""
+        """Use a complete StillPose. May raise a Refusal, which is shown."""
 
     def lines(self, now_ms):
         if self.state in (NOTICE, RESULT) and ticks_diff(now_ms, self._until_ms) >= 0:
