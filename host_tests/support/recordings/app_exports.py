@@ -1,7 +1,7 @@
-"""Writes a known ride as apps and loggers export it. Each small writer follows the documentation of the format's maker.
+"""Writes a known ride as apps and loggers export it. Each writer follows the documentation of the format's maker.
 
-Addresses are in the modules of kickstand_tools.imports.apps and in the tests. No data in this module is copied from an
-export.
+The addresses of these documents are in the modules of kickstand_tools.imports.apps and in the tests. No data in this
+module is copied from an export.
 """
 
 import functools
@@ -179,7 +179,7 @@ def sensor_logger(ride: Riding, platform: str = "android", standard: bool = Fals
 
 
 def sensorlog(ride: Riding, separator: str = ",", accelerometer: bool = True) -> str:
-    """Write the app's wide CSV. It has Core Motion's values, rows that repeat old values, and one GPS fix per second."""
+    """Write the app's wide CSV: Core Motion's values, rows that repeat old values, and one GPS fix per second."""
     boot_s = 86_400.0
     names = ["loggingTime(txt)", "loggingSample(N)", "locationTimestamp_since1970(s)", "locationLatitude(WGS84)"]
     names += ["locationLongitude(WGS84)", "locationSpeed(m/s)"]

@@ -1,5 +1,5 @@
-"""A second simulator of rides. It shares nothing with kickstand_tools.simulation, and checks parameters that were fitted
-with kickstand_tools.simulation.
+"""A second simulator of rides, which shares nothing with kickstand_tools.simulation. It checks parameters that were
+fitted with kickstand_tools.simulation.
 
 The path and the attitude of the bike are random curves. They determine the sensor's position. The force is the second
 derivative of this position plus gravity, and the rates are derivatives of the attitude's matrix. Both are computed
