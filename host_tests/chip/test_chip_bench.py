@@ -11,7 +11,7 @@ pytestmark = pytest.mark.chip
 @pytest.mark.long
 def test_the_loop_and_the_start_stay_within_their_limits():
     """No sample is lost, the heap does not shrink, and the first lean appears within 1.12 s."""
-    pico()  # or skip
+    pico()  # skips the test without the emulator
     from kickstand_workshop.bench import bench
 
     result = bench.loop(2)  # within only one second the number of garbage collections varies
@@ -32,7 +32,7 @@ def test_the_loop_and_the_start_stay_within_their_limits():
 @pytest.mark.nightly
 def test_bench(monkeypatch):
     """In a short run of all parts, the times of the stages add up, and each figure is in the tables."""
-    pico()  # or skip
+    pico()  # skips the test without the emulator
     from kickstand_workshop.bench import bench
 
     monkeypatch.setattr(bench, "_MODES", {"recording": {"RECORD": True}})

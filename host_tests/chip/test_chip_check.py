@@ -117,7 +117,8 @@ PLANTED = {
 
 @pytest.mark.parametrize("name", PLANTED)
 def test_a_defect_that_hides_others_is_found_by_its_name(name):
-    """Together with the eleven defects above, the check finds twenty defects."""
+    """Each board has one defect. Its line comes first, before those of its consequences. With the eleven defects above,
+    the tests plant twenty."""
     what, planted = PLANTED[name]
     found = checked("pico", **planted)
     assert next(iter(found), None) == what, found

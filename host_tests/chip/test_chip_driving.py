@@ -12,8 +12,8 @@ from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 
 pytestmark = pytest.mark.chip
 
-# The code before this script defines mount, clock, elapsed and allocated. Each update does one step of the work, and
-# every update is timed.
+# The code before this script defines mount, clock, elapsed and allocated. Each update does one step of the work, so
+# every update is timed in the same way.
 _DRIVE = """
 from kickstand.drive_alignment import alignment
 from kickstand.rotation import matrix
