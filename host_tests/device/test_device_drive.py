@@ -1,5 +1,5 @@
-"""The whole device, aligned by driving. A car finds its first alignment. A motorcycle checks and refines its alignment
-by the two presses. Some speed sources are unusable."""
+"""The whole device, aligned by driving. A car finds its first alignment. On a motorcycle, driving checks and refines
+the alignment that the two presses found. Some speed sources are unusable."""
 
 import math
 import re

@@ -70,7 +70,7 @@ def test_a_maximum_must_last_and_unknown_leans_count_as_none():
     lean = np.full(60, np.nan)
     assert _maximum(t_s, lean).tolist() == [0.0] * 60
     assert HELD_S == 0.15
-    lean[5:20], lean[30:46] = 30.0, 20.0  # 15 samples, then 16 samples
+    lean[5:20], lean[30:46] = 30.0, 20.0  # the first lean lasts 15 samples, the second 16
     lean[50:] = -5.0
     found = _maximum(t_s, lean)
     assert found.tolist() == [0.0] * 45 + [20.0] * 15
