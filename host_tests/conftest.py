@@ -20,8 +20,8 @@ from kickstand_tools.simulated_board.fakes import cpython
 
 cpython.supplement()
 
-# Set before numpy is imported. The matrices are small, and the library's threads would only wait for each other. Where
-# every processor runs a test, this takes several times as long.
+# Set this before numpy is imported. The matrices are small, so several threads would only wait for each other. If every
+# processor already runs a test, these threads make a test several times slower.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 # The time that an example takes depends on how busy the machine is.
@@ -112,8 +112,11 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_runtest_setup() -> None:
-    """The app collects garbage often. CPython needs half a second to scan the objects of earlier tests. So collections
-    skip the objects that exist before a test. Occasionally those are scanned too, to free their garbage."""
+    """Make garbage collections skip the objects that exist before a test.
+
+    The app collects garbage often, and CPython needs half a second to scan the objects of earlier tests. Occasionally
+    these objects are scanned, too, to free their garbage.
+    """
     if next(_tests) % TESTS_PER_COLLECTION == 0:
         gc.unfreeze()
         gc.collect()
@@ -131,7 +134,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 
 def _why_skipped(reason: str) -> str:
-    """The cause of a skip for the summary line: "for want of" the missing thing, if the reason names it."""
+    """Return the cause of a skip for the summary line. If the reason names a missing thing, it is "for want of" it."""
     missing = re.match(r"no (.+?)(?: for this system)?(?:: |$)|needs (.+)|could not import '([\w.]+)'", reason)
     return "for want of " + next(filter(None, missing.groups())) if missing else f"because {reason}"
 
@@ -147,7 +150,7 @@ def shared_data() -> Path:
 
 @pytest.fixture(scope="session")
 def chromium():
-    """Chromium as playwright's browser, shared by all tests of a process, because playwright cannot be started
+    """Return Chromium as playwright's browser. All tests of a process share it, because playwright cannot be started
     twice."""
     executable = shutil.which("chromium")
     if executable is None:

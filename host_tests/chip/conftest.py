@@ -1,5 +1,8 @@
-"""Start a board once for all tests of a process that need the same start. Each test of a Pico runs in a fork with
-its own copy. QEMU cannot be copied, so tests of the ESP32 restore its state or use a separate board."""
+"""Emulated boards for the tests. Tests of one process that need the same start share one board.
+
+Each test of a Pico runs in a fork of the process, so it changes only its own copy of the board. QEMU cannot be forked.
+So the tests of the ESP32 restore its state, or use a board of their own.
+"""
 
 import os
 import traceback

@@ -1,4 +1,4 @@
-"""kickstand bench on the emulated Pico: its figures agree with each other and stay within their limits."""
+"""The command `kickstand bench` on the emulated Pico: its figures agree with each other and are within their limits."""
 
 import json
 
@@ -11,10 +11,10 @@ pytestmark = pytest.mark.chip
 @pytest.mark.long
 def test_the_loop_and_the_start_stay_within_their_limits():
     """No sample is lost, the heap does not shrink, and the first lean appears within 1.12 s."""
-    pico()  # or skip
+    pico()  # skips the test without the emulator
     from kickstand_workshop.bench import bench
 
-    result = bench.loop(2)  # in one second the number of collections varies
+    result = bench.loop(2)  # within only one second the number of garbage collections varies
     for spread in result["turn_us"], result["collection_pause_us"]:
         assert 0 < spread["median"] <= spread["p99"] <= spread["max"]
     assert result["samples_taken"] == pytest.approx(result["seconds"] * bench.SAMPLE_HZ, abs=2)
@@ -31,8 +31,8 @@ def test_the_loop_and_the_start_stay_within_their_limits():
 
 @pytest.mark.nightly
 def test_bench(monkeypatch):
-    """A short run of everything: the stages add up, and each figure is in the tables."""
-    pico()  # or skip
+    """In a short run of all parts, the times of the stages add up, and each figure is in the tables."""
+    pico()  # skips the test without the emulator
     from kickstand_workshop.bench import bench
 
     monkeypatch.setattr(bench, "_MODES", {"recording": {"RECORD": True}})

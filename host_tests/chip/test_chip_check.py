@@ -13,7 +13,7 @@ ESP32 = pytest.param("esp32", marks=pytest.mark.esp32)
 
 
 def checked(chip, world=REST, plant=None, press=True, files=None, **fitted):
-    """Return {what: line} of the findings that are not good."""
+    """Run `kickstand check` on an emulated board. Return the bad findings as {what was checked: line}."""
     with CHIPS[chip](world, modules(chip) | (files or {}), **fitted) as device:
         if plant:
             plant(device.board)
@@ -38,8 +38,8 @@ def test_a_good_board_is_good(chip):
 
 
 def spoilt(t_s):
-    """The accelerometer's x is dead and y is noisy. The gyro's x is biased, y is noisy and z is dead. The chip is
-    hot."""
+    """Return the readings of a sensor with many defects. The accelerometer's x is dead and its y is noisy. The gyro's x
+    is biased, its y is noisy and its z is dead. The chip is hot."""
     force, rate = list(REST(t_s)[:3]), list(REST(t_s)[3:6])
     hashed = int(t_s * 1e4) * 2654435761 % 65536 / 65536 - 0.5
     force[0] = 0.3
@@ -117,7 +117,8 @@ PLANTED = {
 
 @pytest.mark.parametrize("name", PLANTED)
 def test_a_defect_that_hides_others_is_found_by_its_name(name):
-    """With the eleven defects above this makes twenty."""
+    """Each board has one defect. Its line comes first, before those of its consequences. With the eleven defects above,
+    the tests plant twenty."""
     what, planted = PLANTED[name]
     found = checked("pico", **planted)
     assert next(iter(found), None) == what, found

@@ -1,4 +1,4 @@
-"""Corrections to the emulated Pico: the bus and flash take time, errors are those of the chip, and the console is
+"""Corrections to rp2040py: the bus and the flash take time, I2C errors are those of the chip, and the console is
 quiet."""
 
 import os
@@ -28,7 +28,7 @@ def timed(f, *a):
 
 @pytest.fixture(scope="module")
 def board():
-    """Return a Pico without files on which _TOOLS has run."""
+    """Return a Pico without files. The code of _TOOLS has run on it."""
     with pico() as emulated:
         emulated.exec(_TOOLS)
         yield emulated
@@ -45,7 +45,7 @@ def test_fast_division_gives_the_results_of_rp2040py():
         chip.sio.reset()
         began = chip.core.cycles
         seen = []
-        for signed in (0, 8):  # the registers of signed division are the next two
+        for signed in (0, 8):  # the two registers of signed division follow those of unsigned division
             for dividend in (0, 1, 7, 1000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF):
                 for divisor in (1, 3, 0, 0x7FFFFFFF, 0xFFFFFFF9, 0xFFFFFFFF):
                     for register, value in ((0x60 + signed, dividend), (0x64 + signed, divisor)):
@@ -55,7 +55,7 @@ def test_fast_division_gives_the_results_of_rp2040py():
     assert results[0] == results[1]
 
 
-# Leave out the import hook for modules compiled for this Python.
+# This code leaves out the import hook for modules that are compiled for this Python.
 _WHEELS_OWN = """
 import sys, kickstand_emulator
 del sys.meta_path[0]
@@ -65,7 +65,8 @@ print(emulated.begun(0.003))
 
 
 def test_chip_runs_the_same_on_every_host():
-    """Cycles and memory are the same whether compiled for this Python or taken from the wheel, and on a slow host."""
+    """Cycles and memory are the same with modules compiled for this Python, with the wheel's modules, and on a slow
+    host."""
     pico()  # skips the test without the emulator
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     other = subprocess.run([sys.executable, "-c", _WHEELS_OWN], env=environment, capture_output=True, text=True)
@@ -73,12 +74,12 @@ def test_chip_runs_the_same_on_every_host():
 
 
 def ask(board, expression):
-    """Return the value of an expression on the board."""
+    """Evaluate an expression on the board and return its value."""
     return eval(board.exec(f"print(repr(({expression})))"))
 
 
 def test_i2c_bits_take_time(board):
-    """At 400 kHz 156 bits take 390 us plus MicroPython's overhead. At 100 kHz 69 bytes take 6.2 ms."""
+    """At 400 kHz, 156 bits take 390 us plus MicroPython's overhead. At 100 kHz, 69 bytes take 6.2 ms."""
     us, _ = ask(board, "timed(sensor.readfrom_mem, 0x68, 0x3B, 14)")
     assert 390 < us < 500
     us, _ = ask(board, "timed(lcd.writeto, 0x27, bytes(68))")
@@ -94,7 +95,7 @@ def test_absent_device_fails_fast_and_harms_no_transfer(board):
 
 
 def test_held_wires_time_out_until_freed(board):
-    """The time-out is 5 ms as set. After nine manual clock pulses the chip answers again."""
+    """A transfer ends after the set time-out of 5 ms. After nine manual clock pulses the chip answers again."""
     board.board.sensor_bus.hang()
     us, number = ask(board, "timed(sensor.readfrom_mem, 0x68, 0x75, 1)")
     assert number == 110
@@ -110,7 +111,7 @@ def test_held_wires_time_out_until_freed(board):
 
 
 def test_devices_answer_bit_banged_pins(board):
-    """MicroPython drives the pins itself for SoftI2C and for scan(), which writes 0 bytes."""
+    """MicroPython drives the pins in software for SoftI2C, and for scan(), which writes 0 bytes."""
     assert ask(board, "sensor.scan(), lcd.scan()") == ([0x68], [0x27])
     board.exec("soft = SoftI2C(sda=Pin(4), scl=Pin(5), freq=100000)\nsoft.writeto_mem(0x68, 0x6B, b'\\x01')")
     assert ask(board, "soft.readfrom_mem(0x68, 0x6B, 1), soft.readfrom_mem(0x68, 0x75, 1)") == (b"\x01", b"h")
@@ -125,7 +126,8 @@ def test_flash_operations_take_time(board):
 
 
 def test_idle_console_takes_no_processor_time(board):
-    """One pass of an empty loop takes 3.1 us. With empty USB packets it would take three times as long."""
+    """One pass of an empty loop takes 3.1 us. If the console sent empty USB packets, the pass would take three times as
+    long."""
     code = (
         "def f():\n    t = ticks_us()\n    for i in range(1000): pass\n    return ticks_diff(ticks_us(), t)\nprint(f())"
     )

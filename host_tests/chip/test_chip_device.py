@@ -1,6 +1,5 @@
-"""The whole device on the emulated boards, with MicroPython's own image, file system, floats and drivers. Faults
-affect I2C, the FIFO backlog, the watchdog and reset. The tests in host_tests/device run every fault of the fault
-script."""
+"""The whole device on the emulated boards, with MicroPython's own image, file system, floats and drivers. The faults
+here concern I2C, the FIFO's backlog, the watchdog and resets. The tests in host_tests/device cover all other faults."""
 
 import re
 from typing import Any
@@ -24,7 +23,8 @@ FAULT_S = 0.6
 @pytest.mark.long
 @pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=[pytest.mark.esp32, pytest.mark.nightly])])
 def test_two_presses_align_a_new_board_for_good(chip):
-    """The bike is uncalibrated, on its kickstand, upright, power-cycled, then leaned. The display shows the lean."""
+    """The sensor is not calibrated. After the pose on the kickstand and the upright pose, the power is switched off and
+    on. Then the display shows the lean of the bike."""
     ride = Ride([kickstand(5.5), upright(5.5), upright(1e6, lean_deg=LEAN_DEG)])
     part = Sensor(seed=1, share=0.1)  # small errors, because the accelerometer is not calibrated here
     device = CHIPS[chip](part.world(ride.motion), firmware(chip))
@@ -41,7 +41,7 @@ def test_two_presses_align_a_new_board_for_good(chip):
     assert {"kickstand_a.cal", "kickstand_b.cal"} & set(device.files())
     device.run(0.2)
     assert samples.taken() > 1000
-    assert samples.lost() == 0  # also during the poses and the flash writes
+    assert samples.lost() == 0  # no sample was lost, even during the poses and the flash writes
 
     device.power_off()
     device.run_until(lambda: ride.truth(device.time_s)[0] > LEAN_DEG - 1.0, 10.0)
@@ -52,13 +52,13 @@ def test_two_presses_align_a_new_board_for_good(chip):
 
 
 def lean_is_right(device):
-    """Return True if the display shows a lean and it is correct."""
+    """Return True if the display shows a lean and this lean is correct."""
     shown = shown_lean(device.lcd())
     return shown is not None and abs(shown - LEAN_DEG) <= NEAR_DEG
 
 
 def watch(device, seconds):
-    """Advance the time. Return every text of the display. Fails if the display shows a wrong lean."""
+    """Advance the time and return every text of the display. Fail if the display shows a wrong lean."""
     texts = set()
     for _ in range(round(seconds / 0.02)):
         device.run(0.02)
@@ -69,7 +69,7 @@ def watch(device, seconds):
 
 
 def starts_again(device):
-    """After a reset the correct lean appears again, on a display that has lost its content."""
+    """Erase the display's content, as a reset does. The correct lean must appear again."""
     device.board.lcd.power_on()
     device.run_until(lambda: lean_is_right(device), 4.0)
 
@@ -84,7 +84,7 @@ def starts_again(device):
     ids=["EIO", "ETIMEDOUT", "SDA held"],
 )
 def test_bus_errors_are_shown_while_they_last(riding, inject, request):
-    """The display shows the fault while it lasts. A brief fault may fall between two reads of the display."""
+    """A brief fault may begin and end between two reads of the display."""
     inject(riding.board.faults, riding.time_s + 0.01)
     texts = watch(riding, 0.01 + FAULT_S + RECOVERY_S)
     assert lean_is_right(riding), riding.lcd()
@@ -94,8 +94,9 @@ def test_bus_errors_are_shown_while_they_last(riding, inject, request):
 
 @pytest.mark.parametrize("riding", ["pico"], indirect=True)
 def test_stalled_processor_keeps_the_lean_right(riding):
-    """A stall of 45 ms (a flash erase with interrupts off) or more loses no sample. A stall of seconds overflows the
-    FIFO: the lost samples are counted, the sensor is not restarted, and the lean stays correct."""
+    """A stall of 45 ms loses no sample. It is as long as a flash erase, during which interrupts are off. A stall of
+    seconds overflows the FIFO. The firmware then counts the lost samples, does not restart the sensor, and the lean
+    stays correct."""
     samples = SampleCount(riding.board.sensor)
     samples.begin()
     for stall_s in (0.045, 0.3):
@@ -112,8 +113,8 @@ def test_stalled_processor_keeps_the_lean_right(riding):
 
 
 def test_watchdog_restarts_a_hung_program(riding):
-    """The watchdog resets the board within 8.4 s (an ESP32 a second later, because it prints the reason). Then the lean
-    is shown again."""
+    """The watchdog resets the board within 8.4 s. An ESP32 needs a second more, because it prints the reason. Then the
+    display shows the lean again."""
     riding.exec("from time import sleep\nfrom kickstand.board import port")
     riding.send(b"port.start_watchdog()\nwhile True: sleep(10)\x04")
     resets = riding.resets
@@ -139,7 +140,7 @@ def test_reset_during_a_read_frees_the_bus(riding):
     ],
 )
 def test_oled_is_found_and_shows_the_lean_in_large_digits(chip, display):
-    """The test uses MicroPython's own framebuf, on the I2C of a Pico and on the pins of an ESP32."""
+    """The boards use MicroPython's own framebuf. A Pico has hardware I2C, and an ESP32 drives the pins in software."""
     with CHIPS[chip](leaning(LEAN_DEG), firmware(chip) | calibrated(), display=display) as device:
         device.run_until(lambda: shown_lean(device.lcd()) == LEAN_DEG, 3.0)
         oled: Any = device.board.lcd

@@ -12,8 +12,8 @@ from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 
 pytestmark = pytest.mark.chip
 
-# mount, clock, elapsed and allocated are defined outside. Each update does one step of the work, so all updates are
-# timed alike.
+# The code before this script defines mount, clock, elapsed and allocated. Each update does one step of the work, so
+# every update is timed in the same way.
 _DRIVE = """
 from kickstand.drive_alignment import alignment
 from kickstand.rotation import matrix
@@ -58,8 +58,8 @@ def allocated():
 
 
 def test_alignment_by_driving_on_the_chip(at_prompt, monkeypatch):
-    """The drive has five acceleration events with braking events between them. An update takes at most 2 ms of the
-    10 ms between samples."""
+    """The drive has five events of acceleration, with braking events between them. An update takes at most 2 ms. The
+    time between two samples is 10 ms."""
     mount = random_mounting(4)
     host = {"mount": mount, "clock": time.monotonic_ns, "elapsed": lambda began: 0, "allocated": lambda: 0}
     monkeypatch.setattr(alignment, "STEP_US", 10**9)
@@ -71,7 +71,7 @@ def test_alignment_by_driving_on_the_chip(at_prompt, monkeypatch):
     between = np.reshape(chip["matrix"], (3, 3)) @ np.reshape(host["result"]["matrix"], (3, 3)).T
     assert np.degrees(np.linalg.norm(rotation_vector(between))) < 0.05
     assert chip["longest"] < 2100, "microseconds"
-    # The heap does not grow once each number is on it.
+    # The heap grows until each attribute has its number. It must not grow in the second half of the drive.
     later = chip["memory"][len(chip["memory"]) // 2 :]
     assert max(later) - min(later) < 400, chip["memory"]
     assert later[-1] - chip["memory"][0] < 3000

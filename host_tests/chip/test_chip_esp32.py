@@ -1,4 +1,4 @@
-"""Features of the emulated ESP32, and tests that need a separate board. Tests for both chips: test_chip_device.py."""
+"""Features of the emulated ESP32, and tests that need a board of their own. test_chip_device.py tests both chips."""
 
 import math
 import re
@@ -33,13 +33,13 @@ save(0)
 
 
 def board(config="", world=None, files=None):
-    """Return a calibrated board held at LEAN_DEG, still off. config: the text of config.py."""
+    """Return a calibrated board that is held at LEAN_DEG and is off. config: the text of config.py."""
     own = FILES | ({"/config.py": config.encode()} if config else {})
     return esp32(world or leaning(LEAN_DEG), (files or firmware("esp32")) | own)
 
 
 def test_board_survives_ctrl_c_unplugging_and_soft_reset():
-    """The owner does all this to a running board."""
+    """The owner does all three to a running board."""
     with board() as device:
         shows(device, LEAN, BOOT_S)
         faults = device.board.faults
@@ -73,8 +73,8 @@ def test_board_survives_ctrl_c_unplugging_and_soft_reset():
 
 
 def test_safe_mode_and_refused_pins():
-    """Holding the button at power-on stops the app before it begins. A pin that the chip needs for its flash is
-    refused, because it would crash the board at each start."""
+    """In safe mode the button is held at power-on, and the app does not start. The firmware refuses a pin that the chip
+    needs for its flash, because using it would crash the board at each start."""
     with board("SENSOR_SDA = 6\n") as device:
         shows(device, r"SENSOR_SDA", BOOT_S)
         assert device.resets == 0
@@ -87,8 +87,10 @@ def test_safe_mode_and_refused_pins():
 
 
 def states_of_flash(device, code):
-    """Yield the file system before the code runs, and after each of its flash writes. QEMU's flash takes no time,
-    but the program needs tens of microseconds between two writes."""
+    """Yield the content of the flash before the code runs, and after each of its flash writes.
+
+    QEMU's flash takes no time, but the program needs tens of microseconds between two writes.
+    """
     device.exec("pass")
     device.send(code.encode() + b"\x04")
     del device.said[:]
@@ -102,7 +104,7 @@ def states_of_flash(device, code):
 
 
 def test_old_or_new_wherever_a_save_is_cut(tmp_path):
-    """The power is cut after each write of four saves. A board that starts with that flash has a whole calibration."""
+    """The power is cut after each write of four saves. A board that then starts has the old or the new calibration."""
     with board(files=modules("esp32")) as device:
         device.exec(_SAVE)
         states, writes = [], 0
@@ -134,7 +136,7 @@ _SIDES = [[1, 0, 0], [0, 0, -1], [0, 1, 0], [-1, 0, 0], [0, 0, 1], [0, -1, 0], [
 
 @pytest.mark.nightly
 def test_six_positions_by_the_button():
-    """The rider starts in the menu and ends with a stored calibration. The last position is a free one."""
+    """The rider begins in the menu. After the six sides comes a free pose. At the end the calibration is in flash."""
     steps = [[0, None]]
     for i, up in enumerate(_SIDES):
         steps += [[8.0 + 6.0 * i, up], [13.0 + 6.0 * i, None]]
@@ -168,7 +170,7 @@ def test_power_cut_loses_only_the_last_block_of_a_ride():
 
 
 def test_ride_removes_the_oldest_parts_first():
-    """In a flash full of rides, only as many of the oldest parts as needed are removed."""
+    """The flash is full of rides. The new ride removes only as many parts as it needs room for."""
     parts = [part_path("rides", ride, number) for ride in (1, 2) for number in range(11)]
     full = dict.fromkeys(parts, bytes(PART_BLOCKS * BLOCK))
     with board(files=modules("esp32") | full) as device:
@@ -177,7 +179,7 @@ def test_ride_removes_the_oldest_parts_first():
         device.exec("recorder.start(Chip(), Calibration())\nfeed(2)\nrecorder.stop()", 30.0)
         files = device.files()
     gone = [path for path in parts if path not in files]
-    short = needed - (before - 2 * BLOCK)  # missing bytes, after the ride has created its directory
+    short = needed - (before - 2 * BLOCK)  # bytes to be freed, after the ride has created its directory
     assert short > 0
     assert gone == parts[: math.ceil(short / (PART_BLOCKS * BLOCK))]
     assert FILES.items() <= files.items()

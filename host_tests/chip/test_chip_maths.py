@@ -20,7 +20,7 @@ pytestmark = pytest.mark.chip
 
 
 def records():
-    """Return three seconds of a ride in the form that replay_engine.run() takes."""
+    """Return three seconds of a ride as input of replay_engine.run()."""
     world = PART.world(Ride([accelerate(15.0, 1.0), turn(-30.0, 1.0, 0.5)]).motion)
     offsets = [-o / s for o, s in zip(PART.accel_offset_g, PART.accel_scale, strict=True)]
     slopes = [1.0 / s for s in PART.accel_scale]
@@ -36,7 +36,7 @@ def records():
 
 
 def agree(results):
-    """The whole LeanMeter gives the same lean within 0.01 degrees at every sample."""
+    """Assert that all engines give the same lean within 0.01 degrees at every sample. results: one per engine."""
     host, *others = (np.frombuffer(result).reshape(-1, len(replay_engine.COLUMNS)) for result in results)
     assert abs(host[:, 0]).max() > 25.0
     for other in others:
@@ -53,8 +53,8 @@ def on_host():
 
 
 def test_the_same_log_gives_the_same_lean(tmp_path):
-    """The results agree on a Pico, on the unix port and on CPython."""
-    pico()  # or skip
+    """The lean agrees on a Pico, on MicroPython's unix port and on CPython."""
+    pico()  # skips the test without the emulator
     from kickstand_emulator.engine import rp2040
 
     with rp2040(iter([records()]), None) as results_of_chip:

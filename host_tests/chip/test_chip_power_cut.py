@@ -7,9 +7,9 @@ from kickstand.calibration.store import Store
 
 pytestmark = pytest.mark.chip
 
-SAVES = 16  # littlefs writes one page at a time, and every fifteenth save erases a new block
+SAVES = 16  # number of saves: littlefs appends one page per save, and every fifteenth save erases a new block
 
-# The calibrations differ in the gyro bias about x.
+# Each save stores another gyro bias about x, so a test can tell the calibrations apart.
 _TOOLS = """
 from kickstand.calibration.store import Store
 def bias():
@@ -25,7 +25,7 @@ save(0)
 
 
 def torn(before, after, share):
-    """Return the flash after only this share of one operation's change."""
+    """Return the flash after the power was cut in an operation. share: the share of the operation that was done."""
     first = next(i for i in range(0, len(before), 256) if before[i : i + 256] != after[i : i + 256])
     last = next(i for i in range(len(before), 0, -256) if before[i - 256 : i] != after[i - 256 : i])
     while before[first] == after[first]:
@@ -35,7 +35,7 @@ def torn(before, after, share):
 
 
 def loaded(system, image, directory):
-    """Return the gyro bias that the firmware loads from this flash. Fails without a whole record."""
+    """Return the gyro bias that the firmware loads from this flash. Fail if it finds no complete calibration."""
     for name, content in system.read(image).items():
         if name.endswith(".cal"):
             (directory / name).write_bytes(content)
@@ -63,7 +63,8 @@ def test_old_or_new_wherever_a_save_is_cut(at_prompt, tmp_path):
 
 @pytest.mark.parametrize("operation", [8, *(pytest.param(n, marks=pytest.mark.nightly) for n in (1, 9, 10))])
 def test_board_starts_and_saves_after_a_power_cut(at_prompt, operation):
-    """The power is really cut in the middle of an operation and then restored. The eighth operation is an erase."""
+    """The emulated board loses power in the middle of an operation, and gets it back. The eighth operation is an
+    erase."""
     at_prompt.exec(_TOOLS)
     at_prompt.chip.flash.cut_power(operation, 0.5)
     del at_prompt.said[:]

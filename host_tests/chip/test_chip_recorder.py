@@ -1,4 +1,5 @@
-"""The recorder on the emulated Pico, with its own littlefs, stalling flash, 32-bit floats, power cuts and mpremote."""
+"""The recorder on the emulated Pico. This board has littlefs, a flash that stalls the processor, and 32-bit floats. The
+tests also cut the power and use mpremote."""
 
 import ast
 import re
@@ -22,7 +23,7 @@ pytestmark = pytest.mark.chip
 
 RIDE = Ride([wait(1.0), accelerate(15.0, 2.0), turn(-30.0, 3.0), turn(35.0, 3.0)])
 
-# Run the unchanged app, record the lean at each loop pass for some seconds, then end the ride.
+# Run the unchanged app for some seconds and note the lean at each pass of its loop. Then end the ride.
 _RUN = """
 from array import array
 from time import ticks_add, ticks_diff, ticks_ms
@@ -90,7 +91,7 @@ def rides(files):
     return found
 
 
-@pytest.mark.nightly  # host_tests/rides: test_recorder.py on the simulated board, test_slow_flash.py with slow flash
+@pytest.mark.nightly  # host_tests/rides has similar tests: test_recorder.py, and test_slow_flash.py with a slow flash
 def test_a_recorded_ride_replays_as_it_was_shown(at_prompt, tmp_path):
     """No sample is lost during the recording, and the display keeps working."""
     begun_s, world = at_prompt.time_s, PART.world(RIDE.motion)
@@ -117,7 +118,7 @@ def test_a_recorded_ride_replays_as_it_was_shown(at_prompt, tmp_path):
     assert max(leans) - min(leans) > 10
 
 
-@pytest.mark.nightly  # the next test cuts one write, test_chip_power_cut.py each write of a calibration
+@pytest.mark.nightly  # test_chip_power_cut.py is similar: it cuts each write of a calibration
 def test_power_cut_loses_only_the_last_block(at_prompt):
     """The power is cut before, during and after each flash operation. The calibration always survives."""
     at_prompt.exec(FEED)
@@ -165,14 +166,15 @@ def test_board_records_again_after_a_power_cut(at_prompt, operation):
 @pytest.mark.nightly
 @pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=pytest.mark.esp32)])
 def test_pull_and_record_through_mpremote(tmp_path, monkeypatch, chip):
-    """A ride with an ESP32's GPS is ended and pulled, then a log is streamed. Both can be replayed."""
+    """A ride ends and is pulled, then a log is streamed. The ESP32 also has a GPS receiver. Both logs can be
+    replayed."""
     config = "RECORD = True\n" + {"pico": "", "esp32": 'SPEED = "gps"\n'}[chip]
     files = firmware(chip) | calibrated() | {"config.py": config.encode()}
     board: Any = CHIPS[chip](PART.world(RIDE.motion), files)
     with board as device:
         if chip == "esp32":
             device.fit_gps(lambda t_s: RIDE.truth(t_s)[1])
-        ends = []  # times in seconds when Ctrl-C is pressed here
+        ends = []  # times in seconds at which the user presses Ctrl-C
 
         def ctrl_c():
             if ends and device.time_s > ends[0]:
@@ -190,7 +192,7 @@ def test_pull_and_record_through_mpremote(tmp_path, monkeypatch, chip):
         assert np.isfinite(log.lat_deg).any() == (chip == "esp32")
 
         live = tmp_path / "live.csv"
-        device.run(2.0)  # a starting ESP32 ignores its console, and the next attempt would be 10 s later
+        device.run(2.0)  # while an ESP32 starts it ignores its console, and the next attempt would be 10 s later
         ends.append(device.time_s + 5.0)
         result = command.works("record", "--port", emulated_port.NAME, "--out", live)
         assert result.err == ""

@@ -1,4 +1,4 @@
-"""Speed sources on the emulated boards: the firmware's own drivers use real pin interrupts and a real UART."""
+"""Speed sources on the emulated boards, with the firmware's own drivers, MicroPython's pin interrupts and its UART."""
 
 import json
 from typing import Any

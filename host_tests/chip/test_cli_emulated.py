@@ -1,4 +1,4 @@
-"""Tests `kickstand emulate`, and the commands flash and status with mpremote on an emulated board."""
+"""The command `kickstand emulate`, and the commands flash and status with mpremote on an emulated board."""
 
 import math
 import queue
@@ -29,7 +29,7 @@ pytestmark = pytest.mark.chip
     [("rp2040", "Pico"), pytest.param("esp32", "ESP32", marks=pytest.mark.esp32)],
 )
 def test_emulate_in_a_terminal(chip, name):
-    """The picture shows the bike, and the keys work the button and end the program."""
+    """The picture shows the bike. One key presses the button, and another key ends the program."""
     need("esp32" if chip == "esp32" else "pico")
     with socket.create_server(("127.0.0.1", 0)) as found:
         free = found.getsockname()[1]
@@ -52,7 +52,7 @@ def test_without_its_library_an_esp32_is_refused(words, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("chip", ["rp2040", "esp32"])
 def test_emulate_reports_its_start_at_once(tmp_path, monkeypatch, chip):
-    """A missing file is reported, too: the message says where to get it and where to put it."""
+    """The program also reports a missing file at once. The message says where to get the file and where to put it."""
     monkeypatch.setattr(Path, "home", lambda: tmp_path)
     monkeypatch.setattr(image, "URL", "http://127.0.0.1:9/" + image.NAME)
     monkeypatch.setenv(esp32_library.VARIABLE, str(tmp_path))
@@ -72,7 +72,7 @@ def test_an_esp32_needs_no_emulator_of_the_pico():
 
 
 class Emulating(threading.Thread):
-    """Runs `kickstand emulate` beside the test, with these files on its board, until end_s of the board's time."""
+    """Runs `kickstand emulate` beside the test, with these files on its board. It ends at end_s of the board's time."""
 
     def __init__(self, patch, files, chip):
         super().__init__(daemon=True)
@@ -117,8 +117,7 @@ class Emulating(threading.Thread):
 @pytest.mark.nightly  # the page Install has a similar test, and host_tests/deploy tests a fake board
 @pytest.mark.parametrize("chip", ["rp2040", pytest.param("esp32", marks=pytest.mark.esp32)])
 def test_flash_and_status_on_the_emulated_board(monkeypatch, chip):
-    """The board has an older version with an edited config. Then the bike's ride begins, and the display shows what to
-    do."""
+    """The board has an older version and an edited config.py. After `flash` the display shows the rider's next step."""
     name = "esp32" if chip == "esp32" else "pico"
     names = {"rp2040": "Raspberry Pi Pico with RP2040", "esp32": "Generic ESP32 module with ESP32"}
     CHIPS[name]()  # skips the test without the emulator
@@ -133,7 +132,7 @@ def test_flash_and_status_on_the_emulated_board(monkeypatch, chip):
         clock = types.SimpleNamespace(monotonic=emulating.time_s, sleep=emulating.sleep)
         for module in (transport_serial, connection):
             monkeypatch.setattr(module, "time", clock)
-        emulating.sleep(2.0)  # a starting ESP32 ignores its console
+        emulating.sleep(2.0)  # while an ESP32 starts, it ignores its console
         flashed = command.works("flash", "--port", address[0]).out
         assert f"{names[chip]}, MicroPython 1.26.1 on {address[0]}" in flashed
         assert "kept: config.py" in flashed

@@ -27,14 +27,14 @@ ESP32_PINS = [4, 18, 19, 21, 22]
         *[(m, WIRED_TO_FREE, FREE, [6, 7, 8, 9, 10]) for m in ("pico", "xiao rp2040", "s2", "s3", "c6")],
         *[("c3", {**WIRED, "i2c_driver": driver}, PINS, [4, 5, 6, 7, 10]) for driver in ("legacy", "new")],
         ("c3", {**WIRED, "one_bus": True}, {**PINS, "LCD_SDA": 4, "LCD_SCL": 5}, [4, 5, 10]),
-        # the wheel and GPS inputs may be on an input-only pin
+        # The inputs of the wheel and of a GPS receiver may be on an input-only pin.
         ("esp32", {}, {**SPEED, "GPS_RX": 34}, None),
         ("esp32", {}, {**CARD, "SD_MISO": 39}, None),
     ],
 )
 def test_other_boards_measure(machine, board, config, touched, tmp_path):
-    """Tested with the board's usual pins or others, with either driver of an ESP32, on one bus or two. No other pin
-    is touched."""
+    """The boards use their usual pins or other pins, either driver of an ESP32, and one bus or two. The firmware
+    touches no other pin."""
     plan = {"lean": LEANING, "board": {"machine": machine, **board}, "config": config, "until": 3}
     record = device_plans.run("cpython", tmp_path, plan)
     assert record.last[0].startswith("Raw   25°")
@@ -44,7 +44,7 @@ def test_other_boards_measure(machine, board, config, touched, tmp_path):
 
 @pytest.mark.parametrize("machine", WITHOUT)
 def test_a_board_without_usual_pins_touches_none(machine, tmp_path, capsys):
-    """The message names the missing pins, also in safe mode (button held at power-on)."""
+    """The message names the missing pins. It also appears in safe mode, with the button held at power-on."""
     plan = {"board": {"machine": machine, **WIRED}, "presses": [[0, 2]], "until": 3}
     record = device_plans.run("cpython", tmp_path, plan, capsys)
     assert record.ends == ["returned"]
@@ -80,8 +80,8 @@ def test_the_refusal_is_shown_where_the_display_s_pins_are_set(config, lines, tm
     ],
 )
 def test_a_classic_esp32_keeps_its_flash_and_its_console(machine, name, pin, tmp_path, capsys):
-    """Driving a pin of the flash crashes the board at each start. Input-only pins have no pull-up, so a button there
-    would always read as pressed."""
+    """The firmware refuses these pins. Driving a pin of the flash would crash the board at each start. Input-only pins
+    have no pull-up, so a button on such a pin would always read as pressed."""
     config = {**(CARD if name == "SD_CS" else {}), **({"SPEED": "wheel"} if name == "WHEEL_PIN" else {}), name: pin}
     if name == "GPS_TX":
         config = {**SPEED, **config}
@@ -95,7 +95,7 @@ def test_a_classic_esp32_keeps_its_flash_and_its_console(machine, name, pin, tmp
 
 
 def test_a_board_with_psram_has_no_usual_pins_for_a_gps_receiver(tmp_path, capsys):
-    """The board's PSRAM uses the usual pins. config.py must set others, and the display says so."""
+    """The board's PSRAM uses the usual pins of a GPS receiver. The display asks the owner to set other pins."""
     plan = {"lean": LEANING, "board": {"machine": "esp32 spiram"}, "config": {"SPEED": "gps"}, "until": 3}
     record = device_plans.run("cpython", tmp_path, plan, capsys)
     assert record.ends == ["returned"]
@@ -122,8 +122,8 @@ def test_a_display_with_wrong_pins_drives_no_other_pin(machine, config, wrong, t
 
 @pytest.mark.parametrize("driver", ["legacy", "new"])
 def test_a_bus_that_stalls_never_stops_the_loop_of_an_esp32(driver, tmp_path):
-    """The sensor's wires are held for a second, then the display's for a moment. Both devices come back without a
-    reset."""
+    """A fault holds the sensor's wires for a second, then the display's wires for a moment. Both devices work again
+    without a reset."""
     faults = [["timeout_for", [SENSOR, 3.0, 1.0]], ["timeout_for", [LCD, 6.0, 0.05]], ["stuck_sda", [7.0]]]
     board = {"machine": "esp32", "i2c_driver": driver}
     plan = {"lean": [[0, 25], [6, 30]], "board": board, "faults": faults, "until": 9}
@@ -137,19 +137,19 @@ def test_a_bus_that_stalls_never_stops_the_loop_of_an_esp32(driver, tmp_path):
 
 @pytest.mark.parametrize("bits", [8, 60])
 def test_a_device_that_hangs_on_an_esp32_is_freed(bits, tmp_path):
-    """SoftI2C does not notice that SDA is held. Either its own clock pulses free the device, or the readings are
-    rejected."""
+    """SoftI2C does not notice that a device holds SDA. Its clock pulses free the device. If they do not, the firmware
+    rejects the readings."""
     faults = [["stuck_sda", [3.0, bits]], ["stuck_sda", [3.0, bits, True]]]
     plan = {"lean": [[0, 25], [3.2, 35]], "board": {"machine": "esp32"}, "faults": faults, "until": 5}
     record = device_plans.run("cpython", tmp_path, plan)
     assert record.ends == ["off"]
     assert record.first("Raw   3[1-5]°", 3.2) < 4.0
     shown = {int(line[5:8]) for t_s, line, _ in record.frames if t_s > 1.0 and line.startswith("Raw")}
-    assert shown <= set(range(25, 36))  # readings from that time are never used
+    assert shown <= set(range(25, 36))  # no reading from the time of the fault is used
 
 
 def on(machine, function, until_s):
-    """Run function(board) on this board, with firmware that is imported on it. Return (outcome, board)."""
+    """Run function(board) on a board of this machine, which imports the firmware anew. Return (outcome, board)."""
     before = device_runs.take_firmware()
     try:
         with Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=machine) as board:
@@ -161,7 +161,7 @@ def on(machine, function, until_s):
 
 @pytest.mark.parametrize("machine", ["pico", "esp32", "s3"])
 def test_a_stopped_watchdog_allows_an_open_console_for_days(machine):
-    """An ESP32's watchdog cannot be stopped, not even by a soft reset."""
+    """An ESP32's watchdog cannot be stopped, even by a soft reset. So the firmware must feed it."""
 
     def use_the_console(board):
         from time import sleep_ms  # pyright: ignore[reportAttributeAccessIssue]

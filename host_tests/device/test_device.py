@@ -1,5 +1,4 @@
-"""How a rider uses the device: two presses and a ride, six positions, the menu, power-off, and what must not go
-wrong."""
+"""How a rider uses the device: two presses and a ride, six positions, the menu, power-off, and a faulty gyro."""
 
 import math
 import re
@@ -14,14 +13,14 @@ from support.device_plans import ALIGNED, LEFT_S, PRESSES, RIDE, RIGHT_S, STRAIG
 
 @pytest.mark.parametrize(("engine", "seed"), [("cpython", None), ("micropython", 3)])
 def test_two_presses_and_a_ride(engine, seed, tmp_path):
-    """With seed None the sensor is perfect and mounted straight. With seed 3 it has the data sheet's errors and any
-    mounting, and is not calibrated."""
+    """With seed None the sensor is perfect, and its axes are the bike's. With seed 3 it has the data sheet's errors and
+    a random mounting, and is not calibrated."""
     record = device_plans.run(engine, tmp_path, {**ALIGNED, "seed": seed})
     assert record.at(1.9)[0].startswith("Raw")
     assert record.first("On stand: press") < 2.5
     assert record.at(6)[0] == "Now upright:    "
-    # 8 s of poses and settling; the errors of a part change its reading of 1 g in each pose, which also costs tilt
     assert record.first("Aligned!") < 16.0
+    # An uncalibrated sensor has another error in each pose. So the alignment is wrong by some degrees.
     tolerance = 2 if seed is None else 7
     for t_s, lean in ((LEFT_S, -30), (RIGHT_S, 40), (STRAIGHT_S, 0)):
         assert record.lean_at(t_s) == pytest.approx(lean, abs=tolerance)
@@ -86,10 +85,9 @@ def test_a_refused_alignment_leaves_the_old_one(tmp_path):
 
 
 def test_pages_and_menu(tmp_path):
-    # imported here because the import needs a board
     source = (firmware_path.PACKAGE / "ui" / "page_ring.py").read_text(encoding="utf-8")
     ring = re.findall(r"pages\.(\w+)", source.partition("MOTORCYCLE = (")[2].partition(")")[0])
-    turns_s = [46.0 + k for k in range(len(ring))]  # presses through all pages, back to the first one
+    turns_s = [46.0 + k for k in range(len(ring))]  # times of the presses through all pages, back to the first page
     menu_s = turns_s[-1] + 1.0
     short = [*turns_s, *(menu_s + after_s for after_s in (2, 3, 7.5, 11, 12, 13, 19))]
     long = [menu_s + after_s for after_s in (0, 4, 9, 14)]
@@ -119,7 +117,11 @@ UPS = [[1, 0, 0], [0, 0, -1], [0, 1, 0], [-1, 0, 0], [0, 0, 1], [0, -1, 0]]
 
 
 def six_positions(free, repeat=False):
-    """Return a plan: the menu, six sides of 5 s each with a second of turning between them, and a free pose."""
+    """Return a plan: the rider chooses the six positions in the menu, holds six sides for 5 s each, and a free pose.
+
+    Between two poses the rider turns the sensor for a second.
+    free: direction up in the free pose, in the sensor's axes. repeat: True to hold the first side twice.
+    """
     steps, t_s = [[0, None]], 6.0
     for up in [*UPS[:3], *([UPS[0]] if repeat else []), *UPS[3:], free]:
         steps += [[t_s, up], [t_s + 5, None]]
@@ -129,7 +131,7 @@ def six_positions(free, repeat=False):
 
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
 def test_six_positions_then_alignment_of_a_part_with_errors(engine, tmp_path):
-    """The main task from start to end: after both wizards the lean is right despite the sensor's errors."""
+    """This is the main task from start to end. After both wizards the lean is right despite the sensor's errors."""
     record = device_plans.run(engine, tmp_path, {**six_positions([0.5, 0.6, -0.7]), "seed": 3})
     assert record.first("any of the six") < math.inf
     assert record.first(r"Side \+x done") < 12
@@ -149,7 +151,7 @@ def test_the_six_positions_calibrate_the_gyro_too(tmp_path):
 
 
 def test_a_fast_turn_is_reported_and_repeated(tmp_path):
-    """All turns take a tenth of a second, so no axis of the gyro is verified."""
+    """The rider turns the sensor within 0.15 s each time, so no axis of the gyro can be checked."""
     plan = six_positions([0.5, 0.6, -0.7])
     steps = plan["poses"]
     for i in range(2, len(steps) - 1, 2):
@@ -163,8 +165,8 @@ def test_a_fast_turn_is_reported_and_repeated(tmp_path):
 
 @pytest.mark.parametrize(("faults", "goes_on"), [([], True), ([["unplug_sensor", [10.8]]], False)])
 def test_a_turn_beyond_the_range_does_not_end_six_positions(faults, goes_on, tmp_path):
-    """Half a turn in 0.3 s is 600 deg/s, beyond the range of 500. If the sensor's wire is off, the procedure does
-    end."""
+    """Half a turn in 0.3 s is 600 deg/s, but the gyro's range is 500 deg/s. The procedure only ends if the sensor's
+    wire comes off."""
     poses = [[0, None], [6, [1, 0, 0]], [10.7, None], [11, [-1, 0.05, 0.05]], [30, None]]
     plan = {"poses": poses, "presses": [[2, 1.2], [4, 0.15], [5, 1.2]], "until": 17, "faults": faults}
     record = device_plans.run("cpython", tmp_path, plan)
@@ -174,7 +176,7 @@ def test_a_turn_beyond_the_range_does_not_end_six_positions(faults, goes_on, tmp
 
 
 def ill(monkeypatch, change):
-    """Make the gyro of every simulated sensor read change(rate) about x."""
+    """Change the gyro of every simulated sensor: about x it reads change(true rate)."""
     read = sensor_errors.Sensor.read
 
     def changed(self, motion, t_s):
@@ -204,7 +206,7 @@ def test_the_six_positions_refuse_a_faulty_gyro(tmp_path, monkeypatch, capsys, c
 
 @pytest.mark.parametrize(("share", "aligned"), [(0.5, False), (-1.0, False), (0.95, True), (1.05, True)])
 def test_the_two_presses_refuse_a_faulty_gyro(tmp_path, monkeypatch, capsys, share, aligned):
-    """In a sensor without a mounting rotation the bike rolls about the sensor's z."""
+    """The sensor's axes are the bike's, so the bike rolls about the sensor's z."""
     read = sensor_errors.Sensor.read
 
     def changed(self, motion, t_s):
@@ -227,14 +229,14 @@ def test_six_positions_shows_the_next_step(tmp_path):
 
 
 def test_a_tilted_upright_pose_is_corrected_on_the_road(tmp_path):
-    """The bike leans two degrees to the right at the upright press. After a ride the display shows the true lean, also
-    after power-off."""
+    """The bike leans two degrees to the right when the rider presses for the upright pose. After a ride the display
+    shows the true lean, even after power-off."""
     ride = [["kickstand", 8.0], ["upright", 14.0, 2.0], ["accelerate", 15.0, 6.0]]
     for _ in range(3):
         ride += [["turn", -25.0, 3.0], ["straight", 25.0], ["turn", 25.0, 3.0], ["straight", 25.0]]
     plan = {**ALIGNED, "ride": [*ride, ["brake", 0.0, 6.0], ["wait", 10.0]], "until": 230}
     record = device_plans.run("cpython", tmp_path, plan)
-    assert record.lean_at(20.2) == 0  # the bike leans by 2 degrees, as at the alignment
+    assert record.lean_at(20.2) == 0  # the bike still leans by 2 degrees, as in the upright pose
     assert record.last[0].startswith("Lean   0°")
     again = device_plans.run("cpython", tmp_path, {"ride": [["upright", 5.0]], "until": 4})
     assert again.lean_at(3.5) == 0

@@ -1,5 +1,5 @@
-"""The whole device aligned by driving. Cars have no earlier alignment, and motorcycles have theirs checked and
-refined. Some speed sources are unusable."""
+"""The whole device, aligned by driving. A car finds its first alignment. On a motorcycle, driving checks and refines
+the alignment that the two presses found. Some speed sources are unusable."""
 
 import math
 import re
@@ -18,8 +18,10 @@ POSES_S = 20.0
 
 
 def town(blocks):
-    """Return a ride of 30 s blocks, each with a turn and one straight braking event to a stop of about 8 s. Each
-    entry is [name of a manoeuvre, its arguments]."""
+    """Return a ride as [[name of a manoeuvre, arguments...], ...].
+
+    Each block lasts 30 s. The vehicle accelerates, turns, rides straight, brakes and then rests for 8 or 9 s.
+    """
     ride = []
     for k in range(blocks):
         ride += [["accelerate", 13.0 + k % 3, 6.0], ["turn", -25.0 if k % 2 else 20.0, 3.0], ["straight", 5.0]]
@@ -28,7 +30,7 @@ def town(blocks):
 
 
 def stops(time_s, start_s):
-    """Return True while the vehicle is at rest in a ride whose town() begins at start_s."""
+    """Return True if the vehicle is at rest at time_s. The blocks of town() begin at start_s."""
     return time_s < start_s or (time_s - start_s) % 30.0 > 21.0
 
 
@@ -50,7 +52,7 @@ def stored(flash):
 
 
 def forward_error_deg(calibration, seed=None):
-    """Return the yaw error, which driving corrects. seed: of the sensor's mount and errors."""
+    """Return the alignment's error in yaw, which driving corrects. seed: the sensor's seed."""
     true = sensor_errors.Sensor(seed=seed).vehicle_from_sensor
     up, forward = true[3:6], calibration.vehicle_from_sensor[6:9]
     left = sum(a * b for a, b in zip(true[0:3], forward, strict=True))
@@ -61,17 +63,17 @@ def forward_error_deg(calibration, seed=None):
 
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
 def test_a_car_finds_its_alignment_and_shows_the_next_step(engine, tmp_path):
-    """This drive runs on MicroPython, with its floats and its heap. The other drives run on CPython."""
+    """This drive runs on MicroPython, to test its floats and its heap. The other drives run on CPython."""
     record = device_plans.run(engine, tmp_path, car("gps", 5, presses=[[60, SHORT], [65, SHORT]]))
     assert record.at(3.0) == ["Brakings   0/5  ", "stop needed     "]
     assert record.first("brake straight") < 8.0
     assert record.first("braking...") < 30.0
-    assert record.at(62.0)[0].startswith("Raw")  # the other page
+    assert record.at(62.0)[0].startswith("Raw")  # the first press shows the other page
     assert record.first("Brakings   [2-4]/5", 65.0) < 67.0
     saved = record.first("Aligned by drive")
     assert saved < 150.0 and stops(saved, 6.0)
     assert record.at(saved)[1].startswith("error about")
-    assert record.first("Accel    0.3", saved) < math.inf  # the first page of a car
+    assert record.first("Accel    0.3", saved) < math.inf  # a car's first page
     calibration = stored(tmp_path)
     assert calibration.aligned and calibration.by_drive
     assert forward_error_deg(calibration, 3) < 1.5
@@ -101,23 +103,24 @@ def test_a_car_whose_sensor_is_mounted_anew_finds_it_out(tmp_path):
     record = device_plans.run("cpython", tmp_path, car("wheel", 7, remount=[20.0, 8]))
     assert record.first("Aligned by drive") < math.inf
     after, true = stored(tmp_path).vehicle_from_sensor, sensor_errors.random_mounting(8)
-    assert max(abs(a - b) for a, b in zip(after, true, strict=True)) < 0.12  # the sensor's own errors cause 4 degrees
+    assert max(abs(a - b) for a, b in zip(after, true, strict=True)) < 0.12  # the sensor's errors cause up to 4 degrees
     assert max(abs(a - b) for a, b in zip(before.vehicle_from_sensor, true, strict=True)) > 0.5
 
 
 QUESTION = "Side was wrong"
-TURN_S = POSES_S + 30.0 * 2 + 9.0  # in a right turn of 20 degrees
+TURN_S = POSES_S + 30.0 * 2 + 9.0  # a time in a right turn of 20 degrees
 
 
 @pytest.fixture(scope="module")
 def unanswered(tmp_path_factory):
-    """Return the Record of a ride with the poses on the wrong side and no answer to the question."""
+    """Return the Record of a ride. The kickstand is on the other side than set, and the rider does not answer the
+    question."""
     return device_plans.run("cpython", tmp_path_factory.mktemp("asked"), bike("gps", 3, kickstand=(12.0,)))
 
 
 @pytest.fixture
 def asked(unanswered):
-    """Return the time when the display asks about the side."""
+    """Return the time at which the display asks about the side."""
     return unanswered.first(QUESTION)
 
 
@@ -125,8 +128,8 @@ def test_a_wrong_kickstand_side_is_noticed(unanswered, asked):
     assert asked < POSES_S + 60.0 and stops(asked, POSES_S)
     assert unanswered.at(asked)[1] == "hold = fix      "
     away = unanswered.first("Lean", asked)
-    assert not stops(away, POSES_S)  # it does not disturb the ride
-    assert unanswered.lean_at(TURN_S) is None  # a trim would have the wrong sign
+    assert not stops(away, POSES_S)  # the question disappears during the ride
+    assert unanswered.lean_at(TURN_S) is None  # no lean is shown, because its sign is uncertain
     assert unanswered.at(TURN_S) == ["Lean  --        ", "side was wrong? "]
 
 
@@ -150,8 +153,8 @@ def test_a_side_that_the_rider_confirms_is_not_asked_for_again(asked, tmp_path):
 
 @pytest.mark.parametrize(("model", "config"), [({"until_s": 65.0}, {}), ({}, {"PULSES_PER_METRE": 0.25})])
 def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
-    """A wire that breaks during the ride reads as a standstill, and a second magnet as twice the speed. The display
-    reports both at a stop."""
+    """If the wheel's wire breaks during the ride, the measured speed stays 0. With a second magnet the measured speed
+    is twice the true one. The display reports either fault at the next stop."""
     plan = bike("wheel", 6, wheel=model, config={"SPEED": "wheel", **config})
     record = device_plans.run("cpython", tmp_path, plan)
     for town_round in range(6):
@@ -159,13 +162,13 @@ def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
         assert shown == pytest.approx(-25 if town_round % 2 else 20, abs=4)
     shown_s = record.first("Speed (stuck at|2.0 times)")
     assert stops(shown_s, POSES_S)
-    assert record.at(shown_s + 2.0) == record.at(shown_s)  # until the rider answers or rides on
+    assert record.at(shown_s + 2.0) == record.at(shown_s)  # the text stays until the rider answers or rides on
 
 
 def test_errors_of_both_poses_are_found_while_riding(tmp_path):
-    """Two degrees of pitch on the kickstand give a yaw error of almost ten degrees. Forward is refined at a stop,
-    and at most 1.5 degrees remain. The upright pose was 2 degrees off, and its trim is kept by the new alignment.
-    The maxima are kept too."""
+    """A pitch of two degrees on the kickstand gives a yaw error of almost ten degrees. The firmware refines forward at
+    a stop, and at most 1.5 degrees remain. The upright pose was 2 degrees off. The new alignment keeps the trim that
+    corrects this, and the maxima."""
     plan = bike("wheel", 8, kickstand=(-12.0, 2.0))
     plan["ride"][1] = ["upright", 10.0, 2.0, 0.0]
     first = device_plans.run("cpython", tmp_path, {**plan, "until": 19.0})
@@ -180,7 +183,7 @@ def test_errors_of_both_poses_are_found_while_riding(tmp_path):
 
 
 def test_a_moved_mount_hides_the_lean_despite_other_messages(tmp_path):
-    """The wheel's wire breaks later, and the rider has not answered the first message."""
+    """Later the wheel's wire breaks, too, before the rider has answered the first message."""
     record = device_plans.run(
         "cpython", tmp_path, bike("wheel", 6, remount=[POSES_S + 60.0, 8], wheel={"until_s": 130.0})
     )
@@ -191,8 +194,8 @@ def test_a_moved_mount_hides_the_lean_despite_other_messages(tmp_path):
 
 
 def test_a_requested_drive_keeps_the_old_alignment_until_ready(tmp_path):
-    """The rider starts the drive in the menu after remounting the sensor. A fault of the sensor during the drive does
-    no harm."""
+    """The rider has remounted the sensor and starts alignment by driving in the menu. During the drive the sensor
+    fails for a moment, without harm."""
     device_plans.align(tmp_path)
     old = list(stored(tmp_path).vehicle_from_sensor)
     menu = [[2, LONG], *([4 + t, SHORT] for t in range(4)), [9, LONG]]
@@ -280,7 +283,8 @@ def test_status_shows_the_speed(config, fitted, said, capsys, monkeypatch, tmp_p
 
 
 def test_ctrl_c_keeps_the_worst_for_the_status(tmp_path, monkeypatch, capsys):
-    """Other code used the processor for half a second: the FIFO overflowed, and one turn of the loop took as long."""
+    """Other code keeps the processor busy for 0.25 s. The status then reports this longest turn of the loop, and the
+    room that was left in the FIFO."""
     monkeypatch.chdir(tmp_path)
 
     def interrupt():
@@ -316,7 +320,7 @@ def test_ctrl_c_keeps_the_worst_for_the_status(tmp_path, monkeypatch, capsys):
 
 
 def test_a_press_for_a_page_does_not_answer_a_hidden_question(asked, tmp_path):
-    """The information page hides the question."""
+    """The page with the sensor's information hides the question."""
     plan = bike("gps", 3, kickstand=(12.0,))
     to_info = [[asked - 14.0, LONG], *([asked - 12.0 + t, SHORT] for t in range(3)), [asked - 9.0, LONG]]
     presses = [*POSES, *to_info, [asked + 2.0, LONG]]

@@ -1,4 +1,4 @@
-"""However the firmware ends, the display says so and shows no lean."""
+"""If the firmware ends for any reason, the display says so and shows no lean."""
 
 import pytest
 from kickstand_tools.simulated_board import simulator
@@ -20,7 +20,7 @@ def on_lean(lean_deg, trusted, meter):
 
 @pytest.fixture
 def boards(tmp_path, monkeypatch):
-    """Return the simulated boards that ran, each with an alignment in its flash."""
+    """Return the list of the simulated boards that have run. The flash contains an alignment."""
     device_plans.align(tmp_path)
     made = []
     install = simulator.Board.install
@@ -41,7 +41,7 @@ def test_after_an_error_in_user_py_no_lean_is_shown(kind, boards, tmp_path, monk
 
 @pytest.mark.parametrize("turn", [1, 2, 150, 300])
 def test_ctrl_c_in_a_transfer_leaves_no_lean(turn, boards, tmp_path, monkeypatch):
-    """Ctrl-C comes in the middle of a line of the display, after half of a byte."""
+    """Ctrl-C interrupts the transfer of a line to the display, after half of a byte."""
     from kickstand.board import hd44780
 
     calls = []
@@ -61,7 +61,7 @@ def test_ctrl_c_in_a_transfer_leaves_no_lean(turn, boards, tmp_path, monkeypatch
 
 
 def test_a_ride_that_is_streamed_ends_without_a_lean(boards, tmp_path, monkeypatch):
-    """`kickstand record` starts the app itself."""
+    """Here `kickstand record` starts the app, not main.py."""
     from kickstand import app
 
     turn = app.App.turn

@@ -1,5 +1,5 @@
-"""Faults of sensor, bus, display and flash on the whole device are shown while they last and cleared soon after. A
-wrong value is never shown as good."""
+"""Faults of sensor, bus, display and flash on the whole device. The display shows a fault while it lasts and soon
+recovers. It never shows a wrong value as good."""
 
 import math
 import time
@@ -21,7 +21,7 @@ def aligned(tmp_path):
 
 
 def standing(faults, until=10, **more):
-    """Return a bike at rest at 25 degrees, with these faults of the device."""
+    """Return the plan of a bike at rest at 25 degrees, with these faults."""
     return {"lean": [[0, STATIC]], "faults": faults, "until": until, **more}
 
 
@@ -41,7 +41,7 @@ def test_a_lasting_fault_is_shown_until_it_ends(faults, said, aligned):
     assert record.lean_at(FAULT_S - 0.1) == STATIC
     assert record.first(said, FAULT_S) < FAULT_S + 0.4
     back = record.first("Lean +25° right", END_S)
-    assert back < END_S + RECOVERY_S + 0.1  # the record is taken every 0.1 s
+    assert back < END_S + RECOVERY_S + 0.1  # the record has a frame every 0.1 s
     assert set(record.leans(0, 10)) == {STATIC}  # no other value was shown as the lean
 
 
@@ -118,7 +118,7 @@ def in_turn_300(monkeypatch):
 
 def test_an_exception_is_reported_and_the_board_restarts(aligned, in_turn_300, capsys):
     in_turn_300(lambda: 1 / 0)
-    held = {"presses": [[3.0, 5.0]]}  # the button is held all that time: safe mode only starts at power-on
+    held = {"presses": [[3.0, 5.0]]}  # the button is held during the restart: safe mode starts only at power-on
     record = device_plans.run("cpython", aligned, standing([], until=12, **held), capsys)
     assert record.first("Error, restarts") < math.inf
     assert record.first("ZeroDivisionErro") < math.inf
@@ -139,18 +139,20 @@ def test_a_loop_that_hangs_is_restarted_by_the_watchdog(aligned, in_turn_300):
 
 @pytest.mark.parametrize(("lean", "off_s"), [(-14, 0.507), (-30, 0.4)])
 def test_a_sensor_lost_in_a_turn(lean, off_s, tmp_path):
-    """A turn is as calm as rest and has no side force. After the fault it must not be treated as upright."""
+    """In a steady turn the readings are as calm as at rest, without a force to the side. After the fault the firmware
+    must not take the bike for upright."""
     ride = [["kickstand", 8.0], ["upright", 8.0], ["accelerate", 20.0, 8.0], ["turn", 25.0, 3.0], ["turn", lean, 20.0]]
     plan = {"ride": ride, "presses": [[2, 0.15], [12, 0.15]], "until": 53}
     record = device_plans.run("cpython", tmp_path, {**plan, "faults": [["unplug_sensor", [40.0, off_s]]]})
     assert record.lean_at(39.5) == pytest.approx(lean, abs=2)
     assert record.first("No sensor|Sensor", 40) < 40.5
-    assert all(abs(shown - lean) <= 7 for shown in record.leans(40.6, 52))  # "not sure yet" comes first
+    assert all(abs(shown - lean) <= 7 for shown in record.leans(40.6, 52))  # before that no lean is shown
     assert record.lean_at(51) == pytest.approx(lean, abs=3)
 
 
 def test_a_fifo_out_of_step_is_noticed(aligned, monkeypatch):
-    """After stray bytes in the FIFO, shifted frames would be read as readings forever."""
+    """After stray bytes in the FIFO all later frames are shifted. Without a check the firmware would read wrong values
+    forever."""
     install = simulator.Board.install
 
     def with_stray_bytes(board):
@@ -164,7 +166,7 @@ def test_a_fifo_out_of_step_is_noticed(aligned, monkeypatch):
 
 
 def test_a_changed_range_is_repaired(aligned, monkeypatch):
-    """The readings continue and look normal, and only the register shows the fault."""
+    """The readings continue and look normal. Only the register with the range shows the fault."""
     install, boards = simulator.Board.install, []
 
     def installed(board):

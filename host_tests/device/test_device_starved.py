@@ -1,12 +1,12 @@
-"""The board loses time to a flash erase, slow USB or a storm of wheel pulses, or the display fails in the middle of
-a line. The display never shows a lean that is over half a second old, or half old and half new."""
+"""A flash erase, slow USB or a storm of wheel pulses stops the loop for a while, or a transfer to the display breaks
+off in a line. The display never shows a lean that is more than half a second old, or half old and half new."""
 
 import pytest
 from kickstand_tools.simulation.scripted import script
 from support import device_plans, engines
 
 FROM_S = 32.0
-# From FROM_S on the bike rolls from side to side, so fast that the displayed lean shows its own age.
+# From FROM_S on the bike rolls quickly from side to side. So a displayed lean tells how old it is.
 RIDE = [
     *device_plans.RIDE[:3],
     ["turn", -30.0, 2.0],
@@ -14,9 +14,9 @@ RIDE = [
     *[["turn", 40.0 * (-1) ** k, 0.3] for k in range(8)],
 ]
 TRUE = script.Ride([getattr(script, name)(*more) for name, *more in RIDE])
-OLDEST_S = 0.5 + 0.1 + 0.1  # half a second, a page, and the time between two looks at the display
-HANG_S = 1.46  # the first page after the event, which names the cause, is complete at the next frame
-NEAR_DEG = 10.0  # readings lost while the bike rolls cost up to 8 degrees until the filter has made up for them
+OLDEST_S = 0.5 + 0.1 + 0.1  # half a second, the time to write a page, and the time between two frames of the record
+HANG_S = 1.46  # with this duration, the first page after the hang is complete at the next frame of the record
+NEAR_DEG = 10.0  # readings lost while the bike rolls cause errors of up to 8 degrees for a while
 
 STARVED = {
     "flash erase": ([["busy", [FROM_S, 0.4, 6]]], {}),
@@ -34,7 +34,10 @@ def run(engine, flash, faults, config, **more):
 
 
 def too_old(record, from_s=FROM_S - 5.0):
-    """Return [(t_s, line), ...] of each displayed lean that the bike has not had within OLDEST_S."""
+    """Return the displayed leans that the bike has not had within the last OLDEST_S.
+
+    Returns [(t_s, line, least lean in this time, largest lean), ...].
+    """
     found = []
     for k in range(int(10 * (FROM_S + 8.0 - from_s))):
         t_s = from_s + k / 10
@@ -50,7 +53,7 @@ def test_no_lean_on_the_display_is_too_old(engine, name, tmp_path):
     faults, config = STARVED[name]
     record = run(engine, tmp_path, faults, config)
     assert record.ends == ["off"]
-    # a hung program cannot change the display
+    # While the program hangs, it cannot change the display.
     hang_s = (FROM_S + 0.3, FROM_S + 0.3 + HANG_S + 0.05) if name == "a hang" else (0, 0)
     assert [found for found in too_old(record) if not hang_s[0] < found[0] < hang_s[1]] == []
     if name == "a hang":
@@ -61,7 +64,7 @@ def test_no_lean_on_the_display_is_too_old(engine, name, tmp_path):
 
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
 def test_a_storm_of_wheel_pulses_is_reported_and_leaves_the_lean(engine, tmp_path):
-    """At 50,000 pulses per second the loop gets no time until the interrupt disables itself."""
+    """At 50,000 pulses per second the loop gets no time, until the interrupt's handler disables the interrupt."""
     storm = [["wheel_storm", [FROM_S, 3.0, 50_000]]]
     record = run(engine, tmp_path, storm, {"SPEED": "wheel"}, wheel={})
     assert record.ends == ["off"]

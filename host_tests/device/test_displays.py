@@ -1,4 +1,4 @@
-"""The whole device with each display shows the same lean, and the display recovers from every fault."""
+"""The whole device with each display. All displays show the same lean, and recover from every fault."""
 
 import random
 
@@ -24,7 +24,7 @@ def test_the_lean_is_that_of_the_character_display(engine, display, one_bus, tmp
 
 @pytest.mark.parametrize(("engine", "display"), [("cpython", "lcd"), ("micropython", "ssd1306")])
 def test_presses_and_unplugs_at_random(engine, display, tmp_path):
-    """At the end the display shows a page as usual. The displays' own tests check MicroPython's heap."""
+    """At the end the display shows a page as usual. host_tests/simulated_board tests the heap with each display."""
     chance = random.Random(3)
     presses, faults = [[2, 0.15], [12, 0.15]], []
     for k in range(SHOTS):

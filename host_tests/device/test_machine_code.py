@@ -1,5 +1,5 @@
-"""Wrong machine code is detected when its module is imported. The plain function is then used, and the console says
-so."""
+"""The firmware detects wrong machine code when it imports the module. It then uses the plain function, and the console
+says so."""
 
 import re
 import shutil
@@ -10,7 +10,7 @@ from kickstand_tools.common import firmware_path, unix_port
 from kickstand_tools.deploy import bytecode
 from support import emulated
 
-# The two versions of each function: (function, name of the plain version).
+# This code defines for each function: (the function in use, name of its plain version).
 _CHOSEN = """
 from kickstand.calibration import transform
 from kickstand.imu import fifo_frames
@@ -21,8 +21,7 @@ for module, name in PAIRS + ((kalman, "add_products"),):
     plain = getattr(module, name + "_python")
     print(name, "plain" if getattr(module, name) is plain else "quick")
 """
-# One mistake in each viper function, as a compiler might make it. (module, function): text to replace and its
-# replacement.
+# One mistake in each viper function, as a compiler might make it: {(module, function): (text, its replacement)}.
 MISTAKES = {
     ("imu/fifo_frames_viper.py", "decode"): ("frames[at] << 8 |", "frames[at] << 8 &"),
     ("imu/fifo_frames_viper.py", "add_up"): ("value > 32767", "value > 32768"),
@@ -34,7 +33,7 @@ NAMES = [name for _, name in MISTAKES]
 
 
 def write_broken(path, name, target):
-    """Write the module with its mistake in this function."""
+    """Write the module to `target`, with the mistake in this function."""
     source = (firmware_path.PACKAGE / path).read_text(encoding="utf-8")
     right, wrong = MISTAKES[path, name]
     start = source.index(f"def {name}(")
@@ -43,8 +42,11 @@ def write_broken(path, name, target):
 
 
 def imported(tmp_path, path="", name="", error=""):
-    """Return MicroPython's output when the firmware is imported and the function chosen. Either the function has a
-    mistake, or the import of its module raises an error."""
+    """Import the firmware on MicroPython and return the output, which names the functions in use.
+
+    path, name: the module and the function with a mistake.
+    error: the error that an import of the module raises.
+    """
     if not unix_port.available():
         pytest.skip("no MicroPython unix port for this system")
     shutil.copytree(firmware_path.PACKAGE, tmp_path / "kickstand")
@@ -61,7 +63,6 @@ def imported(tmp_path, path="", name="", error=""):
 
 
 def test_correct_machine_code_is_used(tmp_path):
-    """The machine code of every viper function is used."""
     found = [
         (path.relative_to(firmware_path.PACKAGE).as_posix(), name)
         for path in firmware_path.PACKAGE.rglob("*_viper.py")
@@ -88,7 +89,8 @@ def test_wrong_machine_code_is_not_used(tmp_path, path, name):
     ],
 )
 def test_machine_code_that_cannot_be_loaded_is_not_used(tmp_path, path, error):
-    """An ESP32 runs machine code from a separate memory, which may be too small. The meter still works."""
+    """An ESP32 runs machine code from a separate memory, which may be too small. The lean meter works without machine
+    code."""
     without = [name for other, name in MISTAKES if other == path]
     chosen = imported(tmp_path, path, error=error)
     assert chosen == [f"{name} {'plain' if name in without else 'quick'}" for name in NAMES]

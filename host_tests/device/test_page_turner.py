@@ -1,4 +1,4 @@
-"""The button is pressed until a page is shown, and a missing page ends the presses."""
+"""The PageTurner presses the button until a page is shown. If the page never appears, it stops."""
 
 import pytest
 from support import device_plans

@@ -1,7 +1,8 @@
-"""An ESP32's heap starts small. Garbage is still collected between passes of the loop, never during one.
+"""The heap of an ESP32 is small at the start. The firmware still collects garbage only between turns of the loop.
 
-MicroPython's unix port with a heap that is nearly full, as an ESP32's is. Its objects are twice as large, and the
-models of the parts are on it too, so what a turn uses is measured first."""
+The test runs MicroPython's unix port with a nearly full heap, as on an ESP32. Its objects are twice as large, and the
+simulated parts are on the heap, too. So the test first measures how much heap one turn uses.
+"""
 
 import json
 
@@ -82,10 +83,10 @@ print(json.dumps({"free": free, "turns": turns.n, "within": within, "plan": plan
 
 @pytest.mark.parametrize("plan", [True, False])
 def test_the_garbage_is_collected_between_turns(plan):
-    """Without a check of the free heap, garbage is collected during passes. This proves that the heap is small
-    enough."""
+    """plan: True if the firmware checks the free heap. Without this check garbage is collected during turns, which
+    proves that the heap of the test is small enough."""
     found = json.loads(run_mpy(_SCRIPT.replace("PLAN", str(plan)), heap="4M").splitlines()[-1])
-    assert 8 < found["free"] < 20  # passes until the heap is full: fewer than 25
+    assert 8 < found["free"] < 20  # number of turns until the heap is full
     assert 3 <= found["plan"] <= 10
     assert found["turns"] > 500
     assert (found["within"] == 0) is plan, found

@@ -1,4 +1,4 @@
-"""The start by main.py if something is missing or broken."""
+"""The start by main.py if a module, the settings or the flash is missing or broken."""
 
 import builtins
 import os
@@ -15,7 +15,7 @@ from support import mpy
 
 @pytest.fixture
 def board(request, tmp_path, monkeypatch):
-    """Return a board with an empty flash. The indirect parameter gives the arguments of Board."""
+    """Return a board with an empty flash. The fixture's parameter has the arguments of Board."""
     monkeypatch.chdir(tmp_path)
     fitted = getattr(request, "param", {})
     made = Board(sensor_errors.resting(sensor_errors.Sensor(), (0, 0, 1)), **fitted)
@@ -25,14 +25,14 @@ def board(request, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("module", ["kickstand.app", "kickstand.lean.lean_filter"])
 def test_incomplete_firmware_ends_at_the_prompt_and_says_so(module, board, monkeypatch, capsys):
-    """The board does not restart endlessly."""
+    """The board stays at the prompt and does not restart."""
     from time import sleep_ms  # pyright: ignore[reportAttributeAccessIssue]
 
     from kickstand import start
 
     def use_the_console():
         start.main()
-        sleep_ms(20_000)  # a watchdog that is not fed would reset the board
+        sleep_ms(20_000)  # a running watchdog would reset the board in this time
 
     monkeypatch.setitem(sys.modules, module, None)
     board.press(2.0)
@@ -44,7 +44,8 @@ def test_incomplete_firmware_ends_at_the_prompt_and_says_so(module, board, monke
 @pytest.mark.parametrize("charge_us", [0, 7_000, 75_000])
 @pytest.mark.parametrize("held", [False, True])
 def test_a_capacitor_at_the_button_is_no_press_at_power_on(held, charge_us, board, capsys):
-    """The pin's pull-up needs time to charge the capacitor. A button that is held still prevents the start."""
+    """The pin's pull-up needs time to charge the capacitor. Until then the pin reads as pressed. A button that is held
+    still prevents the start."""
     from kickstand import start
 
     board.button.charge_us = charge_us
@@ -66,7 +67,8 @@ ALIGN, SIX, RECORD = 0, 1, 4  # positions in the menu
 
 @pytest.fixture(params=["missing", "no memory"])
 def without(request, monkeypatch):
-    """Return a function that takes the end of a module's name, blocks its import, and returns the expected message."""
+    """Return without(end of a module's name), which blocks the import of this module and returns the expected
+    message."""
 
     def take_away(ending):
         real = builtins.__import__
@@ -85,7 +87,7 @@ def without(request, monkeypatch):
 
 
 def watch(board):
-    """Return [(t_s, lines), ...] of the display's changes from now on."""
+    """Return a list that will contain (t_s, lines) of each change of the display."""
     seen = []
 
     def look():
@@ -97,7 +99,7 @@ def watch(board):
 
 
 def choose(board, at_s, place):
-    """Return the presses that choose this entry of the menu, within 8 s."""
+    """Return the presses that choose an entry of the menu. They take 8 s. place: position of the entry."""
     for t_s in range(place):
         board.press(at_s + 2 + t_s)
     board.press(at_s, 1.2)
@@ -109,7 +111,7 @@ def choose(board, at_s, place):
     [("align_wizard", ALIGN), ("pose_taker", SIX), ("recorder", RECORD)],
 )
 def test_a_failed_import_of_the_menu_is_reported(module, place, without, board, capsys):
-    """The failure is reported whenever the entry is chosen, and never earlier."""
+    """The display reports the failure each time the rider chooses the entry, and never earlier."""
     from kickstand import start
 
     if module == "pose_taker":
@@ -120,7 +122,7 @@ def test_a_failed_import_of_the_menu_is_reported(module, place, without, board, 
         choose(board, at_s, place)
     assert board.run(start.main, 28.0) == "off"
     shown_s = [t_s for t_s, lines in seen if lines == said]
-    for t_s in shown_s:  # the message is in front for two seconds, and a sample may catch a half-written line
+    for t_s in shown_s:  # the message is shown for two seconds, and one sample may be a half-written line
         assert min(abs(t_s - (at_s + 4 + place)) for at_s in (3, 15)) < 2
     assert min(shown_s) < 12 < max(shown_s)
     assert seen[-1][1][0].startswith("Raw")
@@ -142,7 +144,7 @@ def test_a_board_that_cannot_record_still_shows_the_lean(module, without, board,
 @pytest.mark.parametrize("module", ["radio", "live"])
 @pytest.mark.parametrize("board", [{"machine": "pico w"}], indirect=True)
 def test_without_lives_modules_the_lean_continues(module, without, board, monkeypatch, capsys):
-    """The missing module is reported once, without a restart. The radio is then off."""
+    """The console reports the missing module once. The board does not restart, and the radio is off."""
     from kickstand import settings, start
 
     monkeypatch.setattr(settings, "load", lambda: settings.Settings(type("Config", (), {"LIVE": True})))
@@ -182,12 +184,12 @@ def test_a_display_without_its_driver_is_probed_less_often(without, board, monke
     assert board.run(start.main, 31.0) == "off"
     words = "no memory for that" if said == NO_MEMORY else "incomplete firmware"
     times = capsys.readouterr().out.count(words)
-    assert 8 <= times <= 10 and board.boots == 1  # retries after 0.4, 0.8, 1.6, 3.2, 6.4 s, then every 6.4 s; one boot
+    assert 8 <= times <= 10 and board.boots == 1  # after 0.4, 0.8, 1.6, 3.2 s, then every 6.4 s
 
 
 @pytest.mark.parametrize("missing", [MemoryError, ImportError])
 def test_settings_that_cannot_be_loaded_end_on_the_display(missing, board, monkeypatch, capsys):
-    """The display must not keep the lean that it showed before a reset."""
+    """The display must not keep the lean that it showed before the reset."""
     from kickstand import settings, start
 
     def load():
@@ -201,7 +203,7 @@ def test_settings_that_cannot_be_loaded_end_on_the_display(missing, board, monke
 
 
 def test_a_failed_import_can_be_repeated(tmp_path):
-    """After an interrupted import MicroPython keeps the module without its later definitions."""
+    """If an import is interrupted, MicroPython keeps the incomplete module. The next import must load it again."""
     (tmp_path / "outer.py").write_text("import inner\n\n\nclass Outer:\n    inner = inner.Inner\n")
     (tmp_path / "inner.py").write_text("import memory\n\nmemory.take()\n\n\nclass Inner:\n    pass\n")
     (tmp_path / "memory.py").write_text(
@@ -230,7 +232,7 @@ print(attempt(use), len(made))
 
 
 def test_a_report_that_cannot_be_worded_gives_its_code(board, monkeypatch, capsys):
-    """After a failure of flash or heap the words may be missing, which must not end the ride."""
+    """After a failure of flash or heap, the module with the words may not load. This must not end the ride."""
     errors.report(errors.StoreError("not-written", "EIO"))
     monkeypatch.setitem(sys.modules, "kickstand.console", None)
     errors.report(errors.StoreError("not-written", "EIO"))

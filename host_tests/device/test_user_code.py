@@ -1,4 +1,4 @@
-"""user.py, the owner's own code, is called at the right times, and the lean continues whatever it does."""
+"""The firmware calls the owner's code in user.py at the right times. The lean continues, whatever this code does."""
 
 import re
 import sys
@@ -7,7 +7,7 @@ import pytest
 from support import device_plans, engines
 
 POSES = {"ride": device_plans.RIDE, "presses": device_plans.PRESSES, "until": device_plans.LEFT_S + 0.5}
-# With an alignment in flash: a turn to the left; presses through all pages, back to the first
+# The board is already aligned. The bike turns to the left, and the rider presses through all pages, back to the first.
 PLAN = {"ride": [["upright", 2.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 6.0]], "until": 14.0}
 PLAN["turn_to"] = [[3, "raw"], [7.5, "lean"]]
 WHOLE = """
@@ -30,8 +30,8 @@ def page_two(app):
 
 @pytest.fixture
 def run(tmp_path, monkeypatch, capsys):
-    """Return run(source of user.py, plan) -> Record. It runs on MicroPython, with its exceptions, memory and
-    printing."""
+    """Return run(source of user.py, plan), which returns the Record. By default it runs on MicroPython, to test its
+    exceptions, memory and printing."""
 
     def run(source, plan=PLAN, engine="micropython"):
         if plan["ride"] == PLAN["ride"]:
@@ -44,7 +44,7 @@ def run(tmp_path, monkeypatch, capsys):
 
 
 def goes_on(record, t_s=13.5):
-    """Assert that the lean is right at the end of the left turn."""
+    """Return True if the display shows the right lean at the end of the left turn."""
     lean = record.lean_at(t_s)
     return lean is not None and abs(lean + 30) < 4
 
@@ -60,7 +60,7 @@ def test_each_function_is_called(run, engine):
 
 
 def test_its_pages_follow_the_others_and_are_in_the_menu(run):
-    # Own pages is the sixth entry of the menu
+    # "Own pages" is the sixth entry of the menu.
     presses = [[2, 1.2]] + [[4 + 0.5 * k, 0.15] for k in range(5)] + [[8, 1.2], [10, 0.15], [11, 0.15]]
     record = run(WHOLE, POSES | {"presses": presses, "until": 13})
     assert record.at(7.5)[0].startswith("→Own pages"), record.frames
@@ -123,7 +123,7 @@ def test_user_py_is_disabled_before_memory_runs_out(run):
 
 
 def test_without_a_user_py_its_module_is_not_loaded(run, tmp_path):
-    """The module would take 3 KB of a board's heap."""
+    """The module that runs user.py would use 3 KB of a board's heap."""
     sys.modules.pop("kickstand.user_code", None)
     device_plans.run("cpython", tmp_path, PLAN | {"until": 1.0})
     assert "kickstand.user_code" not in sys.modules
@@ -134,6 +134,7 @@ def test_without_a_user_py_its_module_is_not_loaded(run, tmp_path):
 
 @pytest.mark.parametrize("name", ["__dir__", "__getattr__"])
 def test_a_module_that_raises_when_inspected_is_disabled(run, name):
-    """Only CPython calls a module's __dir__(). The lean continues, and the board does not restart."""
+    """The lean continues, and the board does not restart. The test needs CPython, because MicroPython does not call a
+    module's __dir__()."""
     record = run(f"def {name}(*_):\n    raise ValueError('mine')\n", engine="cpython")
     assert goes_on(record)

@@ -15,12 +15,12 @@ def still(_t_s):
 
 
 def noisy(t_s):
-    a, b, c = (t_s * k % 1 for k in (977, 577, 433))  # the readings of every axis of a working sensor change
+    a, b, c = (t_s * k % 1 for k in (977, 577, 433))  # in a working sensor the readings of every axis change
     return (0.01 * a, 1 + 0.01 * b, 0.01 * c, 0.5 * b, 0.5 * c, 0.5 * a)
 
 
 def shown(tmp_path, monkeypatch, fit, world=noisy, until_s=4.0, config=None, **fitted):
-    """Return the display's two lines after this time. fit(board): changes the board before power-on."""
+    """Return the display's two lines at until_s. fit(board): a function that changes the board before power-on."""
     return shows(tmp_path, monkeypatch, fit, world, [until_s], config, **fitted)[0]
 
 
@@ -57,7 +57,7 @@ def status(tmp_path, monkeypatch, fit, world=noisy, config=None, **fitted):
 
 
 def instead(*devices):
-    """Return a board with these devices on the sensor's bus instead of the sensor."""
+    """Return fit(board), which replaces the sensor by these devices on the sensor's bus."""
 
     def fit(board):
         board.remove_sensor()
@@ -105,7 +105,8 @@ def test_a_chip_of_another_family_is_named(name, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("number", [0x47, 0x75])
 def test_a_chip_that_is_accepted_and_keeps_nothing(number, tmp_path, monkeypatch):
-    """The message does not blame the wiring. An ICM-42688 has registers that keep some of the settings."""
+    """The display does not blame the wiring. An ICM-42688 is named. It keeps some of the settings in other
+    registers."""
     fit = instead(Registers(0x68, {0x75: number}, range(0x4B, 0x77)))
     name = {0x47: ("ICM-42688", "not supported"), 0x75: ("Sensor keeps no", "settings: broken")}[number]
     config = {"ACCEPT_WHO_AM_I": number}
@@ -128,7 +129,7 @@ def test_the_other_address_is_tried(mine, tmp_path, monkeypatch):
 
 
 def test_a_clock_that_has_the_sensors_address_is_not_set(tmp_path, monkeypatch):
-    """The driver only writes the number of the register to read."""
+    """The driver writes nothing to this address but the number of the register to read."""
     clocks = []
 
     def fit(board):
@@ -196,7 +197,7 @@ def always_full(board):
 
 @pytest.mark.parametrize(("fit", "how"), [(never_fills, "stays empty"), (always_full, "stays full")])
 def test_a_broken_fifo_stays_reported_and_presses_work(fit, how, tmp_path, monkeypatch):
-    """The menu opens although the sensor is being set up repeatedly."""
+    """The menu opens, although the firmware sets up the sensor again and again."""
     times = [3 + 0.1 * k for k in range(40)]
     seen = shows(tmp_path, monkeypatch, fit, noisy, [*times, 8.5], presses=[(7.5, 0.9)])
     assert {lines for lines in seen[:40] if "---" not in lines[1]} == {("Sensor: its FIFO", how)}
@@ -233,7 +234,7 @@ def test_status_lists_both_buses(tmp_path, monkeypatch):
 
 
 def test_the_sensor_page_lists_the_devices(tmp_path, monkeypatch):
-    """Without a speed source the page is the menu's fourth entry. A fault does not hide the menu."""
+    """The page is the fourth entry of the menu if there is no speed source. A fault does not hide the menu."""
     fit = instead(Ds3231, Registers(0x57), Registers(0x77))
     presses = [(2.0, 1.0), (3.5,), (3.9,), (4.3,), (4.7, 1.0)]
     seen = shows(tmp_path, monkeypatch, fit, noisy, [6 + 0.5 * k for k in range(8)], presses=presses)
@@ -259,10 +260,11 @@ def test_a_nack_does_not_fail_the_set_up(nth, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("wiring", [1, 2, 3, 4])
 def test_status_finds_the_wiring_of_a_backpack(wiring, tmp_path, monkeypatch):
-    """The board shows the number of each wiring by means of that wiring: only the right one is readable and lit."""
+    """The board shows the number of each possible wiring, and uses this wiring to do so. Only the text of the right
+    wiring is readable and lit."""
     monkeypatch.chdir(tmp_path)
     board = Board(noisy)
-    setattr(board.lcd, "wiring", wiring)  # noqa: B010 - an attribute of Lcd that Oled lacks
+    setattr(board.lcd, "wiring", wiring)  # noqa: B010 - only Lcd has this attribute, not Oled
     seen = Counter()
     board.every(0.1, lambda: seen.update([(*board.lcd.text(), board.lcd.backlight)]))
     with board, redirect_stdout(io.StringIO()) as out:

@@ -1,4 +1,4 @@
-"""The keys of paired phones stay in flash, until the PIN changes."""
+"""The keys of paired phones stay in flash until the PIN changes."""
 
 import json
 

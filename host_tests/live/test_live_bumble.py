@@ -1,5 +1,5 @@
-"""The whole device on a virtual radio: bumble's Bluetooth LE stack on both sides, and a central that uses only the
-published documents."""
+"""The whole device on a virtual radio. Both sides use bumble's Bluetooth LE stack. The central knows only what the
+published documents say."""
 
 import asyncio
 import collections
@@ -18,10 +18,10 @@ RATE, NOW, RIDE, BOARD = (SERVICE.replace("0000", f"000{number}", 1) for number 
 
 @pytest.fixture
 def on_air(tmp_path, monkeypatch, capsys):
-    """run(until_s, [(at_s, visit, pin)], **config): the Centrals and the device's Record."""
+    """Return run(until_s, [(at_s, visit, pin), ...], **config), which returns the Centrals and the device's Record."""
     monkeypatch.chdir(tmp_path)
     made = []
-    browsers = asyncio._get_running_loop()  # playwright's idle event loop, if this process has tested a page before
+    browsers = asyncio._get_running_loop()  # playwright's idle event loop, if this process has used a browser
     asyncio._set_running_loop(None)
 
     def run(until_s, visits, machine="pico w", **config):
@@ -57,7 +57,7 @@ async def ask_racechrono(central):
 
 def test_racechrono_finds_the_board_filters_and_decodes(on_air):
     (central,), record = on_air(44, [(20, ask_racechrono, None)], RECORD=True)
-    assert central.done.result() == 0  # sent nothing, because all packets were denied
+    assert central.done.result() == 0  # the board sends nothing while the phone denies all packets
     counts = collections.Counter(data[0] for _, _, data in central.heard)
     assert counts.keys() == {1, 2} and 198 <= counts[1] <= 202 and 496 <= counts[2] <= 503
     for t_s in (device_plans.LEFT_S, device_plans.RIGHT_S):
@@ -82,7 +82,7 @@ just_write = functools.partial(press_in, pair=False)
 
 
 def test_a_phone_must_enter_the_pin(on_air):
-    """The stack itself enforces it: a phone gets no packet without pairing or with a wrong PIN."""
+    """The Bluetooth stack enforces the PIN. A phone gets no packet without pairing, or with a wrong PIN."""
     visits = [(20, just_write, None), (26, press_in, 314159), (34, press_in, 271828)]
     (silent, wrong, right), _ = on_air(44, visits, machine="esp32", LIVE_PIN=271828)
     assert "INSUFFICIENT_" in str(silent.done.exception())

@@ -1,5 +1,7 @@
-"""Hundreds of random connects, writes and disconnects, most of them invalid. The device continues, and on MicroPython
-uses no more memory: test_live_micropython.py runs this there."""
+"""A phone connects, writes and disconnects at random, hundreds of times. Most writes are invalid. The device continues.
+
+test_live_micropython.py runs this test on MicroPython, where the heap in use must not grow.
+"""
 
 import gc
 import random
@@ -10,16 +12,16 @@ from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 from support.device_runs import standing
 from support.simulated_phones import PLACES, Phone
 
-WARM = 200  # number of acts until everything is imported and every buffer has its final size
+WARM = 200  # number of acts until all modules are imported and every buffer has its final size
 ACTS = 400
-GROWTH = 2048  # bytes: the uncertainty of the collector
+GROWTH = 2048  # bytes of heap that the garbage collector may miss
 
 
 def used():
-    """Bytes of MicroPython's heap in use."""
+    """Return the bytes of MicroPython's heap in use, or 0 on CPython."""
     gc.collect()
     gc.collect()
-    return getattr(gc, "mem_alloc", int)()  # 0 on CPython, which cannot tell
+    return getattr(gc, "mem_alloc", int)()  # CPython has no mem_alloc(); int() is 0
 
 
 class Forgetful(Phone):
@@ -33,7 +35,7 @@ class Forgetful(Phone):
 
 
 def nonsense(dice):
-    """Possible writes of a phone: valid commands, wrong lengths, unknown commands, long ones."""
+    """Return the bytes of a random write: two commands with random arguments, or random bytes of any length."""
     kind = dice.randrange(6)
     if kind == 0:
         return bytes([1, 0, dice.randrange(256)])
@@ -53,10 +55,10 @@ def act(dice, phone, radio):
         phone.away(bool(dice.randrange(2)))
     elif kind == 2:
         phone.read(dice.choice(sorted(PLACES)))
-    elif kind == 3:  # more than the loop can have read in that time
+    elif kind == 3:  # a phone writes faster than the loop reads
         for _ in range(40):
             phone.write("filter", nonsense(dice))
-    elif kind == 4:  # disconnected and connected again between two turns of the loop
+    elif kind == 4:  # the phone disconnects and connects again between two turns of the loop
         phone.leave()
         radio.found = radio.found or b""
         phone.connect(dice.randrange(256))
@@ -65,7 +67,8 @@ def act(dice, phone, radio):
 
 
 def test_random_acts_of_a_phone_do_no_harm():
-    for drops in (True, False):  # the radio drops packets that it cannot send, as an ESP32, or keeps them, as a Pico W
+    # An ESP32's radio drops packets that it cannot send. A Pico W's radio keeps them.
+    for drops in (True, False):
         board = Board(Sensor(seed=3).world(standing([[0, 10]])))
         board.radio = radio = Radio(board.clock, drops)
         with board:

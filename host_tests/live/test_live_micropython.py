@@ -1,4 +1,4 @@
-"""Runs the tests that need no pytest on MicroPython."""
+"""Runs tests on MicroPython that do not need pytest."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Each field of each packet equals the tables of firmware/docs/live.md, also at its limits."""
+"""Each field of each packet is as in the tables of firmware/docs/live.md, also at its limits."""
 
 import types
 

@@ -1,4 +1,4 @@
-"""The largest values of a log: slightly larger ones are refused with the unit, by both readers."""
+"""The largest values that a log may have. Both readers refuse slightly larger values and name the unit."""
 
 import contextlib
 import io
@@ -12,8 +12,8 @@ from kickstand_tools.logs.reader import read_blocks, read_log
 from support import command
 
 HEADER = command.HEADER + ",speed_mps,temp_c,lat_deg,lon_deg,utc_s"
-# The widest ranges of the chips are 16 g and 2000 deg/s: larger values are in another unit. Their data sheets end at 85
-# C.
+# The widest ranges of the chips are 16 g and 2000 deg/s, so larger values are in another unit. Their data sheets end at
+# 85 C. Each entry is {column: (largest value, unit)}.
 LIMITS = {
     "t_s": (1e10, "seconds"),
     "ax_g": (20.0, "g"),
@@ -30,7 +30,7 @@ LIMITS = {
 }
 
 
-@pytest.mark.parametrize("quoted", [False, True])  # columns at once, or cell by cell
+@pytest.mark.parametrize("quoted", [False, True])  # one reader reads columns at once, the other reads cells
 @pytest.mark.parametrize("name", LIMITS)
 def test_values_out_of_range_are_refused(name, quoted):
     limit, unit = LIMITS[name]
@@ -71,7 +71,7 @@ def test_a_firmware_without_a_temperature_gets_25():
     [(9.81, 0.01, "look like m/s2"), (1.0, 10.0, "is t_s in milliseconds"), (4.5, 0.01, ""), (1.0, 2.0, "")],
 )
 def test_common_wrong_units_are_refused(size_g, step_s, words):
-    """Forces are judged by their usual size, not by single axes."""
+    """The check uses the usual size of the force, not single axes."""
     force = np.tile([size_g * 0.6, 0.0, size_g * 0.8], (9, 1))
     force[:4] = [0.0, 1.0, 0.0]
     log = Log(np.arange(9) * step_s, force, np.zeros((9, 3)))

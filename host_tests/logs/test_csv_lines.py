@@ -1,4 +1,4 @@
-"""Columns of numbers as text: exactly as Python's own formatting."""
+"""Columns of numbers are written exactly as Python's own formatting writes them."""
 
 import numpy as np
 import pytest
@@ -11,8 +11,8 @@ AWKWARD = [0.0, -0.0, -1e-9, 5e-324, 0.5, 1.5, 2.5, -0.5, 9.9999999, 99999.5, 2.
 def numbers(digits):
     chance = np.random.default_rng(digits)
     many = [chance.normal(scale=scale, size=300) for scale in (1e-6, 1e-2, 1.0, 30.0, 1e6, 1.7e9)]
-    middles = (np.arange(-40, 40) + 0.5) * 10.0**-digits  # exactly between two texts, or as close as a double allows
-    decimals = np.round(chance.normal(size=300), digits + 1)  # every tenth has such a 5 at its end
+    middles = (np.arange(-40, 40) + 0.5) * 10.0**-digits  # halfway between two texts, as closely as a double allows
+    decimals = np.round(chance.normal(size=300), digits + 1)  # one number of ten is halfway, too
     return np.concatenate((*many, middles, np.nextafter(middles, 9.0), decimals))
 
 

@@ -1,4 +1,4 @@
-"""A recorder that lost its power: a broken end of its log is left out; a broken middle is refused."""
+"""The log of a recorder that lost its power. A broken end is left out. A log with a broken middle is refused."""
 
 import gzip
 
@@ -16,7 +16,7 @@ WHOLE = ("\n".join([command.HEADER, *ROWS]) + "\n").encode()
 LINE = len(ROWS) + 1
 CUT = f"line {LINE}, the last one, was cut: it is left out"
 
-# content, number of samples read, message
+# {name: (content of the log, number of samples that are read, message)}
 ENDS = {
     "fewer cells": (WHOLE[:-12], 399, CUT),
     "fewer cells, but a line": (WHOLE[:-12] + b"\n", 399, CUT),
@@ -49,7 +49,8 @@ def test_a_cut_line_behind_nul_bytes(tmp_path):
 
 
 def test_a_last_speed_may_be_empty(tmp_path):
-    """The last row is whole, for any digits of the previous speed, and without a line feed after it."""
+    """A last row without a speed is complete. The number of digits in the previous speed does not matter, and there may
+    be no line feed after the row."""
     path = tmp_path / "log.csv"
     rows = [row + ("," if k % 2 else ",5.25") for k, row in enumerate(ROWS)]
     path.write_text("\n".join([f"{command.HEADER},speed_mps", *rows]))
@@ -82,7 +83,7 @@ def test_broken_line_in_the_middle_is_refused_by_number(tmp_path, broken):
 
 
 def test_every_command_reports_a_cut_end(tmp_path):
-    """report and export read like replay, see test_frozen.py."""
+    """The commands report and export read logs as replay does, see test_frozen.py."""
     ride = analysis_rides.short(tmp_path)
     ride.write_bytes(ride.read_bytes()[:-20])
     for arguments in (("replay", ride), ("cut", ride, "--from", "5")):

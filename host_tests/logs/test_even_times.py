@@ -1,4 +1,4 @@
-"""Rounded times, and times shared by several samples, compared with the original even times."""
+"""The repair of rounded times, and of times that several samples share. The result is compared with the true times."""
 
 import doctest
 import sys
@@ -12,8 +12,12 @@ ROUND = {"down": lambda x: np.floor(x + 1e-9), "to nearest": np.rint}
 
 
 def errors(true, recorded):
-    """The largest relative error of the steps, and the largest error of the times apart from a constant (s), away from
-    the ends."""
+    """Repair the recorded times and return two errors. The 200 samples at either end do not count.
+
+    Returns:
+        the largest relative error of a step.
+        the largest error of a time in s, after the mean error is removed.
+    """
     found = even_times(recorded)
     assert np.all(np.diff(found) > 0.0)
     inner = slice(200, -200)
@@ -29,7 +33,7 @@ def test_rounded_times_are_even_again(rate_hz, tick_s, how):
     true = 0.123 + np.arange(5000) / rate_hz
     recorded = ROUND[how](true / tick_s) * tick_s
     step_error, time_error = errors(true, recorded)
-    assert step_error < 0.03  # the error before the repair is over 1: steps of 0 and of twice the right length
+    assert step_error < 0.03  # without the repair some steps are 0 and some are twice as long
     assert time_error < 0.07 * tick_s
     found = even_times(recorded)
     assert np.max(np.abs(found - recorded)) <= 0.6 * tick_s + 1e-9
@@ -77,7 +81,7 @@ def test_repeated_line_moves_other_times_within_rounding():
 
 
 def test_invalid_time_is_refused():
-    """Times that go back or are all the same: test_cli_logs.py."""
+    """test_cli_logs.py tests times that go back, and times that are all the same."""
     with pytest.raises(InputError, match=r"time stands still at 0\.99 s"):
         even_times([*np.arange(100) / 100.0, *[0.99] * 600, *(1.0 + np.arange(100) / 100.0)])
 
@@ -88,7 +92,7 @@ def test_example_in_the_docstring_works():
 
 @pytest.mark.parametrize(("gap", "error"), [(4, 0.01), (8, 0.01), (40, 0.01)])
 def test_gaps_do_not_lengthen_the_period(gap, error):
-    """Samples come every 10.4 ms, with times in steps of 10 ms. Some of every 20 are missing."""
+    """The samples are 10.4 ms apart, and their times are rounded to 10 ms. After each 20 samples some are missing."""
     numbers = np.concatenate([np.arange(20) + (19 + gap) * k for k in range(60)])
     found = even_times(np.rint(numbers * 1.04) / 100.0)
     steps = np.diff(found).reshape(-1)

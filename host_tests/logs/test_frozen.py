@@ -1,4 +1,4 @@
-"""Frozen readings are a gap, not a standstill. A quiet sensor at rest is not frozen."""
+"""Frozen readings are treated as a gap, not as a standstill. A quiet sensor at rest is not frozen."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from support import command
 from support.recordings import analysis_rides
 
 HZ = 100
-REST = np.array([0.012, 0.985, 0.171, 0.4, -1.1, 0.2])  # g, deg/s: at rest, with a gyro's bias
+REST = np.array([0.012, 0.985, 0.171, 0.4, -1.1, 0.2])  # reading at rest in g and deg/s, with a gyro's bias
 
 
 def log_of(readings, hz=HZ) -> Log:
@@ -26,7 +26,7 @@ def frozen(log: Log) -> np.ndarray:
 
 
 def riding(seconds, seed=0, digits=5):
-    """Readings with vibration and bends."""
+    """Return readings with vibration and bends. digits: number of decimals."""
     chance = np.random.default_rng(seed)
     n = round(seconds * HZ)
     values = REST + chance.normal(scale=[0.1, 0.1, 0.1, 4.0, 4.0, 4.0], size=(n, 6))
@@ -34,7 +34,11 @@ def riding(seconds, seed=0, digits=5):
 
 
 def resting(seconds, seed=0, noise=1.0, digits=5):
-    """noise: factor on that of a phone's sensor, 1 mg and 0.03 deg/s."""
+    """Return readings at rest.
+
+    noise: factor on the noise of a phone's sensor, 1 mg and 0.03 deg/s.
+    digits: number of decimals.
+    """
     chance = np.random.default_rng(seed)
     return np.round(REST + noise * chance.normal(scale=[0.001] * 3 + [0.03] * 3, size=(round(seconds * HZ), 6)), digits)
 
@@ -45,7 +49,7 @@ def test_a_freeze_is_marked_to_the_sample(monkeypatch, blocks_of):
     readings = riding(8)
     readings[300:500] = readings[300]
     found = np.flatnonzero(frozen(log_of(readings)))
-    # at the end of a block the first frozen samples may count as readings
+    # At the end of a block, the first frozen samples may count as normal readings.
     first = 301 if blocks_of == 60_000 else found[0]
     assert found.tolist() == list(range(first, 500))
     assert first < 360
@@ -69,8 +73,8 @@ def test_freezes_at_each_end_and_twice_are_marked():
 @pytest.mark.parametrize("digits", [5, 3, 1])
 @pytest.mark.parametrize("noise", [1.0, 0.3])
 def test_a_vehicle_at_rest_is_not_frozen(digits, noise):
-    """A quiet sensor, the engine off, in logs with fewer and fewer digits: with one, most readings are the same."""
-    idling = resting(1, 5, 30.0, digits)  # a running engine shakes it
+    """The sensor is quiet and the engine is off. With only one decimal, most readings are the same."""
+    idling = resting(1, 5, 30.0, digits)  # a running engine shakes the sensor
     readings = np.vstack((riding(5, 1, digits), idling, resting(20, 2, noise, digits), idling, riding(5, 3, digits)))
     same = np.all(np.diff(readings[600:2600], axis=0) == 0.0, axis=1)
     assert not np.any(frozen(log_of(readings)))
@@ -79,7 +83,8 @@ def test_a_vehicle_at_rest_is_not_frozen(digits, noise):
 
 
 def test_constant_log_is_not_marked_as_frozen():
-    """A whole frozen log has nothing to compare with. A pose of such readings is refused, see test_still_pose."""
+    """A completely frozen log has no normal readings to compare with. test_still_pose.py shows that such a pose is
+    refused."""
     assert not np.any(frozen(log_of(np.tile(REST, (500, 1)))))
 
 
@@ -96,7 +101,7 @@ def test_log_without_frozen_readings_has_gaps():
 def test_commands_report_frozen_readings(tmp_path):
     ride = analysis_rides.short(tmp_path, speed_hz=1)
     header, *rows = ride.read_text().splitlines()
-    for k in range(1300, 1500):  # in the first turn
+    for k in range(1300, 1500):  # during the first turn
         rows[k] = rows[k].partition(",")[0] + "," + ",".join(rows[1300].split(",")[1:7]) + ","
     ride.write_text("\n".join([header, *rows]) + "\n")
     out = tmp_path / "out.csv"
@@ -124,7 +129,7 @@ def test_every_engine_gets_frozen_readings_as_a_gap(engine):
     found = replay(log_of(readings), CalibrationFile(aligned=True), engine)
     assert np.flatnonzero(np.isnan(found.lean_deg)).tolist() == list(range(201, 400))
     gap = replay(without_frozen(log_of(readings)), CalibrationFile(aligned=True))
-    # MicroPython has the covariance in 32 bits, CPython in 64
+    # MicroPython computes the covariance with 32 bits, CPython with 64.
     assert np.max(np.abs(found.lean_deg[400:] - gap.lean_deg[201:])) < 0.02
 
 
@@ -157,8 +162,8 @@ def test_quiet_phone_in_a_ride_is_not_frozen(digits):
 @pytest.mark.parametrize(("count", "marked"), [(9, 0), (10, 9), (11, 10)])
 @pytest.mark.parametrize("block", [6, 24])
 def test_ten_equal_readings_are_frozen_across_blocks(count, marked, block):
-    """At two readings per second the number of equal readings decides. Across blocks only readings of the later blocks
-    are marked."""
+    """At two readings per second the number of equal readings decides. If a freeze begins in an earlier block, only its
+    readings in later blocks are marked."""
     readings = np.insert(riding(24 / HZ), 3, 20.0, axis=1)
     readings[4 : 4 + count] = readings[4]
     finder, found = FrozenFinder(), []
@@ -174,8 +179,8 @@ def test_ten_equal_readings_are_frozen_across_blocks(count, marked, block):
 
 @pytest.mark.parametrize(("near_s", "marked"), [(0.2, True), (0.4, False)])
 def test_the_adjacent_half_second_shows_if_rounding_hid_noise(near_s, marked):
-    """Digits of 0.01 g: 0.025 g from the mean is near. At 0.1 g for the rest of half a second the mean is 0.06 or 0.02
-    off."""
+    """Readings are rounded to 0.01 g. A mean within 0.025 g of the equal readings counts as near. In the half second
+    before them some readings are 0.1 g off, so its mean is 0.06 g or 0.02 g off."""
     readings = np.round(np.tile(REST, (400, 1)), 2)
     readings[:, 3:] = 0.0
     readings[:100, 0] += 0.1

@@ -1,4 +1,4 @@
-"""A log in memory and its blocks: times, orders of columns, and arrays that do not fit."""
+"""A log in memory and its blocks: times, the order of columns, and arrays of wrong shapes."""
 
 import io
 import time
@@ -58,7 +58,7 @@ def test_the_chips_order_and_the_names_of_the_columns():
         ({"speed_mps": [1.0]}, r"speed_mps has the shape \(1,\), it must be \(2,\)"),
         ({"t_s": [0.0, 0.0]}, "must increase"),
         ({"t_s": [1.0, 0.5]}, "must increase"),
-        ({"t_s": [0.0, 4e-7]}, "must increase"),  # the same microsecond
+        ({"t_s": [0.0, 4e-7]}, "must increase"),  # both times are in the same microsecond
     ],
 )
 def test_arrays_that_do_not_fit_are_refused(changed, words):
@@ -134,7 +134,7 @@ def test_stem_of_the_current_folder_is_its_name(tmp_path, monkeypatch):
 
 
 def test_long_line_is_refused_quickly(tmp_path):
-    """1 MB without a line end: read byte by byte, the time would grow with the square of the length."""
+    """The line has 1 MB. A reader that searches its end again after each byte would take minutes."""
     (tmp_path / "long.csv").write_text("[" + "0.12345," * 125_000)
     begin_s = time.process_time()
     assert not is_log(tmp_path / "long.csv")
@@ -143,7 +143,7 @@ def test_long_line_is_refused_quickly(tmp_path):
 
 @pytest.mark.parametrize(("blank", "rows"), [("\n", 2), ("\n" * 2_000_000, 2), ("\n", 0), ("\n" * 2_000_000, 0)])
 def test_blank_lines_below_the_header_are_skipped(tmp_path, blank, rows):
-    """The result is the same if they fill more than a block."""
+    """The blank lines may fill more than one block."""
     header, *given = text_of(2).splitlines(keepends=True)
     (tmp_path / "log.csv").write_text(header + blank + "".join(given[:rows]))
     assert is_log(tmp_path / "log.csv") == (rows > 0)

@@ -1,4 +1,4 @@
-"""A log read block by block equals the log read at once, and a mistake far down is found with its line."""
+"""A log that is read in blocks equals the log that is read at once. A mistake far down is reported with its line."""
 
 import gzip
 import tracemalloc
@@ -44,7 +44,8 @@ def test_blocks_add_up_to_the_log(tmp_path, monkeypatch, name, block_bytes):
 
 
 def test_the_readers_of_numbers_agree(tmp_path):
-    """The cell reader reads a block with an exponent or a text column, and finds the same numbers."""
+    """The reader of cells reads blocks with an exponent or with a column of text. It finds the same numbers as the
+    reader of columns."""
     quick = write(tmp_path / "quick.csv", [HEADER, *[row.replace("1e0", "1") for row in rows(800)]])
     plain = write(tmp_path / "plain.csv", [HEADER, *rows(800)])
     noted = write(tmp_path / "noted.csv", [HEADER + ",note", *[row + ',"a, ""b"""' for row in rows(800)]])
@@ -75,7 +76,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("row", MISTAKES)
-@pytest.mark.parametrize("block_bytes", [1, 700, 1 << 22])  # of 1: a row each
+@pytest.mark.parametrize("block_bytes", [1, 700, 1 << 22])  # with 1 byte, each block is one row
 def test_mistake_far_down_is_reported_with_its_line(tmp_path, monkeypatch, row, block_bytes):
     monkeypatch.setattr(reader, "BLOCK_BYTES", block_bytes)
     path = tmp_path / "ride.csv"
@@ -86,7 +87,7 @@ def test_mistake_far_down_is_reported_with_its_line(tmp_path, monkeypatch, row, 
 
 
 def test_memory_does_not_grow_with_the_log(tmp_path, monkeypatch):
-    """Only the cells of the last hour (here half a minute) stay in memory, to check them."""
+    """To check the text columns, only the cells of the last hour stay in memory. In this test it is half a minute."""
     monkeypatch.setattr(reader, "BLOCK_BYTES", 1 << 16)
     monkeypatch.setattr(cells, "KEPT", 300)
     peaks = []

@@ -1,4 +1,4 @@
-"""Positions and Universal Time in a log are read, cut, repaired and written like the other columns."""
+"""The positions and the Universal Time in a log are read, cut, repaired and written as the other columns are."""
 
 import io
 from collections.abc import Iterable
@@ -29,7 +29,8 @@ def text(n: int = 400, t: str = "{:.2f}") -> str:
 
 
 def placed(log: Log) -> list[tuple[int, tuple[float, ...]]]:
-    """Return (hundredths of a second by the recorder's clock, position and time) of each row with a position."""
+    """Return [(hundredths of a second by the recorder's clock, (position and time)), ...] of the rows with a
+    position."""
     assert np.array_equal(np.isfinite(log.lat_deg), np.isfinite(log.utc_s))
     rows = np.flatnonzero(np.isfinite(log.lat_deg) & np.isfinite(log.lon_deg))
     return [
@@ -54,7 +55,7 @@ def test_positions_are_read_in_any_block_and_cut(monkeypatch, block_bytes):
 
 
 def test_spread_times_keep_positions_in_their_rows():
-    """Times in tenths of a second: ten rows share one."""
+    """The times are rounded to tenths of a second, so ten rows have the same time."""
     log = read_log(io.StringIO(text(t="{:.1f}")))
     assert np.flatnonzero(np.isfinite(log.lat_deg)).tolist() == list(PLACED)
     assert log.lon_deg[23] == pytest.approx(place(23)[1], abs=1e-8)

@@ -1,4 +1,5 @@
-"""1,000 logs broken in many ways: each gives a result or one line, and a written file is complete or absent."""
+"""Commands read 1,000 logs that are broken in many ways. Each command gives a result or a message of one line. The file
+that it writes is complete or does not exist."""
 
 import io
 import json
@@ -40,7 +41,7 @@ def _export(form: str):
     return lambda log, out: export(open_ride(log, CALIBRATION), form, out)
 
 
-# Uses of a log: (log, the file to write). Add a new command that reads logs here.
+# Each use of a log is a function of the log and of the file to write. Add new commands that read logs here.
 USES = {
     "replay": lambda log, out: replay_to_csv(log, CALIBRATION, "cpython", out),
     "report and plot": _report,
@@ -58,7 +59,8 @@ USES = {
 
 @pytest.fixture(scope="module")
 def bases(tmp_path_factory) -> list[bytes]:
-    """Three logs of two seconds: a ride with speed and temperature, one of the seven columns, a pose."""
+    """Return the texts of three logs of two seconds: a ride with speed and temperature, a log with only the seven usual
+    columns, and a pose."""
     chance = np.random.default_rng(12)
     parts = [script.upright(0.5), script.accelerate(8, 0.6), script.turn(-25, 0.6), script.brake(0, 0.5)]
     ride = script.Ride(parts, 0.02)
@@ -102,5 +104,5 @@ def test_mutated_log_gives_a_result_or_one_line(bases, tmp_path):
                     out.unlink()
         assert [path.name for path in tmp_path.iterdir()] == [name], f"number {number}: {ways}"
         log.unlink()
-    assert 0.2 * COUNT < results < 1.8 * COUNT  # both happen often
+    assert 0.2 * COUNT < results < 1.8 * COUNT  # results and refusals are both frequent
     assert len(lines) > 20

@@ -1,4 +1,4 @@
-"""A stretch of a log: its samples and times, cut out by `kickstand cut` or selected by --from and --to."""
+"""The samples and times of a stretch of a log, which `kickstand cut` or the options --from and --to select."""
 
 import gzip
 import io
@@ -94,12 +94,13 @@ def test_replay_and_report_accept_a_stretch(tmp_path):
     data = json.loads(command.works("report", ride, "--from", "18", "--to", "26", "--json").out)
     assert data["duration_s"] == 8.0
     assert data["stops"] == []
-    assert 18.0 <= data["max_right_deg"]["time_s"] <= 26.0  # the ride's own time
+    assert 18.0 <= data["max_right_deg"]["time_s"] <= 26.0  # times are those of the whole ride
 
 
 @pytest.mark.parametrize("name", ["replay", "smooth", "export"])
 def test_lean_of_a_stretch_equals_that_of_the_whole_ride(tmp_path, name):
-    """Earlier and later readings show where upright is. Without them the lean would be off or unknown."""
+    """The firmware also uses the readings before and after the stretch. Without them the lean would be wrong or
+    unknown."""
     ride = analysis_rides.short(tmp_path, rate_hz=50)
     whole, part = tmp_path / "whole.csv", tmp_path / "part.csv"
     form = ("--to", "csv") if name == "export" else ()
@@ -124,9 +125,9 @@ def test_stretch_warns_of_another_mounts_calibration(tmp_path):
 
 
 def test_exported_stretch_keeps_its_time_of_day(tmp_path):
-    """A log without a clock is assumed to end when its file was written. A stretch of it ends earlier by the omitted
-    part."""
-    ride = analysis_rides.short(tmp_path)  # 34 s
+    """A log without a time of day is assumed to end when its file was written. A stretch before its end must end
+    earlier."""
+    ride = analysis_rides.short(tmp_path)  # lasts 34 s
     os.utime(ride, (1_700_000_100, 1_700_000_100))
     out = tmp_path / "out.csv"
     api.export(api.open_ride(Stretch(ride, 10.0, 20.0)), "racechrono", out)

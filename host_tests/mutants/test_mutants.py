@@ -1,4 +1,4 @@
-"""kickstand_workshop.mutants: its table of packages, the changes that it makes, and which of them count as noticed."""
+"""The command `mutants`: its table of packages, its changes of the code, and which changes count as noticed."""
 
 import os
 import subprocess
@@ -22,7 +22,7 @@ def test_every_pattern_of_the_table_has_files(name):
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
 def test_noticed_unnoticed_and_for_ever(tmp_path):
-    """Run it in separate processes, because it forks."""
+    """The function runs in separate processes, because it forks."""
     (tmp_path / "tools").mkdir()
     (tmp_path / "tools" / "code_under.py").write_text("def twice(x):\n    return 2 * x\n")
     (tmp_path / "test_code.py").write_text(

@@ -1,4 +1,4 @@
-"""kickstand overlay: frames read back, transparency, times, sides; other videos are refused."""
+"""`kickstand overlay`: the tests read back the pictures and check transparency, times, sides and refused videos."""
 
 import os
 import subprocess
@@ -34,12 +34,12 @@ def lean(ride):
 
 @pytest.fixture(scope="module")
 def left_s(lean) -> float:
-    """When the bike leans furthest to the left; six seconds later it leans to the right."""
+    """Return the time of the largest lean to the left, in s. Six seconds later the bike leans to the right."""
     return float(lean.t_s[np.nanargmin(lean.lean_deg)])
 
 
 def filled(pictures: np.ndarray, gauge: Gauge) -> np.ndarray:
-    """Return the filled share of the dial (n), < 0 on the left. pictures: the gauge alone."""
+    """Return the filled share of the dial in each picture, negative on the left. pictures: the gauge alone."""
     colour = pictures[..., :3].astype(int)
     amber = (colour[..., 0] > 180) & (np.abs(colour[..., 1] - 160) < 60) & (colour[..., 2] < 110)
     dial = amber[:, : round(0.55 * gauge.height), : round(1.15 * gauge.height)]
@@ -63,12 +63,12 @@ def test_transparent_clip_shows_the_lean(tmp_path, ride, lean, left_s, form, fps
     shares = filled(pictures, gauge)
     wanted = lean.at(begin + np.arange(8 * fps) / fps).lean_deg
     assert wanted.min() < -20.0 < 20.0 < wanted.max()
-    # 3.5 degrees are 0.06 s where the bike rolls fastest
+    # At the largest roll rate, 3.5 degrees correspond to 0.06 s.
     assert np.abs(shares * np.abs(wanted).max() - wanted).max() < 3.5
 
 
 def test_gauge_over_a_video_shows_the_lean_at_its_time(tmp_path, ride, left_s):
-    """The video around the gauge is unchanged, and the gauge shows the time of the ride given by the offset."""
+    """The video around the gauge is unchanged. The option --offset selects the ride's time that the gauge shows."""
     film, out = gopro.film(tmp_path / "film.mp4", 4.0), tmp_path / "out.mp4"
     offset = round(left_s - 2.0, 2)
     said = command.works("overlay", ride, "--video", film, "--offset", offset, "--fps", 30, "--out", out).out
@@ -86,7 +86,7 @@ def test_gauge_over_a_video_shows_the_lean_at_its_time(tmp_path, ride, left_s):
 
 
 def ffmpeg(*arguments: object) -> str:
-    """The program's output."""
+    """Run ffmpeg and return its output."""
     command = [imageio_ffmpeg.get_ffmpeg_exe(), *(str(argument) for argument in arguments)]
     return subprocess.run(command, capture_output=True, text=True).stderr
 
@@ -108,7 +108,7 @@ def test_a_gopros_gyro_finds_the_offset(tmp_path):
     api.write_log(log, api.Log.from_readings(made.readings, made.rate_hz))
     kickstand, upright = (api.Log.from_readings(pose, made.rate_hz) for pose in (made.kickstand, made.upright))
     api.write_calibration(tmp_path / "RIDE.cal.json", api.fit_two_positions(kickstand, upright).calibration)
-    begin = 9005  # between two of the compared cells of 0.05 s
+    begin = 9005  # at 200 Hz, a time in the middle of one of the compared cells of 0.05 s
     turned = made.readings[begin : begin + 30 * 200, 4:] @ np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     noise = np.random.default_rng(2).normal(0.0, 0.5, turned.shape)
     film = gopro.with_telemetry(gopro.film(tmp_path / "GX01.mp4", 30.0), turned + noise + [1.0, -2.0, 0.5], 200.0)
@@ -123,7 +123,7 @@ def test_a_gopros_gyro_finds_the_offset(tmp_path):
 
 
 def walk(count: int) -> np.ndarray:
-    """Rates of another motion."""
+    """Return the rates of another motion, shape (count, 3)."""
     steps = np.random.default_rng(5).normal(size=(count, 3))
     return 40.0 * np.apply_along_axis(lambda v: np.convolve(v, np.ones(80) / 80.0, "same"), 0, steps)
 
@@ -157,7 +157,7 @@ def test_file_that_is_not_a_video_of_the_ride_is_refused(tmp_path, ride):
 
 
 def test_stopped_overlay_leaves_nothing(tmp_path, ride):
-    """Neither a file nor a running ffmpeg is left."""
+    """No file remains, and ffmpeg does not keep running."""
     film = gopro.film(tmp_path / "film.mp4", 5.0)
     (tmp_path / "clip.mov").write_text("an older clip")
     before = command.snapshot(tmp_path)
@@ -180,7 +180,7 @@ def test_stopped_overlay_leaves_nothing(tmp_path, ride):
 
 
 def test_full_disk_is_reported_by_overlay(tmp_path, ride, monkeypatch):
-    """The line contains ffmpeg's last words."""
+    """The message contains the last line of ffmpeg's output."""
     from kickstand_tools.overlay import overlay
 
     monkeypatch.setitem(overlay._TRANSPARENT, ".mov", ("-c:v", "no-such-codec"))
@@ -200,7 +200,7 @@ def test_gopro_readings_are_in_deg_s_on_the_videos_time(tmp_path):
 
 
 def test_live_option_shows_the_displayed_lean(tmp_path, ride):
-    """The two differ at the first lean, because the display did not have the later readings."""
+    """The displayed lean and the smoothed lean differ at the beginning. Only smoothing uses later readings."""
     for more in ((), ("--live",)):
         part = "--from", 6, "--to", 9, "--height", 240
         command.works("overlay", ride, *part, *more, "--out", tmp_path / f"clip{len(more)}.webm")

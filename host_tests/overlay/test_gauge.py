@@ -1,4 +1,5 @@
-"""The pixels of the gauge: the side of the lean, the maxima, unknown values, transparency; and its input values."""
+"""The pixels of the gauge: the side of the lean, the maxima, unknown values, transparency. Also the values that it
+gets."""
 
 import math
 
@@ -21,13 +22,13 @@ def gauge() -> Gauge:
 
 
 def amber(gauge: Gauge, **values: float) -> np.ndarray:
-    """(height, width) True where the picture has the colour of the lean."""
+    """Return True for each pixel in the colour of the lean, shape (height, width)."""
     picture = np.asarray(gauge.picture(**(KNOWN | values)), dtype=int)
     return np.abs(picture[..., :3] - ACCENT[:3]).max(axis=2) < 12
 
 
 def on_dial(gauge: Gauge, found: np.ndarray) -> tuple[int, int]:
-    """Number of pixels left and right of the middle of the dial, above its ends."""
+    """Count the pixels of the dial above its ends. Return (number left of the middle, number right of it)."""
     middle, end = round(0.6 * gauge.height), round(0.62 * gauge.height)
     return int(found[:end, :middle].sum()), int(found[:end, middle : round(1.15 * gauge.height)].sum())
 
@@ -43,7 +44,8 @@ def test_lean_fills_its_side_of_the_dial(gauge, lean):
 
 
 def test_the_bike_leans_to_that_side(gauge):
-    """Judged by the white pixels between its feet and the dial: the rider's head is on the side of the lean."""
+    """The rider's head is on the side of the lean. The test finds it by the white pixels between the tyre and the
+    dial."""
     rows, middle = slice(round(0.25 * gauge.height), round(0.5 * gauge.height)), round(0.6 * gauge.height)
     for lean in (-35.0, 35.0):
         picture, still = (np.asarray(gauge.picture(**(KNOWN | {"lean_deg": d})), dtype=int) for d in (lean, math.nan))
@@ -72,7 +74,7 @@ def test_unknown_values_are_not_drawn(gauge):
 
 
 def test_spot_moves_in_the_direction_of_the_acceleration(gauge):
-    """The dot moves up when speeding up, down when braking, and to the left in a left turn."""
+    """The dot moves up when the bike speeds up, down when it brakes, and to the left in a left turn."""
     side = round(1.2 * gauge.height)
 
     def spot(**forces: float) -> np.ndarray:
@@ -107,7 +109,7 @@ def test_gauge_scales_with_the_video_and_has_clear_corners(height, pixels):
     assert gauge.height == pixels
     assert gauge.width % 2 == gauge.height % 2 == 0
     assert picture[0, 0, 3] == picture[-1, -1, 3] == 0
-    assert 50 < picture[gauge.height // 2, 2, 3] < 200  # the panel is transparent
+    assert 50 < picture[gauge.height // 2, 2, 3] < 200  # the panel is partly transparent
     assert picture[..., 3].max() == 255
 
 

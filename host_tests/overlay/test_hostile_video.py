@@ -1,4 +1,4 @@
-"""Fake videos and camera readings cause no internal error and open no other file."""
+"""Invalid videos and invalid readings of a camera cause no internal error, and open no other file."""
 
 import random
 import struct

@@ -30,7 +30,7 @@ def test_shown_values_are_those_of_the_display(ride):
     braking = seen.at(np.array([seen.t_s[-1] - 6.0]))
     assert braking.forward_g[0] < -0.2
     turning = np.abs(seen.lean_deg) > 25.0
-    assert np.all(np.sign(seen.left_g[turning]) == -np.sign(seen.lean_deg[turning]))  # right lean: pushed right
+    assert np.all(np.sign(seen.left_g[turning]) == -np.sign(seen.lean_deg[turning]))  # to the right in a right turn
 
 
 def test_brief_or_untrusted_lean_is_no_maximum(ride, monkeypatch):
@@ -54,7 +54,7 @@ def test_brief_or_untrusted_lean_is_no_maximum(ride, monkeypatch):
 
 
 def test_contradicted_calibration_is_reported_by_overlay(ride):
-    """The same holds in every command with a calibration."""
+    """Every command with a calibration reports it, too."""
     calibration = api.read_calibration(ride.with_name("RIDE.cal.json"))
     backward = replace(calibration, vehicle_from_sensor=np.diag([-1.0, 1.0, -1.0]))
     for given, codes in ((calibration, []), (backward, ["forward-exchanged"])):
@@ -64,19 +64,20 @@ def test_contradicted_calibration_is_reported_by_overlay(ride):
 
 
 def test_a_maximum_must_last_and_unknown_leans_count_as_none():
-    """At 100 samples a second, with HELD_S of 0.15 s: sixteen samples in a row."""
+    """At 100 samples per second and HELD_S = 0.15 s, a maximum needs sixteen samples in a row. The first lean has only
+    fifteen."""
     t_s = np.arange(60) / 100.0
     lean = np.full(60, np.nan)
     assert _maximum(t_s, lean).tolist() == [0.0] * 60
     assert HELD_S == 0.15
-    lean[5:20], lean[30:46] = 30.0, 20.0  # values after 15 and after 16 samples
+    lean[5:20], lean[30:46] = 30.0, 20.0  # the first lean lasts 15 samples, the second 16
     lean[50:] = -5.0
     found = _maximum(t_s, lean)
     assert found.tolist() == [0.0] * 45 + [20.0] * 15
 
 
 def test_a_camera_with_uneven_times_is_found_in_the_ride():
-    """Cells of 50 ms hold one to four of the camera's readings; the ride began 12 s earlier."""
+    """Each cell of 50 ms contains one to four of the camera's readings. The ride began 12 s before the video."""
     chance = np.random.default_rng(4)
     knots_s = np.arange(0.0, 62.0, 0.7)
     knots = chance.normal(scale=30.0, size=(len(knots_s), 3))

@@ -1,4 +1,4 @@
-"""kickstand replay: the firmware's own lean over a log, the same on every engine."""
+"""`kickstand replay` computes the firmware's own lean from a log, with the same result on every engine."""
 
 import csv
 import json
@@ -14,7 +14,7 @@ from support.recordings import analysis_rides
 
 
 def replayed(log, cal, engine="cpython"):
-    """The table that `replay` writes, and its printed output."""
+    """Run `replay`. Return the table that it writes, and its printed output."""
     out = cal.with_name("LEAN.csv")
     said = command.works("replay", log, "--calibration", cal, "--out", out, "--engine", engine)
     return analysis_rides.table(out), said.err
@@ -26,7 +26,7 @@ def refused(log, cal, words, *more):
 
 
 def ride(path, seconds=20.0, rate_hz=100, seed=0):
-    """A log that leans, turns, brakes and shakes, with gaps in time, in the sensor's axes."""
+    """Write a log of a bike that leans, turns, brakes and shakes, with gaps in time and in the sensor's axes."""
     rng = np.random.default_rng(seed)
     t = np.cumsum(rng.uniform(0.5, 1.5, round(seconds * rate_hz))) / rate_hz
     lean, s = 0.6 * np.sin(t), 0.7 * np.sin(t)
@@ -55,7 +55,7 @@ def test_forces_and_rates_are_the_calibrated_and_turned_readings(tmp_path):
 
 
 def with_speed(log, speed):
-    """The log with this speed in the last column of each row."""
+    """Add a last column with this speed to the log."""
     header, *rows = log.read_text().split("\n")[:-1]
     text = [header + ",speed_mps", *[f"{row},{mps}" for row, mps in zip(rows, speed, strict=True)]]
     (log.with_name("speed.csv")).write_text("\n".join(text) + "\n")
@@ -64,7 +64,8 @@ def with_speed(log, speed):
 
 @pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
 def test_all_engines_give_the_same_lean(tmp_path):
-    """The log has a speed once per second, sometimes 0, that affects the lean. The lean is not always shown."""
+    """The log has a speed once per second, which changes the lean. Some speeds are 0. In part of the log no lean is
+    shown."""
     plain, cal = ride(tmp_path / "log.csv", seconds=60), command.write_cal(tmp_path / "CAL.json", trim_deg=1.0)
     log = with_speed(plain, [("0" if k % 1000 else "14.0") if k % 100 == 0 else "" for k in range(6000)])
     results = [replayed(log, cal, engine)[0] for engine in ("cpython", "micropython")]
@@ -115,7 +116,8 @@ def test_car_has_no_displayed_lean(tmp_path):
 
 
 def test_the_trim_that_riding_found_is_used(tmp_path):
-    """At standstill the lean is the accelerometer's minus the error of the upright pose; without a trim it is 0."""
+    """The trim is the error of the upright pose. At standstill the lean is the accelerometer's lean minus the trim.
+    Without a trim the lean would be 0."""
     log = command.still(tmp_path / "log.csv", (0.0, 0.0, 1.0), seconds=8.0)
     leans = []
     for changed in ({}, {"trim_deg": 2.0}):
@@ -126,7 +128,7 @@ def test_the_trim_that_riding_found_is_used(tmp_path):
 
 
 def test_times_of_the_log_are_kept_exactly(tmp_path):
-    """A log that starts at a Unix time keeps that time, exact to the microsecond."""
+    """The times of a log may begin at a Unix time. They stay exact to the microsecond."""
     cal = command.write_cal(tmp_path / "CAL.json")
     tables = []
     for start_s in 1_700_000_000.0, 0.0:
@@ -140,7 +142,7 @@ def test_times_of_the_log_are_kept_exactly(tmp_path):
 
 
 def test_lean_of_a_real_recording_matches_gravity(tmp_path, shared_data):
-    """Held upright, leaned to one side and held, then to the other: gravity gives the true lean."""
+    """A person holds the bike upright, then leaned to one side, then to the other. Gravity gives the true lean."""
     given = analysis_rides.table(shared_data / "hand-leaning.csv.gz")
 
     def mean(begin_s, end_s):
@@ -163,7 +165,7 @@ def test_lean_of_a_real_recording_matches_gravity(tmp_path, shared_data):
 
 
 def test_calibration_beside_the_log_is_used(tmp_path):
-    """This also holds in report, plot and export. Replay's output is not read as a log."""
+    """The commands report, plot and export also use it. They refuse replay's output as a log."""
     log = analysis_rides.short(tmp_path)
     beside = log.with_name(log.name.split(".")[0] + ".cal.json")
     beside.unlink(missing_ok=True)
@@ -184,7 +186,7 @@ def test_calibration_beside_the_log_is_used(tmp_path):
     ):
         command.refused(tmp_path, *arguments, words=words)
     command.refused(tmp_path, "report", exported, words=words.replace("LEAN", "EXPORTED"))
-    (tmp_path / "OTHER.csv").write_bytes(log.read_bytes())  # either may be right
+    (tmp_path / "OTHER.csv").write_bytes(log.read_bytes())  # with two logs, the calibration may belong to either one
     (tmp_path / "OTHER.cal.json").write_bytes(beside.read_bytes())
     command.refused(tmp_path, "report", lean, words="give the log that it was made from\n")
 

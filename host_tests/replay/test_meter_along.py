@@ -1,5 +1,5 @@
-"""The fast loop of replay, report and plot gives the same as the firmware's meter for each sample, and LEAN.csv
-contains exactly that."""
+"""The commands replay, report and plot use a fast loop. For each sample it gives the result of the firmware's meter.
+LEAN.csv contains exactly these results."""
 
 import multiprocessing
 from dataclasses import replace
@@ -15,12 +15,13 @@ from kickstand_tools.replay import replay, replay_engine
 from kickstand_tools.replay.meter_along import MeterAlong
 from support.recordings import smoothed_rides
 
-BY_NUMPY = ("lean_formula_deg", "static_lean_deg")  # its arc functions may differ in the last digit of a double
+# numpy computes these two columns. Its arc functions may differ in the last digit of a double.
+BY_NUMPY = ("lean_formula_deg", "static_lean_deg")
 
 
 @pytest.fixture(scope="module")
 def known():
-    """A ride with a speed in some samples, a short and a long gap, and frozen readings."""
+    """Return a ride with a speed in some samples, a short gap, a long gap, and frozen readings."""
     made = smoothed_rides.simulated("street", 3, 40.0)
     log, n = made.log, len(made.log.t_s)
     t_s, accel_g, gyro_dps = log.t_s.copy(), log.accel_g.copy(), log.gyro_dps.copy()
@@ -34,7 +35,10 @@ def known():
 
 
 def by_steps(log, calibration):
-    """(n, COLUMNS) by the loop that MicroPython runs, NaN where the readings froze."""
+    """Return the results of the loop that MicroPython runs, shape (n, number of COLUMNS).
+
+    Rows with frozen readings are NaN.
+    """
     engine = replay_engine.Replay(calibration.to_firmware(), calibration.delay_s())
     rows = []
     for block in read_blocks(log):
@@ -48,7 +52,7 @@ def test_fast_loop_equals_the_meter_for_each_sample(known):
     (block,) = read_blocks(log)
     measured, along = block.measured, MeterAlong(calibration)
     assert 0 < len(measured.time_us) < len(block.time_us)
-    cuts = [0, 1, 1, 700, 5000, len(measured.time_us)]  # in blocks, one of them empty
+    cuts = [0, 1, 1, 700, 5000, len(measured.time_us)]  # limits of the blocks, one of which is empty
     parts = [along.columns(measured.part(slice(a, b))) for a, b in pairwise(cuts)]
     got, want = np.concatenate(parts), by_steps(log, calibration)[~block.frozen]
     shown = got[:, -1] != replay_engine.NOT_SHOWN
@@ -75,8 +79,8 @@ def test_lean_file_has_values_as_python_writes_them(known, tmp_path):
 
 
 def test_two_processes_write_the_same_file(known, tmp_path, monkeypatch):
-    """A second process reads the blocks, as for a long log, with more blocks than it reads ahead. If it ends, an error
-    is raised."""
+    """As for a long log, a second process reads the blocks ahead. The log has more blocks than the process may read
+    ahead. If this process ends early, the command raises an error."""
     log, calibration = known
     write_log(tmp_path / "log.csv", log)
     monkeypatch.setattr(reader, "BLOCK_BYTES", 50_000)

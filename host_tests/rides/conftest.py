@@ -1,4 +1,4 @@
-"""A clock, and a directory that simulates flash, for tests of the rides' modules at their limits."""
+"""A simulated clock, and a directory that simulates the flash, for tests of the modules in kickstand/rides."""
 
 import types
 
@@ -15,13 +15,13 @@ def clock(monkeypatch):
     fake_time.use(clock, 0)
     for name in fake_time.ADDED:
         monkeypatch.setattr("time." + name, getattr(fake_time, name), raising=False)
-    clock.advance(3_000_000)  # since power-on
+    clock.advance(3_000_000)  # power-on was 3 s ago
     return clock
 
 
 @pytest.fixture
 def root(tmp_path, monkeypatch):
-    """A directory that simulates flash: space.free bytes of space.all are free."""
+    """Return a directory that simulates the flash. space.free bytes of space.all are free."""
     space = types.SimpleNamespace(free=400 * KB_4, all=500 * KB_4, path=tmp_path)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(flash_ring, "free_bytes", lambda _path: space.free)

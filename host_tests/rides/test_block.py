@@ -10,18 +10,18 @@ from support.recordings import ride_writer
 
 
 def some_turns(count):
-    """Turns that are the same in every version of Python."""
+    """Return turns that are the same in every version of Python."""
     for i in range(count):
         n = (2, 2, 3, 1, 8, 2)[i % 6]
         yield [n * (i * k * 7919 % 4001 - 2000) for k in range(1, 8)], n, n * 5000 + i * 37 % 400 - 200
 
 
-FORMAT_1 = 1672459265  # the check sum of the bytes written by the test below
+FORMAT_1 = 1672459265  # check sum of the bytes that the next test writes
 
 
 def test_the_bytes_of_a_block_are_those_of_format_1(monkeypatch):
-    """Rides of older firmware must stay readable. If you change these bytes, change the format's number and keep a
-    reader for the old one."""
+    """Rides of older firmware must stay readable. If you change these bytes, change the format's number and keep the
+    reader of the old format."""
     monkeypatch.setattr(block_format, "__version__", "0.0.0")
     block = RideBlock(5000)
     block.begin(4092, 7, 3, 123456789012, ride_writer.CHIP, 200, bytes(range(80)))
@@ -47,12 +47,12 @@ def places(block):
 
 @pytest.mark.parametrize("length", range(700, 720))
 def test_the_worst_turn_and_a_position_fit_into_any_block(length):
-    """After quiet turns, which need few bits each, every number of a violent turn needs the longest code."""
+    """A quiet turn needs few bits. In a violent turn after quiet ones, every number needs the longest code."""
     quiet = [800] * 7, 8, 40_000
     count = 0
-    for violent in (False, True):  # first to see how many quiet ones there are, then with the last one violent
+    for violent in (False, True):  # the first round counts the quiet turns; in the second round the last one is violent
         block = RideBlock(5000)
-        for sequence in range(2):  # the first block did not keep room from its beginning
+        for sequence in range(2):  # only the second block reserves room for a position from its beginning on
             ride_writer.begun(length, sequence, block)
             block.add_place(ride_writer.place(0))
             while not block.full() and (not violent or not sequence or block.count < count - 1):
@@ -70,7 +70,8 @@ def test_the_worst_turn_and_a_position_fit_into_any_block(length):
 
 
 def test_a_block_contains_nothing_of_the_previous_one():
-    """Each can be read without the others. The rest of a longer one is overwritten with zeros."""
+    """Each block can be read without the others. A shorter block overwrites the rest of the previous one with
+    zeros."""
     first, again = ride_writer.begun(4096), RideBlock(5000)
     for turn in some_turns(150):
         first.add_speed(900)
@@ -106,7 +107,7 @@ def test_a_littlefs_block_begins_with_a_pointer_per_halving(index):
 
 
 def test_the_first_position_is_dropped_if_it_has_no_room():
-    """After the first position every block reserves room for one, even if it is almost full."""
+    """After the ride's first position, every block reserves room for a position, even if it is almost full."""
     block = RideBlock(5000)
     for sequence in range(3):
         ride_writer.begun(512, sequence, block)

@@ -1,4 +1,4 @@
-"""An SD card is tested before it is needed."""
+"""The firmware tests an SD card before a ride is recorded to it."""
 
 import contextlib
 import io
@@ -11,7 +11,7 @@ from rings import CARD
 
 
 def tried(root, monkeypatch, **failing):
-    """Return the problem that the trial of a card finds. failing: the error of each failing function."""
+    """Return the problem that the trial of a card finds. failing: {name of a function: error that it raises}."""
     from kickstand.rides import card_trial
 
     def raised(error):

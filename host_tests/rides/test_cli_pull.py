@@ -1,4 +1,4 @@
-"""kickstand pull from a fake board: rides become logs, damage is reported, nothing unverified is deleted."""
+"""`kickstand pull` from a fake board. Rides become logs, damage is reported, and no unverified ride is deleted."""
 
 import binascii
 import errno
@@ -22,7 +22,7 @@ from support.recordings import ride_writer
 
 @pytest.fixture
 def board(tmp_path, monkeypatch):
-    """A board with the firmware, and no rides yet."""
+    """Return a board with the firmware and without rides."""
     (tmp_path / "flash").mkdir()
     (tmp_path / "out").mkdir()
     board = fake_board.plug_in(monkeypatch, fake_board.FakeBoard(tmp_path / "flash"))
@@ -41,7 +41,7 @@ def put(board, name, blocks):
 
 
 def left(board):
-    """The whole content of the directory of the rides."""
+    """Return all paths in the board's directory of rides."""
     return sorted(path.relative_to(board.root / "rides").as_posix() for path in board.root.glob("rides/**/*"))
 
 
@@ -72,14 +72,15 @@ def test_rides_become_logs_with_their_calibration(board, tmp_path):
     assert cal["vehicle_from_sensor"] == [[0, 1, 0], [0, 0, 1], [1, 0, 0]]
     assert cal["accel_offset_g"] == pytest.approx([0.01, -0.02, 0.03])
     assert (cal["trim_deg"], cal["firmware"], cal["who_am_i"], cal["sample_hz"]) == (1.25, __version__, "0x68", 200)
-    assert len(list(board.root.glob("rides/*/*/*"))) == 3  # the command must delete nothing
+    assert len(list(board.root.glob("rides/*/*/*"))) == 3  # the command has deleted nothing
 
 
 @pytest.mark.parametrize(
     ("vehicle", "by_drive", "said"), [("car", True, "car"), ("car", False, None), ("motorcycle", True, None)]
 )
 def test_the_log_of_a_car_says_that_it_is_a_car(vehicle, by_drive, said, board, tmp_path, monkeypatch):
-    """The log of a car's ride shows no lean. A ride aligned by two poses is older than the board's use in the car."""
+    """Such a log shows no lean. A ride that was aligned by two poses was recorded before the board was used in the
+    car."""
     made = ride_writer.calibration()
     made.by_drive = by_drive
     monkeypatch.setattr(ride_writer, "calibration", lambda _trim_deg: made)
@@ -100,7 +101,7 @@ def test_another_ride_with_the_same_number_gets_its_own_file(board, tmp_path):
 
 
 def test_only_completely_pulled_rides_are_deleted(board, tmp_path):
-    """A ride that a power cut has ended is complete up to that time."""
+    """A ride that ended with a power cut counts as complete."""
     data = {ride: ride_writer.blocks(4, ride=ride)[0] for ride in range(1, 5)}
     put(board, "000/01/00000.rid", data[1])
     put(board, "000/02/00000.rid", [data[2][0], data[2][1][:1000] + b"?" + data[2][1][1001:], *data[2][2:]])
@@ -179,7 +180,7 @@ class Altered:
 
 
 def ends_early(board, count):
-    """Reading a ride ends after this many bytes, as with a damaged FAT chain."""
+    """Make the reading of a ride end after `count` bytes, as with a damaged FAT chain."""
     opened = board._open
     board._globals["__builtins__"]["open"] = lambda path, mode="r": (
         Altered(opened(path, mode), count) if mode == "rb" else opened(path, mode)
@@ -187,7 +188,10 @@ def ends_early(board, count):
 
 
 def on_the_cable(board, change, times=99):
-    """change(bytes) of the first transfers of a ride."""
+    """Change the bytes of a ride on the cable.
+
+    change(bytes): returns the changed bytes. times: number of transfers that are changed.
+    """
     send, left = board.exec_raw_no_follow, [times]
 
     def sends(script):
@@ -269,8 +273,11 @@ def test_a_folder_that_cannot_be_made_is_named(board, tmp_path, monkeypatch):
 
 
 def copied(monkeypatch, printed, size=6, end=None):
-    """Return the result of _read() for a board that prints these lines at each try, and the parts passed to
-    progress."""
+    """Return the result of _read() and the sizes that it reports as progress.
+
+    printed: the lines that the board prints at each attempt.
+    size: size of the file.
+    """
     part, came, tries = pull._Part(3, 1, size, "rides/3.rid"), [], []
 
     def lines(transport, program, silent_s, most_bytes):
@@ -285,7 +292,10 @@ def copied(monkeypatch, printed, size=6, end=None):
 
 
 def sent(content, announced=None):
-    """The lines of a file, three bytes each, and its size and sum."""
+    """Return the lines that a board prints for a file: three bytes per line, then the size and the check sum.
+
+    announced: content whose size and check sum are printed instead.
+    """
     of = content if announced is None else announced
     pieces = [binascii.b2a_base64(content[at : at + 3]).strip() for at in range(0, len(content), 3)]
     return [*pieces, str((len(of), zlib.crc32(of))).encode()]
@@ -300,16 +310,16 @@ def test_a_file_comes_in_parts_and_is_compared_with_its_sum(monkeypatch):
 @pytest.mark.parametrize(
     ("first", "kept"),
     [
-        (sent(b"abc", b"abcdef"), b"abc"),  # half of the file
-        (sent(b"abcdef", b"abcdeg"), b"abcdef"),  # another byte
-        ([b"?", *sent(b"abcdef")[1:]], b"def"),  # a line that is not base64
-        (sent(b"abcdef")[:-1], b"abcdef"),  # without its check sum
+        (sent(b"abc", b"abcdef"), b"abc"),  # only half of the file arrives
+        (sent(b"abcdef", b"abcdeg"), b"abcdef"),  # one byte is wrong
+        ([b"?", *sent(b"abcdef")[1:]], b"def"),  # one line is not base64
+        (sent(b"abcdef")[:-1], b"abcdef"),  # the check sum is missing
     ],
 )
 def test_a_file_that_is_not_whole_is_copied_again(monkeypatch, first, kept):
     content, whole, came, tries = copied(monkeypatch, [first, sent(b"abcdef")])
     assert (content, whole, tries) == (b"abcdef", True, 2)
-    assert sum(count for _, count in came) == len(kept)  # progress does not count the second attempt
+    assert sum(count for _, count in came) == len(kept)  # progress counts no byte twice
     content, whole, _, tries = copied(monkeypatch, [first])
     assert (content, whole, tries) == (kept, False, pull._TRIES)
 

@@ -1,4 +1,4 @@
-"""kickstand record from a fake board that streams: the log grows with the stream, and Ctrl-C or the board ends it."""
+"""`kickstand record` from a fake board that streams. The log grows with the stream, and Ctrl-C or the board ends it."""
 
 import base64
 import contextlib
@@ -22,7 +22,7 @@ from support.watched_stderr import Watched, watched
 
 
 class Clocks:
-    """Replace `time`: only waiting takes time. While the computer sleeps its monotonic clock stops."""
+    """Replaces the module time. Only waiting takes time. While the computer sleeps, its monotonic clock stops."""
 
     waited_s = asleep_s = 0.0
 
@@ -40,8 +40,11 @@ class Clocks:
 
 
 class Stream(fake_board.Serial):
-    """A serial port with the board's output, and an event at its end: "ctrl-c" or another signal, "error", "unplug",
-    "silence", "asleep"."""
+    """A serial port with the board's output.
+
+    end: the event after this output. It is "ctrl-c" or another signal, "error", "unplug", "silence" or "asleep".
+    last: the board's output after Ctrl-C.
+    """
 
     def __init__(self, blocks, end, last=b""):
         super().__init__()
@@ -71,21 +74,21 @@ class Stream(fake_board.Serial):
 
 
 class Streaming(fake_board.FakeBoard):
-    """Its app runs until the stream ends."""
+    """A board whose app runs until the stream ends."""
 
     def exec_raw_no_follow(self, command):
         self.resets += "machine.reset()" in command
 
 
 def _said(block):
-    """One block as usb_stream prints it."""
+    """Return one block as usb_stream prints it."""
     pieces = [block[at : at + 256] for at in range(0, len(block), 256)]
     return b"".join(base64.b64encode(piece) + b"\r\n" for piece in pieces) + b".\r\n"
 
 
 @pytest.fixture
 def streaming(tmp_path, monkeypatch):
-    """streaming(blocks, end): a board that streams them. Only waiting for it takes time."""
+    """Return streaming(blocks, end), which connects a board that streams these blocks. Only waiting takes time."""
     monkeypatch.setattr(Clocks, "waited_s", 0.0)
     monkeypatch.setattr(Clocks, "asleep_s", 0.0)
 
@@ -115,7 +118,8 @@ def signals():
 @pytest.mark.parametrize("before", [signal.default_int_handler, signal.SIG_IGN], ids=["shell", "background"])
 @pytest.mark.usefixtures("signals")
 def test_ctrl_c_ends_a_whole_log(before, streaming, tmp_path):
-    """The signal ends it even if a shell has started it with the signal ignored. The handler is restored afterwards."""
+    """Ctrl-C also works if a shell has started the command with this signal ignored. Afterwards the earlier handler is
+    in use again."""
     signal.signal(signal.SIGINT, before)
     data, turns = half_seconds(9)
     board = streaming(data[:-1], "ctrl-c", _said(data[-1]))
@@ -124,7 +128,7 @@ def test_ctrl_c_ends_a_whole_log(before, streaming, tmp_path):
     assert board.serial.written == b"\x03\x01"
     assert board.resets == 1
     log = read_log(tmp_path / "ride.csv")
-    assert len(log.time_us) == len(turns)  # it includes the board's output after Ctrl-C
+    assert len(log.time_us) == len(turns)  # the log includes the board's output after Ctrl-C
     assert log.time_us[-1] == sum(dt for _, _, dt in turns) - turns[0][2]
     cal = json.loads((tmp_path / "ride.cal.json").read_text())
     assert cal["accel_slope"] == pytest.approx([1.01, 0.99, 1.0])
@@ -169,7 +173,7 @@ def test_the_lean_is_shown_live_once_it_is_known(aligned, still, words, streamin
 
 @pytest.mark.parametrize("aligned", [True, False])
 def test_a_car_shows_g_and_no_lean(aligned, streaming, tmp_path, monkeypatch):
-    """Its log has no lean either: its calibration says that it is a car."""
+    """Replaying the log gives no lean, because its calibration says that the vehicle is a car."""
     monkeypatch.setattr(ride_writer, "calibration", functools.partial(calibration, ride_writer.calibration(), aligned))
     monkeypatch.setattr(ride_writer, "turns", braking_in_a_left_bend)
     board = streaming(half_seconds(3)[0], "ctrl-c")
@@ -190,13 +194,13 @@ def test_a_disturbed_vehicle_name_does_not_end_the_recording(streaming, tmp_path
 
 
 def at_rest(count, seed=0):
-    """Like ride_writer.turns(), upright on a quiet stand."""
+    """Yield turns as ride_writer.turns() does, for an upright bike at rest."""
     for i in range(count):
         yield [2 * mean for mean in (-40, 83, 4096, 0, i % 2, 98, 0)], 2, 10_000
 
 
 def braking_in_a_left_bend(count, seed=0):
-    """The turns of a car: 0.2 and 0.3 g."""
+    """Yield turns as ride_writer.turns() does, for a car: 0.2 and 0.3 g."""
     for _ in range(count):
         yield [2 * mean for mean in (-851, 1324, 4096, 0, 0, 98, 0)], 2, 10_000
 
@@ -211,7 +215,7 @@ def test_a_closed_terminal_loses_nothing(streaming, tmp_path, monkeypatch):
     streaming(data, "ctrl-c")
     terminal = Watched()
     terminal.closed_after = 300
-    with contextlib.suppress(OSError):  # its last output cannot be written
+    with contextlib.suppress(OSError):  # the command cannot write its last output
         watched(monkeypatch, terminal, "record", "--out", tmp_path / "ride.csv")
     assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
 
@@ -226,7 +230,7 @@ def test_an_earlier_recording_is_not_overwritten(name, streaming, tmp_path):
 
 
 def fails(board, error):
-    """The board's next program fails with this error."""
+    """Make the board's next program fail with this error."""
     board.serial.data = b"\x04Traceback (most recent call last):\r\n" + error + b"\r\n\x04>"
 
 
@@ -241,7 +245,7 @@ def test_a_board_without_the_firmware_is_reported_alike(arguments, streaming, tm
 
 @pytest.mark.parametrize("arguments", [["record", "--out", "ride.csv"], ["pull"]])
 def test_a_board_with_an_older_version_must_be_updated(arguments, streaming, tmp_path, monkeypatch):
-    """A board with version 0.2.0, which has all modules in one folder."""
+    """The board has version 0.2.0, whose modules are all in one folder."""
     monkeypatch.chdir(tmp_path)
     board = streaming([], None)
     board.modules["kickstand"] = types.SimpleNamespace(settings=types.SimpleNamespace(load=lambda: None))
@@ -269,7 +273,8 @@ def test_the_data_before_a_broken_stream_are_kept(end, words, streaming, tmp_pat
 
 
 def test_a_computer_that_slept_is_reported(streaming, tmp_path, monkeypatch):
-    """The board has stopped streaming. The command waits less long for this than for a sensor that is off."""
+    """Meanwhile the board has stopped streaming. The command notices this sooner than it gives up a sensor that is
+    off."""
     monkeypatch.setattr(board_console, "_AWAY_SILENT_S", 0.1)
     data, turns = half_seconds(3)
     streaming(data, "asleep")

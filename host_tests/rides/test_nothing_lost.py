@@ -1,7 +1,7 @@
-"""Power cuts, full disks and pulled cables at random moments: no existing data are lost.
+"""No command loses existing data if the power is cut, the disk is full or the cable is pulled at a random moment.
 
-Each case is a fork of this process that runs a command. The kernel ends it (a timer whose signal has no handler, like
-kill -9), or its disk or cable fails. The test then examines the remaining files.
+Each case runs a command in a fork of this process. Then a timer's signal ends the fork without a handler, like kill -9,
+or the disk or the cable of the fork fails. The test then examines the remaining files.
 """
 
 import contextlib
@@ -29,19 +29,23 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has
 
 WEATHER = b"# my weather station\nwhile True: pass\n"
 OFTEN = [("record", "full"), ("pull", "kill"), ("pull", "cable"), ("flash", "cable"), ("smooth", "kill")]
-FAST, ALL = 2, 10  # moments of each case, and nightly of each command with each fault
+FAST, ALL = 2, 10  # number of random moments: for each case in OFTEN, and nightly for each case in KINDS
 
 
 class Scene:
-    """The files and board of a command. arguments: its command line.  plug(monkeypatch): connects its board in the
-    fork. lost(): the losses since the scene was created, as words."""
+    """The files and the board of a command.
+
+    arguments: the command line.
+    plug(monkeypatch): connects the board, in the fork.
+    lost(): returns one sentence for each loss since the scene was created.
+    """
 
     def __init__(self, place: Path):
         self.place = place
         self.out = place / "out"
         self.out.mkdir(parents=True)
         (self.out / "notes.txt").write_text("mine")
-        self.kept = {self.out / "notes.txt": [b"mine"]}  # path: contents that it may have; None for any whole log
+        self.kept = {self.out / "notes.txt": [b"mine"]}  # {path: contents that the file may have}
 
     def keep(self, path: Path) -> None:
         self.kept[path] = [path.read_bytes()]
@@ -58,7 +62,7 @@ class Scene:
 
 
 def is_whole(path: Path) -> bool:
-    """True for a file that a command has written completely."""
+    """Return True for a file that a command has written completely."""
     data = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
     if path.suffix in (".csv", ".gz"):
         return data.endswith(b"\n") and data.startswith(b"t_s,") and len(data) > 20_000
@@ -137,7 +141,7 @@ class Flash(Scene):
 
 
 class Computed(Scene):
-    """A command that overwrites the results of an earlier run. source: the folder of a simulated ride."""
+    """A command that replaces the results of an earlier run. source: the folder of a simulated ride."""
 
     def __init__(self, place, source, verb):
         super().__init__(place)
@@ -159,18 +163,22 @@ class Computed(Scene):
 
 @pytest.fixture(scope="module")
 def source(tmp_path_factory):
-    """A simulated ride with its calibration."""
+    """Return the folder of a simulated ride with its calibration."""
     place = tmp_path_factory.mktemp("source")
     command.works("simulate", "--profile", "street", "--seconds", 20, "--out", place)
     command.works("calibrate", "two", place / "KICKSTAND.csv", place / "UPRIGHT.csv", "--out", place / "RIDE.cal.json")
-    for verb in ("import", "smooth"):  # import their modules once, not in each fork
+    for verb in ("import", "smooth"):  # so each fork finds the modules already imported
         (made := place / verb).mkdir()
         command.works(*Computed(made, place, verb).arguments)
     return place
 
 
 def in_a_fork(scene, fault, share, usual_s=1.0):
-    """Run the scene's command in a fork, with a fault after a share of its duration. Return its duration in s."""
+    """Run the scene's command in a fork. Return its duration in s.
+
+    share: the share of usual_s, of the file or of the transfer after which the fault happens.
+    usual_s: duration of the command without a fault.
+    """
     begun_s = time.monotonic()
     child = os.fork()
     if not child:
@@ -199,7 +207,7 @@ def in_a_fork(scene, fault, share, usual_s=1.0):
 
 
 def cut(board, share):
-    """The cable is pulled after a share of the changes to the board's flash, or of its output."""
+    """Let the cable be pulled after a share of the changes to the board's flash, or of the board's output."""
     left = [round(share * (30 if isinstance(board.serial, Stream) else 300))]
 
     def pulled(*_):
@@ -230,7 +238,7 @@ KINDS += [(verb, fault) for verb in ("import", "smooth", "plot") for fault in ("
     ],
 )
 def test_no_existing_file_is_lost(verb, fault, count, source, tmp_path):
-    """21 kinds, of which the nightly run has 10 moments each, 210 in all."""
+    """The nightly run tests 21 pairs of a command and a fault, with 10 random moments each."""
     chance = random.Random(f"{verb} {fault}")
 
     def scene(k):
@@ -251,7 +259,7 @@ def test_no_existing_file_is_lost(verb, fault, count, source, tmp_path):
 
 
 def test_a_killed_command_that_writes_in_place_loses_data(source, tmp_path, monkeypatch):
-    """Proof that the test above can fail: without a temporary file an earlier result is cut."""
+    """This proves that the test above can fail. Without a temporary file, an earlier result is cut."""
 
     @contextlib.contextmanager
     def in_place(path):

@@ -17,12 +17,12 @@ SHORT, LONG = 0.15, 1.2
 
 
 def menu(from_s):
-    """Presses for "Record ride" or "Stop recording" in the menu, in 8 s."""
+    """Return the presses that choose "Record ride" or "Stop recording" in the menu. They take 8 s."""
     return [[from_s, LONG], *([from_s + i, SHORT] for i in (2, 3, 4, 5)), [from_s + 6, LONG]]
 
 
 def rides(flash):
-    """The whole blocks of each ride by its number, and every problem."""
+    """Return {number of a ride: its whole blocks}, and a list of all problems."""
     found, problems = {}, []
     for path in sorted((flash / "rides").glob("*/*/*.rid")):
         blocks, bad = block_reader.read(path.read_bytes())
@@ -33,14 +33,15 @@ def rides(flash):
 
 
 def replayed(blocks, directory):
-    """Replay's lean for each row of the ride's log."""
+    """Return the lean that `replay` computes for each row of the ride's log."""
     cal = ride_log.write(directory / "ride.csv.gz", blocks)
     engine = replay_engine.Replay(read_calibration(cal).to_firmware())
     return [engine.step(*row)[0] for block in read_blocks(directory / "ride.csv.gz") for row in block.rows()]
 
 
 def lean_matches(record, blocks, leans, slack_s=0.4):
-    """Each lean on the display must be one from the replay in the last slack_s. Return their number."""
+    """Assert that each displayed lean is within the replay's leans of the last slack_s. Return the number of compared
+    leans."""
     begun = blocks[0].time_us / 1e6
     times = [turn.time_us / 1e6 for block in blocks for turn in block.turns]
     compared = 0
@@ -56,7 +57,7 @@ def lean_matches(record, blocks, leans, slack_s=0.4):
 
 @pytest.fixture
 def computed(monkeypatch):
-    """Every lean that the firmware computes, on CPython."""
+    """Return a list that will contain every lean that the firmware computes on CPython."""
     leans = []
     update = LeanMeter.update_sum
 
@@ -70,7 +71,8 @@ def computed(monkeypatch):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_a_recorded_ride_replays_as_the_display_showed(engine, tmp_path, computed):
-    """Recorded from power-on: one ride before the alignment and one after it. A power cut ends the second."""
+    """The board records from power-on. It records one ride before the alignment and one after it. A power cut ends the
+    second ride."""
     flash = tmp_path / "flash"
     flash.mkdir()
     record = device_plans.run(engine, flash, {**ALIGNED, "seed": 2, "config": {"RECORD": True}})
@@ -82,7 +84,7 @@ def test_a_recorded_ride_replays_as_the_display_showed(engine, tmp_path, compute
     assert found[2][0].calibration().aligned
     assert not found[1][0].calibration().aligned
     leans = replayed(found[2], tmp_path)
-    assert 46 - found[2][-1].turns[-1].time_us / 1e6 < 6.0  # a block at most
+    assert 46 - found[2][-1].turns[-1].time_us / 1e6 < 6.0  # at most one block is missing
     assert lean_matches(record, found[2], leans) > 50
     if engine == "cpython":
         before = sum(len(block.turns) for block in found[1])
@@ -92,7 +94,7 @@ def test_a_recorded_ride_replays_as_the_display_showed(engine, tmp_path, compute
 
 
 def test_a_fault_of_the_sensor_in_a_ride_is_replayed(tmp_path, computed):
-    """The sensor is set up again, the filter restarts, and the ride continues in the same file."""
+    """The firmware sets up the sensor again and restarts the filter. The ride continues in the same file."""
     device_plans.align(tmp_path)
     plan = {
         "ride": [["upright", 4.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 5.0], ["turn", 40.0, 5.0]],
@@ -113,7 +115,8 @@ def test_a_fault_of_the_sensor_in_a_ride_is_replayed(tmp_path, computed):
 
 
 def test_a_wheel_is_not_misread_while_flash_is_erased(tmp_path, monkeypatch):
-    """Interrupts are off for 45 ms once per block. Only one of the edges in that time is noticed, and late."""
+    """Interrupts are off for 45 ms once per block. Of the wheel's edges in that time the firmware notices only one, and
+    late."""
     boards, writes = [], []
     fit, write = Board.fit_wheel, RideRing.write
 
@@ -157,7 +160,7 @@ def test_the_menu_starts_and_ends_a_ride(tmp_path):
     assert record.at(15.9)[0].startswith("Rec         0:0") or record.at(15.9)[0].endswith("*")
     assert record.at(20.8)[0] in ("Rec         0:05", "Rec         0:06")
     assert record.at(20.8)[1].startswith("room ")
-    assert record.at(27)[0] == "Lean  10° right*"  # has settled
+    assert record.at(27)[0] == "Lean  10° right*"  # the filter has settled
     assert 34 < record.first("Stop recording") < 36
     assert record.first("Recording ended") < 38
     assert record.at(39.5)[0] == "Lean  10° right "

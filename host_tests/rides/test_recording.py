@@ -14,7 +14,13 @@ TURN_US = 10_000
 
 
 class Keeper:
-    """Replaces a RideRing. steps: the calls so far; taken: whole blocks. fails: the name of a step that raises."""
+    """Replaces a RideRing.
+
+    steps: names of the calls so far.
+    taken: the complete blocks.
+    takes_ms: {name of a step: its duration in ms}.
+    fails: the name of the step that raises `error`.
+    """
 
     stops_interrupts = True
     fails = ""
@@ -23,7 +29,7 @@ class Keeper:
     def __init__(self, clock, length=1024):
         self.clock, self.length = clock, length
         self.steps, self.taken, self.begun = [], [], b""
-        self.takes_ms = {}  # by the name of a step
+        self.takes_ms = {}
         self.is_ready, self.free = True, 1_000_000
 
     def _step(self, name):
@@ -78,7 +84,7 @@ def recorder(clock, keeper):
 
 
 def take_stall(recorder):
-    """Record a turn as the app does."""
+    """Return and reset the recorder's mark of a stall, as the app does."""
     stalled, recorder.stalled = recorder.stalled, False
     return stalled
 
@@ -88,7 +94,7 @@ def start(recorder):
 
 
 def add(recorder, turns, clock=None, tick=True):
-    """Add this many turns of 10 ms with the same two samples."""
+    """Add `turns` turns of 10 ms, with the same two samples in each turn."""
     for _ in range(turns):
         if clock:
             clock.advance(TURN_US)
@@ -108,7 +114,8 @@ def times(keeper):
 
 
 def test_a_ride_after_an_alignment_begins_like_its_replay(keeper):
-    """A replay does not know that the bike was just held upright. So the meter restarts without this knowledge."""
+    """After an alignment the meter knows that the bike is upright, but a replay does not know it. So the meter restarts
+    without this knowledge."""
     from kickstand.rides.recording import Recording
 
     settings = SimpleNamespace(SD_SPI=None, RECORD=True, SAMPLE_HZ=200)
@@ -128,7 +135,7 @@ def test_a_ride_after_an_alignment_begins_like_its_replay(keeper):
 
 
 def test_the_second_start_reuses_the_recorder(root, clock):
-    """A recording also starts if the menu was open too briefly to prepare it."""
+    """A recording also starts if the menu was open for too short a time to prepare it."""
     from kickstand.rides.recording import Recording
 
     settings = SimpleNamespace(SD_SPI=None, RECORD=False, SAMPLE_HZ=200)
@@ -154,13 +161,13 @@ def test_a_block_is_written_256_bytes_per_turn(recorder, keeper):
     while not keeper.taken:
         before = len(keeper.steps)
         add(recorder, 1)
-        assert len(keeper.steps) == before + 2  # ready, and one more
+        assert len(keeper.steps) == before + 2  # one call of ready(), and one other step
         written.append(len(keeper.begun))
     assert written == [256, 512, 700, 0]
     assert [len(data) for data in keeper.taken] == [700]
     before = len(keeper.steps)
     recorder.tick()
-    assert len(keeper.steps) == before  # nothing is waiting
+    assert len(keeper.steps) == before  # no data wait to be written
 
 
 def test_all_blocks_have_their_ride_and_sequence(recorder, keeper, clock):
@@ -179,7 +186,7 @@ def test_all_blocks_have_their_ride_and_sequence(recorder, keeper, clock):
 
 
 def test_a_turn_that_fills_a_block_waits_for_the_previous_one(recorder, keeper):
-    """No block may be lost if flash is slower than the ride."""
+    """If the flash is slower than the ride, no block may be lost."""
     start(recorder)
     add(recorder, 1500, tick=False)
     recorder.stop()
@@ -191,7 +198,7 @@ def test_a_turn_that_fills_a_block_waits_for_the_previous_one(recorder, keeper):
 @pytest.mark.parametrize(("ms", "slow"), [(9, False), (12, True)])
 @pytest.mark.parametrize(("step", "fails"), [("begin", ""), ("begin", "begin"), ("abandon", "begin"), ("write", "")])
 def test_a_step_of_over_10_ms_was_an_erase_of_the_flash(step, fails, ms, slow, stops_interrupts, recorder, keeper):
-    """This also holds for a ride that could not begin."""
+    """The recorder also reports the erase if the ride could not begin."""
     keeper.stops_interrupts, keeper.fails = stops_interrupts, fails
     keeper.takes_ms = {step: ms}
     start(recorder)
@@ -241,10 +248,10 @@ def test_a_gap_belongs_to_its_own_ride(recorder, keeper, clock):
 
 
 def test_a_position_and_a_speed_belong_to_the_next_turn_only(recorder, keeper):
-    """A turn may have either without the other. Zero is a valid speed."""
+    """A turn may have a position without a speed, or a speed without a position. Zero is a valid speed."""
     start(recorder)
     recorder.add_fix(None, ride_writer.place(0))
-    recorder.add_fix(None, ride_writer.place(1))  # the newest one counts
+    recorder.add_fix(None, ride_writer.place(1))  # the newest position is recorded
     add(recorder, 2)
     recorder.add_fix(5.0, None)
     recorder.add_fix(0.0, None)
@@ -263,7 +270,7 @@ def test_a_position_and_a_speed_belong_to_the_next_turn_only(recorder, keeper):
 
 
 def test_time_and_room(recorder, keeper):
-    """A kilobyte per second until the first block is measured."""
+    """Until the recorder has measured its first block, it assumes a kilobyte per second."""
     start(recorder)
     assert recorder.seconds() == 0
     assert recorder.room_s() == 1_000_000 // 1024
@@ -298,7 +305,7 @@ def test_whatever_fails_ends_the_ride_once_with_one_notice(step, error, recorder
     assert isinstance(recorder.problem, Notice)
     assert recorder.take_problem().values == (str(error),)
     assert recorder.take_problem() is None
-    keeper.fails = ""  # the next ride is recorded when it works again
+    keeper.fails = ""  # the flash works again, so the next ride is recorded
     start(recorder)
     add(recorder, 3)
     recorder.stop()

@@ -11,8 +11,8 @@ from support.recordings import ride_writer
 
 PAGE = Path(__file__).resolve().parents[2] / "firmware" / "docs" / "rides.md"
 BYTES_S = 1024  # the recorder assumes this rate until it has measured a block
-# Bytes of the file system that MicroPython's images make: ports/rp2/boards/*/mpconfigboard.cmake,
-# ports/esp32/partitions-4MiBplus.csv
+# Size of the file system in MicroPython's images, in KB. The sources are ports/rp2/boards/*/mpconfigboard.cmake and
+# ports/esp32/partitions-4MiBplus.csv.
 FLASH_KB = {"Pico": 1408, "Pico W": 848, "Pico 2": 3072, "Pico 2 W": 2560, "ESP32 with 4 MB of flash": 2048}
 
 
@@ -22,7 +22,10 @@ def rows():
 
 
 def room_s(monkeypatch, tmp_path, spi, size, used):
-    """The time that an empty board or card reports as left."""
+    """Return the recording time in s that a board reports if its flash or card has no rides.
+
+    spi: None for the flash, a number for a card. size, used: bytes of the file system, and bytes in use.
+    """
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("os.ilistdir", lambda _path: iter(()), raising=False)
     monkeypatch.setattr(ride_paths, "directory", lambda _settings: "rides")

@@ -1,14 +1,15 @@
-"""Rides on a card with MicroPython's own FAT: no step reads much, for any number of rides; power cuts."""
+"""Rides on a card with MicroPython's own FAT. No step of the recorder reads many sectors, for any number of rides. A
+power cut loses only the last block."""
 
 import json
 
 import pytest
 from support.mpy import run_mpy
 
-SECTOR_S = 3.1e-3  # at 1.32 MHz, with the commands
+SECTOR_S = 3.1e-3  # time to transfer a sector at 1.32 MHz, including the commands
 TURN_S, BEGIN_S = 0.1, 1.0
 
-# A card of 32 GB in RAM, of which only the sectors that are not zero are kept; its clusters have the usual 32 KB
+# A card of 32 GB. Only its sectors that are not zero are kept in RAM. Its clusters have the usual 32 KB.
 _CARD = """
 import json, os
 from kickstand.rides import flash_ring, ride_paths
@@ -89,8 +90,8 @@ def test_no_turn_waits_long_for_a_card(rides, parts):
     assert all(sectors * SECTOR_S < TURN_S for sectors in worst.values()), worst
 
 
-# Four rides of three blocks; the first ride must make room for the fourth. Then the power is cut before each write of a
-# sector: completed blocks are kept, and the next ride is recorded
+# The board records four rides of three blocks. The first ride is removed to make room for the fourth. Then the power is
+# cut before each write of a sector. Completed blocks must be kept, and the next ride must be recorded.
 _CUTS = """
 states = []
 safe = {}  # blocks of each ride
@@ -148,7 +149,7 @@ def test_after_any_power_cut_a_card_loses_only_the_last_block():
     assert int(run_mpy(_CARD + _CUTS)) > 300
 
 
-# A flash with a folder /sd of its own, and the card
+# The board has a folder /sd in its flash, and a card.
 _FOLDER = """
 import os
 from kickstand_tools.simulated_board.simulator import Board
@@ -194,5 +195,5 @@ print(len(opened))
 
 
 def test_a_folder_in_the_flash_is_not_the_card():
-    """A folder called /sd, left by a copy of a card's files: rides would be written to the flash."""
+    """A copy of a card's files may leave a folder /sd in the flash. Rides must not be written to this folder."""
     assert int(run_mpy(_FOLDER)) == 1

@@ -1,4 +1,4 @@
-"""The format of recorded rides: exact on both engines; a damaged block is skipped, and nothing else."""
+"""The format of recorded rides. It is exact on both engines. A reader skips damaged blocks, but no other blocks."""
 
 import io
 import math
@@ -28,7 +28,8 @@ _EXTREMES = [
     ([1, -1, 4096, 0, 0, -1, 1], 2, 9999),
 ]
 
-# Random entries, most of them typical, coded by machine code and by Python: state and bytes must be the same
+# Code random entries with machine code and with Python. Most entries are typical. The states and the bytes must be the
+# same.
 _BOTH = """
 import random
 from array import array
@@ -73,13 +74,13 @@ def written(turns):
 
 
 def held(block):
-    """(sums, n, dt_us) of its turns."""
+    """Return [(sums, n, dt_us), ...] of the turns in a block."""
     times = [block.time_us] + [turn.time_us for turn in block.turns]
     return [(t.sums, t.n, t.time_us - before) for t, before in zip(block.turns, times[:-1], strict=True)]
 
 
 def test_every_turn_comes_back_exactly():
-    """The largest numbers are exact, too."""
+    """This includes turns with the largest numbers."""
     turns = [*_EXTREMES, *ride_writer.turns(200), *_EXTREMES]
     data = written(turns)
     block = block_reader.parse(data)
@@ -90,7 +91,8 @@ def test_every_turn_comes_back_exactly():
 
 
 def test_a_ride_of_version_0_3_0_has_no_delay(tmp_path):
-    """In older rides this byte was the last of twelve of the firmware's version, and always 0."""
+    """In rides of version 0.3.0 the byte of the delay was the last of the twelve bytes of the firmware's version. It
+    was always 0."""
     data = bytearray(ride_writer.blocks(1)[0][0])
     data[43] = 0
     data[-4:] = struct.pack("<I", crc32(data[:-4]))
@@ -102,7 +104,7 @@ def test_a_ride_of_version_0_3_0_has_no_delay(tmp_path):
 
 def test_a_replay_subtracts_the_delay_of_the_ride(tmp_path):
     cal = read_calibration(ride_log.write(tmp_path / "ride.csv", [block_reader.parse(ride_writer.blocks(1)[0][0])]))
-    assert cal.gyro_delay_s == 0.0134  # DLPF 5
+    assert cal.gyro_delay_s == 0.0134  # the delay with DLPF 5
     late, early = (replay(tmp_path / "ride.csv", replace(cal, gyro_delay_s=delay_s)) for delay_s in (None, 0.0134))
     ahead = early.lean_deg - late.lean_deg
     assert np.abs(ahead - (0.0134 - 0.0048) * early.roll_rate_dps)[200:].max() < 0.02
@@ -161,13 +163,13 @@ def sealed(data):
 
 
 def test_a_block_with_impossible_values_is_bad(tmp_path):
-    """Every block that the reader accepts can be written as a log and shown live."""
+    """So every block that the reader accepts can be written as a log and shown live."""
     good = ride_writer.blocks(1, speed=True, places_every=50)[0][0]
     head = struct.calcsize(block_format.HEAD)
     start = head + store.BODY_LENGTH
     forged = []
     fields = struct.unpack_from(block_format.HEAD, good)
-    for i in (7, 8, 9):  # the units of force and rate, samples a second
+    for i in (7, 8, 9):  # these fields are the units of force and rate, and the samples per second
         forged.append(struct.pack(block_format.HEAD, *fields[:i], 0, *fields[i + 1 :]) + good[head:])
     for value in (math.nan, math.inf, 1e38):
         at = start - 4 * len(ride_writer.calibration().parameters())

@@ -1,4 +1,4 @@
-"""Positions in recorded rides: exact in each block, with their own turn, and without other losses."""
+"""Positions in recorded rides. They are exact, belong to the right turn, and displace no other data."""
 
 import struct
 
@@ -12,16 +12,16 @@ from support.recordings import ride_writer
 from test_recorder import rides
 
 MIDNIGHT_S = 1_798_761_600.0  # 1 January 2027
-DEGREE = 6_000_000  # in 0.00001 minutes
+DEGREE = 6_000_000  # one degree in units of 0.00001 minutes
 
 
 def expected(k: int) -> tuple[float, float, float]:
-    """Latitude, longitude and UTC of ride_writer.place(k)."""
+    """Return the latitude, longitude and UTC of ride_writer.place(k)."""
     return (-203_212_345 + 7 * k) / DEGREE, (-1_079_999_999 + 11 * k) / DEGREE, MIDNIGHT_S - 17.9 + k / 10
 
 
 def found(blocks) -> list[tuple[int, tuple[float, float, float | None]]]:
-    """Return (number of the turn, position) of each position."""
+    """Return [(number of the turn, position), ...] of all positions in the blocks."""
     turns = [turn for block in blocks for turn in block.turns]
     return [(i, (t.place.lat_deg, t.place.lon_deg, t.place.utc_s)) for i, t in enumerate(turns) if t.place]
 
@@ -43,11 +43,12 @@ def test_no_turn_is_lost_and_positions_keep_their_turn(every, length):
     assert [turn.speed_mps for block in blocks for turn in block.turns][:101:100] == [0.0, 1.0]
     for block, content in zip(blocks, data):
         free = content[: -6 - 16 * sum(bool(turn.place) for turn in block.turns)]
-        assert len(free) - len(free.rstrip(b"\0")) < 16 + 60  # the free room is only for the worst turn
+        assert len(free) - len(free.rstrip(b"\0")) < 16 + 60  # unused: only room for one turn
 
 
 def said(*values: int) -> list:
-    """The content of a block whose only position is this: date, ms, latitude, longitude."""
+    """Return the positions that the tools read from a block with one position. values: date, ms, latitude,
+    longitude."""
     block = ride_writer.begun(1024)
     block.add_place(values)
     block.add([0, 0, 8192, 0, 0, 0, 0], 2, 10_000)
@@ -65,7 +66,8 @@ def test_an_invalid_date_leaves_the_position():
 
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
 def test_a_recorded_ride_has_positions(engine, tmp_path):
-    """From the receiver's wire to the log, ten times per second, even before a motorcycle's speed is confirmed."""
+    """Ten positions per second get from the receiver's wire to the log, even before a motorcycle's speed is
+    confirmed."""
     place = [-33.5, -70.5, -1e-4, 2e-4]
     plan = {
         "ride": [["upright", 4.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 5.0]],
@@ -80,7 +82,7 @@ def test_a_recorded_ride_has_positions(engine, tmp_path):
     placed = np.isfinite(log.lat_deg)
     seconds = log.t_s[-1] - log.t_s[0]
     assert np.count_nonzero(placed) > 9.5 * seconds - 10
-    noon_s = 1_795_262_400.0  # 21 November 2026; the clock of the model is 0 at 20 s before
+    noon_s = 1_795_262_400.0  # noon on 21 November 2026; the model's clock began 20 s earlier
     fix_s = log.utc_s[placed] - (noon_s - 20.0)
     at_s = log.t_s[placed] + blocks[0].time_us * 1e-6
     assert np.all((at_s - fix_s > 0.09) & (at_s - fix_s < 0.2))
@@ -103,7 +105,8 @@ def test_a_log_has_no_empty_columns(tmp_path):
 
 
 def test_an_older_reader_finds_all_but_the_positions():
-    """An older reader takes the number of positions for a byte of the version's name, and their bytes for zeros."""
+    """An older reader takes the number of positions for a byte of the version's name. It ignores the positions' bytes,
+    where it expects zeros."""
     data, _ = ride_writer.blocks(3, places_every=10)
     for content in data:
         fields = struct.unpack_from("<4sHHIIqhHHH11sB", content)

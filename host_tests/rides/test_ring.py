@@ -1,4 +1,4 @@
-"""The ring of rides at its limits: room, the oldest ride, places of files."""
+"""The ring of rides at its limits: the room for a part, the removal of the oldest ride, and the paths of files."""
 
 import shutil
 from pathlib import Path
@@ -34,7 +34,7 @@ def test_room_is_made_exactly_when_a_part_does_not_fit(root):
         root.free = free
         ring = RideRing(FLASH)
         assert ring.begin() > 1
-        assert write_block(ring) == steps  # the oldest is found, its part is removed, the new one is opened
+        assert write_block(ring) == steps  # the steps are: find the oldest ride, remove its part, open the new part
         assert (old / "00000.rid").exists() is (steps == 1)
         ring.end()
 
@@ -51,14 +51,15 @@ def test_its_own_first_parts_are_removed_last(root):
     while not ring.ready():
         root.free = flash_ring.RESERVE + 3 * KB_4
         rooms.append(ring.room())
-    # ride 1 is found, its part is removed, its directory too, ride 2 is found, its part is removed, the next is opened
+    # The steps are: find ride 1, remove its part, remove its directory, find ride 2, remove its part, open the next
+    # part.
     assert [room > 0 for room in rooms] == [True] * 5 + [False] * 2
     assert [part for part in ride_paths.parts("rides") if part[1] == 0] == []
     assert not (root.path / "rides/000/01").exists()
 
 
 def test_the_oldest_rides_are_removed_first(root):
-    """One step removes one thing. Rides without parts are skipped, and the owner's files are kept."""
+    """Each step removes one file or one directory. Rides without parts are skipped. The owner's files are kept."""
     for ride in (98, 99, 100, 300):
         old_ride(root, ride)
     (root.path / "rides/000/98/notes.txt").write_bytes(b"the rider's own")
@@ -92,8 +93,8 @@ def test_the_oldest_rides_are_removed_first(root):
         "003/00",
     ]
     assert before == ["000", "000/98", "000/98/notes.txt", "001", "001/notes.txt", "003", "003/01"]
-    # ride 0 found and removed; of each other found, its part and its directory removed; groups 1 and 2 found empty; the
-    # ride itself found
+    # Two steps find and remove ride 0. Three steps find each other ride, remove its part and remove its directory. Two
+    # steps find the groups 1 and 2 empty. The last step finds the current ride itself.
     assert len(gone) == 2 + 4 * 3 + 2 + 1
 
 
@@ -108,7 +109,12 @@ def test_without_the_current_ride_there_is_no_room(root):
 
 
 class File:
-    """An open file. short: the bytes missing from each write. closed: number of calls of close()."""
+    """Replaces an open file.
+
+    short: number of bytes that each write leaves out.
+    error: error that close() raises, or None.
+    closed: number of calls of close().
+    """
 
     def __init__(self, short=0, error=None):
         self.short, self.error, self.closed = short, error, 0
@@ -123,7 +129,7 @@ class File:
 
 
 def begun(file, monkeypatch):
-    """A ring whose first part is this file."""
+    """Return a ring whose first part is this file."""
     monkeypatch.setattr(flash_ring, "open", lambda path, mode: file, raising=False)
     ring = RideRing(FLASH)
     ring.begin()
@@ -150,7 +156,7 @@ def test_faults_have_their_codes():
 
 
 def test_ending_closes_once_and_abandoning_raises_nothing(root, monkeypatch):
-    RideRing(FLASH).end()  # there is nothing to close
+    RideRing(FLASH).end()  # no part is open
     file = File(error=OSError(5))
     ring = begun(file, monkeypatch)
     ring.abandon()
@@ -161,7 +167,8 @@ def test_ending_closes_once_and_abandoning_raises_nothing(root, monkeypatch):
 
 
 def test_free_and_all_bytes_are_blocks_of_the_size_that_counts(monkeypatch):
-    """The results of statvfs: block size, fragment size (the unit of the counts), all fragments, free fragments."""
+    """statvfs() returns the block size, the fragment size, the number of all fragments and of free fragments. Only the
+    fragment size counts."""
     monkeypatch.setattr("os.statvfs", lambda path: (512, 4096, 300, 200, 190, 0, 0, 0, 0, 255), raising=False)
     assert flash_ring.free_bytes("") == 200 * 4096
     assert flash_ring.all_bytes("") == 300 * 4096
@@ -171,7 +178,7 @@ def test_numbers_of_rides_continue(root):
     Path("rides").mkdir()
     assert ride_paths.newest_ride("rides") == 0
     old_ride(root, 99)
-    (root.path / "rides/002").mkdir()  # without parts: the owner's, or power was lost before the first block
+    (root.path / "rides/002").mkdir()  # without parts, as after a power cut before the first block
     ring = RideRing(FLASH)
     assert ring.begin() == ring.begin() == 100
     write_block(ring)
@@ -179,7 +186,7 @@ def test_numbers_of_rides_continue(root):
 
 
 def strays(root, *names):
-    """Other directories and files among the rides, each file with its own content."""
+    """Create other directories and files among the rides. Each file has its own content."""
     for name in names:
         path = root.path / "rides" / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -214,7 +221,7 @@ def test_no_stray_name_makes_a_ride_overwrite_another(names, root):
     assert len(set(numbers)) == 5
     assert {path: path.read_bytes() for path in before} == before
     found = {ride: size for ride, part, size in ride_paths.parts("rides") if ride in numbers}
-    assert found == {number: 100 + k for k, number in enumerate(numbers)}  # pull lists every ride
+    assert found == {number: 100 + k for k, number in enumerate(numbers)}  # `pull` lists every ride
 
 
 def test_an_existing_part_is_never_opened_for_writing(root):

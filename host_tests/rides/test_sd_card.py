@@ -1,5 +1,5 @@
-"""Rides on realistic SD cards: busy for long, rejecting data, slow to start, slow to count, never ready again.
-The whole device on the simulated board, with MicroPython's own FAT."""
+"""The whole device with realistic SD cards, on the simulated board with MicroPython's own FAT. Some cards are busy for
+long, reject data, start slowly, count their room slowly, or stop answering."""
 
 import base64
 
@@ -20,7 +20,7 @@ def run(flash, card=None, **plan):
 
 
 def blocks(record):
-    """Return the rides on the card."""
+    """Return the blocks of the rides on the card."""
     found = []
     for _, content in sorted((record.rides or {}).items()):
         whole, problems = block_reader.read(base64.b64decode(content))
@@ -34,13 +34,15 @@ def missing_s(record):
 
 
 def leans_on(record, since_s):
-    """The display keeps changing: the board neither hangs nor restarts."""
-    later = [record.at(since_s + 9.5 + 0.25 * k)[0] for k in range(8)]  # the notice of a loss may cover it
+    """Return True if the display still shows the right lean some 10 s after since_s, and the board has not
+    restarted."""
+    later = [record.at(since_s + 9.5 + 0.25 * k)[0] for k in range(8)]  # a message may hide the lean for a while
     return record.ends == ["off"] and any(line.startswith("Raw   20°") for line in later)
 
 
 def test_a_card_records_without_loss_in_little_time(tmp_path):
-    """With the driver's default clock, a block would take 25 ms, and the FAT of a 32 GB card would take 25 s."""
+    """With the driver's default clock, writing a block would take 25 ms. Reading the FAT of a 32 GB card would take
+    25 s."""
     record = run(tmp_path)
     assert record.card_hz >= 8_000_000
     assert len(blocks(record)) >= 3
@@ -57,7 +59,8 @@ def test_without_a_card_nothing_waits_for_one(tmp_path):
 
 
 def test_a_card_busy_within_the_specification_loses_nothing(tmp_path):
-    """The card is busy for 250 ms at each block, every eight seconds. The chip's FIFO lasts longer."""
+    """The card is busy for 250 ms at each block, once in eight seconds. The sensor's FIFO keeps readings for a longer
+    time."""
     record = run(tmp_path, {"faults": [[5.0 + 8.0 * i, "busy_next_s", 0.25] for i in range(4)]})
     assert len(blocks(record)) >= 3
     assert missing_s(record) == []
@@ -80,7 +83,8 @@ def test_a_failing_card_ends_the_ride_without_a_restart(fault, tmp_path):
 
 
 def test_a_cards_room_is_counted_before_the_watchdog_runs(tmp_path):
-    """The card's FSINFO is invalid, and reading its whole FAT takes longer than the watchdog waits."""
+    """The card has no valid count of its free room (FSINFO). Reading its whole FAT takes longer than the watchdog's
+    time-out."""
     record = run(tmp_path, {"sectors": 1 << 24, "read_s": 0.006, "fsinfo": False}, until=40)
     assert record.first("SD card") < 1.0
     assert record.first("Raw   20°") < 30
@@ -91,7 +95,7 @@ def test_a_cards_room_is_counted_before_the_watchdog_runs(tmp_path):
 @pytest.mark.parametrize(
     "card",
     [
-        {"init_s": None},  # the driver waits 5 s for it
+        {"init_s": None},  # the driver waits 5 s for the card
         {"init_s": 4.5, "formatted": False},
         {"driver": False},
         {"faults": [[0.0, "rejects", 1000]]},
@@ -108,7 +112,8 @@ def test_an_unusable_card_is_reported_without_a_restart(card, tmp_path):
 
 
 def test_a_card_that_failed_at_the_start_is_not_waited_for_again(tmp_path):
-    """The driver would wait for seconds, and the lean would freeze. So the failure is reported, also after a press."""
+    """The driver would wait for seconds, and the displayed lean would freeze. When the rider chooses to record, the
+    display only reports the failure again."""
     menu = [[14, 1.2], *([16 + i, 0.15] for i in range(4)), [21, 1.2]]
     plan = {"config": {**PINS, "RECORD": False}, "presses": menu, "lean": [[0, 0], [23, 20]]}
     record = run(tmp_path, {"init_s": None}, **plan)

@@ -1,5 +1,5 @@
-"""A flash that takes 400 ms to erase a block, longer than the chip's FIFO lasts. Losses are counted and reported, and a
-lean that is wrong after them is not shown."""
+"""A slow flash: an erase takes longer than the sensor's FIFO keeps samples. The firmware counts and reports the lost
+samples. If the lean is wrong after a loss, the display does not show it."""
 
 import gc
 import re
@@ -14,12 +14,12 @@ from support import device_plans
 SHORT, LONG = 0.15, 1.2
 BENDS = device_plans.RIDE[:3] + [["turn", -40.0, 3.0], ["turn", 40.0, 3.0]] * 6 + [["straight", 6.0]]
 FROM_S, UNTIL_S = 22.0, 70.0
-# WHO_AM_I, the duration of an erase, and the time for which the FIFO keeps samples
+# {size of the sensor's FIFO: (WHO_AM_I, duration of an erase in s, time in s for which the FIFO keeps samples)}
 PARTS = {"1024 bytes": (0x68, 0.40, 0.365), "512 bytes": (0x70, 0.25, 0.180)}
 
 
 class Seen:
-    """The firmware's results of each turn: (time, lean, trusted, dt, n)."""
+    """Notes the meter's results. turns: [(time in s, lean in degrees, trusted, dt in s, number of samples), ...]."""
 
     def __init__(self, monkeypatch):
         self.turns, boards = [], []
@@ -43,7 +43,7 @@ def blocks(flash):
 
 @pytest.fixture(scope="module", params=PARTS)
 def run(request, tmp_path_factory):
-    """Record a ride; return (the display, the turns, the ride's blocks, erase_s, fifo_s)."""
+    """Record a ride. Return (record of the display, turns, blocks of the ride, erase_s, fifo_s)."""
     who_am_i, erase_s, fifo_s = PARTS[request.param]
     flash = tmp_path_factory.mktemp("flash")
     plan = {"seed": 2, "board": {"who_am_i": who_am_i}}
@@ -69,7 +69,7 @@ def test_each_loss_is_counted_and_is_a_gap_of_its_length(run):
     assert sum(dt for *_, dt, _ in turns[: sum(len(b.turns) for b in recorded)]) * 1e6 == pytest.approx(rode_s, abs=2e4)
 
     counts = {int(line[12:]) for _, _, line in record.frames if line.startswith("samples lost")}
-    until = [200 * erase_s * k for k in range(len(missing_s) + 3)]  # the last block is not written yet
+    until = [200 * erase_s * k for k in range(len(missing_s) + 3)]  # one or two losses more than in the written blocks
     assert counts
     assert max(counts) > 200
     assert all(min(abs(count - lost) for lost in until) < 25 for count in counts)
@@ -83,8 +83,8 @@ def test_a_lean_that_is_wrong_after_a_loss_is_not_shown(run):
     rode = [turn for turn in turns if turn[0] > FROM_S]
     errors = [(t, abs(lean - ride.truth(t)[0]), trusted, dt) for t, lean, trusted, dt, _ in rode]
     assert max(error for _, error, _, _ in errors) > 4  # the gaps cause errors
-    # The result depends on the gaps' places in the bends, which change within ten microseconds: 0 to 1.6 s with the
-    # parts 2 to 7
+    # This time depends on where in a bend the gaps are. A shift of ten microseconds changes it. With the sensors of
+    # seeds 2 to 7 it is 0 to 1.6 s.
     assert sum(dt for _, error, trusted, dt in errors if trusted and error > 5) < 2.0
     assert max(error for _, error, trusted, _ in errors if trusted) < 12
     assert all(not trusted for _, _, trusted, dt in errors if dt > 0.3)

@@ -47,6 +47,6 @@ def test_the_second_slow_print_within_a_minute_ends_the_stream(clock, monkeypatc
     slow += [True]
     with pytest.raises(OSError):
         stream.write(b"x")
-    stream.begin()  # a new ride starts from zero
+    stream.begin()  # a new ride forgets the earlier slow print
     slow += [True]
     stream.write(b"x")

@@ -1,5 +1,5 @@
-"""The computer sleeps while a ride is streamed to it: each print then takes half a second. The stream ends itself, and
-the lean continues."""
+"""The computer falls asleep while the board streams a ride to it. Each print() then takes half a second. The firmware
+ends the stream, and the lean continues."""
 
 import binascii
 import contextlib
@@ -38,15 +38,15 @@ def test_the_stream_ends_itself_and_the_lean_continues(engine, tmp_path, capsys)
     record = device_plans.run(engine, tmp_path, plan, capsys)
     assert FROM_S < record.first("USB not read") < FROM_S + 3.0
     assert record.at(39)[0] == "Lean  20° right "
-    assert record.first("Lean  20° right ") < 28  # as early as without the stream: no more delays
+    assert record.first("Lean  20° right ") < 28  # as early as without a stream, so nothing delays the loop any more
     streamed = list(blocks(record.console))
     assert [block.sequence for block in streamed] == list(range(len(streamed)))
     assert 35 < len(streamed) < 42
-    assert record.ends[-1] == "off"  # no reset by the watchdog
+    assert record.ends[-1] == "off"  # the watchdog did not reset the board
 
 
 def test_refusals_do_not_stall_the_loop_repeatedly():
-    """A repeated failure, of any kind, costs at most one slow print per minute."""
+    """A failure that repeats causes at most one slow print() per minute."""
     with Board(lambda t_s: (0, 1, 0, 0, 0, 0)) as board:
 
         def main():

@@ -1,4 +1,4 @@
-"""The virtual clock and the `time` built on it."""
+"""The virtual clock, and the module `time` that uses it."""
 
 import kickstand_tools.simulated_board.clock as clock_module
 from kickstand_tools.simulated_board.clock import Clock, PowerOff
@@ -10,14 +10,14 @@ from support.board_access import level, raised
 def test_the_deadline_stops_the_clock_and_stays():
     clock, seen = Clock(), []
     clock.set_deadline(500)
-    clock.at(500, lambda: seen.append(1))  # events at the deadline still happen
+    clock.at(500, lambda: seen.append(1))  # an event at the deadline still happens
     assert isinstance(raised(clock.advance, 1000), PowerOff)
     assert clock.now_us == 500 and seen == [1]
     assert isinstance(raised(clock.advance, 1), PowerOff)
     clock.set_deadline(None)
     clock.advance(1)
     assert clock.now_us == 501
-    assert not issubclass(PowerOff, Exception)  # also switches off firmware that catches every exception
+    assert not issubclass(PowerOff, Exception)  # so it also ends firmware that catches every Exception
 
 
 def test_pace_follows_the_host():

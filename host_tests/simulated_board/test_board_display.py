@@ -1,4 +1,4 @@
-"""The same tests for each display's driver on the model of that display. Also run under MicroPython."""
+"""The same tests for the driver of each display, on the model of this display. They also run on MicroPython."""
 
 import gc
 import sys
@@ -15,7 +15,7 @@ OLD, NEW = ("Lean  19\xdf right", "first"), ("Lean  28\xdf left", "second line")
 
 
 def as_text(lines):
-    # by hand: MicroPython's %-16s counts the bytes of a degree sign, which are two
+    # Pad the lines by hand, because MicroPython's %-16s counts a degree sign as two bytes.
     return [line.replace("\xdf", "\xb0") + " " * (16 - len(line)) for line in lines]
 
 
@@ -27,7 +27,7 @@ def open_display(board, hz=None, kind="auto", wiring=1):
 
 
 def turns(board, display, count, after=lambda: None):
-    """Run this many turns of the loop; return the longest in us."""
+    """Run this many turns of the loop. Return the duration of the longest one in us."""
     from time import sleep_us, ticks_diff, ticks_ms, ticks_us  # type: ignore[attr-defined]
 
     longest = 0
@@ -42,7 +42,7 @@ def turns(board, display, count, after=lambda: None):
 
 
 def on_each(hz=BUS_HZ, kinds=KINDS):
-    """Decorates test(board, display): it runs on a board with each display, which shows OLD."""
+    """Decorate test(board, display), so that it runs with each display. At its start the display shows OLD."""
 
     def decorated(test):
         def with_each():
@@ -86,7 +86,7 @@ def test_no_turn_delays_the_loop(board, display):
 
 @on_each()
 def test_nothing_is_sent_while_nothing_changes(board, display):
-    """Nothing is sent except a check of the connection, five times per second."""
+    """The driver only checks the connection, five times per second."""
     address = board.lcd.address
     before = board.lcd_bus.transfers[address]
     for _ in range(20):
@@ -97,7 +97,8 @@ def test_nothing_is_sent_while_nothing_changes(board, display):
 
 @on_each((None,), ("lcd",))
 def test_only_the_changed_part_of_a_line_is_sent(board, display):
-    """An LCD takes four bytes per character plus four for its place; twice that for more than one character."""
+    """For one changed character an LCD needs four bytes for the position and four for the character. For more
+    characters the driver sends twice as many bytes."""
     sent, original = [], board.lcd.write_byte
     board.lcd.write_byte = lambda value: sent.append(value) or original(value)
     for line, count in (("Lean  18\xdf right", 4 * 2), ("Lean   4\xdf left", 2 * 4 * (1 + 9))):
@@ -114,7 +115,7 @@ def test_after_any_unplug_it_returns_and_shows_nothing_old(board, display):
         turns(board, display, 40)
         display.show(*NEW)
         turns(board, display, gap_turns % 7)  # the display may be removed during a transfer of the new lines
-        for begun in (0, 12) if isinstance(board.lcd, Lcd) else (0,):  # once more while it is initialised
+        for begun in (0, 12) if isinstance(board.lcd, Lcd) else (0,):  # again during the initialisation
             turns(board, display, begun)
             board.remove_lcd()
             board.clock.advance(1000 * gone_ms)
@@ -133,7 +134,7 @@ def test_after_any_unplug_it_returns_and_shows_nothing_old(board, display):
 
 @on_each((None,))
 def test_a_transfer_cut_at_any_byte_is_repaired(board, display):
-    """Before the change is complete, only the old or the new lean is visible."""
+    """Until the change is complete, the display shows only the old or the new lean."""
     address = board.lcd.address
     good = as_text(OLD)[0], as_text(NEW)[0]
     for byte in range(1, 40, 3):
@@ -156,7 +157,7 @@ def test_a_stuck_bus_is_freed(board, display):
 
 
 def test_the_processor_is_reset_in_the_middle_of_a_part():
-    """The display keeps its power and its text. The next start must replace the text."""
+    """The display keeps its power and its text. The next start of the firmware must replace the text."""
     for kind in KINDS:
         for count in range(1, 12, 2):
 
@@ -208,7 +209,7 @@ def test_any_address_of_a_backpack_is_found():
 
 
 def test_the_set_kind_is_used():
-    """Controllers without a useful status and displays at unusual addresses need the setting."""
+    """Controllers without a useful status, and displays at unusual addresses, need the setting."""
     for kind in KINDS:
 
         def run(board, kind=kind):
@@ -241,7 +242,8 @@ def test_a_status_that_is_never_on_leaves_no_oled_dark(board, display):
 
 
 def test_no_status_leaves_an_oled_dark():
-    """The status distinguishes the two, but each gets the supply commands of both. A picture may be two columns off."""
+    """The driver recognises the two controllers by their status. It sends the supply commands of both to each one. If
+    it takes one for the other, the picture is only two columns off."""
     for kind in OLEDS:
         for identity in range(16):
 
@@ -258,8 +260,8 @@ def test_no_status_leaves_an_oled_dark():
 
 
 def test_a_panel_of_32_rows_shows_both_lines():
-    """Letters of 16 rows fill the display. The picture moves down by a pixel or two, over rows that letters leave
-    blank."""
+    """Letters of 16 rows fill the display. The picture moves down by one or two rows. These rows
+    of the letters are blank."""
 
     def run(board):
         display = open_display(board, None, "ssd1306-32")
@@ -297,7 +299,8 @@ def test_each_wiring_of_a_backpack_works():
 
 
 def test_the_rows_of_a_larger_display_are_blanked():
-    """The third and fourth row of a 20x4 are the memory behind the first two. An earlier program may have used it."""
+    """The third and fourth row of a 20x4 display show the memory behind the first two rows. An earlier program may have
+    written there."""
 
     def run(board):
         board.lcd.ddram[0x10:0x28] = board.lcd.ddram[0x50:0x68] = b"x" * 24
@@ -321,13 +324,13 @@ def test_an_oled_is_rewritten_every_ten_seconds_and_moves(board, display):
         turns(board, display, 1010)
         starts.add(board.lcd.start_line)
         assert board.lcd.on and board.lcd.text() == as_text(OLD), board.lcd.text()
-        assert board.lcd.unknown == 0  # no unknown command
+        assert board.lcd.unknown == 0  # the model got no unknown command
     assert starts == {0, 1, 2}
 
 
 @on_each((None,))
 def test_hundreds_of_unplugs_take_no_memory(board, display):
-    """Only MicroPython reports the memory in use."""
+    """Only MicroPython reports the memory in use, so only a run on MicroPython checks it."""
     count = 300 if sys.implementation.name == "micropython" else 20
     used = []
     for k in range(count):

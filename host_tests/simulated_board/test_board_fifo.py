@@ -7,13 +7,13 @@ FRAME = 12
 
 
 def numbered(t_s):
-    """The millisecond of the sample as accelerometer x in the 2 g range, and as gyro z at 250 deg/s."""
+    """Return a reading that encodes its time in ms, in accelerometer x (range 2 g) and gyro z (range 250 deg/s)."""
     ms = round(t_s * 1000)
     return (ms / 16384, 0.5, 1.0, 0.0, 0.0, ms / 131.0)
 
 
 def filling(who_am_i=0x68, fifo_en=0x78):
-    """A chip at 1 kHz whose FIFO was just emptied and enabled."""
+    """Return a chip at 1 kHz. Its FIFO was just emptied and enabled."""
     clock, chip = awake(numbered, who_am_i, div=0, dlpf=1)
     write(chip, 0x38, 0x11)
     write(chip, 0x23, fifo_en)
@@ -68,7 +68,7 @@ def test_overflow_loses_the_oldest_and_the_alignment():
         assert waiting(chip) == size
         assert read(chip, 0x3A)[0] & 0x10
         assert read(chip, 0x3A)[0] & 0x10 == 0, "cleared by reading"
-        # The oldest frame has lost its beginning: the first byte read is from its middle
+        # The oldest frame has lost its beginning, so the first byte is from its middle.
         lost = (whole + 1) * frame - size
         read(chip, 0x74, frame - lost)
         clock.advance(0)

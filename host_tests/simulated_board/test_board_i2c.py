@@ -1,4 +1,4 @@
-"""The wires, and machine.I2C and Pin on them."""
+"""The simulated wires of I2C, with machine.I2C and machine.Pin."""
 
 import errno
 
@@ -31,7 +31,7 @@ def test_a_missing_chip_gives_an_error():
 
 
 def transfer_us(board, i2c, count, error_number):
-    """The duration of a burst of count bytes. It must end with this error, or None without one."""
+    """Return the duration of a burst of `count` bytes. It must end with this error, or without an error for None."""
     start = board.clock.now_us
     error = raised(i2c.readfrom_mem_into, 0x68, 0x3B, bytearray(count))
     assert (error.args[0] if error else None) == error_number, error
@@ -58,7 +58,7 @@ def test_an_esp32s_old_driver_waits_longer_than_the_watchdog(board):
 
 @firmware(machine="esp32")
 def test_soft_i2c_does_not_notice_that_sda_is_held(board):
-    """The clocks of SoftI2C free the device. A device that keeps holding SDA reads as zeros."""
+    """The clock pulses of SoftI2C free the device. If the device keeps holding SDA, SoftI2C reads zeros."""
     i2c = SoftI2C(sda=Pin(21), scl=Pin(22))
     for bits, freed in ((1, True), (8, True), (60, False)):
         board.sensor_bus.hang(bits)
@@ -73,7 +73,8 @@ def test_soft_i2c_does_not_notice_that_sda_is_held(board):
 
 
 def edges_in_a_transfer(machine, pulses_per_s):
-    """The number of interrupts during a transfer of 10 ms, and the levels seen by those in the 0.3 ms after it."""
+    """Return the number of interrupts during a transfer of 10 ms, and the pin's levels at the interrupts in the 0.3 ms
+    after it."""
     seen, counted = [], []
 
     def firmware(board):
@@ -91,18 +92,18 @@ def edges_in_a_transfer(machine, pulses_per_s):
 
 
 def test_interrupts_of_an_esp32_wait_for_the_end_of_a_transfer():
-    """At most eight interrupts are kept, and they see the pin's level after the transfer. On a Pico they come at
-    once."""
+    """An ESP32 keeps at most eight interrupts. Their handlers see the pin's level after the transfer. On a Pico the
+    handlers run at once."""
     assert edges_in_a_transfer("pico", 300)[0] in (5, 6, 7)
     during, after = edges_in_a_transfer("esp32", 300)
     assert during == 0 and len(after) in (5, 6, 7) and len(set(after)) == 1
     during, after = edges_in_a_transfer("esp32", 1000)
-    assert during == 0 and len(after) in (8, 9)  # one more interrupt may have come since
+    assert during == 0 and len(after) in (8, 9)  # one more edge may follow the transfer
 
 
 def test_a_classic_esp32_crashes_if_a_flash_pin_is_driven():
     def drive(number):
-        Pin(number)  # this alone is harmless
+        Pin(number)  # a Pin without a mode is harmless
         Pin(number, Pin.OPEN_DRAIN)
 
     for machine, number, outcome in (
@@ -132,7 +133,7 @@ def test_a_bus_that_is_too_fast_for_the_display_is_seen():
 
 
 def pulses_until_free(board):
-    """Free the bus as a driver does: clock until SDA is high, then STOP."""
+    """Free the bus as a driver does: send clock pulses until SDA is high, then STOP. Return the number of pulses."""
     scl = Pin(5, Pin.OPEN_DRAIN, value=1)
     sda = Pin(4, Pin.OPEN_DRAIN, value=1)
     count = 0

@@ -1,10 +1,10 @@
-"""The HD44780 behind its PCF8574."""
+"""The model of an LCD: an HD44780 behind a PCF8574."""
 
 from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.lcd import CLEAR_US, POWER_UP_US, Lcd
 
 RS, E, LIGHT = 0x01, 0x04, 0x08
-PORT_US = 90  # a byte at 100 kHz
+PORT_US = 90  # time of a byte at 100 kHz
 
 
 def pins(lcd, value):
@@ -13,7 +13,7 @@ def pins(lcd, value):
 
 
 def nibble(lcd, value, rs=0):
-    """The high four bits of value, strobed."""
+    """Send the high four bits of value, with a pulse of the enable line."""
     pins(lcd, value & 0xF0 | LIGHT | rs | E)
     pins(lcd, value & 0xF0 | LIGHT | rs)
 
@@ -24,7 +24,7 @@ def send(lcd, value, rs=0):
 
 
 def ready():
-    """A display that is on, in 4-bit mode with two lines: the data sheet's initialisation by instruction, figure 24."""
+    """Return a display that is on, in 4-bit mode with two lines, initialised as in figure 24 of the data sheet."""
     clock = Clock()
     lcd = Lcd(clock)
     clock.advance(POWER_UP_US)

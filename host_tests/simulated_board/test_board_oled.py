@@ -1,4 +1,4 @@
-"""The models of the OLED controllers, and framebuf. Also run under MicroPython."""
+"""The models of the OLED controllers, and framebuf. The tests also run on MicroPython."""
 
 import sys
 
@@ -19,7 +19,7 @@ def send(oled, control, *values):
 
 
 def ready(kind):
-    """A display that is on, upright and blank."""
+    """Return a display that is on, upright and blank."""
     oled = Oled(Clock(), kind=kind)
     send(oled, 0x00, *SUPPLY[kind], 0xA1, 0xC8, 0xAF)
     for page in range(8):
@@ -30,7 +30,7 @@ def ready(kind):
 
 
 def lit(oled):
-    """(x, y) of every lit pixel."""
+    """Return (x, y) of every lit pixel."""
     pixels = oled.pixels()
     return [(i % 128, i // 128) for i in range(8192) if pixels[i >> 3] & 0x80 >> (i & 7)]
 
@@ -46,7 +46,7 @@ def test_a_byte_is_eight_rows_of_a_column():
 
 
 def test_the_fake_framebuf_draws_as_micropython_s_own():
-    """Without MicroPython's framebuf only the basic drawing is checked."""
+    """On CPython, without MicroPython's framebuf, the test only checks simple drawings."""
     module = fake
     if sys.implementation.name == "micropython":
         import framebuf as module  # pyright: ignore[reportMissingImports]

@@ -10,7 +10,7 @@ NOON = 12 * 3600 * 1000
 
 
 def places_of(text, piece=1000, step_ms=10, steps=60):
-    """Every position that Gps reads from this text, each as a list."""
+    """Return every position that Gps reads from this text, each as a list."""
     with Board(level):
         from kickstand.speed.gps import Gps
 
@@ -51,13 +51,13 @@ def test_an_invalid_position_is_none_and_does_no_harm():
     assert places_of(rmc(mode=",N")) == []
     assert places_of(rmc(mode=",E")) == []
     assert places_of(sentence("GPRMC,,V,,,,,,,,,,N")) == []
-    assert places_of(sentence("GPRMC,120000.00,A,4807.038,N,01131.000,E,19.4"))[0][0] == 0  # no field for the date
+    assert places_of(sentence("GPRMC,120000.00,A,4807.038,N,01131.000,E,19.4"))[0][0] == 0  # has no date
     assert places_of(sentence("GPVTG,84.4,T,,M,19.438,N,36.0,K,A")) == []
     assert places_of(rmc() + rmc(), step_ms=10) == places_of(rmc())  # the same fix again
 
 
 def test_a_date_that_is_not_known_yet_is_0():
-    for date in ("", "xx1126", "0x1126", "311299"):  # no receiver is as old as the last date
+    for date in ("", "xx1126", "0x1126", "311299"):  # the last date is older than any receiver
         assert places_of(rmc(date=date))[0][:2] == [0, NOON]
     assert places_of(rmc(date="311226"))[0][0] == 26 << 9 | 12 << 5 | 31
 
@@ -74,12 +74,12 @@ def test_midnight_and_ten_a_second():
 
 
 def test_an_old_position_is_not_returned_as_new():
-    """This holds after only VTG, and after a silence that ends without a fix."""
+    """This holds while only VTG arrives, and after a silence that ends without a fix."""
     with Board(level):
         from kickstand.speed.gps import Gps
 
         gps = Gps(Listing(rmc().encode()))
-        assert [gps.poll(ms) is None for ms in (990, 1000)] == [True, False]  # 64 bytes at once
+        assert [gps.poll(ms) is None for ms in (990, 1000)] == [True, False]  # each poll reads 64 bytes
         assert gps.place(1000) is not None
         assert gps.place(1010) is None
         gps._uart = Listing(sentence("GPVTG,84.4,T,,M,19.438,N,36.0,K,A").encode())
@@ -87,7 +87,7 @@ def test_an_old_position_is_not_returned_as_new():
         assert gps.place(5000) is None
         gps._uart = Listing(rmc(time="120005.00").encode())
         assert [gps.poll(ms) is None for ms in (5990, 6000)] == [True, False]
-        for ms in (7000, 8000, 9000, 10000):  # then VTG alone, which is used once RMC is 3 s old
+        for ms in (7000, 8000, 9000, 10000):  # then only VTG, whose speed is used if RMC is 3 s old
             gps._uart = Listing(sentence("GPVTG,84.4,T,,M,19.438,N,36.0,K,A").encode())
             assert (gps.poll(ms) is None) == (ms < 9000), ms
             assert gps.place(ms) is None, ms

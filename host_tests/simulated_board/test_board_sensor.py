@@ -1,4 +1,4 @@
-"""The MPU6050 at its registers."""
+"""The registers of the simulated MPU6050."""
 
 from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.mpu6050 import START_UP_US, WAKE_US, Mpu6050
@@ -6,12 +6,12 @@ from support.board_access import counts, level, read, write
 
 
 def ramp(t_s):
-    """A motion whose values encode the time: 1 count per millisecond in the widest gyro range."""
+    """Return a motion whose values encode the time: 1 count per millisecond in the widest gyro range."""
     return (t_s, -t_s, 1.0, t_s * 10.0, 0.0, -t_s * 10.0, 25.0)
 
 
 def awake(world=level, who_am_i=0x68, div=9, dlpf=3):
-    """A clock and a chip that samples at 1000 / (1 + div) Hz, some time after start."""
+    """Return a clock, and a chip that has started and samples at 1000 / (1 + div) Hz."""
     clock = Clock()
     chip = Mpu6050(clock, world, who_am_i)
     clock.advance(START_UP_US)
@@ -29,7 +29,7 @@ def test_reset_values():
     expected = [0] * 128
     expected[0x6B], expected[0x75] = 0x40, 0x68
     found = read(chip, 0, 0x74) + [0] + read(chip, 0x75, 11)
-    assert all(found[0x0D:0x11])  # the factory's trim, which each chip has its own of
+    assert all(found[0x0D:0x11])  # the factory's trim, which differs from chip to chip
     assert found[:0x0D] + [0] * 4 + found[0x11:] == expected
 
 

@@ -1,4 +1,4 @@
-"""The board as a whole: power, resets, watchdog, button, and being installed."""
+"""The simulated board as a whole: power, resets, watchdog, button, and its modules' installation."""
 
 import sys
 
@@ -54,7 +54,7 @@ def test_the_watchdog_of_an_esp32_counts_in_32_bits():
 
 
 def levels(board, until_us):
-    """(time, level) at each change of the button's pin."""
+    """Return (time, level) of each change of the button's pin."""
     pin = Pin(15, Pin.IN, Pin.PULL_UP)
     changes, last = [], 1
     while board.clock.now_us < until_us:
@@ -81,6 +81,7 @@ def test_a_press_bounces_and_then_holds(board):
 
 
 def test_cpython_has_no_machine_code():
-    """From Python 3.14 on viper's types alone raise no error, but as plain Python the code would give other results."""
+    """From Python 3.14 on, the types in viper code raise no error. But run by CPython, the code would give wrong
+    results."""
     if sys.implementation.name == "cpython":
         assert isinstance(raised(sys.modules["micropython"].viper, None), NameError)

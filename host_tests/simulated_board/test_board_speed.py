@@ -23,7 +23,7 @@ class Listing:
 
 
 def speeds_of(text, piece=1000, step_ms=10, steps=60):
-    """Every speed that Gps reads from this text, rounded to mm/s."""
+    """Return every speed that Gps reads from this text, in mm/s."""
     with Board(level):
         from kickstand.speed.gps import Gps
 
@@ -33,8 +33,10 @@ def speeds_of(text, piece=1000, step_ms=10, steps=60):
 
 
 def busy_with_transfers():
-    """Simulate an ESP32's SoftI2C transfers: 1.3 ms per turn, and 12 ms every 100 ms. Call this in each turn of the
-    loop."""
+    """Return turn(number), which simulates an ESP32's SoftI2C transfers. Call it in each turn of the loop.
+
+    The sensor's transfer takes 1.3 ms in each turn. The display's transfers take 12 ms every 100 ms.
+    """
     from machine import Pin, SoftI2C  # type: ignore[import-not-found]
 
     sensor = SoftI2C(Pin(22), Pin(21), freq=250_000)
@@ -50,8 +52,12 @@ def busy_with_transfers():
 
 
 def drive(config, fit, until_s, port="rp2"):
-    """The results of the firmware's Speed, [(t_s, m/s, age_us), ...], and {t_s: fault} each second. On an ESP32 during
-    transfers to sensor and display."""
+    """Run the firmware's Speed. On an ESP32, transfers to sensor and display run at the same time.
+
+    Returns:
+        speeds: [(t_s, speed in m/s, age_us), ...].
+        faults: {t_s: the fault's lines on the display, or None}, one per second.
+    """
     board = Board(level, port=port)
     fit(board)
     got, faults = [], {}
@@ -128,12 +134,14 @@ def test_a_turn_of_the_loop_reads_64_bytes_at_most():
 
 def test_an_invalid_fix_gives_no_speed():
     assert speeds_of(sentence(RMC % ("GP", 1, "V", "19.438", ",N"))) == []
-    assert speeds_of(sentence(RMC % ("GP", 1, "A", "19.438", ",E"))) == []  # the last fix carried on
+    assert (
+        speeds_of(sentence(RMC % ("GP", 1, "A", "19.438", ",E"))) == []
+    )  # mode E: the receiver extrapolates its last fix
     assert speeds_of(sentence("GPRMC,,V,,,,,,,,,,N")) == []
     assert speeds_of(sentence(RMC % ("GP", 1, "A", "", ",A"))) == []
     assert speeds_of(sentence("GPVTG,,,,,,,,,N")) == []
     void = sentence(RMC % ("GP", 1, "V", "", ",N"))
-    assert speeds_of(void + sentence("GPVTG,84.4,T,,M,19.438,N,36.0,K,A")) == []  # not used instead of the void
+    assert speeds_of(void + sentence("GPVTG,84.4,T,,M,19.438,N,36.0,K,A")) == []  # VTG does not replace a void RMC
 
 
 def test_damaged_lines_are_refused_and_the_next_is_read():
@@ -142,11 +150,11 @@ def test_damaged_lines_are_refused_and_the_next_is_read():
     for at in range(len(good) - 2):
         bad = good[:at] + chr(ord(good[at]) ^ 1) + good[at + 1 :]
         assert speeds_of(bad + later, piece=37) in ([5000], [10000, 5000]), bad
-        # a damaged talker or star is no loss; every speed read is true
+        # A damaged talker does not matter. Every speed that is read is true.
         assert (10000 in speeds_of(bad)) <= (at in (1, 2)), bad
     for at in range(1, len(good) - 3):
-        assert speeds_of(good[at:] + later) == [5000]  # begun in the middle
-        assert speeds_of(good[:at] + later) == [5000]  # ended in the middle
+        assert speeds_of(good[at:] + later) == [5000]  # the beginning is missing
+        assert speeds_of(good[:at] + later) == [5000]  # the end is missing
     assert speeds_of("$" * 1000 + good) == [10000]
     assert speeds_of("\x00\xff".encode() * 500 + b"\n" + good.encode()) == [10000]
 
@@ -190,7 +198,7 @@ def test_a_receiver_whose_clock_jumps_is_late_for_seconds_only():
                 second = 10 + i + (jump if i >= 10 else 0)
                 gps._uart = Listing(sentence(RMC % ("GP", second, "A", "19.438", ",A")).encode())
                 at_ms = 1000 * i + 20 * (i % 3)
-                heard = [gps.poll(at_ms), gps.poll(at_ms)]  # in two pieces
+                heard = [gps.poll(at_ms), gps.poll(at_ms)]  # each poll reads a part of the sentence
                 if i < 10 or i >= 22 or jump > 0:
                     assert heard[1] is not None, (jump, i)
                     assert 0 <= gps.age_ms <= 40, (jump, i, gps.age_ms)
@@ -250,7 +258,8 @@ def test_a_contact_that_bounces_is_counted_once():
 
 
 def test_a_storm_of_pulses_is_reported_and_the_speed_returns():
-    """The storm lasts twice as long as the pause: the interrupt is tried again in its middle."""
+    """The firmware disables the interrupt for a pause. The storm lasts twice as long, so the interrupt is enabled again
+    in the middle of the storm."""
     for port, pulses_per_s in (("rp2", 50_000), ("esp32", 6_000)):
 
         def fit(board, pulses_per_s=pulses_per_s):
@@ -274,7 +283,7 @@ def test_the_wheel_of_a_quick_vehicle_is_no_storm():
 
 
 def wheel_on_an_esp32(pulses_per_metre, speed_mps, seconds=21.0, **kind):
-    """The mean of the speeds in 20 s, the standard deviation of one, and the faults."""
+    """Return the mean of the speeds in 20 s, their standard deviation, and the faults."""
     config = {"SPEED": "wheel", "PULSES_PER_METRE": pulses_per_metre}
 
     def fit(board):
@@ -304,7 +313,7 @@ def test_a_contact_that_bounces_is_counted_once_on_an_esp32_too():
 
 
 def test_a_wheel_too_fast_for_an_esp32_is_reported():
-    """Some of its pulses are lost, which would give a speed that is too low."""
+    """The board loses some of the wheel's pulses. Without the report, the speed would be too low."""
 
     def speed_of(t_s):
         return 20.0 if 4.0 < t_s < 7.0 else 5.0
@@ -349,7 +358,7 @@ def test_jumps_that_no_vehicle_makes_are_refused_until_they_last():
 
 
 def fault_of(data, seconds=8):
-    """The code and values of a Gps's fault when it gets these bytes once per second."""
+    """Return the code and the values of a Gps's fault if it gets these bytes once per second."""
     with Board(level):
         from kickstand.speed.gps import Gps
 
@@ -378,7 +387,7 @@ def test_sentences_without_a_speed_are_named():
 
 
 def test_u_blox_s_binary_protocol_is_named():
-    """NAV-PVT of 92 bytes, whose line ends fall anywhere."""
+    """The message is a NAV-PVT of 92 bytes. Its bytes may contain line ends anywhere."""
     for filler in (b"\x00", b"\x0a", b"\x24"):
         assert fault_of(b"\xb5b\x01\x07\x5c\x00" + filler * 92 + b"\x12\x34") == ("gps-other", "UBX")
     assert fault_of(bytes(range(256))) == ("gps-garbled",)
@@ -421,12 +430,12 @@ DAYS = 6.3, 9.0, 12.4, 12.5, 19.0
 
 
 def later(days, seconds=0):
-    """ticks_ms() this long after 1000."""
+    """Return the value of ticks_ms() this time after it was 1000."""
     return (1000 + round(86_400_000 * days) + 1000 * seconds) & 0x3FFFFFFF
 
 
 class Once:
-    """A source that gives each value once."""
+    """A speed source that returns each value once."""
 
     age_ms, problem = 0, None
 
@@ -439,7 +448,7 @@ class Once:
 
 
 def test_a_speed_is_taken_after_days_without_one():
-    """ticks_diff() is negative after 6.2 days."""
+    """After 6.2 days ticks_diff() is negative."""
     with Board(level):
         from kickstand.speed.source import Speed
 

@@ -8,7 +8,7 @@ from test_board_speed import Listing
 
 
 def test_fields_from_nowhere_give_no_place_and_raise_nothing():
-    """Sentences with a correct checksum that a failing receiver or an attacker on its wire may send."""
+    """The checksums of these sentences are correct, but their fields are random."""
     chance = random.Random(3)
     fields = b"|-1|1e999|inf|nan|99999999999999999999|17959.9|9000.0|4899.0|4807.038|01131.000|235960.99".split(b"|")
     fields += b"-99999.0|246060.00|A|N|E|19.4|230394|999999|.|12|\xff".split(b"|")

@@ -35,7 +35,7 @@ def raises(monkeypatch):
 
 
 def trip(seconds, cut_save=None):
-    """Both poses, a lean of 12 degrees to the right for a while, and one failed transfer."""
+    """Run both poses, then a lean of 12 degrees to the right for a while, with one failed transfer."""
     ride = script.Ride([script.kickstand(8.0), script.upright(8.0), script.upright(seconds, 12.0)])
     presses = [(3.0, SHORT_S), (13.0, SHORT_S)]
     return Trip("poses", ride, ride.seconds, presses, [], [("nack_for", (SENSOR, 20.0, 0.01))], cut_save=cut_save)

@@ -1,4 +1,4 @@
-"""A hand that turns the sensor: the rates add up to the turn of gravity; and the filters of the simulation."""
+"""A hand that turns the sensor, and filters of the simulation. The hand's rates agree with the turn of gravity."""
 
 from types import SimpleNamespace
 
@@ -22,8 +22,8 @@ from kickstand_tools.simulation.scripted import sensor_errors
     ],
 )
 def test_the_rates_of_a_hand_turn_gravity_to_the_next_pose(before, after, degrees):
-    """In the sensor's axes du/dt = -rate x u. The turn lasts from 1 to 3 s. It is fastest
-    halfway, at 2 s: 15 / 8 of the mean rate."""
+    """The test integrates the direction up, u, in the sensor's axes: du/dt = -rate x u. The turn lasts from 1 to 3 s.
+    Halfway, at 2 s, its rate is largest: 15 / 8 of the mean rate."""
     part = SimpleNamespace(vehicle_from_sensor=np.eye(3).ravel().tolist(), world=lambda motion: motion)  # no errors
     world = sensor_errors.turning(part, before, after, 1.0, 3.0)
     up, step_s = np.array(before) / np.linalg.norm(before), 0.002
@@ -41,7 +41,8 @@ def test_the_rates_of_a_hand_turn_gravity_to_the_next_pose(before, after, degree
 
 
 def test_a_low_pass_of_second_order_at_its_own_frequency():
-    """Gain 1 at 0 Hz; at the natural frequency 1 / (2 damping) and a quarter of a period late; far above 1 / s^2."""
+    """The gain is 1 at 0 Hz. At the natural frequency the gain is 1 / (2 damping), and the delay a quarter of a period.
+    Far above, the gain falls with the square of the frequency."""
     rate_hz, t_s = 1000.0, np.arange(4000) / 1000.0
     inner = slice(1000, 3000)
     assert second_order(np.ones(4000), 10.0, 0.7, rate_hz)[inner] == pytest.approx(np.ones(2000), abs=1e-6)
@@ -53,7 +54,7 @@ def test_a_low_pass_of_second_order_at_its_own_frequency():
 
 
 def test_a_mount_that_creeps_turns_slowly_and_at_once():
-    """The mount turns by 2 degrees about one axis: 60 % evenly, 40 % within a second."""
+    """The mount turns by 2 degrees about one axis. It makes 60 % of the turn evenly, and 40 % within a second."""
     turned = ride._creep(np.random.default_rng(3), 20_000, 2.0)
     size = np.degrees(np.linalg.norm(turned, axis=1))
     assert size[0] == pytest.approx(0.0, abs=1e-3)

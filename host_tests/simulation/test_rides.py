@@ -1,4 +1,4 @@
-"""Scripted rides and the one by hand: balance, poses, vibration, and the kinematics of long simulated rides."""
+"""Scripted rides, and the ride that a user steers by hand: balance, poses, vibration and kinematics."""
 
 import numpy as np
 import pytest

@@ -22,20 +22,20 @@ def rides():
 
 
 def in_vehicle(made):
-    """Force (g) and rates (deg/s) of the ride while it rides."""
+    """Return the force in g and the rates in deg/s along the vehicle's axes, while the bike rides."""
     riding = made.truth["speed_mps"] > 5.0
     turned = made.vehicle_from_sensor.T
     return (made.readings[:, :3] @ turned)[riding], (made.readings[:, 4:7] @ turned)[riding]
 
 
 def test_each_road_class_is_twice_as_rough(rides):
-    """Each road class has four times the power of the one before; on the quietest the engine adds to it. The rides
-    differ only by rider and camber."""
+    """Each road class has four times the power of the class before it. The engine adds to the vibration on the quietest
+    road. The rides differ otherwise only in rider and camber."""
     assert np.array_equal(rides("A").truth["speed_mps"], rides("D").truth["speed_mps"])
     off = rides("C").truth["lean_deg"] - rides().truth["lean_deg"]
     assert 0.1 < np.sqrt(np.mean(off**2)) < 2.0
     forces = [bands_of(*in_vehicle(rides(road)), 200.0)[QUANTITIES[0]] for road in CLASSES]
-    bands = np.array([force[3] for force in forces])  # 1 to 3 Hz: the springs' own
+    bands = np.array([force[3] for force in forces])  # 1 to 3 Hz, where the springs resonate
     assert np.all((bands[1:] / bands[:-1] > 1.7) & (bands[1:] / bands[:-1] < 2.2))
 
 
@@ -55,7 +55,7 @@ def test_gyro_measures_the_sagging_of_a_holder():
     holder = Holder(np.full(3, 20.0), np.full(3, 0.5), np.radians([1.0, 0.0, 1.0]))
     pushed = np.zeros((8000, 3))
     pushed[:, 1] = 1.0
-    pushed[3000:5000, 2] = 0.5  # braked the other way: forward, for two seconds
+    pushed[3000:5000, 2] = 0.5  # pushed forward for two seconds
     force, rates = holder.shaken(pushed, np.zeros((8000, 3)), 1000.0)
     assert np.sum(rates[2000:4000, 0]) / 1000.0 == pytest.approx(0.5, abs=0.02)
     lean_of_force = np.degrees(np.arctan2(force[4000, 2] - 0.5, force[4000, 1]))
@@ -70,7 +70,8 @@ def test_bad_mount_changes_readings_but_not_the_ride(rides, mount):
 
 
 def test_aliased_engine_vibration_appears_at_low_frequencies(rides):
-    """The road shakes the bike below 25 Hz. The additional vibration there is aliased from above 100 Hz."""
+    """The road shakes the bike below 25 Hz. The additional vibration at these frequencies is engine vibration above 100
+    Hz, aliased."""
     plain, aliased = (bands_of(*in_vehicle(rides("A", mount)), 200.0)[QUANTITIES[1]] for mount in (None, "aliasing"))
     assert aliased[4] > 1.05 * plain[4]
 
@@ -86,8 +87,8 @@ def test_bands_are_those_of_a_sine():
 
 
 def test_simulated_roads_are_as_rough_as_real_ones():
-    """Through town (tools/docs/simulation.md): vertical 0.078 g from 1 to 3 Hz and 0.151 g from 3 to 10,
-    between C and D."""
+    """A recorded ride through town has a vertical vibration of 0.078 g from 1 to 3 Hz and 0.151 g from 3 to 10 Hz, see
+    tools/docs/simulation.md. This is between the simulated road classes C and D."""
     calm, rough = (of_simulated("street", 0, 100.0, road, None)[QUANTITIES[0]] for road in "CD")
     assert len(calm) == len(BANDS_HZ)
     assert calm[3] < 0.151 and rough[3] > 0.078

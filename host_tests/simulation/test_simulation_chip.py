@@ -1,4 +1,4 @@
-"""The simulated MPU6050: the data sheet's delay, bandwidth, range, steps and errors."""
+"""The simulated MPU6050 has the delay, bandwidth, range, steps and errors of the data sheet."""
 
 from dataclasses import replace
 
@@ -66,7 +66,7 @@ def test_the_range_ends_before_the_filter():
 
 def test_noise_matches_the_data_sheet():
     still = read(PERFECT, STILL, STILL)
-    # behind a 44 Hz low-pass of this shape (equivalent bandwidth about 50 Hz)
+    # The equivalent noise bandwidth of the chip's 44 Hz low-pass is about 50 Hz.
     assert still[:, :3].std() == pytest.approx(400e-6 * np.sqrt(50.0), rel=0.1)
     assert still[:, 4:].std() == pytest.approx(0.005 * np.sqrt(50.0), rel=0.15)
 

@@ -1,4 +1,4 @@
-"""The simulated motion against attitude and position differentiated numerically, and the laws of balance."""
+"""The simulated motion agrees with numerical derivatives of attitude and position, and with the laws of balance."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ EDGE = 50  # samples at both ends, where derivatives are one-sided
 
 
 def wild_motion() -> Motion:
-    """Everything at once: speed, slope, yaw, lean and pitch all change."""
+    """Return a motion in which speed, slope, yaw, lean and pitch all change."""
     t = np.arange(8000) / RATE
     return Motion(
         RATE,
@@ -28,7 +28,10 @@ def wild_motion() -> Motion:
 
 
 def attitude(motion: Motion) -> np.ndarray:
-    """(n, 3, 3): columns left, up, forward of the vehicle in the world's (east, north, up), by rotations."""
+    """Return the attitude as rotation matrices, shape (n, 3, 3).
+
+    The columns are the vehicle's left, up and forward, in the world's axes east, north and up.
+    """
 
     def about(axis: int, angle: np.ndarray) -> np.ndarray:
         c, s = np.cos(angle), np.sin(angle)
@@ -71,7 +74,7 @@ def test_force_is_the_second_derivative_of_the_sensors_place():
 
 
 def held_turn(lean_deg: float, bike: Bike, speed: float = 18.0, **more: float) -> tuple[physics.Roll, int]:
-    """A turn's roll and a sample in its steady middle."""
+    """Return the roll of a simulated turn, and the index of a sample in its steady middle."""
     command = commands([Leg("straight", 3.0, speed, 0.0), Leg("turn", 8.0, speed, lean_deg, **more)], RATE)
     return physics.roll(command, bike, np.zeros_like(command.time)), 9000
 
@@ -96,7 +99,8 @@ def test_wide_tyres_and_spinning_wheels_add_lean():
 
 
 def test_the_moments_about_the_contact_point_balance():
-    """Bank, hanging off and tyres: the line from contact point to centre of mass has the balance lean."""
+    """The road is banked, the rider hangs off and the tyres are wide. The line from the contact point to the centre of
+    mass must have the lean of balance."""
     bike, bank, hang, b = Bike(), np.radians(7.0), 0.03, np.radians(31.0)
     lean = physics.chassis_lean(b, bike, bank, hang)
     arm = bike.mass_height - bike.tyre_radius

@@ -1,4 +1,5 @@
-"""Whole simulated rides: reproducible from the seed, within their stated ranges, written as logs."""
+"""Whole simulated rides. A seed always gives the same ride, the values are in their stated ranges, and the logs are
+valid."""
 
 import tracemalloc
 
@@ -20,7 +21,10 @@ def rides():
 
 
 def vehicle_readings(made):
-    """Force (N, 3, g) and rates (N, 3, deg/s) in vehicle axes, the part's matrix and biases taken off."""
+    """Return force in g and rates in deg/s along the vehicle's axes, each of shape (n, 3).
+
+    The sensor's mounting and its biases are removed.
+    """
     chip, mounting = made.chip, made.vehicle_from_sensor
     force = (made.readings[:, :3] - chip.accel_offset) @ np.linalg.inv(chip.accel_matrix).T @ mounting.T
     rates = (made.readings[:, 4:] - chip.gyro_bias) @ np.linalg.inv(chip.gyro_matrix).T @ mounting.T
@@ -91,7 +95,7 @@ def test_each_profile_has_its_special_condition(rides):
     assert np.ptp(rides["temperature"].readings[:, 3]) > 5.0
     windy = rides["crosswind"]
     straight = (windy.phase == "straight") & (windy.truth["speed_mps"] > 10.0)
-    straight[: len(straight) // 2] = False  # the wind turns half way
+    straight[: len(straight) // 2] = False  # the wind turns in the middle of the ride
     assert np.abs(np.mean(windy.truth["lean_deg"][straight])) > 1.8
 
 
@@ -104,7 +108,7 @@ def test_moving_rider_does_not_tilt_a_bike_on_its_stand(rides, name):
 
 
 def test_a_creeping_mount_turns_by_some_degrees():
-    """The gravity measured at the end has moved against the truth's lean and pitch."""
+    """At the end, the measured direction of gravity differs from the true lean and pitch."""
     made = ride("creep", 4, 60.0, share=0.0)
     force, _ = vehicle_readings(made)
     early, late = force[200:600].mean(axis=0), force[-600:-200].mean(axis=0)
@@ -155,7 +159,7 @@ def test_calibration_of_the_previous_ride_is_removed(tmp_path):
 def test_memory_of_a_ride_is_limited():
     """An hour has 3.6 million rows at the chip's 1 kHz. The result keeps none of them in memory."""
     seconds = 400.0
-    column = seconds * RATE_HZ * 8  # bytes of one number a row
+    column = seconds * RATE_HZ * 8  # bytes of a column with one number per row
     tracemalloc.start()
     try:
         made = ride("creep", seed=0, seconds=seconds)

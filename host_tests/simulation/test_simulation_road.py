@@ -18,7 +18,8 @@ def over(speed: float, roughness: float, seconds: float = 40.0, seed: int = 0) -
 
 
 def test_the_profile_has_the_standards_density():
-    """ISO 8608: displacement PSD of class B is 64e-6 m3 at 0.1 cycles/m and falls with the square."""
+    """In ISO 8608, the power density of the height of a class B road is 64e-6 m^3 at 0.1 cycles/m. It falls with the
+    square of the spatial frequency."""
     step = 0.02
     slope = road.profile_slope(np.random.default_rng(1), 40000.0, road.CLASS_B)
     n = 2**14
@@ -61,14 +62,15 @@ def test_the_front_wheel_meets_a_bump_first():
 
 
 def test_lowest_gear_under_the_shift_speed_is_used():
-    """370, 260, 205, 170, 150 and 135 /min per m/s; the clutch slips at first, and the last gear has no limit."""
+    """The six gears give 370, 260, 205, 170, 150 and 135 /min per m/s. The clutch slips at low speed. The last gear has
+    no upper limit."""
     rpm = {0.0: 1250.0, 3.0: 1250.0, 10.0: 3700.0, 15.0: 3900.0, 24.0: 4920.0, 29.0: 4930.0, 33.0: 4950.0, 40.0: 5400.0}
     for mps, wanted in rpm.items():
         assert crank_rpm(np.full(2000, mps), 5000.0, RATE)[1000] == pytest.approx(wanted), mps
 
 
 def test_engine_shakes_at_its_three_orders():
-    """A four-stroke engine fires every other turn; 3900 /min are 65 Hz."""
+    """A four-stroke engine fires once in two revolutions. 3900 /min are 65 Hz."""
     n = 20000
     force, rates = vibration(np.random.default_rng(2), np.full(n, 15.0), np.ones(n), 0.1, 5000.0, RATE)
     for shaken in np.column_stack((force, rates)).T:

@@ -11,7 +11,7 @@ def level(t_s):
 
 
 def raised(function, *args):
-    """The exception that function(*args) raises, or None."""
+    """Return the exception that function(*args) raises, or None."""
     try:
         function(*args)
     except BaseException as error:
@@ -36,14 +36,14 @@ def write(chip, register, *values):
 
 
 def counts(chip):
-    """Return the seven signed numbers of a burst: force, temperature, rate."""
+    """Read one burst. Return its seven signed numbers: three forces, the temperature, three rates."""
     data = read(chip, 0x3B, 14)
     values = [data[2 * i] << 8 | data[2 * i + 1] for i in range(7)]
     return [value - 65536 if value > 32767 else value for value in values]
 
 
 def on_board(program, until_s=1.0, **fitted):
-    """Run program(board) on a new Board(**fitted), at rest unless `world` is given. Returns (outcome, board)."""
+    """Run program(board) on a new Board(**fitted). Return (outcome, board). Without `world` the board is at rest."""
     world = fitted.pop("world", level)
     board = Board(world, **fitted)
     board.install()
@@ -55,7 +55,7 @@ def on_board(program, until_s=1.0, **fitted):
 
 
 def firmware(until_s=30.0, **fitted):
-    """Decorates test(board): the test runs as the firmware of a new Board(**fitted), and must run to its end."""
+    """Decorate test(board), so that it runs as the firmware of a new Board(**fitted). It must run to its end."""
 
     def decorated(function):
         def test():

@@ -12,7 +12,7 @@ from kickstand_tools.deploy.check_limits import Finding
 from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor, resting
 
-PRESS_S = 0.5  # after the start of the check
+PRESS_S = 0.5  # time from the check's request to the press
 
 
 def part(seed: int = 1, **more: float):
@@ -22,8 +22,15 @@ def part(seed: int = 1, **more: float):
 
 
 class CheckedBoard:
-    """world, fitted: see Board. config: settings. presses: [(at_s, for_s), ...]; None: one press when the check asks
-    for it. board: the Board; plant a defect in it before findings(). said: the messages to the rider."""
+    """A simulated board on which `kickstand check` runs.
+
+    world, fitted: see Board.
+    config: settings.
+    presses: [(at_s, for_s), ...]. None: one press when the check asks for it.
+
+    board: the Board. Plant a defect in it before you call findings().
+    said: the messages to the rider.
+    """
 
     def __init__(
         self,
@@ -51,7 +58,7 @@ class CheckedBoard:
             self.board.press(self.board.clock.now_us / 1e6 + PRESS_S, 0.2)
 
     def run(self, folder: Path, function: Callable[[check.Ask], object]) -> None:
-        """Call function(ask) with the power on."""
+        """Call function(ask) while the board has power. ask(code) runs code on the board."""
         space: dict = {}
         board = self.board
         for press in self._presses or ():

@@ -22,7 +22,7 @@ class Result:
 
 
 def run(*arguments: object, err: io.StringIO | None = None) -> Result:
-    """Run `kickstand arguments...`. Return its exit status and its output. err: receives its standard error."""
+    """Run `kickstand arguments...`. Return its exit status and output. err: the stream to use as standard error."""
     out, err = io.StringIO(), err or io.StringIO()
     with pytest.raises(SystemExit) as leaving, contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         main.main([str(argument) for argument in arguments])
@@ -39,7 +39,10 @@ def works(*arguments: object, err: io.StringIO | None = None) -> Result:
 
 
 def refused(directory: Path, *arguments: object, words: str = "") -> str:
-    """Run a command that must be refused in one line that contains these words. It must not change `directory`."""
+    """Run a command that must be refused in one line with these words, and return this line.
+
+    The command must not change `directory`.
+    """
     before = snapshot(directory)
     result = run(*arguments)
     assert result.status == 2, result.out + result.err
@@ -54,12 +57,15 @@ def refused(directory: Path, *arguments: object, words: str = "") -> str:
 
 
 def snapshot(directory: Path) -> dict[str, bytes]:
-    """The content of every file of a directory."""
+    """Return {path: content} of all files in a directory."""
     return {str(p): p.read_bytes() for p in directory.rglob("*") if p.is_file()}
 
 
 def still(path: Path, force, bias=(0.0, 0.0, 0.0), seconds: float = 3.0, seed=0) -> Path:
-    """Write a log of a sensor at rest that reads force (3, g) and bias (3, deg/s) with an MPU6050's noise."""
+    """Write a log of a sensor at rest, with an MPU6050's noise.
+
+    force: mean force, three numbers in g. bias: mean rates, three numbers in deg/s.
+    """
     rng = np.random.default_rng(seed)
     n = round(seconds * 100)
     accel = np.asarray(force) + rng.normal(scale=0.003, size=(n, 3))
@@ -75,7 +81,7 @@ def write(path: Path, rows) -> Path:
 
 
 def write_cal(path: Path, **changed: object) -> Path:
-    """Write a valid CAL.json with some entries changed; None leaves one out."""
+    """Write a valid CAL.json with some entries changed. The value None leaves an entry out."""
     data: dict[str, object] = {
         "version": 1,
         "accel_offset_g": [0.01, -0.02, 0.03],

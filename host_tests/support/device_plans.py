@@ -15,7 +15,8 @@ from support.mpy import BOARD_HEAP, run_mpy
 
 SCRIPT = Path(device_runs.__file__)
 
-# On the stand to 8 s, upright to 18 s, then turns of 30 degrees to the left and 40 to the right at 15 m/s
+# The bike is on the stand until 8 s and upright until 18 s. Then it turns at 15 m/s, with a lean of 30 degrees to the
+# left and of 40 degrees to the right.
 RIDE = [
     ["kickstand", 8.0],
     ["upright", 8.0],
@@ -24,7 +25,7 @@ RIDE = [
     ["turn", 40.0, 5.0],
     ["straight", 6.0],
 ]
-LEFT_S, RIGHT_S, STRAIGHT_S = 30.0, 38.0, 44.0  # late in each turn
+LEFT_S, RIGHT_S, STRAIGHT_S = 30.0, 38.0, 44.0  # times late in the two turns and in the straight after them
 PRESSES = [[2, 0.15], [12, 0.15]]
 ALIGNED = {"ride": RIDE, "presses": PRESSES, "until": 46}
 
@@ -44,7 +45,7 @@ class Record:
         self.console = console
 
     def at(self, t_s):
-        """Both lines of the display at t_s."""
+        """Return both lines of the display at t_s."""
         shown = ["", ""]
         for start, line1, line2 in self.frames:
             if start <= t_s + 1e-6:
@@ -52,14 +53,17 @@ class Record:
         return shown
 
     def first(self, pattern, after=0.0):
-        """Return the first time after `after` at which a line matches, infinity if none does."""
+        """Return the first time from `after` on at which a line matches, or infinity without such a line."""
         for start, line1, line2 in self.frames:
             if start >= after and (re.search(pattern, line1) or re.search(pattern, line2)):
                 return start
         return math.inf
 
     def lean_at(self, t_s):
-        """The lean on the display in degrees, > 0 to the right; None if it shows none or a half-written one."""
+        """Return the lean on the display in degrees, positive to the right.
+
+        Returns None if the display shows no lean, or a half-written line.
+        """
         match = re.fullmatch(r"Lean +(\d+)° (right|left |     )[ *]", self.at(t_s)[0])
         return match and int(match[1]) * (-1 if match[2] == "left " else 1)
 
@@ -70,7 +74,7 @@ class Record:
 
 
 def run(engine, flash, plan, capsys=None):
-    """The Record of a plan. flash: a directory, which keeps its content from run to run as a board's flash does."""
+    """Run a plan and return its Record. flash: a directory that keeps its content between runs, as a board's flash."""
     if engine == "cpython":
         before = os.getcwd()
         os.chdir(flash)
@@ -89,12 +93,12 @@ def run(engine, flash, plan, capsys=None):
 
 @functools.cache
 def _aligned_once():
-    """A directory that exists as long as this process: the flash after a ride of ALIGNED."""
+    """Return a directory with the content of the flash after a run of ALIGNED. It exists until this process ends."""
     directory = tempfile.TemporaryDirectory()
     run("cpython", directory.name, ALIGNED)
     return directory
 
 
 def align(flash):
-    """Write the alignment from a ride of ALIGNED into a directory that serves as a board's flash."""
+    """Write the alignment that a run of ALIGNED finds into a directory that simulates a board's flash."""
     shutil.copytree(_aligned_once().name, flash, dirs_exist_ok=True)

@@ -20,10 +20,9 @@ PRESS_EVERY_S = 0.4  # while searching a page
 
 
 class CarRide(script.Ride):
-    """The same ride by car: it has the yaw rate of a motorcycle with this lean, and its body rolls a little
-    outwards."""
+    """A ride by car. The car has the yaw rate of a motorcycle with the same lean. Its body rolls a little outwards."""
 
-    ROLL_SHARE = -0.08  # of the lean that a motorcycle would have
+    ROLL_SHARE = -0.08  # the car's roll as a share of the motorcycle's lean
 
     def state(self, t_s):
         state = super().state(t_s)
@@ -34,7 +33,10 @@ RAISE_S = 0.3  # duration of the change from one lean of standing() to the next
 
 
 def standing(plan):
-    """motion(t_s) of a bike at rest at each lean of the plan [[from_s, lean_deg], ...], which moves between them."""
+    """Return motion(t_s) of a bike at rest, held at one lean after the other. It moves to each lean within RAISE_S.
+
+    plan: [[from_s, lean_deg], ...].
+    """
 
     def motion(t_s):
         now = before = plan[0]
@@ -50,8 +52,10 @@ def standing(plan):
 
 
 def poses_of(seed, steps):
-    """world(t_s) of a sensor not on a bike. steps: [[from_s, up in the sensor's axes, or None while it is turned],
-    ...]. It is shaken before the first pose and after the last one."""
+    """Return world(t_s) of a sensor that is held in the hand. It is shaken before the first pose and after the last.
+
+    steps: [[from_s, up], ...]. `up` is the direction up in the sensor's axes, or None while the sensor is turned.
+    """
     part = sensor_errors.Sensor(seed=seed)
     worlds = []
     for i, (start, up) in enumerate(steps):
@@ -77,7 +81,10 @@ def poses_of(seed, steps):
 
 
 def remounted(world, motion, seed, at_s, mounting_seed):
-    """world(t_s) of a sensor whose mounting changes at at_s."""
+    """Return world(t_s) of a sensor whose mounting changes at at_s.
+
+    world: the readings before that. motion: the motion of the bike. mounting_seed: seed of the new mounting.
+    """
     part = sensor_errors.Sensor(seed=seed)
     part.vehicle_from_sensor = sensor_errors.random_mounting(mounting_seed)
     later = part.world(motion)
@@ -97,13 +104,19 @@ class Device:
         self._turner = PageTurner()
 
     def turn_to(self, at_s, name):
-        """From at_s on, press the button until the view has this name: see kickstand/state.py. run() raises
-        AssertionError if this view never appears."""
+        """Press the button from at_s on, until the view with this name appears.
+
+        The names are in kickstand/state.py. run() raises AssertionError if the view never appears.
+        """
         self.board.at(at_s, lambda: self._turner.turn_to(name))
 
     def fit_speed(self, source, ride, place=None, **model):
-        """Fit a speed source, "gps" or "wheel", that measures the speed of the ride. place: [latitude, longitude,
-        degrees north per second, degrees east per second]."""
+        """Fit a speed source that measures the speed of the ride.
+
+        source: "gps" or "wheel".
+        place: [latitude, longitude, degrees north per second, degrees east per second] of a GPS receiver.
+        model: arguments of the source's model.
+        """
         if place:
             model["place"] = lambda t_s: (place[0] + place[2] * t_s, place[1] + place[3] * t_s)
         getattr(self.board, "fit_" + source)(lambda t_s: ride.truth(t_s)[1], **model)
@@ -116,12 +129,15 @@ class Device:
             self.board.at(at_s, lambda attribute=attribute, value=value: setattr(self.board.card, attribute, value))
 
     def run(self, config, off_s, streams=False):
-        """Run the firmware with these settings. The power is switched off and on again at each time in off_s. streams:
-        start the app as `kickstand record` does."""
+        """Run the firmware with these settings.
+
+        off_s: times in s at which the power is switched off. After each but the last it is switched on again.
+        streams: True to start the app as `kickstand record` does.
+        """
         self.board.every(FRAME_S, self._watch)
         self.board.every(PRESS_EVERY_S, self._turn_page)
         self.board.install()
-        # imported here because it needs firmware imported on the board
+        # The firmware must be imported on the board. So first remove the modules that the host has imported.
         before = take_firmware() if self.board.poses else {}
         try:
             from kickstand import settings, start
@@ -131,7 +147,7 @@ class Device:
             for until_s in off_s:
                 self._run_until(until_s, _stream if streams else lambda: start.main(self._run_app))
             settings.load = load
-            if self.ends[-1] == "returned":  # before the power is cut: the display's last content
+            if self.ends[-1] == "returned":  # record what the display shows before the power is cut
                 self._watch()
             self._turner.check()
         finally:
@@ -149,7 +165,7 @@ class Device:
             self.board.press(for_s=0.15)
 
     def record(self):
-        """The record as data for JSON."""
+        """Return the record as data for JSON."""
         board = self.board
         seen = {"frames": self.frames, "ends": self.ends, "last": self.frames[-1][1:], "too_fast": board.too_fast}
         seen["touched"] = sorted(board.touched)
@@ -173,7 +189,7 @@ class Device:
 
 
 def _config(settings):
-    """Return a module config.py with these settings. Lists become tuples, because JSON has no tuples."""
+    """Return a module config.py with these settings. Convert lists to tuples, because JSON has no tuples."""
     values = {name: tuple(value) if isinstance(value, list) else value for name, value in settings.items()}
     return type("Config", (), values)
 
@@ -188,13 +204,13 @@ def _stream():
 
 
 def take_firmware():
-    """Remove the imported modules of the firmware from Python, and return them by name."""
+    """Remove the firmware's modules from Python's imported modules. Return them by name."""
     names = [name for name in sys.modules if name.split(".")[0] == "kickstand"]
     return {name: sys.modules.pop(name) for name in names}
 
 
 def _world(plan):
-    """world(t_s) of a plan, and its ride or None."""
+    """Return world(t_s) of a plan, and the plan's ride or None."""
     seed = plan.get("seed")
     if "poses" in plan:
         return poses_of(seed, plan["poses"]), None
@@ -211,15 +227,23 @@ def _world(plan):
 
 
 def run_device(plan):
-    """Device.record() of a run that is described as data, which can be sent to another process.
+    """Run a plan and return Device.record(). A plan is data, which can be sent to another process.
 
-    plan: "until" (s); "lean" as for standing(), or "ride" [[name of a function in rides, arguments...], ...], or
-    "poses" as for poses_of; "seed" of the part (None: perfect); "presses" [[at_s, for_s], ...]; "faults" [[method,
-    arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...]; "gps", "wheel" and "card":
-    arguments of Device's methods; config "VEHICLE" "car": the ride is a car's; "remount" [at_s, seed of the mounting
-    from then on]; "turn_to" [[at_s, name of a view], ...], as for Device.turn_to(); "phones": [[[at_s, action of a
-    simulated Phone, arguments...], ...], ...], one after the other; "stream" True: start the app as `kickstand record`
-    does.
+    A plan has the time "until" (s) and one of three motions. All other entries are optional.
+        "lean": as for standing().
+        "ride": [[name of a function in rides, arguments...], ...]. It is a car's ride if "config" has "VEHICLE" "car".
+        "poses": as for poses_of().
+        "seed": seed of the sensor's errors. None: a perfect sensor.
+        "remount": [at_s, seed of the mounting from then on].
+        "presses": [[at_s, for_s], ...].
+        "turn_to": [[at_s, name of a view], ...], as for Device.turn_to().
+        "faults": [[method, arguments], ...].
+        "power": [off_s, ...], as for Device.run().
+        "config": settings.
+        "board": arguments of Board.
+        "gps", "wheel", "card": arguments of Device's methods.
+        "phones": one list of acts per simulated Phone, in the order of their visits: [at_s, method, arguments...].
+        "stream": True to start the app as `kickstand record` does.
     """
     world, ride = _world(plan)
     device = Device(world, **plan.get("board", {}))

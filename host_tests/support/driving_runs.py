@@ -20,8 +20,14 @@ RATE_HZ = 100
 
 
 def around(events=6, braking=-2.0, seconds=3.0, yaw_dps=0.0, pause_s=5.0, stands=True):
-    """Legs of a drive: the vehicle stands, then speeds up and brakes `events` times. braking (m/s^2), seconds and
-    yaw_dps: of each braking event."""
+    """Return the legs of a drive: the vehicle is at rest, then speeds up and brakes `events` times.
+
+    braking: acceleration of each braking event, in m/s^2.
+    seconds: duration of each braking event.
+    yaw_dps: yaw rate in each braking event.
+    pause_s: time at constant speed before each braking event.
+    stands: False for a drive that does not begin at rest.
+    """
     legs = [list(STAND)] if stands else []
     for k in range(events):
         legs.append([4.0 + (6.0 if k == 0 else 0.0), -braking * seconds / 4.0 if k else 1.2, 12.0])
@@ -32,8 +38,12 @@ def around(events=6, braking=-2.0, seconds=3.0, yaw_dps=0.0, pause_s=5.0, stands
 
 
 def samples(legs, vehicle="car", tilt_deg=0.0, noise_g=0.003, start_mps=0.0):
-    """Yields (force, rate, speed) at RATE_HZ in the vehicle's axes. A motorcycle leans into turns. tilt_deg: the road's
-    camber at standstill."""
+    """Yield (force, rate, speed) at RATE_HZ, in the vehicle's axes. A motorcycle leans into turns.
+
+    tilt_deg: camber of the road where the vehicle is at rest.
+    noise_g: size of the force's noise.
+    start_mps: speed at the beginning.
+    """
     seed = 1
     speed = start_mps
     for seconds, acceleration, yaw_dps in legs:
@@ -56,14 +66,24 @@ def samples(legs, vehicle="car", tilt_deg=0.0, noise_g=0.003, start_mps=0.0):
 
 
 def mounted(m, vector):
-    """Convert a vector from the vehicle's axes to the sensor's. m: vehicle from sensor (9, rows left, up, forward)."""
+    """Convert a vector from the vehicle's axes to the sensor's axes.
+
+    m: the matrix from the sensor's to the vehicle's axes, nine numbers in the rows left, up, forward.
+    """
     x, y, z = vector
     return [m[i] * x + m[3 + i] * y + m[6 + i] * z for i in range(3)]
 
 
 class SpeedSource:
-    """A GPS that gives a speed every every_s, delayed by late_s, multiplied by scale, rounded to multiples of step
-    (m/s). From stuck_from_s on the speed stays the same. Within silent (from, to; s) no speed arrives."""
+    """A GPS receiver with errors.
+
+    every_s: time between two speeds.
+    late_s: delay of a speed.
+    scale: factor on each speed.
+    step: each speed is rounded to a multiple of this step, in m/s. 0: no rounding.
+    stuck_from_s: the speed stays the same from this time on.
+    silent: (begin, end) of a time without any speed, in s.
+    """
 
     def __init__(self, every_s=0.5, late_s=0.0, scale=1.0, step=0.0, stuck_from_s=1e9, silent=(1e9, 1e9)):
         self.every = round(every_s * RATE_HZ)
@@ -90,9 +110,19 @@ class SpeedSource:
 
 
 def drive(legs, mount, options):
-    """Run the legs through an alignment and return its results by name. mount: 9, rows left, up, forward. options:
-    vehicle, method, up, bias, source (arguments of SpeedSource), samples (arguments of samples), gyro_bias, moved
-    [from_s, another mount], against (a matrix to compare with)."""
+    """Run the legs through an alignment by driving and return its results by name.
+
+    mount: the matrix from the sensor's to the vehicle's axes, nine numbers in the rows left, up, forward.
+    options:
+        vehicle: "car" or "motorcycle".
+        method: "published" for ViriCiti's method.
+        up, bias: passed to the alignment.
+        source: arguments of SpeedSource.
+        samples: arguments of samples().
+        gyro_bias: three numbers in deg/s.
+        moved: [from_s, mount from then on].
+        against: a matrix with which the result is compared.
+    """
     vehicle = options.get("vehicle", "car")
     source = SpeedSource(**options.get("source", {}))
     method = DriveAlignment
@@ -136,7 +166,10 @@ def drive(legs, mount, options):
 
 
 def regression(rows, lag):
-    """rows: [seconds, change_g, curve_g, force (3)]; every tenth row ends an event. Returns forward, level, blocks."""
+    """Run the regression over rows of an event, and return its forward, level and blocks.
+
+    rows: each row is [seconds, change_g, curve_g, three forces]. Every tenth row ends an event.
+    """
     fitted, fit = ForwardRegression(), Fit()
     for k, (seconds, change, curve, force) in enumerate(rows):
         fitted.add(lag, seconds, change, curve, force)
@@ -148,7 +181,10 @@ def regression(rows, lag):
 
 
 def parts(blocks):
-    """blocks: [across, along, roll_g, pitch_g, weight, seconds]. Returns forward_deg, sigmas, roll_deg, pitch_deg."""
+    """Compare the parts of a drive, and return their forward_deg, sigmas, roll_deg and pitch_deg.
+
+    blocks: each block is [across, along, roll_g, pitch_g, weight, seconds].
+    """
     compared = DriveParts()
     for block in blocks:
         compared.add(*block)

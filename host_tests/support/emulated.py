@@ -25,7 +25,7 @@ def need(chip: str) -> None:
 
 @functools.cache  # do not download a missing package for each test
 def _lacking(chip: str) -> str:
-    """Return the reason why this chip cannot be emulated, "" if it can."""
+    """Return the reason why this chip cannot be emulated, or "" if it can."""
     from kickstand_emulator import esp32_library, image
 
     try:
@@ -42,7 +42,7 @@ def _lacking(chip: str) -> str:
 
 
 def pico(world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any):
-    """Return an emulated Pico, still without power. Skips the test if the emulator or its image is missing."""
+    """Return an emulated Pico that is off. Skip the test if the emulator or the MicroPython image is missing."""
     need("pico")
     from kickstand_emulator.pico import Pico
 
@@ -50,7 +50,7 @@ def pico(world: Callable[[float], tuple] | None = None, files: dict[str, bytes] 
 
 
 def esp32(world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any):
-    """Return an emulated ESP32, still without power. Skips the test if QEMU's library is missing."""
+    """Return an emulated ESP32 that is off. Skip the test if QEMU's library is missing."""
     need("esp32")
     from kickstand_emulator.esp32 import Esp32
 
@@ -63,7 +63,7 @@ MPY = {"pico": bytecode.PICO, "esp32": bytecode.ESP32}
 
 @functools.cache
 def firmware(chip: str = "pico") -> dict[str, bytes]:
-    """The firmware's files, compiled, which halves the start time."""
+    """Return the firmware's compiled files. A board starts in half the time with them."""
     from kickstand_emulator import flash_image
 
     return flash_image.firmware(True, MPY[chip])
@@ -94,20 +94,22 @@ def calibrated(who_am_i: int = 0x68) -> dict[str, bytes]:
 
 
 def begun(pause_s: float) -> tuple[int, str]:
-    """The cycles and a hash of the memory 0.15 s after power-on of a Pico without files. pause_s: pauses of the host in
-    between."""
+    """Start a Pico without files. Return its cycles and a hash of its memory 0.15 s after power-on.
+
+    pause_s: duration of the pauses that the host makes meanwhile.
+    """
     with pico() as device:
         device.run(0.15, lambda: time.sleep(pause_s))
         return device.chip.rp2040.core.cycles, hashlib.sha256(bytes(device.chip.rp2040.sram)).hexdigest()
 
 
 def leaning(lean_deg: float) -> Callable[[float], tuple]:
-    """The readings of PART on a bike held at this lean."""
+    """Return world(t_s) of PART on a bike that is held at this lean."""
     return PART.world(Ride([upright(1e6, lean_deg=lean_deg)]).motion)
 
 
 def shows(device, pattern: str, limit_s: float) -> re.Match:
-    """Advance the time until the display's two lines, joined by a bar, match. Returns the match."""
+    """Advance the time until the display's two lines match, joined by "|". Return the match."""
     return device.run_until(lambda: re.search(pattern, "|".join(device.lcd())), limit_s)
 
 

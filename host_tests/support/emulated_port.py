@@ -1,7 +1,7 @@
-"""Offers the emulated Pico's console as the port that mpremote and the tools open. All runs in the test's process.
+"""Offers the emulated Pico's console as the port that mpremote and the tools open, in the test's own process.
 
-Emulated time passes only while somebody waits at the port, and every time-out uses it. So a busy machine only makes a
-test longer, and a hanging board ends it.
+Emulated time passes only while a program waits at the port, and every time-out counts emulated time. On a busy machine
+a test only takes longer. A board that hangs ends the test.
 """
 
 import types
@@ -13,7 +13,7 @@ NAME = "/dev/emulated"
 
 
 class EmulatedPort:
-    """Replaces pyserial's port. device: an emulator.pico.Pico. meanwhile(): called during each wait."""
+    """Replaces pyserial's port. device: an emulator.pico.Pico. meanwhile(): a function called during each wait."""
 
     def __init__(self, device, meanwhile=lambda: None):
         self._device, self._meanwhile = device, meanwhile
@@ -45,7 +45,7 @@ class EmulatedPort:
         pass
 
     def sleep(self, seconds):
-        """Replaces time.sleep(); output of the board ends it early."""
+        """Replaces time.sleep(). Output of the board ends the wait early."""
         self._let_pass(seconds, len(self._heard) + 1)
 
     def _let_pass(self, seconds, until_bytes):
@@ -68,7 +68,7 @@ class EmulatedPort:
 
 
 def plug_in(monkeypatch, device, meanwhile=lambda: None):
-    """Connect this Pico at the port NAME. mpremote and the tools that talk to it then use the emulated time."""
+    """Connect this Pico to the port NAME. mpremote and the tools at this port then use emulated time."""
     port = EmulatedPort(device, meanwhile)
 
     def open_port(_name, timeout, **_options):

@@ -1,4 +1,4 @@
-"""The two engines that run the firmware's mathematics on the host: each test can run on both."""
+"""The two engines that run the firmware's mathematics on the host: CPython and MicroPython."""
 
 import json
 from pathlib import Path
@@ -23,14 +23,14 @@ ENGINES = [
 
 
 def run(engine, calls):
-    """The results of the calls [(name, arguments), ...], as decoded from JSON."""
+    """Run the calls on this engine. Return their results, decoded from JSON. calls: [(name, arguments), ...]."""
     if engine == "cpython":
         return json.loads(json.dumps([firmware_calls.call(name, arguments) for name, arguments in calls]))
     return json.loads(run_mpy(SCRIPT, stdin=json.dumps(calls)))
 
 
 def words(answer):
-    """The terminal's message for a result that is a refusal."""
+    """Return the terminal's message for a refusal. answer: a result of run()."""
     refusal = Refusal(answer["refused"], *answer["values"])
     for of in (pose_refusals, drive_refusals):
         if refusal.code in of.CODES:

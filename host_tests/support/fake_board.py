@@ -27,9 +27,13 @@ def plug_in(monkeypatch: pytest.MonkeyPatch, board: Any) -> Any:
 
 
 class FakeBoard(Transport):
-    """Replaces SerialTransport. root: the directory that serves as its flash. written: paths in the order in which they
-    were opened for writing, or their new names. on_write(path, data): called before each write; returns the bytes that
-    are really written.  before_change(): called before each change of the flash.  mpy: as sys.implementation._mpy.
+    """Replaces mpremote's SerialTransport.
+
+    root: the directory that simulates the flash.
+    mpy: value of sys.implementation._mpy.
+    written: paths in the order in which they were opened for writing. A renamed file has its new name.
+    on_write(path, data): called before each write. It returns the bytes that are really written.
+    before_change(): called before each change of the flash.
     """
 
     def __init__(self, root: Path, python: str = "micropython", answers: bool = True, mpy: int = PICO) -> None:
@@ -59,12 +63,12 @@ class FakeBoard(Transport):
         self._globals = {"__builtins__": vars(builtins) | {"__import__": imports, "open": self._open}}
 
     def wait(self, seconds: float) -> None:
-        """Uses the clock that a test may have set for the tools."""
+        """Wait by the clock of the tools, which a test may replace."""
         board_console.time.sleep(seconds)
 
     def enter_raw_repl(self, soft_reset: bool = True, timeout_overall: int = 10) -> None:
         if not self.answers:
-            print(b"\x00\x00")  # as mpremote does
+            print(b"\x00\x00")  # mpremote expects these bytes
             raise TransportError("could not enter raw repl")
 
     def exec(self, command: str | bytes, data_consumer: Callable[[bytes], object] | None = None) -> bytes:
@@ -73,7 +77,7 @@ class FakeBoard(Transport):
             with contextlib.redirect_stdout(out):
                 exec(command, self._globals)
         except ConnectionError:
-            raise  # the cable, not the board
+            raise  # the cable failed, not the board
         except OSError as error:
             number = error.errno or 0
             text = f"OSError: [Errno {number}] {errno.errorcode[number]}"
@@ -153,7 +157,7 @@ class FakeBoard(Transport):
 
 
 class Serial:
-    """The port: data to be read, and data written."""
+    """Replaces the serial port: holds the data to be read and the data written."""
 
     def __init__(self) -> None:
         self.data = b""

@@ -52,7 +52,10 @@ def apply(offset, slope, bias, lsb, gyro_lsb, reading):
 
 
 def transform(offset, slope, matrix, sums, n):
-    """Return force and rate of the mean of n samples, computed by the board's code and by floats. 4096 counts per g."""
+    """Compute force and rate of the mean of n samples, by the board's code and with plain floats.
+
+    sums: sums of the n readings, at 4096 counts per g.
+    """
     calibration = Calibration()
     calibration.set_accel(offset, slope)
     for i in range(9):
@@ -72,8 +75,11 @@ def transform(offset, slope, matrix, sums, n):
 
 
 def add_up(batches, limit):
-    """For each batch of frames of 14 bytes: [number of good frames, their sums, the good frames, the watch], by the
-    board's machine code and by Python."""
+    """Add up batches of frames, by the board's machine code and by Python. Each frame has 14 bytes.
+
+    Returns two lists, one per version. Per batch they contain [number of good frames, sums, good frames, notes of the
+    AxisWatch].
+    """
     out = []
     for function in (fifo_frames.add_up, fifo_frames.add_up_python):
         watch = fifo_frames.AxisWatch(200, 3, 1, 3, limit).notes
@@ -90,7 +96,7 @@ def add_up(batches, limit):
 
 
 def decode(batch):
-    """The counts of each frame of 14 bytes, by the board's machine code and by Python."""
+    """Decode frames of 14 bytes, by the board's machine code and by Python. Return two lists of each frame's counts."""
     data = b"".join([bytes(frame) for frame in batch])
     out = []
     for function in (fifo_frames.decode, fifo_frames.decode_python):
@@ -104,7 +110,7 @@ def decode(batch):
 
 
 def capture(samples):
-    """samples: rows of seven integers, 8192 counts per g and 65.5 per deg/s."""
+    """Return the means of a still pose. samples: rows of seven integers, 8192 counts per g and 65.5 per deg/s."""
     pose = StillPose(8192, 65.5, 32700, len(samples))
     for sample in samples:
         pose.add(sample)
@@ -136,7 +142,7 @@ CALLS = {
 
 
 def call(name, arguments):
-    """The result, or {"refused": code, "values": values, "lcd": lines}."""
+    """Return the result, or {"refused": code, "values": values, "lcd": lines} for a refusal."""
     try:
         return CALLS[name](*arguments)
     except Refusal as refusal:

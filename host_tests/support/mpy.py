@@ -33,12 +33,18 @@ def run_mpy(
     stdin: str = "",
     directory: Path | None = None,
 ) -> str:
-    """The standard output of a script (text, or Path). Skips the test without MicroPython. Raises AssertionError if the
-    script fails. directory: its working directory; by default an empty one."""
+    """Run a script and return its standard output. Skip the test without MicroPython.
+
+    script: the code as text, or the Path of a file.
+    directory: the working directory. None: an empty one.
+
+    Raises AssertionError if the script fails.
+    """
     if not unix_port.available():
         pytest.skip("no MicroPython unix port for this system")
     environment = unix_port.environment()
-    environment["MICROPYPATH"] = f"{HOST_TESTS}:{environment['MICROPYPATH']}:{directory or ''}"  # as a board's flash is
+    # Python searches the directory for modules, as a board searches its flash.
+    environment["MICROPYPATH"] = f"{HOST_TESTS}:{environment['MICROPYPATH']}:{directory or ''}"
     with tempfile.TemporaryDirectory() as scratch:
         if isinstance(script, str):
             file = Path(scratch) / "script.py"

@@ -1,4 +1,4 @@
-"""Finds a page of the display by pressing the button. CPython and MicroPython."""
+"""Finds a page of the display by pressing the button. Runs on CPython and MicroPython."""
 
 MOST_PRESSES = 20  # twice the number of pages
 
@@ -8,14 +8,14 @@ class PageTurner:
 
     def __init__(self):
         self._wanted = []
-        self._seen = []  # the views at the presses for the first of _wanted
+        self._seen = []  # the views shown at the presses so far, while searching the first view of _wanted
 
     def turn_to(self, name):
-        """Wait for the view with this name next: see kickstand/state.py."""
+        """Add a view to the wanted ones. The names are in kickstand/state.py."""
         self._wanted.append(name)
 
     def presses(self, view):
-        """True if the button must be pressed now. view: the name of the view that is shown, or None if no app runs."""
+        """Return True if the button must be pressed now. view: name of the shown view, or None if no app runs."""
         if self._wanted and view == self._wanted[0]:
             self._wanted.pop(0)
             self._seen = []
@@ -25,7 +25,7 @@ class PageTurner:
         return True
 
     def check(self):
-        """Raise AssertionError if a view has not been shown. The message names the views that were shown."""
+        """Raise AssertionError if a wanted view never appeared. The message names the views that appeared."""
         if self._wanted:
             seen = ", ".join(sorted(set(self._seen))) or "nothing"
             raise AssertionError(f"no view {self._wanted[0]} after {len(self._seen)} presses, only: {seen}")

@@ -1,4 +1,7 @@
-"""Decodes the radio's packets by firmware/docs/live.md alone: its equations for RaceChrono and its tables of bytes."""
+"""Decodes the radio's packets with the equations for RaceChrono and the tables of bytes in firmware/docs/live.md.
+
+It uses nothing else, so it also tests that page.
+"""
 
 import re
 from pathlib import Path
@@ -7,7 +10,7 @@ PAGE = Path(__file__).resolve().parents[2] / "firmware" / "docs" / "live.md"
 _SECTION = PAGE.read_text(encoding="utf-8")
 SERVICE = re.findall(r"is `([0-9a-f-]{36})`", _SECTION)[0]
 
-# {channel, its text before the first comma: (packet, equation)}
+# {channel: (packet, equation)}. A channel's name ends before the first comma.
 EQUATIONS = {
     name.split(",")[0]: (int(packet), equation)
     for name, packet, equation in re.findall(r"^\| ([^|]+) \| (\d) \| `(.+)` \|$", _SECTION, re.MULTILINE)
@@ -30,7 +33,7 @@ def channels(data):
 
 
 def _rows(title):
-    """Parse a table: [(first byte, last byte, kind, text, value for unknown or None)]."""
+    """Return the rows of a table: [(first byte, last byte, kind, text, value that means unknown, or None), ...]."""
     table = _SECTION.split(f"\n`{title}`, ")[1].split("\n\n")[1]
     rows = []
     for line in table.splitlines()[2:]:
@@ -42,7 +45,10 @@ def _rows(title):
 
 
 def own(title, data):
-    """Decode a packet of our own: {quantity: integer in the table's unit, None for unknown}."""
+    """Decode a packet of Kickstand's own service. Return {quantity: integer in the table's unit, or None}.
+
+    None means that the value is unknown.
+    """
     rows = _rows(title)
     assert len(data) == rows[-1][1] + 1
     found = {}

@@ -1,17 +1,17 @@
 """Formats the simulated board's SD card before a run and reads it afterwards, with MicroPython's own FAT."""
 
 # pyright: reportAttributeAccessIssue=false
-# imported here, because this needs MicroPython's os
+# Only MicroPython's os has a FAT, so only a run on MicroPython can have a card.
 
 import binascii
 import os
 
 MOUNT = "/sd"
-READER = "/reader"  # as on a computer
+READER = "/reader"  # where the card is mounted to read it, as a computer does
 
 
 def format_card(card, formatted=True, fsinfo=True):
-    """Create a card with a FAT file system. Without fsinfo the card has no count of its free space."""
+    """Write a FAT file system to the card. Without fsinfo the card has no count of its free space."""
     if formatted:
         os.VfsFat.mkfs(card)
     if not fsinfo:

@@ -8,7 +8,7 @@ PLACES = {"chrono": CHRONO, "filter": FILTER, "board": BOARD, "rate": RATE, "now
 
 
 class Phone:
-    """acts: [[at_s, method, arguments...], ...]. Bytes are lists of numbers, as JSON has them."""
+    """A phone that follows its plan. acts: [[at_s, method, arguments...], ...], with bytes as lists of numbers."""
 
     def __init__(self, board, acts=()):
         self._board = board
@@ -27,7 +27,7 @@ class Phone:
         return {"packets": self.packets, "said": self.said}
 
     def handle(self, name):
-        """The handle of a characteristic, from the board's registered services."""
+        """Return the handle of a characteristic in the services that the board has registered."""
         service, kind = PLACES[name]
         for uuid, made in self._board.radio.services:
             for found, _, handle in made:

@@ -7,11 +7,11 @@ import subprocess
 import time
 
 SILENT_S = 120.0
-DRAWN = 4_000_000  # characters: more than the output of a minute of continuous drawing
+DRAWN = 4_000_000  # longest output to wait for, in characters: more than a minute of continuous drawing
 
 
 class Terminal:
-    """A context; the process is killed at its end."""
+    """A context manager that runs a command. It kills the process at its end."""
 
     def __init__(self, command: list[str]) -> None:
         import pty  # not on Windows
@@ -33,9 +33,10 @@ class Terminal:
         os.close(self._master)
 
     def wait_for(self, pattern: str) -> re.Match:
-        """Wait until a matching text appears. Drop the output up to its end and return the match. The wait is limited
-        by the amount of output, because times depend on how busy the machine is. A command that draws nothing for
-        SILENT_S counts as dead.
+        """Wait until a matching text appears. Drop the output up to the match's end and return the match.
+
+        The amount of output limits the wait, because times depend on how busy the machine is. A command that draws
+        nothing for SILENT_S counts as dead.
         """
         drawn, heard_s = 0, time.monotonic()
         while not (found := re.search(pattern, self._seen)):
@@ -59,7 +60,7 @@ class Terminal:
         return self.process.returncode
 
     def _read(self) -> str:
-        with contextlib.suppress(OSError):  # nothing is there, or it has ended
+        with contextlib.suppress(OSError):  # there is no process, or it has ended
             return os.read(self._master, 1 << 20).decode(errors="replace")
         return ""
 

@@ -13,7 +13,7 @@ from bumble.host import Host
 from kickstand_tools.simulated_board import radio as model
 
 PUMP_S = 0.005
-ROUNDS = 12  # turns of the stacks' loop per call, because a packet passes several layers
+ROUNDS = 12  # turns of the event loop per call of pump(), because a packet passes several layers
 ADDRESSES = "F0:00:00:00:00:01", "F1:00:00:00:00:02"
 ASKED = {model.READ_PAIRED: "READ", model.WRITE_PAIRED: "WRITE"}
 
@@ -40,7 +40,7 @@ def uuid_of(value):
 
 
 class _Pin(pairing.PairingDelegate):
-    """pin(): returns the PIN shown or typed on this side."""
+    """Answers a request to pair. pin(): returns the PIN that is shown or typed on this side."""
 
     def __init__(self, pin, capability):
         super().__init__(capability)
@@ -57,8 +57,7 @@ class _Pin(pairing.PairingDelegate):
 
 
 class Air:
-    """Connects board.radio to the virtual radio. central(): a Device that can scan and connect. task: runs beside the
-    board."""
+    """Connects board.radio to the virtual radio."""
 
     def __init__(self, board):
         self.radio = board.radio
@@ -99,7 +98,7 @@ class Air:
         return self.loop.run_until_complete(make()) if not self.loop.is_running() else None
 
     def central(self, pin=None):
-        """Create a central. pin: the PIN that its rider types."""
+        """Return a central, a Device that can scan and connect. pin: the PIN that its rider types."""
         device = self._make("central")
         if pin is not None:
             delegate = _Pin(lambda: pin, pairing.PairingDelegate.KEYBOARD_INPUT_ONLY)
@@ -162,7 +161,7 @@ class Air:
             self.radio.disconnect()
         self._advertised = None
 
-    # the interface of a phone that the radio's model uses
+    # The radio's model calls these methods of a phone.
 
     def heard(self, handle, data):
         if self._connection:
@@ -176,7 +175,7 @@ class Air:
 
 
 class Central:
-    """One visit of a phone. heard: [(s, name of the characteristic, bytes)]."""
+    """A phone on the virtual radio. heard: the received packets, [(s, name of the characteristic, bytes), ...]."""
 
     def __init__(self, air, pin=None):
         self.air = air
@@ -186,7 +185,7 @@ class Central:
         self.connection: Any = None
 
     def at(self, at_s, visit):
-        """Run the coroutine visit(self) from at_s on. `done` holds its result or its exception."""
+        """Run the coroutine visit(self) from at_s on. The task `done` has its result or its exception."""
 
         async def run():
             await asyncio.sleep(max(0.0, at_s - self.air.loop.time()))
@@ -197,7 +196,7 @@ class Central:
         return self
 
     async def find(self, wanted, seconds=5.0):
-        """The first Advertisement that names this service. TimeoutError if there is none."""
+        """Return the first Advertisement that names this service. Raises TimeoutError without one."""
         found = self.air.loop.create_future()
 
         def seen(advertisement):

@@ -6,7 +6,7 @@ from support import command
 
 
 class Watched(io.StringIO):
-    """closed_after: number of characters that can be written before writing fails."""
+    """A stream that claims to be a terminal. Writing fails after closed_after characters."""
 
     closed_after = 10**9
 
@@ -20,6 +20,6 @@ class Watched(io.StringIO):
 
 
 def watched(monkeypatch, terminal: Watched, *arguments: object) -> str:
-    """The output of a successful command to such a terminal."""
+    """Run a command that must succeed. Return its output to this terminal."""
     monkeypatch.setenv("TERM", "xterm")
     return command.works(*arguments, err=terminal).err

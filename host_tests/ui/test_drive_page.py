@@ -1,4 +1,4 @@
-"""The page for alignment by driving: what each state shows."""
+"""The texts of the page for alignment by driving, in each state."""
 
 from types import SimpleNamespace
 
@@ -35,7 +35,7 @@ DONE = Notice("aligned", 0.4)
         ({"counted": 6, "quality": 180.0}, (f"Brake  6 +-99.9{DEGREE}", "brake straight")),
         ({"state": alignment.READY, "counted": 6}, ("Ready:", "stop to save it")),
         ({"problem": Refusal("speed-negative")}, ("Speed negative", "Check its source")),
-        # the last result until new brakings count, and again once they are ready
+        # The page shows the last result until new braking events count.
         ({"result": DONE, "counted": 0}, ("Aligned by drive", f"error about 0.4{DEGREE}")),
         ({"result": DONE, "counted": 1}, ("Brakings   1/6", "brake straight")),
         ({"result": DONE, "counted": 6, "ready": True}, ("Aligned by drive", f"error about 0.4{DEGREE}")),

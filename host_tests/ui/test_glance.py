@@ -15,7 +15,11 @@ def glance():
 
 
 class Canvas:
-    """Records the drawing: digits {column: digit} of the number's row; the other calls in their order."""
+    """Records what is drawn.
+
+    digits: {place: digit} of the large number.
+    calls: all other calls, in their order.
+    """
 
     def __init__(self, glance):
         self._glyphs = glance._GLYPHS
@@ -54,7 +58,7 @@ def test_the_maxima_are_drawn_to_both_sides(glance, left, right, digits):
 @pytest.mark.parametrize(
     ("forward_g", "digits", "word", "bar"),
     [
-        # 60 columns per g, from column 64
+        # The bar begins at column 64 and has 60 columns per g.
         (0.55, (0, 5, 5), "accel", (64, 49, 33, 6, 1)),
         (-0.97, (0, 9, 7), "brake", (6, 49, 58, 6, 1)),
         (1.5, (1, 5, 0), "accel", (64, 49, 63, 6, 1)),
@@ -63,7 +67,8 @@ def test_the_maxima_are_drawn_to_both_sides(glance, left, right, digits):
     ],
 )
 def test_an_acceleration_is_drawn_as_number_and_bar(glance, forward_g, digits, word, bar):
-    """The marks: nothing, and the peaks of 0.4 g (24 columns) and of 1.2 g, at the edge."""
+    """Three marks show 0 g and the two peaks. The peak of 0.4 g is 24 columns to the right, and that of 1.2 g is at the
+    left edge."""
     meter = {"smooth_force": [0.0, 1.0, forward_g], "max_accel_g": 0.4, "max_brake_g": 1.2}
     canvas = drawn(glance, glance.acceleration, **meter)
     assert canvas.digits == dict(zip([(0, 8), (34, 8), (62, 8)], digits))
@@ -84,7 +89,8 @@ def test_an_acceleration_is_drawn_as_number_and_bar(glance, forward_g, digits, w
     ],
 )
 def test_a_lean_is_drawn_as_number_arc_and_side(glance, lean_deg, digits, columns, side):
-    """One column per degree, 60 at most. The upper edge is a circle of radius 100: at 60 columns 102 - 80."""
+    """The arc has one column per degree, at most 60. Its upper edge is a circle of radius 100 that begins in row 2. So
+    at column 60 it is in row 102 - 80 = 22."""
     canvas = drawn(glance, glance.lean, lean_deg=lean_deg)
     assert canvas.calls[0] == ("scale", 0, 0)
     assert canvas.digits == digits
@@ -97,7 +103,7 @@ def test_a_lean_is_drawn_as_number_arc_and_side(glance, lean_deg, digits, column
 
 
 def test_the_arrow_points_to_the_side_and_rec_is_below(glance):
-    """24 columns, one dot at the point, 29 at the back."""
+    """The arrow has 24 columns. Its point is one pixel high, and its back 29 pixels."""
     canvas = drawn(glance, glance.lean, recording=True, lean_deg=20.0)
     arrow = [call for call in canvas.calls if call[0] == "vline" and call[1] > 101]
     assert (len(arrow), arrow[0], arrow[-1]) == (24, ("vline", 125, 40, 1, 1), ("vline", 102, 26, 29, 1))

@@ -14,13 +14,13 @@ from kickstand_tools.common import firmware_path
 POSES = {"CaptureError", "SickSensor", "CalibrationError", "GyroError"}  # the tools raise these codes, too
 
 CLASSES = {name for name in vars(errors) if name[0].isupper()}
-# Codes from a name or a call, not from a text beside the class
+# The firmware passes these codes as a variable, so codes() does not find them.
 INDIRECT = {"other-side", "mount-moved", "incomplete", "no-memory", "out-of-memory", "out-of-room"}
 INDIRECT |= {"sensor-lost", "sensor-frozen", "sensor-silent", "sensor-reset", "flash-fault", "card-fault", "usb-fault"}
 # For these codes the display shows the setting's name
 OTHER_SETTINGS = {"not-allowed", "card-pins", "one-i2c", "no-such-pin", "i2c-pins", "uart-pins", "aliasing"}
 CONSOLE_ONLY = {"wrong-code"}  # reported during imports, before there is a display
-# Values that fit the words of any code: numbers, names, and long ones of both
+# Values for the words of each code. Some are long numbers and long names.
 VALUES = {"dead-axis": ("x", 0.1), "odd-axis": ("x", 0.1, 1.0), "side-tilted": ("+x", 25.0, 20.0)}
 VALUES |= {"not-one-g": ("kickstand", 1.23), "mount-moved": ("between-stops", 12.0), "few-events": (4, 5, 12)}
 VALUES |= {"uncertain": (180.0, 12), "unknown-chip": (0x12,), "speed-unit": (99.9,)}
@@ -36,7 +36,7 @@ VALUES |= {"speed-late": (2.5,), "aligned": (9.9,)}
 
 
 def codes():
-    """All codes used with each class in errors.py, by class."""
+    """Return {code: name of its class in errors.py} of all codes that the firmware's source contains."""
     found = {}
     for path in firmware_path.PACKAGE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -48,7 +48,7 @@ def codes():
 
 
 def worded(table):
-    """The codes of a table of words. Each must be unique."""
+    """Return the codes of a table of words. Assert that each code occurs once."""
     found = [line.split("|")[0] for line in table.split("\n") if line]
     assert len(set(found)) == len(found)
     return set(found)

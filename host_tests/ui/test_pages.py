@@ -13,8 +13,11 @@ FULL = "#"
 
 
 def bar(lean_deg):
-    """The bar as text: # is a full cell, 1 to 4 the columns filled from the left, a to d from the right, a space an
-    empty cell."""
+    """Return the lean's bar as text.
+
+    "#" is a full cell and a space is an empty cell. In a cell "1" to "4", so many columns are filled from the left. In
+    a cell "a" to "d", 1 to 4 columns are filled from the right.
+    """
     names = {0x20: " ", 0xFF: FULL, **{i: str(i + 1) for i in range(4)}, **{4 + i: "abcd"[i] for i in range(4)}}
     return "".join(names[code] for code in pages.lean_bar(lean_deg))
 
@@ -31,7 +34,7 @@ def meter(**values):
 
 
 def measured(counts, calibrate=None):
-    """A meter after one reading in counts, 4096 per g and 65.5 per deg/s."""
+    """Return a meter after one reading. counts: 4096 per g and 65.5 per deg/s."""
     from array import array
 
     calibration = Calibration()
@@ -164,7 +167,7 @@ def test_the_formula_is_shown_beside_the_filter():
 
 
 def test_before_alignment_tilt_and_g_are_the_sensors_own():
-    """ "Not aligned" and the next step are shown alternately, two seconds each."""
+    """The page shows "Not aligned" and the next step in turn, for two seconds each."""
     shown = meter(smooth_force=[0.5, 0.866, -0.25])
     lines = [pages.not_aligned(shown, seconds) for seconds in range(5)]
     assert {line for line, _ in lines} == {f"Raw   30{DEGREE} -0.25g"}
@@ -182,7 +185,7 @@ def test_the_sensor_page_of_a_fault_lists_the_devices():
 
 
 def test_the_sensor_page_counts_gaps_starts_and_lost_samples():
-    """Two seconds each."""
+    """The page shows each of them for two seconds."""
     chip = types.SimpleNamespace(name="MPU6050", temperature_c=lambda counts: counts / 10.0, overflows=3, address=0x69)
     calibration = types.SimpleNamespace(six_done=True, aligned=False)
     shown = meter(reading=[1, 2, 3, 285, 5, 6, 7], calibration=calibration)

@@ -10,7 +10,7 @@ SHORT, LONG = 1, 2  # as in board/button.py
 
 
 class Drive:
-    """Alignment by driving that has a question, until it is answered."""
+    """Replaces alignment by driving. It has a question until the rider answers."""
 
     shown = False
 
@@ -53,7 +53,8 @@ def first_line(screen, now_ms):
 
 
 def test_a_cancelled_alignment_gets_no_more_samples(screen):
-    """Samples are not used even during the 100 ms until the next page: the last one would save the alignment."""
+    """This holds even during the 100 ms until the next page is shown. In that time the last sample would save the
+    alignment."""
     screen.press(LONG, 0)
     screen.press(LONG, 100)
     assert screen.wizard is not None

@@ -12,7 +12,7 @@ from support.web.rides_page import Rides
 
 @pytest.fixture(scope="session")
 def files() -> dict[str, bytes]:
-    """The site's files."""
+    """Build the site once and return its files, {path: content}."""
     try:
         return site.site_files()
     except InputError as error:
@@ -21,7 +21,7 @@ def files() -> dict[str, bytes]:
 
 @pytest.fixture(scope="session")
 def address(files):
-    """The address of a server of the site."""
+    """Start a server of the site and return its address."""
     with serve.server(files, 0) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         yield f"http://{serve.HOST}:{server.server_address[1]}/"
@@ -30,7 +30,7 @@ def address(files):
 
 @pytest.fixture(scope="session")
 def ride(tmp_path_factory):
-    """A ride of half a minute, with a speed."""
+    """Return a ride of half a minute that includes the speed."""
     return analysis_rides.short(tmp_path_factory.mktemp("ride"), rate_hz=50, speed_hz=5)
 
 
@@ -41,7 +41,7 @@ def calibration(ride):
 
 @pytest.fixture(scope="session")
 def page(chromium, address):
-    """One page for all tests: Python is loaded once. Its content security policy blocks nothing that is needed."""
+    """Return one page for all tests, so that Python is loaded only once. The content security policy is enforced."""
     rider = Rider(chromium, address + "rides.html", policy=True, **LAPTOP)
     yield Rides(rider)
     away = [url for url in rider.asked if not url.startswith((address, "blob:" + address, "data:"))]

@@ -1,4 +1,4 @@
-"""The documents as pages of the site: all are there, every link leads somewhere, and everybody can read them."""
+"""The documents as pages of the site: all exist, every link has a target, and the pages are accessible."""
 
 import re
 from pathlib import Path
@@ -32,7 +32,7 @@ def test_every_document_is_a_page():
 
 
 def test_every_link_of_a_page_leads_somewhere(files):
-    """If the project's address is unknown, the pages name its other files without links."""
+    """If the project's address is unknown, names of files outside the site are plain text, not links."""
     assert "config.py</a>" not in files["docs/settings.html"].decode()
     for name, text in pages(files).items():
         for link in re.findall(r'(?:href|src)="([^"]+)"', text):
@@ -76,7 +76,7 @@ def test_one_page_has_all_the_words(files):
 
 
 def test_a_documents_own_marks_do_no_harm():
-    """The page handles quotes in a table, an empty head, an angle bracket and a broken link."""
+    """The conversion handles quotes in a table, an empty table head, an angle bracket and a broken link."""
     made = converted('# A & B\n\n"one" < two\n\n| | b |\n|---|---|\n| [c](d.md) | `<x>` |\n', lambda link: None, str)
     assert (made.title, made.about) == ("A & B", '"one" < two')
     assert "<td></td>" in made.html and "<th>b</th>" in made.html

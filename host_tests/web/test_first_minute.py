@@ -1,4 +1,4 @@
-"""A first visit in Chromium, with real clicks and keys: from an empty page to the lean, then what can be broken."""
+"""A first visit in Chromium, with real clicks and keys: from an empty page to the lean, then faults and repairs."""
 
 import json
 import time
@@ -11,13 +11,14 @@ from support.web.rider import Rider
 
 LEAN_DEG = 30
 RIDING_S = 6
-SLOWED = 4  # times
-LAPTOP_LOOP_S = 0.06  # what _loop_s() gives on a common laptop
+SLOWED = 4  # factor by which a slow phone is slower than a laptop
+LAPTOP_LOOP_S = 0.06  # result of _loop_s() on a common laptop
 
 
 @pytest.mark.long
 def test_a_first_visit(chromium, address, tmp_path):
-    """One test for all steps, because they run in real time. test_guide.py tests the steps after a power cut."""
+    """This is one test for all steps, because they run in real time. test_guide.py tests the steps after a power
+    cut."""
     rider = Rider(chromium, address, viewport={"width": 1000, "height": 700})
     first_minute(rider)
     pull_the_wire(rider)
@@ -33,7 +34,7 @@ def test_a_first_visit(chromium, address, tmp_path):
 
 
 def first_minute(rider):
-    """From an empty page to a lean within two degrees of the true one, on both sides."""
+    """Start with an empty page. At the end the shown lean is within two degrees of the true lean, on both sides."""
     rider.align()
     rider.reads("Aligned!")
     rider.click("#do")  # ride
@@ -53,12 +54,13 @@ def first_minute(rider):
     true_deg, shown_deg = rider.leans()
     assert true_deg < 4 - LEAN_DEG
     assert shown_deg == pytest.approx(true_deg, abs=2.0)
-    # Chromium cannot slow workers down. So compare the processor time, as it would be on a laptop.
+    # Chromium cannot slow down workers. So convert their processor time to that of a laptop, and check that it leaves
+    # room for a processor that is SLOWED times slower.
     assert 0.0 < used_s * LAPTOP_LOOP_S / _loop_s() < RIDING_S / SLOWED
 
 
 def _loop_s():
-    """Processor time that this computer needs for a loop of a million sums, the median of five, in s."""
+    """Return the processor time of a loop of a million sums on this computer, in s. It is the median of five runs."""
     times_s = []
     for _ in range(5):
         begin_s = time.process_time()
@@ -80,10 +82,10 @@ def pull_the_wire(rider):
 
 
 def is_what_the_firmware_shows(rider, flash):
-    """The display's memory is the same, frame by frame, as with kickstand.start.main() on MicroPython for Linux, with
-    the same orders at the same times."""
+    """Repeat the orders at the same times with kickstand.start.main() on MicroPython for Linux. The display's memory
+    must be the same in each frame."""
     displays, orders = rider.seen("displays"), rider.seen("orders")
-    assert len(displays) > 60  # a display that changes all the time is sent ten times per second or less
+    assert len(displays) > 60  # the worker sends a display that changes all the time at most ten times per second
     given = json.dumps({"orders": orders, "until_s": displays[-1][0] + 0.001})
     said = run_mpy(Path(page_repeated.__file__), "loop", stdin=given, directory=flash)
     assert json.loads(said.splitlines()[-1])["displays"] == displays

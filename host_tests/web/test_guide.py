@@ -1,5 +1,5 @@
-"""The guide's next step for the displays of the real firmware. The page's device runs here at full speed, steered like
-by a person. The page's own guide gets each state that was visible."""
+"""The guide's next step for each state of the real firmware. The page's device runs at full speed, with orders as a
+rider gives them. The page's own guide then gets each state that the rider could see."""
 
 import json
 from pathlib import Path
@@ -8,8 +8,8 @@ import pytest
 from kickstand.ui import messages
 from support.mpy import run_mpy
 
-# A rider's waits and presses. Each generator yields (s, name, value) with a name from Device.act().
-# turn_to presses until a view is shown.
+# Carries out orders (s, name, value): waits s seconds, then acts. Most names are those of Device.act(). The name
+# turn_to presses the button until a view is shown.
 DRIVE = """
 import json, sys
 from kickstand_tools.web.device import PageDevice
@@ -58,7 +58,7 @@ for stage, orders in enumerate(json.load(sys.stdin)):
 print("\\n" + json.dumps(said))
 """
 
-# Does the same as tell() in main.mjs
+# This script does the same as tell() in main.mjs.
 LOOK = Path(__file__).with_name("guide_steps.js").read_text()
 
 SHORT, LONG = ("press", 0.15), ("press", 1.2)
@@ -70,7 +70,7 @@ RIDING = [*ALIGN, RIDE, ("wait", 12), ("lean", 30), ("wait", 6)]
 
 @pytest.fixture(scope="module")
 def guide(chromium, address):
-    """Run the page's modules without its board: returns the result of LOOK for a list of ticks."""
+    """Return a function that runs the page's modules without its board: the result of LOOK for a list of ticks."""
     page = chromium.new_page()
     page.goto(address + "licences.txt")
     yield lambda ticks: page.evaluate(LOOK, ticks)
@@ -79,7 +79,10 @@ def guide(chromium, address):
 
 @pytest.fixture
 def drive(guide, tmp_path):
-    """The last texts in each stage of a drive: (words beside the true lean, number, text, action)."""
+    """Return a function that runs orders and returns the guide's last texts in each stage.
+
+    The result is {stage: [words beside the true lean, number of the step, text, action]}.
+    """
 
     def drive(orders):
         done = run_mpy(DRIVE, stdin=json.dumps(orders), directory=tmp_path)
@@ -90,7 +93,10 @@ def drive(guide, tmp_path):
 
 @pytest.fixture
 def stages(drive):
-    """Each case has its orders and, for its end, the words, number, part of the text and action."""
+    """Return a function that checks the guide at the end of each stage of a drive.
+
+    Each stage is (orders, words beside the true lean, number of the step, a part of its text, action).
+    """
 
     def check(*table):
         last = drive([orders for orders, *_ in table])
@@ -170,8 +176,8 @@ def test_the_power_goes_in_a_save_or_by_its_switch(stages):
 
 
 def test_it_rides_straight_until_the_meter_is_sure(stages):
-    """If the rider leans too early, the guide says what is missing. After the time that it names, a bend no longer
-    hides the lean."""
+    """If the rider leans too early, the guide asks for a straight and says how long. After that time, the display keeps
+    showing the lean in a bend."""
     stages(
         ([*ALIGN, RIDE, ("wait", 5)], "not sure", 4, "It rides straight for ten seconds", ""),
         ([("lean", 30), ("wait", 2)], "not sure", 4, "needs ten seconds straight on", "straight"),
@@ -181,7 +187,8 @@ def test_it_rides_straight_until_the_meter_is_sure(stages):
 
 
 def test_after_power_on_in_a_bend_it_says_what_ends_the_doubt(stages):
-    """Riding on in such a bend does not help: nothing in it separates the lean from an error of the sensor."""
+    """Riding on in the bend does not help. In a steady bend the firmware cannot tell the lean from an error of the
+    sensor."""
     power = [("power", False), ("wait", 0.5), ("power", True)]
     stages(
         ([*RIDING, ("lean", -8), ("wait", 4)], "not sure", 5, "That is all", ""),
@@ -193,7 +200,7 @@ def test_after_power_on_in_a_bend_it_says_what_ends_the_doubt(stages):
 
 
 def test_it_rides_straight_is_not_said_of_a_bike_that_leans(guide):
-    """Neither before nor after the first lean."""
+    """This holds before and after the first lean."""
     tick = {"powered": True, "plugged": True, "pose": "ride", "phase": "ride", "stage": 0}
     tick.update(t_s=1.0, lean_deg=-7.5)
     said = [
@@ -210,13 +217,13 @@ def test_a_disarmed_save_is_whole(drive):
     assert said[0][2].startswith("Done")
 
 
-# Codes by the paragraphs of the display's words: of a pose, of both poses, of the flash, of the sensor
+# The display's words are in paragraphs: one for each kind of refusal or fault. These are the codes of each paragraph.
 _PARAGRAPHS = [[line.split("|")[0] for line in part.split("\n")] for part in messages._LINES.strip().split("\n\n")]
 SPOILT, _, UNLIKE, FLASH, _, FAULTS = _PARAGRAPHS[:6]
 
 
 def view_of(code):
-    """The state in which the firmware shows this code: see kickstand/state.py."""
+    """Return the state in which the firmware shows this code. The states are in kickstand/state.py."""
     if code in FAULTS:
         return {"view": "fault", "code": code, "fault": code}
     if code in SPOILT:
@@ -225,7 +232,7 @@ def view_of(code):
 
 
 def test_each_refusal_and_fault_has_its_step(guide):
-    """Includes the codes that the simulated board never reaches on its own."""
+    """The test includes codes that the simulated board never reaches."""
     tick = {"powered": True, "plugged": True, "pose": "kickstand", "phase": "kickstand", "t_s": 1.0, "stage": 0}
     spoilt = ("refused", "The meter says why it has not taken this pose. Press the button: once more.")
     unlike = ("refused", "The meter says why it takes neither pose. Press the button, and begin with the stand.")

@@ -12,7 +12,7 @@ pytest.importorskip("bumble", reason="no bumble")
 from support.web.bluetooth_bridge import FAKE, Bridge
 
 BEGIN_S = 26.0
-# The last part lasts for the whole test, even on a busy machine
+# The last turn lasts longer than the test, even on a busy machine.
 RIDE = [["kickstand", 8.0], ["upright", 8.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 900.0]]
 PLAN = {"ride": RIDE, "presses": device_plans.PRESSES, "config": {"LIVE": True}, "until": 900}
 
@@ -69,8 +69,8 @@ def lean_reads(rider, pattern):
 
 
 def test_lean_fills_the_screen_and_returns(on_the_bar, tmp_path):
-    """In a left turn of 30 degrees the page shows the lean, loses the board and shows "--". The connection returns, is
-    stopped, and the ride is saved."""
+    """In a left turn of 30 degrees the page shows the lean. When the connection is lost it shows "--", and later the
+    lean again. Then the rider stops and saves the ride."""
     rider, bridge = on_the_bar
     page = rider.page
     page.evaluate("boardThere = false")
@@ -118,7 +118,7 @@ def test_browser_without_serial_and_bluetooth_gives_advice(chromium, address):
 
 @pytest.fixture(scope="module")
 def packets(tmp_path_factory):
-    """The packets of a minute of bends and then a stop, and the display's record."""
+    """Return the packets of a minute of bends with a stop at the end, and the display's Record."""
     turns = [["turn", lean, 5.0] for lean in (-30.0, 35.0, -20.0, 40.0)] * 2
     ride = [*RIDE[:3], *turns, ["straight", 4.0], ["brake", 0.0, 3.0], ["upright", 12.0]]
     acts = [[18.0, "connect"], [18.1, "write", "rate", [40, 0]]]
@@ -128,14 +128,14 @@ def packets(tmp_path_factory):
 
 
 def test_saved_bluetooth_log_can_be_reported_and_smoothed(chromium, address, packets, tmp_path):
-    """The smoothed lean equals the display's within a degree and a half. Time continues over 16 bits, and late packets
-    are recognised."""
+    """The smoothed lean is within 1.5 degrees of the displayed one. The log's time continues when the packets' 16-bit
+    time overflows. Late packets are recognised."""
     heard, record = packets
     rider = Rider(chromium, address + "live.html")
     assert rider.page.evaluate(LATE) == [[0, 0], [40, 5], [540, 0], [580, 2420], [3540, 0]]
     done = rider.page.evaluate(LOGGED, [one for one in heard if one[1] in ("now", "ride")])
     rider.context.close()
-    assert 0.9 < done["stop"]["peak"] < 1.05 and 2 < done["stop"]["seconds"] < 3  # 15 m/s in 3 s, softly
+    assert 0.9 < done["stop"]["peak"] < 1.05 and 2 < done["stop"]["seconds"] < 3  # a soft stop from 15 m/s in 3 s
     for name, text in done["files"]:
         (tmp_path / name).write_text(text)
     log, calibration = (tmp_path / name for name, _ in done["files"])

@@ -12,11 +12,10 @@ from support.web.serial_line import SerialLine
 LEAN_DEG = 20.0
 
 
-@pytest.mark.nightly  # the usual tests cover `flash` on the same board, and the page with a fake one
+@pytest.mark.nightly  # other tests cover `flash` on the same board, and the page with a fake board
 @pytest.mark.chip
 def test_board_is_updated_and_watched(chromium, address, tmp_path):
-    """The board keeps its calibration. The page shows the same lean as the display, and saves the same log as
-    `kickstand record`."""
+    """The board keeps its calibration. The page shows the display's lean, and saves the log of `kickstand record`."""
     line = SerialLine(chromium, address + "install.html")
     rider = line.rider
     old = {path: b"old" if path == "/kickstand/lean/meter.mpy" else data for path, data in firmware().items()}
@@ -40,7 +39,7 @@ def test_board_is_updated_and_watched(chromium, address, tmp_path):
         rider.page.click("#stop")
         rider.page.wait_for_selector("#files li", timeout=120_000)
     assert rider.text("#live-said") == "Stopped."
-    rider.page.wait_for_function("document.querySelector('#lean').textContent === '--'")  # the value is soon outdated
+    rider.page.wait_for_function("document.querySelector('#lean').textContent === '--'")  # no new value
     blocks = streamed(bytes(line.said))
     assert len(blocks) > 1
     assert list(saved(rider, tmp_path).values()) == recorded(blocks)
@@ -51,11 +50,11 @@ def test_board_is_updated_and_watched(chromium, address, tmp_path):
 @pytest.mark.nightly
 @pytest.mark.chip
 def test_interrupted_installation_is_completed_up_to_the_lean(chromium, address):
-    """All steps of a rider: install, unplug, press on the stand and upright. The display shows the lean. Most files are
-    already on the board, because copying all of them takes a minute."""
+    """The test takes all steps of a rider: install, unplug, press on the stand, press upright. Most files are already
+    on the board, because copying all of them takes a minute."""
     line = SerialLine(chromium, address + "install.html")
     poses = Ride([kickstand(5.5), upright(5.5), upright(1e6, lean_deg=LEAN_DEG)])
-    part = Sensor(seed=1, share=0.1)  # its accelerometer is not calibrated here: small errors cost no degrees
+    part = Sensor(seed=1, share=0.1)  # small errors, because the accelerometer is not calibrated here
     feels, started_s = part.world(poses.motion), 0.0
     missing = ("/main.py", "/kickstand/calibration/")
     there = {path: data for path, data in firmware().items() if not path.startswith(missing)}
@@ -85,7 +84,7 @@ def test_interrupted_installation_is_completed_up_to_the_lean(chromium, address)
 @pytest.mark.nightly
 @pytest.mark.chip
 def test_a_board_is_checked_on_the_page(chromium, address):
-    """The lines of the command, including the request to press the button."""
+    """The page shows the same lines as the command, including the request to press the button."""
     line = SerialLine(chromium, address + "install.html")
     with pico(part(4, share=0.3), modules()) as device:
         device.run(0.5)

@@ -6,7 +6,7 @@ from pathlib import Path
 from support.mpy import run_mpy
 from support.web import page_repeated
 
-# Safe mode too: the button is held while the power comes on
+# The orders include safe mode: the button is held while the power is switched on.
 ORDERS = [
     *([1.0, "button", True], [1.2, "button", False], [5.0, "pose", "upright"]),
     *([6.0, "sensor", False], [7.3, "sensor", True]),
@@ -31,6 +31,6 @@ def test_the_page_turns_the_loop_as_the_firmware_does(tmp_path):
 
 
 def test_a_press_that_comes_with_its_release_counts(tmp_path):
-    """For example after the browser stalled for longer than the press."""
+    """This happens if the browser stalls for longer than the press."""
     page = run("page", [[1.0, "button", True], [1.0, "button", False]], tmp_path / "page")
     assert any(display["text"][0].startswith("Stand: hold") for _, display in page["displays"])

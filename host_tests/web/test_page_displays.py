@@ -1,4 +1,4 @@
-"""The page Try can replace the display of its running board by another type."""
+"""The page Try can replace the display of its running board by a display of another type."""
 
 import json
 

@@ -17,7 +17,7 @@ FIRMWARE = firmware_files.contents(PICO)
 
 @pytest.fixture(scope="module")
 def line(chromium, address):
-    """One page for all tests."""
+    """Return one page for all tests."""
     line = SerialLine(chromium, address + "install.html")
     yield line
     assert line.rider.errors == [] and line.rider.strangers() == []
@@ -26,7 +26,7 @@ def line(chromium, address):
 
 @pytest.fixture
 def board(tmp_path):
-    """A board with all of the firmware except the lean's modules and main.py, because copying takes time."""
+    """Return a board on which only main.py and the modules of lean/ are missing, because copying takes time."""
     for path, data in FIRMWARE.items():
         if not path.startswith("/kickstand/lean/") and path.count("/") > 1:
             (tmp_path / path[1:]).parent.mkdir(parents=True, exist_ok=True)
@@ -45,7 +45,8 @@ def choose(line, name, value):
 
 
 def test_a_new_board_gets_the_firmware_and_its_settings(line, board):
-    """A fault is shown beside the field, by the firmware's own rules, and nothing is copied until it is corrected."""
+    """An invalid setting is reported beside its field, by the firmware's own rules. Nothing is copied until it is
+    corrected."""
     line.plug_in(RawPrompt(board))
     assert line.look().startswith("Imagined Pico with RP2040, MicroPython 1.26.1 is there.")
     page = line.rider.page
@@ -87,7 +88,7 @@ def test_riders_settings_are_shown_and_kept(line, board):
 
 
 def test_each_board_has_its_own_default_pins(line, board):
-    """The fields above are filled in from a Pico."""
+    """Until the page knows the board, it shows a Pico's pins."""
     other(board, _machine="Generic ESP32 module with ESP32")
     board.modules["sys"].platform = "esp32"
     line.plug_in(RawPrompt(board))
@@ -122,7 +123,7 @@ def test_pulled_cable_leaves_a_board_that_starts_nothing(line, board):
 
 
 def test_a_check_of_a_board_without_the_firmware_is_refused(line, board):
-    """A board without the firmware is refused. test_page_board.py tests the rest with an emulated Pico."""
+    """test_page_board.py tests a check of a complete board, with an emulated Pico."""
     line.plug_in(RawPrompt(board))
     assert line.check().startswith("the firmware on the board at this port is of another version or not whole")
     assert line.rider.page.is_visible("#check") and line.rider.axe() == []
@@ -167,7 +168,7 @@ def test_unsuitable_board_is_not_changed(line, board, differs, platform, words):
 
 
 def test_file_that_is_no_esp32_image_is_not_written(line, board, tmp_path):
-    """The page refuses an image for another chip, too. No chip answers here at all."""
+    """The page also refuses an image for another chip. In this test no chip answers."""
     page = line.rider.page
     page.click("a[href='#micropython']")
     page.click("text=ESP32: a file that ends in .bin")
@@ -217,14 +218,14 @@ def test_setting_of_0_is_not_shown_as_the_default(line):
 
 
 def test_browser_without_serial_ports_is_told_so(chromium, address):
-    """The message is at the top, and the page offers no action that needs a serial port."""
+    """The message is at the top of the page. The page offers no action that needs a serial port."""
     rider = Rider(chromium, address, script="delete Navigator.prototype.serial")
     for name in ("install.html", "live.html"):
         rider.page.goto(address + name)
         first = rider.page.locator("main section:visible").first
         assert first.get_attribute("id") == "unable"
         assert "in Chrome or Edge on a computer" in first.inner_text() and "Firefox, Safari" in first.inner_text()
-        if name == "install.html":  # each step is shown, with the terminal command that replaces it
+        if name == "install.html":  # each step is shown with the command for the terminal
             assert rider.page.locator("main h2:visible").count() == 5
             assert rider.text("#here") == address + name
             rider.page.evaluate("document.querySelectorAll('details').forEach((one) => (one.open = true))")
@@ -245,7 +246,8 @@ def test_browser_without_serial_ports_is_told_so(chromium, address):
 
 
 def test_the_board_is_chosen_first_and_the_steps_around_it_open(chromium, address):
-    """The steps fit on the first screen of a phone and of a laptop. The first step is open; a link opens its step."""
+    """The steps fit on the first screen of a phone and of a laptop. The first step is open. A link to another step
+    opens that step."""
     rider = Rider(chromium, address + "install.html", **PHONE)
     rider.page.evaluate("document.documentElement.dataset.serial = 'yes'")
     page = rider.page
@@ -287,7 +289,7 @@ def test_the_wiring_is_that_of_the_boards_own_pins(line):
 
 
 def test_each_board_has_its_own_page_for_micropython(line):
-    """Click a link that opens a new tab."""
+    """The link opens a new tab."""
     links = line.rider.page.locator("a[href^='https:']")
     assert links.evaluate_all("links => links.map((one) => [one.target, one.rel])") == 10 * [["_blank", "noopener"]]
     names = links.evaluate_all("links => links.map((one) => one.href)")

@@ -1,4 +1,4 @@
-"""The page listens to boards and fetches their rides, with the code of `kickstand record` and `pull`."""
+"""The page Live receives a board's lean and fetches its rides, with the code of `kickstand record` and `pull`."""
 
 import functools
 import gzip
@@ -28,7 +28,7 @@ half_seconds = functools.partial(ride_writer.blocks, length=lambda _: 512)  # bl
 
 @pytest.fixture(scope="module")
 def line(chromium, address):
-    """One page for all tests, whose Python is loaded once."""
+    """Return one page for all tests, so that Python is loaded only once."""
     line = SerialLine(chromium, address + "live.html")
     yield line
     assert line.rider.errors == [] and line.rider.strangers() == []
@@ -48,7 +48,7 @@ def board(tmp_path):
 
 
 def test_pulled_cable_leaves_the_log(line, rider, board, tmp_path):
-    """The gauge then shows no lean. While the bike swayed too much for a certain lean it showed "--"."""
+    """After that the gauge shows no lean. Earlier it shows "--" while the bike sways too much for a certain lean."""
     blocks, _ = half_seconds(3)
     line.plug_in(RawPrompt(board, blocks))
     rider.page.click("#start")
@@ -61,7 +61,7 @@ def test_pulled_cable_leaves_the_log(line, rider, board, tmp_path):
 
 
 def test_car_shows_g_instead_of_a_lean(line, rider, board, tmp_path, monkeypatch):
-    """The calibration in its log says so as well. For the next motorcycle the gauge appears again."""
+    """The calibration in the log says "car", too. For the next motorcycle the gauge appears again."""
     monkeypatch.setattr(ride_writer, "turns", braking_in_a_left_bend)
     line.plug_in(RawPrompt(board, half_seconds(3)[0], vehicle="car"))
     rider.page.click("#start")
@@ -83,7 +83,7 @@ def test_car_shows_g_instead_of_a_lean(line, rider, board, tmp_path, monkeypatch
 
 
 def braking_in_a_left_bend(count, seed=0):
-    """Like ride_writer.turns(), but for a car: 0.2 and 0.3 g."""
+    """Yield turns as ride_writer.turns() does, for a car: 0.2 and 0.3 g."""
     for _ in range(count):
         yield [2 * mean for mean in (-851, 1324, 4096, 0, 0, 98, 0)], 2, 10_000
 
@@ -93,7 +93,7 @@ def test_a_lean_ends_soon_after_the_last_block(rider):
 
 
 def test_failed_loading_of_tools_can_be_repeated(chromium, address, board):
-    """A browser without a store for other pages explains how to transfer the files."""
+    """If the browser has no store that other pages can read, the page explains how to transfer the files."""
     line = SerialLine(chromium, address + "live.html", service_workers="block")
     rider = line.rider
     line.plug_in(RawPrompt(board, half_seconds(3)[0]))
@@ -195,7 +195,7 @@ def test_port_without_signals_is_closed_again(line):
 
 
 def test_port_with_a_stuck_stream_is_closed(line):
-    """The port is closed; otherwise it could not be opened again."""
+    """Without closing it, the page could not open the port again."""
     script = """async () => {
       const { SerialLine } = await import("./cable/cable.mjs");
       const said = [];
@@ -212,7 +212,8 @@ def test_port_with_a_stuck_stream_is_closed(line):
 
 
 def test_line_continues_after_a_disturbed_byte(line):
-    """As with Web Serial, the stream fails, and the port gets a new stream until the cable is pulled."""
+    """As with Web Serial, the stream fails at the disturbed byte. The port then has a new stream, until the cable is
+    pulled."""
     script = """async () => {
       const { SerialLine } = await import("./cable/cable.mjs");
       const streams = [1, 2].map((byte) => {
@@ -242,8 +243,9 @@ def test_board_without_firmware_is_sent_to_page_install(line, rider, board):
 
 
 def test_simulated_board_is_watched_without_a_real_one(chromium, address):
-    """Also in a browser that cannot connect to a board, such as a phone's: a lean to each side, marked as simulated.
-    The last minute is on the first screen. Before, there are neither empty figures nor an empty chart."""
+    """This works in a browser that cannot connect to a board, such as a phone's. The page shows a lean to each side,
+    marked as simulated. The chart of the last minute is on the first screen. Until then the page shows no empty
+    figures and no empty chart."""
     rider = Rider(chromium, address + "live.html", **PHONE)
     page = rider.page
     page.evaluate("document.documentElement.dataset.serial = 'no'")

@@ -8,7 +8,8 @@ PAGES = {"": "Try", "install.html": "Install", "live.html": "Live"}
 
 @pytest.mark.parametrize("name", PAGES)
 def test_axe_finds_nothing(chromium, address, name):
-    """Colours and names are the same on a laptop. So its layout is only checked on the page with the most content."""
+    """Each page is checked on a phone. Colours and names are the same on a laptop, so only the page with the most
+    content is also checked there."""
     rider = Rider(chromium, address + name, **PHONE)
     assert rider.text("nav [aria-current]") == PAGES[name]
     if not name:
@@ -43,7 +44,7 @@ def test_a_phones_first_screen_has_all_for_the_first_minute(chromium, address):
 
 
 def test_a_phone_leans_the_motorcycle_if_it_has_motion_data(chromium, address):
-    """The page's introduction is visible, too. A screen reader's click, which comes without a pointer, also presses the
+    """The page's introduction is visible. A screen reader clicks without a pointer, and this also presses the
     button."""
     rider = Rider(chromium, address, **PHONE)
     rider.page.set_viewport_size({"width": 820, "height": 1180})
@@ -72,7 +73,7 @@ def test_a_phone_leans_the_motorcycle_if_it_has_motion_data(chromium, address):
 
 
 def test_nothing_is_below_the_choice_of_the_display(chromium, address):
-    """The same holds in a narrow window of a computer, where the page also explains the keys."""
+    """This also holds in a narrow window of a computer, where the page explains the keys, too."""
     rider = Rider(chromium, address, viewport={"width": 390, "height": 844})
     for width in (360, 390, 420, 480, 512, 560, 800):
         rider.page.set_viewport_size({"width": width, "height": 844})

@@ -1,5 +1,5 @@
-"""The content security policy of the pages blocks nothing that they need. Most other tests switch it off; those of the
-page Rides keep it."""
+"""The pages' content security policy blocks nothing that the pages need. Most other tests switch the policy off. The
+tests of the page Rides enforce it."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""Rides given to the page: it shows the same as the commands, and no file leaves it."""
+"""The page Rides shows the same as the commands, and sends no file to a server."""
 
 import json
 import re
@@ -54,7 +54,7 @@ def test_the_charts_are_those_of_the_command(page, ride, calibration):
     assert "Plotly.newPlot" in html and "src=" not in html.split("<body>")[0].rpartition("</script>")[2]
     assert '<script src="' not in html and "<h1>RIDE</h1>" in html
     frame = page.page.locator("#plot").bounding_box()
-    assert frame["height"] > 900  # as high as its charts, so nothing scrolls inside it
+    assert frame["height"] > 900  # the frame is as high as its charts, so it needs no scroll bar
 
 
 def test_the_lean_of_each_sample_is_that_of_the_command(page, ride, calibration, tmp_path):
@@ -85,11 +85,11 @@ def test_page_does_not_wait_for_impossible_charts(page, ride, calibration):
     page.page.evaluate("given()")
     page.give(ride, calibration)
     page.page.wait_for_function("document.querySelector('#drawing').hidden")
-    page.rider.errors[:] = before  # drop the errors of the frame that had no library
+    page.rider.errors[:] = before  # forget the errors of the frame without the library
 
 
 def test_too_short_ride_is_reported_at_the_top(page, calibration, tmp_path):
-    """The page uses the words of the command. A standing bike with a running engine is not riding."""
+    """The page shows the command's message. A bike at rest with a running engine is not a ride."""
     random = np.random.default_rng(1)
     readings = random.normal(0.0, [0.03] * 3 + [1.0] * 3, (1200, 6)) + [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
     rows = [",".join(f"{value:.4f}" for value in (k / 100.0, *row)) for k, row in enumerate(readings.tolist())]
@@ -115,7 +115,7 @@ def test_charts_follow_the_dark_theme(page, ride, calibration):
 
 
 def test_values_at_the_pointer_are_in_one_line(page, ride, calibration):
-    """Only two of the chart library's many buttons remain."""
+    """The page keeps only two of the chart library's many buttons."""
     page.show(ride, calibration)
     inside = page.page.frame_locator("#plot")
     inside.locator("#chart .main-svg").first.wait_for()
@@ -178,7 +178,7 @@ def test_axe_finds_nothing(page, ride, calibration, kind):
 
 @pytest.mark.nightly
 def test_page_responds_while_reading_thirty_megabytes(chromium, address, calibration, tmp_path):
-    """Over half an hour at 200 samples per second: the page stays responsive, and its memory hardly grows."""
+    """The log lasts more than half an hour at 200 samples per second. The page's memory hardly grows."""
     short = app_exports.riding()
     readings = np.column_stack((short.force_g, short.rates_dps))
     lines = [",".join(f"{value:.7f}" for value in row) for row in readings.tolist()]
@@ -199,6 +199,6 @@ def test_page_responds_while_reading_thirty_megabytes(chromium, address, calibra
 
 
 def rss_mb(process):
-    """The memory of a process, by its id."""
+    """Return the resident memory of a process in MB. process: its id."""
     lines = Path(f"/proc/{process}/status").read_text().splitlines()
     return sum(int(line.split()[1]) for line in lines if line.startswith("VmRSS")) / 1024.0

@@ -1,4 +1,4 @@
-"""The files given to the page Rides: in any order, of other apps, cut off, wrong."""
+"""The page Rides accepts files in any order and of other apps, and reports files that are cut off or wrong."""
 
 import base64
 import gzip
@@ -20,7 +20,7 @@ PULLED = Path(__file__).with_name("keep_pulled.js").read_text()
 
 
 def test_cut_gzip_file_is_shown_with_a_warning(page, ride, calibration, tmp_path):
-    """A recorder that lost power leaves half a file: its content is shown with a warning."""
+    """A recorder that loses power leaves such a file."""
     page.give()
     packed = gzip.compress(ride.read_bytes())
     files = [("RIDE.csv.gz", packed[: len(packed) // 2]), ("RIDE.cal.json", calibration.read_bytes())]
@@ -44,7 +44,7 @@ def test_a_log_alone_asks_for_its_calibration(page, ride, calibration):
 
 
 def test_the_export_of_a_phone_becomes_a_log(page, tmp_path):
-    """The log is the one that `import` writes. With a calibration it is a ride."""
+    """The page makes the same log as `import`. With a calibration the log is a ride."""
     path = app_exports.into(tmp_path / "phone.zip", app_exports.phyphox(app_exports.riding().every(4)))
     assert "phone.zip has no calibration with it" in page.give(path)
     (tmp_path / "phone.cal.json").write_text(json.dumps(PHONE_MOUNTED))
@@ -68,7 +68,7 @@ def test_one_of_several_rides_is_chosen(page, ride, calibration, tmp_path):
         files[-1].write_bytes(calibration.read_bytes())
     page.give(*files)
     first = page.report()[0]
-    # the report appears although another ride was chosen meanwhile
+    # The report appears, although another ride was chosen meanwhile.
     with page.page.expect_download(timeout=WAIT_MS) as lean:
         page.page.evaluate("document.querySelector('#save-lean').click()")
         page.page.select_option("#ride", "B.csv")
@@ -108,7 +108,7 @@ def test_wrong_file_gives_one_line_and_harms_no_other_ride(page, ride, calibrati
 
 
 def test_unreadable_file_does_not_harm_the_others(page, ride, calibration, tmp_path):
-    """A folder, and a file rewritten after it was given; both fail in the same way."""
+    """The file is rewritten after it was chosen. The page treats a folder in the same way."""
     path = tmp_path / "written.csv"
     path.write_bytes(ride.read_bytes())
     page.give(path)
@@ -126,7 +126,7 @@ def test_files_are_added_and_removed_in_any_order(page, ride, calibration, tmp_p
     assert page.page.inner_text("#calibration") == "RIDE.cal.json"
     other = tmp_path / "other.csv"
     other.write_bytes(ride.read_bytes())
-    assert "other.csv has no calibration" in page.add(other)  # the calibration is beside another ride
+    assert "other.csv has no calibration" in page.add(other)  # the only calibration belongs to the other ride
     bike = tmp_path / "bike.json"
     bike.write_bytes(calibration.read_bytes())
     assert page.add(bike) == ""
@@ -141,14 +141,14 @@ def test_files_are_added_and_removed_in_any_order(page, ride, calibration, tmp_p
 
 
 def test_the_columns_of_a_table_can_be_named(page, tmp_path):
-    """Like --columns and --units of `import`."""
+    """The page offers the same as the options --columns and --units of `import`."""
     log, riding = tmp_path / "log.csv", app_exports.riding().every(4)
     log.write_text(app_exports.any_table(riding).replace("Acc_X", "Quantity 1", 1))
     assert page.give(log).endswith("and no acceleration found in it: say what its columns are.")
     assert page.page.eval_on_selector("[name=ay]", "select => select.value") == "Acc_Y"
-    assert page.page.locator("#first-seconds polyline").count() == 3  # of the gyro
+    assert page.page.locator("#first-seconds polyline").count() == 3  # the gyro's three axes
     page.page.click("#table button")
-    assert page.page.is_visible("#table")  # one is missing
+    assert page.page.is_visible("#table")  # one column has no name yet
     page.page.select_option("[name=ax]", "Quantity 1")
     page.page.select_option("[name=a]", "m/s2")
     page.page.select_option("[name=g]", "deg/s")
@@ -167,7 +167,7 @@ def test_the_columns_of_a_table_can_be_named(page, tmp_path):
     "write", [phone_tracks.write_gpx, pytest.param(phone_tracks.write_fit, marks=pytest.mark.nightly)]
 )
 def test_a_track_joins_a_ride_without_gps(page, tmp_path, write):
-    """Like `join`: the page then has a map, and the log with positions can be saved. Another ride's track is
+    """As after `join`, the page has a map, and the log with positions can be saved. The track of another ride is
     refused."""
     made = simulate_ride("hills", seed=1, seconds=120.0)
     log = Log.from_readings(made.readings[::4], made.rate_hz / 4)
@@ -188,7 +188,7 @@ def test_a_track_joins_a_ride_without_gps(page, tmp_path, write):
 
 
 def test_sample_ride_is_shown_as_simulated(page):
-    """Before that, a drawing of a report is beside the place for files. Afterwards the charts are beside the
+    """At first a drawing of a report is beside the place for files. With the sample ride, the charts are beside the
     figures."""
     page.give()
     drop, drawn = (page.page.locator(one).bounding_box() for one in ("#drop", ".sample svg"))
@@ -221,7 +221,7 @@ def test_pulled_rides_are_opened_once(page, address, ride, calibration):
     page.page.evaluate(PULLED, [[path.name, path.read_text()] for path in (ride, calibration)])
     page.page.goto(address + "licences.txt")
     page.page.goto(address + "rides.html#pulled")
-    page.page.wait_for_selector("#report", timeout=WAIT_MS)  # which takes a while after the page has loaded
+    page.page.wait_for_selector("#report", timeout=WAIT_MS)  # the report appears a while after the page has loaded
     assert page.said() == ""
     assert page.page.inner_text("#report-title") == "RIDE.csv"
     page.page.goto(address + "licences.txt")

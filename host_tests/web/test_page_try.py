@@ -1,4 +1,4 @@
-"""The page Try in Chromium: by the keyboard alone, its room for every step, and a file that is missing."""
+"""The page Try in Chromium: used by the keyboard alone, with room for every step, and with a missing file."""
 
 import re
 
@@ -22,8 +22,8 @@ def says(rider, selector, text):
 
 
 def test_by_the_keyboard_alone(chromium, address):
-    """A pose is chosen, and then the arrow keys lean and the space bar is the board's button. Controls that
-    the rider cannot steer show what the motorcycle does. The focus outlives the guide's step."""
+    """The arrow keys change the lean, and the space bar is the board's button. Controls that the rider cannot move
+    show what the motorcycle does. The focus stays when the guide shows its next step."""
     rider = Rider(chromium, address, **LAPTOP)
     rider.reads("Raw")
     says(rider, "#lean-out", "12° left")
@@ -55,13 +55,13 @@ def test_by_the_keyboard_alone(chromium, address):
     rider.keys("Enter", 1)
     assert rider.page.evaluate(ACTIVE) == "press"
     assert rider.page.get_attribute("#pose [value=kickstand]", "aria-pressed") == "true"
-    assert sum(shift[0] for shift in rider.seen("shifts")) < 1e-3, rider.seen("shifts")  # 0.1 is what people notice
+    assert sum(shift[0] for shift in rider.seen("shifts")) < 1e-3, rider.seen("shifts")  # people notice a shift of 0.1
     rider.context.close()
 
 
 def test_every_step_has_its_room(chromium, address, files):
-    """No step may move the parts of the page below it. The texts come from the guide's source, so the longest are
-    included."""
+    """A longer text must not move the parts of the page below it. The texts come from the guide's source, so the
+    longest one is included."""
     guide = files["guide.mjs"].decode()
     pages = re.findall(r'^  \w+: "(.{20,})",$', guide, re.M)
     steps = [text for pair in re.findall(r'"([^"\n]{25,})"|`([^`]{25,})`', guide) for text in pair if text]

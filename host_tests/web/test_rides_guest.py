@@ -1,4 +1,4 @@
-"""The code of the page Rides, on CPython."""
+"""The Python code of the page Rides, run on CPython."""
 
 import json
 
@@ -12,7 +12,7 @@ def test_singular_matrix_is_detected_in_webassembly():
     silent = rides_guest.raising(lambda matrix: np.full_like(matrix, np.nan))
     with pytest.raises(np.linalg.LinAlgError):
         silent(np.zeros((3, 3)))
-    assert np.all(np.isnan(silent(np.full((3, 3), np.nan))))  # like numpy on other platforms
+    assert np.all(np.isnan(silent(np.full((3, 3), np.nan))))  # as numpy does on other platforms
     assert rides_guest.raising(np.linalg.inv)(2.0 * np.eye(2)).tolist() == [[0.5, 0.0], [0.0, 0.5]]
 
 
@@ -32,7 +32,7 @@ def test_calibration_of_another_ride_is_not_used(ride, tmp_path, monkeypatch, na
 
 
 def test_two_recordings_of_single_files_are_two_rides(tmp_path, monkeypatch):
-    """Files of an app that form one recording are one ride."""
+    """Only files of one app that form one recording are one ride."""
     riding = app_exports.riding().every(4)
     parts = {name: text for name, text in app_exports.phyphox(riding).items() if "/" not in name}
     files = {"b.csv": app_exports.racechrono(riding), "a.csv": app_exports.racechrono(riding), **parts}
@@ -55,12 +55,12 @@ def test_ride_that_exceeds_the_memory_is_reported():
 
 
 def rides_of(tmp_path, monkeypatch, files):
-    """Return {log: calibration} for these files, {name: text}."""
+    """Return {log: calibration} of the rides in these files. files: {name: text}."""
     for folder in ("given", "here"):
         (tmp_path / folder).mkdir()
     for name, text in files.items():
         text = json.dumps(analysis_rides.CALIBRATION) if name.endswith(".json") else text
         (tmp_path / "given" / name).write_text(text)
-    monkeypatch.chdir(tmp_path / "here")  # the folder in which all other files are deleted
+    monkeypatch.chdir(tmp_path / "here")  # the code deletes all other files in its working directory
     found = json.loads(rides_guest.rides(str(tmp_path / "given"), json.dumps(list(files))))
     return {one["log"]: one["calibration"] for one in found["rides"]}

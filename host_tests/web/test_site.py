@@ -40,7 +40,7 @@ def test_a_page_asks_for_little_until_it_is_ready(chromium, address, files, name
 
 @pytest.fixture
 def built(files, monkeypatch):
-    """The command uses the existing site."""
+    """Make the command use the site that is already built."""
     monkeypatch.setattr(site, "site_files", lambda: files)
 
 
@@ -73,7 +73,7 @@ def test_site_is_served_and_opened(files, built, monkeypatch):
     monkeypatch.setattr("webbrowser.open", opened.append)
 
     def look(server):
-        """Replaces the server that runs until Ctrl-C."""
+        """Replaces the server's loop, which would run until Ctrl-C."""
         threading.Thread(target=server.handle_request, daemon=True).start()
         seen.append(urllib.request.urlopen(opened[0]).read())
         raise KeyboardInterrupt
@@ -84,7 +84,7 @@ def test_site_is_served_and_opened(files, built, monkeypatch):
 
 
 def test_site_works_at_any_address(files):
-    """The folder contains all files that the site refers to."""
+    """The folder contains every file that a page refers to."""
     to_micropython = re.compile(r'<a href="https://micropython\.org/download/\w+/" target="_blank" rel="noopener">')
     ours = {path.relative_to(site.PAGE).as_posix() for path in site.PAGE.rglob("*") if path.is_file()}
     assert ours < set(files)
@@ -96,8 +96,8 @@ def test_site_works_at_any_address(files):
 
 
 def test_every_page_leads_home(files, monkeypatch):
-    """Each page links to the first page. If the installed package knows the project's address, each page links to it,
-    and the site's version differs."""
+    """Each page links to the first page. If the installed package knows the project's address, each page also links to
+    this address, and the site has another version."""
     home = "https://an.example/kickstand"
     monkeypatch.setattr(site, "home", lambda: home)
     made = site.site_files()
@@ -146,7 +146,7 @@ def test_each_board_gets_its_own_machine_code(files):
 
 
 def test_every_file_has_its_type(files):
-    """Modules and WebAssembly do not run with another type, and nothing else is served."""
+    """Browsers do not run modules and WebAssembly of a wrong type. The server sends no other files."""
     with serve.server(files, 0) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         connection = http.client.HTTPConnection(serve.HOST, server.server_address[1])
@@ -205,7 +205,7 @@ def test_existing_file_is_not_overwritten_by_the_site(files, tmp_path):
 
 
 def test_every_page_has_a_policy_and_charts_no_rights(files):
-    """Only the site's own scripts run. A framed page has access neither to it nor to its stored data."""
+    """Only the site's own scripts run. A framed page of charts has no access to the site or to its stored data."""
     pages = {name: data.decode() for name, data in files.items() if name.endswith(".html")}
     assert len(pages) == 4 + len(documents.PATHS) + 1
     for name, text in pages.items():
@@ -220,7 +220,7 @@ def test_every_page_has_a_policy_and_charts_no_rights(files):
 
 
 def ask(port, said):
-    """The server's whole answer to these bytes, until it disconnects."""
+    """Send these bytes to the server. Return its whole answer until it disconnects."""
     with socket.create_connection((serve.HOST, port), timeout=20) as connection:
         connection.sendall(said)
         return b"".join(iter(lambda: connection.recv(4096), b""))
@@ -245,7 +245,7 @@ def test_strange_or_slow_requests_do_not_stop_the_server(monkeypatch, capsys):
 
 
 def test_trickling_connections_are_ended_for_others(monkeypatch):
-    """These clients send a byte in time, but never a whole request."""
+    """These clients send a byte before each time-out, but never a whole request."""
     monkeypatch.setattr(serve, "MOST", 4)
     monkeypatch.setattr(serve, "FULL_S", 0.2)
     with serve.server({"index.html": b"the page"}, 0) as server:
@@ -263,7 +263,8 @@ def test_trickling_connections_are_ended_for_others(monkeypatch):
 
 
 def test_silent_connections_do_not_hold_the_page():
-    """190 connections with the real limits: each one above the limit closes the oldest one without a request."""
+    """The test opens 190 connections and keeps the server's real limits. Each connection above the limit closes the
+    oldest connection without a request."""
     with serve.server({"index.html": b"the page"}, 0) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         port = server.server_address[1]
@@ -278,7 +279,7 @@ def test_silent_connections_do_not_hold_the_page():
 
 
 def test_pages_get_no_other_installed_packages(tmp_path, monkeypatch):
-    """The tools are installed beside numpy and rich here."""
+    """In this test the tools are installed in the same directory as numpy and rich."""
     shutil.copytree(firmware_path.TOOLS / "kickstand_tools", tmp_path / "kickstand_tools")
     for name in "numpy", "rich":
         (tmp_path / name).mkdir()

@@ -7,7 +7,7 @@ import pytest
 from support.mpy import run_mpy
 from support.web.rider import LAPTOP, Rider
 
-# Five minutes of a ride from the first press, as fast as the board's clock goes; every tick is 20 ms
+# This script simulates a ride from the first press on, as fast as possible. Each tick is 20 ms.
 DRIVE = """
 import json
 from kickstand_tools.web.device import PageDevice
@@ -45,14 +45,14 @@ for i in range(UNTIL_S // 5):
         press(0.15)
 print("\\n" + json.dumps(seen))
 """
-# The whole first lines of the views that come in the drive
+# Every complete first line that the display can show in this ride
 WHOLE = re.compile(
     r" {16}$|Kickstand {7}$|Raw +-?\d+° [+-]\d\.\d\dg *$|Stand: hold {5}$|Now upright: {4}$|Upright: hold {3}$"
     r"|Aligned! +\d+\.\d° *$|Lean  -- {8}$|Lean +\d+° (left|right)? *$|Max left +\d+° *$|(Accel|Brake) +\d\.\d\d g *$"
     r"|Formula +-?\d+° *$| *-?\d\.\d\d *-?\d\.\d\d *-?\d\.\d\dg *$"
 )
 STARTED_S = 1.0
-LASTING_S = 0.08  # the firmware writes a page every 0.1 s: text that disappears sooner was not a page
+LASTING_S = 0.08  # the firmware writes a page every 0.1 s, so a text that disappears sooner was not a page
 LOOK = """(seconds) => new Promise((done) => {
   const seen = [], until = performance.now() + 1000 * seconds;
   const look = () => {
@@ -66,7 +66,10 @@ LOOK = """(seconds) => new Promise((done) => {
 
 
 def flashes(samples):
-    """Return the entries of [[s, words], ...] that last for less than LASTING_S between two others."""
+    """Return the texts that last for less than LASTING_S, without the first and the last one.
+
+    samples: [[s, text], ...].
+    """
     changes = [samples[0]]
     for sample in samples:
         if sample[1] != changes[-1][1]:

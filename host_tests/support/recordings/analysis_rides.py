@@ -20,14 +20,15 @@ CALIBRATION = {
 
 
 def calibration(path: Path, **changed) -> Path:
-    """Write the file CALIBRATION with these changes; return its path."""
+    """Write the entries of CALIBRATION with these changes. Return the path of the file."""
     path.write_text(json.dumps(CALIBRATION | changed))
     return path
 
 
 def write(directory: Path, segments: list, rate_hz: int = 100, speed_hz: int = 0, vibration_g: float = 0.02) -> Path:
-    """Write RIDE.csv and RIDE.cal.json of a ride of these script segments; return the path of the former.
+    """Simulate a ride and write its RIDE.csv and RIDE.cal.json. Return the path of RIDE.csv.
 
+    segments: the ride's manoeuvres, see kickstand_tools.simulation.scripted.
     speed_hz: rate of the speed in the log, 0 for a log without speed.
     """
     return _put(directory, _text(segments, rate_hz, speed_hz, vibration_g))
@@ -53,7 +54,7 @@ def _text(segments: list, rate_hz: int, speed_hz: int, vibration_g: float) -> st
 
 
 def short(directory: Path, rate_hz: int = 100, speed_hz: int = 0) -> Path:
-    """Write a ride of less than a minute: stand, set off, a turn to each side, a hard stop."""
+    """Write a ride of less than a minute: the bike stands, sets off, turns to each side and stops hard."""
     return _put(directory, _short(rate_hz, speed_hz))
 
 

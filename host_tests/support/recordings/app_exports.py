@@ -1,7 +1,7 @@
-"""Writes a known ride as apps and loggers export it. Each small writer follows the documentation of the format's maker.
+"""Writes a known ride as apps and loggers export it. Each writer follows the documentation of the format's maker.
 
-Addresses are in the modules of kickstand_tools.imports.apps and in the tests. No data in this module is copied from an
-export.
+The addresses of these documents are in the modules of kickstand_tools.imports.apps and in the tests. No data in this
+module is copied from an export.
 """
 
 import functools
@@ -25,8 +25,13 @@ _EARTH_M = 6_371_000.0
 
 @dataclass
 class Riding:
-    """n samples: t_s from 0; force_g, rates_dps (n, 3) in the vehicle's left, up, forward; speed_mps, lat_deg, lon_deg,
-    lean_deg (n)."""
+    """The true motion of a ride, n samples.
+
+    t_s: time, from 0 on, shape (n).
+    force_g: specific force along the vehicle's left, up, forward, shape (n, 3).
+    rates_dps: rates about the same axes, shape (n, 3).
+    speed_mps, lat_deg, lon_deg, lean_deg: shape (n).
+    """
 
     t_s: np.ndarray
     force_g: np.ndarray
@@ -45,31 +50,30 @@ class Riding:
         return self.every(round(1.0 / float(np.median(np.diff(self.t_s)))), 20)
 
     def without(self, begin_s: float, end_s: float) -> "Riding":
-        """A gap."""
+        """Return the ride without the samples between two times."""
         kept = (self.t_s < begin_s) | (self.t_s >= end_s)
         return Riding(*(getattr(self, name)[kept] for name in self.__dataclass_fields__))
 
     @property
     def phone_g(self) -> np.ndarray:
-        """The force in PHONE's axes."""
+        """The force in the phone's axes, in g."""
         return self.force_g @ PHONE.T
 
     @property
     def phone_rad(self) -> np.ndarray:
-        """The rates in PHONE's axes, rad/s."""
+        """The rates about the phone's axes, in rad/s."""
         return np.radians(self.rates_dps @ PHONE.T)
 
     @property
     def gravity_g(self) -> np.ndarray:
-        """The gravity that a phone reports: the direction up in its axes, as a specific force, on an upright or leaned
-        bike."""
+        """The gravity that a phone reports: a specific force of 1 g along the direction up, in the phone's axes."""
         lean = np.radians(self.lean_deg)
         return np.column_stack((np.sin(lean), np.cos(lean), np.zeros(len(lean)))) @ PHONE.T
 
 
 @functools.cache
 def riding(rate_hz: int = 200) -> Riding:
-    """Half a minute: stand, set off, turn to each side, stop. The positions begin in Berlin."""
+    """Return a ride of half a minute: stand, set off, turn to each side, stop. The positions begin in Berlin."""
     parts = [script.upright(3), script.accelerate(14, 4), script.turn(-25, 4), script.straight(1)]
     ride = script.Ride([*parts, script.turn(35, 4), script.straight(1), script.brake(0, 3), script.wait(2)], 0.02)
     t_s = np.arange(round(ride.seconds * rate_hz)) / rate_hz
@@ -84,7 +88,7 @@ def riding(rate_hz: int = 200) -> Riding:
 
 
 def lines(names: Sequence[str], rows: Iterable[Sequence[object]], separator: str = ",", comma: bool = False) -> str:
-    """A table as text. comma: a decimal comma."""
+    """Return a table as text. comma: True to write a decimal comma."""
     text = [separator.join(names)]
     for row in rows:
         cells = [cell if isinstance(cell, str) else f"{cell:.9g}" for cell in row]
@@ -93,7 +97,7 @@ def lines(names: Sequence[str], rows: Iterable[Sequence[object]], separator: str
 
 
 def into(target: Path, files: dict[str, str]) -> Path:
-    """Write files into a folder, or into a zip if target ends in .zip."""
+    """Write files into a folder, or into a zip archive if the name of target ends in .zip."""
     if target.suffix != ".zip":
         for name, text in files.items():
             (target / name).parent.mkdir(parents=True, exist_ok=True)
@@ -108,8 +112,10 @@ def into(target: Path, files: dict[str, str]) -> Path:
 
 
 def phyphox(ride: Riding, separator: str = ",", comma: bool = False) -> dict[str, str]:
-    """Use the names and columns of the app's own template. The gyro has half the rate and starts slightly later. GPS
-    comes once per second."""
+    """Write the files and columns of the app's own template.
+
+    The gyro has half the accelerometer's rate and starts slightly later. GPS comes once per second.
+    """
 
     def number(value: float, digits: int = 9) -> str:
         return f"{value:.{digits}E}".replace(".", "," if comma else ".")
@@ -136,7 +142,10 @@ def phyphox(ride: Riding, separator: str = ",", comma: bool = False) -> dict[str
 
 
 def sensor_logger(ride: Riding, platform: str = "android", standard: bool = False) -> dict[str, str]:
-    """One CSV per sensor, columns in the order z, y, x, times in ns since 1970. An iPhone has no TotalAcceleration."""
+    """Write one CSV per sensor, with columns in the order z, y, x and times in ns since 1970.
+
+    An iPhone writes no TotalAcceleration.
+    """
     sign = -1.0 if platform == "ios" and not standard else 1.0
     gyro = ride.every(2, 1)
     head = ["time", "seconds_elapsed", "z", "y", "x"]
@@ -170,7 +179,7 @@ def sensor_logger(ride: Riding, platform: str = "android", standard: bool = Fals
 
 
 def sensorlog(ride: Riding, separator: str = ",", accelerometer: bool = True) -> str:
-    """The wide CSV: Core Motion's values, rows that repeat old values, a fix once per second."""
+    """Write the app's wide CSV: Core Motion's values, rows that repeat old values, and one GPS fix per second."""
     boot_s = 86_400.0
     names = ["loggingTime(txt)", "loggingSample(N)", "locationTimestamp_since1970(s)", "locationLatitude(WGS84)"]
     names += ["locationLongitude(WGS84)", "locationSpeed(m/s)"]
@@ -196,7 +205,10 @@ def sensorlog(ride: Riding, separator: str = ",", accelerometer: bool = True) ->
 
 
 def sensor_kinetics(ride: Riding, semicolon: bool = False) -> dict[str, str]:
-    """NAME_accm.csv, NAME_gyrm.csv, NAME_lacm.csv, NAME_grvm.csv: times have four decimals, and some occur twice."""
+    """Write NAME_accm.csv, NAME_gyrm.csv, NAME_lacm.csv and NAME_grvm.csv.
+
+    Times have four decimals, and some times occur twice.
+    """
     head = ["time", "X_value", "Y_value", "Z_value"]
 
     def table(part: Riding, values: np.ndarray) -> str:
@@ -214,8 +226,10 @@ def sensor_kinetics(ride: Riding, semicolon: bool = False) -> dict[str, str]:
 
 
 def racechrono(ride: Riding, sign: float = 1.0, version: int = 3) -> str:
-    """Version 3 has three header lines and repeats some names. Version 2 has one header line, with units in
-    brackets."""
+    """Write version 3 or 2 of the app's CSV.
+
+    Version 3 has three header lines and repeats some names. Version 2 has one header line, with units in brackets.
+    """
     force, rates = sign * ride.phone_g, np.degrees(ride.phone_rad)
     none = [""] * len(ride.t_s)
     speed = [f"{value:.2f}" for value in ride.speed_mps]
@@ -248,7 +262,10 @@ def racechrono(ride: Riding, sign: float = 1.0, version: int = 3) -> str:
 
 
 def racebox(ride: Riding, per_mps: float = 3.6, laps: bool = False) -> str:
-    """Axes: x forward, y left, z up. The header gives no unit for Speed. per_mps: its value for 1 m/s."""
+    """Write a CSV whose axes are x forward, y left, z up.
+
+    The header has no unit for Speed. per_mps: the number in the column Speed for 1 m/s.
+    """
     names = "Record,Time,Latitude,Longitude,Altitude,Speed,GForceX,GForceY,GForceZ,Lap,GyroX,GyroY,GyroZ".split(",")
     rows = []
     for k, (left, up, forward) in enumerate(ride.force_g.tolist()):
@@ -264,7 +281,11 @@ def racebox(ride: Riding, per_mps: float = 3.6, laps: bool = False) -> str:
 
 
 def vbo(ride: Riding, speed: str = "kmh") -> str:
-    """A file with sections: positions in minutes, positive in the west, and an IMU04's channels in their own signs."""
+    """Write a file with sections.
+
+    Positions are in minutes, and longitudes in the west are positive. The channels of the IMU04 have that unit's own
+    signs.
+    """
     per_mps = {"kmh": 3.6, "knots": 3600.0 / 1852.0}[speed]
     names = ["sats", "time", "lat", "long", "velocity", "heading", "height"]
     units = ["g", "g", "g", "deg/s", "deg/s", "deg/s"]
@@ -286,7 +307,10 @@ def vbo(ride: Riding, speed: str = "kmh") -> str:
 
 
 def aim(ride: Riding, quoted: bool = True, up_sign: float = -1.0) -> str:
-    """The axes are forward, right, down. Every cell is in quotation marks, or saved by a spreadsheet."""
+    """Write a CSV whose axes are forward, right, down.
+
+    quoted: True to put every cell in quotation marks. False to write the cells as a spreadsheet saves them.
+    """
     names = ["Time", "GPS Speed", "GPS Nsat", "GPS Latitude", "GPS Longitude", "InlineAcc", "LateralAcc", "VerticalAcc"]
     names += ["RollRate", "PitchRate", "YawRate", "GPS InlineAcc"]
     units = ["s", "km/h", "#", "deg", "deg", "g", "g", "g", "deg/s", "deg/s", "deg/s", "g"]
@@ -304,14 +328,14 @@ def aim(ride: Riding, quoted: bool = True, up_sign: float = -1.0) -> str:
 
 
 _AXES = [f"{sensor}_{axis}" for sensor in ("Acc", "Gyro") for axis in "XYZ"]
-# the columns of any_table()
+# The columns of any_table()
 ANY_NAMES: dict[str, str] = dict(
     zip(("t", "ax", "ay", "az", "gx", "gy", "gz", "speed"), ("Millis", *_AXES, "Speed_kmh"))
 )
 
 
 def any_table(ride: Riding, separator: str = ",", comma: bool = False) -> str:
-    """An unknown logger: ms, m/s2, rad/s, km/h."""
+    """Write the table of an unknown logger, in ms, m/s2, rad/s and km/h."""
     names = ["Millis", "Acc_X", "Acc_Y", "Acc_Z", "Gyro_X", "Gyro_Y", "Gyro_Z", "Speed_kmh", "Note"]
     rows = []
     for k, t in enumerate(ride.t_s.tolist()):

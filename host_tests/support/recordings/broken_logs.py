@@ -16,7 +16,7 @@ SIZES = (0.0, 1e-3, 1e-6, 9.80665, 57.29578, 1000.0, 1e6, 1e12, -1.0)
 
 
 def _of_lines(way):
-    """Convert a function that breaks a list of lines to one that breaks a text."""
+    """Return a function that breaks a text, from a function that breaks a list of lines."""
 
     @functools.wraps(way)
     def of_text(text: bytes, chance: random.Random) -> bytes:
@@ -27,7 +27,7 @@ def _of_lines(way):
 
 
 def _of_cells(way):
-    """Convert a function that changes lists of cells in place to one that breaks a text."""
+    """Return a function that breaks a text, from a function that changes lists of cells in place."""
 
     @functools.wraps(way)
     def of_text(text: bytes, chance: random.Random) -> bytes:
@@ -184,7 +184,7 @@ def nearly_nothing(text: bytes, chance: random.Random) -> bytes:
 
 
 def pack(text: bytes, chance: random.Random) -> bytes:
-    """Gzip's first bytes, whatever the file's name."""
+    """Start the content with the first bytes of a gzip file, also if the file's name does not end in .gz."""
     return gzip.compress(text, 1, mtime=0)
 
 

@@ -21,17 +21,28 @@ from kickstand_tools.simulation.physics.chip import GYRO_DPS_PER_G, Chip
 from support.recordings.other_bike import FINE_HZ, KINDS, G, _about, _course, _mounting, _noise, _readings, _tolerances
 from support.recordings.smoothed_rides import Known, rms
 
-# The share of each mount. "foreign": accelerations of the mount itself, which shakes or bends
+# The share of rides with each mount. A "foreign" mount shakes or bends, so the sensor measures the mount's own
+# accelerations.
 MOUNTS = {"firm": 0.5, "holder": 0.1, "aliasing": 0.1, "clipping": 0.1, "drifting": 0.1, "foreign": 0.1}
-ROUGH = {"track": (4e-6, 32e-6)}  # m^3 at 0.1 cycles/m, of ISO 8608; others from a new motorway to a patched lane
+# The roughness of a road is its power density in m^3 at 0.1 cycles/m, as in ISO 8608. Roads other than a track range
+# from a new motorway to a patched lane.
+ROUGH = {"track": (4e-6, 32e-6)}
 USUALLY_ROUGH = 8e-6, 512e-6
 WAVES_PER_M = 0.03, 4.0
 
 
 @dataclass
 class DrawnRide:
-    """logs: one per device on the bike (n samples each, on its own clock); calibrations: one per device. Truth (m):
-    time_s, lean_deg, speed_mps. kind, mounts: the drawn kind of ride and mounts."""
+    """A ride with the logs of its devices and its true motion.
+
+    logs: one log per device on the bike. Each has its own clock.
+    calibrations: one calibration per device.
+    time_s: time of each true value, in s.
+    lean_deg: true lean at time_s.
+    speed_mps: true speed at time_s.
+    kind: the kind of ride, a key of DRAWN.
+    mounts: one mount per device, a key of MOUNTS.
+    """
 
     logs: list
     calibrations: list
@@ -46,12 +57,12 @@ class DrawnRide:
         return np.interp(self.logs[k].t_s, self.time_s, self.lean_deg)
 
     def riding(self, k):
-        """(n) True from setting off on."""
+        """Return True for each sample of device k after the bike has set off."""
         return self.logs[k].t_s > self.time_s[np.argmax(self.speed_mps > 0.5)]
 
 
 def street(chance):
-    """Bends to either side, straights, some traffic lights."""
+    """Return the legs of a ride with bends to either side, straights and some traffic lights."""
     legs = [(6.0, 0.0, 0.0), (6.0, 0.0, 15.0)]
     for _ in range(60):
         speed, kind = chance.uniform(11.0, 26.0), chance.random()
@@ -65,7 +76,7 @@ def street(chance):
 
 
 def city(chance):
-    """Junctions and roundabouts at 4 to 13 m/s, and stops."""
+    """Return the legs of a ride with junctions and roundabouts at 4 to 13 m/s, and stops."""
     legs = [(6.0, 0.0, 0.0), (5.0, 0.0, 9.0)]
     for _ in range(60):
         speed, kind = chance.uniform(4.0, 8.0), chance.random()
@@ -79,7 +90,7 @@ def city(chance):
 
 
 def hills(chance):
-    """Like street(), but slower; the ride's conditions add the slopes."""
+    """Return the legs of street() at 0.7 times the speed. drawn_ride() adds the slopes."""
     return [(s, lean, 0.7 * v) for s, lean, v in street(chance)]
 
 
@@ -87,9 +98,14 @@ DRAWN = {**KINDS, "street": street, "city": city, "hills": hills}
 
 
 def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
-    """mounts: one per device on the bike; None: one device with a random mount. kind: None: at random. sheet: the
-    sensor has all errors of its data sheet, and is calibrated by one log of the six positions and by two poses.
-    Otherwise it only has the errors that remain after a calibration."""
+    """Return a DrawnRide. The same arguments give the same ride.
+
+    seconds: longest duration.
+    mounts: one mount per device on the bike. None: one device with a random mount.
+    kind: a key of DRAWN. None: a random one.
+    sheet: True for a sensor with all errors of its data sheet, calibrated by one log of the six positions and by two
+        poses. False for a sensor that only has the errors that remain after a calibration.
+    """
     chance = np.random.default_rng([seed, 24])
     drawn = str(chance.choice(list(DRAWN)))
     kind = kind or drawn
@@ -103,7 +119,8 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
     time, lean, v = _course([*kept, (8.0, 0.0, 15.0)])
     n = len(time)
     riding = np.clip((v - 1.0) / 3.0, 0.0, 1.0)
-    # The lean of balance, and the chassis's deviation from it: wide tyres on a tilted road, and a rider who moves
+    # The chassis's lean differs from the lean of balance, because the tyres are wide, the road is tilted and the rider
+    # moves.
     wander = chance.uniform(0.2, 0.8) * _noise(chance, n, chance.uniform(0.5, 1.5)) * riding
     balance = np.radians(lean + wander)
     tilt = np.radians(chance.uniform(-2.5, 2.5) + chance.uniform(0.3, 1.0) * _noise(chance, n, 8.0))
@@ -113,7 +130,7 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
     rider = np.radians(np.exp(chance.uniform(np.log(0.3), np.log(1.5))) * _noise(chance, n, chance.uniform(0.7, 3.0)))
     hung = chance.uniform(-0.02, 0.06)
     chassis = balance + (flank + rider - hung * balance) * riding
-    # The roll balance: to lean over, a bike first steers the other way
+    # The yaw rate follows from the balance of roll. To lean over, a bike first steers to the other side.
     falling = chance.uniform(0.6, 0.75) * _twice(balance) / np.cos(balance)
     yaw_rate = np.where(v > 0.5, (falling - G * np.tan(balance)) / np.maximum(v, 3.0), 0.0)
     steep = chance.uniform(1.5, 4.0) if kind == "hills" else chance.uniform(0.3, 1.5)
@@ -142,15 +159,23 @@ def drawn_ride(seed, seconds=150.0, mounts=None, kind=None, sheet=False):
 
 
 def _dive(chance, push):
-    """Pitch (rad, nose up) by the springs at a forward acceleration (g): a fork dives by up to 6 degrees per g and a
-    rear sits down by up to half as much; one fork of eight is an anti-dive one, which rises a little."""
+    """Return the pitch that the springs cause, in rad, positive with the nose up.
+
+    A fork dives by up to 6 degrees per g of braking. The rear sinks by up to 3 degrees per g of acceleration. One bike
+    of eight has an anti-dive fork, which dives by at most 0.5 degrees per g and may rise by up to 1 degree per g.
+
+    push: forward acceleration in g.
+    """
     braking = chance.uniform(-1.0, 0.5) if chance.random() < 0.125 else chance.uniform(0.0, 6.0)
     return np.radians(np.where(push < 0.0, braking, chance.uniform(0.0, 3.0))) * push
 
 
 def _device(chance, mount, force, rates, v, engine, turns, sensor):
-    """The readings of a sensor on the bike, and its calibration by six positions and two inexact poses. sensor: the
-    random source for a sensor with all errors of its data sheet, or None."""
+    """Return the log of a sensor on the bike and its calibration by six positions and two inexact poses.
+
+    sensor: random generator of a sensor with all errors of its data sheet. None: the sensor only has the errors that
+        remain after a calibration.
+    """
     n, rough = len(v), np.clip(v / 5.0, 0.1, 1.0)[:, None]
     for order in (1.0, 2.0):
         phases, weights = chance.uniform(0.0, 2.0 * np.pi, 6), chance.uniform(0.2, 1.0, 6)
@@ -163,7 +188,7 @@ def _device(chance, mount, force, rates, v, engine, turns, sensor):
             np.column_stack([_through(column, *spring) for column, spring in zip(values.T, springs)])
             for values in (force, rates)
         )
-        # The forces make the mount sag, and the gyro measures that
+        # The forces bend the mount, and the gyro measures this rotation.
         sagged = np.radians(chance.uniform(0.1, 0.3)) * (10.0 / hz[0]) ** 2 * np.clip(force[:, 0], -2.0, 2.0)
         rates[:, 2] -= np.degrees(np.gradient(sagged) * FINE_HZ)
         force[:, 0] -= sagged * force[:, 1]
@@ -204,9 +229,12 @@ def _device(chance, mount, force, rates, v, engine, turns, sensor):
 
 
 def _of_the_sheet(chance, time, force, rates, mounting):
-    """The log and the calibration of a sensor that turns these true forces and rates in its own axes into readings with
-    all errors of the data sheet. The upright pose is 1.5 degrees off. The pitch between the two poses is up to 1 degree
-    off."""
+    """Return the log and the calibration of a sensor with all errors of the data sheet.
+
+    The upright pose is 1.5 degrees off. The pitch changes by up to 1 degree between the two poses.
+
+    force, rates: true values in the sensor's axes.
+    """
     chip, home_c = Chip.random(chance), chance.uniform(18.0, 25.0)
     hand = Hand(detour_deg=chance.uniform(5.0, 30.0), push_g=chance.uniform(0.03, 0.2))
     six = hands.procedure(chance, chip, np.array(list(poses.ups(chance))), home_c, hand)
@@ -227,7 +255,10 @@ def _of_the_sheet(chance, time, force, rates, mounting):
 
 
 def _road(chance, v, wheelbase, roughness):
-    """Height (m) of the chassis over each wheel: waves of the road by ISO 8608, met at v, through tyre and spring."""
+    """Return the height of the chassis over the rear and over the front wheel, in m.
+
+    The bike rides at the speed v over a road with waves as in ISO 8608. Springs and tyres filter these waves.
+    """
     at = np.cumsum(v) / FINE_HZ
     edges = np.geomspace(WAVES_PER_M[0], WAVES_PER_M[1], 241)
     waves = np.sqrt(edges[1:] * edges[:-1]) * np.exp(chance.normal(0.0, 0.003, 240))
@@ -247,12 +278,19 @@ def _road(chance, v, wheelbase, roughness):
 
 
 def _spring(hz, damping, by_its_foot=False):
-    """Coefficients of (1 + b s) / (1 + a s + s^2) with s in units of the natural frequency."""
+    """Return (hz, a, b): the spring's natural frequency in Hz and the coefficients of its transfer function.
+
+    The function is (1 + b s) / (1 + a s + s^2). Here s is the complex frequency divided by the natural frequency.
+    by_its_foot: True if the foot of the spring moves. The damper then passes on this movement, so b equals a.
+    """
     return hz, 2.0 * damping, 2.0 * damping if by_its_foot else 0.0
 
 
 def _through(x, hz, a, b):
-    """Filter x by a mass on a spring, with the exact gain at each frequency. The values at both ends are held."""
+    """Filter x as a mass on a spring does, with the exact gain at each frequency.
+
+    Before its beginning and after its end x is assumed to be constant.
+    """
     pad = 4 * FINE_HZ
     size = 1 << int(np.ceil(np.log2(len(x) + 2 * pad)))
     padded = np.pad(x, (pad, size - len(x) - pad), mode="edge")
@@ -267,14 +305,18 @@ def _twice(x):
 
 
 def judged(ride, k=0):
-    """Return three arrays in degrees for device k, only while riding: the live lean's error (NaN where not shown), the
-    smoothed lean's error, and the standard deviation that smoothing gives."""
+    """Return the result of Known.judged() for device k."""
     return Known(ride.logs[k], ride.calibrations[k], ride.true_lean(k), ride.riding(k)).judged()
 
 
 def figures(seed):
-    """seed, kind, mount; live: rms, worst, share shown; smoothed: rms, worst, share within 1 and 2 sigma, mean
-    sigma."""
+    """Judge one ride.
+
+    Returns:
+        seed, kind of ride, mount.
+        live lean: rms error and worst error in degrees, share of samples with a shown lean.
+        smoothed lean: rms error and worst error in degrees, shares within 1 and 2 sigma, mean sigma in degrees.
+    """
     ride = drawn_ride(seed)
     live, off, sigma = judged(ride)
     seen = ~np.isnan(live)
@@ -293,7 +335,10 @@ FORM = "%5d %-9s %-9s %5.2f %5.1f %4.0f%%  %5.2f %5.1f %4.0f%% %4.0f%% %5.2f"
 
 
 def main(which, count):
-    """Print the figures of each of `count` seeds, then those of all seeds, by mount."""
+    """Print one line of figures per seed, then one line per mount.
+
+    which: "odd" or "even" seeds. count: number of seeds.
+    """
     seeds, rows = range(which == "odd", 2 * int(count), 2), []
     print(" seed kind      mount      live worst shown  smooth worst  1 s  2 s sigma")
     for row in map(figures, seeds):

@@ -10,7 +10,7 @@ GRAVITY = 9.80665
 ACCEL_UNITS = {"g": 1.0, "m/s2": GRAVITY, "mg": 1000.0}
 GYRO_UNITS = {"deg/s": 1.0, "rad/s": np.pi / 180.0, "mdeg/s": 1000.0}
 COUNTS = ((16384.0, 131.0), (8192.0, 65.5), (4096.0, 32.8), (2048.0, 16.4))
-# {} is the axis; the last two names of each list state the unit
+# {} stands for the axis. The last two names of each list state the unit.
 NAMES = (
     ("ax ay az", "gx gy gz"),
     ("AccX AccY AccZ", "GyroX GyroY GyroZ"),
@@ -38,8 +38,14 @@ EPOCH_S = 1_715_938_200.25
 
 @dataclass
 class DrawnTable:
-    """text: the file's content. time_s (n), force_g (n, 3), rates_dps (n, 3): its true values. kind: the kind of
-    motion."""
+    """A random table with the motion that it was made from.
+
+    text: content of the file.
+    time_s: shape (n).
+    force_g: true specific force, shape (n, 3).
+    rates_dps: true rates, shape (n, 3).
+    kind: the kind of motion.
+    """
 
     text: str
     time_s: np.ndarray
@@ -110,7 +116,7 @@ def motion(kind: str, hz: float, random: np.random.Generator) -> tuple[np.ndarra
         force[k] = up
         w = np.radians(rates[k]) / hz
         angle = np.linalg.norm(w)
-        if angle > 0.0:  # gravity turns opposite to the sensor
+        if angle > 0.0:  # in the sensor's axes, gravity turns in the opposite direction
             axis = -w / angle
             up = up * np.cos(angle) + np.cross(axis, up) * np.sin(angle) + axis * (axis @ up) * (1.0 - np.cos(angle))
     noise = 0.2 if kind == "shaken" else 0.004
@@ -172,7 +178,7 @@ def _table(random: np.random.Generator, names: list[str] | None, clock: str, tim
 
 
 def _labels(random: np.random.Generator, clock: str, time: list[str], cells: Cells) -> str:
-    """Lines as an Arduino sketch prints them to a serial monitor."""
+    """Write lines with labelled values, as an Arduino sketch prints them to a serial monitor."""
     stamped = ":" in time[0]
     names = [name for axes in NAMES[random.integers(3)] for name in axes.split()]
     mark, between = str(random.choice([": ", ":", " = "])), str(random.choice(["\t", ", ", " "]))

@@ -20,7 +20,7 @@ def film(path: Path, seconds: float, fps: int = 10, size: str = "320x240", colou
 
 
 def frames(path: Path, form: str = "rgb24") -> np.ndarray:
-    """(n, height, width, 3 or 4) all pictures of a video; "rgba": with its transparency."""
+    """Return all pictures of a video, shape (n, height, width, 3), or (..., 4) for "rgba", with transparency."""
     channels = 4 if form == "rgba" else 3
     decoder = ["-c:v", "libvpx-vp9"] if path.suffix == ".webm" else []  # ffmpeg's own decoder ignores transparency
     reader = imageio_ffmpeg.read_frames(str(path), pix_fmt=form, bits_per_pixel=8 * channels, input_params=decoder)
@@ -29,13 +29,16 @@ def frames(path: Path, form: str = "rgb24") -> np.ndarray:
 
 
 def with_telemetry(video: Path, rate_dps: np.ndarray, rate_hz: float) -> Path:
-    """The same video, with a track of GPMF added: the gyro's readings (n, 3) from its first picture on."""
+    """Return the video with an added GPMF track of the gyro's readings.
+
+    rate_dps: readings from the first picture on, shape (n, 3).
+    """
     count = round(rate_hz)
     packets = [_packet(rate_dps[begin : begin + count]) for begin in range(0, len(rate_dps) - count + 1, count)]
     content = video.read_bytes()
     moov = _find(content, b"moov")
     head, inner, rest = content[: moov.start], content[moov.start + 8 : moov.stop], content[moov.stop :]
-    assert not rest  # the data before it keeps its place
+    assert not rest  # the earlier parts of the file keep their offsets
     length = 8 + len(inner) + len(_track(packets, 0))
     grown = inner + _track(packets, len(head) + length + 8)
     video.write_bytes(head + _box(b"moov", grown) + _box(b"mdat", b"".join(packets)))
@@ -72,7 +75,7 @@ def _find(content: bytes, name: bytes) -> slice:
 
 
 def _track(packets: list[bytes], begin: int) -> bytes:
-    """An MP4 track with one packet per second. begin: offset of the first packet in the file."""
+    """Return an MP4 track with one packet per second. begin: offset of the first packet in the file."""
     count, seconds = len(packets), 1000 * len(packets)
     matrix = struct.pack(">9i", 65536, 0, 0, 0, 65536, 0, 0, 0, 1 << 30)
     tkhd = struct.pack(">IIIIII8xHHHH", 7, 0, 0, 3, 0, seconds, 0, 0, 0, 0) + matrix + struct.pack(">II", 0, 0)

@@ -1,7 +1,10 @@
-"""Compares the error of the lean with its targets. Sensors have all errors of the data sheet and are calibrated by one
-log of the six positions. The upright pose is 1.5 degrees off. Bikes have any dive, and rides are with and without a
-measured speed. Both simulators are used. Parameters are fitted with even seeds only; figures are reported for odd
-seeds. As a program: a line per simulator, profile and mount, in 20 s per ride on one processor:
+"""Measures the error of the lean in rides of both simulators, to compare it with its targets.
+
+Each sensor has all errors of the data sheet and is calibrated by one log of the six positions. The upright pose is 1.5
+degrees off. The dive of each bike is random. Rides are judged with and without a measured speed. Parameters are fitted
+with even seeds only, and figures are reported for odd seeds.
+
+The program prints one line per simulator, profile and mount. It takes 20 s per ride on one processor:
 
     OMP_NUM_THREADS=1 PYTHONPATH=host_tests .venv/bin/python -m support.recordings.limit_rides odd 4
 """
@@ -18,7 +21,7 @@ from kickstand_workshop.evaluation.runs import as_log, calibrated_by_log
 from support.recordings.drawn_rides import MOUNTS as DRAWN_MOUNTS, drawn_ride
 from support.recordings.smoothed_rides import Known, rms
 
-# degrees rms of the live lean
+# Largest rms error of the live lean for each profile, in degrees
 TARGETS = {"street": 0.35, "track": 0.50, "sweeper": 0.38, "city": 0.28, "hills": 0.34}
 SECONDS = 240.0
 SPEEDS = ("GPS 1 Hz", "GPS 10 Hz", "wheel")
@@ -26,19 +29,23 @@ SPEEDS = ("GPS 1 Hz", "GPS 10 Hz", "wheel")
 
 @dataclass
 class Measured(Known):
-    """A ride with its true speed (n, m/s)."""
+    """A ride with its true speed, shape (n), in m/s."""
 
     speed_mps: np.ndarray
 
     def with_speed(self, kind, seed):
-        """The log with the speed that a GPS receiver or a contact at the rear wheel measures."""
+        """Return the log with the speed as a GPS receiver or a contact at the rear wheel measures it.
+
+        kind: one of SPEEDS.
+        """
         chance, time = np.random.default_rng([seed, *kind.encode()]), self.log.t_s
         hz, late = {"GPS 1 Hz": (1.0, 0.5), "GPS 10 Hz": (10.0, 0.2), "wheel": (4.0, 0.0)}[kind]
         at = np.arange(time[0] + 1.0, time[-1], 1.0 / hz)
         n = len(at)
         true, lean = (np.interp(at - late, time, values) for values in (self.speed_mps, self.lean_deg))
         if kind == "wheel":
-            # The tyre is worn, has a smaller radius when the bike leans, and slips in proportion to the driving force
+            # Three errors of a wheel's speed: the tyre is worn, its rolling radius is smaller when the bike leans, and
+            # it slips in proportion to the driving force.
             push = np.gradient(true, at) / 9.8
             shrunk = 1.0 - 0.28 * (1.0 - np.cos(np.radians(lean)))
             seen = true * chance.uniform(0.98, 1.02) / shrunk * (1.0 + 0.05 * np.clip(push, -0.3, 0.5))
@@ -51,7 +58,10 @@ class Measured(Known):
 
 
 def limit_ride(simulator, profile, seed, mount=None, seconds=SECONDS):
-    """simulator: "simulate" or "drawn". profile: one of TARGETS. mount: None for a firm one."""
+    """Return a ride with its true lean and speed as a Measured.
+
+    simulator: "simulate" or "drawn". profile: a key of TARGETS. mount: name of a mount, or None for a firm one.
+    """
     if simulator == "drawn":
         kind = "sweepers" if profile == "sweeper" else profile
         made = drawn_ride(seed, seconds, [mount or "firm"], kind, sheet=True)
@@ -71,8 +81,14 @@ def limit_ride(simulator, profile, seed, mount=None, seconds=SECONDS):
 
 @dataclass
 class Found:
-    """Errors (n, riding) in degrees and their standard deviations, live (NaN where not shown) and smoothed; with: the
-    live errors with each of SPEEDS."""
+    """Errors of the lean and their standard deviations while riding. Each array has the shape (n), in degrees.
+
+    live: errors of the live lean, NaN where it is not shown.
+    live_sigma: standard deviations that the firmware computes.
+    smoothed: errors of the smoothed lean.
+    smoothed_sigma: standard deviations that smoothing computes.
+    with_speed: {name in SPEEDS: errors of the live lean with this speed}.
+    """
 
     live: np.ndarray
     live_sigma: np.ndarray
@@ -98,13 +114,13 @@ def judge(known, seed, speeds=SPEEDS):
 
 
 def shares(error, sigma):
-    """Percentages within one and two standard deviations."""
+    """Return the percentages of errors within one and within two standard deviations."""
     seen = ~np.isnan(error)
     return [100.0 * float(np.mean(np.abs(error[seen]) < times * sigma[seen])) for times in (1.0, 2.0)]
 
 
 def line(name, rides):
-    """Pool the figures of some rides."""
+    """Return the printed line for some rides, computed from all their samples together."""
     live, live_sigma, smoothed, sigma = (
         np.concatenate([getattr(one, field) for one in rides])
         for field in ("live", "live_sigma", "smoothed", "smoothed_sigma")
@@ -130,7 +146,11 @@ HEAD = " " * 24 + " rides live worst shown  1 s  2 s   smooth worst 1 s  2 s wor
 
 
 def main(which, count, *mounts):
-    """Score `count` seeds of each profile and simulator. mounts: used instead of a firm one, or "all"."""
+    """Print the figures of each profile and simulator.
+
+    which: "odd" or "even" seeds. count: number of seeds. mounts: names of the mounts to use, or only "all". Without
+        mounts, a firm mount is used.
+    """
     print(HEAD, flush=True)
     for simulator, known in (("simulate", SIMULATED_MOUNTS), ("drawn", DRAWN_MOUNTS)):
         for profile in TARGETS:

@@ -1,9 +1,10 @@
 """A second simulator of rides, which shares nothing with kickstand_tools.simulation. It checks parameters that were
-fitted with that simulator.
+fitted with kickstand_tools.simulation.
 
-Path and attitude are random curves, which determine the sensor's position. Its readings are numerical derivatives: the
-force of the position, the rates of the attitude's matrix. The bike is in exact balance except for a rider who moves.
-The vibration is white noise. World axes: x, y level, z up. Vehicle axes: left, up, forward.
+The path and the attitude of the bike are random curves. They determine the sensor's position. The force is the second
+derivative of this position plus gravity, and the rates are derivatives of the attitude's matrix. Both are computed
+numerically. The bike is in exact balance, except for the movements of its rider. The vibration is white noise. In the
+world's axes x and y are level and z is up. The vehicle's axes are left, up and forward.
 """
 
 import numpy as np
@@ -13,13 +14,17 @@ from kickstand_tools.signals import rotation_matrix
 
 G = 9.80665
 FINE_HZ, RATE_HZ = 800, 200
-UP_ERROR_DEG, PITCH_ERROR_DEG, STAND_DEG = 1.5, 1.0, 11.0  # errors of the two poses, and the tilt between them
+# The roll error of the upright pose, the change of pitch between the two poses, and the tilt between them
+UP_ERROR_DEG, PITCH_ERROR_DEG, STAND_DEG = 1.5, 1.0, 11.0
 VIBRATION_G, VIBRATION_DPS = 0.12, 1.5  # rms of white noise in each sample
 RIDER_DEG = 2.0  # rms difference between the bike's lean and the lean of balance, caused by the rider's movements
 
 
 def sweepers(chance):
-    """(seconds, lean in degrees, speed in m/s) of legs: turns of 60 s at 38 degrees, to either side."""
+    """Return legs with turns of 60 s at 38 degrees, to either side.
+
+    Each leg of a ride is (duration in s, lean in degrees, speed in m/s).
+    """
     legs = [(6.0, 0.0, 0.0), (8.0, 0.0, 22.0)]
     for side in (1.0, -1.0, -1.0, 1.0):
         legs += [(5.0, 0.0, 22.0), (60.0, 38.0 * side, 22.0)]
@@ -27,7 +32,7 @@ def sweepers(chance):
 
 
 def held(chance):
-    """Return long turns to both sides, without straights between them."""
+    """Return legs with long turns to both sides, without straights between them."""
     legs = [(6.0, 0.0, 0.0), (8.0, 0.0, 20.0)]
     for k in range(5):
         legs += [(chance.uniform(25.0, 60.0), chance.uniform(28.0, 42.0) * (-1.0) ** k, chance.uniform(18.0, 25.0))]
@@ -35,7 +40,7 @@ def held(chance):
 
 
 def track(chance):
-    """Return 35 corners of 30 to 55 degrees, with a few short straights."""
+    """Return legs with 35 corners of 30 to 55 degrees, and a few short straights."""
     legs = [(6.0, 0.0, 0.0), (8.0, 0.0, 28.0)]
     for _ in range(35):
         lean, speed = chance.choice((-1.0, 1.0)) * chance.uniform(30.0, 55.0), chance.uniform(18.0, 33.0)
@@ -49,10 +54,19 @@ KINDS = {"sweepers": sweepers, "held": held, "track": track}
 
 
 def other_ride(kind, seed, seconds, height_m=0.0, speed=False):
-    """Log (n samples), calibration by two sloppy poses, and the truth (n): lean in degrees, speed in m/s.
+    """Simulate a ride.
 
-    seconds: the longest duration, in whole legs. height_m: of the sensor above the roll axis. speed: True to record it
-    once per second, 0.4 s late."""
+    kind: a key of KINDS.
+    seconds: longest duration. Legs that end later are left out.
+    height_m: height of the sensor above the roll axis.
+    speed: True to record the speed in the log once per second, 0.4 s late.
+
+    Returns:
+        log: n samples.
+        calibration: by two inexact poses.
+        lean: true lean in degrees, shape (n).
+        speed: true speed in m/s, shape (n).
+    """
     chance = np.random.default_rng([seed, *kind.encode()])
     legs = KINDS[kind](chance)
     legs = [leg for leg, end in zip(legs, np.cumsum([leg[0] for leg in legs])) if end <= seconds]
@@ -74,7 +88,7 @@ def other_ride(kind, seed, seconds, height_m=0.0, speed=False):
     drift = np.cumsum(chance.standard_normal((count, 3)), axis=0) * 0.004 / np.sqrt(RATE_HZ)
     rates = rates @ gyro.T + chance.uniform(-0.3, 0.3, 3) + drift
     force = force @ accel.T + chance.uniform(-0.005, 0.005, 3)
-    # The upright pose has an error in roll; a change of pitch between the poses causes an error in yaw
+    # The upright pose has an error in roll. A change of pitch between the poses causes an error in yaw.
     roll, yaw = np.radians(UP_ERROR_DEG), np.radians(PITCH_ERROR_DEG) / np.tan(np.radians(STAND_DEG))
     roll, yaw = roll * chance.choice((-1.0, 1.0)), yaw * chance.choice((-1.0, 1.0))
     wrong = _about(2, roll) @ _about(1, yaw)
@@ -89,7 +103,10 @@ def other_ride(kind, seed, seconds, height_m=0.0, speed=False):
 
 
 def _tolerances(chance):
-    """Matrices of scale and cross-axis errors of a gyro and an accelerometer after the six positions."""
+    """Return two matrices (3, 3) with the errors of scale and of cross-axes that remain after the six positions.
+
+    The first matrix is the gyro's, the second the accelerometer's.
+    """
     return [
         np.eye(3) + chance.uniform(-1.0, 1.0, (3, 3)) * np.where(np.eye(3) > 0, scale, cross)
         for scale, cross in ((0.03, 0.02), (0.004, 0.01))
@@ -97,13 +114,13 @@ def _tolerances(chance):
 
 
 def _mounting(chance):
-    """The mounting of a sensor: a random rotation."""
+    """Return the mounting of a sensor, a random rotation matrix."""
     mounting, _ = np.linalg.qr(chance.standard_normal((3, 3)))
     return mounting * np.linalg.det(mounting)
 
 
 def _course(legs):
-    """Time (s), lean (degrees) and speed (m/s), smooth, at FINE_HZ."""
+    """Return the smooth course of the legs at FINE_HZ: time in s, lean in degrees, speed in m/s."""
     ends = np.cumsum([leg[0] for leg in legs])
     time = np.arange(int(ends[-1] * FINE_HZ)) / FINE_HZ
     which = np.searchsorted(ends, time, side="right").clip(0, len(legs) - 1)
@@ -113,10 +130,17 @@ def _course(legs):
 
 
 def _readings(v, yaw_rate, slope, lean, pitch, height_m, slip=0.0, heave_m=0.0, ahead_m=0.0):
-    """Specific force (g) and rates (rad/s) along left, up, forward, by differences of place and attitude.
+    """Compute what a perfect sensor reads, by numerical derivatives of its position and its attitude.
 
-    slip: angle (rad, to the left) from the bike's heading to its direction of travel. heave_m: of the roll axis at the
-    rear wheel. height_m, ahead_m: of the sensor above this axis, and in front of that wheel."""
+    slip: angle from the bike's heading to its direction of travel, in rad, positive to the left.
+    heave_m: vertical movement of the roll axis at the rear wheel.
+    height_m: height of the sensor above the roll axis.
+    ahead_m: distance of the sensor in front of the rear wheel.
+
+    Returns:
+        force: specific force along left, up, forward, shape (n, 3), in g.
+        rates: about the same axes, shape (n, 3), in rad/s.
+    """
     heading = np.cumsum(yaw_rate) / FINE_HZ
     course = heading + slip
     direction = np.cos(slope) * np.cos(course), np.cos(slope) * np.sin(course), np.sin(slope)
@@ -131,7 +155,7 @@ def _readings(v, yaw_rate, slope, lean, pitch, height_m, slip=0.0, heave_m=0.0, 
     place = place + height_m * up + ahead_m * ahead
     place[:, 2] += heave_m
     acceleration = np.gradient(np.gradient(place, axis=0), axis=0) * FINE_HZ**2 + [0.0, 0.0, G]
-    body = np.stack((left, up, ahead), axis=1)  # rows are the vehicle's axes in the world
+    body = np.stack((left, up, ahead), axis=1)  # each row is an axis of the vehicle, in the world's axes
     change = np.gradient(body, axis=0) * FINE_HZ
     force = np.einsum("nij,nj->ni", body, acceleration) / G
     turning = (change[:, 1] * ahead, change[:, 2] * left, change[:, 0] * up)
@@ -144,7 +168,7 @@ def _about(axis, angle):
 
 
 def _smooth(values, seconds):
-    """Apply a moving mean twice, which makes a movement as smooth as a hand's."""
+    """Apply a moving mean three times. The result is as smooth as the movement of a hand."""
     width = max(1, round(seconds * FINE_HZ))
     window = np.full(width, 1.0 / width)
     for _ in range(3):
@@ -154,7 +178,7 @@ def _smooth(values, seconds):
 
 
 def _noise(chance, n, seconds):
-    """Smooth noise of rms 1 that changes within `seconds`."""
+    """Return n samples of smooth noise with rms 1. It changes within about this many seconds."""
     knots = chance.standard_normal(int(n / FINE_HZ / seconds) + 3)
     values = _smooth(np.interp(np.arange(n) / FINE_HZ / seconds, np.arange(len(knots)), knots), 0.5 * seconds)
     return values / np.std(values)

@@ -27,10 +27,15 @@ def track(
     speed: bool = True,
     pace: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Track:
-    """One point per second. The track begins earlier than the ride and ends later. Positions have an error of error_m
-    (1 sigma), which changes within changes_s. Their total delay is late_s; smooth_s of that is the mean delay of a
-    low-pass. pace: the same road at another speed: for each sample of the ride its new time (s) and the factor on its
-    speed.
+    """Return the track that a phone records on this ride, one point per second.
+
+    late_s: total delay of the positions.
+    error_m: standard deviation of a position's error.
+    changes_s: time within which this error changes.
+    smooth_s: part of late_s that is the mean delay of a low-pass filter.
+    before_s, after_s: time that the track begins before the ride and ends after it.
+    speed: True if the track has speeds.
+    pace: (new time in s, factor on the speed) of each sample of the ride, to ride the same road at another speed.
     """
     chance = np.random.default_rng(seed)
     step_s = 1.0 / ride.rate_hz
@@ -62,7 +67,7 @@ def _low_pass(values: np.ndarray, delay_s: float, step_s: float) -> np.ndarray:
 
 
 def _wander(chance: np.random.Generator, count: int, sigma_m: float, changes_s: float) -> np.ndarray:
-    """A correlated error, which decays within changes_s, and a little noise."""
+    """Return `count` errors in m: a correlated error that decays within changes_s, and a little white noise."""
     kept, values = np.exp(-1.0 / changes_s), [chance.normal(0.0, sigma_m)]
     for push in chance.normal(0.0, sigma_m * np.sqrt(1.0 - kept * kept), count - 1):
         values.append(kept * values[-1] + push)
@@ -70,7 +75,10 @@ def _wander(chance: np.random.Generator, count: int, sigma_m: float, changes_s: 
 
 
 def write_gpx(path: Path, track: Track, speed_as: str = "") -> Path:
-    """speed_as: "" for none, "1.0" for the element of GPX 1.0, "garmin" for the extension of GPX 1.1."""
+    """Write the track as a GPX file.
+
+    speed_as: "" for a file without speeds, "1.0" for the element of GPX 1.0, "garmin" for the extension of GPX 1.1.
+    """
     document, segment = gpxpy.gpx.GPX(), gpxpy.gpx.GPXTrackSegment()
     document.tracks.append(gpxpy.gpx.GPXTrack())
     document.tracks[0].segments.append(segment)

@@ -1,7 +1,8 @@
 """Measures how often the gyro check of the two presses refuses a sound sensor, and how often it misses a faulty one.
 
-Sensors with all errors of the data sheet, calibrated by the six positions or not, mounted at any angle. Hands raise the
-bike from its stand at once or after a while, shake it and turn it about the vertical. As a program:
+The simulated sensors have all errors of the data sheet and any mounting. Some are calibrated by the six positions.
+Hands raise the bike from its stand at once or after a while. They shake it and turn it about the vertical. The program
+prints the shares:
 
     OMP_NUM_THREADS=1 PYTHONPATH=host_tests .venv/bin/python -m support.recordings.press_check 1000
 """
@@ -25,8 +26,12 @@ FAULTS = ("dead", "half", "mirrored", "double")
 
 
 def presses(chance, chip, mounting):
-    """Readings (n, 7) at 200 Hz from the pose on the kickstand to the upright pose, and the tilt between the two in
-    degrees. The first and last POSE samples are at rest."""
+    """Simulate the two presses: the pose on the kickstand, then the movement to the upright pose.
+
+    Returns:
+        readings: shape (n, 7), at 200 Hz. The first and the last POSE samples are at rest.
+        tilt: angle between the two poses in degrees.
+    """
     wait_s, raise_s = np.exp(chance.uniform(*np.log((0.3, 40.0)))), chance.uniform(0.8, 4.0)
     n, still = int((wait_s + raise_s + 1.0) * RATE_HZ), POSE * RATE_HZ // 200
     tilt = chance.uniform(6.0, 18.0)
@@ -44,7 +49,7 @@ def presses(chance, chip, mounting):
     hand = np.radians(0.05) * band_noise(chance, len(lean), 0.2, 0.6, RATE_HZ)
     lean[-still:] += hand[-still:]
     zero = np.zeros_like(lean)
-    # axes left, up, forward; a lean to the right turns the world's up to the left
+    # The axes are left, up, forward. In these axes, a lean to the right turns the direction up to the left.
     body = (
         _rotations(np.column_stack((zero, yaw, zero)))
         @ _rotations(np.column_stack((-pitch, zero, zero)))
@@ -58,7 +63,10 @@ def presses(chance, chip, mounting):
 
 
 def refusal(chance, fault=None, six_done=False, axis=0):
-    """The code of the refusal, or None. fault: the fault of the gyro's axis `axis`."""
+    """Return the code with which the check refuses a random sensor, or None if it passes.
+
+    fault: one of FAULTS, or None for a sound sensor. axis: index of the faulty axis of the gyro.
+    """
     chip, mounting = Chip.random(chance), random_rotation(chance)
     readings, _ = presses(chance, chip, mounting)
     factor = {"dead": 0.0, "half": 0.5, "mirrored": -1.0, "double": 2.0, None: 1.0}[fault]
@@ -88,7 +96,7 @@ def refusal(chance, fault=None, six_done=False, axis=0):
 
 
 def main(count):
-    """Print the share of refusals for `count` sound sensors, then for each fault."""
+    """Print the share of refusals for `count` sound sensors, then the share for each fault."""
     for six_done in (False, True):
         codes = [refusal(np.random.default_rng([k, 31]), None, six_done)[0] for k in range(int(count))]
         found = {str(code): codes.count(code) for code in set(codes)}

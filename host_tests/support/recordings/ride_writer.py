@@ -22,7 +22,7 @@ CHIP = types.SimpleNamespace(
 
 
 def calibration(trim_deg=0.0):
-    """A plausible calibration in which no value is the default."""
+    """Return a plausible calibration in which no value is the default."""
     new = Calibration()
     new.set_accel((0.01, -0.02, 0.03), (1.01, 0.99, 1.0))
     new.gyro_bias[1] = 1.5
@@ -34,7 +34,10 @@ def calibration(trim_deg=0.0):
 
 
 def turns(count, seed=0):
-    """Yield (sums, n, dt_us) of a bike that leans from side to side on a rough road."""
+    """Yield the turns of the app's loop on a bike that leans from side to side on a rough road.
+
+    Each turn is (sums of the seven readings, n, dt_us). n is the number of samples, and dt_us is the turn's duration.
+    """
     random.seed(seed)
     for i in range(count):
         n = random.choice((2, 2, 2, 2, 2, 1, 3, 8))
@@ -45,7 +48,10 @@ def turns(count, seed=0):
 
 
 def place(k):
-    """The k-th position in the form of Gps.place(): one per 0.1 s, from 17.9 s before the new year's midnight."""
+    """Return the k-th position of a ride, in the form of Gps.place().
+
+    The positions are 0.1 s apart. The first one is 17.9 s before midnight on New Year's Eve.
+    """
     day_ms, date = 86_382_100 + 100 * k, 26 << 9 | 12 << 5 | 31
     if day_ms >= 86_400_000:
         day_ms, date = day_ms - 86_400_000, 27 << 9 | 1 << 5 | 1
@@ -55,9 +61,11 @@ def place(k):
 def blocks(
     count, ride=1, length=block_length, sequence=0, time_us=2_000_000, trim_deg=0.0, speed=False, places_every=0
 ):
-    """`count` full blocks, and the turns of the loop that they hold: (sums of six, n, dt_us).
+    """Return `count` full blocks, and the turns that they contain, each as (six sums, n, dt_us).
 
-    speed: True for a speed in every hundredth turn. places_every: number of turns between positions, 0 for none."""
+    speed: True for a speed in every hundredth turn.
+    places_every: number of turns between two positions, 0 for no positions.
+    """
     block = RideBlock(5000)
     body = pack(CHIP.who_am_i, CHIP.accel_range_g, calibration(trim_deg))
     written, held = [], []
@@ -79,7 +87,7 @@ def blocks(
 
 
 def begun(length, sequence=0, block=None):
-    """An empty block of ride 1. It reuses a RideBlock if one is passed."""
+    """Return an empty block of ride 1. block: a RideBlock to reuse, or None for a new one."""
     block = block or RideBlock(5000)
     block.begin(length, 1, sequence, 0, CHIP, 200, bytes(80))
     return block

@@ -1,5 +1,7 @@
-"""Rides of both simulators with inexact calibrations, and the lean that the display shows in them. As a program it
-prints the table of tools/docs/accuracy.md: errors of the shown and of the smoothed lean."""
+"""Rides of both simulators with inexact calibrations, and the lean that the display shows in them.
+
+The program prints the table of tools/docs/accuracy.md: the errors of the shown lean and of the smoothed lean.
+"""
 
 from dataclasses import dataclass
 
@@ -15,7 +17,13 @@ from support.recordings.other_bike import other_ride
 
 @dataclass
 class Known:
-    """A ride whose lean (n, degrees) is known. riding (n): True from setting off on."""
+    """A ride with its true lean.
+
+    log: n samples.
+    calibration: of the sensor that recorded the log.
+    lean_deg: true lean, shape (n).
+    riding: True after the bike has set off, shape (n).
+    """
 
     log: Log
     calibration: CalibrationFile
@@ -23,31 +31,38 @@ class Known:
     riding: np.ndarray
 
     def live(self):
-        """(n) the firmware's lean."""
+        """Return the lean that the firmware computes, shape (n), in degrees."""
         return replay(self.log, self.calibration).lean_deg
 
     def judged(self):
-        """Return three arrays in degrees, only while riding: the live lean's error (NaN where not shown), the smoothed
-        lean's error, and the standard deviation that smoothing gives."""
+        """Return the errors of the lean while riding, as three arrays in degrees.
+
+        Returns:
+            live: errors of the live lean, NaN where it is not shown.
+            smoothed: errors of the smoothed lean.
+            sigma: standard deviations that smoothing computes.
+        """
         shown, found = replay(self.log, self.calibration), smooth(self.log, self.calibration)
         live = np.where(np.isnan(shown.lean_sigma_deg), np.nan, shown.lean_deg - self.lean_deg)
         return live[self.riding], (found.lean_deg - self.lean_deg)[self.riding], found.lean_sigma_deg[self.riding]
 
     def part(self, kept):
-        """Keep only the samples for which kept (n) is True."""
+        """Return the ride with only the samples for which `kept` is True. kept: shape (n)."""
         return Known(self.log.part(kept), self.calibration, self.lean_deg[kept], self.riding[kept])
 
 
 def simulated(profile, seed, seconds):
-    """A ride by kickstand_tools.simulation. The upright pose is 1.5 degrees off, the pitch between the two poses 1
-    degree."""
+    """Return a ride of kickstand_tools.simulation.
+
+    The upright pose is 1.5 degrees off. The pitch between the two poses is 1 degree off.
+    """
     made = ride(profile, seed, seconds, 1.5 * (1, -1)[seed % 2], 1.0 * (1, -1)[seed // 2 % 2])
     riding = np.cumsum(made.truth["speed_mps"] > 0.5) > 0
     return Known(as_log(made), calibrated_by_poses(made), made.truth["lean_deg"], riding)
 
 
 def other(kind, seed, **more):
-    """By other_bike."""
+    """Return a ride of other_bike.py. more: arguments of other_ride()."""
     log, calibration, lean_deg, speed_mps = other_ride(kind, seed, **more)
     return Known(log, calibration, lean_deg, np.cumsum(speed_mps > 0.5) > 0)
 
@@ -61,7 +76,13 @@ ROWS += ("temperature", "other held", "other sweepers", "other track")
 
 
 def figures(row):
-    """Shown: rms, worst; smoothed: rms, worst, share within 1 and 2 standard deviations. Over all rides, in degrees."""
+    """Compute the figures of one row of the table, from four rides together.
+
+    Returns:
+        shown lean: rms error and worst error, in degrees.
+        smoothed lean: rms error and worst error, in degrees.
+        share of the smoothed lean within 1 standard deviation, and within 2.
+    """
     kind, is_other = row.split()[-1], " " in row
     rides = [
         other(kind, seed, seconds=300.0) if is_other else simulated(kind, seed, 300.0) for seed in (201, 202, 203, 204)

@@ -1,4 +1,5 @@
-"""A board on the virtual radio, in a thread and in real time, for a page whose navigator.bluetooth is fake."""
+"""A simulated board on the virtual radio, for a page with a fake navigator.bluetooth. It runs in a thread, in real
+time."""
 
 import asyncio
 import base64
@@ -17,7 +18,11 @@ FAKE = Path(__file__).with_name("fake_bluetooth.js").read_text()
 
 
 class Bridge:
-    """plan: see device_runs. From begin_s on the board runs in real time."""
+    """Runs a board in a thread.
+
+    plan: see run_device() in device_runs.py.
+    begin_s: the board's time from which on it runs in real time. Before that it runs as fast as possible.
+    """
 
     def __init__(self, plan, begin_s, directory):
         self._requests = queue.Queue()
@@ -55,7 +60,8 @@ class Bridge:
                 try:
                     answer.set_result(await getattr(self, "_" + name)(central, kind, data))
                 except (Exception, asyncio.CancelledError) as error:
-                    # bumble cancels calls that wait for a lost connection: the page must receive the error and continue
+                    # If a connection is lost, bumble cancels the calls that wait for it. The page must get the error
+                    # and continue.
                     task = asyncio.current_task()
                     if task is not None and task.cancelling():
                         raise
@@ -84,7 +90,7 @@ class Bridge:
 
         await central.place(SERVICE, kind).subscribe(heard)
 
-    # Called by the page
+    # The page calls this method.
 
     def do(self, name, kind, data):
         answer = Future()
@@ -95,7 +101,7 @@ class Bridge:
         packets, self._packets = self._packets, []
         return {"lost": self._lost, "packets": packets}
 
-    # Called by the test
+    # A test calls these methods.
 
     def drop(self):
         """Cut the connection."""

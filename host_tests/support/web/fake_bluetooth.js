@@ -1,4 +1,4 @@
-// A navigator.bluetooth whose radio is that of a bumble central (bluetooth_bridge.py)
+// Replaces navigator.bluetooth. Its radio is a bumble central, see bluetooth_bridge.py.
 class Device extends EventTarget {
   name = "Kickstand 1A2B";
   gatt = {

@@ -1,5 +1,5 @@
 window.boardAnswersAtOnce = false;
-// An imagined board has started again at once
+// A fake board starts again at once, so the page need not wait 2 s for it.
 const later = setTimeout;
 window.setTimeout = (done, ms, ...rest) => later(done, boardAnswersAtOnce && ms === 2000 ? 0 : ms, ...rest);
 const line = {

@@ -1,4 +1,4 @@
-// On the page Try ten pictures a second: sixty would take half of the processor, all the time that its board runs
+// Let the page Try draw ten pictures per second. Sixty would take half of the processor while its board runs.
 if (/\/(index.html)?$/.test(location.pathname)) {
   const drawn = requestAnimationFrame;
   window.requestAnimationFrame = (draw) => setTimeout(() => drawn(draw), 100);

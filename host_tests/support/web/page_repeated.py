@@ -1,9 +1,11 @@
 """Runs the page's board, or the same board with the firmware's own loop, with the same orders. Runs on CPython and
 MicroPython.
 
-As a script, with "page" or "loop" as its argument: reads {"until_s": s, "orders": [[s, name, value], ...]} as JSON from
-standard input, runs that in the current directory (the board's flash) and prints as JSON on the last line:
-{"orders": as carried out, "displays": [[s, content of the display from then on], ...]}.
+The script has one argument, "page" or "loop". It reads JSON from standard input:
+    {"until_s": s, "orders": [[s, name, value], ...]}
+It uses the current directory as the board's flash. Its last line is JSON:
+    {"orders": the orders with the times at which they were carried out,
+     "displays": [[s, content of the display from then on], ...]}
 """
 
 import json
@@ -13,7 +15,7 @@ from kickstand_tools.web.device import Device, PageDevice
 
 
 def page(orders, until_s):
-    """Run the page's loop as worker.mjs does, but in slices of other lengths."""
+    """Run the page's loop as worker.mjs does, but with time slices of other lengths."""
     device = PageDevice()
     done, slice_s, now_s = [], 0.007, 0.0
     for at_s, name, value in orders:

@@ -1,5 +1,4 @@
-"""A fake board at the other end of a SerialLine: it simulates MicroPython's raw prompt, byte by byte, for a
-FakeBoard."""
+"""MicroPython's raw prompt for a FakeBoard, byte by byte, at the other end of a SerialLine."""
 
 import base64
 
@@ -9,9 +8,15 @@ _RAW_PASTE = b"\x05A\x01"
 
 
 class RawPrompt:
-    """Has the part of emulator.pico.Pico that SerialLine uses. board: a FakeBoard, on which the code runs. streams: the
-    blocks that the app sends whenever it is started. The app does not really run; after these blocks it waits silently
-    for Ctrl-C. vehicle: in its config.py. deaf: True for a board that never answers."""
+    """Replaces emulator.pico.Pico for a SerialLine.
+
+    The app does not really run. Each time it is started, it sends the next blocks and waits for Ctrl-C.
+
+    board: the FakeBoard on which the code runs.
+    streams: lists of blocks that the app sends.
+    vehicle: setting VEHICLE in the board's config.py.
+    deaf: True for a board that never answers.
+    """
 
     def __init__(self, board, *streams, vehicle="motorcycle", deaf=False):
         self.board, self._deaf = board, deaf
@@ -23,13 +28,13 @@ class RawPrompt:
         self.console = self.chip = self
 
     def run(self, seconds):
-        """It takes no time."""
+        """Do nothing, because this board needs no time to answer."""
 
     def stop(self):
-        """Nothing runs that must be stopped."""
+        """Do nothing, because no program runs."""
 
     def send(self, data):
-        """What is typed."""
+        """Receive the bytes that the page types."""
         for byte in b"" if self._deaf else data:
             if byte == _CTRL_C:
                 self._typed = b""
@@ -38,7 +43,7 @@ class RawPrompt:
                     self.heard(b"\x04\x04>")
             elif byte == _CTRL_A and self._typed + b"\x01" == _RAW_PASTE:
                 self._typed = b""
-                self.heard(b"R\x00")  # understood, but not supported
+                self.heard(b"R\x00")  # MicroPython's answer: raw paste mode is known, but not supported
             elif byte == _CTRL_A:
                 self._typed = b""
                 self.heard(_PROMPT)
@@ -64,7 +69,7 @@ class RawPrompt:
 
 
 def said(blocks):
-    """Format blocks as usb_stream prints them."""
+    """Return the output of usb_stream for these blocks."""
     return b"".join(
         b"".join(base64.b64encode(block[at : at + 256]) + b"\r\n" for at in range(0, len(block), 256)) + b".\r\n"
         for block in blocks

@@ -8,20 +8,28 @@ import pytest
 
 PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
 LAPTOP: dict[str, Any] = {"viewport": {"width": 1440, "height": 900}}
-READ_S = 120  # longest wait for the page to show something; a busy machine is slow
+READ_S = 120  # longest wait for the page to show something, long enough for a busy machine
 
-# Keeps the messages of the board's worker, for tests to check and repeat, and makes the page draw less often
+# This script keeps the messages of the board's worker, so that tests can check and repeat them. It also makes the page
+# draw less often.
 KEEP = Path(__file__).with_name("keep.js").read_text()
 
-# Makes the site answer with this status for files whose address ends so, until window.given() is called. The service
-# worker is bypassed.
+# This script replaces the page's fetch(). Files whose address has the passed ending get the passed status, until the
+# test calls window.given(). The service worker is bypassed.
 MISSING = Path(__file__).with_name("missing.js").read_text()
 
 
 class Rider:
-    """browser: playwright's. asked: the addresses that the page has requested; errors: the errors in it. policy: True
-    to enforce the page's content security policy, which forbids playwright's wait_for_function() except on the page
-    Rides. script: runs before each page's own scripts."""
+    """A rider with a page of the site.
+
+    browser: playwright's browser.
+    policy: True to enforce the page's content security policy. Then playwright's wait_for_function() works only on the
+        page Rides.
+    script: code that runs before each page's own scripts.
+
+    asked: the addresses that the page has requested.
+    errors: the errors on the page.
+    """
 
     def __init__(self, browser, address, policy=False, script="", **kind):
         self._browser = browser
@@ -62,20 +70,20 @@ class Rider:
         self.page.keyboard.down("Space")
         self.wait(seconds)
         self.page.keyboard.up("Space")
-        self.wait(0.3)  # a finger does not press again at once either
+        self.wait(0.3)  # like a finger, which does not press again at once
 
     def click(self, selector):
         self.page.click(selector)
 
     def seen(self, what):
-        """The messages of the board, by a name in KEEP."""
+        """Return the kept messages with this name, one of window.seen in keep.js."""
         return self.page.evaluate(f"seen.{what}")
 
     def text(self, selector):
         return self.page.inner_text(selector)
 
     def leans(self):
-        """The true and the shown lean on the page, degrees, > 0 to the right."""
+        """Return the true and the shown lean on the page, in degrees, positive to the right."""
         return tuple(_lean_deg(self.text(selector)) for selector in ("#true-lean", "#shown-lean"))
 
     def align(self):
@@ -83,12 +91,12 @@ class Rider:
         self.guide_says("Press the button")
         self.click("#press")
         self.reads("Now upright")
-        self.click("#do")  # hold it upright
+        self.click("#do")  # hold the bike upright
         self.guide_says("Press the button once more")
         self.click("#press")
 
     def axe(self):
-        """The findings of axe-core, in the light and the dark style: one line each."""
+        """Return the findings of axe-core in the light and the dark style, one line per finding."""
         axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
         found = []
         for scheme in ("light", "dark"):
@@ -98,25 +106,25 @@ class Rider:
         return found
 
     def fits(self):
-        """True if the page fits the width of its window."""
+        """Return True if the page is not wider than its window."""
         return self.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
     def strangers(self):
-        """The requested addresses outside the site."""
+        """Return the requested addresses that are not on the site."""
         home = "/".join(self.asked[0].split("/")[:3]) + "/"
         return [url for url in self.asked if not url.startswith((home, f"blob:{home}", "data:"))]
 
     def slow(self, times):
-        """Limit the page's own thread to this share of the processor."""
+        """Slow down the page's own thread by this factor."""
         self.context.new_cdp_session(self.page).send("Emulation.setCPUThrottlingRate", {"rate": times})
 
     def processes(self):
-        """The ids of the browser's processes."""
+        """Return the ids of the browser's processes."""
         info = self._browser.new_browser_cdp_session().send("SystemInfo.getProcessInfo")
         return [process["id"] for process in info["processInfo"]]
 
     def worker_s(self):
-        """Processor time that the page's workers have used, in s."""
+        """Return the processor time that the page's workers have used, in s."""
         ticks = 0
         for process in self.processes():
             for thread in Path(f"/proc/{process}/task").glob("*"):

@@ -18,7 +18,7 @@ class Rides:
         self.rider, self.page = rider, rider.page
 
     def give(self, *files):
-        """Replace all files by these; return the page's final message."""
+        """Replace all files by these. Return the page's final message."""
         while self.held():
             self.remove("#held li:first-child button")
             self.said()
@@ -30,7 +30,7 @@ class Rides:
             assert self.give(*files) == ""
 
     def add(self, *files):
-        """Choose files; return the page's final message."""
+        """Add files. Return the page's final message."""
         self.page.set_input_files("#files", files)
         return self.said()
 
@@ -40,7 +40,7 @@ class Rides:
         self.page.click(button)
 
     def held(self):
-        """{name: the page's text about it} for each chosen file."""
+        """Return {name of a chosen file: the page's text about it}."""
         cells = "rows => rows.map((row) => [row.children[0].textContent, row.children[1].textContent])"
         return dict(self.page.eval_on_selector_all("#held li", cells))
 
@@ -49,13 +49,13 @@ class Rides:
         return self.page.inner_text("#said")
 
     def saved(self, selector) -> bytes:
-        """The file that a button offers for download."""
+        """Return the content of the file that a button offers for download."""
         with self.page.expect_download(timeout=WAIT_MS) as download:
             self.page.click(selector)
         return Path(download.value.path()).read_bytes()
 
     def report(self):
-        """The rows of the report as the page shows them."""
+        """Return the rows of the report as the page shows them."""
         return self.page.eval_on_selector_all(
             ":is(#report, #more) tbody tr",
             "rows => rows.map((row) => [...row.cells].map((cell) => cell.textContent.trim()))",

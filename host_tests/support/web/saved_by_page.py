@@ -1,4 +1,4 @@
-"""The files that the page Live offers to save, and the files that the command would write."""
+"""The files that the page Live offers to save, and the files that `kickstand record` would write."""
 
 import base64
 import io
@@ -10,7 +10,7 @@ from kickstand_tools.rides.stream import StreamLog
 
 
 def saved(rider, tmp_path):
-    """{name: content} of all offered files, saved by clicks."""
+    """Save all offered files by clicks. Return {name: content}."""
     found = {}
     for link in rider.page.locator("#files a").all():
         with rider.page.expect_download() as download:
@@ -22,7 +22,7 @@ def saved(rider, tmp_path):
 
 
 def recorded(blocks):
-    """[log, calibration] that `kickstand record` writes for these blocks."""
+    """Return the contents of the log and the calibration that `kickstand record` writes for these blocks."""
     log, calibration = io.StringIO(), io.StringIO()
     recording = StreamLog(threading.Event())
     recording.write(log, iter(map(block_reader.parse, blocks)), [])
@@ -32,7 +32,7 @@ def recorded(blocks):
 
 
 def streamed(said):
-    """The blocks in the whole output of a board."""
+    """Return the blocks in the whole output of a board."""
     begun = said.rindex(b"\x04", 0, said.index(b"\n.\r\n")) + 1
     *whole, _ = said[begun:].partition(b"\r\n")[2].split(b".\r\n")  # the first line names the vehicle
     return [b"".join(map(base64.b64decode, block.split())) for block in whole]

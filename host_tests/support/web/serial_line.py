@@ -15,8 +15,12 @@ FAKE = Path(__file__).with_name("fake_serial.js").read_text()
 
 
 class SerialLine:
-    """rider: uses a page with this port. said: all output of the board. cut_after: the cable is pulled after this
-    number of bytes to the board; None: never."""
+    """A port between a page and a board.
+
+    rider: the Rider who uses the page.
+    said: all output of the board.
+    cut_after: number of bytes to the board after which the cable is pulled. None: never.
+    """
 
     STEP_S = 0.04  # longest emulated time until the page may send again
 
@@ -26,7 +30,7 @@ class SerialLine:
         rider.page.expose_function("boardHears", self._hears)
 
     def plug_in(self, device):
-        """device: an emulator.pico.Pico, whose time this line advances, or a RawPrompt."""
+        """Connect a board. device: a RawPrompt, or an emulator.pico.Pico whose time this line advances."""
         self.rider.page.evaluate(f"boardAnswersAtOnce = {json.dumps(isinstance(device, RawPrompt))}")
         self._device = device
         self._said, self.said = bytearray(), bytearray()
@@ -58,23 +62,23 @@ class SerialLine:
         return self.connected
 
     def look(self):
-        """Click; return the page's text about the board."""
+        """Let the page look at the board. Return the page's text about it."""
         self.rider.page.click("#look")
         return self._said_by("#look")
 
     def install(self):
-        """Click; return the page's final message."""
+        """Let the page install the firmware. Return the page's final message."""
         self.rider.page.click("#install")
         return self._said_by("#look")
 
     def status(self):
-        """Click; return the status that the page shows, or the reason for none."""
+        """Let the page read the board's status. Return the shown status, or the reason why there is none."""
         self.rider.page.click("#status")
         why = self._said_by("#status", "#status-said")
         return self.rider.text("#status-text") if self.rider.page.is_visible("#status-text") else why
 
     def check(self):
-        """Click; return the text of the check that the page shows, or the reason for none."""
+        """Let the page check the board. Return the shown findings, or the reason why there are none."""
         self.rider.page.click("#check")
         why = self._said_by("#check", "#status-said")
         return self.rider.text("#status-text") if self.rider.page.is_visible("#status-text") else why
