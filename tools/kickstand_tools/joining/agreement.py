@@ -34,11 +34,19 @@ _LEANED_DEG = 3.0  # delay and slope are computed only for a larger rms of the l
 
 @dataclass
 class Difference:
-    """B's lean minus A's, in degrees. constant_deg: the mean, caused by poses and mounts. moving_deg: rms of the
-    difference without its mean; 95 % of the values are under p95_deg, and all under worst_deg. slope: B's lean / A's.
-    delay_s: delay of B's lean, s. slope and delay_s are None if the ride leans too little. expected_deg: the rms
-    predicted by both standard deviations. within_1, within_2: shares of the differences within one and two standard
-    deviations."""
+    """B's lean minus A's lean, in degrees.
+
+    seconds: time of riding that is compared.
+    rms_deg: rms of the difference.
+    constant_deg: mean of the difference, caused by poses and mounts.
+    moving_deg: rms of the difference without its mean.
+    p95_deg, worst_deg: 95 % of the absolute differences without the mean are below the first value, all within the
+        second.
+    slope: B's lean divided by A's lean, None if the ride leans too little.
+    delay_s: delay of B's lean in s, None if the ride leans too little.
+    expected_deg: the rms predicted by both standard deviations.
+    within_1, within_2: shares of the differences within one and two standard deviations.
+    """
 
     seconds: float
     rms_deg: float

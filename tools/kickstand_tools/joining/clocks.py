@@ -27,10 +27,14 @@ _ROUNDS = 8
 
 @dataclass
 class Clocks:
-    """later_s: time of B's first sample minus the time of A's first sample, s. drift: seconds per second that B's clock
-    loses against A's. correlation: correlation of the rates. common_s: time for which both have samples, without gaps
-    and frozen readings, s. apart_deg: B's rotation relative to A, once from the calibrations and once from the gyros:
-    the angle between the two."""
+    """The relation of the clocks of sensors A and B.
+
+    later_s: time of B's first sample minus the time of A's first sample, in s.
+    drift: seconds per second that B's clock loses against A's.
+    correlation: correlation of the rates.
+    common_s: time for which both have samples, without gaps and frozen readings, in s.
+    apart_deg: angle between two results for B's rotation relative to A: from the calibrations, and from the gyros.
+    """
 
     later_s: float
     drift: float

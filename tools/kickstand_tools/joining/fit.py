@@ -31,11 +31,16 @@ _STEPS_ALIKE = 4.0  # number of neighbouring steps that share an error, because 
 
 @dataclass
 class TrackFit:
-    """shift_s: the track's time at the ride's first sample, s since the track's first point. drift: seconds per second
-    that the ride's clock loses. sigma_s: standard deviation of a track point's time in the ride, at the end of the ride
-    where it is larger. correlation: correlation of the courses' changes. evidence: natural logarithm of the ratio of
-    the courses' likelihoods with and without the ride's yaw. tilt (2): tilt of the ride's up, rad. segments: number of
-    compared segments."""
+    """The best fit of a track to a ride.
+
+    shift_s: the track's time at the ride's first sample, in s since the track's first point.
+    drift: seconds per second that the ride's clock loses.
+    sigma_s: standard deviation of a track point's time in the ride, at the end of the ride where it is larger.
+    correlation: correlation of the courses' changes.
+    evidence: natural logarithm of a ratio: the courses' likelihood with the ride's yaw over the one without it.
+    tilt: tilt of the ride's up about two axes, in rad, shape (2).
+    segments: number of compared segments.
+    """
 
     shift_s: float
     drift: float

@@ -35,7 +35,7 @@ class CellMotion:
 
     @property
     def t_s(self) -> Array:
-        """(n) the middle of each cell, s since the first sample."""
+        """The middle of each cell, in s since the first sample, shape (n)."""
         return np.arange(0.5, len(self.there)) * STEP_S
 
     @property

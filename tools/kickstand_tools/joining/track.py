@@ -68,9 +68,13 @@ class Track(Table):
 class Course:
     """m steps between the m + 1 points of a track.
 
-    begin_s, end_s (m): times of each step, s since the track's first point. sigma_deg (m): standard deviation of the
-    course of a good step. speed_mps (m): length over duration. good (m): False for a step that is too slow, a gap or a
-    jump. turn_deg (m): change of the course from the previous step, > 0 to the left; 0 unless both steps are good.
+    All arrays have shape (m).
+
+    begin_s, end_s: times of each step, in s since the track's first point.
+    sigma_deg: standard deviation of the course of a good step.
+    speed_mps: the step's length divided by its duration.
+    good: False for a step that is too slow, a gap or a jump.
+    turn_deg: change of the course from the previous step, positive to the left. It is 0 unless both steps are good.
     """
 
     begin_s: Array

@@ -29,7 +29,7 @@ ROWS = 50_000  # rows converted at once, because text takes ten times the memory
 LONGEST = 40  # most characters in a number
 LONGEST_LINE = 100_000  # most characters in a line; Python's csv refuses cells a little longer than this
 # Limits of a table: seven hours of twelve columns at 100 Hz. A number takes 8 bytes, and 8 more while parts are joined.
-# A text takes 60 bytes.
+# A string object uses 60 bytes.
 MOST_CELLS, MOST_TEXTS = 30_000_000, 3_000_000
 _NOTHING = {"", "-", "na", "n/a", "nan", "nil", "none", "null", "#n/a"}
 _PLAIN = b"0123456789.-,\n"
@@ -133,7 +133,7 @@ def numbers_of(cells: Cells) -> NDArray[Any]:
 
 
 def filled(cells: Cells) -> Bools:
-    """(n) True for cells that are not empty."""
+    """True for cells that are not empty, shape (n)."""
     if cells.dtype.kind in "iuf":
         return ~np.isnan(cells.astype(float))
     return np.array([cell != "" for cell in cells.tolist()], dtype=bool)

@@ -74,11 +74,18 @@ def firmware_rows(time_us: Ints, readings: Array, speed_mps: Array) -> Iterator[
 class Log(Table):
     """One recording in the sensor's own axes: n samples.
 
-    t_s (n): seconds since the first sample, increasing. accel_g (n, 3): specific force, g. gyro_dps (n, 3): angular
-    rate, deg/s. speed_mps (n): m/s. temperature_c (n). lat_deg, lon_deg (n): the position, degrees north and east.
-    utc_s (n): Universal Time, s since 1970. The fields from speed_mps to utc_s are optional, and NaN without a new
-    value. start_s: the recorder's own time at the first sample, s. name: the log's name in messages. notices: remarks
-    about the log.
+    t_s: time in s since the first sample, increasing, shape (n).
+    accel_g: specific force in g, shape (n, 3).
+    gyro_dps: angular rate in deg/s, shape (n, 3).
+    speed_mps: speed in m/s, shape (n), optional.
+    temperature_c: temperature in degrees Celsius, shape (n), optional.
+    start_s: the recorder's own time at the first sample, in s.
+    name: the log's name in messages.
+    notices: remarks about the log.
+    lat_deg, lon_deg: latitude and longitude in degrees, shape (n), optional.
+    utc_s: Universal Time in s since 1970, shape (n), optional.
+
+    Optional arrays are NaN in samples without a new value.
 
     You can pass t_s with any start: its first value is added to start_s and subtracted from t_s. Raises InputError for
     shapes that do not fit and for a time that does not increase.
@@ -164,9 +171,11 @@ class Log(Table):
 class Block(Table):
     """Some successive rows of a log, in the units of the firmware's modules.
 
-    time_us (n): since the log's first sample. readings (n, 7): acceleration (3, g), temperature (C), rate (3, deg/s),
-    the chip's order. speed_mps, lat_deg, lon_deg, utc_s (n): as in a Log. Missing values are NaN. start_s: the
-    recorder's own time at the log's first sample. frozen (n): True for repeated readings, see frozen.py.
+    time_us: time in us since the log's first sample, shape (n).
+    readings: acceleration (3 columns, g), temperature (C) and rate (3 columns, deg/s), shape (n, 7).
+    speed_mps, lat_deg, lon_deg, utc_s: as in a Log. Missing values are NaN.
+    frozen: True for repeated readings (see frozen.py), shape (n).
+    start_s: the recorder's own time at the log's first sample, in s.
     """
 
     time_us: Ints

@@ -19,10 +19,15 @@ _APART_S = 2.0
 
 
 def camera_offset_s(ride: CellMotion, camera: Telemetry) -> tuple[float, float]:
-    """The ride's time at the video's first picture, s since the ride's first sample, and the correlation there.
+    """Find the ride's time at the video's first picture.
 
-    A camera on the bike turns with the bike. A camera on a helmet also turns with the head, and may not match. Raises
-    InputError without a match.
+    A camera on the bike turns with the bike. A camera on a helmet also turns with the head, and may not match.
+
+    Returns:
+        offset: time of the first picture, in s since the ride's first sample.
+        correlation: between the rates of camera and bike at this offset.
+
+    Raises InputError without a match.
     """
     cell = np.floor((camera.t_s - camera.t_s[0]) / STEP_S).astype(int)
     count = np.bincount(cell)
@@ -43,6 +48,6 @@ def camera_offset_s(ride: CellMotion, camera: Telemetry) -> tuple[float, float]:
 
 
 def _turning(rate_dps: Array) -> Array:
-    """(n) the magnitude of the rate, without slow and quick changes."""
+    """The magnitude of the rate without slow and quick changes, shape (n)."""
     size = moving_mean(np.linalg.norm(rate_dps, axis=1), round(_QUICK_S / STEP_S))
     return size - moving_mean(size, round(_SLOW_S / STEP_S))

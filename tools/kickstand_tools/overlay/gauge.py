@@ -13,7 +13,7 @@ from .parts import ACCENT, DIM, PANEL, WHITE
 
 MOST_DEG = 60.0  # end of the dial
 MOST_G = 1.2  # edge of the circle of forces
-SHARE = 0.3  # height of the gauge over that of the video
+SHARE = 0.3  # height of the gauge as a share of the video's height
 LEGIBLE_PX, MOST_SHARE = 216.0, 0.45  # least height for legible text; largest share of the video's height
 UPRIGHT_DEG = 0.5  # a smaller lean counts as upright
 _WIDTH = 1.72  # width over height
@@ -23,10 +23,12 @@ _KMH, _MPH = 3.6, 3.6 / 1.609344
 
 
 class Gauge:
-    """Draws the gauge: lean, forces and, if has_speed, the speed. video_height: height of the target video, pixels.
-    mph: show the speed in miles per hour instead of kilometres per hour.
+    """Draws the gauge with lean and forces.
 
-    width, height: size of the pictures in pixels; even numbers, as videos require.
+    video_height: height of the target video in pixels.
+    has_speed: also show the speed.
+    mph: show the speed in miles per hour instead of kilometres per hour.
+    width, height: size of the pictures in pixels. Both are even, as videos require.
     """
 
     def __init__(self, video_height: int, has_speed: bool = True, mph: bool = False) -> None:
@@ -44,8 +46,10 @@ class Gauge:
     def picture(
         self, lean_deg: float, forward_g: float, left_g: float, speed_mps: float, left_deg: float, right_deg: float
     ) -> Image.Image:
-        """Draw one picture (height, width), RGBA. NaN: unknown or not trusted. left_deg, right_deg: largest leans so
-        far."""
+        """Draw one RGBA picture. Values that are unknown or not trusted are NaN.
+
+        left_deg, right_deg: the largest lean to each side so far.
+        """
         picture = self._still.copy()
         known = math.isfinite(lean_deg)
         if known:

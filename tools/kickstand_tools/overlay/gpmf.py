@@ -20,8 +20,11 @@ _NESTED = b"\0"
 
 @dataclass
 class Telemetry:
-    """Readings of the camera's gyro. t_s (n): time since the video's first picture. rate_dps (n, 3): in the camera's
-    axes."""
+    """Readings of the camera's gyro.
+
+    t_s: time since the video's first picture, in s, shape (n).
+    rate_dps: rates about the camera's axes, in deg/s, shape (n, 3).
+    """
 
     t_s: Array
     rate_dps: Array
@@ -34,7 +37,7 @@ def telemetry(video: Video) -> Telemetry | None:
     times, rates = [], []
     try:
         found = packets(video, video.telemetry)
-    except ValueError:  # ffmpeg's output is not a packet's numbers
+    except ValueError:  # ffmpeg's output is not a list of packets
         return None
     for at_s, lasts_s, packet in found:
         samples = [values for values in streams(packet, b"GYRO") if len(values)]
@@ -48,7 +51,7 @@ def telemetry(video: Video) -> Telemetry | None:
 
 
 def streams(packet: bytes, key: bytes) -> Iterator[Array]:
-    """Yield the values (n, axes) of each stream with this key, in the unit that GPMF defines for the key."""
+    """Yield the values of each stream with this key, shape (n, axes), in the unit that GPMF defines for the key."""
     for name, kind, _, body in _items(packet):
         if kind == _NESTED and name in (b"DEVC", b"STRM"):
             yield from _of_stream(body, key) if name == b"STRM" else streams(body, key)

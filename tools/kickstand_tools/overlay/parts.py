@@ -18,8 +18,10 @@ _FINER = 4  # shapes are drawn larger by this factor and then reduced, which smo
 
 
 def smooth_mask(size: tuple[int, int], draw, finer: int = _FINER) -> Image.Image:
-    """A mask with smooth edges, 0 to 255. draw: called with an ImageDraw, and with the number of its pixels per pixel
-    of the mask."""
+    """Draw a mask with smooth edges, values 0 to 255.
+
+    draw: called with a larger ImageDraw, and the number of its pixels per pixel of the mask.
+    """
     mask = Image.new("L", (size[0] * finer, size[1] * finer), 0)
     draw(ImageDraw.Draw(mask), finer)
     return mask.resize(size, Image.Resampling.BOX)
@@ -37,7 +39,7 @@ def outlined(mask: Image.Image, colour: Colour, width: int) -> Image.Image:
 
 @lru_cache(maxsize=2000)
 def text(words: str, height: float, colour: Colour) -> Image.Image:
-    """Words with a dark outline, in a picture that fits the letters. height: of the font, pixels."""
+    """Words with a dark outline, in a picture that fits the letters. height: font height in pixels."""
     stroke = max(1, round(height * 0.09))
     font = ImageFont.load_default(height)
     left, top, right, bottom = font.getbbox(words, stroke_width=stroke)

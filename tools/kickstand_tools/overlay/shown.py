@@ -17,10 +17,14 @@ _SPEED_S = 3.0  # speeds older than this are not shown; most receivers send one 
 
 @dataclass
 class Shown:
-    """n moments of a ride. t_s: since the ride's first sample. Values that are unknown or not trusted are NaN.
+    """The values at n moments of a ride. Values that are unknown or not trusted are NaN.
 
-    lean_deg: > 0 to the right. forward_g: > 0 when speeding up. left_g: acceleration to the left along the road.
-    speed_mps. left_deg, right_deg: the largest lean to each side until then, 0 for none.
+    t_s: time since the ride's first sample.
+    lean_deg: lean, positive to the right.
+    forward_g: forward acceleration, positive when speeding up.
+    left_g: acceleration to the left, parallel to the road.
+    speed_mps: speed.
+    left_deg, right_deg: the largest lean to each side so far, 0 for none.
     """
 
     t_s: Array
@@ -38,11 +42,11 @@ class Shown:
 
     @property
     def values(self) -> tuple[Array, ...]:
-        """All values except the times, (n) each."""
+        """All values except the times, each of shape (n)."""
         return self.lean_deg, self.forward_g, self.left_g, self.speed_mps, self.left_deg, self.right_deg
 
     def at(self, t_s: Array) -> "Shown":
-        """The values at other times (m), interpolated; NaN before the ride, after it and in gaps."""
+        """Interpolate the values at m other times. They are NaN before the ride, after it and in gaps."""
         before = np.clip(np.searchsorted(self.t_s, t_s, side="right") - 1, 0, len(self.t_s) - 2)
         lean, forward, left = (
             _along_lines(self.t_s, value, before, t_s, _GAP_S) for value in (self.lean_deg, self.forward_g, self.left_g)
@@ -71,7 +75,7 @@ def shown(ride: Ride, progress: Progress | None = None, notices: list[Message] |
 
 
 def _maximum(t_s: Array, lean: Array) -> Array:
-    """(n) the largest lean so far that lasted for HELD_S."""
+    """The largest lean so far that lasted for HELD_S, shape (n)."""
     count = round(HELD_S / float(np.median(np.diff(t_s)))) + 1
     value = np.where(np.isfinite(lean), lean, 0.0)
     padded = np.append(np.zeros(count - 1), value)

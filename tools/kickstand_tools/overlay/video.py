@@ -10,13 +10,18 @@ from pathlib import Path
 from ..common.errors import InputError, extra
 
 _QUIET = ("-hide_banner", "-loglevel", "error", "-nostdin", "-y")
-_LARGEST, _FASTEST = 16_384, 1000.0  # limits of a side, pixels, and of pictures per second, which no camera exceeds
+_LARGEST, _FASTEST = 16_384, 1000.0  # no camera exceeds these pixels per side and pictures per second
 
 
 @dataclass
 class Video:
-    """A video file. width, height: as shown, pixels. fps: pictures per second. seconds: duration. telemetry: number of
-    the stream of a GoPro's sensors, None without one."""
+    """A video file.
+
+    width, height: size in pixels, as a player shows the video.
+    fps: pictures per second.
+    seconds: duration.
+    telemetry: number of the stream with a GoPro's sensor readings, None without one.
+    """
 
     path: Path
     width: int
@@ -73,7 +78,13 @@ def open_video(path: Path) -> Video:
 
 
 def packets(video: Video, stream: int) -> list[tuple[float, float, bytes]]:
-    """(start, s since the first picture; duration, s; content) of each packet of a stream."""
+    """Read the packets of a stream.
+
+    Returns one tuple per packet:
+        start: in s since the first picture.
+        duration: in s.
+        content: the packet's bytes.
+    """
     chosen = [*input_of(video.path), "-map", f"0:{stream}", "-c", "copy"]
     listed = _run([*_QUIET, *chosen, "-f", "framecrc", "-"]).stdout.decode(errors="replace")
     data = _run([*_QUIET, *chosen, "-f", "data", "-"]).stdout

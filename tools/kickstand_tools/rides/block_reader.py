@@ -15,9 +15,9 @@ _HEAD_LENGTH = struct.calcsize(block_format.HEAD)
 _TAIL_LENGTH = struct.calcsize(block_format.TAIL)
 _START = _HEAD_LENGTH + store.BODY_LENGTH  # start of the entries if the calibration has no matrices
 _PLACE_LENGTH = struct.calcsize(block_format.PLACE)
-_LATE_PERIODS = 2  # if a turn is late by more sample periods, samples were lost, as in kickstand.imu.sensor
+_LATE_PERIODS = 2  # samples were lost if a turn is late by more sample periods; same rule as kickstand.imu.sensor
 _DEGREE = 60 * 100_000  # in the unit of positions, 0.00001 minutes
-_MOST = 1e4  # largest parameter of a calibration, far beyond those that a board stores
+_MOST = 1e4  # largest accepted parameter of a calibration; a board stores far smaller ones
 CUT_SHORT = "cut short"  # common for the last block of a ride, because the ignition cuts the power during the write
 
 
@@ -27,8 +27,12 @@ class BadBlock(Exception):
 
 @dataclass
 class Place:
-    """A position that arrived in a turn of the board's loop. lat_deg, lon_deg: north and east. utc_s: Universal Time,
-    s since 1970, None if the receiver did not know the date."""
+    """A position that arrived in a turn of the board's loop.
+
+    lat_deg: latitude, positive to the north.
+    lon_deg: longitude, positive to the east.
+    utc_s: Universal Time in s since 1970, None if the receiver did not know the date.
+    """
 
     lat_deg: float
     lon_deg: float
@@ -37,7 +41,13 @@ class Place:
 
 @dataclass
 class StoredTurn:
-    """One turn of the board's loop: sums of the counts of n samples (ax ay az gx gy gz), and the last sample's time."""
+    """One turn of the board's loop.
+
+    time_us: time of the turn's last sample.
+    n: number of samples.
+    sums: sums of the counts of these samples, in the order ax ay az gx gy gz.
+    speed_mps, place: speed and position that arrived in this turn, None without one.
+    """
 
     time_us: int
     n: int
@@ -50,9 +60,12 @@ class StoredTurn:
 class StoredBlock:
     """One block of a ride: the fields of its head, and its turns.
 
-    time_us: time of the last sample before the block, since power-on. centidegrees: temperature in 0.01 C.
-    delay_tenths_ms: delay of the gyro's low-pass, 0 if the firmware did not store it. body: the calibration's bytes.
-    vehicle: from the board's config.py, "" if unknown; blocks do not contain it."""
+    time_us: time of the last sample before the block, since power-on.
+    centidegrees: temperature in 0.01 C.
+    delay_tenths_ms: delay of the gyro's low-pass in 0.1 ms, 0 if the firmware did not store it.
+    body: the calibration's bytes.
+    vehicle: from the board's config.py, "" if unknown. Blocks do not contain it.
+    """
 
     ride: int
     sequence: int

@@ -69,9 +69,12 @@ class _Part(NamedTuple):
 class PulledRide:
     """A ride that was copied from the board.
 
-    log: the written file, with its calibration beside it, or None if the ride cannot be read. seconds, readings: length
-    of the log. problems: one line per fault. whole: True if everything was copied, except an end lost in a power cut.
-    deleted: True if the ride was removed from the board."""
+    log: the written file, with its calibration beside it, or None if the ride cannot be read.
+    seconds, readings: duration of the log and its number of readings.
+    problems: one line per fault.
+    whole: True if everything was copied. An end lost in a power cut does not count.
+    deleted: True if the ride was removed from the board.
+    """
 
     number: int
     log: Path | None = None

@@ -63,9 +63,12 @@ class LiveReading:
 class StreamLog:
     """Writes blocks to a log. If a write fails, the log ends there, with a note.
 
-    stopped: an event that ends the stream; it is set if the log must end. live: called with each block's LiveReading.
-    first: the first block. seconds, count: duration and number of readings so far. written: True once the log contains
-    a block."""
+    stopped: an event that ends the stream. This class sets it if the log must end.
+    live: called with each block's LiveReading.
+    first: the first block.
+    seconds, count: duration and number of readings so far.
+    written: True once the log contains a block.
+    """
 
     def __init__(self, stopped: threading.Event, live: Callable[[LiveReading], None] | None = None) -> None:
         self._stopped = stopped
