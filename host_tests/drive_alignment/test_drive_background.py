@@ -1,4 +1,4 @@
-"""What the background alignment does with each speed, and the state that the rider sees."""
+"""Tests what the background alignment does with each speed, and which state it shows to the rider."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -13,7 +13,8 @@ from kickstand_tools.simulated_board.simulator import Board
 
 
 def device(leans=True, counted=9, problem=None, speed_problem=None, state=alignment.TURNING, speed_mps=0.0):
-    """A BackgroundAlignment whose drive is in this state; passed: the speeds that the lean filter got."""
+    """Return a BackgroundAlignment whose drive has these values. Its list `passed` collects the speeds that it passes
+    to the lean filter."""
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):  # imported here because the module needs a board's clock
         from kickstand.drive_alignment.background import BackgroundAlignment
     made: Any = object.__new__(BackgroundAlignment)
@@ -28,7 +29,7 @@ def device(leans=True, counted=9, problem=None, speed_problem=None, state=alignm
 @pytest.mark.parametrize(
     ("given", "speed", "used"),
     [
-        ({}, 12.3456, 12.35),  # as in a recording
+        ({}, 12.3456, 12.35),  # rounded as in a recording
         ({}, 0.0, None),
         ({"counted": MIN_EVENTS_TO_CHECK_SPEED}, 5.0, 5.0),
         ({"counted": MIN_EVENTS_TO_CHECK_SPEED - 1}, 5.0, None),
