@@ -226,7 +226,7 @@ HUE_180 = np.array([[-0.574, 1.43, 0.144], [0.426, 0.43, 0.144], [0.426, 1.43, -
 
 
 def luminance(rgb):
-    """Return the relative luminance as defined in WCAG 2. rgb: 0 to 1."""
+    """Return the relative luminance of a colour as defined in WCAG 2. rgb: its three parts, each from 0 to 1."""
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     return float(linear @ [0.2126, 0.7152, 0.0722])
 
