@@ -120,7 +120,7 @@ def test_charts_of_car_and_speed_are_drawn_only_if_present(seen, car, speed):
     assert f"{stop.mfdd_mps2:.1f}" in [note["text"] for note in figure["layout"]["annotations"]]
     if speed:
         (drawn,) = (trace for trace in figure["data"] if trace.get("name") == "speed")
-        assert max(drawn["y"]) == pytest.approx(54.0, abs=0.5)  # km/h
+        assert max(drawn["y"]) == pytest.approx(54.0, abs=0.5)  # the chart is in km/h
     assert picture.figure_of(made).get_size_inches()[1] == 5.5 + 2.5 * (not car) + 1.5 * speed
 
 
@@ -222,7 +222,8 @@ def test_line_is_broken_in_a_gap(points):
     assert not np.any(np.isnan(envelope(time, values, points)[1]))
 
 
-HUE_180 = np.array([[-0.574, 1.43, 0.144], [0.426, 0.43, 0.144], [0.426, 1.43, -0.856]])  # CSS's hue-rotate(180deg)
+# the matrix of CSS's hue-rotate(180deg)
+HUE_180 = np.array([[-0.574, 1.43, 0.144], [0.426, 0.43, 0.144], [0.426, 1.43, -0.856]])
 
 
 def luminance(rgb):

@@ -153,7 +153,7 @@ def test_picture_and_page_are_complete(ride, tmp_path):
     assert struct.unpack(">2I", png[16:24]) == (1100, 950)
     html = (out / "RIDE.html").read_text()
     assert "Plotly.newPlot" in html
-    assert not re.search(r"<(script|link)[^>]*(src|href)=", html)  # the whole text is inside
+    assert not re.search(r"<(script|link)[^>]*(src|href)=", html)  # the page loads no other file
     assert sorted(path.name for path in out.iterdir()) == ["RIDE.html", "RIDE.png"]
 
 

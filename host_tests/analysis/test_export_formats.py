@@ -20,7 +20,7 @@ from kickstand_tools.logs.log import Log
 from support import command
 from support.recordings import analysis_rides
 
-EVENING_S = 1_700_000_000.0  # 22:13:20 UTC on 14/11/2023
+EVENING_S = 1_700_000_000.0  # this Unix time is 22:13:20 UTC on 14/11/2023
 VALUES = {
     "lean_deg": -12.34567,
     "lean_formula_deg": 23.4567,
@@ -79,9 +79,9 @@ def test_racechrono_to_the_letter(tmp_path):
 def test_vbo_to_the_letter(tmp_path):
     """In a VBO file a speed of 10.5 m/s is written as 37.8 km/h. The time of day starts again at midnight. Longitudes
     are in minutes, positive to the west."""
-    evening = EVENING_S + 6400.0 - 0.25  # the second before midnight
+    evening = EVENING_S + 6400.0 - 0.25  # the ride begins in the last second before midnight
     moved = block(0.25, 61.5, 3661.75)
-    moved.lon_deg[0] += 1e-5  # 0.68 m to the east
+    moved.lon_deg[0] += 1e-5  # this moves the position 0.68 m to the east
     moved.lat_deg[2] = moved.lon_deg[2] = np.nan
     text = written(export_vbo.write, tmp_path / "x", block(0.0), moved, start_s=evening)
     assert text == expected("ride.vbo").replace("\n", "\r\n")
@@ -126,7 +126,7 @@ def test_vbo_keeps_the_heading_at_standstill(tmp_path):
 
 
 RATE_HZ = 100.0
-SQUARE = CalibrationFile(aligned=True, vehicle="car")  # sensor axes left, up, forward: the same as the vehicle's axes
+SQUARE = CalibrationFile(aligned=True, vehicle="car")  # the sensor's axes are left, up, forward like the vehicle's
 
 
 def squarely(seconds: float = 2.0, start_s: float = 0.0, speed_mps=()) -> Log:
@@ -149,8 +149,8 @@ def test_a_left_turn_under_braking_has_the_signs_of_each_format(tmp_path):
     assert row["lean_angle"] == ""  # a car has no lean
     export(ride, "vbo", out)
     cells = [float(cell) for cell in out.read_text().split("\n")[-2].split(" ")]
-    assert cells[7:9] == [-0.4, 0.2]  # long accel > 0 forward, lat accel > 0 in a left turn
-    assert cells[9:] == pytest.approx([7.0, 9.0])  # yaw > 0 in a left turn, roll > 0 to the right
+    assert cells[7:9] == [-0.4, 0.2]  # long accel is positive forward, lat accel in a left turn
+    assert cells[9:] == pytest.approx([7.0, 9.0])  # yaw is positive in a left turn, roll to the right
     export(ride, "csv", out)
     row = dict(zip(export_columns.COLUMNS, out.read_text().split("\n")[-2].split(",")))
     assert [float(row[f"{name}_rate_dps"]) for name in ("pitch", "yaw", "roll")] == pytest.approx([-5.0, 7.0, 9.0])

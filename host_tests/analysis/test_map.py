@@ -91,7 +91,7 @@ def test_map_has_left_blue_right_orange_and_north_up():
     _, dots = made["data"]
     scale = dict(dots["marker"]["colorscale"])
     assert dots["marker"]["cmin"] == -dots["marker"]["cmax"] < 0.0
-    steeper = replace(seen(), summary=replace(seen().summary, right_deg=Peak(43.6, 1.0)))  # 44 in the title
+    steeper = replace(seen(), summary=replace(seen().summary, right_deg=Peak(43.6, 1.0)))  # the title shows 44 degrees
     bar = track_map.figure(points_of(), steeper)["data"][1]["marker"]["colorbar"]
     assert bar["ticktext"] == ["44", "0", "44"]
     for place, colour in scale.items():
@@ -100,7 +100,7 @@ def test_map_has_left_blue_right_orange_and_north_up():
     lean = np.asarray(dots["marker"]["color"])
     assert lean.min() < -20.0 and lean.max() > 30.0
     assert made["layout"]["yaxis"]["scaleanchor"] == "x"
-    assert "autorange" not in made["layout"]["yaxis"]  # the values of y grow upwards
+    assert "autorange" not in made["layout"]["yaxis"]  # without it, y grows upwards
     assert "N" in made["layout"]["annotations"][1]["text"]
 
 

@@ -124,7 +124,8 @@ ALL = slice(None)
     [
         (150, 1, 900, "moved or knocked"),
         (ALL, 0, 250 * np.sin(np.arange(300)), "vibration"),
-        (ALL, 0, np.linspace(0, 8192 * np.radians(1.0), 300), "slowly tilting"),  # one degree in three seconds
+        # the pose tilts by one degree in three seconds
+        (ALL, 0, np.linspace(0, 8192 * np.radians(1.0), 300), "slowly tilting"),
         (slice(100, 140), 5, 500, "moved or knocked"),
         (ALL, 2, 32767 + 1638, "saturated"),
         (ALL, 6, 50 * 65, "gyro offset"),

@@ -76,7 +76,7 @@ def test_a_turn_is_integrated_as_by_matrices_in_double():
             exact = exact @ (np.eye(3) + np.sin(size) / size * k + (1 - np.cos(size)) / size**2 * k @ k)
     turn.end()
     r = np.array(turn.attitude(bias.tolist(), 0.5)).reshape(3, 3)
-    assert np.max(np.abs(r - exact)) < 3e-4  # 0.02 degrees
+    assert np.max(np.abs(r - exact)) < 3e-4  # this is 0.02 degrees
     assert turn.seconds == pytest.approx(1.0)
     s = np.array(turn.packed(bias.tolist())[9:]).reshape(3, 9)
     # the effect of a scale error that is the same on all axes is a longer turn about the mean axis

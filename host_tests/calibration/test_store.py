@@ -181,7 +181,7 @@ def test_power_cut_at_every_byte_of_a_save(store, tmp_path, saved_before):
         for name, content in before.items():
             (tmp_path / name).write_bytes(content)
         written.write_bytes(record[:cut])
-        assert mark_of(store.load()) == saved_before  # the previous record, or none
+        assert mark_of(store.load()) == saved_before  # the previous record is loaded, or none
         store.save(calibration(5))  # after the power cut the next save works
         assert mark_of(store.load()) == 5
         assert store.load().aligned

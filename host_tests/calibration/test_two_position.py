@@ -15,7 +15,7 @@ from test_rotation import random_rotation
 
 def poses(vehicle_from_sensor, tilt_deg, side="left"):
     """Return the specific force in g on the kickstand and upright, in the sensor's axes."""
-    tilt = np.radians(tilt_deg) * (-1 if side == "left" else 1)  # lean to the right is positive
+    tilt = np.radians(tilt_deg) * (-1 if side == "left" else 1)  # a lean to the right is positive
     kickstand = np.array([np.sin(tilt), np.cos(tilt), 0.0])
     return (vehicle_from_sensor.T @ kickstand).tolist(), (vehicle_from_sensor.T @ [0, 1, 0]).tolist()
 

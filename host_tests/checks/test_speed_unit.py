@@ -79,7 +79,7 @@ def test_no_simulated_ride_is_refused(profile):
     time, force, speed = log.t_s, log.accel_g, log.speed_mps
     rng = np.random.default_rng(1)
     noisy = np.abs(speed + rng.normal(scale=0.5, size=len(speed)))
-    lost = np.where(rng.random(len(speed)) < 0.2, 0.0, speed)  # 0 while the satellites are lost
+    lost = np.where(rng.random(len(speed)) < 0.2, 0.0, speed)  # a receiver may give 0 while the satellites are lost
     for wrong in noisy, np.round(speed), lost, rng.uniform(0.0, 50.0) * rng.random(len(speed)):
         assert said(time, force, np.where(np.isnan(speed), np.nan, wrong)) == ""
 

@@ -38,7 +38,7 @@ def test_no_plot_of_a_ride_is_stale(name, draw):
     )
     assert fresh.shape == kept.shape, STALE
     difference = float(np.mean(np.abs(fresh - kept)))
-    assert difference < 1.0, STALE  # of 255 shades of grey
+    assert difference < 1.0, STALE  # mean difference of the pixels, which are 0 to 255
 
 
 def test_the_picture_of_the_page_is_not_stale():

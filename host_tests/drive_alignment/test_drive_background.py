@@ -70,7 +70,7 @@ def test_a_bend_at_walking_pace_is_shown_as_braking(state, speed_mps, shown):
         (1.9, 1.0, ("speed-late", 1.9)),
         (0.0, 0.74, ("speed-unit", pytest.approx(1 / 0.74))),
         (0.0, 1.36, ("speed-unit", pytest.approx(1 / 1.36))),
-        (0.0, 1 / 3.6, ("speed-unit", pytest.approx(3.6))),  # km/h
+        (0.0, 1 / 3.6, ("speed-unit", pytest.approx(3.6))),  # the unit is km/h
         (0.0, 0.0, ("speed-unit", 99.9)),
         (0.0, -1.0, ("speed-unit", 99.9)),
     ],

@@ -192,7 +192,8 @@ def test_each_vehicle_has_its_source_of_the_vertical():
     assert (pitch(bike, fit), pitch(posed, fit)) == (pytest.approx(4.0), 0.0)
     standing.up = level(10.0)
     assert (pitch(car), pitch(car, fit)) == (pytest.approx(10.0), pytest.approx(7.0))
-    for pitch_deg, times, mean in ((0.0, 1, 0.0), (8.0, 1, 4.0), (8.0, 60, 8.0)):  # the mean of the last minute
+    # the result is the mean of the last minute
+    for pitch_deg, times, mean in ((0.0, 1, 0.0), (8.0, 1, 4.0), (8.0, 60, 8.0)):
         for _ in range(times):
             bike.update(level(pitch_deg), 10.0)
         assert pitch(bike) == pytest.approx(mean, abs=0.1)

@@ -68,7 +68,7 @@ def test_sensor_above_the_roll_axis_moves_with_the_roll(lean):
     ("force", "lean", "parameters"),
     [
         (0.1 * np.sin(0.7) * 1.2, 0.7, {of.TYRES: 0.1}),  # wide tyres touch the road beside their middle
-        (0.03 * np.cos(0.5), 0.5, {of.BESIDE: 0.03}),  # a side wind is level
+        (0.03 * np.cos(0.5), 0.5, {of.BESIDE: 0.03}),  # the force of a side wind is level
         (0.01, 0.0, {of.CAMBER: 0.01}),  # the camber of the road matters only on straights
         (0.01, 0.02, {of.CAMBER: 0.01}),
         (0.0, 0.5, {of.CAMBER: 0.01}),
@@ -129,8 +129,8 @@ def test_the_upright_pose_gives_the_sum_of_rotation_and_offset():
     """The upright pose cannot distinguish an offset of the accelerometer from a tilt. If their sum is right, the force
     at rest is right too."""
     prior, p = Prior.of_pose(six_done=False), np.zeros(PARAMETERS)
-    p[of.ROTATION.stop - 1] = p[of.OFFSET.start] = 0.03  # to the side
-    p[of.ROTATION.start], p[of.OFFSET.stop - 1] = 0.02, -0.02  # forward
+    p[of.ROTATION.stop - 1] = p[of.OFFSET.start] = 0.03  # rotation and offset to the side
+    p[of.ROTATION.start], p[of.OFFSET.stop - 1] = 0.02, -0.02  # rotation and offset forward
     motion = found([0.0] * 3, [0.0, 1.0, 0.0], parameters=enumerate(p))[MOTION]
     assert np.allclose(motion[[LEFT, FORWARD]], 0.0, atol=1e-9)
     apart = p.copy()

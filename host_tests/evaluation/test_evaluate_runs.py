@@ -132,7 +132,7 @@ def recorded() -> Log:
     lean = -np.arctan(speed * yaw / STANDARD_GRAVITY)
     forward = np.gradient(speed, t) / STANDARD_GRAVITY
     size = np.hypot(1.0, speed * yaw / STANDARD_GRAVITY)
-    vehicle = np.column_stack((np.zeros(n), size, forward))  # balanced: the force lies in the bike's plane
+    vehicle = np.column_stack((np.zeros(n), size, forward))  # in a balanced turn the force is in the bike's plane
     rates = np.degrees(np.column_stack((yaw * np.sin(lean), yaw * np.cos(lean), np.gradient(lean, t))))
     mounting = MOUNTED.vehicle_from_sensor
     speeds = np.where(np.arange(n) % 50 == 0, speed, np.nan)
@@ -181,7 +181,8 @@ def test_the_command_prints_a_table_and_writes_json_and_picture(tmp_path, one_ot
     assert set(data["profiles"]) == {"street", "parked"}
     assert data["profiles"]["parked"]["kickstand"]["lag_ms"] is None
     assert (out / "lean.png").read_bytes().startswith(b"\x89PNG")
-    again = json.loads(works("evaluate", "--profiles", "parked", *more, "--json").out)  # on standard output
+    # --json prints to standard output
+    again = json.loads(works("evaluate", "--profiles", "parked", *more, "--json").out)
     assert again["profiles"]["parked"] == data["profiles"]["parked"]
     assert math.isfinite(again["profiles"]["parked"]["formula"]["rms"])
 
@@ -211,7 +212,7 @@ def test_simulate_states_both_leans_on_the_stand(tmp_path):
     made = [tmp_path / name for name in ("KICKSTAND.csv", "UPRIGHT.csv")]
     found = works("calibrate", "two", *made, "--out", tmp_path / "C.json").out
     tilt = re.search(r"([\d.]+) degrees from the kickstand", found)
-    assert tilt and float(tilt[1]) == pytest.approx(-pose, abs=0.8)  # without the six positions
+    assert tilt and float(tilt[1]) == pytest.approx(-pose, abs=0.8)  # inexact without the six positions
     truth = (tmp_path / "TRUTH.csv").read_text().splitlines()[1]
     assert float(truth.split(",")[1]) == pytest.approx(begin, abs=0.05)
     assert abs(pose - begin) > 1.0

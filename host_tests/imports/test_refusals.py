@@ -165,7 +165,7 @@ def test_zip_with_a_password_is_refused(tmp_path):
         archive.writestr("a.csv", "time,x\n0,1\n")
     content = bytearray((tmp_path / "a.zip").read_bytes())
     for mark, place in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
-        content[content.index(mark) + place] |= 1  # the flag of an encrypted entry
+        content[content.index(mark) + place] |= 1  # set the flag of an encrypted entry
     (tmp_path / "a.zip").write_bytes(content)
     refused(tmp_path, tmp_path / "a.zip", "is packed with a password, or in another way: unpack it first")
 

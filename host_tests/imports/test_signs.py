@@ -99,7 +99,7 @@ def test_mirrored_export_of_a_known_app_gives_a_remark(tmp_path):
 
 def test_uncertain_sign_is_reported_and_can_be_turned(tmp_path):
     ride = riding().every(2)
-    ride.force_g = -ride.force_g  # as an iPhone might give it
+    ride.force_g = -ride.force_g  # an iPhone might give this sign
     folder = app_exports.into(tmp_path / "k", app_exports.sensor_kinetics(ride))
     result = command.works("import", folder, "--out", tmp_path / "RIDE.csv")
     assert "warning: " in result.err

@@ -79,7 +79,7 @@ def test_setup_writes_the_values_of_the_register_map(time):
     wires = Wires(clock=time)
     chip = started(wires, accel_range_g=16, gyro_range_dps=1000, dlpf=2, rate_hz=100)
     assert wires.log == [
-        (PWR_MGMT_1, 0x80),  # reset
+        (PWR_MGMT_1, 0x80),  # reset the chip
         (PWR_MGMT_1, 0x01),  # wake up, with the clock of the gyro's X axis, as the register map recommends (p. 40)
         (SMPLRT_DIV, 9),  # a sample rate of 1 kHz / (1 + 9)
         (CONFIG, 2),
@@ -94,7 +94,7 @@ def test_setup_writes_the_values_of_the_register_map(time):
     reset, awake, configured, *_ = wires.times_us
     assert awake - reset >= 100_000  # longest duration of a reset (p. 41)
     assert configured - awake >= 30_000  # start-up time of the gyro (PS-MPU-6000A, 6.1)
-    assert wires.times_us[6] - wires.times_us[5] >= 4 * 4800  # four delays of the slowest usual low-pass
+    assert wires.times_us[6] - wires.times_us[5] >= 4 * 4800  # four times the delay of the slowest usual low-pass
     assert wires.times_us[-1] - reset < 200_000
 
 
@@ -131,7 +131,7 @@ def test_the_delay_of_each_low_pass():
     from kickstand.imu.mpu6050 import GYRO_DELAY_S
 
     assert GYRO_DELAY_S == {dlpf: DLPF_DELAY_US[dlpf] / 1e6 for dlpf in range(1, 7)}
-    assert lean_filter.DELAY_S == GYRO_DELAY_S[3]  # delay of the default low-pass
+    assert lean_filter.DELAY_S == GYRO_DELAY_S[3]  # the delay of the default low-pass
 
 
 @pytest.mark.parametrize(
@@ -304,10 +304,10 @@ def test_readings_that_repeat_for_100_ms_are_frozen(rate_hz, good):
 @pytest.mark.parametrize(
     ("who_am_i", "name", "zero_c", "per_degree"),
     [
-        (0x68, "MPU6050", 36.53, 340.0),  # RM-MPU-6000A p. 30
+        (0x68, "MPU6050", 36.53, 340.0),  # from RM-MPU-6000A p. 30
         (MPU6500, "MPU6500", 21.0, 333.87),  # MPU-6500 register map p. 33, with the sensitivity of the data sheet
         (0x71, "MPU9250", 21.0, 333.87),
-        (0x98, "ICM20689", 25.0, 326.8),  # data sheet table 3
+        (0x98, "ICM20689", 25.0, 326.8),  # from table 3 of the data sheet
         (MPU6886, "MPU6886", 25.0, 326.8),
     ],
 )

@@ -23,7 +23,7 @@ class Chip:
         from kickstand.imu.fifo_frames import AxisWatch
 
         self.axes = AxisWatch(200, 3, 1, 3, 20)
-        self.axes.notes[9] = 1 << 29  # the next check of the axes is far away
+        self.axes.notes[9] = 1 << 29  # the next check of the axes is never reached
         self.waiting, self.setups, self.states = [], [], []
         self.bad = 0
         self.overflows = self.frames_left = 0

@@ -78,7 +78,7 @@ def test_a_trend_is_subtracted_by_weight():
     found = without_trend(np.array([[0.0, 0.0, 3.0]]), weight, np.array([[0.0, 1.0, 2.0]]))
     assert found == pytest.approx(np.array([[0.0, 0.0, 3.0]]))
     even = without_trend(np.array([[0.0, 0.0, 3.0]]), np.ones((1, 3)), np.array([[0.0, 1.0, 2.0]]))
-    assert even == pytest.approx(np.array([[0.5, -1.0, 0.5]]))  # the line is -0.5 + 1.5 t
+    assert even == pytest.approx(np.array([[0.5, -1.0, 0.5]]))  # the trend is the line -0.5 + 1.5 t
 
 
 def test_an_outlier_weighs_less_by_students_distribution():

@@ -71,7 +71,7 @@ def truth(time: np.ndarray, speed: np.ndarray, stop: Stop) -> tuple[float, float
     """
     near = (time > stop.start_s - 1.0) & (time < stop.stop_s + 1.0)
     t, v = time[near], speed[near]
-    first = len(v) - 1 - int(np.argmax(v[::-1] > np.max(v) - 0.01))  # last sample at the earlier speed
+    first = len(v) - 1 - int(np.argmax(v[::-1] > np.max(v) - 0.01))  # the last sample before the speed falls
     t, v = t[first:], v[first:]
     distance = np.concatenate(([0.0], np.cumsum(np.diff(t) * (v[1:] + v[:-1]) / 2.0)))
     kmh = v * 3.6

@@ -56,7 +56,7 @@ def share(ride: Channels) -> float:
         ({"yaw_rate_dps": 0.14}, {"yaw_rate_dps": 0.16}),
         ({"up_g": 0.19}, {"up_g": 0.21}),  # 20 % of the shaking while riding
         ({"engine": 3.0}, {"pitch_rate_dps": 1.0}),  # an idling engine shakes as strongly as the road, but faster
-        ({"pitching": 0.95}, {"pitching": 1.05}),  # 1 deg/s
+        ({"pitching": 0.95}, {"pitching": 1.05}),  # the limit of the mean pitch rate is 1 deg/s
         ({"pitching": -0.95}, {"pitching": -1.05}),
         ({"yawing": 0.95}, {"yawing": 1.05}),
         ({"yawing": -0.95}, {"yawing": -1.05}),

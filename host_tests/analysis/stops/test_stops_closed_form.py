@@ -16,11 +16,11 @@ from roads import RATE_HZ, REST_S, Road, braking
     ("mps", "mps2", "counts"),
     [
         (9.8 / 3.6, 3.0, False),
-        (10.2 / 3.6, 3.0, True),  # 10 km/h
+        (10.2 / 3.6, 3.0, True),  # a stop begins above 10 km/h
         (20.0, 0.97, False),
-        (20.0, 1.03, True),  # 1 m/s2
+        (20.0, 1.03, True),  # the deceleration is at least 1 m/s2
         (30.0, 28.5, True),
-        (30.0, 31.5, False),  # 30 m/s2
+        (30.0, 31.5, False),  # the deceleration is at most 30 m/s2
     ],
 )
 def test_limits_of_a_stop(mps, mps2, counts):
@@ -218,7 +218,7 @@ def test_bend_is_not_a_dive(side):
     road = braking(20.0, 5.0)
     turning = (road.t_s >= 14.5) & (road.t_s < 16.5)
     lean = np.where(turning, 30.0 * side, 0.0)
-    rate = np.where(turning, -8.0 * side, 0.0)  # positive to the left
+    rate = np.where(turning, -8.0 * side, 0.0)  # a yaw rate is positive to the left
     ride = road.channels(
         lean_deg=lean, pitch_rate_dps=-rate * np.sin(np.radians(lean)), yaw_rate_dps=rate * np.cos(np.radians(lean))
     )
