@@ -1,4 +1,5 @@
-"""Implausible readings: the lean is not trusted, a warning gives place and values, and numpy prints no warning."""
+"""For implausible readings the lean is not trusted, and a warning gives their place and values. numpy prints no
+warning."""
 
 import re
 import warnings
@@ -13,13 +14,13 @@ from kickstand_tools.logs.log import Log
 
 
 def spinning(seed):
-    """Return a sensor upright and at rest, then turned at up to 2500 deg/s about a different axis in each sample."""
+    """Return a log with impossible readings: the force stays upright, but the rates are random, up to 2500 deg/s."""
     rates = np.random.default_rng(seed).uniform(-2500, 2500, (600, 3))
     return Log(np.arange(600) / 100.0, np.tile([0.0, 1.0, 0.0], (600, 1)), rates, name="spin.csv")
 
 
 def test_impossible_readings_give_a_warning_and_no_lean():
-    """Impossible readings make the filter diverge in some of six rides."""
+    """Such readings make the filter diverge in some of the six rides, but not in all."""
     diverged_in = 0
     for seed in range(6):
         notices = []

@@ -1,4 +1,5 @@
-"""Alignment errors found from a ride, their cost in the report, and the remedy, compared with known errors."""
+"""A report finds the alignment errors of a ride, their effect on the lean, and the remedy. The tests use known
+errors."""
 
 import dataclasses
 import re
@@ -19,7 +20,8 @@ from support import command
 from support.recordings import analysis_rides
 
 NONE = np.zeros(1)
-# roll: "up" leans to the right of the bike's up; pitch: "forward" points up; yaw: "forward" points to the right
+# The axis of each alignment error. With an error of roll, "up" leans to the right of the bike's up. With an error of
+# pitch, "forward" points up. With an error of yaw, "forward" points to the right.
 AXES = {"roll": (0.0, 0.0, -1.0), "pitch": (1.0, 0.0, 0.0), "yaw": (0.0, 1.0, 0.0)}
 
 
@@ -29,14 +31,14 @@ def turn(name, degrees):
 
 
 def turned(calibration, name, degrees):
-    """Return the calibration with this angle off."""
+    """Return the calibration with this alignment error."""
     matrix = turn(name, degrees) @ calibration.vehicle_from_sensor
     return dataclasses.replace(calibration, vehicle_from_sensor=matrix)
 
 
 @pytest.fixture(scope="module", params=["street", pytest.param("city", marks=pytest.mark.nightly)])
 def ride(request):
-    """Return a log of 100 samples per second with a speed, its true calibration and the true lean."""
+    """Return a log of 100 samples per second with a speed, its true calibration, the true lean and the profile."""
     made = simulate_ride(request.param, seed=2, seconds=150.0)
     n = round(made.rate_hz / 100.0)
     readings = made.readings[: len(made.readings) // n * n].reshape(-1, n, 7).mean(axis=1)
@@ -66,7 +68,7 @@ def test_yaw_and_pitch_cause_the_stated_lean_error(ride, name, degrees):
     said = vars(lean_cost(Quality(**angles, gravity_g=1.0, straight_s=60.0, lateral_g=NONE, forward_g=NONE)))
     most = said.pop(f"{name}_deg")
     assert cost < 1.75 * most + 0.15
-    if ride[3] != "city":  # slow rides lose less
+    if ride[3] != "city":  # the error is smaller in slow rides
         assert cost > 0.3 * most
     assert set(said.values()) == {0.0}
 
@@ -74,7 +76,7 @@ def test_yaw_and_pitch_cause_the_stated_lean_error(ride, name, degrees):
 def test_riding_corrects_roll_up_to_a_limit(ride):
     usual = error_deg(ride, ride[1], 0.5)
     assert error_deg(ride, turned(ride[1], "roll", 3.0), 0.5) < usual + 0.3
-    assert not error_deg(ride, turned(ride[1], "roll", 12.0), 0.5) <= 7.0  # or no lean is shown at all
+    assert not error_deg(ride, turned(ride[1], "roll", 12.0), 0.5) <= 7.0  # NaN if no lean is shown at all
 
 
 def test_calibrate_drive_corrects_yaw(ride):
@@ -126,7 +128,7 @@ def test_ride_without_straights_shows_no_alignment(tmp_path):
     ("notice", "fits"), [(Mirrored(), False), (LeftHanded(), False), (ForwardExchanged(False, "left", 0.0), True)]
 )
 def test_a_log_that_contradicts_its_calibration_is_not_judged(scripted, notice, fits):
-    """In a mirrored log the angles look right, but left and right are exchanged."""
+    """In a mirrored log the alignment angles look right, although left and right are exchanged."""
     seen = overview(open_ride(scripted, with_calibration(scripted, "yaw", 0.0)))
     seen.notices.append(notice)
     assert ("not judged" not in report.words(seen).alignment) == fits

@@ -41,7 +41,7 @@ def test_maxima_are_those_of_the_display(ride):
     whole = joined(list(ride.blocks()))
     for start in range(0, len(whole.t_s), 777):
         summary.add(whole.part(slice(start, start + 777)))
-    # the display's windows of 150 ms begin every 75 ms, those of the summary at every sample
+    # the display averages over windows of 150 ms that begin every 75 ms; in the summary they begin at every sample
     assert meter.max_left_deg - 0.01 < summary.left_deg.value < meter.max_left_deg + 0.5
     assert meter.max_right_deg - 0.01 < summary.right_deg.value < meter.max_right_deg + 0.5
     assert summary.left_deg.value > 25
@@ -81,7 +81,7 @@ def test_thinned_ride_is_the_mean_of_each_stretch(course, block):
 
 
 def part(n=100, **changed) -> Channels:
-    """Return one second at 100 Hz, straight ahead, with all values certain."""
+    """Return one second of riding straight ahead at 100 samples per second. All values are certain."""
     zero = np.zeros(n)
     columns = {field.name: zero for field in fields(Channels)}
     columns |= {"t_s": np.arange(n) / 100.0, "sure": np.ones(n)}
@@ -90,7 +90,8 @@ def part(n=100, **changed) -> Channels:
 
 
 def test_uncertain_lean_counts_only_as_uncertain():
-    """The 30 uncertain samples of 100 have the largest values of the ride. A fallen bike also counts as uncertain."""
+    """30 of the 100 samples are uncertain and have the largest values of the ride. Samples of a fallen bike also count
+    as uncertain."""
     sure = np.ones(100)
     sure[20:50] = 0.0
     lean = np.where(sure > 0.0, 32.0, 50.0)
@@ -141,9 +142,10 @@ def test_channels_are_those_of_the_meter(ride, course):
         rolling.append(engine.meter.filter.rolling)
         trusted.append(engine.meter.trusted)
     for name, column in zip(replay_engine.COLUMNS, np.transpose(rows)):
-        if name not in ("static_lean_deg", "lean_formula_deg", "lean_sigma_deg"):  # test_meter_along.py
+        # test_meter_along.py tests the other columns
+        if name not in ("static_lean_deg", "lean_formula_deg", "lean_sigma_deg"):
             assert np.max(np.abs(getattr(course, name) - column)) < 1e-5, name
     assert np.array_equal(course.shown_g, shown)
     assert np.array_equal(course.rolling, rolling)
-    assert 0.2 < np.mean(rolling) < 0.9  # the lean is known in its turns
+    assert 0.2 < np.mean(rolling) < 0.9  # the ride has turns and straights
     assert np.array_equal(course.trusted, trusted)

@@ -1,5 +1,5 @@
-"""The charts of a ride: left is on the left and braking below, labels do not overlap, and picture and page draw the
-same charts."""
+"""In the charts of a ride, left is on the left and braking is below. Labels do not overlap. The picture and the page
+draw the same charts."""
 
 import itertools
 from dataclasses import replace
@@ -25,8 +25,8 @@ pytest.importorskip("plotly")
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory) -> Overview:
-    """Return a ride with left turns only, gentle acceleration and a hard stop. Its forward is 10 degrees off on
-    purpose."""
+    """Return a ride with gentle acceleration, one left turn and a hard stop. Its calibration has a yaw error of 10
+    degrees on purpose."""
     ride = analysis_rides.write(
         tmp_path_factory.mktemp("ride"),
         [script.upright(4), script.accelerate(15, 12), script.turn(-35, 5), script.brake(0, 3), script.wait(4)],
@@ -69,8 +69,8 @@ def test_lean_to_the_left_is_below_and_on_the_left(seen, panels, drawn):
 
 
 def test_chart_of_g_against_g_has_the_right_sides(seen, panels, drawn):
-    """The turn has 0.7 g for 5 s, plus its beginning and end. The stop has 0.5 g for 3 s. No point is above or on
-    the right."""
+    """The left turn has 0.7 g for 5 s, plus its beginning and end. The stop has 0.5 g for 3 s. So the chart has points
+    on the left and below, but none above or on the right."""
     (cells,) = (trace for trace in chart(seen, "g against").traces if isinstance(trace, CellMap))
     middle = (cells.edges[1:] + cells.edges[:-1]) / 2.0
     x, y = np.meshgrid(middle, middle)
@@ -88,7 +88,8 @@ def test_chart_of_g_against_g_has_the_right_sides(seen, panels, drawn):
 
 
 def test_the_straights_and_their_line(seen, panels, drawn):
-    """Forces to the left are on the left. The line of the yaw goes through the points."""
+    """In the chart of the alignment, forces to the left are on the left. The line that shows the yaw error goes through
+    the points."""
     _, dots, line = chart(seen, "Alignment").traces
     assert isinstance(dots, Dots) and isinstance(line, Line)
     assert dots.x == pytest.approx(-seen.quality.lateral_g)
@@ -119,12 +120,13 @@ def test_charts_of_car_and_speed_are_drawn_only_if_present(seen, car, speed):
     assert f"{stop.mfdd_mps2:.1f}" in [note["text"] for note in figure["layout"]["annotations"]]
     if speed:
         (drawn,) = (trace for trace in figure["data"] if trace.get("name") == "speed")
-        assert max(drawn["y"]) == pytest.approx(54.0, abs=0.5)  # km/h
+        assert max(drawn["y"]) == pytest.approx(54.0, abs=0.5)  # the chart is in km/h
     assert picture.figure_of(made).get_size_inches()[1] == 5.5 + 2.5 * (not car) + 1.5 * speed
 
 
 def test_charts_are_stacked_in_a_narrow_window(seen):
-    """In a wide window the last three charts are side by side and do not overlap."""
+    """In a wide window the last three charts are side by side. In a narrow window they are below each other. They never
+    overlap."""
     for kind, last_row in (("layout", 3), ("narrow", 1)):
         drawn = interactive.figure(charts(seen))[kind]
         axes = [name.removeprefix("xaxis") for name in drawn if name.startswith("xaxis")]
@@ -137,7 +139,7 @@ def test_charts_are_stacked_in_a_narrow_window(seen):
 
 
 def test_unknown_values_are_not_drawn(seen):
-    """Values that are not sure enough are not drawn, nor is the alignment of another mount's calibration."""
+    """Uncertain values are not drawn. The alignment is not drawn if the calibration belongs to another mount."""
     made = replace(seen, notices=[UpOff(20.0, False)], summary=replace(seen.summary))
     made.summary.left_deg = made.summary.right_deg = made.summary.brake_g = made.summary.accel_g = Peak()
     assert title(made).endswith("lean as displayed -- left, -- right  ·  braking --, acceleration --")
@@ -220,17 +222,19 @@ def test_line_is_broken_in_a_gap(points):
     assert not np.any(np.isnan(envelope(time, values, points)[1]))
 
 
-HUE_180 = np.array([[-0.574, 1.43, 0.144], [0.426, 0.43, 0.144], [0.426, 1.43, -0.856]])  # CSS's hue-rotate(180deg)
+# the matrix of CSS's hue-rotate(180deg)
+HUE_180 = np.array([[-0.574, 1.43, 0.144], [0.426, 0.43, 0.144], [0.426, 1.43, -0.856]])
 
 
 def luminance(rgb):
-    """Return the relative luminance as defined in WCAG 2. rgb: 0 to 1."""
+    """Return the relative luminance of a colour as defined in WCAG 2. rgb: its three parts, each from 0 to 1."""
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     return float(linear @ [0.2126, 0.7152, 0.0722])
 
 
 def test_rarest_g_is_visible_on_white_and_on_dark_paper(seen):
-    """The page inverts the charts in dark mode. The rarest value has the first colour of the scale."""
+    """The rarest value has the first colour of the scale. This colour must also be visible in dark mode, where the page
+    inverts the charts."""
     (cells,) = [trace for trace in interactive.figure(charts(seen))["data"] if trace["type"] == "heatmap"]
     logs = np.array([[np.nan if value is None else value for value in row] for row in cells["z"]])
     assert cells["zmin"] == pytest.approx(np.nanmin(logs), abs=0.001)

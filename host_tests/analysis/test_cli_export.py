@@ -1,5 +1,5 @@
-"""Test `kickstand export`: every sample is in the file, and unusable input is refused. The contents of each format
-are tested in test_export_formats.py."""
+"""`kickstand export` writes every sample and refuses unusable input. test_export_formats.py tests the content of each
+format."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ def ride(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def shown(ride) -> np.ndarray:
-    """Return what replay shows."""
+    """Return the table that `kickstand replay` writes for the ride."""
     out = ride.with_name("LEAN.csv")
     command.works("replay", ride, "--calibration", ride.with_name("RIDE.cal.json"), "--out", out)
     return analysis_rides.table(out)
@@ -33,7 +33,7 @@ def export(ride, form, out, *more) -> Path:
 
 @pytest.mark.parametrize("form", ["parquet", "csv.gz"])
 def test_csv_and_parquet_have_every_sample(ride, shown, tmp_path, form):
-    """The vectorised forces, rates and formula equal those of the firmware's replay."""
+    """`export` computes forces, rates and formula with numpy. They equal the values of the firmware in `replay`."""
     read = pandas.read_parquet if form == "parquet" else pandas.read_csv
     got = read(export(ride, form.partition(".")[0], tmp_path / f"out.{form}", "--live"))
     given = analysis_rides.table(ride)
@@ -42,7 +42,8 @@ def test_csv_and_parquet_have_every_sample(ride, shown, tmp_path, form):
     for name in "lean_deg", "lean_sigma_deg", "left_g", "up_g", "forward_g", "yaw_rate_dps", "roll_rate_dps":
         near = 1e-3 if name.endswith("deg") else 2e-4
         assert np.allclose(got[name], shown[name], atol=near, equal_nan=True), name
-    steep = np.abs(shown["left_g"] ** 2 + shown["up_g"] ** 2 - 1.0) < 1e-4  # 32-bit floats change the square root
+    # near 1 g the rounding of 32-bit floats changes the formula's square root
+    steep = np.abs(shown["left_g"] ** 2 + shown["up_g"] ** 2 - 1.0) < 1e-4
     assert np.allclose(got["lean_formula_deg"][~steep], shown["lean_formula_deg"][~steep], atol=0.02)
     lean = np.radians(shown["lean_deg"])
     s = shown["left_g"] * np.cos(lean) - shown["up_g"] * np.sin(lean)
@@ -61,7 +62,8 @@ def test_a_car_has_no_lean_as_in_replay(ride, tmp_path):
 
 
 def test_ride_that_cannot_be_exported_is_refused(ride, tmp_path, monkeypatch):
-    """The ride has no calibration beside it, or an unaligned one; or pyarrow is missing."""
+    """Export is refused if the ride has no calibration beside it, if the calibration is not aligned, or if pyarrow is
+    missing."""
     alone = tmp_path / "alone.csv"
     alone.write_bytes(ride.read_bytes())
     empty = tmp_path / "empty.csv"

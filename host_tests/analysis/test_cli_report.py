@@ -1,4 +1,4 @@
-"""kickstand report and plot: their output for a ride, and their refusals."""
+"""Tests the output of `kickstand report` and `kickstand plot` for a ride, and their refusals."""
 
 import io
 import json
@@ -138,7 +138,7 @@ def test_a_kickstand_on_the_other_side_is_noticed(ride, tmp_path):
 
 
 def test_stop_shown_only_by_the_speed_is_reported(ride, tmp_path):
-    """The axis "forward" points sideways: it is neither right nor reversed."""
+    """The calibration's "forward" points sideways, so it is neither right nor reversed."""
     cal = analysis_rides.calibration(tmp_path / "changed.json", vehicle_from_sensor=[[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
     said = command.works("report", ride, "--calibration", cal, "--live").out
     assert "No stop" not in said
@@ -153,7 +153,7 @@ def test_picture_and_page_are_complete(ride, tmp_path):
     assert struct.unpack(">2I", png[16:24]) == (1100, 950)
     html = (out / "RIDE.html").read_text()
     assert "Plotly.newPlot" in html
-    assert not re.search(r"<(script|link)[^>]*(src|href)=", html)  # the whole text is inside
+    assert not re.search(r"<(script|link)[^>]*(src|href)=", html)  # the page loads no other file
     assert sorted(path.name for path in out.iterdir()) == ["RIDE.html", "RIDE.png"]
 
 

@@ -1,7 +1,7 @@
-"""The exact content of each format: channel, unit, sign and digits of each column.
+"""Tests the exact content of each export format: channel, unit, sign and digits of each column.
 
-The columns and signs are those of the formats' own descriptions, named in the modules; the signs are also checked on
-readings of a sensor mounted square in the vehicle.
+Columns and signs follow the descriptions of the formats, which are named in the modules. The signs are also tested with
+a sensor whose axes are the vehicle's axes.
 """
 
 import time
@@ -20,7 +20,7 @@ from kickstand_tools.logs.log import Log
 from support import command
 from support.recordings import analysis_rides
 
-EVENING_S = 1_700_000_000.0  # 22:13:20 UTC on 14/11/2023
+EVENING_S = 1_700_000_000.0  # this Unix time is 22:13:20 UTC on 14/11/2023
 VALUES = {
     "lean_deg": -12.34567,
     "lean_formula_deg": 23.4567,
@@ -69,19 +69,19 @@ def test_csv_to_the_letter(tmp_path):
 
 
 def test_racechrono_to_the_letter(tmp_path):
-    """t_s is the elapsed time since the first sample, z points forward, and speed and position are written only when
-    new."""
+    """The time is the elapsed time since the first sample. The axis z points forward. Speed and position are written
+    only in rows where they are new."""
     none = block(0.5, speed_mps=np.nan, **NOWHERE)
     text = written(export_racechrono.write, tmp_path / "x", block(0.25), none)
     assert text == expected("ride.racechrono.csv")
 
 
 def test_vbo_to_the_letter(tmp_path):
-    """A speed of 10.5 m/s is 37.8 km/h. The clock starts again at midnight. Minutes of longitude are positive in the
-    west."""
-    evening = EVENING_S + 6400.0 - 0.25  # the second before midnight
+    """In a VBO file a speed of 10.5 m/s is written as 37.8 km/h. The time of day starts again at midnight. Longitudes
+    are in minutes, positive to the west."""
+    evening = EVENING_S + 6400.0 - 0.25  # the ride begins in the last second before midnight
     moved = block(0.25, 61.5, 3661.75)
-    moved.lon_deg[0] += 1e-5  # 0.68 m to the east
+    moved.lon_deg[0] += 1e-5  # this moves the position 0.68 m to the east
     moved.lat_deg[2] = moved.lon_deg[2] = np.nan
     text = written(export_vbo.write, tmp_path / "x", block(0.0), moved, start_s=evening)
     assert text == expected("ride.vbo").replace("\n", "\r\n")
@@ -102,7 +102,7 @@ def test_vbo_without_lean_speed_and_temperature(tmp_path):
 
 
 def test_vbo_has_a_channel_with_gaps(tmp_path):
-    """A channel with gaps in its first block is present, with 0 in the gaps."""
+    """A channel that has gaps in the first block is still written, with 0 in the gaps."""
     first = block(0.0, 0.1, speed_mps=np.nan)
     first.temp_c[1] = np.nan
     first.speed_mps[0] = 10.0
@@ -114,8 +114,8 @@ def test_vbo_has_a_channel_with_gaps(tmp_path):
 
 
 def test_vbo_keeps_the_heading_at_standstill(tmp_path):
-    """The positions go north and east. The next block has the same place and one 0.8 mm north of it, like a receiver's
-    noise."""
+    """The vehicle goes north and then east, and then stands. At standstill the position moves 0.8 mm north, like the
+    noise of a receiver. The heading must not follow it."""
     ridden, stood = block(0.0, 1.0, 2.0), block(3.0, 4.0)
     ridden.lat_deg[1:] += 1e-5
     ridden.lon_deg[2] += 1e-5
@@ -126,7 +126,7 @@ def test_vbo_keeps_the_heading_at_standstill(tmp_path):
 
 
 RATE_HZ = 100.0
-SQUARE = CalibrationFile(aligned=True, vehicle="car")  # sensor axes left, up, forward: the same as the vehicle's axes
+SQUARE = CalibrationFile(aligned=True, vehicle="car")  # the sensor's axes are left, up, forward like the vehicle's
 
 
 def squarely(seconds: float = 2.0, start_s: float = 0.0, speed_mps=()) -> Log:
@@ -137,7 +137,7 @@ def squarely(seconds: float = 2.0, start_s: float = 0.0, speed_mps=()) -> Log:
 
 
 def test_a_left_turn_under_braking_has_the_signs_of_each_format(tmp_path):
-    """Rates about x left, y up and z forward have the gyro's sign. Nose up is a negative rate about x."""
+    """The rates about left, up and forward have the gyro's sign. If the nose rises, the rate about left is negative."""
     ride = open_ride(squarely(), SQUARE)
     out = tmp_path / "out"
     export(ride, "racechrono", out)
@@ -149,8 +149,8 @@ def test_a_left_turn_under_braking_has_the_signs_of_each_format(tmp_path):
     assert row["lean_angle"] == ""  # a car has no lean
     export(ride, "vbo", out)
     cells = [float(cell) for cell in out.read_text().split("\n")[-2].split(" ")]
-    assert cells[7:9] == [-0.4, 0.2]  # long accel > 0 forward, lat accel > 0 in a left turn
-    assert cells[9:] == pytest.approx([7.0, 9.0])  # yaw > 0 in a left turn, roll > 0 to the right
+    assert cells[7:9] == [-0.4, 0.2]  # long accel is positive forward, lat accel in a left turn
+    assert cells[9:] == pytest.approx([7.0, 9.0])  # yaw is positive in a left turn, roll to the right
     export(ride, "csv", out)
     row = dict(zip(export_columns.COLUMNS, out.read_text().split("\n")[-2].split(",")))
     assert [float(row[f"{name}_rate_dps"]) for name in ("pitch", "yaw", "roll")] == pytest.approx([-5.0, 7.0, 9.0])
@@ -178,10 +178,10 @@ def first_time(path: Path, form: str) -> float:
 @pytest.mark.parametrize(
     ("start_s", "now_s", "first_s"),
     [
-        (1e8, EVENING_S, 1e8),  # from 3 March 1973 on a time is Unix time
-        (1e8 - 1.0, EVENING_S, EVENING_S - 2.0),  # three years and two months after power-on
-        (0.0, EVENING_S + 0.985, EVENING_S - 2.0),  # 1.99 s before, in whole seconds
-        (0.0, 1.0, 0.0),  # a clock that was never set: no time before 1970 is written
+        (1e8, EVENING_S, 1e8),  # a time after 3 March 1973 is a Unix time
+        (1e8 - 1.0, EVENING_S, EVENING_S - 2.0),  # an earlier time is the time since power-on: three years, two months
+        (0.0, EVENING_S + 0.985, EVENING_S - 2.0),  # the log begins 1.99 s before now, rounded to whole seconds
+        (0.0, 1.0, 0.0),  # if the computer's clock was never set, no time before 1970 is written
     ],
 )
 def test_log_in_memory_without_a_clock_ends_now(tmp_path, monkeypatch, form, start_s, now_s, first_s):
@@ -191,7 +191,7 @@ def test_log_in_memory_without_a_clock_ends_now(tmp_path, monkeypatch, form, sta
 
 
 def test_every_row_of_a_vbo_has_a_speed(tmp_path):
-    """Speeds between two values are interpolated. Outside them the format leaves gaps."""
+    """A speed comes at 0.5 s and at 1.5 s. Between these times it is interpolated."""
     speed = np.full(200, np.nan)
     speed[[50, 150]] = 10.0, 20.0
     ride = open_ride(squarely(speed_mps=speed), SQUARE)
@@ -206,7 +206,7 @@ def test_every_row_of_a_vbo_has_a_speed(tmp_path):
 
 @pytest.mark.parametrize(("form", "rows"), [("csv", 400), ("parquet", 400), ("racechrono", 400), ("vbo", 201)])
 def test_vbo_has_at_most_100_rows_per_second(tmp_path, form, rows):
-    """The number of written rows is right for any division of the log into blocks."""
+    """The returned number of rows is right, however the log is divided into blocks."""
     if form == "parquet":
         pytest.importorskip("pyarrow")
     n = 400
@@ -220,8 +220,8 @@ def test_vbo_has_at_most_100_rows_per_second(tmp_path, form, rows):
 @pytest.mark.parametrize("start_s", [1e8, 1e8 + 0.0043, 1e8 + 0.00065])
 @pytest.mark.parametrize(("form", "step_s", "columns"), [("racechrono", 0.001, (0, 3)), ("vbo", 0.01, (1,))])
 def test_no_time_is_written_twice(tmp_path, form, step_s, columns, start_s):
-    """Samples are less than one time step apart, on both sides of a step or in the middle between two. Every sample is
-    counted."""
+    """Some samples are less apart than the smallest time step of the format. They are just before or after a step, or
+    in the middle between two steps. The returned number still contains every sample."""
     t_s = step_s * np.array([0.0, 0.96, 1.04, 2.5, 3.5, 4.5, 5.49, 5.51, 6.4, 7.0, 8.0, 9.96, 10.04, 10.5])
     log = Log(t_s, np.tile([0.0, 1.0, 0.0], (len(t_s), 1)), np.zeros((len(t_s), 3)), start_s=start_s)
     notices = []
@@ -234,7 +234,7 @@ def test_no_time_is_written_twice(tmp_path, form, step_s, columns, start_s):
 
 
 def test_progress_and_notices_are_passed_on(tmp_path):
-    """The ride's readings freeze for two seconds."""
+    """The readings of the ride are frozen for two seconds, which gives a notice."""
     n = 3000
     force, rate = np.tile([0.0, 1.0, 0.0], (n, 1)), np.zeros((n, 3))
     rate[200::2] += 1e-4

@@ -18,16 +18,16 @@ from support.recordings import app_exports
 gpxpy = pytest.importorskip("gpxpy")
 pandas = pytest.importorskip("pandas")
 START_S = app_exports.START_UTC_S + 0.004  # not a whole second, because exports must keep milliseconds
-HZ = 5  # positions per second
+HZ = 5  # number of positions per second
 ALIGNED = api.CalibrationFile(aligned=True)
 DEGREE_M = np.radians(app_exports._EARTH_M)
 
 
 @functools.cache
 def log(start_s: float = 0.0) -> api.Log:
-    """Half a minute with a position every 0.2 s, in the row in which it arrived, and a speed every second. There are no
-    positions before 1 s and from 10 to 20 s. start_s: by the log's own clock."""
-    ride = app_exports.riding().every(2)  # 100 a second
+    """Return a log of half a minute with a position every 0.2 s and a speed every second. There are no positions before
+    1 s and from 10 to 20 s. start_s: the start time by the log's own clock."""
+    ride = app_exports.riding().every(2)  # 100 samples per second
     row = np.arange(len(ride.t_s))
     known = (row % (100 // HZ) == 7) & (ride.t_s > 1.0) & ~((ride.t_s > 10.0) & (ride.t_s < 20.0))
     track = [np.where(known, v, np.nan) for v in (ride.lat_deg, ride.lon_deg, START_S + ride.t_s)]
@@ -51,7 +51,7 @@ def away_m(lat, lon, t_s) -> np.ndarray:
 
 
 def values(points, name: str) -> np.ndarray:
-    """Return the numbers in the track points' extensions by element name. A missing number is NaN."""
+    """Return the number with this element name from each track point's extensions, or NaN if it is missing."""
     found = []
     for point in points:
         elements = [one for part in point.extensions for one in part.iter() if one.tag.endswith("}" + name)]
@@ -108,7 +108,8 @@ def test_vbo_interpolates_positions_for_every_row(tmp_path):
     ends_s = [known_s[0], np.max(known_s[known_s < 15.0]), np.min(known_s[known_s > 15.0]), known_s[-1]]
     within = [(t_s > begin - 0.005) & (t_s < end + 0.005) for begin, end in zip(ends_s[::2], ends_s[1::2])]
     assert np.array_equal(placed, within[0] | within[1])
-    assert np.max(away_m(rows["lat"] / 60, -rows["long"] / 60, t_s)[placed]) < 0.2  # rows have hundredths of a second
+    # the distance in metres is not 0, because a row's time is rounded to 0.01 s
+    assert np.max(away_m(rows["lat"] / 60, -rows["long"] / 60, t_s)[placed]) < 0.2
     assert np.all(rows["lat"][~placed] == 0.0)
     ride = app_exports.riding()
     east, north = np.gradient(ride.lon_deg) * np.cos(np.radians(52.5)), np.gradient(ride.lat_deg)
@@ -120,7 +121,8 @@ def test_vbo_interpolates_positions_for_every_row(tmp_path):
 
 @pytest.mark.parametrize("form", ["gpx", "racechrono", "vbo"])
 def test_time_of_the_satellites_is_preferred(tmp_path, form):
-    """Two cases: a log whose own clock was wrong, and a stretch that begins in a second without a position."""
+    """The satellites' time is used if the log's own clock was wrong. It is also used for a stretch that begins in a
+    second without a position."""
     for ride in (log(1.2e9), api.Stretch(log(), 12.5, 25.0)):
         out = exported(form, tmp_path, ride)
         if form == "gpx":
@@ -150,7 +152,8 @@ def test_a_track_across_180_degrees_goes_the_short_way():
 
 
 def test_last_position_of_a_stretch_is_kept():
-    """The mean of positions on both sides of the meridian of 180 degrees would be on the other side of the earth."""
+    """The positions are on both sides of the meridian of 180 degrees. Their mean longitude would be on the other side
+    of the earth, so the last position is used."""
     few = log().part(log().t_s < 0.1)
     few.lon_deg[:] = np.nan
     few.lat_deg[:], few.lon_deg[3:6], few.utc_s[2] = -10.0, (179.9999, -179.9999, -179.9998), START_S

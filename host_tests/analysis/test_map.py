@@ -1,5 +1,5 @@
-"""The map on a ride's page is in metres, with north up and the sides in their colours, and is linked with the
-charts."""
+"""The map on a ride's page is in metres, with north up. Leans to the left and to the right have different colours. The
+map and the charts show the same moment."""
 
 import functools
 import json
@@ -22,8 +22,8 @@ MOTORCYCLE = api.CalibrationFile(aligned=True)
 
 @functools.cache
 def seen(lat_deg: float = 52.5, lon_deg: float = 13.4, gap: bool = False, car: bool = False) -> Overview:
-    """Simulate half a minute from this place on, with a position every half second. gap: leave out positions from 10
-    to 16 s."""
+    """Simulate a ride of half a minute that starts at this place, with a position every half second. gap: True to leave
+    out the positions from 10 to 16 s."""
     ride = app_exports.riding().every(2)
     known = np.arange(len(ride.t_s)) % 50 == 3
     if gap:
@@ -91,7 +91,7 @@ def test_map_has_left_blue_right_orange_and_north_up():
     _, dots = made["data"]
     scale = dict(dots["marker"]["colorscale"])
     assert dots["marker"]["cmin"] == -dots["marker"]["cmax"] < 0.0
-    steeper = replace(seen(), summary=replace(seen().summary, right_deg=Peak(43.6, 1.0)))  # 44 in the title
+    steeper = replace(seen(), summary=replace(seen().summary, right_deg=Peak(43.6, 1.0)))  # the title shows 44 degrees
     bar = track_map.figure(points_of(), steeper)["data"][1]["marker"]["colorbar"]
     assert bar["ticktext"] == ["44", "0", "44"]
     for place, colour in scale.items():
@@ -100,7 +100,7 @@ def test_map_has_left_blue_right_orange_and_north_up():
     lean = np.asarray(dots["marker"]["color"])
     assert lean.min() < -20.0 and lean.max() > 30.0
     assert made["layout"]["yaxis"]["scaleanchor"] == "x"
-    assert "autorange" not in made["layout"]["yaxis"]  # the values of y grow upwards
+    assert "autorange" not in made["layout"]["yaxis"]  # without it, y grows upwards
     assert "N" in made["layout"]["annotations"][1]["text"]
 
 
@@ -133,7 +133,7 @@ def test_page_loads_nothing_unless_tiles_are_requested(tmp_path):
 
 @pytest.mark.parametrize("place", [(52.5, 13.4), (-33.9, 151.2), (47.6, -0.01)])
 def test_tiles_match_the_track(place):
-    """The number of the start's tile is the same from the map's metres and from the formula of slippy maps."""
+    """The map's metres give the same tile for the start as the formula of web maps for latitude and longitude."""
     found = points_of(*place)
     tiles = page.tiles_at(found)
     size = tiles["world_m"] / 2**15

@@ -1,4 +1,4 @@
-"""The riding time of a ride, and logs with too little of a ride."""
+"""Tests the riding time of a ride, and the message about a log that contains too little riding."""
 
 import numpy as np
 import pytest
@@ -40,14 +40,15 @@ def test_standing_bike_is_not_riding(log):
 
 
 def test_knock_at_the_start_is_not_riding():
-    """A hand that switches the device on causes such a knock: 0.4 g for 0.02 s, which are 0.008 g over a second."""
+    """The hand that switches the device on knocks it with 0.4 g for 0.02 s. Averaged over a second this is 0.008 g."""
     log = standing(40, 0.05, 1.5)
     log.accel_g[:2, 2] = 0.4
     assert words_of(log).ride[0][2] == "riding 0:00"
 
 
 def test_riding_time_excludes_standing(tmp_path):
-    """The bike stands for four of 37 s before the ride and four after it. The log is tried with a speed and without."""
+    """The log is 37 s long. The bike stands for 4 s before the ride and for 4 s after it. The riding time is tested
+    with a speed and without one."""
     for speed_hz in (0, 5):
         said = words_of(analysis_rides.short(tmp_path, speed_hz=speed_hz))
         minutes, seconds = said.ride[0][2].removeprefix("riding ").split(":")
@@ -58,7 +59,7 @@ def test_riding_time_excludes_standing(tmp_path):
 
 
 def test_a_speed_that_is_always_0_hides_no_ride(tmp_path):
-    """A broken wheel contact gives such a speed. The riding time is then computed as without a speed."""
+    """A broken contact at the wheel gives a speed that is always 0. The riding time is then computed without it."""
     log = read_log(analysis_rides.short(tmp_path))
     without = words_of(log)
     log.speed_mps[::20] = 0.0
@@ -68,7 +69,8 @@ def test_a_speed_that_is_always_0_hides_no_ride(tmp_path):
 
 
 def test_straight_stretch_without_speed_counts_as_riding():
-    """The bike rides on a rough road at constant speed: this does not prove that it stood still in a whole log."""
+    """The log is a stretch of a longer log. Its readings fit a standing bike, but also a ride at constant speed on a
+    rough road. A stretch with such readings counts as riding."""
     assert words_of(Stretch(standing(40, 0.05, 1.5), 5.0, 30.0)).too_little == ""
 
 

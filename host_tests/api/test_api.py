@@ -1,4 +1,4 @@
-"""kickstand_tools.api: the examples in the docstrings run, and the functions do what the module promises."""
+"""The examples in the docstrings of kickstand_tools.api run, and its functions do what the module promises."""
 
 import doctest
 import gzip
@@ -29,7 +29,7 @@ def test_example_in_each_docstring_runs(name):
 
 
 def test_pydoc_lists_the_promised_functions():
-    """pydoc leaves out names that a module without __all__ only imports."""
+    """Without __all__, pydoc would leave out the names that the module only imports."""
     shown = pydoc.plain(pydoc.render_doc(api))
     for name in ("import_recording", "fit_ride", "open_ride", "export", "simulate_ride"):
         assert re.search(rf"^ +{name}(\(| = )", shown, re.M), name
@@ -38,7 +38,7 @@ def test_pydoc_lists_the_promised_functions():
 
 @pytest.fixture(scope="module")
 def directory(tmp_path_factory):
-    """Return the folder of a simulated ride and its poses, calibrated by the functions under test."""
+    """Return the folder of a simulated ride and its poses. The functions under test make its calibration."""
     made = tmp_path_factory.mktemp("ride")
     simulate("street", 1, made, seconds=60.0, speed=True)
     six = api.fit_six_positions([made / f"POSE_{k}.csv" for k in range(1, 8)])
@@ -56,7 +56,7 @@ def test_nothing_is_printed(directory, capfd):
     with pytest.raises(api.RefusedInput, match="only 2 of 5 braking events"):
         api.fit_drive([log], calibration, progress=lambda done, total: seen.append((done, total)))
     assert tuple(capfd.readouterr()) == ("", "")
-    assert [done == total for done, total in seen].count(True) == 3  # each call of progress ends with done equal to all
+    assert [done == total for done, total in seen].count(True) == 3  # each of the three calls reports its end once
 
 
 def test_any_source_gives_the_same_log(directory):
@@ -80,7 +80,7 @@ def test_any_source_gives_the_same_log(directory):
 
 
 def test_stops_and_summary_of_arrays_match_the_report(directory):
-    """They match for whole logs and blocks, for files and arrays."""
+    """The functions for arrays find the same stops and the same summary as the report of the file."""
     channels = api.vehicle_channels(api.read_log(directory / "RIDE.csv"), directory / "RIDE.cal.json")
     seen = api.overview(api.open_ride(directory / "RIDE.csv"))
     assert seen.stops == api.find_stops(channels) != []

@@ -1,4 +1,4 @@
-"""Each notice and refusal is a sentence and says what to do, in the words of a terminal and of a page."""
+"""Each notice and refusal is a sentence that says what to do. A terminal and a page have different words for it."""
 
 import json
 import pickle

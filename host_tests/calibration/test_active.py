@@ -1,4 +1,4 @@
-"""The active calibration: loading, applying, saving, and writing the trim to flash."""
+"""Tests the active calibration: it is loaded, applied and saved, and its trim is written to flash."""
 
 import pytest
 from kickstand.calibration.parameters import Calibration
@@ -7,7 +7,7 @@ from kickstand_tools.simulated_board.simulator import Board
 
 
 class Meter:
-    """new_trim: the result of keep_trim() in degrees, or None without a new one."""
+    """A lean meter without a filter. new_trim: the result of keep_trim() in degrees, or None without a new trim."""
 
     def __init__(self):
         self.calibration = Calibration()
@@ -33,7 +33,13 @@ class Chip:
 
 @pytest.fixture
 def made(tmp_path, monkeypatch):
-    """Return an ActiveCalibration created at 0 ms, its meter, and the arguments of its calls to changed()."""
+    """Create an ActiveCalibration at 0 ms.
+
+    Returns:
+        The ActiveCalibration.
+        Its meter.
+        A list of the arguments with which it calls changed().
+    """
     monkeypatch.chdir(tmp_path)
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):
         from kickstand.calibration.active import ActiveCalibration
@@ -84,8 +90,8 @@ def test_save_replaces_and_refine_corrects(made):
 
 
 def test_the_trim_is_saved_once_a_minute_at_most(made):
-    """The trim is saved seldom because flash wears, and never in the first minute. If there was nothing to save, the
-    next chance is used."""
+    """The trim is saved seldom, because each write wears the flash. It is never saved in the first minute. If there is
+    no new trim after a minute, the first new one after that is saved."""
     active, meter, _ = made
     active.chip_started(Chip())
     active.save(aligned())

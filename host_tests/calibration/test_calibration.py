@@ -1,4 +1,4 @@
-"""Conversion of counts to g, the pose capture, and the six-position fit."""
+"""Tests the conversion of counts to g, the capture of a pose, and the fit of six positions."""
 
 import numpy as np
 import pytest
@@ -49,7 +49,8 @@ def test_closed_form_is_equations_16_and_17(engine):
 @pytest.mark.parametrize("engine", engines.ENGINES)
 @pytest.mark.parametrize("tilt", [0, 10, 19])
 def test_the_fit_needs_no_exact_poses(engine, tilt):
-    """With poses 10 degrees off, the closed form has an error of 0.6 degrees. The fit stays near 0.1."""
+    """If the poses are tilted by 10 degrees, the closed form has a lean error of 0.6 degrees. The error of the fit
+    stays near 0.1 degrees."""
     rng = np.random.default_rng(tilt)
     calls, truths = [], []
     for _ in range(15):
@@ -97,7 +98,8 @@ def test_every_side_is_found(engine):
 
 
 def still(rng, count=300, accel=(0.1, 0.97, -0.2), gyro=(12.0, -3.0, 0.4)):
-    """Return samples of a chip at rest in the driver's form: 8192 counts per g, 65.5 per deg/s."""
+    """Return samples of a chip at rest as the driver gives them, with 8192 counts per g and 65.5 counts per deg/s.
+    accel is in g, gyro in deg/s."""
     samples = np.zeros((count, 7))
     samples[:, 0:3] = np.array(accel) * 8192 + rng.normal(scale=27, size=(count, 3))
     samples[:, 3] = -3000 + rng.normal(scale=5, size=count)
@@ -122,7 +124,8 @@ ALL = slice(None)
     [
         (150, 1, 900, "moved or knocked"),
         (ALL, 0, 250 * np.sin(np.arange(300)), "vibration"),
-        (ALL, 0, np.linspace(0, 8192 * np.radians(1.0), 300), "slowly tilting"),  # one degree in three seconds
+        # the pose tilts by one degree in three seconds
+        (ALL, 0, np.linspace(0, 8192 * np.radians(1.0), 300), "slowly tilting"),
         (slice(100, 140), 5, 500, "moved or knocked"),
         (ALL, 2, 32767 + 1638, "saturated"),
         (ALL, 6, 50 * 65, "gyro offset"),
@@ -137,12 +140,12 @@ def test_a_pose_that_is_not_still_is_refused(engine, rows, column, more, reason)
 
 
 def readings(offset=(0.0,) * 3, slope=(1.0,) * 3, forces: ArrayLike = AXES):
-    """Return the readings of these forces by a sensor with these errors."""
+    """Return the readings of an accelerometer with this offset and slope for these forces, in g."""
     return ((np.asarray(forces) - offset) / slope).tolist()
 
 
 def test_six_poses_with_a_duplicate_give_no_parameters():
-    """The poses are refused although each axis changes enough."""
+    """Two of the six poses are the same. The fit refuses them, although each axis changes enough."""
     poses = AXES.copy()
     poses[0] = poses[2] = [0.9, 0.9, 0.0]
     with pytest.raises(CalibrationError) as refusal:

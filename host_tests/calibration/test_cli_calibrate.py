@@ -1,4 +1,4 @@
-"""Test `kickstand calibrate`: captures give a CAL.json, and every unusable pose is refused."""
+"""`kickstand calibrate` makes a CAL.json from captured poses and refuses every unusable pose."""
 
 import json
 import shutil
@@ -15,7 +15,7 @@ BIAS = (4.0, -11.0, 0.7)
 
 
 def reads(force):
-    """Return the reading of a true force by a sensor with these errors, in the sensor's axes."""
+    """Return the reading of a sensor with the errors OFFSET and SLOPE. force: the true force in the sensor's axes."""
     return (np.asarray(force, float) - OFFSET) / SLOPE
 
 
@@ -25,7 +25,8 @@ def leaned(angle_deg):
 
 
 def two_poses(directory, stand, upright=(0.0, 1.0, 0.0), bias=(0.0, 0.0, 0.0)):
-    """Write the logs of a pose on the kickstand and an upright pose with these readings."""
+    """Write the logs of a pose on the kickstand and of an upright pose. stand, upright: their readings in g. bias: the
+    gyro's readings in deg/s."""
     return [
         command.still(directory / "stand.csv", stand, bias),
         command.still(directory / "upright.csv", upright, bias, seed=1),
@@ -41,7 +42,7 @@ def aligned(poses, *more):
 
 @pytest.fixture
 def six_poses(tmp_path):
-    """Return one pose for each side up, tilted by up to 10 degrees."""
+    """Write a pose for each of the six sides up, tilted by up to 10 degrees. Return the paths."""
     rng = np.random.default_rng(1)
     return [
         command.still(tmp_path / f"side{side}.csv", reads(tipped(axis, rng.uniform(0, 10), rng)), BIAS, seed=k)
@@ -76,7 +77,7 @@ def test_six_without_a_free_pose_says_what_is_unproven(tmp_path, six_poses):
 @pytest.mark.parametrize(("seed", "side"), [(0, "left"), (1, "right")])
 def test_six_and_two_find_the_mounting_to_0_3_degrees(tmp_path, six_poses, free_pose, seed, side):
     rng = np.random.default_rng(seed)
-    mounting = random_rotation(rng)  # from the sensor's axes to the vehicle's
+    mounting = random_rotation(rng)  # the rotation from the sensor's axes to the vehicle's
     stand, upright = (reads(mounting.T @ leaned(lean)) for lean in (-12.0 if side == "left" else 12.0, 0.0))
     poses = two_poses(tmp_path, stand, upright, BIAS)
     command.works("calibrate", "six", *six_poses, free_pose, "--out", tmp_path / "SIX.json")
@@ -108,7 +109,8 @@ def test_a_small_tilt_is_warned_of(tmp_path):
 
 
 def test_the_bias_of_the_six_positions_is_the_median(tmp_path, six_poses):
-    """A hand that moves the table during one pose does not change the bias."""
+    """The sensor turns during one of the six poses, for example because somebody moves the table. The median ignores
+    this pose."""
     command.still(six_poses[2], reads(command.AXES["+y"]), np.array(BIAS) + 20.0, seed=2)
     command.works("calibrate", "six", *six_poses, "--out", tmp_path / "CAL.json")
     assert json.loads((tmp_path / "CAL.json").read_text())["gyro_bias_dps"] == pytest.approx(BIAS, abs=0.05)
@@ -158,7 +160,7 @@ def test_a_spoilt_pose_is_refused_by_name(tmp_path, six_poses, which):
 
 
 def two_refused(poses, words, *more):
-    """Run `calibrate two` where an older CAL.json must be kept."""
+    """Run `calibrate two` and test that it is refused and keeps the older CAL.json. Return the message."""
     directory = poses[0].parent
     (directory / "CAL.json").write_text("the one from yesterday\n")
     return command.refused(directory, "calibrate", "two", *poses, *more, "--out", directory / "CAL.json", words=words)

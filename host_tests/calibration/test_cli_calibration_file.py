@@ -1,4 +1,4 @@
-"""The content of CAL.json: which values are accepted and which are refused."""
+"""Tests which contents of a CAL.json are accepted and which are refused."""
 
 import io
 import json
@@ -125,7 +125,8 @@ def test_harmful_outputs_are_refused(tmp_path, log):
 
 @pytest.mark.skipif(os.name == "nt", reason="named pipes are of Unix")
 def test_a_special_file_is_not_replaced(tmp_path, log):
-    """A user with the rights could replace /dev/null, for example. The test uses its own pipe."""
+    """A user with enough rights could otherwise replace a special file such as /dev/null. The test uses its own
+    pipe."""
     cal = command.write_cal(tmp_path / "CAL.json")
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
@@ -134,7 +135,7 @@ def test_a_special_file_is_not_replaced(tmp_path, log):
 
 
 def test_a_link_is_written_through(tmp_path, log):
-    """Writing through a link keeps the link: a CAL.json stored elsewhere is updated in place."""
+    """If the output is a link, the link stays and the file to which it points is updated."""
     (tmp_path / "kept").mkdir()
     (tmp_path / "LEAN.csv").symlink_to(tmp_path / "kept" / "LEAN.csv")
     cal = command.write_cal(tmp_path / "CAL.json")
@@ -160,7 +161,8 @@ def whole():
 
 
 def test_matrices_are_applied_alike_wherever_a_calibration_is(tmp_path):
-    """The matrices act alike in the file, in numpy, and in the firmware's own meter."""
+    """The matrices of a calibration have the same effect when they are read from a file, in numpy, and in the
+    firmware."""
     write_calibration(tmp_path / "CAL.json", whole())
     found = read_calibration(tmp_path / "CAL.json")
     assert found == whole()

@@ -1,4 +1,5 @@
-"""How the device waits for a still pose and captures it. The sensor has 8192 counts per g and 65.5 per deg/s."""
+"""Tests how the device waits for a still pose and captures it. The sensor has 8192 counts per g and 65.5 counts per
+deg/s."""
 
 import pytest
 from kickstand.calibration.pose_taker import AVERAGING, DONE, SETTLED, SETTLING, PoseTaker
@@ -11,12 +12,13 @@ class Chip:
 
 
 def taker():
-    """At 100 samples per second it needs 50 samples to settle and 300 to average, and gives up after 1000."""
+    """Return a PoseTaker for 100 samples per second. It needs 50 still samples, then averages 300 samples, and gives up
+    after 1000 samples."""
     return PoseTaker(Chip, 100, 3.0)
 
 
 def step(taking, row):
-    """Return the result of step(), or the code of the CaptureError that it raises."""
+    """Pass a sample to the PoseTaker. Return the result of its step(), or the code of the CaptureError."""
     try:
         return taking.step(row)
     except CaptureError as error:

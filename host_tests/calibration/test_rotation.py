@@ -1,4 +1,4 @@
-"""Vectors and matrices give the same results as numpy, on both engines."""
+"""The firmware's functions for vectors and matrices give the same results as numpy, on CPython and MicroPython."""
 
 import numpy as np
 import pytest

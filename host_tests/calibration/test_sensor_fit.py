@@ -1,4 +1,5 @@
-"""Calibrate the gyro by the turns between still poses: integration, fit, and the check of the result."""
+"""The gyro is calibrated by the turns between still poses. Tests the integration of the turns, the fit and the check of
+the result."""
 
 import numpy as np
 import pytest
@@ -18,14 +19,15 @@ DIAGONAL = np.eye(3, dtype=bool)
 
 
 def handled(seed, hand=None):
-    """Return a random sensor's readings of the six positions in one log, and the sensor."""
+    """Simulate the six positions with a random sensor. Return the sensor and its readings. hand: how the sensor is
+    turned between the positions."""
     chance = np.random.default_rng([seed, 38])
     chip = Chip.random(chance)
     return chip, hands.procedure(chance, chip, np.array(list(poses.ups(chance))), 22.0, hand)
 
 
 def errors_left(chip, calibration):
-    """Return the remaining errors of the gyro (3, 3) in the axes of the calibrated accelerometer."""
+    """Return the remaining errors of the gyro as a matrix (3, 3), in the axes of the calibrated accelerometer."""
     a = calibration.accel_matrix @ np.diag(calibration.accel_slope) @ chip.accel_matrix
     u, _, v = np.linalg.svd(a)
     return calibration.gyro_matrix @ chip.gyro_matrix - u @ v
@@ -74,10 +76,11 @@ def test_a_turn_is_integrated_as_by_matrices_in_double():
             exact = exact @ (np.eye(3) + np.sin(size) / size * k + (1 - np.cos(size)) / size**2 * k @ k)
     turn.end()
     r = np.array(turn.attitude(bias.tolist(), 0.5)).reshape(3, 3)
-    assert np.max(np.abs(r - exact)) < 3e-4  # 0.02 degrees
+    assert np.max(np.abs(r - exact)) < 3e-4  # this is 0.02 degrees
     assert turn.seconds == pytest.approx(1.0)
     s = np.array(turn.packed(bias.tolist())[9:]).reshape(3, 9)
-    nominal = s[:, [0, 4, 8]].sum(axis=1)  # a scale error common to all axes turns it further about its mean axis
+    # the effect of a scale error that is the same on all axes is a longer turn about the mean axis
+    nominal = s[:, [0, 4, 8]].sum(axis=1)
     assert np.linalg.norm(nominal) == pytest.approx(turn.angle(), rel=1e-5)
 
 
@@ -92,7 +95,7 @@ def test_samples_of_a_pose_that_is_spoilt_count_after_all():
         turn.end()
         return np.degrees(turn.angle())
 
-    assert turned(spoilt=True) == pytest.approx(10.0, abs=0.01)  # 20 deg/s for half a second
+    assert turned(spoilt=True) == pytest.approx(10.0, abs=0.01)  # degrees: 20 deg/s for half a second
     assert turned(spoilt=False) == pytest.approx(8.0, abs=0.01)
 
 
@@ -147,7 +150,7 @@ def fitted(seed=3):
 
 
 def test_the_fit_is_numpys_and_so_is_its_covariance():
-    """numpy minimises the same residuals in double precision with numeric derivatives."""
+    """numpy minimizes the same residuals in double precision, with numeric derivatives, and finds the same result."""
     fit = fitted()
     start, sigma = np.array(fit._start), np.array(fit._sigma)
 
@@ -171,7 +174,7 @@ def test_the_fit_is_numpys_and_so_is_its_covariance():
 
 
 def test_micropython_finds_the_same():
-    """MicroPython gets the poses and turns of a log, step by step. Its list of numbers is the whole answer."""
+    """MicroPython gets the same poses and turns, and computes the fit step by step. All its results are compared."""
     fit = fitted()
     script = (
         "from array import array\nfrom kickstand.calibration.sensor_fit import SensorFit\n"
@@ -192,7 +195,7 @@ def with_axis(axis, change):
 
 
 def late(rates):
-    return np.concatenate((np.zeros(30), rates[:-30]))  # late by 150 ms
+    return np.concatenate((np.zeros(30), rates[:-30]))  # delay the rates by 150 ms
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -203,7 +206,7 @@ def late(rates):
         (lambda rates: 2.0 * rates, "gyro-scale"),
         (lambda rates: -rates, None),  # the axis is named if the turns were nearly about one axis
         (lambda rates: 0.0 * rates, "dead-gyro"),
-        (lambda rates: np.where(np.abs(rates) > 5.0, 0.0, rates), "dead-gyro"),  # dead at small rates, but noisy
+        (lambda rates: np.where(np.abs(rates) > 5.0, 0.0, rates), "dead-gyro"),  # a dead axis that still shows noise
         (late, "gyro-misfit"),
         (lambda rates: np.clip(rates, -60.0, 60.0), None),
     ],

@@ -1,5 +1,5 @@
-"""A still pose is tested one axis at a time, with 8192 counts per g and 65.5 per deg/s. Other causes of a spoilt
-pose are tested in test_calibration.py."""
+"""Tests which motions spoil a still pose, one axis at a time. The sensor has 8192 counts per g and 65.5 counts per
+deg/s. test_calibration.py tests other causes of a spoilt pose."""
 
 import math
 
@@ -38,8 +38,8 @@ def problem_of(rows, **settings):
 @pytest.mark.parametrize("axis", [0, 1, 2, 4, 5, 6])
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_a_knock_about_or_along_any_axis_spoils_the_pose(axis, sign):
-    """Any sample that differs from the first one spoils the pose. A single knock moves the mean too little for the
-    other limits."""
+    """A single sample that differs too much from the first one spoils the pose. It changes the mean too little to be
+    noticed by the other limits."""
     peak = 0.08 * 8192 if axis < 3 else 5.0 * 65.5
     for at in (1, 50, 99):
         for share, code in ((0.8, None), (1.2, "moved")):
@@ -60,7 +60,7 @@ def test_readings_that_never_change_are_frozen():
     rows = [list(LEVEL) for _ in range(100)]
     assert problem_of(rows) == "frozen-pose"
     for row in rows:
-        row[3] = row[3] + 1  # only the temperature differs
+        row[3] = row[3] + 1  # the temperature is the only reading that changes
     rows[50][3] += 7
     assert problem_of(rows) == "frozen-pose"
 
@@ -80,7 +80,7 @@ def test_each_axis_has_to_change_by_a_count_now_and_then(axis, code):
 def test_a_noisy_gyro_spoils_the_pose_and_a_sway_does_not(axis):
     for dps, code in ((0.5, None), (0.7, "noisy-gyro")):
         rows = samples(600)
-        for k, row in enumerate(rows):  # the rms of this noise equals dps
+        for k, row in enumerate(rows):  # this noise has the rms `dps`
             row[axis] += round((-1, 1, 1, -1)[k % 4] * dps * 65.5)
         assert problem_of(rows) == code
     rows = samples(600)

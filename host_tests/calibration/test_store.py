@@ -1,5 +1,5 @@
-"""The calibration records: after any damage to the files, loading returns a whole calibration or none, and never
-fails."""
+"""Calibration records in flash may be damaged in any way. Loading then returns a complete calibration or none, and
+never raises an error."""
 
 import io
 import struct
@@ -63,7 +63,7 @@ def record(*, magic=b"KSTD", version=1, sequence=7, chip=(0x68, 8), six_done=1, 
 
 @pytest.mark.parametrize(("six_done", "how"), [(1, 1), (1, 2), (0, 1), (0, 0)])
 def test_records_are_read_and_written_as_by_the_first_release(store, tmp_path, six_done, how):
-    """how: 0: not aligned, 1: aligned by two poses, 2: by driving."""
+    """how: how the sensor was aligned. 0 means not aligned, 1 by two poses, 2 by driving."""
     (tmp_path / FILES[1]).write_bytes(record(sequence=7, six_done=six_done, how=how))
     loaded = store.load()
     assert loaded.parameters() == NUMBERS
@@ -181,8 +181,8 @@ def test_power_cut_at_every_byte_of_a_save(store, tmp_path, saved_before):
         for name, content in before.items():
             (tmp_path / name).write_bytes(content)
         written.write_bytes(record[:cut])
-        assert mark_of(store.load()) == saved_before  # the previous record, or none
-        store.save(calibration(5))  # and the next save works
+        assert mark_of(store.load()) == saved_before  # the previous record is loaded, or none
+        store.save(calibration(5))  # after the power cut the next save works
         assert mark_of(store.load()) == 5
         assert store.load().aligned
 
@@ -228,7 +228,7 @@ def test_a_flash_that_loses_writes_is_reported(store, tmp_path, monkeypatch):
 
 
 def test_a_trim_may_be_stored_beside_a_foreign_record(store, tmp_path):
-    """A foreign record may be from another chip, or empty after a power cut."""
+    """A foreign record is from another chip, or is empty after a power cut. A trim may be saved in spite of it."""
     store.save(calibration(1))
     store.save(calibration(2))
     other = Store(0x70, 8, str(tmp_path))

@@ -1,4 +1,4 @@
-"""Two-position alignment: the true mount is found from simulated poses in any mounting, and unusable poses are
+"""The alignment by two poses finds the true mount from simulated poses, for any mounting. Unusable poses are
 refused."""
 
 import itertools
@@ -15,7 +15,7 @@ from test_rotation import random_rotation
 
 def poses(vehicle_from_sensor, tilt_deg, side="left"):
     """Return the specific force in g on the kickstand and upright, in the sensor's axes."""
-    tilt = np.radians(tilt_deg) * (-1 if side == "left" else 1)  # lean to the right is positive
+    tilt = np.radians(tilt_deg) * (-1 if side == "left" else 1)  # a lean to the right is positive
     kickstand = np.array([np.sin(tilt), np.cos(tilt), 0.0])
     return (vehicle_from_sensor.T @ kickstand).tolist(), (vehicle_from_sensor.T @ [0, 1, 0]).tolist()
 
@@ -68,7 +68,7 @@ def test_every_mounting_is_recovered(engine, side):
 )
 def test_poses_that_fix_nothing_are_refused(engine, kickstand, upright, reason):
     answer = engines.run(engine, [("two_position", (kickstand, upright, "left"))])[0]
-    if kickstand == [0, -1, 0]:  # exactly antiparallel: an upside-down bike is no second pose
+    if kickstand == [0, -1, 0]:  # exactly opposite to the upright pose, as if the bike were upside down
         reason = "no kickstand"
     assert reason in engines.words(answer)
     assert all(len(line) <= 16 for line in answer["lcd"])
@@ -80,7 +80,7 @@ def at(angle_deg):
 
 
 class Pose:
-    """A finished StillPose."""
+    """A finished pose with the interface of StillPose. accel: mean force in g. gyro: mean rate in deg/s."""
 
     def __init__(self, accel, gyro):
         self.accel, self.gyro = accel, gyro
@@ -89,7 +89,8 @@ class Pose:
 @pytest.mark.parametrize("pose", [0, 1])
 @pytest.mark.parametrize("size", [0.9, 1.1])
 def test_after_the_six_positions_a_pose_reads_1_g_more_closely(pose, size):
-    """Before the six positions the data sheet allows 80 mg and 3 %. After them only drift is left."""
+    """The force in a pose must be 1 g within a tolerance. Before the six positions, the data sheet allows an offset of
+    80 mg and a scale error of 3 %. After them only drift is left, so the tolerance is smaller."""
     forces = np.array([at(12), at(0)])
     forces[pose] *= size
     kickstand, upright = (Pose(force.tolist(), [0.0] * 3) for force in forces)
@@ -102,7 +103,7 @@ def test_after_the_six_positions_a_pose_reads_1_g_more_closely(pose, size):
 
 
 def test_an_alignment_keeps_offset_and_slope_and_sets_the_bias():
-    """A bike is stiller on a stand than under a rider."""
+    """The bias is from the kickstand pose, because a bike moves less on its stand than under a rider."""
     before = Calibration()
     before.set_accel((0.05, -0.02, 0.0), (1.02, 0.98, 1.0))
     before.six_done = True

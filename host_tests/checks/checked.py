@@ -1,4 +1,4 @@
-"""Logs and arrays in the form that the checks take, and simulated rides that are each made once."""
+"""Helpers for the tests of the checks: logs in the form that the checks take, and cached simulated rides."""
 
 import functools
 
@@ -10,7 +10,12 @@ from kickstand_tools.simulation.ride import SimulatedRide, ride
 
 
 def cells_of(log: Log, accel=None, gyro=None, speed=True) -> LogCells:
-    """accel, gyro: a matrix (3, 3) that exchanges and reverses the sensor's axes, or a factor on its readings."""
+    """Return the cells of a log with changed axes.
+
+    accel: matrix (3, 3) that exchanges and reverses the accelerometer's axes.
+    gyro: the same for the gyro, or a multiple of the identity matrix to scale its readings.
+    speed: False to leave out the log's speed.
+    """
     force = log.accel_g if accel is None else log.accel_g @ np.transpose(accel)
     rate = log.gyro_dps if gyro is None else log.gyro_dps @ np.transpose(gyro)
     mps = log.speed_mps if speed else np.full(len(log.t_s), np.nan)
@@ -22,20 +27,20 @@ def cells_of(log: Log, accel=None, gyro=None, speed=True) -> LogCells:
 
 
 def words(notice) -> str:
-    """The remark as text, "" for none."""
+    """Return the text of a remark, or "" if there is no remark."""
     return sentence(notice) if notice else ""
 
 
 @functools.cache
 def made_up(profile: str) -> SimulatedRide:
-    """Simulate a ride read by an MPU6050 with the errors that its data sheet allows. In the upright pose the bike
-    leaned by 3.5 degrees to the right or left."""
+    """Simulate a ride that is measured by an MPU6050. The sensor has the errors that its data sheet allows. In the pose
+    that should be upright, the bike leans by 3.5 degrees to the right or left."""
     return ride(profile, 3, 150.0, 3.5 * (-1) ** len(profile))
 
 
 @functools.cache
 def simulated(profile: str) -> Log:
-    """Return the ride of made_up() at 50 Hz, with one speed per second."""
+    """Return the ride of made_up() as a log with 50 samples and one speed per second."""
     made = made_up(profile)
     readings, mps = made.readings[::4], np.full(len(made.time[::4]), np.nan)
     mps[::50] = made.truth["speed_mps"][::200]

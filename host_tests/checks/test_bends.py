@@ -1,4 +1,4 @@
-"""Rates in rad/s give a remark, and rates in deg/s never do."""
+"""The checks in bends report rates in rad/s and a gyro of the opposite sign. Correct logs get no remark."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from support.recordings.drawn_rides import drawn_ride
 
 
 def judged(log, scale=1.0):
-    """Return the remark on a whole log whose rates are multiplied by a factor below 1."""
+    """Return the remark on a log whose rates are multiplied by `scale`."""
     return words(bends(cells_of(log, gyro=scale * np.eye(3))))
 
 
@@ -32,7 +32,8 @@ def test_a_short_ride_shows_it_too():
 
 
 def test_one_long_steady_bend_is_not_the_gyros_bias():
-    """The bend lasts for 60 of 92 s, so it contains most of the calmest seconds."""
+    """The bend takes 60 s of a ride of 92 s, so it contains most of the calmest seconds. The check measures the gyro's
+    bias in these seconds, and must not take the bend's yaw rate for a bias."""
     log = drawn_ride(1036, mounts=["firm"], kind="sweepers").logs[0]
     assert words(handedness(cells_of(log)) or bends(cells_of(log))) == ""
     log.gyro_dps = -log.gyro_dps
@@ -43,7 +44,7 @@ TURN = np.reshape(random_mounting(3), (3, 3))
 
 
 def straight_on(time, forward, up):
-    """Return the remark on a vehicle that hardly turns at all."""
+    """Return the remark on a vehicle that hardly turns. forward and up are the forces along these axes, in g."""
     force = np.column_stack((0.05 * np.sin(0.3 * time), up * np.ones(len(time)), forward)) @ TURN
     rate = 0.01 * np.column_stack((np.cos(time), np.sin(time), time % 1.0)) @ TURN
     return judged(Log(time, force, rate))
@@ -51,14 +52,14 @@ def straight_on(time, forward, up):
 
 @pytest.mark.parametrize("slope", [0.2, 0.0, -0.2])
 def test_braking_and_dips_are_no_bends(slope):
-    """However hard the braking, the force tends slightly forward or back, uphill and downhill."""
+    """The vehicle brakes hard on a level road, uphill and downhill. Such forces must not look like a bend."""
     time = np.arange(0.0, 300.0, 0.02)
     brake = np.where(time % 20.0 < 5.0, -0.9, 0.0)
     assert straight_on(time, slope + brake, 1.0 + 0.1 * np.sin(time)) == ""
 
 
 def test_recordings(shared_data):
-    """The recordings of cars give no remark, but the motorcycle's does."""
+    """With rates in rad/s, only the motorcycle's recording gets a remark, because cars do not lean."""
     for path in shared_data.glob("*.csv.gz"):
         log = read_log(path)
         assert judged(log) == "", path

@@ -1,4 +1,4 @@
-"""Positions show that a log is a mirror image, with all accelerations of the opposite sign."""
+"""If all accelerations of a log have the opposite sign, the log is a mirror image of the ride. Positions show this."""
 
 import functools
 from dataclasses import replace
@@ -16,8 +16,8 @@ from kickstand_tools.simulation.files import positions
 
 @functools.cache
 def simulated(profile: str = "street", late_s: float = 0.6) -> Log:
-    """Simulate a board with a gyro bias and 50 readings per second. Positions come once per second, late as from a
-    receiver."""
+    """Simulate the log of a board with a gyro bias. It has 50 readings per second and one position per second. The
+    positions are late by late_s seconds, as from a satellite receiver."""
     made = made_up(profile)
     here = slice(None, None, 4)
     times, readings = made.time[here], made.readings[here]
@@ -51,8 +51,12 @@ def test_a_bias_of_the_gyro_is_no_turning(bias_dps):
 
 
 def circling(both_sides: bool, bias_dps: float, wavering_dps: float = 0.0) -> bool | None:
-    """A ride at 10 m/s in circles, to the left or to both sides. wavering_dps: noise of the track's yaw rate, which the
-    gyro does not have."""
+    """Return the result of the check for a ride in circles at 10 m/s.
+
+    both_sides: True if the ride turns to the left and later to the right, False for only left turns.
+    bias_dps: the gyro's bias about up, in deg/s.
+    wavering_dps: amplitude of a slow change of the track's yaw rate. The gyro has it with the opposite sign.
+    """
     t_s = np.arange(0.0, 120.0, 0.02)
     turning_dps = np.where(both_sides & (t_s > 60.0), -10.0, 10.0)
     wave_dps = wavering_dps * np.sin(t_s)

@@ -1,4 +1,4 @@
-"""Left-handed axes, a gyro of the opposite sign and exchanged axes give a remark, and correct logs never do."""
+"""The checks report left-handed axes, a gyro of the opposite sign and exchanged axes. Correct logs get no remark."""
 
 import itertools
 
@@ -22,7 +22,7 @@ WRONG_WAY = "are the axes left-handed (reverse one in both sensors) or the gyro 
 
 
 def judged(log, accel=None, gyro=None, speed=True):
-    """Return the remark on a log whose axes these matrices exchange and reverse; "" for none."""
+    """Return the remark on a log whose axes these matrices exchange and reverse, or "" if there is no remark."""
     return words(handedness(cells_of(log, accel, gyro, speed)))
 
 
@@ -30,7 +30,7 @@ def judged(log, accel=None, gyro=None, speed=True):
     ("profile", "speed"), [("street", False), pytest.param("city", True, marks=pytest.mark.nightly)]
 )
 def test_all_48_ways_to_exchange_and_reverse_axes(profile, speed):
-    """Each matrix is applied to both sensors. Left-handed axes get a remark, right-handed axes do not."""
+    """Each matrix is applied to both sensors. A remark is made for the left-handed axes only."""
     remarks = [judged(simulated(profile), exchange, exchange, speed) for exchange in SIGNED]
     for exchange, said in zip(SIGNED, remarks, strict=True):
         assert (WRONG_WAY in said) == bool(said) == (np.linalg.det(exchange) < 0.0), (exchange, said)
@@ -39,7 +39,7 @@ def test_all_48_ways_to_exchange_and_reverse_axes(profile, speed):
 
 @pytest.mark.parametrize("profile", PROFILES)
 def test_simulated_rides(profile):
-    """Without a speed, not every wrong log is found, but no correct log gets a remark."""
+    """Without a speed, the check misses some wrong logs, but it never reports a correct one."""
     log = simulated(profile)
     assert judged(log) == judged(log, speed=False) == ""
     assert (WRONG_WAY in judged(log, gyro=MINUS)) is (profile != "parked")
@@ -74,14 +74,15 @@ def test_the_remark_names_what_fits():
         (None, swap, f"{EITHER} along x and y are exchanged, or the rates are in another order or of another sign"),
         (np.eye(3)[[1, 2, 0]], None, f": the rates are in another order or of another sign, {INSTEAD} gz, gx, gy"),
         (MINUS, None, WRONG_WAY),
-        (None, MINUS, None),  # motion cannot show a mirror image
+        (None, MINUS, None),  # this log is a mirror image, which motion alone cannot show
     ):
         said = judged(log, accel, gyro)
         assert (line in said) if line else said == "", said
 
 
 def test_axes_exchanged_in_one_sensor():
-    """With a speed nearly all exchanges are found (24 of the 47 are tried). Each one found is named correctly."""
+    """The log has a speed. 24 of the 47 possible exchanges of axes are tried. At least 23 must be found, and each one
+    found must be the right one."""
     seen = 0
     log = simulated("street")
     for exchange in EXCHANGES[1::2]:
@@ -94,7 +95,7 @@ def test_axes_exchanged_in_one_sensor():
 
 
 def hand(seconds=60.0, seed=0, hz=50):
-    """A phone waved in the hand: it turns by up to 90 degrees and moves by a few decimetres."""
+    """Simulate a phone that is waved in the hand. It turns by up to 90 degrees and moves by a few decimetres."""
     chance = np.random.default_rng(seed)
     time = np.arange(0.0, seconds, 1.0 / hz)
     waves = [chance.uniform(0.1, 0.7, (4, 3)), chance.uniform(0.0, 6.3, (4, 3)), chance.normal(0.0, 0.3, (4, 3))]
@@ -126,7 +127,7 @@ def test_gaps_and_frozen_readings():
     assert judged(gaps) == ""
     assert WRONG_WAY in judged(gaps, gyro=MINUS)
     force, rate = log.accel_g.copy(), log.gyro_dps.copy()
-    for k in range(1000, len(force) - 1500, 1500):  # here the readings are exchanged back
+    for k in range(1000, len(force) - 1500, 1500):  # freeze the readings for 8 s in every 30 s
         force[k : k + 400], rate[k : k + 400] = force[k], rate[k]
     for sign, codes in (1.0, ["frozen-readings"]), (-1.0, ["frozen-readings", "left-handed"]):
         read = read_log(Log(log.t_s, force, sign * rate, log.speed_mps))
@@ -150,7 +151,8 @@ def test_recordings(shared_data):
 
 
 def test_a_bias_is_found_while_fitting():
-    """The hand is never calm, so no other check can find the wrong axes."""
+    """The gyro has a bias of 2.5 deg/s. The phone in the hand is never calm, so the bias cannot be measured in calm
+    seconds. The fit itself must find it."""
     log = hand(seed=0)
     turning = {}
     for bias in 0.0, 2.5:

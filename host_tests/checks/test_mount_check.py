@@ -1,4 +1,4 @@
-"""Every command that takes a calibration reports one of another mount, and never reports a right one."""
+"""Commands that use a calibration report it if it belongs to another mount. They never report a right calibration."""
 
 import json
 import re
@@ -25,13 +25,13 @@ G = 9.80665
 
 
 def turned(matrix, left=0.0, up=0.0, forward=0.0):
-    """Return the matrix of a mount that is turned about the vehicle's axes by these angles in degrees."""
+    """Return the matrix of a mount that is rotated by these angles, in degrees, about the vehicle's axes."""
     about_left, about_up, about_forward = rotation_matrix(np.diag(np.radians([left, up, forward])))
     return about_forward @ about_up @ about_left @ matrix
 
 
 def made(profile, speed=True):
-    """Simulate a ride at 50 Hz and its calibration by the six positions, then by two poses."""
+    """Return a simulated log with 50 samples per second, and its calibration by six positions and two poses."""
     log = simulated(profile)
     return log if speed else silent(log), calibrated_by_poses(made_up(profile))
 
@@ -51,7 +51,7 @@ def said(log, calibration):
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_right_calibrations_are_never_accused(profile):
+def test_right_calibrations_are_never_reported(profile):
     log, calibration = made(profile)
     for each in log, silent(log):
         assert said(each, calibration) == ""
@@ -59,7 +59,7 @@ def test_right_calibrations_are_never_accused(profile):
 
 
 @pytest.mark.parametrize(("profile", "speed"), [("street", True), ("city", False), ("track", False), ("hills", True)])
-def test_wrong_ones_are(profile, speed):
+def test_wrong_calibrations_are_reported(profile, speed):
     log, calibration = made(profile, speed)
     by = "speed" if speed else "bends"
     for turns, line in (
@@ -95,7 +95,7 @@ def test_gaps():
     assert "by the speed of this ride forward is " in said(gaps, wrong)
 
 
-def test_what_does_not_tell():
+def test_a_log_that_cannot_show_the_mount_gets_no_remark():
     log, calibration = made("street")
     assert said(log, CalibrationFile()) == ""  # an unaligned calibration has its own message
     assert said(log.part(log.t_s < 10.0), other(calibration, up=90.0)) == ""
@@ -143,8 +143,9 @@ def exchanged_line(car, side, roll_deg=None):
 
 
 def test_what_is_reported():
-    """The message always names the log's sign as another cause. Choosing the other side of the kickstand would only
-    give a plausible but mirrored report."""
+    """Forward and backward are exchanged. The message suggests another side of the kickstand. It also asks whether the
+    log's accelerations have the opposite sign, because then another side would only give a plausible, mirrored
+    report."""
     assert exchanged_line(False, "left", 0.0).endswith("exchanged: calibrate two --side right?" + SIGN)
     assert exchanged_line(False, "right", -3.9).endswith("exchanged: calibrate two --side left?" + SIGN)
     assert exchanged_line(False, "", 0.0).endswith("calibrate two with the other --side?" + SIGN)
@@ -154,7 +155,13 @@ def test_what_is_reported():
 
 
 def jerky(late_s: int = 0, sign: float = 1.0, seconds: int = 240, mps2: float = 2.0) -> Log:
-    """A random acceleration along z in each second, with a speed at its beginning, delayed by some seconds; 10 Hz."""
+    """Return a log with 10 samples per second and a random acceleration along z in each second.
+
+    late_s: delay of the speed, which comes at the beginning of each second.
+    sign: -1 to reverse the force.
+    seconds: length of the log.
+    mps2: standard deviation of the accelerations.
+    """
     chance = np.random.default_rng(5)
     pushes = chance.normal(scale=mps2, size=seconds)
     speed_at = 30.0 + np.concatenate(([0.0], np.cumsum(pushes)))
@@ -178,13 +185,14 @@ def exchanged(log: Log) -> bool:
 
 @pytest.mark.parametrize(("late_s", "shown"), [(-1, False), (0, True), (1, True), (2, True), (3, False), (4, False)])
 def test_a_speed_up_to_two_seconds_late_shows_forward(late_s, shown):
-    """The acceleration changes every second, so a speed that is one second late proves nothing."""
+    """The acceleration changes at random every second, so force and speed are related only at the right delay. The
+    check tries delays of 0 to 2 s."""
     assert exchanged(jerky(late_s, sign=-1.0)) is shown
     assert not exchanged(jerky(late_s))
 
 
 def test_only_the_last_hour_counts():
-    """The axes were reversed until this time, as if the sensor had been turned over."""
+    """In the first of two hours the force along forward is reversed, as if the sensor had been turned round."""
     before, after = jerky(sign=-1.0, seconds=3600, mps2=8.0), jerky(seconds=3600)
     after.speed_mps += before.speed_mps[-10] - after.speed_mps[0]
     force, speed = (np.concatenate((getattr(before, name), getattr(after, name))) for name in ("accel_g", "speed_mps"))
@@ -200,7 +208,8 @@ def test_of_several_speeds_in_a_second_the_first_counts():
 
 
 def test_seconds_without_a_speed_or_without_samples():
-    """After a gap in the log and lost satellites the remaining data suffice. But two days are not one ride."""
+    """The log has a gap, and the satellites are lost for 40 s. The rest is still enough. Two parts that are days apart
+    are not judged as one ride."""
     log = jerky(sign=-1.0)
     log.speed_mps[500:900] = np.nan
     assert exchanged(log.part((log.t_s < 100.0) | (log.t_s > 130.0)))
@@ -212,8 +221,8 @@ def test_seconds_without_a_speed_or_without_samples():
 
 
 def swaying(yaw_dps: float, seconds: float) -> Log:
-    """Yaw swings with a period of 4 s and an amplitude of yaw_dps. Roll is half the change of yaw, as on a
-    motorcycle."""
+    """Return a log whose yaw rate swings with a period of 4 s and an amplitude of yaw_dps. The roll rate has half this
+    amplitude and a quarter period of delay, similar to a motorcycle."""
     time = np.arange(0.0, seconds, 0.02)
     yaw, roll = yaw_dps * np.sin(np.pi / 2 * time), -0.5 * yaw_dps * np.cos(np.pi / 2 * time)
     return Log(time, np.tile([0.0, 1.0, 0.0], (len(time), 1)), np.column_stack((0 * yaw, yaw, roll)))
@@ -223,9 +232,16 @@ def swaying(yaw_dps: float, seconds: float) -> Log:
     ("yaw_dps", "seconds", "shown"), [(1.16, 90.0, False), (1.24, 90.0, True), (3.0, 61.0, False), (3.0, 63.0, True)]
 )
 def test_small_or_short_bends_show_no_forward(yaw_dps, seconds, shown):
-    """Means over 0.5 s keep 0.974 of the amplitude. Their changes over a second are 1.414 times as large; smoothing
-    keeps 0.854. So the standard deviation is 0.832 yaw_dps. Finding forward requires 1 deg/s. A log of 61 s has 118
-    changes, one of 63 s has 122; 120 are needed."""
+    """The check needs changes of the yaw rate with a standard deviation of 1 deg/s. Here the standard deviation is
+    0.832 yaw_dps:
+
+    * Means over 0.5 s keep 0.974 of the amplitude.
+    * The changes of these means over a second have 1.414 times the amplitude.
+    * Smoothing keeps 0.854 of it.
+    * The standard deviation of a sine is its amplitude divided by 1.414.
+
+    The check also needs 120 changes. A log of 61 s has 118 changes, and a log of 63 s has 122.
+    """
     calibration = CalibrationFile(aligned=True)
     log = swaying(yaw_dps, seconds)
     assert said(log, calibration) == ""

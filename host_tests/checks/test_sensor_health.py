@@ -1,4 +1,4 @@
-"""A dead axis and a gyro at the end of its range: reported for a log, and never smoothed into a plausible lean."""
+"""A dead axis and a gyro at the end of its range are reported. The smoothed lean never hides such faults."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ def street():
 
 
 def ill(known, change):
-    """The ride's log after change(time, force, rate) has changed force and rates in place."""
+    """Return a copy of the ride's log. The function change(time, force, rate) changes its forces and rates in place."""
     force, rate = known.log.accel_g.copy(), known.log.gyro_dps.copy()
     change(known.log.t_s, force, rate)
     return Log(known.log.t_s, force, rate, temperature_c=known.log.temperature_c)
@@ -105,7 +105,7 @@ def test_sound_sensors_are_not_called_ill(street):
 
 
 def test_rounding_and_a_standstill_are_no_dead_axis():
-    """A log with few digits, and an ideal one without noise, get no remark."""
+    """A log whose readings have few digits gets no remark. An ideal log without noise gets none either."""
     time = np.arange(4000) / 100.0
     turn = rotation_matrix(np.array([0.3, 0.1, 0.2]))
     force = np.round(np.tile(turn[1], (4000, 1)) + 0.002 * np.random.default_rng(1).normal(size=(4000, 3)), 2)

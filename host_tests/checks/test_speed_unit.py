@@ -1,4 +1,4 @@
-"""Every reader of a log refuses a speed that is not in m/s, and never a speed that is."""
+"""Every reader of a log refuses a speed that is in another unit than m/s. It never refuses a speed in m/s."""
 
 import functools
 
@@ -19,7 +19,7 @@ MOUNT = random_mounting(3)
 
 
 def said(time, force, speed) -> str:
-    """Return the message about the unit of a speed."""
+    """Return the message about the unit of the speed, or "" if there is no message."""
     return words(speed_unit(cells_of(Log(time, force, np.zeros(force.shape), speed))))
 
 
@@ -28,14 +28,14 @@ KMH, MPH, KNOTS = 3.6, 2.2369, 1.9438
 
 @functools.cache
 def driven(brakings):
-    """Force, rate and speed of a simulated ride."""
+    """Return the force, rate and speed of a simulated ride with this number of braking events."""
     made = list(driving_runs.samples(driving_runs.around(brakings), "motorcycle"))
     force, rate = (np.array([driving_runs.mounted(MOUNT, row[k]) for row in made]) for k in (0, 1))
     return force, rate, [row[2] for row in made]
 
 
 def record(brakings=7, **source):
-    """A log of the simulated ride; source: a driving_runs.SpeedSource."""
+    """Return a log of the simulated ride. source: arguments of driving_runs.SpeedSource."""
     force, rate, mps = driven(brakings)
     gps = driving_runs.SpeedSource(**{"every_s": 1.0} | source)
     speed = np.array([gps.step_to(value) for value in mps], dtype=float)
@@ -57,13 +57,13 @@ def test_other_units_are_refused(scale, words, every_s, late_s):
 
 
 @pytest.mark.parametrize(("every_s", "late_s"), [(0.1, 0.0), (0.1, 3.0), (0.5, 1.0), (2.0, 0.0), (2.0, 3.0)])
-def test_what_is_right_is_read(every_s, late_s):
+def test_a_speed_in_mps_is_read(every_s, late_s):
     read_log(record(every_s=every_s, late_s=late_s, step=1 / 3.6))
 
 
 @pytest.mark.parametrize("samples", [30, 1500])
-def test_it_takes_no_whole_log(monkeypatch, samples):
-    """Evidence accumulates from block to block, and the log is refused as soon as it suffices."""
+def test_a_wrong_unit_is_refused_before_the_end_of_the_log(monkeypatch, samples):
+    """Evidence accumulates from block to block. The reader refuses the log as soon as the evidence is enough."""
     log = record(20, scale=KMH)
     monkeypatch.setattr(reader, "BLOCK_SAMPLES", samples)
     before = 0
@@ -79,13 +79,14 @@ def test_no_simulated_ride_is_refused(profile):
     time, force, speed = log.t_s, log.accel_g, log.speed_mps
     rng = np.random.default_rng(1)
     noisy = np.abs(speed + rng.normal(scale=0.5, size=len(speed)))
-    lost = np.where(rng.random(len(speed)) < 0.2, 0.0, speed)  # 0 while the satellites are lost
+    lost = np.where(rng.random(len(speed)) < 0.2, 0.0, speed)  # a receiver may give 0 while the satellites are lost
     for wrong in noisy, np.round(speed), lost, rng.uniform(0.0, 50.0) * rng.random(len(speed)):
         assert said(time, force, np.where(np.isnan(speed), np.nan, wrong)) == ""
 
 
-def test_what_was_felt_while_samples_are_missing_is_not_known():
-    """A logger that sleeps for half of each second records only half of the force."""
+def test_the_force_during_missing_samples_is_unknown():
+    """A logger that sleeps for half of each second records only half of the force. Its speed must not seem to change
+    too much."""
     time = np.arange(0.0, 300.0, 0.01)
     push = 0.4 * np.sign(np.sin(2.0 * np.pi * time / 20.0)) * (time % 10.0 < 4.0)
     speed = np.where(np.arange(len(time)) % 100 == 99, 20.0 + np.cumsum(push) * 0.01 * 9.80665, np.nan)
@@ -96,7 +97,7 @@ def test_what_was_felt_while_samples_are_missing_is_not_known():
 
 
 def test_a_speed_that_has_nothing_to_do_with_the_ride():
-    """A random speed shows no unit: not one of a hundred may look like one by chance."""
+    """None of a hundred logs with random forces and speeds may look like a wrong unit by chance."""
     rng = np.random.default_rng(0)
     time = np.arange(0.0, 60.0, 0.1)
     for _ in range(100):
@@ -115,7 +116,7 @@ def test_recordings(shared_data):
 
 
 def test_the_unit_is_judged_once_in_20_s_while_a_log_is_read(monkeypatch):
-    """The message comes from parts of 8 s at 24 and 48 s, and at the end."""
+    """The log comes in blocks of 8 s. The unit is judged after 24 s, after 48 s and at the end."""
     judged_s = []
     monkeypatch.setattr(checks_log, "speed_unit", lambda cells: judged_s.append(round(len(cells.known) * 0.1)))
     checks = checks_log.Checks("ride.csv")

@@ -1,4 +1,5 @@
-"""Which exchange of the gyro's axes is reported for given residuals, and the basis functions of an unknown velocity."""
+"""Tests which exchange of the gyro's axes is reported for known residuals, and the basis functions of an unknown
+velocity."""
 
 from types import SimpleNamespace
 
@@ -12,8 +13,13 @@ ONE_REVERSED, EXCHANGED = np.diag([1.0, 1.0, -1.0]), np.eye(3)[[1, 0, 2]]
 
 
 def reported(*left, windows=10, unbiased=True, swing=0.0):
-    """Return the exchange reported for these mean squares of the residual force: left [(exchange, g2), ...], 9 g2 for
-    all others. swing: added to the unchanged gyro's residual in every second window, subtracted in the others."""
+    """Return the exchange that is reported for these residuals, or None.
+
+    left: pairs (exchange, mean square of the residual force in g2). All other exchanges have 9 g2.
+    windows: number of windows.
+    unbiased: True if the gyro's bias is about 0.
+    swing: change of the residual of the unchanged gyro, in g2. It is added in even windows and subtracted in odd ones.
+    """
 
     def unexplained(exchange):
         found = next((g2 for one, g2 in left if np.array_equal(one, exchange)), 9.0)
@@ -29,16 +35,16 @@ def reported(*left, windows=10, unbiased=True, swing=0.0):
 @pytest.mark.parametrize(
     ("left", "best"),
     [
-        # x 1 for all axes or none reversed, x 1.3 for some reversed, x 1.6 for axes exchanged
+        # a residual counts 1.3 times if some axes are reversed, and 1.6 times if axes are exchanged
         ([(AS_IT_IS, 0.1), (OPPOSITE, 0.02), (ONE_REVERSED, 0.0155), (EXCHANGED, 0.0126)], OPPOSITE),
         ([(AS_IT_IS, 0.1), (OPPOSITE, 0.02), (ONE_REVERSED, 0.0153), (EXCHANGED, 0.0126)], ONE_REVERSED),
         ([(AS_IT_IS, 0.1), (OPPOSITE, 0.02), (ONE_REVERSED, 0.0155), (EXCHANGED, 0.0124)], EXCHANGED),
         ([(AS_IT_IS, 0.0129), (ONE_REVERSED, 0.01)], None),
         ([(AS_IT_IS, 0.0131), (ONE_REVERSED, 0.01)], ONE_REVERSED),
-        # better by a factor of 1.25 in each window
+        # the residual must be smaller by a factor of 1.25 if all windows agree
         ([(AS_IT_IS, 0.0124), (OPPOSITE, 0.01)], None),
         ([(AS_IT_IS, 0.0126), (OPPOSITE, 0.01)], OPPOSITE),
-        # better by at least 0.001 g2
+        # the residual must be smaller by at least 0.001 g2
         ([(AS_IT_IS, 0.0019), (OPPOSITE, 0.00091)], None),
         ([(AS_IT_IS, 0.0019), (OPPOSITE, 0.00089)], OPPOSITE),
     ],
@@ -49,8 +55,9 @@ def test_the_likelier_mistake_wins_unless_another_fits_better(left, best):
     assert found is None or best is None or np.array_equal(found, best)
 
 
-def test_where_the_windows_differ_twice_as_good_is_needed():
-    """The gain swings by s over ten windows. Its standard error is s / root 10; three times that is 0.95 s."""
+def test_windows_that_differ_require_a_factor_of_two():
+    """The gain differs by +s or -s in ten windows, where s is `swing`. Its standard error is s / root 10. Three
+    standard errors are 0.95 s. If the mean gain is not larger than this, the residual must fall to below half."""
     for g2, swing, clear in ((0.0195, 0.011, False), (0.0195, 0.0099, True), (0.0201, 0.011, True)):
         assert (reported((AS_IT_IS, g2), (OPPOSITE, 0.01), swing=swing) is not None) is clear, (g2, swing)
 
@@ -65,7 +72,7 @@ def test_three_windows_must_show_it_five_times_as_well(g2, windows, unbiased, cl
 
 
 def test_an_unknown_velocity_is_linear_between_its_knots():
-    """The knots are 5 s apart. If the coefficients are the knots' times, the velocity equals the time and its
+    """The knots are 5 s apart. With the times of the knots as coefficients, the velocity equals the time, and its
     derivative is 1."""
     values, changes = turning._knots(2, 100)
     knots_s, time_s = np.array([0.0, 5.0, 10.0]), 0.1 * np.arange(100) + 0.05
@@ -75,4 +82,4 @@ def test_an_unknown_velocity_is_linear_between_its_knots():
         assert knots_s @ changes[:, window] == pytest.approx(np.ones(100))
         assert values[:, window].sum(axis=0) == pytest.approx(np.ones(100))
         assert changes[:, window].sum(axis=0) == pytest.approx(np.zeros(100))
-    assert values[:, 0, 62] == pytest.approx([0.0, 0.75, 0.25])  # 6.25 s
+    assert values[:, 0, 62] == pytest.approx([0.0, 0.75, 0.25])  # at 6.25 s, between the knots at 5 and 10 s

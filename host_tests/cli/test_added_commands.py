@@ -1,4 +1,4 @@
-"""Commands of other packages are found by their entry points, and a broken one does not affect the others."""
+"""Commands of other packages are found by their entry points. A broken command does not affect the others."""
 
 import subprocess
 import sys
@@ -26,7 +26,12 @@ def crash_command():
 
 @pytest.fixture
 def installed(tmp_path, monkeypatch):
-    """installed(distribution, its entry_points.txt, name=content of its modules): install a package as pip does."""
+    """Return a function that installs a package as pip does.
+
+    distribution: name of the package.
+    entry_points: content of its entry_points.txt.
+    modules: {name: content} of its modules.
+    """
 
     def install(distribution: str, entry_points: str, **modules: str) -> None:
         info = tmp_path / f"{distribution}-1.0.dist-info"
@@ -37,7 +42,7 @@ def installed(tmp_path, monkeypatch):
             monkeypatch.delitem(sys.modules, name, raising=False)
             (tmp_path / f"{name}.py").write_text(text)
 
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # a refusal leaves no files in the folder
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # command.refused() allows no new files in the folder
     monkeypatch.syspath_prepend(tmp_path)
     return install
 
@@ -94,7 +99,7 @@ def test_unreadable_metadata_adds_no_command(installed):
 
 
 def test_users_own_script_is_not_run(tmp_path):
-    """A script is not run, whatever its name."""
+    """A user's script in the current folder is not run, even if its name begins with kickstand."""
     (tmp_path / "kickstand_my_rides.py").write_text("raise RuntimeError('it was run')\n")
     started = [sys.executable, "-m", "kickstand_tools.cli", "--help"]
     done = subprocess.run(started, cwd=tmp_path, capture_output=True, text=True)

@@ -1,4 +1,5 @@
-"""External faults are named correctly: circular links, nesting, escapes in names, signals, and odd values."""
+"""Faults outside the program are not reported as its bugs: circular links, deep nesting, escapes in names, signals, and
+odd values."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""How the command is called: help, times, and one line for every mistake."""
+"""Tests how the command is called: its help, the times in its options, and one line for every mistake."""
 
 import re
 import subprocess

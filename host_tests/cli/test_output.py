@@ -1,4 +1,4 @@
-"""Files are written whole or not at all."""
+"""A file is written completely or not at all."""
 
 import pytest
 from kickstand_tools.common.errors import InputError

@@ -1,4 +1,4 @@
-"""Test `kickstand demo` as a user runs it: printed, in a terminal, and by hand."""
+"""Tests `kickstand demo` as a user runs it: with its output in a file, in a terminal, and with --hand."""
 
 import functools
 import itertools
@@ -20,14 +20,14 @@ HUNG_S = 300  # only a hanging process takes this long, even on a busy machine
 
 
 def demo_command(engine, hand=False):
-    """Command line of the demo. With --hand its time passes six times as fast."""
+    """Return a command line that starts the demo. With --hand the ride runs six times as fast as usual."""
     code = f"from kickstand_tools.demo import demo; demo.HAND_SPEED = 6.0; demo.demo({hand}, {engine == 'cpython'})"
     return [sys.executable, "-c", code]
 
 
 @functools.cache
 def printed_by(engine):
-    """The demo's output if standard output is not a terminal."""
+    """Return the output of the demo when standard output is not a terminal."""
     done = subprocess.run(
         demo_command(engine),
         stdin=subprocess.DEVNULL,
@@ -44,12 +44,12 @@ def printed_by(engine):
 
 @pytest.fixture(scope="module")
 def printed():
-    """The output that every engine prints, see test_both_engines_show_the_same."""
+    """Return the printed output. test_both_engines_show_the_same tests that it does not depend on the engine."""
     return printed_by("cpython")
 
 
 def frames(text):
-    """Return [(time, phase, true lean, line 1, line 2), ...]."""
+    """Return a tuple for each frame in the text: time, phase, true lean, and the two lines of the LCD."""
     head = r"^ *([\d.]+) s  ([\w ]+), true lean ([\d.]+)° ?(left|right|)"
     edge, line = r"\+-{16}\+", r"\|(.{16})\|"
     found = re.findall("\n".join([head, edge, line, line, edge]), text, re.MULTILINE)
@@ -130,13 +130,13 @@ def test_a_device_that_stops_early_is_an_error(monkeypatch):
     assert "no sensor in the shop" in failed.err
 
 
-CLOCK = r"(\d+\.\d) s\s"  # the time of the ride, drawn in the corner
+CLOCK = r"(\d+\.\d) s\s"  # the time of the ride in the corner of the picture
 
 
 @pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 def test_in_a_terminal_by_hand():
-    """Keys press the button, raise the bike, ride off and lean left, and the LCD follows."""
+    """The test uses the keys to press the button, raise the bike, ride off and lean left. The LCD follows."""
     with Terminal(demo_command("cpython", hand=True)) as at:
         at.wait_for("On stand: press")
         at.press("b")

@@ -1,4 +1,4 @@
-"""Parts of `kickstand demo`: the picture, the lean read from the LCD, the score, and the keys."""
+"""Tests parts of `kickstand demo`: the picture, the lean that is read from the LCD, the score and the keys."""
 
 import os
 

@@ -1,5 +1,5 @@
-"""Cache the checks of config.py. Boards are flashed hundreds of times here, and each flash starts a process for the
-check."""
+"""Caches the checks of config.py for the tests in this folder. They flash boards hundreds of times, and each check
+would start a process."""
 
 import functools
 from pathlib import Path

@@ -1,4 +1,5 @@
-"""A fake board whose flash is a real littlefs: files use blocks as on a board, and a full flash refuses them."""
+"""A fake board with a real littlefs as its flash. Files use as many blocks as on a board, and a full flash refuses
+them."""
 
 import contextlib
 import errno
@@ -13,12 +14,12 @@ from littlefs.errors import LittleFSError
 from support import fake_board
 
 BLOCK = 4096
-# Bytes programmed at once, and the cache size, as MicroPython's ports mount the file system.
+# The program size and the cache size in bytes with which each port of MicroPython mounts the file system.
 PORTS = {"rp2": (256, 1024), "esp32": (32, 128)}
 
 
 class _Flash(UserContext):
-    """A UserContext that does not log each read, because logging takes ten times as long as the read."""
+    """A UserContext that does not log each read. Logging would take ten times as long as the read."""
 
     def read(self, cfg: Any, block: int, off: int, size: int) -> bytearray:
         start = block * cfg.block_size + off
@@ -26,7 +27,12 @@ class _Flash(UserContext):
 
 
 class LittlefsBoard(fake_board.FakeBoard):
-    """port: one of PORTS. count: number of flash blocks."""
+    """A fake board with littlefs.
+
+    port: one of PORTS.
+    mpy: the board's value of sys.implementation._mpy.
+    count: number of flash blocks.
+    """
 
     def __init__(self, port: str = "rp2", mpy: int = bytecode.PICO, count: int = 352) -> None:
         self._context = _Flash(BLOCK * count)
@@ -45,7 +51,7 @@ class LittlefsBoard(fake_board.FakeBoard):
         super().__init__(Path("/no/such/directory"), mpy=mpy)
 
     def power_cycle(self) -> None:
-        """Files that were not closed are lost."""
+        """Restart the board. Files that were not closed are lost."""
         context = _Flash(len(self._context.buffer))
         context.buffer[:] = self._context.buffer
         for file in self._written:

@@ -1,4 +1,4 @@
-"""Test `kickstand check` on the simulated board: good boards pass, and each planted defect is named."""
+"""Tests `kickstand check` on the simulated board: good boards pass, and each simulated defect is named."""
 
 import contextlib
 
@@ -17,7 +17,7 @@ REST = part(4, share=0.3)
 
 @pytest.fixture(autouse=True)
 def short(monkeypatch):
-    """Repeat less often, because only shares and figures per second are judged."""
+    """Repeat the measurements less often. The check judges only shares and figures per second."""
     for name, value in (("TRANSFERS", 2000), ("NOISE_S", 2), ("CLOCK_S", 3), ("LOOP_S", 3), ("TEXTS", 8)):
         monkeypatch.setattr(check, name, value)
 
@@ -45,7 +45,10 @@ def test_related_chip_skips_the_self_test(kind, tmp_path):
 
 
 def changed(axis, change):
-    """Return the world(t_s) of a sensor with a changed reading on one of its six axes."""
+    """Return a function world(t_s) for a sensor whose reading is changed on one of its six axes.
+
+    change: a function of the reading and the time that returns the changed reading.
+    """
 
     def world(t_s):
         values = list(REST(t_s))
@@ -64,7 +67,7 @@ def noisier(factor):
 
 
 def patched(name, value):
-    """Return plant(board), which sets an attribute of the sensor's model."""
+    """Return a function plant(board) that sets an attribute of the sensor's model."""
     return lambda board: setattr(board.sensor, name, value)
 
 
@@ -203,7 +206,7 @@ def test_little_memory_is_found(tmp_path):
 
 @pytest.mark.parametrize("good", [True, False])
 def test_check_prints_findings_and_a_verdict(good, tmp_path, monkeypatch):
-    """The text is meant for an issue. The exit status is 1 if something is wrong."""
+    """The printed text is complete enough for an issue. The exit status is 1 if something is wrong."""
     checked = CheckedBoard(REST, {"SPEED": "gps"}, [(1, 0.2)])
     if good:
         checked.board.fit_gps(lambda t_s: 5.0)
@@ -257,7 +260,8 @@ def test_invalid_measurements_are_refused():
 
 
 def test_the_factory_trim_is_that_of_the_register_map():
-    """RM-MPU-6000A rev 4.2, p. 11: code 1 is 0.34 g and 25 deg/s, code 31 is 0.92 g. Code 0 means no factory trim."""
+    """The register map, RM-MPU-6000A rev 4.2, defines the factory trim on page 11. Code 1 means 0.34 g and 25 deg/s,
+    code 31 means 0.92 g, and code 0 means that there is no factory trim."""
     ones = check_limits.factory_trims((0b000_00001, 0b000_00001, 0b000_00001, 0b01_01_01))
     assert ones == pytest.approx([1392.64] * 3 + [3275, -3275, 3275])
     most = check_limits.factory_trims((0xFF, 0xFF, 0xFF, 0x3F))

@@ -1,4 +1,5 @@
-"""The limits of `kickstand check`, each tested from both sides, and the figures in its messages."""
+"""Each limit of `kickstand check` is tested with values slightly below and above it. The figures in its messages are
+tested too."""
 
 import pytest
 from kickstand_tools.deploy import check_limits as limits
@@ -38,7 +39,7 @@ def test_a_clock_with_losses_is_not_measured(overflows, errors):
 
 
 def rested(force=(0.0, 0.0, 1.0), rate=(0.0, 0.0, 0.0), noise_g=0.005, noise_dps=(0.05,) * 3, **other):
-    """The findings for a sensor at rest with 4096 counts per g and 65.5 per deg/s."""
+    """Return the findings for a sensor at rest. It has 4096 counts per g and 65.5 counts per deg/s."""
     means = [4096 * value for value in force] + [0.0] + [65.5 * value for value in rate]
     spreads = [4096 * noise_g] * 3 + [0.0] + [65.5 * value for value in noise_dps]
     given = {"samples": 1000, "changes": (900,) * 7, "temperature_c": 25.0, "overflows": 0} | other
@@ -56,8 +57,12 @@ def rested(force=(0.0, 0.0, 1.0), rate=(0.0, 0.0, 0.0), noise_g=0.005, noise_dps
 
 
 def test_a_sound_sensor_at_rest_is_good():
-    """The accelerometer's 0.0004 g times the root of 1.57 x 44 Hz are 3.325 mg, and with a third of a count 3.326;
-    the gyro's 0.005 deg/s times the root of 1.57 x 42 Hz are 0.0406, and with a third of a count 0.0409."""
+    """The messages contain the noise by the data sheet, which is computed from its noise density and the bandwidth. The
+    rounding to counts adds a third of a count.
+
+    * Accelerometer: 0.0004 g times the root of 1.57 x 44 Hz is 3.325 mg, with the rounding 3.326 mg.
+    * Gyro: 0.005 deg/s times the root of 1.57 x 42 Hz is 0.0406 deg/s, with the rounding 0.0409 deg/s.
+    """
     found = rested()
     assert set(verdicts(found).values()) == {GOOD}
     assert one(found, "noise, accelerometer x")[1] == "5.0 mg (data sheet 3.3, limit 10.0)"
@@ -72,7 +77,7 @@ def test_a_sound_sensor_at_rest_is_good():
         ({"noise_g": 0.0101}, "noise, accelerometer z", BAD),
         ({"noise_dps": (0.12,) * 3}, "noise, gyro x", GOOD),
         ({"noise_dps": (0.125,) * 3}, "noise, gyro x", BAD),
-        # two axes of the gyro exceed 3 deg/s, so the sensor was moved
+        # the noise of two gyro axes is over 3 deg/s, which means that the sensor was moved
         ({"noise_dps": (3.1, 3.1, 0.05)}, "noise, gyro x", LOOK),
         ({"noise_dps": (3.1, 2.9, 0.05)}, "noise, gyro x", BAD),
         ({"changes": (19, *[900] * 6)}, "noise, accelerometer x", BAD),
@@ -101,7 +106,7 @@ def test_each_limit_of_a_sensor_at_rest(given, what, verdict):
 
 @pytest.mark.parametrize(("off_percent", "verdict"), [(13.9, GOOD), (-13.9, GOOD), (14.1, BAD), (-14.1, BAD)])
 def test_the_self_test_is_compared_with_the_factory_trim(off_percent, verdict):
-    """The gyro's code 1 is 25 x 131 counts, with the opposite sign about y."""
+    """The gyro's trim code is 1 on each axis. This means 25 x 131 counts, with the opposite sign about y."""
     trims = [0.0] * 3 + [3275.0, -3275.0, 3275.0]
     on = tuple(100.0 + trim * (1.0 + off_percent / 100.0) for trim in trims)
     found = limits.self_test((1, 1, 1, 0), (100.0,) * 6, on)
@@ -151,7 +156,7 @@ def test_the_fifo_may_lose_a_tenth_and_two_frames(waiting, noticed, after, verdi
     [
         ({}, (GOOD, GOOD, GOOD)),
         ({"longest_us": 100_100}, (LOOK, GOOD, GOOD)),
-        ({"longest_us": 182_600}, (BAD, GOOD, GOOD)),  # half of the time in which the FIFO fills
+        ({"longest_us": 182_600}, (BAD, GOOD, GOOD)),  # more than half of the time in which the FIFO fills
         ({"overflows": 1}, (BAD, GOOD, GOOD)),
         ({"lost": 1}, (GOOD, LOOK, GOOD)),
         ({"restarts": 1}, (GOOD, GOOD, GOOD)),

@@ -1,4 +1,5 @@
-"""Test `kickstand flash` and `status` on a fake board: which files are copied, kept and removed, and refusals."""
+"""Tests `kickstand flash` and `kickstand status` on a fake board: the files that are copied, kept and removed, and the
+refusals."""
 
 import errno
 import functools
@@ -23,7 +24,7 @@ BUILT_IN = types.SimpleNamespace(device="/dev/ttyS0", vid=None, pid=None)
 
 @pytest.fixture
 def board(tmp_path, monkeypatch):
-    """Return the only connected board, with only MicroPython's own boot.py on it."""
+    """Return the only connected board. It contains only MicroPython's own boot.py."""
     (tmp_path / "flash").mkdir()
     board = fake_board.FakeBoard(tmp_path / "flash")
     board.path("boot.py").write_text("# boot\n")
@@ -42,14 +43,14 @@ def module(path):
 
 
 def refused(board, *arguments, words):
-    """The command is refused, the board's files are unchanged, and its port is closed."""
+    """Test that the command is refused, changes no file on the board, and closes its port. Return the message."""
     line = command.refused(board.root, *arguments, words=words)
     assert board.closed
     return line
 
 
 def broken_off(board, words):
-    """The command refuses the board in one line, in the middle of its work."""
+    """Test that `flash` stops with one line in the middle of its work, and closes the port."""
     result = command.run("flash")
     assert (result.status, result.err.count("\n")) == (2, 1)
     assert words in result.err
@@ -93,7 +94,7 @@ def test_edited_config_is_kept_unless_requested(board):
 
 
 def test_files_of_the_rider_are_kept(board):
-    """The calibration, the rider's files and other folders stay. Only code of an older version is touched."""
+    """The calibration, the rider's files and other folders are kept. Only code of an older version is removed."""
     own = ("kickstand_a.cal", "kickstand/kickstand_a.cal", "kickstand/notes.txt", "lib/x.py", "y.py", "user.py")
     board.path("kickstand").mkdir()
     board.path("lib").mkdir()
@@ -200,7 +201,8 @@ def test_missing_port_is_refused(tmp_path, port, words):
 
 @pytest.mark.parametrize(("port", "limit_s"), [("/dev/ttyACM0", 10), ("socket://127.0.0.1:2040", 120)])
 def test_emulated_board_gets_longer_time_limits(port, limit_s, tmp_path, monkeypatch):
-    """There are two attempts, because a board may be starting. The first time limit is shorter."""
+    """The command tries twice to open the port, because the board may still be starting. The time limit of the first
+    attempt is shorter."""
     waited_s = [0.0]
 
     def sleep(seconds):

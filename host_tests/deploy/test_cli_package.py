@@ -1,4 +1,4 @@
-"""The packages: the list for mip, the wheel with the firmware, and tools/dev.py for setting up a checkout."""
+"""Tests the list of files for mip, the wheel with the firmware, and tools/dev.py, which sets up a checkout."""
 
 import importlib.util
 import json
@@ -67,7 +67,8 @@ def test_the_wheel_carries_the_firmware(tmp_path):
 
 
 def test_advice_to_install_keeps_the_checkout_editable():
-    """Without -e, `flash --config` would copy a config.py that the rider has never edited."""
+    """The documents say `pip install -e`. Without -e, `flash --config` would copy the config.py in site-packages, which
+    the rider has never edited."""
     pages = [path for found in ("*.md", "*/README.md", "*/docs/*.md", ".github/*.md") for path in ROOT.glob(found)]
     text = "\n".join(path.read_text(encoding="utf-8") for path in pages)
     lines = re.findall(r"pip install\b(?! esptool).*", text) + [extra("rides")]
@@ -135,7 +136,7 @@ def test_a_moved_checkout_gets_a_new_venv(dev, steps):
 
 
 def test_working_venv_of_another_python_is_kept(dev, steps, monkeypatch, capsys):
-    """The user may have made it on purpose, with other packages in it."""
+    """The user may have made this .venv on purpose and installed other packages in it."""
     dev.prepare("")
     stamp = Path(dev.STAMP)
     stamp.write_text(stamp.read_text().replace("Python ", "Python 0.", 1))

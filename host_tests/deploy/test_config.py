@@ -1,4 +1,4 @@
-"""The rider's own config.py: which file is flashed, and how the host and the board report a mistake in it."""
+"""Tests which config.py of a rider is flashed, and how the computer and the board report a mistake in it."""
 
 import pytest
 from kickstand_tools.common import errors, firmware_path
@@ -8,7 +8,7 @@ from support import command, fake_board, mpy
 
 @pytest.fixture
 def board(tmp_path, monkeypatch):
-    """Return the only connected board, with a config.py on it."""
+    """Return the only connected board. It contains a config.py."""
     (tmp_path / "flash").mkdir()
     board = fake_board.FakeBoard(tmp_path / "flash")
     board.path("config.py").write_text("# on the board\n")
@@ -17,7 +17,7 @@ def board(tmp_path, monkeypatch):
 
 @pytest.fixture
 def config(tmp_path, monkeypatch):
-    """Return the config.py of a checkout in the current folder, while the command is installed elsewhere."""
+    """Return the config.py of a checkout in the current folder. The command itself is installed elsewhere."""
     firmware = tmp_path / "checkout" / "firmware"
     (firmware / "kickstand").mkdir(parents=True)
     (firmware / "config.py").write_text('SIDE = "right"\n')
@@ -32,7 +32,7 @@ def test_the_checkout_s_config_is_flashed_and_named(board, config):
 
 
 def test_installed_package_uses_config_of_the_current_folder(board, tmp_path, monkeypatch):
-    """Riders should not edit a file in site-packages: the next update replaces it."""
+    """Riders should not edit the config.py in site-packages, because the next update replaces it."""
     package = tmp_path / "site-packages" / "kickstand_tools"
     (package / "firmware").mkdir(parents=True)
     (package / "firmware" / "config.py").write_text("# as shipped\n")
@@ -53,7 +53,8 @@ def test_installed_package_uses_config_of_the_current_folder(board, tmp_path, mo
 
 @pytest.mark.parametrize("arguments", [["flash"], ["flash", "--config"]])
 def test_setting_behind_a_mark_is_reported(arguments, board, config):
-    """The message gives the line, also if config.py is not copied. The shipped file has no such setting."""
+    """A setting behind a '#' has no effect. The message gives its line, also if config.py is not copied. The file as
+    shipped has only examples behind a '#', which are not reported."""
     shipped = (firmware_path.directory() / "config.py").read_text()
     config.write_text(shipped.replace('# SIDE = "left" ', '# SIDE = "right"'))
     said = f"note: {config}, line 4: SIDE = \"right\" is not used, because a '#' is in front of it"
@@ -98,7 +99,7 @@ def test_config_that_is_not_copied_is_not_checked(board, config):
 
 
 def pose(board, machine):
-    """Simulate this board. machine: a key of chips.MACHINES."""
+    """Let the fake board identify itself as another board. machine: a key of chips.MACHINES."""
     system = board.modules["sys"]
     system.implementation._machine = chips.MACHINES[machine]
     system.platform = "esp32" if "ESP32" in chips.MACHINES[machine] else "rp2"

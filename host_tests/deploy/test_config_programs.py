@@ -1,4 +1,4 @@
-"""A config.py is a program. If it ends, hides or delays its own check, it is refused in one line."""
+"""A config.py is a program and may end, hide or delay its own check. It is then refused in one line."""
 
 import pytest
 from kickstand_tools.deploy import config_check

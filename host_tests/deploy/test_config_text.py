@@ -1,4 +1,4 @@
-"""The form for config.py finds its settings and changes them without touching the rest of the file."""
+"""The form for config.py finds the settings and changes them. The rest of the file stays unchanged."""
 
 import ast
 import re

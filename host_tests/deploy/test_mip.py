@@ -34,7 +34,7 @@ def package():
 
 
 def install(package, transport):
-    """Run `mpremote mip install --target / PACKAGE` on the board behind a transport that is at its prompt."""
+    """Run `mpremote mip install --target / PACKAGE` on the board. transport: its connection, at the prompt."""
     state = types.SimpleNamespace(transport=transport, did_action=lambda: None, ensure_raw_repl=lambda: None)
     words = types.SimpleNamespace(command=["install"], packages=[package], index=None, target="/", mpy=None)
     mip.do_mip(state, words)
@@ -52,7 +52,7 @@ def test_mip_installs_from_a_local_server(package, tmp_path):
     assert {path: file.read_bytes() for path, file in found.items()} == sources()
 
 
-@pytest.mark.nightly  # 500 kB through the console
+@pytest.mark.nightly  # slow, because 500 kB go through the console
 @pytest.mark.chip
 def test_mip_installation_starts_on_the_emulated_pico(package, monkeypatch):
     """The board also gets main.py and config.py, as firmware/docs/settings.md describes."""

@@ -1,4 +1,5 @@
-"""Boards that send nonsense: each command prints one line for any answer, and writes no file outside its folder."""
+"""A board may send nonsense. Whatever it answers, each command prints one line and writes no file outside its
+folder."""
 
 import binascii
 import contextlib
@@ -39,7 +40,7 @@ COMMANDS = {
 
 
 class Nonsense(fake_board.FakeBoard):
-    """A board that answers everything with the same bytes. first: correct answers before them."""
+    """A board that answers every command with the same bytes. first: number of correct answers before that."""
 
     def __init__(self, root, content, first=0):
         super().__init__(root)
@@ -57,7 +58,7 @@ class Nonsense(fake_board.FakeBoard):
 
 @pytest.fixture
 def plug_in(tmp_path, monkeypatch):
-    """A function that replaces the connected boards by one board."""
+    """Return a function that makes its argument the only connected board."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "flash").mkdir()
     (tmp_path / "out").mkdir()
@@ -93,7 +94,7 @@ def test_mutated_answer_gives_one_line(tmp_path, plug_in, name):
 
 
 class Endless:
-    """A serial port that repeats the same bytes for ever."""
+    """A serial port that sends the same bytes for ever."""
 
     def __init__(self, said):
         self._said, self.count = said, 0

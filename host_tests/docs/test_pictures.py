@@ -28,21 +28,22 @@ def test_no_drawing_is_stale(pictures):
     assert not stale, f"{', '.join(stale)}: {STALE}"
 
 
-@pytest.mark.nightly  # each draws a whole ride, and host_tests/analysis tests the content of plots
+@pytest.mark.nightly  # each case draws a whole ride, which is slow; host_tests/analysis tests the content of plots
 @pytest.mark.parametrize(("name", "draw"), [("ride.png", ride.draw), ("lean_compared.png", explained.lean_compared)])
 def test_no_plot_of_a_ride_is_stale(name, draw):
-    """The pixels are compared, because matplotlib's files differ between versions."""
+    """The pixels of the pictures are compared. The files themselves differ between versions of matplotlib."""
     fresh, kept = (
         np.asarray(Image.open(io.BytesIO(data)).convert("L"), dtype=float)
         for data in (draw(), (PICTURES / name).read_bytes())
     )
     assert fresh.shape == kept.shape, STALE
     difference = float(np.mean(np.abs(fresh - kept)))
-    assert difference < 1.0, STALE  # of 255
+    assert difference < 1.0, STALE  # mean difference of the pixels, which are 0 to 255
 
 
 def test_the_picture_of_the_page_is_not_stale():
-    """The files that decide how the page looks are compared, because drawing it again would take a minute."""
+    """Drawing the page again would take a minute. Instead, a fingerprint of the files that decide its look is
+    compared with the fingerprint in the picture."""
     with Image.open(PICTURES / page.NAME) as moving:
         assert moving.info["xmp"].decode() == page.looks(), STALE
         assert sum(1 for _ in ImageSequence.Iterator(moving)) > 50
@@ -57,7 +58,7 @@ def test_they_are_small_and_fetch_nothing(pictures):
 
 
 def test_the_wires_go_to_the_pins_of_the_settings(pictures):
-    """The default pins of both boards are emphasized, and no other GPIO is."""
+    """The default pins of both boards are bold. No other pin is bold."""
     for name, pins in (("pico", {"GP4", "GP5", "GP6", "GP7", "GP15"}), ("esp32", {"21", "22", "18", "19", "4"})):
         bold = re.findall(r'font-weight="bold"[^>]*>(?:\d+  )?(GP\d+|\d+)<', pictures[f"wiring_{name}.svg"])
         assert set(bold) == pins

@@ -1,4 +1,4 @@
-"""The documents: every link has a target, and every list matches the files."""
+"""Every link in the documents has a target, and every list in them matches the files."""
 
 import ast
 import re
@@ -15,8 +15,8 @@ BEHIND = sorted(path for folder in ("firmware", "tools") for path in (ROOT / fol
 DISPLAYS, HOW = (ROOT / "firmware" / "docs" / name for name in ("displays.md", "how-it-works.md"))
 PAGES = [FIRST, DEVICE, TOOLS, CONTRIBUTING, ROOT / "firmware/FAQ.md", ROOT / "CHANGELOG.md", *BEHIND]
 MOST_LINES = {FIRST: 130, DEVICE: 250, TOOLS: 200}
-WIDEST = 120  # except for tables, pictures and commands
-# Issues, releases, the site, wherever the project is hosted
+WIDEST = 120  # characters in a line, except in tables, pictures and commands
+# relative links to issues, releases and the site, which are valid wherever the project is hosted
 OF_THE_REPOSITORY = re.compile(r"(\.\./){2,}(issues|releases|deployments)\b")
 LINK = re.compile(r'\]\(([^)\s]+)\)|src="([^"]+)"')
 
@@ -46,7 +46,8 @@ def test_every_link_leads_somewhere(page):
 
 
 def test_a_link_out_of_the_checkout_has_its_depth():
-    """GitHub shows a file at OWNER/NAME/blob/BRANCH/, and the first page also at OWNER/NAME."""
+    """GitHub shows a file at OWNER/NAME/blob/BRANCH/, so a link to the issues must go up by that many folders. GitHub
+    shows the first page also at OWNER/NAME."""
     for page in PAGES:
         for link in filter(OF_THE_REPOSITORY.match, links(page)):
             assert link.count("../") == 1 + len(page.relative_to(ROOT).parts), link
@@ -86,7 +87,7 @@ def test_the_first_page_is_short_and_begins_with_an_animation():
 
 
 def test_how_right_it_is_stands_in_both_places_alike():
-    """The table of the first page is a part of the complete table."""
+    """The rows of the table on the first page are also in the complete table."""
     heads, *rows = [
         [cell.strip() for cell in line.strip("|").split("|")]
         for line in text_of(HOW).partition("| profile | shown")[2].partition("\n\n")[0].splitlines()
@@ -110,7 +111,7 @@ PACKAGES = (
 def test_the_map_has_every_folder_and_no_other(package):
     name = package.rpartition("/")[2]
     drawn = re.split(rf"^ .*\b{name}/(?=\s)", text_of(CONTRIBUTING), maxsplit=1, flags=re.MULTILINE)[1]
-    drawn = re.split(r"\n {4}\w", drawn)[0]  # up to the next top folder
+    drawn = re.split(r"\n {4}\w", drawn)[0]  # the part up to the next top folder
     mapped = set(re.findall(r"\b(\w+)/(?=,| )", drawn.split("\n", 1)[1]))
     folders = {path.parent for path in (ROOT / package).rglob("*.py")} - {ROOT / package}
     assert mapped == {folder.relative_to(ROOT / package).parts[0] for folder in folders}

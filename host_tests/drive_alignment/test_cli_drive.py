@@ -13,8 +13,8 @@ from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 from support import command, driving_runs
 from support.driving_runs import RATE_HZ, STAND, around, mounted
 
-# From the sensor's axes to the vehicle's, rows left, up, forward, by the recording's own receiver: within 1 to 2
-# degrees.
+# For each recording, the matrix from the sensor's axes to the vehicle's, with the rows left, up, forward. It was
+# measured with the recording's own receiver and has an error of 1 to 2 degrees.
 RECORDED = {
     "car-urban-short-turn-loop-nominal-001": [
         [0.0124, 0.9995, 0.0302],
@@ -95,13 +95,13 @@ def test_a_calibrated_accelerometer_keeps_its_parameters(tmp_path):
     data = json.loads(out.read_text())
     assert data["accel_offset_g"] == [0.2, 0.0, 0.0]
     assert data["gyro_bias_dps"] == pytest.approx([1.0, -2.0, 3.0], abs=0.02)
-    assert errors(matrix_in(out), MOUNT)[1] > 5.0  # the offset was used
+    assert errors(matrix_in(out), MOUNT)[1] > 5.0  # the wrong offset of 0.2 g was used
     assert "no six-position" not in result.out
     assert result.out.count("car, method improved") == 1
 
 
 def test_notes_in_a_calibration_are_kept(tmp_path):
-    """Notes are, for example, the board and the chip of a recorded ride."""
+    """The notes of a calibration name, for example, the board and the sensor chip of a recorded ride."""
     log = record(tmp_path / "drive.csv", around(7), MOUNT)
     before = CalibrationFile(notes={"board": "Raspberry Pi Pico", "sensor": "MPU6050"})
     found = fit_drive([log], before).calibration
@@ -110,7 +110,7 @@ def test_notes_in_a_calibration_are_kept(tmp_path):
 
 
 def test_several_logs_of_one_mount_are_combined(tmp_path):
-    """No single log is enough."""
+    """Each log alone has too few braking events."""
     logs = [record(tmp_path / f"{k}.csv", around(2), MOUNT) for k in range(3)]
     refused(tmp_path, "braking events in a straight line", logs[0])
     command.works("calibrate", "drive", *logs, "--out", tmp_path / "CAL.json")
@@ -153,8 +153,8 @@ def test_a_drive_that_begins_in_motion_counts_from_its_beginning(tmp_path):
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_a_motorcycle_whose_pitch_changed_on_the_kickstand(tmp_path, side):
-    """With 2 degrees of pitch the two poses are 8 degrees off, and braking reduces this to 1.5 degrees. A wrong side
-    is reported."""
+    """The pitch changes by 2 degrees between the two poses. The yaw error is then over 6 degrees, and the braking
+    events reduce it to below 1.5 degrees. A wrong side of the kickstand is reported."""
     ride = simulate("city", 3, tmp_path, 320.0, pitch_change_deg=2.0, speed=True)
     poses = [tmp_path / f"POSE_{k}.csv" for k in range(1, 8)]
     six, two, out = tmp_path / "SIX.json", tmp_path / "TWO.json", tmp_path / "CAL.json"
@@ -208,7 +208,8 @@ def test_a_log_with_too_few_samples_per_second_is_refused(tmp_path):
 
 @pytest.mark.parametrize("name", RECORDED)
 def test_recorded_cars_remounted_at_random(tmp_path, shared_data, name):
-    """Yaw is within 1.6 degrees and the total error within 3 degrees of a reference with an error of 1 to 2 degrees."""
+    """The result differs from a reference matrix by less than 1.6 degrees in yaw and 3 degrees in total. The reference
+    itself has an error of 1 to 2 degrees."""
     q = np.reshape(random_mounting(1), (3, 3))
     log = remount(shared_data / f"{name}.csv.gz", tmp_path / "log.csv", q)
     command.works("calibrate", "drive", log, "--out", tmp_path / "CAL.json")
@@ -217,11 +218,11 @@ def test_recorded_cars_remounted_at_random(tmp_path, shared_data, name):
     assert total < 3.0
 
 
-UPSIDE_DOWN = [0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0]  # rows left, up, forward: z points down
+UPSIDE_DOWN = [0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0]  # rows left, up, forward; the sensor's z points down
 
 
 def test_a_log_of_opposite_sign_looks_upside_down(tmp_path):
-    """In a car's log only this notice shows the opposite sign. Without it the mirror image would be accepted."""
+    """All accelerations of this log have the opposite sign. In the log of a car only this notice shows the mistake."""
     log, out = record(tmp_path / "drive.csv", around(8), UPSIDE_DOWN), tmp_path / "CAL.json"
     said = command.works("calibrate", "drive", log, "--out", out)
     assert "the sensor's z points down: if it is not mounted upside down, all accelerations are of the" in said.err

@@ -1,4 +1,4 @@
-"""Alignment by driving on simulated drives, on CPython and MicroPython: results, refusals and their reasons."""
+"""Tests alignment by driving on simulated drives, on CPython and MicroPython: results and refusals."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def turned(m, axis, degrees):
 
 @pytest.mark.parametrize("engine", [*ENGINES, "published"])
 def test_a_car_is_aligned(engine):
-    """Align a car by the published method, only on CPython."""
+    """The published method runs only on CPython."""
     options = {"method": "published"} if engine == "published" else {}
     calls = [("drive", (around(), MOUNT, options | {"gyro_bias": [6.0, -5.0, 1.0]}))]
     [result] = run("cpython" if options else engine, calls)
@@ -48,8 +48,8 @@ def test_a_car_is_aligned(engine):
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("known", [True, False])
 def test_a_motorcycle_is_aligned(engine, known):
-    """Tested with and without the vertical of the upright pose. The motorcycle moves from the start, because it
-    needs no stop."""
+    """The alignment works with and without the vertical of the upright pose. The motorcycle moves from the start,
+    because its alignment needs no stop."""
     options = {"vehicle": "motorcycle", "up": MOUNT[3:6] if known else None, "bias": [0.0, 0.0, 0.0]}
     options["samples"] = {"start_mps": 5.0}
     [result] = run(engine, [("drive", (around(stands=False), MOUNT, options))])
@@ -60,7 +60,8 @@ def test_a_motorcycle_is_aligned(engine, known):
 
 @pytest.mark.parametrize("method", ["improved", "published"])
 def test_the_result_turns_with_the_sensor(method):
-    """The result is equivariant within 0.05 degrees, also for mounts along the axes and exactly antiparallel ones."""
+    """If the sensor is mounted differently, the result changes by exactly this rotation, within 0.05 degrees. The
+    mounts are along the axes, some of them exactly opposite to the vehicle's axes."""
     legs = around(5, pause_s=2.0)
     plain = np.reshape(drive(legs, PLAIN, method=method)["matrix"], (3, 3))
     for order, signs in (
@@ -79,16 +80,16 @@ def test_the_result_turns_with_the_sensor(method):
 
 @pytest.mark.parametrize(("method", "yaw_deg"), [("improved", 0.0), ("published", 10.0)])
 def test_camber_at_the_stops_does_not_reach_forward(method, yaw_deg):
-    """With 2 degrees of camber the published method has a yaw error of 10 degrees: sin 2 degrees against 0.2 g of
-    braking."""
+    """The road's camber at the stops is 2 degrees, so the levelled force has an error of sin 2 degrees = 0.035 g to the
+    side. Compared with a braking force of 0.2 g, this gives the published method a yaw error of 10 degrees."""
     yaw, total = errors(drive(around(8), samples={"tilt_deg": 2.0}, method=method), MOUNT)
     assert abs(yaw) == pytest.approx(yaw_deg, abs=1.0)
     assert total < max(2.3, 1.1 * abs(yaw))
 
 
 def test_it_reports_the_missing_step():
-    """The alignment waits for a speed, a stop and a braking event. Then it reports whether the braking event is
-    straight, and when the result is ready."""
+    """The alignment waits first for a speed, then for a stop, then for a braking event. During a braking event it
+    reports whether the vehicle brakes straight. At the end it reports that the result is ready."""
     legs = [[2.0, 1.0, 0.0], [2.0, -1.0, 0.0], *around(2), [8.0, 1.5, 0.0], [4.0, -2.0, 15.0], *around(6, stands=False)]
     states = drive(legs)["states"]
     assert alignment.DriveAlignment("car").state == alignment.WAITING_FOR_SPEED
@@ -144,7 +145,7 @@ def test_only_usable_speeds_align(source, fine):
 @pytest.mark.parametrize(
     ("axis", "degrees", "from_s", "words"),
     [
-        (1, 180.0, 130.0, "no longer where it was"),  # one braking event is left
+        (1, 180.0, 130.0, "no longer where it was"),  # only one braking event follows
         (1, 12.0, 100.0, "two parts of the drive"),
         (0, 1.3 * quality.PITCH_DEG, 82.0, "vertical"),
         (2, 1.3 * quality.ROLL_DEG, 82.0, "vertical"),
@@ -153,8 +154,9 @@ def test_only_usable_speeds_align(source, fine):
     ],
 )
 def test_a_mount_that_moved(axis, degrees, from_s, words):
-    """The drive has ten braking events, the last one from 137 s on."""
-    legs = [*around(10), [4.0, 1.5, 20.0], [4.0, -1.5, 20.0]]  # events in turns do not repair it
+    """The sensor is rotated by these degrees at the time from_s. The drive has ten braking events in a straight line;
+    the last begins at 137 s."""
+    legs = [*around(10), [4.0, 1.5, 20.0], [4.0, -1.5, 20.0]]  # events in turns at the end do not hide the move
     result = drive(legs, moved=[from_s, turned(MOUNT, axis, degrees)])
     assert result["ready"] is (words is None), result
     assert words is None or words in engines.words(result)
@@ -162,16 +164,18 @@ def test_a_mount_that_moved(axis, degrees, from_s, words):
 
 @pytest.mark.parametrize("silent_s", [200.0, 500.0])
 def test_the_first_braking_counts_after_any_late_first_speed(silent_s):
-    """The history's time wraps every nine minutes."""
+    """The first speed comes after 200 or 500 s. The history's time counter wraps around every nine minutes, and this
+    must not lose a braking event."""
     legs = [[silent_s, 0.0, 0.0], *around(6)]
     result = drive(legs, source={"every_s": 1.0, "silent": (-1.0, silent_s)})
-    assert result["counted"] == 6  # all braking events count, but all acceleration is in turns
+    assert result["counted"] == 6  # the six braking events; the vehicle only speeds up in turns
     assert result["ready"]
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_silent_source_at_zero_is_no_standstill(engine):
-    """The vehicle drives off after the receiver has failed, in long curves with a force as steady as at a stop."""
+    """The receiver fails during a stop, so the last speed is zero. Then the vehicle drives off into a long curve, where
+    the force is as steady as at a stop."""
     before = [*around(7), [8.0, -1.0, 0.0], STAND]
     legs = [*before, [4.0, 4.0, 0.0], [30.0, 0.0, 9.0]]
     seconds = sum(leg[0] for leg in before)
@@ -182,7 +186,8 @@ def test_a_silent_source_at_zero_is_no_standstill(engine):
 
 
 def test_a_silent_source_is_not_a_stuck_one():
-    """In a straight tunnel with stop-and-go traffic there is no speed, only before and after it."""
+    """The vehicle drives in stop-and-go traffic through a straight tunnel. The receiver gives a speed only before and
+    after the tunnel."""
     tunnel = [[seconds, acceleration, 0.0] for seconds, acceleration, _ in around(6, pause_s=3.0, stands=False)]
     before = around(3)
     begin = sum(leg[0] for leg in before)
@@ -193,7 +198,7 @@ def test_a_silent_source_is_not_a_stuck_one():
 
 
 def test_nothing_is_joined_across_missing_samples():
-    """A vehicle is still aligned with gaps of 1.5 s every 25 s."""
+    """Samples are missing for 1.5 s in every 25 s, and the vehicle is still aligned."""
     drive = alignment.DriveAlignment("car")
     source = driving_runs.SpeedSource()
     gap = 0
@@ -224,7 +229,8 @@ def test_nothing_is_joined_across_missing_samples():
     ],
 )
 def test_an_alignment_is_compared_with_driving(against, brakings, verdict):
-    """Two degrees of pitch on a kickstand at 10 degrees give a yaw error of 11.4 degrees."""
+    """A change of pitch by 2 degrees between two poses 10 degrees apart causes a yaw error of 11.4 degrees. The cases
+    use this angle."""
     up = against[3:6] if against[3:6] == PLAIN[3:6] else PLAIN[3:6]
     options = {"vehicle": "motorcycle", "up": up, "bias": [0.0, 0.0, 0.0], "against": against}
     assert drive(around(brakings), PLAIN, **options)["compare"] == verdict

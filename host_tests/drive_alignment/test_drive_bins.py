@@ -17,8 +17,13 @@ CALIBRATION = CalibrationFile(accel_offset_g=np.array([0.02, -0.01, 0.03]), acce
 
 
 def drive(rate_hz=100, every_s=0.5, events=7, seed=5, before=()):
-    """Simulate a drive as a Log with uneven times. A speed comes every every_s, anywhere in a bin. before: earlier
-    legs."""
+    """Simulate a drive as a Log with uneven sample times.
+
+    rate_hz: number of samples per second.
+    every_s: approximate time between two speeds. They fall on different places within the bins.
+    events: number of braking events.
+    before: legs that are driven before these events.
+    """
     mount = np.reshape(random_mounting(seed), (3, 3))
     made = list(driving_runs.samples([*before, *driving_runs.around(events)], tilt_deg=1.0))[:: 100 // rate_hz]
     n = len(made)
@@ -31,7 +36,7 @@ def drive(rate_hz=100, every_s=0.5, events=7, seed=5, before=()):
 
 
 def as_on_the_board(log, bias):
-    """Return the matrix of a DriveAlignment that gets each sample."""
+    """Pass each sample to a DriveAlignment as on the board. Return its matrix and the DriveAlignment."""
     alignment, firmware = DriveAlignment("car", None, bias), CALIBRATION.to_firmware()
     force, rate, previous = [0.0] * 3, [0.0] * 3, 0
     for now, reading, speed in log.rows():
@@ -95,7 +100,8 @@ def test_a_refusal_is_in_the_result_with_its_counts():
 
 
 def test_another_slope_in_the_next_log_is_no_moved_mount():
-    """The vehicle is parked nose down at the end of the first log, and nose up at the beginning of the second."""
+    """The vehicle is parked at the end of the first log on one slope, and at the beginning of the second log on the
+    opposite slope. Both slopes are 4.5 degrees."""
     mount = np.reshape(random_mounting(5), (3, 3))
     logs = []
     for slope_deg, first in ((-4.5, False), (4.5, True)):
@@ -112,8 +118,9 @@ def test_another_slope_in_the_next_log_is_no_moved_mount():
 
 
 def test_bins_have_their_speeds_where_they_came():
-    """At 100 samples per second the bins are 50 ms. Speeds come at the first sample, in the middle and at the end of
-    a bin, and after a gap of 2 s. Each age counts back from the end of all samples but the last."""
+    """The log has 100 samples per second, and a bin is 50 ms long. Speeds come at a bin's first sample, in its middle
+    and at its end, and after a gap of 2 s. The age of a speed in the middle is counted from the bin's last sample but
+    one."""
     t_s = np.append(np.arange(11), np.arange(210, 216)) / 100.0
     speed = np.full(17, np.nan)
     speed[[0, 2, 5, 7, 11]] = [10.0, 10.2, 10.5, 10.7, 11.0]

@@ -1,4 +1,5 @@
-"""The verdict on an alignment by its angle to the drive's, and on a stuck speed by its duration."""
+"""Tests two verdicts: on an earlier alignment, by its angle to the drive's alignment, and on a speed that may be
+stuck."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -10,7 +11,15 @@ from kickstand.drive_alignment.speed_check import SpeedCheck
 
 
 def judged(yaw=0.0, up=0.0, straight=6, counted=6, ready=True, quality=0.5, problem=None, blocks=()):
-    """Return the verdict on axes left, up, forward with forward `yaw` degrees off and up `up` degrees off."""
+    """Return the verdict on an alignment that is the identity matrix, compared with a drive.
+
+    yaw: the angle between the drive's forward and the alignment's, in degrees.
+    up: the angle between the drive's up and the alignment's, in degrees.
+    straight: number of straight events.
+    counted: number of accepted events, of 6 that are needed.
+    quality: standard error of the drive's forward, in degrees.
+    blocks: the forward of each block of the drive, as an angle in degrees.
+    """
     cos, sin = np.cos(np.radians(yaw)), np.sin(np.radians(yaw))
     fit = SimpleNamespace(forward=[sin, 0.0, cos], level=[0.0, np.cos(np.radians(up)), np.sin(np.radians(up))])
 
@@ -32,7 +41,7 @@ def judged(yaw=0.0, up=0.0, straight=6, counted=6, ready=True, quality=0.5, prob
         ({}, verdict.SAME),
         ({"yaw": 0.99}, verdict.SAME),
         ({"yaw": -1.01}, verdict.REFINED),
-        ({"yaw": 2.0, "quality": 2.01}, verdict.SAME),  # within the drive's own error
+        ({"yaw": 2.0, "quality": 2.01}, verdict.SAME),  # the difference is within the drive's own error
         ({"yaw": 29.9}, verdict.REFINED),
         ({"yaw": 30.1}, verdict.MOVED),
         ({"yaw": 134.0}, verdict.MOVED),
@@ -60,7 +69,7 @@ def test_the_verdicts_differ_and_turning_round_reverses_two_axes():
 
 @pytest.mark.parametrize(
     ("lively", "calm", "stuck"),
-    [(7, 0, False), (8, 0, True), (8, 45, True), (8, 46, False), (9, 51, True)],  # 8 of 53 are 15 %
+    [(7, 0, False), (8, 0, True), (8, 45, True), (8, 46, False), (9, 51, True)],  # 8 of 53 seconds are 15 %
 )
 def test_a_stuck_speed_needs_eight_lively_seconds_of_a_seventh(lively, calm, stuck):
     check: Any = SpeedCheck()
@@ -84,7 +93,8 @@ def test_bends_and_changes_of_the_speed_do_not_count_as_stuck():
         check.measure(12.0 + k // 7 * 0.1)
         check.update_second([0.05 * (k % 2), 1.0, 0.0])
     for k in range(40):
-        check.update_second([0.05 * (k % 2), 1.0, 0.0], 5.1 * (k % 2 == 0))  # and one second after a bend
+        # every second is in a bend or directly after one
+        check.update_second([0.05 * (k % 2), 1.0, 0.0], 5.1 * (k % 2 == 0))
     assert check.problem is None
 
 

@@ -1,4 +1,4 @@
-"""The single steps of alignment by driving. Those that compute are compared with numpy."""
+"""Tests the single steps of alignment by driving. Computed results are compared with numpy."""
 
 import types
 
@@ -50,8 +50,8 @@ def test_dispersion_is_fishers(sigma_deg):
 
 
 def test_history_is_exact_and_wraps_round():
-    """Differences of the integrals equal numpy's, also where time and sums wrap. Outside the history there is no
-    result."""
+    """Differences between two integrals equal numpy's, also after the time or a sum has wrapped around. A time outside
+    the history gives no result."""
     rng = np.random.default_rng(2)
     history = ForceHistory()
     history.now = MASK - 3_000_000
@@ -74,7 +74,8 @@ def test_history_is_exact_and_wraps_round():
         expected = [np.interp(times[-1] - one, times, np.array(totals)[:, i]) for i in range(4)]
         expected -= np.array([np.interp(times[-1] - two, times, np.array(totals)[:, i]) for i in range(4)])
         got = [((a - b + 2**28) & MASK) - 2**28 for a, b in zip(out, before, strict=True)]
-        assert np.abs(np.array(got) - expected).max() < 200  # of a million: the rounding of about 60 bins
+        # the differences are about a million; 200 allows for the rounding of about 60 bins
+        assert np.abs(np.array(got) - expected).max() < 200
         assert not history.at(out, history.now + 1000)
         assert not history.at(out, history.now - oldest - 1000)
     history.clear()
@@ -95,13 +96,13 @@ def test_regression_is_weighted_least_squares(engine, count):
     weight = np.sqrt(seconds)[:, None]
     design = np.column_stack((a, np.ones(count), c))
     expected = np.linalg.lstsq(design * weight, force * weight, rcond=None)[0]
-    assert np.abs(np.array(forward) - expected[0]).max() < 2e-3  # caused by the ridge on c and 32-bit sums
+    assert np.abs(np.array(forward) - expected[0]).max() < 2e-3  # due to the ridge term for c and to 32-bit sums
     assert np.abs(np.array(level) - expected[1]).max() < 2e-4
     assert 5 <= blocks <= 8
 
 
 def test_two_fits_at_the_same_time_do_not_interfere():
-    """The loop may compare an alignment with the drive while the quality of the drive is being judged."""
+    """The main loop may compare an alignment with the drive while another fit, for the quality, is in progress."""
     rng = np.random.default_rng(5)
     regression = ForwardRegression()
     for k in range(8):
@@ -119,8 +120,8 @@ def test_two_fits_at_the_same_time_do_not_interfere():
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_parts_of_a_drive(engine):
-    """Forward turns by 12 degrees after five of eight blocks. The parts match numpy, with two directions of the
-    forward of the whole drive."""
+    """Forward turns by 12 degrees after five of eight blocks, and pitch by 5 degrees after four. The differences
+    between the parts match numpy. They do not depend on the forward direction of the whole drive, so two are tried."""
     rng = np.random.default_rng(5)
     weights, seconds = rng.uniform(0.1, 0.5, 8), rng.uniform(25.0, 40.0, 8)
     angles = np.array([0.0] * 5 + [12.0] * 3) + rng.normal(0.0, 1.0, 8)
@@ -165,8 +166,8 @@ def test_each_stop_counts_once_in_the_vertical():
 
 
 def test_a_late_speed_is_no_rotated_sensor():
-    """A vehicle may accelerate evenly for some seconds while a late speed is still zero. A rotated sensor shows a
-    constant force for longer."""
+    """A late speed is still zero while the vehicle already accelerates evenly for some seconds. Only a constant force
+    that lasts longer shows a rotated sensor."""
     standing = StandingVertical()
     stand(standing, level(0.0), 5.0)
     stand(standing, level(15.0), 2.5)
@@ -177,8 +178,8 @@ def test_a_late_speed_is_no_rotated_sensor():
 
 
 def test_each_vehicle_has_its_source_of_the_vertical():
-    """A car uses its stops, and with a fit the mean of stops and fit. A motorcycle uses the upright pose, or else
-    straight riding."""
+    """A car uses the vertical of its stops, or with a fit the mean of stops and fit. A motorcycle uses its upright
+    pose. Without the pose it uses the fit, or straight riding."""
     standing = types.SimpleNamespace(up=None)
     fit = types.SimpleNamespace(level=[2.0 * part for part in level(4.0)])
 
@@ -191,7 +192,8 @@ def test_each_vehicle_has_its_source_of_the_vertical():
     assert (pitch(bike, fit), pitch(posed, fit)) == (pytest.approx(4.0), 0.0)
     standing.up = level(10.0)
     assert (pitch(car), pitch(car, fit)) == (pytest.approx(10.0), pytest.approx(7.0))
-    for pitch_deg, times, mean in ((0.0, 1, 0.0), (8.0, 1, 4.0), (8.0, 60, 8.0)):  # the mean of the last minute
+    # the result is the mean of the last minute
+    for pitch_deg, times, mean in ((0.0, 1, 0.0), (8.0, 1, 4.0), (8.0, 60, 8.0)):
         for _ in range(times):
             bike.update(level(pitch_deg), 10.0)
         assert pitch(bike) == pytest.approx(mean, abs=0.1)
@@ -202,7 +204,8 @@ def test_each_vehicle_has_its_source_of_the_vertical():
 
 @pytest.mark.parametrize(("share", "moved"), [(0.9, True), (1.1, False)])
 def test_a_bend_at_a_stuck_zero_is_no_stop(share, moved):
-    """In a bend the rate differs from the bias at the last stop by more than warming up can explain."""
+    """The speed stays at zero while the vehicle is in a bend. The measured rate then differs from the bias at the last
+    stop by more than the gyro's drift while warming up."""
     standing = StandingVertical()
     stand(standing, level(0.0), 5.0, rate=(1.0, -4.0, 2.0))
     stand(standing, level(0.0), 3.0, speed=10.0)
@@ -216,7 +219,7 @@ def test_a_bend_at_a_stuck_zero_is_no_stop(share, moved):
     [(2.0, 0.0, 0.02, 0), (4.0, 0.0, 0.02, 1), (9.0, 1.0, 0.0, 0), (9.0, 0.0, 0.2, 0)],
 )
 def test_a_stop_requires_stillness_and_time(seconds, speed, shake_g, stops):
-    """A stop needs three seconds at rest, with no more shaking than an engine's."""
+    """A stop needs three seconds at rest. The force may shake no more than it does from an idling engine."""
     standing = StandingVertical()
     for k in range(round(seconds * 10)):
         standing.update([0.0, 1.0, shake_g * (-1) ** k], (0.0, 0.0, 0.0), speed, 0.1)
@@ -227,7 +230,7 @@ def test_a_stop_requires_stillness_and_time(seconds, speed, shake_g, stops):
     ("speeds", "yaw_dps", "stuck"), [((7.0, 7.0), 0.0, True), ((7.0, 7.1), 0.0, False), ((7.0, 7.0), 10.0, False)]
 )
 def test_a_speed_that_stays_the_same_in_a_lively_ride_is_stuck(speeds, yaw_dps, stuck):
-    """A changing speed is not stuck, nor is a steady speed through bends."""
+    """A speed that changes is not stuck. A constant speed in bends is not stuck either."""
     check = SpeedCheck()
     for k in range(30):
         check.measure(speeds[k % 6 // 3])

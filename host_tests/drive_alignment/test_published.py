@@ -1,7 +1,17 @@
-"""ViriCiti's method against numbers computed by hand from the article, "Aligning the coordinate systems of
-accelerometer and vehicle" (S. Liem and E. Poeze): R = I + sin t (u.L) + (1 - cos t) (u.L)^2, u the direction of a x b,
-t the angle between a and b. The article has z down and x forward; here the axes are left, up, forward, so the reading
-of gravity is (0, 1, 0) and that of braking (0, 0, -1)."""
+"""ViriCiti's published method is compared with numbers computed by hand from its article, "Aligning the coordinate
+systems of accelerometer and vehicle" (S. Liem and E. Poeze).
+
+The article rotates a unit vector a to a unit vector b with this matrix:
+
+    R = I + sin t (u.L) + (1 - cos t) (u.L)^2
+
+    u: the direction of a x b
+    t: the angle between a and b
+    u.L: the cross product matrix of u; L_x, L_y and L_z are those of the three axes
+
+In the article z points down and x forward. Here the axes are left, up, forward. A vehicle at rest therefore reads
+(0, 1, 0), and the force of braking is along (0, 0, -1).
+"""
 
 from array import array
 
@@ -17,20 +27,28 @@ from kickstand_tools.calibration.published import (
     rotation_between,
 )
 
-# By hand, for a = (2, 1, 2) / 3 and b = up: a x b = (-2, 0, 2) / 3 and cos t = 1 / 3. With K = (a x b).L
-#   K = [[0, -2, 0], [2, 0, 2], [0, -2, 0]] / 3,  K^2 = [[-4, 0, -4], [0, -8, 0], [-4, 0, -4]] / 9
-# and (1 - cos t) / sin^2 t = 1 / (1 + cos t) = 3 / 4, so R = I + K + 3/4 K^2:
+# The rotation that takes a = (2, 1, 2) / 3 to b = up, computed by hand:
+#   a x b = (-2, 0, 2) / 3
+#   cos t = 1 / 3
+#   K = (a x b).L = [[0, -2, 0], [2, 0, 2], [0, -2, 0]] / 3
+#   K^2 = [[-4, 0, -4], [0, -8, 0], [-4, 0, -4]] / 9
+#   (1 - cos t) / sin^2 t = 1 / (1 + cos t) = 3 / 4
+#   R = I + K + 3/4 K^2
 LEVEL = np.array([[2, -2, -1], [2, 1, 2], [-1, -2, 2]]) / 3
-# For a = (0.6, 0, -0.8) and b = backward: a x b = (0, 0.6, 0), u.L = L_y, sin t = 0.6, cos t = 0.8, L_y^2 =
-# diag(-1, 0, -1), so R = I + 0.6 L_y + 0.2 L_y^2:
+# The rotation that takes a = (0.6, 0, -0.8) to b = backward, computed by hand:
+#   a x b = (0, 0.6, 0), so u.L = L_y
+#   sin t = 0.6, cos t = 0.8
+#   L_y^2 = diag(-1, 0, -1)
+#   R = I + 0.6 L_y + 0.2 L_y^2
 TURN = np.array([[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]])
-# The matrix product TURN @ LEVEL, by hand: a sensor that reads (2, 1, 2) / 3 at rest, and whose levelled reading of
-# braking is along (0.6, 0, -0.8)
+# The matrix product TURN @ LEVEL, computed by hand. This sensor reads (2, 1, 2) / 3 at rest. LEVEL rotates its force
+# of braking to (0.6, 0, -0.8).
 MOUNT = np.array([[1.0, -2.8, 0.4], [2, 1, 2], [-2.0, -0.4, 2.2]]) / 3
-# The same with braking along (0.6, 0, 0.8), over 90 degrees from backward: about up sin t = 0.6, cos t = -0.8, so the
-# turn is [[-0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, -0.8]]
+# This sensor also reads (2, 1, 2) / 3 at rest, but LEVEL rotates its force of braking to (0.6, 0, 0.8). This direction
+# is over 90 degrees from backward. The rotation about up has sin t = 0.6 and cos t = -0.8, so it is
+# [[-0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, -0.8]].
 TURNED_MOUNT = np.array([[-2.2, 0.4, 2.0], [2, 1, 2], [-0.4, 2.8, -1.0]]) / 3
-BRAKES = (0.0, 1.0, -0.3)  # g, along left, up, forward
+BRAKES = (0.0, 1.0, -0.3)  # the force while braking, in g along left, up, forward
 STEADY = (0.0, 1.0, 0.0)
 G = 9.80665
 
@@ -42,9 +60,11 @@ G = 9.80665
         ((0.6, 0.8, 0.0), UP, 0, [[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]]),
         ((2 / 3, 1 / 3, 2 / 3), UP, 0, LEVEL),
         ((0.6, 0.0, -0.8), BACKWARD, 1, TURN),
-        # over 90 degrees: about the third axis sin t = 0.6, cos t = -0.8 as in the article
+        # a is over 90 degrees from b. The rotation about the third axis has sin t = 0.6 and cos t = -0.8, as in the
+        # article
         ((0.6, -0.8, 0.0), UP, 2, [[-0.8, -0.6, 0], [0.6, -0.8, 0], [0, 0, 1]]),
-        # after half a turn about the first axis, (0.6, 0.8, 0): the first line times diag(1, -1, -1)
+        # a half turn about the first axis takes a to (0.6, 0.8, 0), so the result is the first case's matrix times
+        # diag(1, -1, -1)
         ((0.6, -0.8, 0.0), UP, 0, [[0.8, 0.6, 0], [0.6, -0.8, 0], [0, 0, -1]]),
     ],
 )
@@ -54,9 +74,20 @@ def test_the_rotation_is_the_articles(a, b, axis, by_hand):
 
 @pytest.mark.parametrize("turned", [1.0, 1j, 0.6 - 0.8j])
 def test_the_dispersion_by_hand(turned):
-    """Directions at 0 and at the angles of cosine 0.8 to both sides: R = 2.6 / 3, and cos 2a = 2 x 0.64 - 1 = 0.28, so
-    rho2 = 1.56 / 3 = 0.52 and d = 0.48 / (2 x 6.76 / 9) = 4.32 / 13.52. Two directions at a to both sides: R = cos a,
-    rho2 = cos 2a, d = tan^2 a; of tangent 3 / 4 that is 9 / 16."""
+    """The dispersion is d = (1 - rho2) / (2 R^2), where R is the length of the mean direction, and rho2 the mean cosine
+    of twice the angle from it.
+
+    Three directions, at -a, 0 and a, with cos a = 0.8:
+        R = 2.6 / 3
+        cos 2a = 2 x 0.64 - 1 = 0.28
+        rho2 = 1.56 / 3 = 0.52
+        d = 0.48 / (2 x 6.76 / 9) = 4.32 / 13.52
+
+    Two directions, at -a and a, with tan a = 3 / 4:
+        R = cos a
+        rho2 = cos 2a
+        d = tan^2 a = 9 / 16
+    """
     three, two = [0.8 + 0.6j, 1.0, 0.8 - 0.6j], [0.8 + 0.6j, 0.8 - 0.6j]
     assert circular_dispersion([turned * way for way in three]) == pytest.approx(4.32 / 13.52, rel=1e-9)
     assert circular_dispersion([turned * way for way in two]) == pytest.approx(9 / 16, rel=1e-9)
@@ -64,17 +95,18 @@ def test_the_dispersion_by_hand(turned):
 
 
 def test_directions_without_a_mean_have_the_largest_dispersion():
-    """Two directions, each off by an angle whose tangent is 4, would give d = 16. Opposite directions give R = 0."""
+    """The dispersion d is limited to 9.9. Two directions at -a and a with tan a = 4 would give d = tan^2 a = 16. Two
+    opposite directions have no mean direction."""
     wide = (1 + 4j) / 17**0.5
     assert circular_dispersion([wide, wide.conjugate()]) == 9.9
     assert circular_dispersion([1.0, -1.0]) == 9.9
-    # tangent 3: d = 9 is not limited
+    # with tan a = 3, d = 9 is below the limit
     far = (1 + 3j) / 10**0.5
     assert circular_dispersion([far, far.conjugate()]) == pytest.approx(9.0, rel=1e-9)
 
 
 class Drive:
-    """A drive with a sample every 10 ms and a speed every every_s."""
+    """A drive with a sample every 10 ms and a speed every `every_s` seconds. It begins with 6 s at rest."""
 
     def __init__(self, every_s=0.5, mount=MOUNT):
         self.alignment, self.mount = PublishedAlignment("car"), mount
@@ -82,10 +114,9 @@ class Drive:
         self.go(STEADY, 6.0)
 
     def go(self, forces, seconds, mps2=0.0):
-        """Drive with each of the forces for an equal share of the time."""
-        readings = (
-            np.atleast_2d(forces) @ self.mount
-        ).tolist()  # the transposed matrix: from the vehicle's axes to the sensor's
+        """Drive for `seconds` with the acceleration mps2. The time is divided equally among the forces."""
+        # the product with the transposed matrix rotates from the vehicle's axes to the sensor's
+        readings = (np.atleast_2d(forces) @ self.mount).tolist()
         samples = round(100 * seconds)
         for k in range(samples):
             self.speed += 0.01 * mps2
@@ -94,7 +125,7 @@ class Drive:
                 self.alignment.measure_speed(self.speed)
 
     def brake(self, *forces, seconds=2.0, mps2=-0.3 * G):
-        """The braking starts at 15 m/s, then the speed stays constant."""
+        """Speed up to 15 m/s, brake with these forces, and then keep the speed for 2 s."""
         self.reach_15_mps()
         self.go(forces or BRAKES, seconds, mps2)
         self.go(STEADY, 2.0)
@@ -123,9 +154,9 @@ def test_stops_and_three_brakings_give_the_mount_by_hand(every_s, mount):
 
 
 def test_forward_is_along_the_sum_of_the_brakings_forces():
-    """Level forces (0.3 x 0.6, -0.3 x 0.8) for 2 s, (0, -0.3) for 2 s, (-0.3 x 0.6, -0.3 x 0.8) for 2 s: their sum is
-    straight back. Their directions are those of the dispersion by hand, so the standard error of their mean is the
-    root of 4.32 / 13.52 / 3, in degrees 18.70."""
+    """Three braking events have the levelled forces (0.18, -0.24), (0, -0.3) and (-0.18, -0.24) g along left and
+    forward. Their sum points straight back. Their dispersion is 4.32 / 13.52, as computed above for three directions.
+    The standard error of their mean is therefore the root of 4.32 / 13.52 / 3, which is 18.70 degrees."""
     drive = Drive()
     assert drive.alignment.quality_deg == 180.0
     drive.brake((0.18, 1.0, -0.24), mps2=-0.24 * G)
@@ -138,9 +169,12 @@ def test_forward_is_along_the_sum_of_the_brakings_forces():
 
 
 def test_a_longer_braking_counts_for_more():
-    """Force times 10 means of 100 ms for each second: (0.18, -0.24) for 4 s and (0, -0.3) twice for 2 s make
-    40 x 0.18 = 7.2 to the left and 40 x 0.24 + 2 x 20 x 0.3 = 21.6 back. So the mean points to the left of
-    backward by atan(1 / 3)."""
+    """The method adds ten means of the force per second, in g. One event has the levelled force (0.18, -0.24) for 4 s,
+    two events have (0, -0.3) for 2 s each.
+
+    The sum to the left is 40 x 0.18 = 7.2. The sum to the back is 40 x 0.24 + 2 x 20 x 0.3 = 21.6. The sum therefore
+    points atan(1 / 3) to the left of backward.
+    """
     drive = Drive()
     drive.brake((0.18, 1.0, -0.24), seconds=4.0, mps2=-0.24 * G)
     drive.brake()
@@ -152,16 +186,16 @@ def test_a_longer_braking_counts_for_more():
 
 @pytest.mark.parametrize(("side_g", "counted"), [(0.040, 1), (0.045, 0)])
 def test_a_braking_whose_direction_spreads_does_not_count(side_g, counted):
-    """Half of the braking pulls to the left and half to the right, by side_g of 0.3 g. d = (side_g / 0.3)^2 is
-    0.0178 and 0.0225, and the limit is 0.02."""
+    """The force is 0.3 g to the back, and side_g to the left in the first half and to the right in the second half. Its
+    dispersion (side_g / 0.3)^2 is 0.0178 in the first case and 0.0225 in the second. The limit is 0.02."""
     drive = Drive()
     drive.brake((side_g, 1.0, -0.3), (-side_g, 1.0, -0.3))
     assert (drive.alignment.counted, drive.alignment.turned) == (counted, 1 - counted)
 
 
 def test_a_shaking_of_ten_times_a_second_is_averaged_away():
-    """Every 50 ms the force changes sides by 0.2 g. Over 100 ms the mean is 0, but over 50 ms the dispersion would
-    be (0.2 / 0.3)^2 = 0.44."""
+    """The side force is 0.2 g and changes its side every 50 ms. Its mean over 100 ms, which the method uses, is 0.
+    Means over 50 ms would have a dispersion of (0.2 / 0.3)^2 = 0.44."""
     drive = Drive()
     drive.brake(*[(side, 1.0, -0.3) for side in (0.2, -0.2)] * 20)
     assert (drive.alignment.counted, drive.alignment.turned) == (1, 0)
@@ -170,10 +204,10 @@ def test_a_shaking_of_ten_times_a_second_is_averaged_away():
 @pytest.mark.parametrize(
     ("seconds", "mps2", "counted"),
     [
-        (2.0, -0.74, 0),  # below 1 m/s2 it is not a braking, for any force
+        (2.0, -0.74, 0),  # a deceleration below 1 m/s2 is not braking, whatever the force
         (2.0, -0.99, 0),
         (2.0, -1.01, 1),
-        (1.0, -1.45, 0),  # less than 1.5 m/s in total
+        (1.0, -1.45, 0),  # this reduces the speed by less than 1.5 m/s
         (1.0, -1.55, 1),
         (0.5, -2.9, 0),
         (0.5, -3.1, 1),
@@ -181,7 +215,7 @@ def test_a_shaking_of_ten_times_a_second_is_averaged_away():
     ],
 )
 def test_which_change_of_speed_is_a_braking(seconds, mps2, counted):
-    """A braking event that reduces the speed too little is noise. It is not counted as braking in a bend either."""
+    """A braking event that reduces the speed too little is noise. It is not counted as refused either."""
     drive = Drive()
     drive.brake(seconds=seconds, mps2=mps2)
     assert (drive.alignment.counted, drive.alignment.turned) == (counted, 0)
@@ -225,8 +259,8 @@ def test_a_braking_with_a_gap_is_dropped_and_earlier_ones_stay(lost):
 
 @pytest.mark.parametrize("lost", [lost_samples, lost_speeds])
 def test_the_loss_of_a_dropped_braking_is_dropped_too(lost):
-    """The braking loses 3 m/s before the gap and 0.5 s x 2 m/s2 = 1 m/s after it. This is less than the 1.5 m/s that
-    a braking event needs."""
+    """The speed falls by 3 m/s before the gap, and by 0.5 s x 2 m/s2 = 1 m/s after it. Only the fall after the gap
+    counts. It is less than the 1.5 m/s that a braking event needs."""
     drive = Drive()
     drive.reach_15_mps()
     drive.go(BRAKES, 1.0, -3.0)

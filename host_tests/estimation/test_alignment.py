@@ -1,6 +1,6 @@
 """Test `kickstand calibrate ride`: the alignment of a motorcycle from a ride without poses, and refusals.
 
-Simulated rides have a sensor mounted at random, with errors as the data sheet allows.
+In the simulated rides the sensor is mounted at random. It has the errors that its data sheet allows.
 """
 
 import functools
@@ -35,12 +35,12 @@ def log_of(made, speed=True):
 
 
 def mounted(log, rotation):
-    """The same ride with the sensor turned, so all its readings are rotated."""
+    """Return the log of the same ride by a sensor that is mounted differently. All readings are rotated."""
     return replace(log, accel_g=log.accel_g @ rotation.T, gyro_dps=log.gyro_dps @ rotation.T)
 
 
 def errors_deg(found, true):
-    """The errors of pitch, yaw and roll: about left, up and forward."""
+    """Return the errors of pitch, yaw and roll, which are the rotations about left, up and forward."""
     return np.abs(np.degrees(rotation_vector(found.calibration.vehicle_from_sensor @ true.T)))
 
 
@@ -72,12 +72,12 @@ def test_the_display_shows_the_lean_with_this_alignment():
     shown = ~np.isnan(found.lean_sigma_deg)
     assert np.mean(shown) > 0.95
     off = (found.lean_deg - made.truth["lean_deg"])[shown]
-    assert np.sqrt(np.mean(off**2)) < 1.0  # the goal was 1.5
+    assert np.sqrt(np.mean(off**2)) < 1.0  # degrees; the goal was 1.5
 
 
 def test_ride_alignment_is_as_good_as_two_poses():
-    """It is as good in yaw, which a kickstand pose hardly determines, and in roll, which an offset of the accelerometer
-    falsifies."""
+    """The ride gives a better yaw, which a kickstand pose hardly determines. It also gives a better roll, which an
+    offset of the accelerometer falsifies in the poses."""
     made = simulated("hills", 22, 240.0)
     kickstand, upright = (api.Log.from_readings(pose, RATE_HZ) for pose in (made.kickstand, made.upright))
     two = errors_deg(api.fit_two_positions(kickstand, upright), made.vehicle_from_sensor)
@@ -87,7 +87,8 @@ def test_ride_alignment_is_as_good_as_two_poses():
 
 
 def test_the_offset_across_the_bike_is_found():
-    """Half of the tolerance of 50 mg would be 1.4 degrees of roll. The result for the same log must be better."""
+    """The accelerometer has an additional offset of 50 mg across the bike. Half of it would be 1.4 degrees of roll. The
+    fit must find the offset to within 20 mg."""
     made = simulated()
     log = log_of(made)
     across = made.vehicle_from_sensor[0]
@@ -100,8 +101,8 @@ def test_the_offset_across_the_bike_is_found():
 
 
 def test_left_handed_axes_are_refused():
-    """Of the 48 ways to exchange and reverse axes, the 24 right-handed ones are only another mounting. This test
-    tries every fifth way, and checks/test_handedness.py tries all."""
+    """There are 48 ways to exchange and reverse axes. The 24 right-handed ways are only another mounting, and the 24
+    others are refused. This test tries every fifth way; checks/test_handedness.py tries all."""
     log = log_of(simulated(), speed=False)
     want = first_guess.axes(mounted_windows(log)).matrix
     for order, signs in [*itertools.product(itertools.permutations(range(3)), SIGNS)][::5]:
@@ -126,7 +127,7 @@ def test_phones_mounting_shows_a_reversed_accelerometer():
 
 
 def test_a_phones_mounting_is_a_prior():
-    """The prior has little weight compared with the ride."""
+    """The known mounting of a phone is a prior that has little weight compared with the ride."""
     made = simulated()
     tilted = rotation_matrix(np.radians([35.0, 0.0, 0.0])) @ PHONES["flat"][0]
     log = mounted(log_of(made, speed=False), tilted.T @ made.vehicle_from_sensor)
@@ -139,7 +140,7 @@ def test_a_phones_mounting_is_a_prior():
 
 @pytest.mark.parametrize("phone", PHONES)
 def test_a_phones_mounting_is_checked(phone):
-    """The mounting must be within the usual tilt of a holder."""
+    """The phone may be tilted from the stated mounting as is usual in a holder. Another mounting is refused."""
     made = simulated()
     tilted = rotation_matrix(np.radians([35.0, 10.0, 0.0]))
     for mountings in PHONES.values():
@@ -237,7 +238,7 @@ def test_slow_log_or_unknown_phone_mounting_is_refused():
 
 
 def test_a_recorded_car_is_refused(shared_data):
-    """The car is refused in any mounting, with its speed and without."""
+    """The log of a car is refused in any mounting, with a speed and without one."""
     rotation = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     rotation *= np.linalg.det(rotation)
     drives = sorted(shared_data.glob("car-*.csv.gz"))
@@ -251,8 +252,8 @@ def test_a_recorded_car_is_refused(shared_data):
 
 
 def test_recorded_motorcycle_is_aligned(shared_data):
-    """Forward, known from braking between the same two traffic lights, and up, from the first second, are good to a few
-    degrees."""
+    """The reference matrix has an error of a few degrees. Its forward is from braking between the same two traffic
+    lights, and its up is from the first second."""
     log = api.read_log(shared_data / "motorcycle-ride.csv.gz")
     rough = np.array([[0.9869, 0.1612, 0.0060], [-0.0137, 0.0466, 0.9988], [0.1608, -0.9858, 0.0482]])
     found, without = api.fit_ride(log), api.fit_ride(replace(log, speed_mps=np.full(len(log.t_s), np.nan)))

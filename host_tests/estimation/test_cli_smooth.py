@@ -81,7 +81,8 @@ def test_report_has_the_smoothed_or_the_live_lean(ride):
 
 
 def test_slow_log_is_reported_with_the_displayed_lean(tmp_path):
-    """The report contains the lean that the display showed. The command smooth refuses such a log."""
+    """The log has only 5 samples per second. `report` uses the lean that the display showed, and `smooth` refuses the
+    log."""
     t_s = np.arange(0.0, 60.0, 0.2)
     noise = np.random.default_rng(1).normal(0.0, 0.01, (len(t_s), 6))
     table = np.column_stack((t_s, noise + [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]))

@@ -1,4 +1,4 @@
-"""The process model and measurement model are compared with motions whose readings follow from geometry."""
+"""The smoother's equations are compared with motions whose readings follow from geometry."""
 
 import numpy as np
 import pytest
@@ -14,8 +14,10 @@ WHEELS = (eq.SLIDING, eq.CLIMBING, eq.SLOPING)
 
 
 def found(rate, force, states=(), parameters=(), speed=np.nan, warm=0.0):
-    """Return the residuals (ROWS) of one window with these readings. States and parameters are set by index, all
-    others are 0."""
+    """Return the residuals of one window with these readings, shape (ROWS).
+
+    states, parameters: {index: value}. All others are 0.
+    """
     x = np.zeros((STATES + PARAMETERS, 1))
     for index, value in dict(states).items():
         x[index] = value
@@ -30,7 +32,8 @@ def found(rate, force, states=(), parameters=(), speed=np.nan, warm=0.0):
 @pytest.mark.parametrize("lean", [-0.9, 0.0, 0.6])
 @pytest.mark.parametrize("yaw_rate", [-0.4, 0.5])
 def test_steady_turn_is_constant(lean, yaw_rate):
-    """Nicolae's equations (22) and (23) give the force of a turn at any lean, balanced or not."""
+    """Nicolae's equations (22) and (23) give the force in a steady turn, whether the lean is balanced or not. With this
+    force the states stay constant."""
     speed, s, c = 17.0, np.sin(lean), np.cos(lean)
     across = speed * yaw_rate / G
     rate, force = [yaw_rate * s, yaw_rate * c, 0.0], [across * c + s, c - across * s, 0.0]
@@ -65,8 +68,8 @@ def test_sensor_above_the_roll_axis_moves_with_the_roll(lean):
     ("force", "lean", "parameters"),
     [
         (0.1 * np.sin(0.7) * 1.2, 0.7, {of.TYRES: 0.1}),  # wide tyres touch the road beside their middle
-        (0.03 * np.cos(0.5), 0.5, {of.BESIDE: 0.03}),  # a side wind is level
-        (0.01, 0.0, {of.CAMBER: 0.01}),  # a cambered road matters on straights only
+        (0.03 * np.cos(0.5), 0.5, {of.BESIDE: 0.03}),  # the force of a side wind is level
+        (0.01, 0.0, {of.CAMBER: 0.01}),  # the camber of the road matters only on straights
         (0.01, 0.02, {of.CAMBER: 0.01}),
         (0.0, 0.5, {of.CAMBER: 0.01}),
     ],
@@ -84,8 +87,7 @@ def test_a_warmer_sensor_has_other_offsets():
 
 
 def test_the_jacobian_is_that_of_the_equations():
-    """The derivatives by the states and by every parameter equal central differences, for both directions of the
-    speed."""
+    """The derivatives by all states and parameters equal central differences, for forward and backward speeds."""
     rng, n = np.random.default_rng(3), 30
     force, rate = rng.normal(size=(2, n, 3))
     windows = windows_of(np.linspace(0.0, 6.0, n), force, rate, rng.normal(size=n), rng.normal(size=n))
@@ -99,7 +101,8 @@ def test_the_jacobian_is_that_of_the_equations():
 
 
 def test_a_yaw_of_eight_degrees_is_no_error_of_scale():
-    """A bike leans, rolls and turns, and its sensor is turned about the up axis."""
+    """The sensor is rotated by 8 degrees about the bike's up, while the bike leans, rolls and turns. If the parameters
+    contain this rotation, the residuals do not change."""
     lean, speed, yaw_rate, roll = 0.7, 25.0, -0.3, 1.5
     s, c = np.sin(lean), np.cos(lean)
     across = speed * yaw_rate / G
@@ -110,7 +113,7 @@ def test_a_yaw_of_eight_degrees_is_no_error_of_scale():
         found(a, b, states, p)
         for a, b, p in ((rate, force, {}), (turn.T @ rate, turn.T @ force, {of.ROTATION.start + 1: np.radians(8.0)}))
     )
-    assert np.allclose(turned[:LEFT], right[:LEFT], atol=1e-3)  # to first order the difference is 15e-3
+    assert np.allclose(turned[:LEFT], right[:LEFT], atol=1e-3)  # equations of first order would differ by 15e-3
 
 
 def test_a_measured_gyro_is_not_estimated_again():
@@ -123,10 +126,11 @@ def test_a_measured_gyro_is_not_estimated_again():
 
 
 def test_the_upright_pose_gives_the_sum_of_rotation_and_offset():
-    """A sensor whose offset the pose has taken for a tilt is right at rest, whatever the offset."""
+    """The upright pose cannot distinguish an offset of the accelerometer from a tilt. If their sum is right, the force
+    at rest is right too."""
     prior, p = Prior.of_pose(six_done=False), np.zeros(PARAMETERS)
-    p[of.ROTATION.stop - 1] = p[of.OFFSET.start] = 0.03  # to the side
-    p[of.ROTATION.start], p[of.OFFSET.stop - 1] = 0.02, -0.02  # forward
+    p[of.ROTATION.stop - 1] = p[of.OFFSET.start] = 0.03  # rotation and offset to the side
+    p[of.ROTATION.start], p[of.OFFSET.stop - 1] = 0.02, -0.02  # rotation and offset forward
     motion = found([0.0] * 3, [0.0, 1.0, 0.0], parameters=enumerate(p))[MOTION]
     assert np.allclose(motion[[LEFT, FORWARD]], 0.0, atol=1e-9)
     apart = p.copy()
@@ -154,7 +158,7 @@ def test_windows_hold_the_integrals_and_gaps_are_separate():
 
 
 def test_gravity_stays_whole_in_a_window_while_the_bike_rolls():
-    """The bike rolls by 30 degrees in a window. Means along the rolling axes are 1 % too small."""
+    """The bike rolls by 30 degrees in a window. A mean force along the rolling axes would be 1 % too small."""
     t = np.arange(400) / 200.0
     lean = np.radians(150.0) * (t - 1.0)
     force = np.column_stack((np.sin(lean), np.cos(lean), np.zeros(400)))

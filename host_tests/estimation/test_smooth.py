@@ -1,4 +1,4 @@
-"""The smoothed lean is compared with the truth of two simulators, also in rides with phases other than riding."""
+"""The smoothed lean is compared with the truth of two simulators. Some logs also contain time without riding."""
 
 import functools
 from dataclasses import replace
@@ -47,25 +47,28 @@ def error(ride):
     return smooth(ride.log, ride.calibration).lean_deg - ride.lean_deg
 
 
-# Each has a special feature. The nightly run adds rides similar to these.
+# Each ride has a special feature. The rides in NIGHTLY are similar to others, so only the nightly run uses them.
 NIGHTLY = "banked", "warming up"
 NAMES = [pytest.param(name, marks=pytest.mark.nightly) if name in NIGHTLY else name for name in RIDES]
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_smoothed_lean_beats_the_display_and_knows_its_error(name):
-    """The comparison includes the first turns."""
+    """The whole ride is compared, including the first turns."""
     ride, found = known(name), smoothed(name)
     off, sigma = (found.lean_deg - ride.lean_deg)[ride.riding], found.lean_sigma_deg[ride.riding]
     assert rms(off) < 0.6 * rms((ride.live() - ride.lean_deg)[ride.riding])
     assert np.max(np.abs(off)) < 2.5
-    assert np.mean(np.abs(off) < sigma) > 0.35  # in one short ride; over many rides it is 0.58 or more
+    assert (
+        np.mean(np.abs(off) < sigma) > 0.35
+    )  # the limit for one short ride; over many rides the mean is at least 0.58
     assert np.mean(np.abs(off) < 3.0 * sigma) > 0.95
     assert np.mean(found.lean_sigma_deg) < 1.2
 
 
 def test_forces_that_are_not_the_bikes_count_less():
-    """With the noise of a firm mount the error was 0.80 degrees."""
+    """The mount is not firm, so the sensor measures forces that do not act on the bike. When the smoother assumed the
+    noise of a firm mount, the error was 0.80 degrees."""
     live, off, sigma = judged(drawn_ride(2028, mounts=["foreign"]))
     assert rms(off) < min(0.65, rms(live))
     assert np.mean(np.abs(off) < 2.0 * sigma) > 0.85
@@ -73,8 +76,8 @@ def test_forces_that_are_not_the_bikes_count_less():
 
 @pytest.mark.parametrize(("seed", "mount"), [(2018, "drifting"), (98, "holder")])
 def test_steady_ride_on_a_straight_is_not_a_standstill(seed, mount):
-    """For 2 s both bikes hardly move, at 22 and at 12 m/s. Treated as a standstill, this made the smoothed lean worse
-    than the live one: 0.56 and 0.37 degrees."""
+    """At 22 m/s and at 12 m/s, the two bikes ride so steadily for 2 s that the readings resemble a standstill. When
+    the smoother treated this as a standstill, its rms errors were 0.56 and 0.37 degrees."""
     live, off, _ = judged(drawn_ride(seed, mounts=[mount]))
     assert rms(off) < 0.8 * rms(live)
 
@@ -87,14 +90,15 @@ def test_good_mounts_and_roads_are_not_doubted():
 
 
 def test_side_force_of_tyres_grows_with_the_force_up():
-    """With a side force in proportion to gravity alone, bends of unequal lean shifted the whole lean: by 0.44 degrees,
-    more than the display's error."""
+    """The side force of wide tyres grows with the force along the bike's up. When the smoother did not know this, bends
+    with unequal leans shifted the lean of the whole ride by 0.44 degrees. The display's error is smaller."""
     ride = simulated("sweeper", 304, 200.0)
     assert rms(error(ride)[ride.riding]) < 0.2
 
 
 def test_wheelies_do_not_count_as_a_soft_mount():
-    """Treated as a soft mount, wheelies caused an error of 0.4 degrees; treated as slopes, 0.16."""
+    """When wheelies were treated as a soft mount, the error was 0.4 degrees. When they were treated as slopes, it was
+    0.16 degrees."""
     ride, found = known("wheelie"), smoothed("wheelie")
     assert not np.any(found.doubtful)
     assert rms((found.lean_deg - ride.lean_deg)[ride.riding]) < 0.155
@@ -102,7 +106,8 @@ def test_wheelies_do_not_count_as_a_soft_mount():
 
 @pytest.mark.parametrize("dive_deg_per_g", [-1.5, 6.0])
 def test_the_dive_of_a_bike_is_learned(monkeypatch, dive_deg_per_g):
-    """When the dive was treated as a slope of the road or as acceleration, the lean depended on the bike's fork."""
+    """A bike's nose dives under braking. When the dive was treated as a slope of the road or as acceleration, the
+    smoothed lean depended on the bike's fork."""
     drawn, made = Bike.random, []
     dives = {"dive_deg_per_g": dive_deg_per_g, "squat_deg_per_g": dive_deg_per_g}
     monkeypatch.setattr(Bike, "random", staticmethod(lambda chance: replace(drawn(chance), **dives)))
@@ -123,8 +128,8 @@ def test_pose_that_was_not_upright_is_reported(street, wrong_deg):
 
 
 def test_slipping_mount_has_little_effect_afterwards(street):
-    """The mount slips by 1.5 degrees about forward within 0.3 s. The gyro measures this, and from then on straights
-    seem to lean."""
+    """The mount slips by 1.5 degrees about forward within 0.3 s. The gyro measures this rotation. From then on the bike
+    seems to lean on straights."""
     log, calibration = street.log, street.calibration
     angle = np.radians(1.5) * np.clip((log.t_s - 65.0) / 0.3, 0.0, 1.0)
     about = calibration.vehicle_from_sensor
@@ -143,14 +148,18 @@ def test_slipping_mount_has_little_effect_afterwards(street):
 
 
 def _turned(vectors, angle):
-    """Return vectors (n, 3) in the axes of a sensor that is turned by angle (n, rad) to the right about forward."""
+    """Return the vectors in the axes of a sensor that is rotated to the right about forward.
+
+    vectors: shape (n, 3).
+    angle: the rotation at each time, shape (n), in rad.
+    """
     s, c = np.sin(angle), np.cos(angle)
     x, y, z = vectors.T
     return np.column_stack((c * x + s * y, c * y - s * x, z))
 
 
 def test_a_mount_that_yields_makes_the_lean_less_sure():
-    """The mount yields by 2 to 5 degrees in the course of the ride."""
+    """During the ride the mount slowly yields by 2 to 5 degrees."""
     ride = simulated("creep", 10, 150.0)
     found = smooth(ride.log, ride.calibration)
     sigmas = (np.abs(found.lean_deg - ride.lean_deg) / found.lean_sigma_deg)[ride.riding]
@@ -160,7 +169,7 @@ def test_a_mount_that_yields_makes_the_lean_less_sure():
 
 
 def test_a_wind_that_turns_makes_the_lean_less_sure():
-    """A wind that turns looks like a wrong upright pose."""
+    """A side wind that changes its direction has the same effect as a wrong upright pose."""
     windy, calm = (np.mean(smoothed(name).lean_sigma_deg[-10_000:]) for name in ("crosswind", "street"))
     assert windy > 2.0 * calm
 
@@ -206,8 +215,8 @@ def test_frozen_readings_have_no_lean_and_do_not_harm_the_rest(street):
 
 
 def test_a_pothole_leaves_no_lean_behind(street):
-    """The roll rate is 300 deg/s for 60 ms. Two phones on one scooter measured such rates with opposite
-    signs: so the phones moved, not the scooter."""
+    """In a pothole the sensor shows a roll rate of 300 deg/s for 60 ms, but the bike does not roll. Two phones on one
+    scooter measured such rates with opposite signs, so the phones moved and the scooter did not."""
     log, at = street.log, 80.0
     hit = (log.t_s > at) & (log.t_s < at + 0.06)
     rate = log.gyro_dps.copy()
@@ -219,7 +228,12 @@ def test_a_pothole_leaves_no_lean_behind(street):
 
 
 def hand(seconds, rate_hz=200, seed=4):
-    """Return the force (n, 3, g) and rate (n, 3, deg/s) of a sensor turned in the hand."""
+    """Simulate a sensor that is turned in the hand.
+
+    Returns:
+        force: shape (n, 3), in g.
+        rate: shape (n, 3), in deg/s.
+    """
     rng = np.random.default_rng(seed)
     n = int(seconds * rate_hz)
     t = np.arange(n) / rate_hz
@@ -256,8 +270,8 @@ def test_short_log_has_a_lean_with_a_large_sigma(street, seconds):
 
 
 def test_long_ride_is_estimated_in_parts(street, monkeypatch):
-    """Time grows with the length of the ride, and memory does not. The end of each part is estimated twice, because it
-    depends on the samples after it. Remarks count each second once."""
+    """A long ride is estimated in parts, so its length does not increase the memory. The end of each part depends on
+    the samples after it, so it is estimated again with the next part. Remarks count each second once."""
     whole, sizes, added = smoothed("street"), [], []
     estimated = module.Smoother.estimated
 

@@ -16,7 +16,12 @@ S, M, ROWS = 3, 2, 6
 
 
 class Problem:
-    """Random residuals of blocks of windows, and random walks of the parameters whose steps have G variances."""
+    """Random residuals of blocks of windows, and random walks of the parameters from block to block.
+
+    blocks: number of blocks.
+    length: number of windows per block.
+    variances: the variances of a step of the M parameters, one row for each hypothesis.
+    """
 
     def __init__(self, blocks, length, variances=([0.01, 0.1],)):
         rng = np.random.default_rng(0)
@@ -27,8 +32,13 @@ class Problem:
         self.blocks = reduce_windows(self.jacobian, S)
 
     def at_once(self, g=0):
-        """Solve for all states in a row, then the parameters of each block. Return solution, covariance and -2
-        log(likelihood)."""
+        """Solve for all states and parameters in one least-squares problem, for hypothesis g.
+
+        Returns:
+            found: (n), all states in order of time, then the parameters of each block.
+            covariance: (n, n), the covariance of found.
+            likelihood: -2 log(likelihood), up to a constant.
+        """
         blocks, length = self.jacobian.shape[:2]
         states = blocks * length + 1
         n = states * S + blocks * M

@@ -1,4 +1,4 @@
-"""Estimators on simulated and recorded rides, and `kickstand evaluate` as a whole."""
+"""Tests the estimators on simulated and recorded rides, and the command `kickstand evaluate`."""
 
 import json
 import math
@@ -20,8 +20,8 @@ THERE = [name for name in estimators.OTHERS if estimators.PACKAGES.get(name) not
 
 
 def leaned(lean_deg: float, roll_s: float = 1.5) -> Samples:
-    """Simulate a bike at rest that leans slowly from upright to lean_deg, then holds for the same time. It does not
-    turn."""
+    """Simulate a bike at rest. It leans from upright to lean_deg within roll_s, and keeps this lean for the same
+    time."""
     n = int(roll_s * 200)
     lean = np.radians(np.concatenate((np.linspace(0.0, lean_deg, n), np.full(n, lean_deg))))
     rate = np.zeros((2 * n, 3))
@@ -53,7 +53,8 @@ def test_every_estimator_is_scored(swept):
 
 
 def test_filters_that_trust_the_force_decay_in_a_held_turn(swept):
-    """Riders complain about this decay: it is the reason for this project."""
+    """In a long turn the shown lean of such filters decays. Riders complain about this; it is the reason for this
+    project."""
     assert swept.scores["complementary"].slope < 0.5
     assert 0.85 < swept.scores["formula"].slope < 1.1
     assert swept.scores["formula 0.3 s"].rms_deg < 0.5 * swept.scores["formula"].rms_deg
@@ -93,7 +94,7 @@ def test_the_calibration_is_from_the_poses_alone(calibrated):
 
 @pytest.fixture
 def one_other(monkeypatch):
-    """Use only one of the other filters, because each takes seconds."""
+    """Compare with only one other filter, because each takes some seconds."""
     monkeypatch.setattr(estimators, "OTHERS", {"complementary": estimators.OTHERS["complementary"]})
 
 
@@ -122,8 +123,8 @@ MOUNTED = CalibrationFile(
 
 
 def recorded() -> Log:
-    """Simulate a level ride with the phone turned about the vertical: straight acceleration after 2 s, then a left
-    turn."""
+    """Simulate a ride on a level road with a phone that is rotated about the vertical. After 2 s the bike accelerates
+    straight ahead, and after 20 s it turns to the left."""
     n, rate = 3000, 50.0
     t = np.arange(n) / rate
     speed = np.clip((t - 2.0) * 2.0, 0.0, 10.0)
@@ -131,7 +132,7 @@ def recorded() -> Log:
     lean = -np.arctan(speed * yaw / STANDARD_GRAVITY)
     forward = np.gradient(speed, t) / STANDARD_GRAVITY
     size = np.hypot(1.0, speed * yaw / STANDARD_GRAVITY)
-    vehicle = np.column_stack((np.zeros(n), size, forward))  # balanced: the force lies in the bike's plane
+    vehicle = np.column_stack((np.zeros(n), size, forward))  # in a balanced turn the force is in the bike's plane
     rates = np.degrees(np.column_stack((yaw * np.sin(lean), yaw * np.cos(lean), np.gradient(lean, t))))
     mounting = MOUNTED.vehicle_from_sensor
     speeds = np.where(np.arange(n) % 50 == 0, speed, np.nan)
@@ -155,8 +156,9 @@ def test_a_recording_without_speed_is_refused():
 
 
 def test_recorded_motorcycle_has_its_known_scores(shared_data):
-    """The complementary filter's slope on this recording is known to be 0.40 (measured with another calibration). With
-    forward from braking and up from the first second the shown lean had 2.98 degrees rms and a slope of 1.226."""
+    """The slope is the share of the true lean that a filter shows. The complementary filter had a slope of 0.40 in this
+    recording, with another calibration. With forward from braking and up from the first second, the lean meter had an
+    rms error of 2.98 degrees and a slope of 1.226."""
     made = real_ride.compare(shared_data / "motorcycle-ride.csv.gz")
     scores, leans = made.scores, made.traces
     assert scores["complementary"].slope == pytest.approx(0.40, abs=0.06)
@@ -179,7 +181,8 @@ def test_the_command_prints_a_table_and_writes_json_and_picture(tmp_path, one_ot
     assert set(data["profiles"]) == {"street", "parked"}
     assert data["profiles"]["parked"]["kickstand"]["lag_ms"] is None
     assert (out / "lean.png").read_bytes().startswith(b"\x89PNG")
-    again = json.loads(works("evaluate", "--profiles", "parked", *more, "--json").out)  # on standard output
+    # --json prints to standard output
+    again = json.loads(works("evaluate", "--profiles", "parked", *more, "--json").out)
     assert again["profiles"]["parked"] == data["profiles"]["parked"]
     assert math.isfinite(again["profiles"]["parked"]["formula"]["rms"])
 
@@ -202,22 +205,22 @@ def test_bands_of_a_recording_without_riding_are_refused(tmp_path):
 
 
 def test_simulate_states_both_leans_on_the_stand(tmp_path):
-    """The poses are at another place than the start of the ride."""
+    """The two poses are taken at another place than the start of the ride, so the stand leans the bike differently."""
     arguments = "--profile", "street", "--seconds", "20", "--pitch-change", "0", "--out", tmp_path
     said = works("simulate", *arguments).out.splitlines()[-1]
     pose, begin = (float(number) for number in re.findall(r"-\d+\.\d", said))
     made = [tmp_path / name for name in ("KICKSTAND.csv", "UPRIGHT.csv")]
     found = works("calibrate", "two", *made, "--out", tmp_path / "C.json").out
     tilt = re.search(r"([\d.]+) degrees from the kickstand", found)
-    assert tilt and float(tilt[1]) == pytest.approx(-pose, abs=0.8)  # without the six positions
+    assert tilt and float(tilt[1]) == pytest.approx(-pose, abs=0.8)  # inexact without the six positions
     truth = (tmp_path / "TRUTH.csv").read_text().splitlines()[1]
     assert float(truth.split(",")[1]) == pytest.approx(begin, abs=0.05)
     assert abs(pose - begin) > 1.0
 
 
 def test_a_wheelie_is_not_treated_as_a_faulty_sensor():
-    """A wheelie causes large innovations, because the filter's equations do not hold. A filter that judged by them
-    restarted (4.0 degrees rms)."""
+    """The filter's equations do not hold in a wheelie, so its innovations are large. When the filter took them for a
+    fault, it restarted, and the rms error was 4.0 degrees."""
     made = ride("wheelie", 2, 120.0)
     shown = replay(runs.as_log(made), runs.calibrated_by_log(made))
     error = (np.asarray(shown.lean_deg) - made.truth["lean_deg"])[made.truth["speed_mps"] > 5.0]

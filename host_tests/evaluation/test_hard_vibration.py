@@ -1,5 +1,5 @@
-"""Engine vibration can exceed the accelerometer's range while its low-pass hides the excess. This is why the default
-range is 16 g. The driver also notices stronger vibration."""
+"""Engine vibration can exceed the accelerometer's range without a sign in the readings, because the low-pass hides it.
+The default range is therefore 16 g. The driver notices vibration that exceeds even this range."""
 
 import dataclasses
 from array import array
@@ -15,8 +15,12 @@ from kickstand_workshop.evaluation.runs import as_log, calibrated_by_poses
 
 
 def shaken(monkeypatch, profile, seed, factor, range_g, seconds):
-    """Return a ride with engine vibration times `factor`, measured in this range, and the vibration in g rms per
-    axis."""
+    """Simulate a ride with stronger engine vibration, measured with the accelerometer range range_g.
+
+    Returns:
+        The ride, with its vibration multiplied by `factor`.
+        The rms of this vibration per axis, in g.
+    """
     rms = []
 
     def harder(*arguments):

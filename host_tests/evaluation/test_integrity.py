@@ -1,4 +1,4 @@
-"""Wrong leans that are shown as good: how they are judged, the faults, and `kickstand evaluate --faults`."""
+"""Tests how wrong leans that are shown as good are judged, the simulated faults, and `kickstand evaluate --faults`."""
 
 import json
 
@@ -14,7 +14,12 @@ NAMED = {fault.title: fault for fault in FAULTS}
 
 
 def trace(error_deg, shown=None, first_s=10.0, end_s=100.0):
-    """Return 60 s of riding with an error (600) and a flag `shown` (600), True where the lean is shown."""
+    """Return 60 s of riding at a lean of 20 degrees, with 10 samples per second.
+
+    error_deg: error of the displayed lean, a number or shape (600).
+    shown: True where the lean is shown, shape (600). None if it is always shown.
+    first_s, end_s: time of the start and the end of the fault.
+    """
     n = 600
     time = np.linspace(0.0, STEP_S * (n - 1), n)
     shown = np.ones(n, dtype=bool) if shown is None else shown

@@ -1,4 +1,4 @@
-"""Make one small fleet and run it once for all tests of a module, because both take seconds."""
+"""Simulates one small fleet for all tests of a module, because this takes seconds."""
 
 import made_fleet
 import pytest
@@ -7,7 +7,7 @@ from kickstand_fleet import run
 
 @pytest.fixture(scope="session")
 def fleet(tmp_path_factory):
-    """Return a MadeFleet of nine vehicles, several of them with a trouble."""
+    """Return a MadeFleet of nine vehicles, some of which have a fault."""
     return made_fleet.make(tmp_path_factory.mktemp("fleet"))
 
 

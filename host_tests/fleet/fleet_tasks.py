@@ -1,4 +1,5 @@
-"""Tasks for a fleet's workers, some of which fail. They are in a module because workers must import them."""
+"""Tasks for the workers of a fleet. Some of the tasks fail. They are in a module of their own, because workers must
+import them."""
 
 import os
 import time
@@ -6,8 +7,11 @@ from pathlib import Path
 
 
 def task(number, behaviour="", note=""):
-    """Return the task's number. behaviour: "die" ends the worker, "hang" never returns, "raise" raises, "slow" takes
-    longer. note: a file to which each start of the task adds a line with the worker's process id."""
+    """Return the task's number.
+
+    behaviour: "die" ends the worker, "hang" never returns, "raise" raises an error, "slow" takes longer.
+    note: path of a file. Each start of the task adds a line with its number and the worker's process id.
+    """
     if note:
         with Path(note).open("a") as file:
             file.write(f"{number} {os.getpid()}\n")

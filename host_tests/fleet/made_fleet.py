@@ -1,4 +1,4 @@
-"""A small simulated fleet, and its drives in memory."""
+"""Makes small simulated fleets and single drives."""
 
 import csv
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from kickstand_fleet.simulation.vehicle import HANDLING, Receiver, drive_log, ra
 from kickstand_tools.logs.csv_lines import write_log
 from kickstand_tools.signals import rotation_matrix
 
-# the trouble of each vehicle; the kinds are car, bus and motorcycle in turn
+# the fault of each vehicle, "" for none; the kinds of vehicle are car, bus and motorcycle in turn
 TROUBLES = ["", "", "", "moved-between", "garbage", "moved-within", "km/h", "dead", "late"]
 
 
@@ -40,7 +40,13 @@ def make(directory, troubles=TROUBLES, seed=3, seconds=170.0):
 
 
 def drive(seed, kind="car", seconds=200.0, sensor=None, moved=None, straight=True, rate_hz=50.0, **receiver):
-    """Return (Log, Sensor) of one drive. moved: (seconds, mount from then on)."""
+    """Simulate one drive. Return its Log and its Sensor.
+
+    sensor: the sensor to use, or None for a random one.
+    moved: (time in s, the mount from this time on), or None.
+    straight: passed to random_route().
+    receiver: arguments of Receiver.
+    """
     chance = np.random.default_rng([seed, 5])
     sensor = sensor or random_sensor(chance)
     route = random_route(chance, HANDLING[kind], seconds, rate_hz, straight)
@@ -49,7 +55,7 @@ def drive(seed, kind="car", seconds=200.0, sensor=None, moved=None, straight=Tru
 
 
 def turn_of(degrees, axis):
-    """Return the matrix (3, 3) of a rotation about an axis (3)."""
+    """Return the matrix of a rotation by this angle. axis: any vector along the axis, shape (3)."""
     return rotation_matrix(np.radians(degrees) * np.asarray(axis) / np.linalg.norm(axis))
 
 
@@ -59,7 +65,7 @@ def yaw_deg(found, true):
 
 
 def worked_on(directory, *logs):
-    """Return the result for these logs of one car."""
+    """Write these logs as those of one car, and return the fleet's result for them."""
     paths = tuple(str(directory / f"{k}.csv") for k in range(1, 1 + len(logs)))
     for path, log in zip(paths, logs):
         write_log(path, log)

@@ -1,4 +1,4 @@
-"""Tests with Dask's workers: a failing task does not affect other tasks, and a stopped run is resumed."""
+"""Tests with Dask's workers. A task that fails does not affect other tasks, and a stopped run is resumed."""
 
 import json
 import os
@@ -26,14 +26,14 @@ from support.recordings import broken_logs
 
 @pytest.fixture(scope="module")
 def cluster():
-    """Return a cluster that ends no task because the machine is busy."""
+    """Return a cluster with a long time limit, so that no task is ended because the machine is busy."""
     with Cluster(None, 2, timeout_s=600.0) as running:
         yield running
 
 
 class Overdue(dict):
-    """Start times of tasks. Task 5 began long ago and is ended at once. No other task is ended, even on a busy
-    machine."""
+    """Start times of tasks. Task 5 seems to have begun long ago, so it is ended at once. No other task is ended, even
+    on a busy machine."""
 
     def __setitem__(self, key, began):
         super().__setitem__(key, (began[0] - 1000.0 * key.startswith("fleet-5-"), began[1]))
@@ -61,7 +61,7 @@ def test_killed_worker_costs_no_result(cluster, tmp_path):
     def kill():
         while not note.exists() or len(note.read_text().splitlines()) < 3:
             time.sleep(0.05)
-        os.kill(int(note.read_text().splitlines()[-1].split()[1]), signal.SIGKILL)  # one of this run's workers
+        os.kill(int(note.read_text().splitlines()[-1].split()[1]), signal.SIGKILL)  # a worker of this test's cluster
 
     killer = threading.Thread(target=kill)
     killer.start()
@@ -107,7 +107,7 @@ def test_fleet_on_a_cluster_is_resumed(cluster, fleet, tmp_path, monkeypatch):
     os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + 1_000_000))
     assert run_fleet(periods, tmp_path).new == 1
     assert run_fleet(periods, tmp_path).new == 0
-    # other options cause a new computation, too
+    # a changed option also causes a new computation
     assert run_fleet(periods[:1], tmp_path, with_signals=True).new == 1
     written = sorted((tmp_path / "signals").rglob("*.parquet"))
     assert len(written) >= len(periods[0].paths)
@@ -168,7 +168,8 @@ def test_two_runs_do_not_share_a_journal(tmp_path):
 
 
 def test_removed_journal_is_replaced_and_locked_again(tmp_path, monkeypatch):
-    """The journal is locked until it is removed. A run that has opened it meanwhile creates a new one."""
+    """A run locks the journal and removes it at its end. A second run may have opened the journal just before. It must
+    then create and lock a new one."""
     fcntl = pytest.importorskip("fcntl", reason="files are not locked on this system")
     path = tmp_path / "journal.jsonl"
     locks, lock = [], fcntl.flock
@@ -216,18 +217,18 @@ PROGRAM = """
 import signal, time
 from kickstand_fleet.cluster import Cluster
 if __name__ == "__main__":
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell ignores it for what runs in the background
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # programs in the background of a shell ignore Ctrl-C
     print("starting", flush=True)
     with Cluster(None, 2, 60.0):
         time.sleep(60.0)
 """
 
 
-@pytest.mark.nightly  # the next test stops at a moment that does not depend on the machine's load
+@pytest.mark.nightly  # the next test is similar, and does not depend on the machine's load
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="Ctrl-C comes at once on this system")
 @pytest.mark.parametrize("after_s", [0.6, 1.6])
 def test_ctrl_c_while_workers_start_is_deferred(tmp_path, after_s):
-    """Workers that are interrupted at once would print pages of errors."""
+    """Ctrl-C waits until the workers have started. Otherwise they would print pages of errors."""
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)
     command, pipe = [sys.executable, str(program)], subprocess.PIPE

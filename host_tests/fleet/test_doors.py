@@ -1,4 +1,5 @@
-"""Bad names, other users of the computer and changing files cost a fleet only their own row."""
+"""Bad file names, other users of the computer and files that change during a run spoil at most one row of the
+results."""
 
 import http.client
 import os
@@ -49,7 +50,7 @@ def test_signals_of_equally_named_logs_have_separate_files(drive, tmp_path, alon
     assert sum(parquet.ParquetFile(tmp_path / path).metadata.num_rows for path in written) == 6 * len(
         files.open_log(str(drive)).t_s
     )
-    assert sum("second" in path.name for path in written) == 2  # both files have the mount's name
+    assert sum("second" in path.name for path in written) == 2  # the names of both files contain the mount
     run_fleet(periods[:1], tmp_path / "again", with_signals=True)
     again = {path.name for path in (tmp_path / "again" / "signals").rglob("*.parquet")}
     assert len(again) == 2 and again <= {path.name for path in written}
@@ -173,8 +174,8 @@ def test_hostile_manifest_gives_one_line_or_a_row(tmp_path, alone, content, word
 
 
 def test_move_at_an_unknown_time_is_counted(tmp_path, monkeypatch):
-    """For example, a motorcycle treated as a car leans on its stand. Names are short, and the message gives the
-    kind."""
+    """A move of the mount is counted even if its time is unknown. An example is a motorcycle that is treated as a car,
+    because it leans on its stand."""
 
     def moved(_, items, *__):
         for index, (period, _) in enumerate(items):
@@ -227,7 +228,7 @@ def test_pipe_is_refused_as_manifest_and_log(tmp_path, alone):
 
 
 def test_unwritable_file_is_reported_with_its_reason(tmp_path, monkeypatch):
-    """The temporary file cannot be removed on a read-only file system."""
+    """The file system is read-only. The temporary file cannot be removed either."""
 
     def read_only(*_, **__):
         raise OSError(30, "Read-only file system")

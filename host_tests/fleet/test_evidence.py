@@ -1,4 +1,5 @@
-"""The intervals of a drive show level, forward and left, and 1 g stays 1 g in each."""
+"""The intervals of a drive show the directions level, forward and left. A force of 1 g along each of them is found as
+1 g."""
 
 import numpy as np
 import pytest

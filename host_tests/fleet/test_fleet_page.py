@@ -1,4 +1,4 @@
-"""A fleet's page has the site's style and readable colours, and a zero is not coloured like a fault."""
+"""A fleet's page has the style of the site and readable colours. A zero does not have the colour of a fault."""
 
 import pytest
 from kickstand_fleet.manifest import read_manifest
@@ -13,7 +13,7 @@ INK = "() => getComputedStyle(document.body).color"
 
 @pytest.fixture(scope="module")
 def page_file(fleet, tmp_path_factory):
-    """The results of an aligned vehicle and of a moved mount."""
+    """Write the page of a fleet with an aligned vehicle and a moved mount. Return its path."""
     glance = Glance()
     for period in read_manifest(str(fleet.manifest))[1:4:2]:
         glance.add(work_on_period(period))

@@ -1,4 +1,5 @@
-"""Forward from whole logs is more exact than the device's, and its standard error is right."""
+"""The fleet computes forward from whole logs. It is more exact than the device's forward, and its standard error is
+right."""
 
 import dataclasses
 
@@ -13,12 +14,15 @@ from kickstand_tools.logs.reader import read_log
 from kickstand_tools.signals import rotation_vector
 from made_fleet import drive, turn_of, worked_on, yaw_deg
 
-SEEDS = (101, 102, 106, 109)  # with these seeds the device is off by about a degree
+SEEDS = (101, 102, 106, 109)  # with these seeds the device's forward has an error of about a degree
 
 
 @pytest.fixture(scope="module")
 def buses():
-    """Return (the device's fit, the result of the whole log, the mount) of buses that brake gently about ten times."""
+    """Simulate buses that brake gently about ten times.
+
+    Returns a tuple for each bus: the device's fit, the result of the whole log, and the true mount.
+    """
     found = []
     for seed in SEEDS:
         log, sensor = drive(seed, "bus", 150.0)
@@ -77,7 +81,8 @@ def test_late_speed_is_not_reported_as_a_moved_mount(tmp_path, monkeypatch):
     assert "2.5 s late" in row["message"]
 
 
-# from the recordings' own receivers: rows left, up, forward
+# Matrices from the sensor's axes to the vehicle's, with the rows left, up, forward. They were measured with the
+# recordings' own receivers.
 REFERENCES = {
     "short-turn-loop-nominal-001": [[0.0124, 0.9995, 0.0302], [-0.0021, -0.0302, 0.9995], [0.9999, -0.0124, 0.0017]],
     "medium-turn-loop-nominal-001": [[0.0473, 0.9987, 0.0204], [-0.0003, -0.0204, 0.9998], [0.9989, -0.0473, -0.0006]],
@@ -109,7 +114,7 @@ def test_contradicting_device_makes_forward_uncertain(buses):
 
 
 def test_a_tight_turn_counts_less_than_a_wide_one():
-    """Ahead of the rear axle, a car's sensor moves sideways in a tight turn."""
+    """A car's sensor is ahead of the rear axle, so it moves sideways in a tight turn. Forward is then less certain."""
     log, _ = drive(4)
     log = dataclasses.replace(log, gyro_dps=np.zeros_like(log.gyro_dps))
     straight = evidence.intervals(log, "car", 0.0, np.zeros(3))

@@ -1,4 +1,4 @@
-"""The disk fills up during any write: no finished row is lost, and one line reports the full disk."""
+"""If the disk fills up during any write, no finished row is lost, and one line reports the full disk."""
 
 import copy
 import errno
@@ -20,7 +20,7 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 @pytest.fixture
 def disk(tmp_path):
-    """Return the directory of a disk made by resize()."""
+    """Return the directory where resize() mounts a disk."""
     if not sys.platform.startswith("linux"):
         pytest.skip("tmpfs is of Linux")
     path = tmp_path / "disk"
@@ -30,7 +30,7 @@ def disk(tmp_path):
 
 
 def resize(path, kb):
-    """Create a disk of this size at path, or enlarge it."""
+    """Mount a disk in memory with this size at path, or change its size."""
     option = "remount," if os.path.ismount(path) else ""
     mount = ["mount", "-t", "tmpfs", "-o", f"{option}size={kb}k", "tmpfs", str(path)]
     if subprocess.run(mount, capture_output=True, check=False).returncode:
@@ -39,7 +39,7 @@ def resize(path, kb):
 
 @pytest.fixture(scope="module")
 def results(fleet):
-    """The logs of three vehicles, by name, and their periods."""
+    """Return the results of three vehicles, {name: result}, and their periods."""
     periods = read_manifest(str(fleet.manifest))[:3]
     return {period.vehicle: work_on_period(period) for period in periods}, periods
 
@@ -51,7 +51,8 @@ def finished(directory, keys):
         return sum(key in journal for key in keys)
 
 
-# The sizes go from a disk without room for a picture to one with room for all rows but not for the last table.
+# On the smallest disk there is no room for a picture. On the largest there is room for all rows, but not for the last
+# table.
 @pytest.mark.parametrize("kb", [8, 48, 80])
 def test_disk_of_any_size_loses_no_finished_row(disk, results, alone, monkeypatch, kb):
     known, periods = results

@@ -1,4 +1,4 @@
-"""Valid manifests, and refusals by `kickstand fleet` and `simulate --fleet`."""
+"""Tests valid manifests, and the refusals by `kickstand fleet` and `kickstand simulate --fleet`."""
 
 import pytest
 from kickstand_fleet.manifest import Period, by_pattern, is_pattern, read_manifest

@@ -1,4 +1,4 @@
-"""Small rotations of a mount are found, also from the motion of the car's body. The tests use artificial sums and
+"""Small rotations of a mount are found. The swaying of the car's body also shows them. The tests use simulated and
 recorded drives."""
 
 import copy
@@ -19,8 +19,11 @@ def driven(log, lag_s=0.3, bias_dps=(0.0, 0.0, 0.0)):
 
 
 def swaying(log, sensor, size_g=0.03, other_deg=0.0, seed=1):
-    """Return the log of a car whose body sways sideways 5 times per second. From the middle on, the direction
-    differs by other_deg."""
+    """Return the log of a car whose body sways sideways 5 times per second.
+
+    size_g: usual size of the swaying force.
+    other_deg: angle by which the direction of the swaying changes in the middle of the log.
+    """
     chance = np.random.default_rng(seed)
     size = size_g * np.interp(log.t_s, np.arange(0.0, log.t_s[-1] + 1.0), chance.normal(size=int(log.t_s[-1]) + 2))
     sway = np.outer(size * np.sin(2.0 * np.pi * 5.0 * log.t_s), (1.0, 0.0, 0.0))
@@ -32,7 +35,7 @@ def swaying(log, sensor, size_g=0.03, other_deg=0.0, seed=1):
 
 
 def halves(log):
-    """Return the rotation of the mount found in the middle of a log, and its sigma."""
+    """Return the rotation of the mount between the two halves of a log, and its standard deviation."""
     whole = evidence.blocks([driven(log)])
     middle = len(whole.log) // 2
     found = compare(whole.part(slice(0, middle)), whole.part(slice(middle, None)))
@@ -80,8 +83,8 @@ def test_move_between_logs_is_not_found_during_them():
 
 
 def test_one_road_counts_once_for_all_its_intervals():
-    """The regression uses innovations: if the force's error is constant, only the first interval of a standstill
-    counts."""
+    """At a standstill the slope of the road gives each interval the same error. Together these intervals therefore
+    count like about one interval. Intervals on different roads count separately."""
     count = 50
     standing = evidence.Intervals(
         np.arange(count, dtype=float),
@@ -93,13 +96,13 @@ def test_one_road_counts_once_for_all_its_intervals():
     )
     weight = float(np.sum(evidence.blocks([standing]).square[:, 0, 0]))
     assert weight == pytest.approx(1.0 / (evidence.ROAD_SHARE + 1.0 / count), rel=1e-6)
-    standing.speed += 1000.0  # a different road each time
+    standing.speed += 1000.0  # now each interval is on a different road
     weight = float(np.sum(evidence.blocks([standing]).square[:, 0, 0]))
     assert weight == pytest.approx(count / (evidence.ROAD_SHARE + 1.0), rel=0.01)
 
 
 def pitched(log, sensor, degrees):
-    """Return the log with the sensor rotated about left by degrees (n)."""
+    """Return the log of a sensor that is rotated about left. degrees: the angle at each sample, shape (n)."""
     vehicle = log.accel_g @ sensor.mount.T
     angle = np.radians(degrees)
     cosine, sine = np.cos(angle), np.sin(angle)
@@ -127,7 +130,7 @@ def test_turns_of_five_degrees_in_a_recorded_drive(shared_data):
     found, chance = [], np.random.default_rng(8)
     for k in range(8):
         axis = UP if k % 2 else (np.cos(k), 0.0, np.sin(k))
-        turn = frame.T @ turn_of(5.0, axis).T @ frame  # rotation of the sensor in its own axes
+        turn = frame.T @ turn_of(5.0, axis).T @ frame  # the rotation of the sensor, in the sensor's own axes
         at_s = log.t_s[-1] * chance.uniform(0.4, 0.6)
         later = (log.t_s >= at_s)[:, None]
         turned = copy.copy(log)

@@ -1,4 +1,4 @@
-"""Results for all logs of one mount of one vehicle."""
+"""Tests the result for a period, which is all logs of one mount of one vehicle."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A fleet with its logs and results in S3 gives the same results as a fleet in files."""
+"""A fleet whose logs and results are in S3 gives the same results as a fleet in files."""
 
 from pathlib import Path
 

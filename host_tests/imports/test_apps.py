@@ -1,5 +1,5 @@
-"""Each app's export is imported and replays like the ride that it was made from. No export is copied: the writers in
-support/recordings/app_exports.py follow the makers' documentation.
+"""The export of each app is imported, and its replay equals the original ride. The tests use no recorded export. The
+writers in support/recordings/app_exports.py make the files according to these sources:
 
 phyphox: https://github.com/phyphox/phyphox-ios, SimpleExperimentTemplete.swift and ExperimentExport.swift
 Sensor Logger: https://github.com/tszheichoi/awesome-sensor-logger, UNITS.md, COORDINATES.md and CROSSPLATFORM.md
@@ -27,8 +27,8 @@ ON_PHONE = api.CalibrationFile(vehicle_from_sensor=PHONE.T, aligned=True)
 ON_BIKE = api.CalibrationFile(aligned=True)
 ON_THE_BIKE = ("RaceBox", "VBO", "AiM")  # the axes of these apps are the bike's, not the phone's
 WITHOUT_DATE = ("AiM", "Sensor Kinetics")  # the times of these apps have no date
-WITHOUT_SPEED = ("Sensor Kinetics",)  # without a satellite receiver
-# rms of a replay against the true lean; the original ride has 0.28 at 100 samples per second
+WITHOUT_SPEED = ("Sensor Kinetics",)  # this app does not use the satellite receiver
+# Largest rms difference between a replay and the true lean. The original ride has 0.28 at 100 samples per second.
 WITHIN_DEG = 0.5
 
 
@@ -44,7 +44,8 @@ def several(name: str, write: Callable[..., dict[str, str]], **options) -> Calla
     return lambda directory, ride: app_exports.into(directory / name, write(ride, **options))
 
 
-# export's name, beginning with the app's: its writer, and the divider of 200 samples per second
+# The name of each export begins with the name of its app. The values are the export's writer and a number n, if only
+# each n-th of 200 samples per second is written.
 EXPORTS = {
     "phyphox zip": (several("p.zip", app_exports.phyphox), 2),
     "phyphox folder, ; and decimal comma": (several("p", app_exports.phyphox, separator=";", comma=True), 2),
@@ -109,7 +110,8 @@ def test_an_export_replays_as_the_ride_it_was_made_from(tmp_path, name):
 
 
 def test_phyphox_file_with_all_sensors_is_read(tmp_path):
-    """ "Raw Data.csv" of a combined experiment has the time of each sensor in the column before it."""
+    """If an experiment combines sensors, "Raw Data.csv" has a column with the time before the columns of each
+    sensor."""
     ride = app_exports.riding().every(2)
     late = ride.every(2, 1)
     names = ["Time (s)", *[f"Acceleration {axis} (m/s^2)" for axis in "xyz"]]
@@ -127,7 +129,7 @@ def test_phyphox_file_with_all_sensors_is_read(tmp_path):
 
 
 def test_a_pause_of_phyphox_is_a_gap(tmp_path):
-    """The experiment's own time stops in a pause. meta/time.csv gives the duration."""
+    """The time of an experiment stops during a pause. The file meta/time.csv shows how long the pause was."""
     files = app_exports.phyphox(app_exports.riding().every(2))
     rows = [("START", 0.0, 0.0), ("PAUSE", 12.0, 12.0), ("START", 12.0, 72.0), ("PAUSE", 28.0, 88.0)]
     files["meta/time.csv"] = '"event","experiment time","system time","system time text"\n' + "\n".join(
@@ -165,7 +167,7 @@ def test_kickstands_own_exports_are_read_back(tmp_path, form):
 
 
 def test_log_saved_by_a_spreadsheet_is_read_back(tmp_path):
-    """The file has semicolons, decimal commas, and the columns that only an imported log has."""
+    """The file has semicolons, decimal commas, and the columns temp_c, lat_deg and lon_deg."""
     ride = app_exports.riding().every(8)
     names = "t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps,speed_mps,temp_c,lat_deg,lon_deg".split(",")
     rows = np.column_stack((ride.t_s, ride.force_g, ride.rates_dps, ride.speed_mps, np.full(len(ride.t_s), 21.5)))

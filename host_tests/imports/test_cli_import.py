@@ -13,7 +13,7 @@ from support.recordings.app_exports import riding
 
 def test_import_reports_its_choices_and_the_next_step(tmp_path):
     ride = riding().every(2).without(10.0, 12.0)
-    ride.t_s = 1.25 * ride.t_s  # long enough for an alignment
+    ride.t_s = 1.25 * ride.t_s  # make the ride long enough for an alignment
     source, out = app_exports.into(tmp_path / "p.zip", app_exports.phyphox(ride)), tmp_path / "RIDE.csv"
     result = command.works("import", source, "--out", out)
     words = " ".join(result.out.split())
@@ -29,7 +29,8 @@ def test_import_reports_its_choices_and_the_next_step(tmp_path):
 
 @pytest.mark.parametrize("name", ["EXPORT.zip", "EXPORT"])
 def test_report_reads_an_export_directly(tmp_path, name):
-    """The export is imported and aligned, and a line reports this. A calibration beside the export is used."""
+    """`report` imports and aligns the export, and a line says so. If a calibration is beside the export, it is
+    used."""
     ride = riding().every(4)
     again = app_exports.Riding(*(np.concatenate([column] * 3) for column in vars(ride).values()))
     again.t_s = np.arange(len(again.t_s)) / 50.0
@@ -49,7 +50,7 @@ def test_report_reads_an_export_directly(tmp_path, name):
 
 
 def test_export_of_one_file_is_read(tmp_path):
-    """RaceChrono's CSV is such an export. An unknown file is refused as a log."""
+    """The export of RaceChrono is a single CSV file. A file of an unknown app is refused as a log."""
     (tmp_path / "r.csv").write_text(app_exports.racechrono(riding().every(4)))
     words = "s of riding: at least 30 s with bends are needed"
     assert "r.csv: only" in command.refused(tmp_path, "report", tmp_path / "r.csv", words=words)
@@ -76,7 +77,7 @@ def test_export_in_vehicle_axes_needs_no_alignment(tmp_path):
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
 def test_mutated_export_gives_a_log_or_one_line(tmp_path):
-    """The result is never a traceback, a numpy warning or an unreadable log."""
+    """The result of an import is a readable log or one line. It is never a traceback or a numpy warning."""
     ride = riding().every(8).every(1, 100)
     exports = [app_exports.racebox(ride), app_exports.vbo(ride), app_exports.aim(ride), app_exports.sensorlog(ride)]
     exports += [app_exports.racechrono(ride), app_exports.sensor_kinetics(ride)["Ride_accm.csv"]]
@@ -114,14 +115,14 @@ def aligned_export(target, files):
 
 
 def test_no_output_destroys_a_file_of_the_export(tmp_path):
-    """test_refusals.py tests the command `import` itself."""
+    """Commands that read an export must not overwrite its files. test_refusals.py tests the same for `import`."""
     source = aligned_export(tmp_path / "EXPORT", app_exports.phyphox(riding().every(4)))
     given = "export", source, "--to", "csv", "--out", source / "Accelerometer.csv"
     command.refused(tmp_path, *given, words="Accelerometer.csv is also an input")
 
 
 def test_remarks_of_an_import_are_in_report_and_page(tmp_path):
-    """Each notice appears once, although the imported log is checked again."""
+    """Each notice appears once, although the log is checked both by the import and by the report."""
     source = aligned_export(tmp_path / "EXPORT", app_exports.sensor_kinetics(riding().every(4)))
     result = command.works("report", source, "--json", "--live")
     assert [remark["code"] for remark in json.loads(result.out)["remarks"]].count("import-sign") == 1

@@ -1,4 +1,4 @@
-"""Which files of a recording are read: tables by name, from a file, a folder or a zip."""
+"""Tests which files of a recording are read from a file, a folder or a zip."""
 
 import gzip
 import zipfile
@@ -20,7 +20,7 @@ def names(source):
 
 
 def test_of_a_zip_only_tables_that_are_not_hidden_are_read(tmp_path):
-    """A folder in the zip is not a file, whatever its name."""
+    """A folder whose name ends in .csv is not read as a table."""
     with zipfile.ZipFile(tmp_path / "r.zip", "w") as archive:
         archive.writestr("folder.csv/", b"")
         for name in NAMES:

@@ -1,4 +1,5 @@
-"""The columns of an unknown table are found from their values, whatever its names, units, separators and times."""
+"""The columns of an unknown table are found from their values. Names, units, separators and times may be of any
+kind."""
 
 import functools
 import re
@@ -18,12 +19,17 @@ HEAD = "t,ax,ay,az,gx,gy,gz"
 
 @functools.cache
 def hand(hz=50.0):
-    """Return (time, force, rates) of a sensor turned in a hand."""
+    """Return the times, forces and rates of a sensor that is turned in a hand."""
     return drawn_tables.motion("hand", hz, np.random.default_rng(5))
 
 
 def lines(form, times=1.0, force=1.0, rates=1.0, head=""):
-    """Write one row per sample, with a format for seven numbers."""
+    """Return the text of a table with one row per sample.
+
+    form: format string for seven numbers.
+    times, force, rates: factors on the values.
+    head: first line of the table, or "".
+    """
     t, f, w = hand()
     rows = [form.format(*row) for row in np.column_stack((times * t, force * f, rates * w)).tolist()]
     return "\n".join([head, *rows] if head else rows) + "\n"
@@ -157,7 +163,7 @@ def judged(seed, path):
 
 @pytest.mark.parametrize("count", [30, pytest.param(500, marks=pytest.mark.nightly)])
 def test_no_random_table_is_imported_wrongly(tmp_path, count):
-    # odd seeds were not used for development
+    # the tables with odd seeds were not used for development
     results = [judged(seed, tmp_path / "log.csv") for seed in range(1, 2 * count, 2)]
     assert [result for result in results if result not in ("right", "refused")] == []
     assert results.count("right") >= 0.99 * count

@@ -1,4 +1,4 @@
-"""Sensors with different rates are joined on one clock. No values are made up across a gap or for a missing sensor."""
+"""Sensors with different sample rates are joined on one clock. Gaps and missing sensors are not filled with values."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ MS = 10**6
 
 
 def sensor(name: str, t_s: np.ndarray, column: np.ndarray | None = None) -> RecordedSensor:
-    """A sensor whose values are the time multiplied by 1, 2 and 3."""
+    """Return a sensor with three axes. Their values are the column, or else the time, multiplied by 1, 2 and 3."""
     values = t_s if column is None else column
     return RecordedSensor(name, np.rint(t_s * 1e9).astype(np.int64), np.outer(values, [1.0, 2.0, 3.0]))
 
@@ -29,7 +29,7 @@ def test_slower_gyro_is_interpolated_within_its_own_time():
 
 
 def test_a_faster_gyro_is_averaged_over_each_sample():
-    """Without averaging, vibration between two samples would become a slow rate."""
+    """Without averaging, a fast vibration would look like a slow rate (aliasing)."""
     t_s = np.arange(0.0, 4.0, 0.0025)
     gyro = sensor("gyro", t_s, 10.0 * t_s + 50.0 * np.sin(2 * np.pi * 99.0 * t_s))
     clock = np.arange(100, 390) * 10 * MS
@@ -72,7 +72,7 @@ def test_fix_is_only_in_the_nearest_row():
 
 
 def test_markers_of_unknown_speed_and_position_are_dropped():
-    """A phone writes -1 for an unknown speed. The position 0, 0 is in the sea."""
+    """A phone writes -1 for an unknown speed. It may write 0, 0 for an unknown position, which is in the sea."""
     t_ns = np.arange(4) * 10**9
     track = ReceiverTrack(
         t_ns, np.array([-1.0, 3.0, -1.0, 4.0]), np.array([0.0, 52.0, 91.0, 52.1]), np.array([0.0, 13.0, 13.0, 13.1])
@@ -82,14 +82,14 @@ def test_markers_of_unknown_speed_and_position_are_dropped():
 
 
 def test_repeated_values_at_standstill_are_kept_once_per_second():
-    """A logger may repeat its receiver's values in each row."""
+    """A logger may write the receiver's last value in each row. At a standstill this value is kept once per second."""
     track = ReceiverTrack(np.arange(80) * 50 * MS, np.repeat([0.0, 5.0], 40), np.full(80, 52.0), np.full(80, 13.0))
     assert (track.time_ns // MS).tolist() == [0, 1000, 2000, 3000]
     assert track.speed_mps.tolist() == [0.0, 0.0, 5.0, 5.0]
 
 
 def test_rounded_and_repeated_times_are_spread(tmp_path):
-    """Sensor Kinetics writes four decimals, and gives several samples the same time."""
+    """Sensor Kinetics writes times with four decimals, and writes the same time for several samples."""
     ride = riding()
     found = api.import_recording(app_exports.into(tmp_path / "k", app_exports.sensor_kinetics(ride)))
     steps = np.diff(found.log.t_s)
@@ -108,7 +108,8 @@ def test_late_samples_are_sorted(tmp_path):
 
 
 def test_damaged_row_costs_only_itself(tmp_path):
-    """An impossible time, an impossible reading and a word are counted. A last line that is cut is left out."""
+    """Rows with an impossible time, an impossible reading or a word are left out and counted. A last line that is cut
+    off is left out, too."""
     ride = riding().every(4)
     lines = app_exports.racebox(ride).splitlines()
     lines[200] = lines[200].replace("2024-05-17", "2031-05-17")

@@ -34,7 +34,7 @@ def imported(directory, content, *more, columns=NAMES, units=UNITS):
 
 
 def bomb(path: Path, kind: str) -> None:
-    """Write a small file that unpacks to more than the limit."""
+    """Write a small compressed file whose content exceeds the limit. kind: its format."""
     part, parts = b"1,2,3\n" * 1_000_000, 48
     if kind == "gz":
         packed = gzip.compress(part, 9)

@@ -44,7 +44,7 @@ def test_damaged_zip_is_refused(tmp_path, ride, damage):
 
 
 def test_two_recordings_in_one_folder_are_refused(tmp_path, ride):
-    """The files are from one app in two folders, from two apps, and from one app under two names."""
+    """Three cases are tested: one app in two folders, two apps in one folder, and one app with two names."""
     monday = app_exports.into(tmp_path / "all" / "monday", app_exports.phyphox(ride))
     app_exports.into(tmp_path / "all" / "tuesday", app_exports.phyphox(ride))
     refused(tmp_path, tmp_path / "all", "holds 2 recordings (monday, tuesday): give one of them")
@@ -72,7 +72,8 @@ def test_other_files_in_the_folder_do_not_matter(tmp_path, ride):
     assert api.import_recording(folder).app == "phyphox"
 
 
-# Missing part of a recording: its writer, the files or the word to remove (and the replacement), the message.
+# For each missing part of a recording: the writer of the export, the files or the word to remove (with a replacement),
+# and the message.
 LACKING = {
     "phyphox": (app_exports.phyphox, ["Gyroscope.csv"], "no gyroscope: add it to the experiment"),
     "Sensor Logger, gyro": (app_exports.sensor_logger, ["Gyroscope.csv"], "no Gyroscope.csv: switch the gyroscope on"),
@@ -164,7 +165,7 @@ def test_zip_with_a_password_is_refused(tmp_path):
         archive.writestr("a.csv", "time,x\n0,1\n")
     content = bytearray((tmp_path / "a.zip").read_bytes())
     for mark, place in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
-        content[content.index(mark) + place] |= 1  # the flag of an encrypted entry
+        content[content.index(mark) + place] |= 1  # set the flag of an encrypted entry
     (tmp_path / "a.zip").write_bytes(content)
     refused(tmp_path, tmp_path / "a.zip", "is packed with a password, or in another way: unpack it first")
 

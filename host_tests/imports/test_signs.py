@@ -1,4 +1,4 @@
-"""For every app the axis that points up reads +1 g at rest, and gravity is never missing."""
+"""In a log from any app, the axis that points up reads +1 g at rest, and gravity is never missing."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from support.recordings.app_exports import PHONE, riding
 
 
 def up_at_rest(found: api.Imported) -> np.ndarray:
-    """Return the mean force of the first second, when the motorcycle stands upright."""
+    """Return the mean force in the first second, while the motorcycle stands upright."""
     return found.log.accel_g[found.log.t_s < 1.0].mean(axis=0)
 
 
@@ -62,7 +62,7 @@ def test_acceleration_without_gravity_is_completed_or_refused(tmp_path, app):
 
 
 def test_a_table_without_gravity_is_refused(tmp_path):
-    """Gravity is detected by its size, without a name."""
+    """The column names do not say whether gravity is included. The size of the accelerations shows that it is not."""
     ride = riding().every(4)
     rows = np.column_stack((ride.t_s, ride.phone_g - ride.gravity_g, ride.phone_rad)).tolist()
     (tmp_path / "log.csv").write_text(app_exports.lines(list("tabcpqr"), rows))
@@ -87,7 +87,8 @@ def test_turns_of_the_track_show_an_unknown_sign(tmp_path, sign):
 
 
 def test_mirrored_export_of_a_known_app_gives_a_remark(tmp_path):
-    """The app's sign is known, so the cause is something else, and no sign is changed."""
+    """The sign of this app is known, so something else reversed the accelerations. The import changes no sign and makes
+    a remark."""
     ride = riding().every(2)
     ride.force_g = -ride.force_g
     found = api.import_recording(app_exports.into(tmp_path / "p.zip", app_exports.phyphox(ride)))
@@ -98,7 +99,7 @@ def test_mirrored_export_of_a_known_app_gives_a_remark(tmp_path):
 
 def test_uncertain_sign_is_reported_and_can_be_turned(tmp_path):
     ride = riding().every(2)
-    ride.force_g = -ride.force_g  # as an iPhone might give it
+    ride.force_g = -ride.force_g  # an iPhone might give this sign
     folder = app_exports.into(tmp_path / "k", app_exports.sensor_kinetics(ride))
     result = command.works("import", folder, "--out", tmp_path / "RIDE.csv")
     assert "warning: " in result.err
@@ -109,7 +110,7 @@ def test_uncertain_sign_is_reported_and_can_be_turned(tmp_path):
 
 
 def test_no_turns_show_no_sign(tmp_path):
-    """A straight ride gives the same warning as a ride without a track."""
+    """A ride without turns gives the same warning as a ride without a track."""
     ride = riding().every(2)
     ride.lat_deg, ride.lon_deg = 52.5 + 1e-5 * ride.t_s, np.full(len(ride.t_s), 13.4)
     (tmp_path / "r.csv").write_text(app_exports.racechrono(ride))
@@ -119,8 +120,8 @@ def test_no_turns_show_no_sign(tmp_path):
 @pytest.mark.parametrize("late_s", [0.0, 1.0, 1.5, 2.0])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_late_swerves_are_not_mistaken_for_opposite_ones(sign, late_s):
-    """The bike swerves to the left, to the right and back in four seconds. A track that is 2 s late turns the other
-    way."""
+    """The bike swerves to the left and to the right with a period of four seconds. In a track that is 2 s late, the
+    turns therefore seem to be in the opposite direction."""
     t_s = np.arange(0.0, 60.0, 0.02)
     yaw_dps = 20.0 * np.sin(2 * np.pi * t_s / 4.0 + np.sin(t_s / 7.0))
     course = np.cumsum(np.radians(yaw_dps)) * 0.02

@@ -1,4 +1,4 @@
-"""The unit of the speed in each app's export: the unit in the file, and the unit assumed without one."""
+"""Tests the unit of the speed in the export of each app. It is the unit in the file, or an assumed unit."""
 
 import numpy as np
 import pytest
@@ -6,14 +6,14 @@ from kickstand_tools import api
 from kickstand_tools.common.errors import InputError
 from support.recordings import app_exports
 
-# m/s per unit; a mile is 1609.344 m, a nautical mile 1852 m
+# The value of each unit in m/s. A mile is 1609.344 m, and a nautical mile 1852 m.
 IN_MPS = {"m/s": 1.0, "km/h": 1000 / 3600, "mph": 1609.344 / 3600, "knots": 1852 / 3600}
 
 PHYPHOX, AIM, VBO, RACEBOX = "Velocity (m/s)", '"s","km/h"', "velocity kmh", "Speed,"
 
 
 def exported(ride, app, said):
-    """Return the files of an export with another label for the speed. The numbers stay the same."""
+    """Return the files of an export whose speed has another label. Its numbers are unchanged."""
     if app == "phyphox":
         files = app_exports.phyphox(ride)
         return files | {"Location.csv": files["Location.csv"].replace(PHYPHOX, said)}
@@ -39,7 +39,7 @@ def exported(ride, app, said):
         ("VBO", "velocity furlongs", 3.6, "km/h"),
         *[("RaceBox", f"Speed ({unit})", 3.6, unit) for unit in IN_MPS],
         ("RaceBox", "KPH", 3.6, "km/h"),
-        ("RaceBox", "Speed", 3.6, "km/h"),  # found from the positions
+        ("RaceBox", "Speed", 3.6, "km/h"),  # this unit is found from the positions
         ("RaceBox", "Speed (furlongs)", 3.6, "km/h"),
     ],
 )

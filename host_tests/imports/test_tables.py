@@ -1,4 +1,5 @@
-"""Tables from any source: separators, decimal marks, character sets, units, times, and messages about unknown files."""
+"""Tests tables from any source, with various separators, decimal marks, character sets, units and times. Also tests the
+messages about unknown files."""
 
 import shlex
 
@@ -109,20 +110,20 @@ TIMES = {
 
 
 def column(texts):
-    """Return these cells as they are read."""
+    """Return the column that the reader makes of these cells."""
     return csv_reader.columns_of([[text] for text in texts], 1)[0]
 
 
 @pytest.mark.parametrize("name", TIMES)
 def test_times_of_any_kind_without_a_unit(name):
     found = units.times_ns(column(TIMES[name]))
-    assert np.allclose(np.diff(found), 10_000_000, atol=600)  # rounding of a double in ns since 1970
+    assert np.allclose(np.diff(found), 10_000_000, atol=600)  # a double rounds a time in ns since 1970
     if "1970" in name or "zone" in name or name == "UTC":
         assert found[0] == pytest.approx(START_NS, abs=600)
 
 
 def test_slow_times_in_ms_are_not_read_as_seconds():
-    """Tested at 10 and 25 samples per second, and up to 400."""
+    """The cases have 10 to 400 samples per second, with times in ms, s or us."""
     for step, unit in ((100, 1e6), (40, 1e6), (2.5, 1e6), (0.1, 1e9), (0.0025, 1e9), (100_000, 1e3), (2500, 1e3)):
         found = units.times_ns(np.array([step * k for k in range(20)]))
         assert np.allclose(np.diff(found), step * unit), (step, unit)
@@ -134,7 +135,7 @@ def test_cell_without_a_time_is_marked():
 
 
 def test_uncertain_table_gives_a_command_line_that_works(tmp_path, monkeypatch):
-    """The proposed command line works unchanged."""
+    """The message proposes a command line, which works without a change."""
     monkeypatch.chdir(tmp_path)
     rest = app_exports.any_table(riding().every(4)).split("\n")[:120]
     (tmp_path / "my log.csv").write_text("\n".join(rest) + "\n")
@@ -223,8 +224,8 @@ def test_columns_are_whole_numbers_floats_or_text():
 
 
 def test_a_damaged_row_costs_itself(monkeypatch):
-    """The table has an unclosed quotation mark, too few or too many cells, a line that is too long, and text after
-    numbers."""
+    """The damaged rows have an unclosed quotation mark, too few or too many cells, a line that is too long, or text
+    after numbers."""
     monkeypatch.setattr(csv_reader, "ROWS", 2)
     rows = ['"1","2","3"', '"4","5,"6"', "7,8,9,10", "11", f"12,13,{14:0200000d}", "15,stop,16"]
     (first, second, third), left_out = csv_reader.columns_of_text("\n".join(rows), ",", 3)

@@ -1,4 +1,5 @@
-"""The unit of rates and speeds is found from a fit and from positions. The expected numbers are computed by hand."""
+"""The unit of rates is found from a fit, and the unit of speeds from positions. The expected numbers were computed by
+hand."""
 
 import numpy as np
 import pytest
@@ -6,7 +7,7 @@ from kickstand_tools.imports.rate_fit import RateFit
 from kickstand_tools.imports.recording import Sheet
 from kickstand_tools.imports.speeds import unit_by_positions
 
-RAD_S, DEG_S = 180.0 / np.pi, 1.0  # deg/s in one unit of each
+RAD_S, DEG_S = 180.0 / np.pi, 1.0  # the value of each unit in deg/s
 
 
 @pytest.mark.parametrize(
@@ -14,20 +15,20 @@ RAD_S, DEG_S = 180.0 / np.pi, 1.0  # deg/s in one unit of each
     [
         (1.0, {"rad/s": RAD_S, "deg/s": DEG_S}, 0.6, "rad/s"),
         (1.0 / RAD_S, {"rad/s": RAD_S, "deg/s": DEG_S}, 0.6, "deg/s"),
-        # another size may be wrong by a factor of up to e^1.2 = 3.32
+        # the fitted size may differ from a unit by a factor of up to e^1.2 = 3.32
         (3.3, {"rad/s": RAD_S, "deg/s": DEG_S}, 0.6, "rad/s"),
         (1 / 3.3, {"rad/s": RAD_S, "deg/s": DEG_S}, 0.6, "rad/s"),
         (3.35, {"rad/s": RAD_S, "deg/s": DEG_S}, 0.6, ""),
         (1 / 3.35, {"rad/s": RAD_S, "deg/s": DEG_S}, 0.6, ""),
-        # units that differ by less than e^3 = 20.1 times must explain 0.9 of the variance
+        # if two units differ by a factor below e^3 = 20.1, the fit must explain 0.9 of the variance
         (1.0, {"one": RAD_S, "other": RAD_S / 20.0}, 0.89, ""),
         (1.0, {"one": RAD_S, "other": RAD_S / 20.0}, 0.91, "one"),
         (1.0, {"one": RAD_S, "other": RAD_S / 20.2}, 0.51, "one"),
         (1.0, {"one": RAD_S, "other": RAD_S / 20.2}, 0.49, ""),
-        # and up to the middle between two units that differ by a factor of 2: 1.414
+        # the limit between two units that differ by a factor of 2 is 1.414
         (1.4, {"one": RAD_S, "other": 2.0 * RAD_S}, 0.95, "one"),
         (1.43, {"one": RAD_S, "other": 2.0 * RAD_S}, 0.95, "other"),
-        # with only one possible unit: e^1 = 2.72 times
+        # with only one possible unit, the fitted size may differ by a factor of up to e^1 = 2.72
         (2.7, {"one": RAD_S}, 0.95, "one"),
         (2.75, {"one": RAD_S}, 0.95, ""),
         (1.0, {"one": RAD_S}, 0.89, ""),
@@ -47,8 +48,12 @@ def test_a_fit_of_too_little_decides_nothing(fit):
 
 
 def driving(mps, rows=40, period_s=0.5, east=True, per_degree=(1.0, 1.0)):
-    """Return columns speed, lat, lon of a straight course from the equator, and times. One degree there is 111 194.9
-    m."""
+    """Simulate a straight course that begins at the equator, where one degree is 111 194.9 m.
+
+    Returns:
+        times: in ns.
+        columns: latitudes and longitudes, in units of which one is per_degree[k] degrees.
+    """
     t_s = period_s * np.arange(rows)
     way = mps * t_s / 111_194.9
     lat, lon = (0.0 * way, way) if east else (way, 0.0 * way)
@@ -74,10 +79,10 @@ def test_positions_show_the_unit_of_the_speed(said, unit, per_degree, east):
         (20.0, 20.0, {"places": (None, 2)}, ""),
         (20.0, 20.0, {"places": (1, None)}, ""),
         (3.1, 3.1, {}, "m/s"),
-        (2.9, 2.9, {}, ""),  # slower than the errors of positions
-        (20.0, 20.0, {"rows": 21}, ""),  # 19 steps of a second
+        (2.9, 2.9, {}, ""),  # at this speed the errors of positions are too large
+        (20.0, 20.0, {"rows": 21}, ""),  # this gives 19 steps of one second, and 20 are needed
         (20.0, 20.0, {"rows": 22}, "m/s"),
-        (24.9, 20.0, {}, "m/s"),  # within a factor of 1.25
+        (24.9, 20.0, {}, "m/s"),  # the two speeds differ by a factor below 1.25
         (29.0, 20.0, {}, ""),
         (0.0, 20.0, {}, ""),
         (20.0, 20.0, {"period_s": 1.9}, "m/s"),

@@ -1,4 +1,4 @@
-"""The driver finds faulty axes by their counts, and never reports a good axis."""
+"""The driver finds faulty axes by their counts. It never reports a good axis."""
 
 from array import array
 
@@ -7,12 +7,12 @@ import pytest
 from kickstand.imu.fifo_frames import DUE, AxisWatch, add_up
 
 RATE_HZ = 200
-REST = (0, 0, 4096, -3920, 10, -500, 300)  # counts of a chip at rest, for 8 g and 500 deg/s
-NOISE = (13, 13, 13, 3, 2.66, 2.66, 2.66)  # by the data sheet at DLPF 3; see sensor.ACCEL_NOISE_G
+REST = (0, 0, 4096, -3920, 10, -500, 300)  # counts of a chip at rest, in the ranges of 8 g and 500 deg/s
+NOISE = (13, 13, 13, 3, 2.66, 2.66, 2.66)  # rms of the noise in counts, by the data sheet at DLPF 3
 
 
 def filtered(rng, count, bandwidth_hz):
-    """Return noise of rms 1 behind a first-order low-pass."""
+    """Return noise with an rms of 1 after a first-order low-pass."""
     pole = np.exp(-2 * np.pi * bandwidth_hz / RATE_HZ)
     white = rng.normal(size=count + 50) * np.sqrt(1 - pole * pole)
     out = np.zeros(count + 50)
@@ -22,7 +22,7 @@ def filtered(rng, count, bandwidth_hz):
 
 
 def counts(seconds, seed=0, noise=NOISE, bandwidth_hz=42, rest=REST):
-    """Return samples (n, 7) of a chip at rest."""
+    """Return samples of a chip at rest in counts, shape (n, 7)."""
     rng = np.random.default_rng(seed)
     n = int(seconds * RATE_HZ)
     return np.stack([at + of * filtered(rng, n, bandwidth_hz) for at, of in zip(rest, noise, strict=True)], axis=1)
@@ -39,7 +39,7 @@ def ride(seconds, seed=0):
 
 
 def judged(samples, gyro_range=1, dlpf=3, accel_range=3):
-    """Return each change of the notice: [(seconds, words or None), ...]."""
+    """Return a list of the changes of the notice. Each one is a pair: the time in s, and the words or None."""
     axes = AxisWatch(RATE_HZ, accel_range, gyro_range, dlpf, 20)
     sums = array("i", [0] * 7)
     said: list[tuple[float, str | None]] = [(0.0, None)]
@@ -79,7 +79,7 @@ def toggled(low, high):
     return lambda column: np.where(np.arange(len(column)) % 3 == 0, low, high)
 
 
-ILL = [  # words, fault
+ILL = [  # pairs of the words of a notice and the fault
     ("Gyro x dead", stuck(4, lambda column: 0 * column)),
     ("Gyro y dead", stuck(5, lambda column: 0 * column - 1)),
     ("Gyro z dead", stuck(6, lambda column: 0 * column + 317)),
@@ -88,8 +88,8 @@ ILL = [  # words, fault
     ("Accel xyz stuck", stuck(slice(0, 3), lambda columns: 0 * columns + 55)),
     ("Gyro x dead", stuck(4, toggled(0, -1))),
     ("Gyro y dead", stuck(5, toggled(-700, 900))),
-    ("Gyro z dead", stuck(6, lambda column: column & ~0xFF | 0x40)),  # its low byte
-    ("Gyro x dead", stuck(4, lambda column: column & ~1)),  # its lowest bit
+    ("Gyro z dead", stuck(6, lambda column: column & ~0xFF | 0x40)),  # the low byte is stuck
+    ("Gyro x dead", stuck(4, lambda column: column & ~1)),  # the lowest bit is stuck
     ("Gyro xy equal", copied(4, 5)),
     ("Gyro xz equal", copied(6, 4)),
     ("Accel yz equal", copied(1, 2)),
@@ -104,7 +104,8 @@ HIGH_BYTE = [
 
 @pytest.mark.parametrize(("words", "spoil"), ILL + HIGH_BYTE)
 def test_a_faulty_axis_is_reported_at_once_and_recovers(words, spoil):
-    """A fault is reported within 1.2 s. A stuck high byte only shows when the counts pass its value."""
+    """A fault is reported within 1.2 s. A stuck high byte may take longer, because it shows only when the counts leave
+    its range."""
     said = judged(spoil(ride(8)))
     assert [what for _, what in said] == [words, None]
     assert 2.3 < said[0][0] <= (3.7 if (words, spoil) in HIGH_BYTE else 3.2)
@@ -114,7 +115,8 @@ def test_a_faulty_axis_is_reported_at_once_and_recovers(words, spoil):
 @pytest.mark.parametrize("gyro_range", range(4))
 @pytest.mark.parametrize("dlpf", [1, 2, 3, 4, 5, 6])
 def test_the_quietest_chip_at_rest_is_not_faulty(gyro_range, dlpf):
-    """The noise is 100 ug/sqrt(Hz) at 16 g and 0.004 deg/s/sqrt(Hz). The means make the counts as quiet as possible."""
+    """The chip has little noise, 100 ug/sqrt(Hz) and 0.004 deg/s/sqrt(Hz), and the accelerometer's range is 16 g. The
+    counts then change as little as they can."""
     bandwidth = (None, 188, 98, 42, 20, 10, 5)[dlpf]
     per_g, per_dps = 2048, (131, 65.5, 32.8, 16.4)[gyro_range]
     root = np.sqrt(np.pi / 2 * bandwidth)
@@ -124,7 +126,8 @@ def test_the_quietest_chip_at_rest_is_not_faulty(gyro_range, dlpf):
 
 
 def test_no_axis_is_faulty_in_a_ride(monkeypatch):
-    """The axes also look so good that the module that judges them (2 KB of heap) is not imported."""
+    """In a ride the axes look so good that the driver does not import the module that judges them. This saves 2 KB of
+    heap."""
     monkeypatch.setattr(AxisWatch, "_load", lambda watch: pytest.fail("not well"))
     for seed in range(4):
         assert judged(ride(20, seed)) == []
@@ -148,8 +151,8 @@ def test_single_samples_at_the_end_of_the_range_are_no_fault():
 
 @pytest.mark.parametrize(("accel_range", "said"), [(0, 0), (1, 0), (2, 2), (3, 2)])
 def test_hard_vibration_clips_unless_the_range_is_small(accel_range, said):
-    """After the low-pass the vibration still reaches half of 8 g or 16 g for three seconds. In a range of 2 g bends
-    clip too."""
+    """For three seconds the vibration reaches half of the range, even after the low-pass. In a range of 8 or 16 g this
+    means that it clips before the low-pass. In smaller ranges bends may clip too, so no fault is reported."""
     samples = ride(8)
     samples[400:1000, 1] += 17000 * np.sin(np.arange(600) * 2.2)
     assert [words for _, words in judged(samples, accel_range=accel_range)] == ["Accel", None][:said]

@@ -1,5 +1,5 @@
-"""The samples of one loop pass are added up and transformed together. The sums match numpy on CPython and
-MicroPython, and machine code matches Python."""
+"""The samples of one loop pass are added up and transformed together. The sums equal numpy's on CPython and
+MicroPython. Machine code and Python give the same results."""
 
 import numpy as np
 import pytest
@@ -9,18 +9,18 @@ LIMIT = 5
 
 
 def frames(samples):
-    """Convert samples of seven int16 to the bytes on the bus."""
+    """Convert samples of seven 16-bit integers to the bytes on the bus."""
     return np.asarray(samples, ">i2").view(np.uint8).reshape(-1, 14).tolist()
 
 
 def noise(count, seed=0):
-    """Return samples that are all different."""
+    """Return random samples, which are all different."""
     return np.random.default_rng(seed).integers(-32768, 32768, (count, 7))
 
 
 def added(engine, batches):
-    """Return the number of samples that add_up() takes from each batch, and their sums. Fails if add_up_python()
-    returns or notes anything else."""
+    """Return the number of samples that add_up() takes from each batch, and their sums. Also test that
+    add_up_python() has the same results."""
     chosen, python = engines.run(engine, [("add_up", (batches, LIMIT))])[0]
     assert chosen == python
     return [answer[:2] for answer in chosen]
@@ -28,7 +28,7 @@ def added(engine, batches):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_sums(engine):
-    """Tested with zero, one and eight samples, and near the ends of the range."""
+    """The batches have zero, one and eight samples, and four samples near the ends of the range."""
     ends = np.array([[-32699] * 7, [32699] * 7, [-32699] * 7, [32697] * 7])
     batches = [noise(0), noise(1), noise(8), ends]
     answers = added(engine, [frames(batch) for batch in batches])
@@ -37,7 +37,7 @@ def test_sums(engine):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_a_frame_is_seven_big_endian_numbers(engine):
-    """Tested at every place in the FIFO's bytes, and at the ends of the range and of its halves."""
+    """The values are random, at the ends of the range, and where the bytes change."""
     edges = [[value] * 7 for value in (-32768, -32767, -1, 0, 1, 255, 256, 16383, 16384, 32766, 32767)]
     samples = np.vstack((noise(5), edges))
     chosen, python = engines.run(engine, [("decode", (frames(samples),))])[0]
@@ -47,8 +47,8 @@ def test_a_frame_is_seven_big_endian_numbers(engine):
 @pytest.mark.parametrize("engine", engines.ENGINES)
 @pytest.mark.parametrize("dead", [0, -1])
 def test_all_zeros_or_ones_is_a_dead_frame(engine, dead):
-    """Frames before a dead frame count, whatever its temperature and rate. A chip with zero force in only two axes
-    works."""
+    """A frame is dead if all three forces are zero or all bits are one. Only the frames before it count. A frame with
+    such forces on only two axes is good."""
     samples = noise(4)
     samples[2, 0:3] = dead
     alive = noise(1)
@@ -63,7 +63,8 @@ def test_all_zeros_or_ones_is_a_dead_frame(engine, dead):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_repeated_readings_are_a_frozen_chip(engine):
-    """Repetitions are counted across batches. A change of any byte except the temperature's ends them."""
+    """Repeated readings are counted, also from batch to batch. A change of any byte ends the repetition, except in the
+    temperature."""
     still = np.repeat(noise(1), 12, axis=0)
     calls, expected = [[still[:3], still[3:7], still[7:]]], [[3, 2, 0]]
     for column in range(7):
@@ -80,7 +81,8 @@ def test_repeated_readings_are_a_frozen_chip(engine):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_a_sample_at_the_end_of_the_range_is_left_out(engine):
-    """Readings at either end of any axis count, but not those of the temperature. The good samples move up."""
+    """A sample is left out if any axis is at an end of its range. The temperature does not matter. The good samples
+    move together in the buffer."""
     samples = noise(8) // 2
     samples[2, 1], samples[3, 6], samples[5, 0], samples[5, 4], samples[6, 3] = 32700, -32768, -32700, 32767, 32767
     good = samples[[0, 1, 4, 6, 7]]
@@ -89,17 +91,19 @@ def test_a_sample_at_the_end_of_the_range_is_left_out(engine):
     count, sums, moved, watch = chosen[0]
     assert (count, sums) == (5, good.sum(axis=0).tolist())
     assert moved == np.ravel(frames(good)).tolist()
-    assert watch[3:8] == [3, 0, 0b1010011, 3, 2]  # lost; in a row; which axes; frames, with the gyro
+    # number of samples left out, number left out in a row at the end, bits of the axes, number of frames at the end of
+    # the range, and how many of these in the gyro
+    assert watch[3:8] == [3, 0, 0b1010011, 3, 2]
     assert watch[26:33] == np.abs(samples).max(axis=0).tolist()
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_a_watch_records_the_low_bits_wraps_and_differences(engine):
-    """The watch records the values of the lowest four bits, a changed high byte, a jump below it, and the axes that
-    differ."""
+    """For each axis the watch records the values of the lowest four bits, a change of the high byte, and a jump of the
+    low byte. It also records which axes differ from each other."""
     samples = np.full((8, 7), 700) + np.arange(7)
-    samples[:, 0] = 5, 6, 5, 6, 5, 6, 5, 6  # two values
-    samples[:, 1] = 2, 194, 5, 6, 7, 198, 9, 8  # jumps within one high byte
+    samples[:, 0] = 5, 6, 5, 6, 5, 6, 5, 6  # only two values
+    samples[:, 1] = 2, 194, 5, 6, 7, 198, 9, 8  # the low byte jumps, and the high byte stays the same
     samples[:, 2] = -1, 0, 1, 2, 3, 4, 5, 6
     samples[:, 4] = samples[:, 6] = np.arange(8) * 3 - 8
     chosen, python = engines.run(engine, [("add_up", ([frames(samples[:1]), frames(samples)], LIMIT))])[0]
@@ -115,8 +119,8 @@ def test_a_watch_records_the_low_bits_wraps_and_differences(engine):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_integers_are_as_good_as_floats(engine):
-    """The error is at most 0.03 degrees of lean and 0.05 % of a rate. Eight samples at the ends of the range do not
-    overflow."""
+    """Integers cause errors of at most 0.03 degrees of lean and 0.05 % of a rate. The sum of eight samples at the ends
+    of the range does not overflow."""
     rng = np.random.default_rng(2)
     calls = []
     for _ in range(30):

@@ -1,4 +1,4 @@
-"""Each driver alone: its transfers on the bus, and the button's events."""
+"""Tests the drivers one at a time: transfers on the bus, and the events of the button."""
 
 import re
 import textwrap
@@ -81,7 +81,8 @@ def test_presses(board, held_s, events):
 
 
 def test_ctrl_c_stops_the_watchdog(board, monkeypatch, capsys, tmp_path):
-    """After Ctrl-C the watchdog is not fed, and a reset in the middle of a copy would break an installation."""
+    """After Ctrl-C nothing feeds the watchdog. If it were not stopped, it could reset the board while files are being
+    copied, and the installation would be incomplete."""
     from kickstand import app, start
 
     monkeypatch.chdir(tmp_path)

@@ -1,18 +1,19 @@
-"""Other chips at the sensor's addresses are named by their registers, as given in their data sheets."""
+"""Other chips at the addresses of the sensor are named by their registers. The values are from their data sheets."""
 
 import pytest
 from kickstand_tools.simulated_board.simulator import Board
 
 OTHER, MOTION, SUPPORTED = 0, 1, 2
 WHO_AM_I, PWR_MGMT_1 = 0x75, 0x6B
-# second 37, minute 59, hour 23, then an order that depends on the chip; binary-coded decimals
-DS3231 = [0x37, 0x59, 0x23, 0x05, 0x26, 0x11, 0x26, 0, 0, 0]  # day of the week, date, month, year
-PCF8523 = [0, 0, 0, 0x37, 0x59, 0x23, 0x26, 0x04, 0x11, 0x26]  # date, day of the week, month, year
+# Registers of two clocks that show 23:59:37 in binary-coded decimals: seconds, minutes, hours. The order of the next
+# four registers depends on the chip.
+DS3231 = [0x37, 0x59, 0x23, 0x05, 0x26, 0x11, 0x26, 0, 0, 0]  # then the day of the week, date, month and year
+PCF8523 = [0, 0, 0, 0x37, 0x59, 0x23, 0x26, 0x04, 0x11, 0x26]  # then the date, day of the week, month and year
 
 
 @pytest.fixture
 def chips():
-    with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):  # the driver needs a board's clock
+    with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):  # the driver needs the clock of a board
         from kickstand.imu import other_chips
 
         yield other_chips

@@ -1,6 +1,7 @@
-"""The driver with constant registers: its writes, its checks, and its use of the FIFO count.
+"""Tests the driver with registers that do not change on their own: its writes, its checks, and its use of the FIFO
+count.
 
-The values are those of the register map, RM-MPU-6000A rev 4.2, and of the other chips' data sheets.
+The values are from the register map RM-MPU-6000A rev 4.2, and from the data sheets of the other chips.
 """
 
 from typing import Any
@@ -17,14 +18,19 @@ MPU6500, MPU6886 = 0x70, 0x19
 
 @pytest.fixture(autouse=True)
 def time():
-    """The clock of a board, on which the driver waits."""
+    """Return the clock of a simulated board. The driver waits by this clock."""
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0)) as board:
         yield board.clock
 
 
 class Wires:
-    """A machine.I2C with only registers behind it. stuck: registers that keep their value on a write.
-    log: the writes, [(register, value), ...], at times_us of the clock. waiting: bytes in the FIFO."""
+    """A machine.I2C whose device consists only of registers.
+
+    stuck: registers that a write does not change.
+    log: list of the writes as (register, value).
+    times_us: time of each write by the clock.
+    waiting: number of bytes in the FIFO.
+    """
 
     def __init__(self, who_am_i=0x68, stuck=(), clock=None):
         self.registers = bytearray(128)
@@ -49,7 +55,8 @@ class Wires:
 
     def readfrom_mem_into(self, address, register, buffer):
         self._expect(address)
-        if register not in (FIFO_R_W, USER_CTRL):  # only the bytes that are used: each takes 25 us
+        # each byte takes 25 us, so the driver must read only the bytes that it uses
+        if register not in (FIFO_R_W, USER_CTRL):
             assert len(buffer) == {SMPLRT_DIV: 11, 0x3B: 14, FIFO_COUNT_H: 2}.get(register, 1)
         self.registers[FIFO_COUNT_H], self.registers[FIFO_COUNT_H + 1] = divmod(self.waiting, 256)
         if register == FIFO_R_W:
@@ -72,22 +79,22 @@ def test_setup_writes_the_values_of_the_register_map(time):
     wires = Wires(clock=time)
     chip = started(wires, accel_range_g=16, gyro_range_dps=1000, dlpf=2, rate_hz=100)
     assert wires.log == [
-        (PWR_MGMT_1, 0x80),  # reset
-        (PWR_MGMT_1, 0x01),  # awake, clock from the gyro's X axis, which the register map recommends (p. 40)
-        (SMPLRT_DIV, 9),  # 1 kHz / (1 + 9)
+        (PWR_MGMT_1, 0x80),  # reset the chip
+        (PWR_MGMT_1, 0x01),  # wake up, with the clock of the gyro's X axis, as the register map recommends (p. 40)
+        (SMPLRT_DIV, 9),  # a sample rate of 1 kHz / (1 + 9)
         (CONFIG, 2),
         (GYRO_CONFIG, 0x10),
         (ACCEL_CONFIG, 0x18),
         (FIFO_EN, 0),
-        (USER_CTRL, 0x04),  # FIFO_RESET, while FIFO_EN is 0
+        (USER_CTRL, 0x04),  # FIFO_RESET works only while FIFO_EN is 0
         (USER_CTRL, 0x40),
         (FIFO_EN, 0xF8),
     ]
     assert (chip.accel_lsb_per_g, chip.gyro_lsb_per_dps) == (2048, 32.8)
     reset, awake, configured, *_ = wires.times_us
-    assert awake - reset >= 100_000  # longest time of a reset (p. 41)
-    assert configured - awake >= 30_000  # the gyro's start-up time (PS-MPU-6000A, 6.1)
-    assert wires.times_us[6] - wires.times_us[5] >= 4 * 4800  # four delays of the slowest usual low-pass
+    assert awake - reset >= 100_000  # longest duration of a reset (p. 41)
+    assert configured - awake >= 30_000  # start-up time of the gyro (PS-MPU-6000A, 6.1)
+    assert wires.times_us[6] - wires.times_us[5] >= 4 * 4800  # four times the delay of the slowest usual low-pass
     assert wires.times_us[-1] - reset < 200_000
 
 
@@ -101,7 +108,7 @@ def test_setup_writes_the_values_of_the_register_map(time):
     ],
 )
 def test_ranges_and_their_counts(accel_g, accel_bits, lsb_per_g, gyro_dps, gyro_bits, lsb_per_dps):
-    """The values are from pages 14, 15, 29 and 31 of the register map."""
+    """The expected values are from pages 14, 15, 29 and 31 of the register map."""
     wires = Wires()
     chip = started(wires, accel_range_g=accel_g, gyro_range_dps=gyro_dps)
     assert (wires.registers[ACCEL_CONFIG], wires.registers[GYRO_CONFIG]) == (accel_bits, gyro_bits)
@@ -109,7 +116,8 @@ def test_ranges_and_their_counts(accel_g, accel_bits, lsb_per_g, gyro_dps, gyro_
 
 
 def test_one_burst_is_one_reading():
-    """Registers 0x3B to 0x48 (p. 29) give the accelerometer, temperature and gyro."""
+    """The registers 0x3B to 0x48 (p. 29) contain the accelerometer, the temperature and the gyro. The driver reads them
+    in one transfer."""
     wires = Wires()
     chip = started(wires)
     wires.registers[0x3B:0x49] = bytes(range(0x70, 0x70 + 28, 2))
@@ -119,11 +127,11 @@ def test_one_burst_is_one_reading():
 
 
 def test_the_delay_of_each_low_pass():
-    """The delay of the gyro's low-pass in seconds, p. 13."""
+    """The delays of the gyro's low-pass are from p. 13 of the register map."""
     from kickstand.imu.mpu6050 import GYRO_DELAY_S
 
     assert GYRO_DELAY_S == {dlpf: DLPF_DELAY_US[dlpf] / 1e6 for dlpf in range(1, 7)}
-    assert lean_filter.DELAY_S == GYRO_DELAY_S[3]  # delay of the default low-pass
+    assert lean_filter.DELAY_S == GYRO_DELAY_S[3]  # the delay of the default low-pass
 
 
 @pytest.mark.parametrize(
@@ -160,7 +168,8 @@ def test_any_changed_register_ends_configured(who_am_i):
 
 @pytest.mark.parametrize(("who_am_i", "bits"), [(0x68, 0xF8), (MPU6500, 0xF8), (0x98, 0xF8), (MPU6886, 0x18)])
 def test_each_bit_of_the_fifo_that_the_chip_has_must_stay(who_am_i, bits):
-    """Bits 7 to 3 stand for temperature, gyro x, y, z and accelerometer. The MPU6886 has only bits 4 (gyro) and 3."""
+    """Bits 7 to 3 of FIFO_EN stand for the temperature, gyro x, y and z, and the accelerometer. The MPU6886 has only
+    bits 4 (gyro) and 3 (accelerometer)."""
     wires = Wires(who_am_i)
     chip = started(wires)
     for bit in range(8):
@@ -186,7 +195,7 @@ def test_an_unknown_number_is_an_unknown_chip_unless_accepted():
 
 
 def test_a_number_that_reads_differently_each_time_is_an_error():
-    """0x78 is another known chip, one bit away from 0x68."""
+    """WHO_AM_I is read as 0x68 and as 0x78. Both are numbers of known chips, and they differ by one bit."""
     from kickstand.imu.mpu6050 import Mpu6050
 
     wires = Wires(0x68)
@@ -206,7 +215,8 @@ def test_a_number_that_reads_differently_each_time_is_an_error():
 
 
 def test_the_simulated_board_models_every_chip_of_the_driver():
-    """A chip without its own model would be tested as an MPU6050. The driver may use less than the whole FIFO."""
+    """Each chip of the driver has its own simulated model. Otherwise it would be tested as an MPU6050. The FIFO of the
+    model may be larger than the part that the driver uses."""
     from kickstand.imu.mpu6050 import CHIPS
 
     assert set(CHIPS) == set(VARIANTS)
@@ -222,8 +232,8 @@ def test_the_simulated_board_models_every_chip_of_the_driver():
     [(0, 0, 0), (1, 1, 0), (3, 3, 0), (4, 3, 1), (7, 3, 4), (8, 8, 0), (9, 8, 1), (20, 8, 12), (72, 8, 64)],
 )
 def test_how_many_frames_are_read_and_left(frames, read, left):
-    """It reads three frames at a time, or eight to catch up. The MPU6050's 1024 bytes hold 73 frames, so 72 are no
-    overflow."""
+    """The driver reads at most three frames at a time, or eight to catch up. The MPU6050's FIFO has 1024 bytes, enough
+    for 73 frames. With 72 frames it has not overflowed."""
     wires = Wires()
     chip = started(wires)
     wires.waiting = 14 * frames
@@ -234,12 +244,13 @@ def test_how_many_frames_are_read_and_left(frames, read, left):
 
 @pytest.mark.parametrize(("who_am_i", "most"), [(0x68, 72), (MPU6500, 35), (0x98, 35), (MPU6886, 35)])
 def test_a_fifo_that_may_have_overflowed_is_emptied(who_am_i, most):
-    """The FIFO has 1024 bytes, or 512 (MPU-6500 register map p. 31). It is full when fewer than 14 are free."""
+    """The FIFO has 1024 bytes, or 512 bytes (MPU-6500 register map p. 31). It is full if fewer than 14 bytes are
+    free."""
     wires = Wires(who_am_i)
     chip = started(wires)
     wires.waiting = 14 * most
     assert chip.fetch() == 8
-    wires.waiting = (1024 if who_am_i == 0x68 else 512) - 14  # a frame still fits: one is being written
+    wires.waiting = (1024 if who_am_i == 0x68 else 512) - 14  # there is still room for one frame
     assert (chip.fetch(), chip.overflows) == (0, 0)
     wires.waiting = 14
     assert chip.fetch() == 1
@@ -261,7 +272,7 @@ def test_a_frame_that_is_being_written_is_waited_for_once():
         assert (chip.frames_left, chip.overflows) == (left, 0)
     wires.waiting = 33
     assert chip.fetch() == 0
-    wires.waiting = 47  # still odd: an overflow has cut off part of a frame
+    wires.waiting = 47  # a number that stays odd means that an overflow has cut off part of a frame
     assert chip.fetch() == 0
     assert (chip.overflows, chip.frames_left) == (1, 0)
     wires.waiting = 5
@@ -271,7 +282,7 @@ def test_a_frame_that_is_being_written_is_waited_for_once():
 
 @pytest.mark.parametrize(("rate_hz", "good"), [(200, 20), (100, 10)])
 def test_readings_that_repeat_for_100_ms_are_frozen(rate_hz, good):
-    """The first reading counts as new. The count restarts after a set-up."""
+    """The first reading counts as new. After a set-up the repetitions are counted again from the first reading."""
     wires = Wires()
     chip = started(wires, rate_hz=rate_hz)
     wires.waiting = 14
@@ -293,10 +304,10 @@ def test_readings_that_repeat_for_100_ms_are_frozen(rate_hz, good):
 @pytest.mark.parametrize(
     ("who_am_i", "name", "zero_c", "per_degree"),
     [
-        (0x68, "MPU6050", 36.53, 340.0),  # RM-MPU-6000A p. 30
-        (MPU6500, "MPU6500", 21.0, 333.87),  # MPU-6500 register map p. 33, with the sheet's sensitivity
+        (0x68, "MPU6050", 36.53, 340.0),  # from RM-MPU-6000A p. 30
+        (MPU6500, "MPU6500", 21.0, 333.87),  # MPU-6500 register map p. 33, with the sensitivity of the data sheet
         (0x71, "MPU9250", 21.0, 333.87),
-        (0x98, "ICM20689", 25.0, 326.8),  # data sheet table 3
+        (0x98, "ICM20689", 25.0, 326.8),  # from table 3 of the data sheet
         (MPU6886, "MPU6886", 25.0, 326.8),
     ],
 )
@@ -336,7 +347,8 @@ def test_a_write_or_a_read_that_fails_is_repeated_once():
 
 
 def test_the_low_pass_of_a_rate_is_the_widest_under_half_of_it():
-    """DLPF_CFG is from the register map, p. 13: the gyro's bandwidth in Hz. Value 0 is 256 Hz."""
+    """The values of DLPF_CFG are from the register map, p. 13. They select the gyro's bandwidth; the value 0 selects
+    256 Hz."""
     from kickstand.imu.mpu6050 import MIN_DLPF
 
     hz = [256, 188, 98, 42, 20, 10, 5]
@@ -345,7 +357,8 @@ def test_the_low_pass_of_a_rate_is_the_widest_under_half_of_it():
 
 
 def test_a_row_of_samples_at_the_end_of_the_range_clips():
-    """A row of 20 samples is 0.1 s. The axes are bits, with the accelerometer's three below the gyro's."""
+    """20 samples in a row, which are 0.1 s, are a fault. Each axis is a bit. The accelerometer's three bits are below
+    the gyro's."""
     from kickstand.imu import fifo_frames
 
     watch = fifo_frames.AxisWatch(200, 3, 1, 3, 20)

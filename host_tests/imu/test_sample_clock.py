@@ -1,4 +1,4 @@
-"""The times of the samples follow the chip's even rate, corrected with the board's clock."""
+"""The times of the samples follow the chip's constant sample rate and are corrected by the board's clock."""
 
 import numpy as np
 import pytest
@@ -20,8 +20,12 @@ def clock():
 
 
 def elapsed(own, samples_us, looks_us):
-    """Return the sum of the steps of SampleClock `own` when the FIFO is emptied at looks_us and the chip samples at
-    samples_us."""
+    """Return the sum of the steps of a SampleClock.
+
+    own: the SampleClock.
+    samples_us: times at which the chip takes samples.
+    looks_us: times at which the FIFO is emptied.
+    """
     total, taken = 0, 0
     for now_us in looks_us:
         ready = int(np.searchsorted(samples_us, now_us, side="right"))
@@ -38,13 +42,13 @@ def test_samples_are_a_period_apart():
     assert own.step(1, 15_000) == PERIOD_US
     assert own.step(3, 30_000) == 3 * PERIOD_US
     own.restart()
-    assert own.step(4, 100_000) == 3 * PERIOD_US  # counted from the first sample
+    assert own.step(4, 100_000) == 3 * PERIOD_US  # from the first to the fourth sample after the restart
     assert own.step(1, 105_000) == PERIOD_US
 
 
 @pytest.mark.parametrize("error", [0.01, 0.0, -0.01])
 def test_a_chip_that_is_1_percent_off_keeps_the_boards_time(error):
-    """The test reads for 20 s at random moments up to 10 ms apart."""
+    """The FIFO is emptied for up to 20 s, at random moments that are 2 to 10 ms apart."""
     rng = np.random.default_rng(1)
     samples_us = (np.arange(4000) * PERIOD_US / (1 + error)).astype(int)
     looks_us = np.cumsum(rng.integers(2000, 10_000, 3000))
@@ -55,8 +59,8 @@ def test_a_chip_that_is_1_percent_off_keeps_the_boards_time(error):
 
 @pytest.mark.parametrize(("late_us", "counted"), [(2 * PERIOD_US, False), (2 * PERIOD_US + 1, True)])
 def test_a_gap_of_lost_samples_is_spanned(late_us, counted):
-    """A last sample over two periods late means that samples were lost. A smaller delay is a difference of the
-    clocks, which is adjusted."""
+    """If the last sample is over two periods late, samples were lost, and the whole gap is added. A smaller delay is a
+    difference between the clocks, which is corrected gradually."""
     own = clock()
     own.step(1, 0)
     own.emptied(PERIOD_US // 2 + late_us)
@@ -81,7 +85,8 @@ def test_ticks_that_begin_again_at_0_are_no_gap():
 
 
 def test_a_sample_is_half_a_period_old_on_average():
-    """The first read is at the moment of a sample. The later reads are spread evenly over the period."""
+    """The first read is at the moment of a sample. The later reads are at random moments within a period, so the age of
+    a sample is half a period on average."""
     rng = np.random.default_rng(2)
     errors = []
     samples_us = np.arange(1200) * PERIOD_US

@@ -1,4 +1,4 @@
-"""Sensor keeps the chip working. The test controls the chip."""
+"""The class Sensor keeps the chip working. In these tests the chip is replaced by a class that the test controls."""
 
 import pytest
 from kickstand_tools.simulated_board.simulator import Board
@@ -11,14 +11,19 @@ def board():
 
 
 class Chip:
-    """waiting: results of the next fetches, samples or an exception; later fetches return one sample. bad: number of
-    spoilt samples. setups: exceptions of the set-ups in their last step, or None. calls: the calls so far."""
+    """A chip that the test controls.
+
+    waiting: results of the next fetches, each a number of samples or an exception. Later fetches return one sample.
+    bad: number of spoilt samples.
+    setups: for each set-up the exception that its last step raises, or None.
+    calls: list of the calls up to now.
+    """
 
     def __init__(self):
         from kickstand.imu.fifo_frames import AxisWatch
 
         self.axes = AxisWatch(200, 3, 1, 3, 20)
-        self.axes.notes[9] = 1 << 29  # the next check of the axes is far away
+        self.axes.notes[9] = 1 << 29  # the next check of the axes is never reached
         self.waiting, self.setups, self.states = [], [], []
         self.bad = 0
         self.overflows = self.frames_left = 0
@@ -68,7 +73,7 @@ def made(board, explain=None):
 
 
 def set_up(sensor, now_ms):
-    """Let the chip be set up from now_ms on, in loop passes of 10 ms. Return the time of the end."""
+    """Run loop passes of 10 ms from now_ms on until the chip is set up. Return the time of the last pass."""
     for _ in range(19):
         assert sensor.fetch(now_ms) == 0
         now_ms += 10
@@ -76,7 +81,7 @@ def set_up(sensor, now_ms):
 
 
 def running(board, explain=None):
-    """Return a sensor with a running chip, and the time of its first sample in ms."""
+    """Return a Sensor, its chip, which is running, and the time of the first sample in ms."""
     sensor, chip = made(board, explain)
     now_ms = set_up(sensor, 0)
     assert sensor.fetch(now_ms) == 1
@@ -103,7 +108,7 @@ def test_a_new_chip_is_at_fault_until_its_first_sample(board):
 
 
 def test_a_chip_that_is_prepared_starts_with_the_first_fetch(board):
-    """No earlier samples are in the FIFO."""
+    """The chip was prepared earlier, but its FIFO starts only with the first fetch. It contains no older samples."""
     sensor, chip = made(board)
     for now_ms in range(0, 1000, 15):
         sensor.prepare(now_ms)
@@ -129,7 +134,7 @@ def test_a_failed_set_up_is_repeated_after_50_ms(board):
     for now_ms in (420, 520, 580, 600):
         sensor.fetch(now_ms)
     assert (chip.calls.count("configure"), sensor.restarts) == (3, 1)
-    assert code(sensor) == "unknown-chip"  # the time until the first sample
+    assert code(sensor) == "unknown-chip"  # the fault stays until the first sample
     sensor.fetch(605)
     assert code(sensor) is None
 
@@ -145,7 +150,8 @@ def test_silence_is_a_fault_after_100_ms(board):
 
 
 def test_an_overflow_is_no_silence(board):
-    """An overflow means that the FIFO was emptied just now, even if the loop read the time earlier."""
+    """After an overflow the FIFO has just been emptied, so it contains no samples yet. This is no silence, even if the
+    loop read the time before that."""
     sensor, chip, now_ms = running(board)
     board.clock.advance(now_ms * 1000 + 400_000)
     chip.waiting = [0, 0, 0]
@@ -159,14 +165,14 @@ def test_an_overflow_is_no_silence(board):
 
 
 def test_half_a_second_of_lost_readings_is_a_fault(board):
-    """The FIFO overflowed repeatedly because the board had no time to read it."""
+    """The FIFO overflows again and again, because the board has no time to read it."""
     sensor, chip, now_ms = running(board)
     for after_ms, said in ((300, None), (500, None), (502, "readings-lost")):
         board.clock.advance(max(0, (now_ms + after_ms) * 1000 - board.clock.now_us))
         chip.waiting, chip.overflows = [0], chip.overflows + 1
         assert sensor.fetch(now_ms + after_ms) == 0
         assert code(sensor) == said
-    assert sensor.restarts == 2  # there is a gap before the next samples
+    assert sensor.restarts == 2  # the lost readings are a gap, which counts as a restart
     assert sensor.fetch(now_ms + 510) == 1
     assert code(sensor) is None
 
@@ -184,7 +190,7 @@ def test_two_lost_transfers_are_tolerated_and_three_are_a_fault(board):
 
 
 def test_the_fifo_is_emptied_after_a_failed_transfer(board):
-    """The failed transfer may have taken half a frame. The FIFO is emptied only once."""
+    """The failed transfer may have read only a part of a frame. The FIFO is therefore emptied, but only once."""
     sensor, chip, now_ms = running(board)
     chip.waiting = [OSError(110), 1, 1]
     for k in range(3):
@@ -229,7 +235,8 @@ def test_a_check_that_is_lost_counts_as_a_lost_transfer(board):
 
 
 def test_nothing_is_judged_after_a_lost_transfer(board):
-    """The restart of the FIFO may be incomplete. The next successful transfer completes it."""
+    """After a lost transfer the restart of the FIFO may be incomplete. It is completed after the next successful
+    transfer, and only then is the chip judged again."""
     sensor, chip, now_ms = running(board)
     chip.waiting, chip.states = [OSError(5)], [False, False]
     sensor.fetch(now_ms + 10)
@@ -241,14 +248,14 @@ def test_nothing_is_judged_after_a_lost_transfer(board):
 
 
 def until_failed(sensor, chip, now_ms, since_ms):
-    """Let a chip that is set up give no samples for since_ms. Return the time of the fault."""
+    """Let a running chip give no samples for since_ms. Return the time of the fault."""
     chip.waiting = [0] * 20
     sensor.fetch(now_ms + since_ms)
     return now_ms + since_ms
 
 
 def test_the_fifo_is_tested_if_set_ups_do_not_help(board):
-    """The test runs at the third fault in a row, if each fault comes soon after a set-up."""
+    """The test of the FIFO runs at the third fault in a row, if each fault comes soon after a set-up."""
     from kickstand.errors import Notice
 
     asked = []
@@ -260,7 +267,7 @@ def test_the_fifo_is_tested_if_set_ups_do_not_help(board):
         said.append(code(sensor))
         now_ms = set_up(sensor, now_ms)
     assert said == ["sensor-silent", "sensor-silent", "sensor-fifo", "sensor-fifo"]
-    assert asked == [None]  # the test takes 0.3 s, and presses count during it
+    assert asked == [None]  # the test takes 0.3 s, so it runs only once
     chip.waiting = []
     sensor.fetch(now_ms + 5)
     assert code(sensor) is None

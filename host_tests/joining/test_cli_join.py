@@ -1,4 +1,4 @@
-"""kickstand join: GPX and FIT are read, the lines of the ride are kept, wrong input is refused in one line."""
+"""`kickstand join` reads GPX and FIT and keeps the lines of the ride. It refuses wrong input in one line."""
 
 import gzip
 
@@ -24,14 +24,14 @@ def track(ride):
 
 @pytest.fixture
 def log(tmp_path, ride):
-    """RIDE.csv of a board without GPS."""
+    """Write RIDE.csv, the log of a board without GPS. Return its path."""
     made = api.Log.from_readings(ride.readings, ride.rate_hz)
     api.write_log(tmp_path / "RIDE.csv", made)
     return tmp_path / "RIDE.csv"
 
 
 def placed(path) -> np.ndarray:
-    """Return the rows with a position."""
+    """Return the rows of a log that have a position."""
     table = analysis_rides.table(path)
     return table[np.isfinite(table["lat_deg"])]
 
@@ -49,7 +49,8 @@ def test_each_point_is_in_the_nearest_row(tmp_path, log, ride, track):
     assert np.allclose(np.diff(there["t_s"]), 1.0, atol=0.006)
     assert np.allclose(there["utc_s"] - there["t_s"], phone_tracks.START_UTC_S + 0.5, atol=0.2)
     found = api.join_track(log, track).match
-    assert np.all(np.abs(found.ride_s(there["utc_s"]) - there["t_s"]) < 0.0026)  # half the time between samples, 5 ms
+    # samples are 5 ms apart, so the nearest is within 2.5 ms
+    assert np.all(np.abs(found.ride_s(there["utc_s"]) - there["t_s"]) < 0.0026)
     first = int(np.argmin(np.abs(track.utc_s - there["utc_s"][0])))
     part = slice(first, first + len(there))
     assert np.allclose(there["utc_s"], track.utc_s[part], atol=1e-3)
@@ -61,14 +62,14 @@ def test_each_point_is_in_the_nearest_row(tmp_path, log, ride, track):
 def test_nearest_row_may_be_before_or_after():
     time_us, at_us = np.arange(0, 50_000, 5000), np.array([-1, 0, 2400, 2600, 12_400, 44_000, 45_000, 45_001])
     rows, points = joined._nearest(time_us, at_us)
-    assert rows.tolist() == [0, 1, 2, 9]  # the later of two points in a row
+    assert rows.tolist() == [0, 1, 2, 9]  # if two points belong to the same row, the later one is kept
     assert points.tolist() == [2, 3, 4, 6]
     gap_us = np.array([0, 1_000_000, 1_005_000])
     assert joined._nearest(gap_us, np.array([100_000, 500_000, 900_000]))[1].tolist() == [0, 2]
 
 
 def test_lines_of_the_ride_are_unchanged(tmp_path, log, track):
-    """Every line is kept, with new columns at its end."""
+    """Every line of the ride is unchanged, except for the new columns at its end."""
     gpx = phone_tracks.write_gpx(tmp_path / "track.gpx", track)
     packed = tmp_path / "JOINED.csv.gz"
     command.works("join", log, gpx, "--out", packed)
@@ -93,7 +94,7 @@ def test_own_speed_of_the_log_is_kept(tmp_path, ride, track):
 
 
 def test_columns_without_values_are_replaced(tmp_path, log, track):
-    """A log as written by import: a time in the first row, and an empty speed column."""
+    """The log is like one from `kickstand import`: its first row has a UTC time, and its speed column is empty."""
     head, *rows = log.read_text().splitlines()
     rows = [f"{rows[0]},,1.5", *[row + ",," for row in rows[1:]]]
     log.write_text("\n".join([head + ",speed_mps,utc_s", *rows]) + "\n")
@@ -118,7 +119,7 @@ def test_tracks_are_read_with_their_speed(tmp_path, track, kind):
         assert np.all(np.isnan(read.speed_mps))
         known = np.isfinite(read.speeds_mps())
         assert np.median(np.abs(read.speeds_mps() - track.speed_mps)[known]) < 1.0
-        assert 0.5 < np.mean(known) < 0.95  # not at standstill
+        assert 0.5 < np.mean(known) < 0.95  # the speed is unknown at a standstill
 
 
 def test_track_of_another_ride_is_refused(tmp_path, log, track):

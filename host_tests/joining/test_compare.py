@@ -1,4 +1,4 @@
-"""Tests of `kickstand compare`, which puts the logs of two devices on one clock and compares their leans."""
+"""Tests `kickstand compare`. It puts the logs of two devices on one clock and compares their leans."""
 
 import json
 from dataclasses import replace
@@ -15,7 +15,7 @@ LATER_S, SLOW = 7.3, 80e-6
 
 
 def shifted(log, later_s, drift):
-    """The log of a device that was started later_s later and whose clock is slow."""
+    """Return the log of a second device. It was started later_s later, and its clock is slow by the share `drift`."""
     kept = log.t_s >= later_s
     t_s = (log.t_s[kept] - later_s) * (1.0 - drift)
     return api.Log(t_s, log.accel_g[kept], log.gyro_dps[kept])
@@ -49,7 +49,7 @@ def test_the_clocks_are_found(found, ride):
 
 
 def test_the_difference_is_that_of_both_errors(found, ride):
-    """Both leans are compared with the truth: the error of each, and their difference."""
+    """The difference between the two leans equals the difference between their errors."""
     for kind, seen in (("live", found.live), ("smoothed", found.smoothed)):
         leans = [found.leans[f"{kind} {name}"] for name in "AB"]
         riding = ~np.isnan(leans[0] + leans[1])
@@ -64,7 +64,7 @@ def test_the_difference_is_that_of_both_errors(found, ride):
 
 
 def test_constant_slope_and_delay_are_separated():
-    """B leans 1.5 degrees more to the left, 3 % more, and 0.1 s later."""
+    """The lean of device B differs in three ways: it is 1.5 degrees further left, 3 % larger and 0.1 s late."""
     t_s = np.arange(0.0, 60.0, agreement.STEP_S)
     sigma = np.ones(len(t_s))
     one, late = 20.0 * np.sin(t_s), 20.0 * np.sin(t_s - 0.1)
@@ -98,7 +98,7 @@ def test_words_json_and_a_picture(files, found, monkeypatch):
 
 
 def test_dollar_signs_in_a_name_are_no_formula(found, tmp_path):
-    """matplotlib reads text between two $ as a formula."""
+    """matplotlib would otherwise show text between two dollar signs as a formula."""
     agreement.draw(tmp_path / "C.png", replace(found, names=("A$_$.csv", "B$x$.csv")))
     assert (tmp_path / "C.png").read_bytes().startswith(b"\x89PNG")
 
@@ -108,7 +108,7 @@ def test_remark_appears_once(ride):
     stuck = np.where(np.abs(log.t_s - 80.0) < 3.0, np.argmax(log.t_s > 80.0), np.arange(len(log.t_s)))
     frozen = api.Log(log.t_s, log.accel_g[stuck], log.gyro_dps[stuck])
     for said in api.compare_rides(frozen, frozen, calibration, calibration).notices.values():
-        (line,) = [one.line() for one in said]  # both ways to read a log find it
+        (line,) = [one.line() for one in said]  # the log is read in two ways, and both find the frozen readings
         assert line.startswith("the readings froze from 77.0 to 83.0 s")
 
 

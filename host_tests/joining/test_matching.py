@@ -1,4 +1,5 @@
-"""The place of a track in a ride is found within 0.2 s in every profile. Another track is refused."""
+"""The time of a track within a ride is found with an error below 0.2 s, for every profile. The track of another ride is
+refused."""
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from kickstand_tools.signals import EARTH_M
 from support.recordings import phone_tracks
 
 PROFILES = ("street", "track", "sweeper", "city", "hills")
-SECONDS = {"sweeper": 450.0, "city": 300.0, "street": 300.0}  # for rides with few bends per length
+SECONDS = {"sweeper": 450.0, "city": 300.0, "street": 300.0}  # rides with few bends must be longer
 
 
 @pytest.fixture(scope="module")
@@ -19,14 +20,14 @@ def rides():
 
 
 def log_of(ride, part: slice = slice(None), slow_ppm: float = 0.0) -> api.Log:
-    """The log of a board whose clock is slow by slow_ppm."""
+    """Return the log of a board whose clock is slow by slow_ppm parts per million."""
     readings = ride.readings[part]
     t_s = np.arange(len(readings)) / ride.rate_hz * (1.0 - slow_ppm * 1e-6)
     return api.Log(t_s, readings[:, :3], readings[:, 4:], name="ride")
 
 
 def error_s(joined, late_s: float, at_s: float = 0.0) -> float:
-    """The match's time error at a time of the ride."""
+    """Return the error of the match, in s. late_s: the true delay of the track. at_s: the time in the ride."""
     return float(joined.match.ride_s(np.array([phone_tracks.START_UTC_S + late_s + at_s]))[0]) - at_s
 
 
@@ -43,7 +44,8 @@ def test_a_phones_track_is_found_within_a_fifth_of_a_second(rides, profile):
 
 
 def test_track_over_half_of_the_ride_is_found_at_any_offset(rides):
-    """The phone was switched on late, or off early; the track begins hours earlier."""
+    """The track may begin hours before the ride. It may also cover only a part of the ride, because the phone was
+    switched on late or off early."""
     ride = rides["hills"]
     track = phone_tracks.track(ride, before_s=8 * 3600.0)
     assert abs(error_s(api.join_track(log_of(ride), track), 0.5)) < 0.2
@@ -55,7 +57,12 @@ def test_track_over_half_of_the_ride_is_found_at_any_offset(rides):
 
 
 def winding(seconds: float, slow_ppm: float = 0.0) -> tuple[api.Log, api.Track]:
-    """A road of random bends at 20 m/s by an exact sensor and, ten times a second, an exact receiver; a slow log."""
+    """Simulate a ride at 20 m/s on a road with random bends.
+
+    Returns:
+        The log of an exact sensor, whose clock is slow by slow_ppm.
+        The track of an exact receiver with ten positions per second.
+    """
     t_s, speed = np.arange(0.0, seconds, 0.02), 20.0
     knots_s = np.arange(0.0, seconds + 12.0, 6.0)
     yaw = np.interp(t_s, knots_s, np.radians(25.0) * np.random.default_rng(1).uniform(-1.0, 1.0, len(knots_s)))
@@ -92,7 +99,7 @@ def test_another_rides_track_is_refused(rides, profile, other):
 
 @pytest.mark.parametrize(("profile", "differs"), [("street", 0.03), ("track", 0.08), ("city", 0.08), ("hills", 0.03)])
 def test_the_same_roads_on_another_day_are_refused(rides, profile, differs):
-    """The other ride has the same bends, at a speed that differs by some per cent from minute to minute."""
+    """The other ride has the same bends. Its speed differs by some per cent, and this difference changes every 20 s."""
     ride = rides[profile]
     knots_s = np.arange(0.0, ride.time[-1] + 40.0, 20.0)
     faster = np.interp(ride.time, knots_s, 1.0 + np.random.default_rng(6).normal(0.0, differs, len(knots_s)))
@@ -116,7 +123,7 @@ def test_short_or_straight_ride_is_refused(rides):
 
 
 def test_similar_bends_are_refused_as_ambiguous():
-    """A slalom matches another slalom at every bend."""
+    """In a slalom all bends are alike, so the track matches the ride at many times."""
     t_s = np.arange(0.0, 120.0, 0.01)
     yaw_dps = 25.0 * np.sin(2.0 * np.pi * t_s / 12.0)
     log = api.Log(t_s, np.tile([0.0, 1.0, 0.0], (len(t_s), 1)), np.outer(yaw_dps, [0.0, 1.0, 0.0]))
@@ -145,11 +152,11 @@ def test_frozen_readings_and_gaps_are_left_out(rides):
     joined = api.join_track(broken, phone_tracks.track(ride))
     assert [notice.code for notice in joined.notices] == ["frozen-readings"]
     assert abs(error_s(joined, 0.5)) < 0.2
-    assert joined.match.correlation > 0.97  # with the frozen readings the value would be 0.8
+    assert joined.match.correlation > 0.97  # if the frozen readings were used, it would be 0.8
 
 
 def test_course_turns_are_scaled_by_the_lean():
-    """At 45 degrees of lean the rate about the bike's up is 0.7 of the yaw rate."""
+    """The gyro's rate about the bike's up is smaller than the yaw rate. At a lean of 45 degrees it is 0.7 of it."""
     log, track = winding(300.0)
     steps = course(track.once_a_second())
     compared = Comparison(motion(log), steps, segments(steps), 0.0, 3.0)

@@ -1,4 +1,4 @@
-"""Tracks and calibrations broken in many ways: each is read, or refused in one line."""
+"""Tracks and calibrations are damaged in many ways. Each one is read, or refused in one line."""
 
 import json
 import random
@@ -21,7 +21,7 @@ def some_track():
 
 
 def flipped(content, number):
-    """The binary content with some bytes or a part changed."""
+    """Return damaged content: changed bytes, a cut end, a missing piece, or zero bytes. number: selects the damage."""
     chance = random.Random(number)
     change = (broken_logs.flip_bytes, broken_logs.cut_end, broken_logs.cut_a_piece, broken_logs.put_nul_bytes)[
         number % 4

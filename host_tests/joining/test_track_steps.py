@@ -1,11 +1,12 @@
-"""The steps, speeds and segments of a track, and the weights of its errors, compared with hand-computed numbers."""
+"""The steps, speeds and segments of a track, and the weights of its errors, are compared with numbers computed by
+hand."""
 
 import numpy as np
 import pytest
 from kickstand_tools.joining import fit
 from kickstand_tools.joining.track import Course, Track, course, segments, without_trend
 
-METRE = 1.0 / 111_194.9  # degrees of latitude, and of longitude at the equator
+METRE = 1.0 / 111_194.9  # one metre in degrees of latitude, and at the equator also of longitude
 
 
 def track(utc_s, east_m, north_m, speed_mps=None):
@@ -26,13 +27,14 @@ def test_a_track_of_ten_points_a_second_is_thinned_to_one():
 
 
 def test_a_course_turns_to_the_left_by_hand():
-    """20 m east, 20 m north, 20 m west, then 3 m and 400 m west: the last two are too slow and too fast."""
+    """The track goes 20 m east, 20 m north, 20 m west, 3 m west and 400 m west. The last two steps are not good: one is
+    too slow, and one is too fast."""
     found = course(track([0, 1, 2, 3, 5, 6], [0, 20, 20, 0, -3, -403], [0, 0, 20, 20, 20, 20]))
     assert found.begin_s.tolist() == [0, 1, 2, 3, 5] and found.end_s.tolist() == [1, 2, 3, 5, 6]
     assert found.speed_mps == pytest.approx([20.0, 20.0, 20.0, 1.5, 400.0], rel=1e-3)
     assert found.good.tolist() == [True, True, True, False, False]
     assert found.turn_deg == pytest.approx([0.0, 90.0, 90.0, 0.0, 0.0], abs=0.01)
-    # 1 m across 20 m is 2.865 degrees, with 4 degrees of other errors 4.920
+    # an error of 1 m to the side over 20 m is 2.865 degrees; with other errors of 4 degrees, the sum is 4.920
     assert found.sigma_deg[:3] == pytest.approx(4.920, abs=0.005)
 
 
@@ -47,15 +49,15 @@ def test_a_step_is_good_between_a_walk_and_a_jump(step_s, step_m, good):
 def test_speeds_without_their_own_are_means_over_four_steps():
     east = np.cumsum([0.0, 10.0, 10.0, 20.0, 20.0, 20.0, 20.0, 1.0, 1.0, 1.0, 1.0])
     found = track(np.arange(11.0), east, np.zeros(11)).speeds_mps()
-    assert np.isnan(found[[0, 1, 8, 9, 10]]).all()  # the ends, and under 2.5 m/s
+    assert np.isnan(found[[0, 1, 8, 9, 10]]).all()  # speeds are unknown at both ends and below 2.5 m/s
     assert found[2:8] == pytest.approx([15.0, 17.5, 20.0, 15.25, 10.5, 5.75], rel=1e-3)
     assert track([0, 1], [0, 9], [0, 0], [3.0, np.nan]).speeds_mps()[0] == 3.0
     assert np.isnan(track(np.arange(4.0), np.arange(4.0) * 9, np.zeros(4)).speeds_mps()).all()
 
 
 def test_segments_have_thirty_steps_and_at_least_eight():
-    """47 good steps give segments of 30 and 17; 7 steps give none. Mean and trend are subtracted, so a constant bend
-    gives zeros."""
+    """47 good steps give segments of 30 and 17 steps. 7 good steps are too few for a segment. Mean and trend are
+    subtracted from each segment, so a constant bend gives zeros."""
     n = 55
     good = np.ones(n, dtype=bool)
     good[47] = False
@@ -71,17 +73,18 @@ def test_segments_have_thirty_steps_and_at_least_eight():
 
 
 def test_a_trend_is_subtracted_by_weight():
-    """The line through the weighted points (0, 0), (1, 0) and (2, 3), the last with weight 0, is 0."""
+    """The points are (0, 0), (1, 0) and (2, 3). If the last one has the weight 0, the trend is the line 0."""
     weight = np.array([[1.0, 1.0, 0.0]])
     found = without_trend(np.array([[0.0, 0.0, 3.0]]), weight, np.array([[0.0, 1.0, 2.0]]))
     assert found == pytest.approx(np.array([[0.0, 0.0, 3.0]]))
     even = without_trend(np.array([[0.0, 0.0, 3.0]]), np.ones((1, 3)), np.array([[0.0, 1.0, 2.0]]))
-    assert even == pytest.approx(np.array([[0.5, -1.0, 0.5]]))  # the line is -0.5 + 1.5 t
+    assert even == pytest.approx(np.array([[0.5, -1.0, 0.5]]))  # the trend is the line -0.5 + 1.5 t
 
 
 def test_an_outlier_weighs_less_by_students_distribution():
-    """Of errors 1, 1, 1, 4 of weight 1 the median over 0.6745 is 1.4826. With f degrees of freedom each has the weight
-    (1 + 1 / f) / (1 + e^2 / f) / 1.4826^2, where e = error / 1.4826."""
+    """The sizes of four errors of weight 1 are 1, 1, 1 and 4. Their usual size is their median divided by 0.6745, which
+    is 1.4826. In units of this size an error is e = error / 1.4826. With f degrees of freedom its weight is
+    (1 + 1 / f) / (1 + e^2 / f) / 1.4826^2."""
     f, usual = fit._FREEDOM, 1.0 / 0.6745
     error = np.array([[1.0, -1.0, 1.0, 4.0, 9.0]])
     weight = np.array([[1.0, 1.0, 1.0, 1.0, 0.0]])

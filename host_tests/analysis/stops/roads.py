@@ -1,4 +1,4 @@
-"""Rides without noise, for which every figure is known."""
+"""Simulated rides without noise, whose true figures are known exactly."""
 
 from dataclasses import fields
 
@@ -11,10 +11,12 @@ REST_S = 5.0
 
 
 class Road:
-    """A ride of stretches with constant acceleration in m/s2, level and upright unless a test changes the channels."""
+    """A ride that consists of stretches with constant acceleration. It is level and upright unless a test changes the
+    channels."""
 
     def __init__(self, *legs: tuple[float, float], rate_hz: float = RATE_HZ):
-        """legs: seconds and m/s2. At speed 0 without acceleration the vehicle stands."""
+        """legs: duration in s and acceleration in m/s2 of each stretch. At speed 0 without acceleration the vehicle
+        stands."""
         self.t_s = np.arange(0.0, sum(seconds for seconds, _ in legs) - 1e-9, 1.0 / rate_hz)
         ends = np.cumsum([seconds for seconds, _ in legs])
         steps = np.array([mps2 for _, mps2 in legs] + [0.0])
@@ -26,7 +28,7 @@ class Road:
         self.rests = (self.mps == 0.0) & (after == 0.0)
 
     def channels(self, **changed: np.ndarray) -> Channels:
-        """The ride without a speed in its log."""
+        """Return the channels of the ride, without a speed in the log. changed: channels with other values."""
         n = len(self.t_s)
         columns = {field.name: np.zeros(n) for field in fields(Channels)}
         columns |= {

@@ -13,7 +13,7 @@ from kickstand_tools.simulation import profiles
 from kickstand_tools.simulation.files import simulate
 from kickstand_tools.simulation.plan import Conditions, Plan
 
-# Speed in the log: samples per second, delay, noise (m/s)
+# Each speed in the log: number of values per second, delay in s, standard deviation of the noise in m/s
 PERFECT_1HZ, PERFECT_10HZ = (1, 0.0, 0.0), (10, 0.0, 0.0)
 SATELLITES_1HZ, SATELLITES_10HZ = (1, 0.2, 0.05), (10, 0.2, 0.05)
 
@@ -23,7 +23,7 @@ def course(path: Path) -> Channels:
 
 
 def brakes(plan: Plan) -> Conditions:
-    """Repeated stops from 29 to 126 km/h with 2 to 9 m/s2, on slopes of up to 3 %."""
+    """Plan repeated stops from speeds of 29 to 126 km/h. The decelerations are 2 to 9 m/s2, the slopes up to 3 %."""
     plan.begin()
     while plan.going_on:
         speed = plan.uniform(8.0, 35.0)
@@ -36,8 +36,8 @@ def brakes(plan: Plan) -> Conditions:
 
 @pytest.fixture(scope="module")
 def ride(tmp_path_factory) -> tuple[Channels, np.ndarray, np.ndarray]:
-    """Simulate a ride with a randomly mounted MPU6050 calibrated by its poses. Return the course, true times and
-    speeds."""
+    """Simulate a ride with a randomly mounted MPU6050 that is calibrated by its poses. Return its channels, the times
+    of the truth and the true speeds."""
     directory = tmp_path_factory.mktemp("brakes")
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(profiles.PROFILES, "brakes", brakes)
@@ -62,10 +62,16 @@ def with_speed(ride, hz: int, late_s: float, noise_mps: float) -> Channels:
 
 
 def truth(time: np.ndarray, speed: np.ndarray, stop: Stop) -> tuple[float, float, float]:
-    """Return (initial speed, distance from the start found, MFDD), computed from the true speed around this stop."""
+    """Compute the figures of a stop from the true speed.
+
+    Returns:
+        initial speed: in m/s.
+        distance: from the start that was found to the standstill, in m.
+        MFDD: in m/s2.
+    """
     near = (time > stop.start_s - 1.0) & (time < stop.stop_s + 1.0)
     t, v = time[near], speed[near]
-    first = len(v) - 1 - int(np.argmax(v[::-1] > np.max(v) - 0.01))  # last sample at the earlier speed
+    first = len(v) - 1 - int(np.argmax(v[::-1] > np.max(v) - 0.01))  # the last sample before the speed falls
     t, v = t[first:], v[first:]
     distance = np.concatenate(([0.0], np.cumsum(np.diff(t) * (v[1:] + v[:-1]) / 2.0)))
     kmh = v * 3.6
@@ -81,7 +87,7 @@ def true_stops(time: np.ndarray, speed: np.ndarray) -> np.ndarray:
     return time[1:][(speed[1:] < 0.01) & (speed[:-1] >= 0.01)]
 
 
-# largest errors in per cent: of the MFDD, of the initial speed
+# largest errors of the MFDD and of the initial speed, in per cent
 LIMITS = {
     "1 Hz": (PERFECT_1HZ, 1.0, 0.5),
     "10 Hz": (PERFECT_10HZ, 1.0, 0.5),
@@ -109,7 +115,7 @@ def test_stops_with_a_speed_match_the_truth(ride, name):
 
 
 def test_stops_without_a_speed_match_the_truth(ride):
-    """All true stops are found, and no others. Errors are at most 3 %, and 1 % rms."""
+    """All true stops are found, and no others. The errors are at most 3 %, and their rms is at most 1 %."""
     whole = ride[0]
     found = find_stops(whole)
     assert len(found) == len(true_stops(ride[1], ride[2]))
@@ -122,8 +128,8 @@ def test_stops_without_a_speed_match_the_truth(ride):
 
 
 def test_mfdd_follows_its_definition():
-    """The MFDD of a constant deceleration is that deceleration. Braking before 0.8 v0 and after 0.1 v0 does not
-    count."""
+    """If the deceleration is constant, the MFDD equals it. Only the braking from 0.8 v0 to 0.1 v0 counts, where v0 is
+    the initial speed."""
     v = np.linspace(20.0, 0.0, 2001)
     assert mfdd_mps2(v, (20.0**2 - v * v) / (2 * 5.0)) == pytest.approx(5.0, rel=1e-9)
     # decelerate at 3 m/s2 down to 0.8 v0, then at 8 and 5, then at 3 again
@@ -135,7 +141,7 @@ def test_mfdd_follows_its_definition():
     assert mfdd_mps2(v, bent) == pytest.approx(want, rel=1e-6)
     assert mfdd_mps2(np.array([9.0, 0.0]), np.zeros(2)) == float(
         "inf"
-    )  # the whole speed is lost from one sample to the next
+    )  # the speed falls to 0 from one sample to the next
 
 
 def test_slowing_down_is_not_a_stop(ride):

@@ -1,5 +1,5 @@
-"""Without a speed in the log, a standstill must be proven and a stop plausible. The simulated track is fast and
-smooth."""
+"""Without a speed in the log, a standstill must be proven, and a stop must be plausible. The tests use a simulated
+track that is fast and smooth, so that riding resembles a standstill."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def without_speed(whole: Channels) -> Channels:
 
 
 def test_fast_smooth_track_is_not_a_standstill(track):
-    """A sensor need not be calibrated by six positions for this, because the ride shows its force at rest."""
+    """This also works without a calibration by six positions, because the ride shows the sensor's force at rest."""
     still = standing(without_speed(track))
     assert np.max(track.speed_mps[still]) < 0.5
     assert np.mean(still[track.speed_mps == 0.0]) > 0.9
@@ -43,7 +43,7 @@ def test_fast_smooth_track_is_not_a_standstill(track):
 
 
 def test_stop_at_a_false_standstill_is_not_shown(track, monkeypatch):
-    """False rests are inserted on fast straights after hard braking."""
+    """The test marks the fast straights after hard braking as standstills, although the bike rides."""
     braked = (track.shown_g < -0.4) & (track.speed_mps > 20.0)
     ends = np.flatnonzero(braked[:-1] & ~braked[1:])
     made_up = np.zeros(len(braked), dtype=bool)
@@ -61,7 +61,7 @@ def test_stop_at_a_false_standstill_is_not_shown(track, monkeypatch):
     ("mps", "side_m", "heading_deg"), [(80.0, 0.0, 0.0), (20.0, -20.0, 0.0), (20.0, 20.0, 0.0), (20.0, 0.0, -40.0)]
 )
 def test_implausible_bend_or_speed_is_not_a_stop(mps, side_m, heading_deg):
-    """Integrated readings alone do not prove a stop with 288 km/h, 20 m beside the line, or a heading change of 40
-    degrees."""
+    """Integrated readings alone do not prove a stop from 288 km/h, a stop that ends 20 m beside the straight line, or a
+    stop with a change of heading by 40 degrees."""
     assert brake_test.plausible(60.0, 10.0, 20.0)
     assert not brake_test.plausible(mps, side_m, heading_deg)

@@ -1,6 +1,6 @@
-"""Standstill by small shaking: each condition alone, slightly on both sides of its limit.
+"""A standstill is found because the bike shakes little. Each condition is tested slightly on both sides of its limit.
 
-Ten seconds of riding, four of what may be a standstill, ten of riding; no speed in the log.
+The simulated log has 10 s of riding, 4 s that may be a standstill, and 10 s of riding. It has no speed.
 """
 
 import numpy as np
@@ -10,13 +10,13 @@ from kickstand_tools.analysis.stops.standstill import standing
 from roads import RATE_HZ, Road
 
 BEGIN_S, END_S = 10.0, 14.0
-SHAKEN = {"pitch_rate_dps": 3.0, "yaw_rate_dps": 2.0, "up_g": 0.1}  # by the road; 4.5 Hz
+SHAKEN = {"pitch_rate_dps": 3.0, "yaw_rate_dps": 2.0, "up_g": 0.1}  # shaking by the road, at 4.5 Hz
 ROAD_HZ, ENGINE_HZ = RATE_HZ / 11.0, 3.0 * RATE_HZ / 7.0
 
 
 def maybe(**changed: float) -> Channels:
-    """NAME=share: shaking of a channel in the middle as a share of that while riding, 5 % by default. Other keywords:
-    below."""
+    """Simulate the log. The name of a channel sets its shaking in the middle part, as a share of its shaking while
+    riding; the default is 5 %. The code below shows what the other names change."""
     road = Road((24.0, 0.0))
     road.rests[:] = False
     ride = road.channels()
@@ -54,19 +54,20 @@ def share(ride: Channels) -> float:
     [
         ({"pitch_rate_dps": 0.14}, {"pitch_rate_dps": 0.16}),  # 15 % of the shaking while riding
         ({"yaw_rate_dps": 0.14}, {"yaw_rate_dps": 0.16}),
-        ({"up_g": 0.19}, {"up_g": 0.21}),  # 20 % of it
-        ({"engine": 3.0}, {"pitch_rate_dps": 1.0}),  # idling: as strong, but faster
-        ({"pitching": 0.95}, {"pitching": 1.05}),  # 1 deg/s
+        ({"up_g": 0.19}, {"up_g": 0.21}),  # 20 % of the shaking while riding
+        ({"engine": 3.0}, {"pitch_rate_dps": 1.0}),  # an idling engine shakes as strongly as the road, but faster
+        ({"pitching": 0.95}, {"pitching": 1.05}),  # the limit of the mean pitch rate is 1 deg/s
         ({"pitching": -0.95}, {"pitching": -1.05}),
         ({"yawing": 0.95}, {"yawing": 1.05}),
         ({"yawing": -0.95}, {"yawing": -1.05}),
         ({"bends": 15.0}, {"bends": 15.0, "yaw_rate_dps": 0.5}),  # slow bends do not hide shaking by the road
-        ({"drifting": 0.018}, {"drifting": 0.022}),  # the forward force, 0.01 g in half a second
+        ({"drifting": 0.018}, {"drifting": 0.022}),  # the forward force changes by 0.01 g in half a second
         ({"drifting": -0.018}, {"drifting": -0.022}),
-        ({"rolling": 4.0}, {"rolling": 6.0}),  # the filter finds rest in half of a second
-        ({"heavier": 0.115}, {"heavier": 0.125}),  # 0.12 g, of a sensor without six positions
+        ({"rolling": 4.0}, {"rolling": 6.0}),  # the filter finds rest in half of the samples of a second
+        ({"heavier": 0.115}, {"heavier": 0.125}),  # the force differs by 0.12 g, for a sensor without six positions
         ({"heavier": -0.115}, {"heavier": -0.125}),
-        ({"heavier": 0.145, "rested": 1.1}, {"heavier": 0.155, "rested": 1.1}),  # 0.05 g from a rest's force
+        # the force differs by 0.05 g from the force of a rest during the ride
+        ({"heavier": 0.145, "rested": 1.1}, {"heavier": 0.155, "rested": 1.1}),
         ({"heavier": 0.055, "rested": 1.1}, {"heavier": 0.045, "rested": 1.1}),
     ],
 )
@@ -77,7 +78,7 @@ def test_each_condition_of_a_standstill_has_its_limit(stands, does_not):
 
 @pytest.mark.parametrize("ridden_s", [(0.0, 24.0), (8.0, 15.0)])
 def test_standstill_is_found_within_half_a_second(ridden_s):
-    """This also holds if the standstill is the larger part of the ride."""
+    """The standstill is found this fast even if it is the larger part of the log."""
     ride = maybe()
     ride = ride.part((ride.t_s >= ridden_s[0]) & (ride.t_s < ridden_s[1]))
     times = ride.t_s[standing(ride)]
@@ -95,8 +96,8 @@ def test_standstill_needs_a_second_of_quiet(seconds, stands):
 
 
 def test_rest_of_the_filter_is_extended_back():
-    """The road does not shake the bike. It brakes until 12 s, the fork rebounds for 0.3 s, and the filter finds a rest
-    from 13.5 s on."""
+    """The road is smooth and does not shake the bike. The bike brakes until 12 s, and then its fork rebounds for 0.3 s.
+    The filter finds a rest only from 13.5 s on. The standstill begins after the rebound."""
     road = Road((8.0, 0.0), (4.0, -4.0), (4.0, 0.0))
     ride = road.channels(resting=(road.t_s >= 13.5).astype(float))
     ride.forward_g += 0.03
@@ -104,7 +105,7 @@ def test_rest_of_the_filter_is_extended_back():
     still = standing(ride)
     assert ride.t_s[still][0] == pytest.approx(12.3, abs=0.07)
     assert still[ride.t_s > 12.4].all()
-    ride.forward_g[(road.t_s >= 12.6) & (road.t_s < 12.9)] += 0.018  # within 0.02 g
+    ride.forward_g[(road.t_s >= 12.6) & (road.t_s < 12.9)] += 0.018  # below the limit of 0.02 g
     assert ride.t_s[standing(ride)][0] == pytest.approx(12.3, abs=0.07)
     ride.forward_g[(road.t_s >= 12.6) & (road.t_s < 12.9)] += 0.006
     assert ride.t_s[standing(ride)][0] == pytest.approx(12.9, abs=0.07)

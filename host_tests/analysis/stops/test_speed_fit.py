@@ -1,4 +1,5 @@
-"""A log's speed is fitted to the measured force. The fit and its delay are compared with an independent computation."""
+"""The speed of a log is combined with the measured force. The fit and its delay are compared with an independent
+computation."""
 
 import numpy as np
 import pytest
@@ -6,22 +7,31 @@ from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.analysis.stops.speed_fit import fitted_speed, speed_delay_s
 from roads import RATE_HZ, Road, braking
 
-BEGIN_S, STOP_S = 14.0, 18.0  # of the braking
+BEGIN_S, STOP_S = 14.0, 18.0  # start and end of the braking
 
 
 def part_of(road: Road, every: int, scale=1.0, off_mps=0.0, late_s=0.0):
-    """Return the ride up to 2.5 s of rest, with a speed at every `every`-th sample that is late by late_s and wrong."""
+    """Return the ride until 2.5 s after the stop, with a wrong speed in the log.
+
+    every: number of samples from one speed to the next.
+    scale, off_mps: factor and offset of the wrong speed.
+    late_s: delay of the speed.
+    """
     ride = road.channels()
     ride.speed_mps[::every] = scale * np.interp(ride.t_s[::every] - late_s, road.t_s, road.mps) + off_mps
     return ride.part(ride.t_s < STOP_S + 2.5)
 
 
 def conditioned(part, speed, acceleration, delay_s):
-    """The estimate as the mean of a normal distribution, conditioned on the measurements.
+    """Compute the estimated speed as the mean of a normal distribution, conditioned on the measured speeds.
 
-    Before any speed is known: the scale is off by 1 %, the log's delay by 0.05 s, and the slope of the force by
-    0.05 m/s2 at the end of the part, from where it walks by 0.1 m/s2 per root second backwards, straight on between
-    points half a second apart. A speed is off by 0.05 m/s.
+    The errors have these standard deviations:
+
+    * the scale of the integrated speed: 1 %.
+    * the delay of the log's speed: 0.05 s.
+    * the error of the acceleration due to the road's slope: 0.05 m/s2 at the end of the part. From there it changes
+      backwards as a random walk of 0.1 m/s2 per root second, linear between points half a second apart.
+    * each measured speed: 0.05 m/s.
     """
     time = part.t_s
     values = np.flatnonzero(~np.isnan(part.speed_mps))
@@ -31,7 +41,7 @@ def conditioned(part, speed, acceleration, delay_s):
     knots = time[-1] - 0.5 * np.arange(count)
     back = np.arange(count)
     covariance = 0.05**2 + 0.1**2 * 0.5 * np.minimum(back[:, None], back[None, :])
-    slopes = []  # effect of each of them on the speed at a sample, m/s
+    slopes = []  # the effect of the acceleration error at each point on the speed of each sample
     for k in range(count):
         hat = np.interp(-time, -knots, np.eye(count)[k])
         steps = np.append(np.diff(time) * (hat[1:] + hat[:-1]) / 2.0, 0.0)
@@ -40,7 +50,7 @@ def conditioned(part, speed, acceleration, delay_s):
     full = np.zeros((len(time), count + 2))
     full[:, 0], full[:, 1:-1] = speed, slopes
     design = full[wanted]
-    n = 5  # samples on each side of 0.2 s
+    n = 5  # the acceleration is averaged over 0.2 s, which is five samples on each side
     design[:, -1] = [-np.mean(np.pad(acceleration, n, mode="edge")[k : k + 2 * n + 1]) for k in wanted]
     prior = np.zeros((count + 2, count + 2))
     prior[0, 0], prior[-1, -1], prior[1:-1, 1:-1] = 0.01**2, 0.05**2, covariance
@@ -90,7 +100,7 @@ def test_fit_needs_several_speeds_during_braking():
 
 
 def waves(seconds=60.0, late_s=0.0, size_mps2=1.5, every_s=1.0, period_s=5.0):
-    """Simulate a speed that rises and falls, with the measured speed delayed by late_s."""
+    """Simulate a speed that rises and falls like a sine. The speed in the log is delayed by late_s."""
     road = Road((seconds, 0.0))
     t, omega = road.t_s, 2.0 * np.pi / period_s
     ride = road.channels(forward_g=size_mps2 * np.cos(omega * t) / STANDARD_GRAVITY)
@@ -115,7 +125,8 @@ def test_impossible_delay_of_the_speed_is_ignored(late_s):
     [
         ({"seconds": 30.0}, {"seconds": 29.0}),  # thirty speeds are needed
         ({"seconds": 30.0, "every_s": 0.5}, {"seconds": 29.0, "every_s": 0.5}),  # only one speed per second counts
-        ({"size_mps2": 0.80}, {"size_mps2": 0.70}),  # that change by 0.5 m/s rms: 0.66 of the acceleration's size
+        # the speeds must change by 0.5 m/s rms, and their change is 0.66 s times the amplitude of the acceleration
+        ({"size_mps2": 0.80}, {"size_mps2": 0.70}),
     ],
 )
 def test_delay_needs_enough_changing_speeds(shows, does_not):

@@ -1,6 +1,7 @@
-"""Stops without noise, compared with their closed form: the definition of a stop, and each figure.
+"""The definition of a stop and its figures are compared with exact formulas for stops without noise.
 
-Nothing shakes, so a standstill is found only by the lean filter's rest or by a speed of 0 in the log.
+The simulated bike does not shake. A standstill is therefore found only if the lean filter detects rest, or if the log
+has a speed of 0.
 """
 
 import numpy as np
@@ -15,11 +16,11 @@ from roads import RATE_HZ, REST_S, Road, braking
     ("mps", "mps2", "counts"),
     [
         (9.8 / 3.6, 3.0, False),
-        (10.2 / 3.6, 3.0, True),  # 10 km/h
+        (10.2 / 3.6, 3.0, True),  # a stop begins above 10 km/h
         (20.0, 0.97, False),
-        (20.0, 1.03, True),  # 1 m/s2
+        (20.0, 1.03, True),  # the deceleration is at least 1 m/s2
         (30.0, 28.5, True),
-        (30.0, 31.5, False),  # 30 m/s2
+        (30.0, 31.5, False),  # the deceleration is at most 30 m/s2
     ],
 )
 def test_limits_of_a_stop(mps, mps2, counts):
@@ -39,33 +40,38 @@ def test_every_figure_of_a_stop_is_right(speed):
         ride.speed_mps[::10] = road.mps[::10]
     (stop,) = find_stops(ride)
     assert stop.speed_from == speed
-    assert stop.start_s == pytest.approx(14.0 - 0.12, abs=1e-6)  # the force is a mean over 0.2 s; a sample before it
+    # the force is a mean over 0.2 s, and the start is one sample before the mean begins to change
+    assert stop.start_s == pytest.approx(14.0 - 0.12, abs=1e-6)
     near = 1e-6 if speed == "integrated" else 2e-3
     assert stop.stop_s == pytest.approx(18.0, abs=near)
     assert stop.duration_s == stop.stop_s - stop.start_s
     assert stop.initial_speed_mps == pytest.approx(20.0, rel=near)
-    assert stop.distance_m == pytest.approx(40.0 + 20.0 * 0.12 - 5.0 * 0.02**2 / 4.0, rel=near)  # a sample's corner
+    # the last term is the corner where braking begins within one sample
+    assert stop.distance_m == pytest.approx(40.0 + 20.0 * 0.12 - 5.0 * 0.02**2 / 4.0, rel=near)
     assert stop.mfdd_mps2 == pytest.approx(5.0, rel=near)
     assert stop.peak_mps2 == pytest.approx(5.0, rel=near)
-    assert stop.jerk_mps3 == pytest.approx(5.0 / 0.22 * 41 / 44, rel=near)  # a step over 11 samples, its corner over 3
+    # the step of the force is averaged over 11 samples, and its corner over 3
+    assert stop.jerk_mps3 == pytest.approx(5.0 / 0.22 * 41 / 44, rel=near)
     assert stop.side_m == stop.heading_deg == 0.0
 
 
 def test_rebound_of_the_fork_does_not_change_the_end():
-    """Below a fiftieth of the speed a constant deceleration is assumed, because the fork throws the sensor back and
-    forth. A stop from 60 m/s at 5 m/s2 takes 12 s and 360 m.
+    """When the bike has nearly stopped, its fork throws the sensor back and forth. Below a fiftieth of the initial
+    speed a constant deceleration is therefore assumed. A stop from 60 m/s at 5 m/s2 takes 12 s and 360 m.
     """
     road = braking(60.0, 5.0)
     ride = road.channels()
     end = int(np.argmax(road.rests & (road.t_s > 20.0)))
-    ride.forward_g[end - 6 : end] += 0.1 * np.array([1.0, -1.0, -1.0, 1.0, 1.0, -1.0])  # no speed is left of it
+    # the sum of this rebound is zero, so it does not change the speed
+    ride.forward_g[end - 6 : end] += 0.1 * np.array([1.0, -1.0, -1.0, 1.0, 1.0, -1.0])
     (stop,) = find_stops(ride)
     assert stop.stop_s == pytest.approx(REST_S + 15.0 + 4.0 + 12.0, abs=1e-6)
     assert stop.distance_m == pytest.approx(360.0 + 60.0 * 0.12, abs=0.002)
 
 
 def test_jerk_is_the_steepest_change_of_the_force():
-    """Braking grows by 10 m/s3 to 6 m/s2, stays constant, and falls by 20 m/s3 at the end, from 3 m/s on."""
+    """The deceleration grows by 10 m/s3 to 6 m/s2 and stays constant. At the end it falls by 20 m/s3, which is the
+    larger jerk."""
     t = np.arange(0.0, 30.0, 1.0 / RATE_HZ)
     braked = np.interp(t, [15.0, 15.6, 17.6, 17.9, 19.0], [0.0, 6.0, 6.0, 0.0, 0.0])
     lost = np.concatenate(([0.0], np.cumsum((braked[1:] + braked[:-1]) / 2.0 / RATE_HZ)))[-1]
@@ -73,7 +79,7 @@ def test_jerk_is_the_steepest_change_of_the_force():
     road.mps2 = road.mps2 - braked[: len(road.t_s)]
     road.rests = (road.t_s < REST_S) | (road.t_s > 17.9)
     (stop,) = find_stops(road.channels())
-    assert stop.jerk_mps3 == pytest.approx(20.0, rel=0.15)  # smoothed twice over 0.2 s
+    assert stop.jerk_mps3 == pytest.approx(20.0, rel=0.15)  # smaller, because the force is smoothed twice over 0.2 s
     assert stop.peak_mps2 == pytest.approx(6.0, rel=0.01)
     assert stop.initial_speed_mps == pytest.approx(lost, rel=0.01)
 
@@ -81,16 +87,17 @@ def test_jerk_is_the_steepest_change_of_the_force():
 @pytest.mark.parametrize(
     ("engine_mps2", "mps2", "earlier_s"),
     [
-        (0.2, 6.0, 0.12),  # under 4 % of the braking: the rider has not begun
-        (0.3, 6.0, 0.71),  # over it, for 0.6 s at most from where that of 15 % begins
+        (0.2, 6.0, 0.12),  # below 4 % of the full deceleration, braking has not begun
+        # from 4 % to 15 %, at most the last 0.6 s before the deceleration exceeds 15 % are braking
+        (0.3, 6.0, 0.71),
         (0.8, 6.0, 0.71),
-        (1.0, 6.0, 4.08),  # over 15 %: it is braking
-        (0.24, 1.4, 0.71),  # under 0.25 m/s2, though over 15 %: a slope or the wind
+        (1.0, 6.0, 4.08),  # above 15 % it is braking
+        (0.24, 1.4, 0.71),  # below 0.25 m/s2 it is a slope or the wind, even above 15 %
         (0.27, 1.4, 4.08),
     ],
 )
 def test_start_of_braking_is_found(engine_mps2, mps2, earlier_s):
-    """Before the brakes, the engine alone slows the bike for 4 s."""
+    """The engine alone slows the bike for 4 s before the rider brakes."""
     mps = 18.0
     seconds = (mps - 4.0 * engine_mps2) / mps2
     road = Road((REST_S, 0.0), (6.0, 3.0), (3.0, 0.0), (4.0, -engine_mps2), (seconds, -mps2), (REST_S, 0.0))
@@ -100,7 +107,8 @@ def test_start_of_braking_is_found(engine_mps2, mps2, earlier_s):
 
 @pytest.mark.parametrize(("pause_s", "counts"), [(0.26, True), (0.56, False)])
 def test_brief_pause_before_the_standstill_is_bridged(pause_s, counts):
-    """A stop continues after a short pause. A longer pause ends it, and the rest is too slow to count."""
+    """A stop continues after a short pause of braking. A longer pause ends it, and the remaining speed is too low to
+    count as a stop."""
     road = Road(*((REST_S, 0.0), (5.0, 4.0), (3.0, 0.0), (3.9, -5.0), (pause_s, 0.0), (0.1, -5.0), (REST_S, 0.0)))
     found = find_stops(road.channels())
     assert len(found) == counts
@@ -116,8 +124,8 @@ def test_no_stop_is_longer_than_a_minute():
 
 @pytest.mark.parametrize(("missing_s", "initial_mps"), [(0.46, 20.0), (0.56, 12.2)])
 def test_missing_readings_are_bridged_for_half_a_second(missing_s, initial_mps):
-    """A gap of up to half a second is bridged. A stop begins after a longer gap: 14 + 1 s and the gap after the log's
-    start."""
+    """Readings are missing from 15 s on, one second after braking began. A gap of up to half a second is bridged. After
+    a longer gap the stop begins at the end of the gap."""
     road = braking(20.0, 5.0)
     there = (road.t_s < 15.001) | (road.t_s > 15.0 + missing_s - 1e-6)
     (stop,) = find_stops(road.channels().part(there))
@@ -125,7 +133,7 @@ def test_missing_readings_are_bridged_for_half_a_second(missing_s, initial_mps):
 
 
 def test_only_readings_after_the_last_gap_are_integrated():
-    """The ride has two gaps. Only the last one counts."""
+    """The stop has two gaps of 0.9 s. It begins after the last gap."""
     road = braking(20.0, 2.0)
     there = ~((road.t_s > 14.5) & (road.t_s < 15.4)) & ~((road.t_s > 17.0) & (road.t_s < 17.9))
     (stop,) = find_stops(road.channels().part(there))
@@ -136,7 +144,8 @@ class TestStandstill:
     """The rest after the stop shows the slope and the gyro's reading at rest."""
 
     def disturbed(self, begin_s: float, end_s: float, off_g: float = 0.1) -> float:
-        """Return the deceleration found if the force is off from begin_s to end_s after the standstill at 18 s."""
+        """Return the MFDD if the force has an error of off_g from begin_s to end_s, counted from the standstill at
+        18 s."""
         road = braking(20.0, 5.0)
         ride = road.channels()
         ride.forward_g[(road.t_s > 18.0 + begin_s - 0.01) & (road.t_s < 18.0 + end_s - 0.01)] += off_g
@@ -147,12 +156,12 @@ class TestStandstill:
         right = self.disturbed(9.0, 9.0)
         assert right == pytest.approx(5.0, rel=0.002)
         assert self.disturbed(2.56, 4.0) == pytest.approx(right, rel=1e-4)
-        # here it counts as slope: 0.1 g for 1 of 2 s is 0.49 m/s2
+        # in this time the force counts as slope: 0.1 g during 1 of 2 s are 0.49 m/s2
         assert self.disturbed(0.5, 1.5) == pytest.approx(right + 0.49, rel=0.02)
         assert self.disturbed(1.5, 2.5) == pytest.approx(right + 0.49, rel=0.02)
 
     def test_rebound_of_the_fork_is_not_part_of_the_slope(self):
-        """The rebound has a mean of zero, so it changes no speed, and it lasts less than half a second."""
+        """The mean force of the rebound is zero, so it does not change the speed. It lasts less than half a second."""
         road = braking(20.0, 5.0)
         ride = road.channels()
         after = road.t_s - 18.0
@@ -171,7 +180,7 @@ class TestStandstill:
 
 @pytest.mark.parametrize("up", [-0.33, 0.33])
 def test_steep_road_does_not_change_the_figures(up):
-    """The slope is the sine of 19 degrees, as in the steepest streets. The force at standstill shows it."""
+    """The steepest streets have a slope of 19 degrees. The force at standstill shows the slope."""
     road = braking(20.0, 5.0)
     (stop,) = find_stops(road.channels(forward_g=road.mps2 / STANDARD_GRAVITY + up))
     assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.002)
@@ -179,7 +188,8 @@ def test_steep_road_does_not_change_the_figures(up):
 
 @pytest.mark.parametrize(("samples", "counts"), [(10, 0), (11, 1)])
 def test_brief_standstill_shows_no_slope(samples, counts):
-    """A longer standstill shows the slope of a road that falls by 10 %."""
+    """The road falls by 10 %. A brief standstill does not show this slope, so the stop does not count. A longer one
+    shows it."""
     road = braking(20.0, 5.0)
     still = (road.t_s >= 18.0 - 1e-6) & (road.t_s < 18.0 + samples / RATE_HZ - 1e-6)
     found = stops_of(road.channels(forward_g=road.mps2 / STANDARD_GRAVITY - 0.1), still)
@@ -187,9 +197,9 @@ def test_brief_standstill_shows_no_slope(samples, counts):
 
 
 def test_dive_is_not_braking():
-    """The nose is 4 degrees down while the bike brakes: the sensor feels its weight along the bike, which is no
-    deceleration. Going down at 10 deg/s where braking begins, a sensor 0.65 m above the hubs is 0.11 m/s faster than
-    the bike."""
+    """The nose is 4 degrees down while the bike brakes. The sensor then measures a part of gravity along the bike,
+    which is no deceleration. When braking begins, the nose goes down at 10 deg/s. A sensor 0.65 m above the hubs is
+    then 0.11 m/s faster than the bike."""
     road = braking(20.0, 5.0)
     ride = road.channels()
     pitch = np.interp(road.t_s, [13.7, 14.1, 17.8, 18.0], [0.0, -4.0, -4.0, 0.0])
@@ -203,12 +213,12 @@ def test_dive_is_not_braking():
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_bend_is_not_a_dive(side):
-    """Braking in a bend at 30 degrees of lean: turned about the vertical by 8 deg/s for 2 s, the gyro reads a rate of
-    pitch, but the nose stays level."""
+    """The bike brakes in a bend at 30 degrees of lean, with a yaw rate of 8 deg/s for 2 s. Because of the lean, the
+    gyro shows a pitch rate, but the nose stays level."""
     road = braking(20.0, 5.0)
     turning = (road.t_s >= 14.5) & (road.t_s < 16.5)
     lean = np.where(turning, 30.0 * side, 0.0)
-    rate = np.where(turning, -8.0 * side, 0.0)  # positive to the left
+    rate = np.where(turning, -8.0 * side, 0.0)  # a yaw rate is positive to the left
     ride = road.channels(
         lean_deg=lean, pitch_rate_dps=-rate * np.sin(np.radians(lean)), yaw_rate_dps=rate * np.cos(np.radians(lean))
     )
@@ -219,22 +229,23 @@ def test_bend_is_not_a_dive(side):
 
 
 def test_deviation_from_the_straight_line_is_right():
-    """The bike turns left at 0.5 deg/s for 4 s. The deviation is the integral of (20 - 5 t) sin(0.5 deg/s t), with t
-    from the start of braking."""
+    """The bike turns left at 0.5 deg/s for 4 s while it brakes from 20 m/s at 5 m/s2. Its deviation from the straight
+    line is the integral of (20 - 5 t) sin(0.5 deg/s t), where t is the time since the start of braking."""
     road = braking(20.0, 5.0)
     ride = road.channels(yaw_rate_dps=np.where((road.t_s >= 14.0) & (road.t_s < 18.0), 0.5, 0.0))
     (stop,) = find_stops(ride)
-    assert stop.heading_deg == pytest.approx(0.5 * (0.98 * 4.0 + 0.01), abs=0.002)  # down to 2 % of the speed
+    # the heading is measured until the speed is 2 % of the initial speed
+    assert stop.heading_deg == pytest.approx(0.5 * (0.98 * 4.0 + 0.01), abs=0.002)
     t = np.linspace(0.0, 4.0, 4001)
     assert stop.side_m == pytest.approx(np.trapezoid((20.0 - 5.0 * t) * np.sin(np.radians(0.5 * t)), t), abs=0.02)
-    ride.yaw_rate_dps *= 20.0  # by 40 degrees: only a speed in the log shows that such a bend ended in a stop
+    ride.yaw_rate_dps *= 20.0  # the bike now turns by 40 degrees, so only a speed in the log would prove a stop
     assert find_stops(ride) == []
     ride.speed_mps[::10] = road.mps[::10]
     assert len(find_stops(ride)) == 1
 
 
 def test_each_stop_begins_after_the_previous_standstill():
-    """Each stop has its own initial speed and start, for any order of hard and soft stops."""
+    """Each stop has its own initial speed and start, also if hard and soft stops alternate."""
     legs = []
     for mps, mps2 in (20.0, 6.0), (12.0, 3.0), (25.0, 8.0):
         legs += [(3.0, 0.0), (mps / 4.0, 4.0), (3.0, 0.0), (mps / mps2, -mps2), (3.0, 0.0)]
@@ -245,13 +256,15 @@ def test_each_stop_begins_after_the_previous_standstill():
 
 @pytest.mark.parametrize(("off_g", "counts"), [(0.11, True), (0.15, False)])
 def test_stop_with_an_open_speed_is_rejected(off_g, counts):
-    """An error of 0.15 g over 8.8 s of riding would give 13 m/s at the previous standstill. The limit is 3 m/s plus 0.7
-    m/s per second."""
+    """The speed is integrated back to the previous standstill, where it must be near 0. The limit is 3 m/s plus 0.7 m/s
+    per second of riding. An error of 0.15 g over 8.8 s would give 13 m/s."""
     road = braking(20.0, 5.0, before_s=4.0)
     ride = road.channels()
     ride.forward_g[(road.t_s > 5.0) & (road.t_s < 14.0)] -= off_g
     assert len(find_stops(ride)) == counts
-    assert closes(40.0, seconds=40.0) and not closes(40.0, seconds=20.0)  # an old speed proves nothing
+    assert closes(40.0, seconds=40.0) and not closes(
+        40.0, seconds=20.0
+    )  # after a long time the integral proves nothing
 
 
 def test_rolling_out_is_not_braking():
@@ -272,7 +285,7 @@ def test_speed_in_the_log_corrects_the_integral():
 
 @pytest.mark.parametrize(("mps2", "counts"), [(1.45, False), (1.55, True)])
 def test_hard_stop_is_shown_by_the_speed_alone(mps2, counts):
-    """A stop counts from 1.5 m/s2 on and from more than 10 km/h."""
+    """The speed alone shows a stop if it falls by more than 1.5 m/s2, from over 10 km/h."""
     road = braking(20.0, mps2)
     ride = road.channels()
     ride.speed_mps[::50] = road.mps[::50]
@@ -287,8 +300,8 @@ def test_hard_stop_is_shown_by_the_speed_alone(mps2, counts):
     ("hard", "easy", "counts"), [((4.0, -4.0), (8.0, -0.5), True), ((4.0, -9.0), (16.0, -0.25), False)]
 )
 def test_stop_by_speed_alone_takes_at_most_15_seconds(hard, easy, counts):
-    """Braking from 20 m/s within 12 s is a stop. From 40 m/s within 20 s it is not, because the last 15 s do not show
-    it."""
+    """Braking from 20 m/s within 12 s is a stop. Braking from 40 m/s within 20 s is not, because only the last 15 s are
+    considered."""
     top_mps = -hard[0] * hard[1] - easy[0] * easy[1]
     road = Road((REST_S, 0.0), (top_mps / 4.0, 4.0), (3.0, 0.0), hard, easy, (REST_S, 0.0))
     ride = road.channels()
@@ -309,7 +322,7 @@ def test_old_speed_shows_no_standstill(age_s, stands):
 
 
 def test_log_may_begin_on_the_move():
-    """The log has no earlier standstill with speed 0."""
+    """The log begins while the vehicle moves, so it has no standstill before the stop."""
     ride = braking(20.0, 5.0).channels()
     (stop,) = find_stops(ride.part(ride.t_s >= 11.0))
     assert stop.initial_speed_mps == pytest.approx(20.0, rel=0.003)
@@ -338,16 +351,20 @@ def test_the_straight_line_is_the_direction_just_before_braking():
     ("hard", "easy", "earlier_s"), [((2.0, -6.0), (1.4, -2.0), 0.71), ((10.0 / 9.0, -9.0), (2.4, -2.0), 4.08)]
 )
 def test_full_deceleration_is_from_the_last_two_seconds(hard, easy, earlier_s):
-    """The brake is eased from 6 to 2 m/s2. If 6 m/s2 fill a quarter of the last two seconds, 15 % are 0.9 m/s2, more
-    than the engine's 0.8. If they end earlier they do not count: 15 % are 0.3 m/s2, and the stop begins with the
-    engine's braking."""
+    """The rider eases the brake from 6 to 2 m/s2. Before braking the engine slows the bike by 0.8 m/s2. A stop begins
+    at 15 % of the full deceleration.
+
+    * If 6 m/s2 fill a quarter of the last two seconds, 15 % are 0.9 m/s2. The engine's braking does not count.
+    * If they end earlier, the full deceleration is 2 m/s2, and 15 % are 0.3 m/s2. The stop begins with the engine's
+      braking.
+    """
     legs = (REST_S, 0.0), (6.0, 3.0), (3.0, 0.0), (4.0, -0.8), hard, easy, (REST_S, 0.0)
     (stop,) = find_stops(Road(*legs).channels())
     assert REST_S + 6.0 + 3.0 + 4.0 - stop.start_s == pytest.approx(earlier_s, abs=0.025)
 
 
 def test_rolling_out_after_braking_is_left_out():
-    """The last metre per second is lost at 0.4 m/s2, with released brakes. The stop ends before that."""
+    """With released brakes the speed falls by 0.4 m/s2 at the end. The stop ends before that."""
     legs = (REST_S, 0.0), (5.0, 4.0), (3.0, 0.0), (3.9, -5.0), (1.25, -0.4), (REST_S, 0.0)
     (stop,) = find_stops(Road(*legs).channels())
     assert stop.initial_speed_mps == pytest.approx(20.0, rel=1e-3)
