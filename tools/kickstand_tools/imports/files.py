@@ -22,7 +22,10 @@ _BOMS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", 
 
 @dataclass
 class RecordingFile:
-    """One file of a recording. name: its path below the given folder or zip, with "/". content: its unpacked bytes.
+    """One file of a recording.
+
+    name: its path below the given folder or zip, with "/".
+    content: its unpacked bytes.
     text: the decoded content; lines end in a line feed.
     """
 
@@ -41,7 +44,7 @@ class RecordingFile:
         return PurePosixPath(self.name.removesuffix(".gz")).stem.lower()
 
     def first_lines(self, count: int) -> list[str]:
-        """At most count lines of the text, without blank ones."""
+        """Return the first `count` lines of the text that are not blank, or fewer."""
         return [line for line in self.text[: 1 << 16].split("\n") if line.strip()][:count]
 
 

@@ -53,14 +53,20 @@ CALM_S = 0.5  # a sensor is judged calm over this duration
 CALMEST = 0.2  # share of the samples that count as calm
 NEAR = 1.3  # largest factor between a calm length and gravity in a unit; clones and rough rides differ by up to this
 NOISE_DPS = 0.1  # standard deviation of a gyro at rest
-LINEAR = 0.35  # without gravity, the mean vector's length is a smaller share of the vectors' mean length
+# Share: the length of the mean acceleration over the mean length of accelerations. Without gravity it is smaller.
+LINEAR = 0.35
 _SLOWEST_S, _QUICKEST_S = 1.0, 1e-4  # limits of the time between samples
 
 
 @dataclass
 class ColumnFinding:
-    """columns: the names in the table. unit: their unit. why: the reason in words. certain: False if the user should
-    check it."""
+    """The columns of one quantity.
+
+    columns: the names in the table.
+    unit: the unit of these columns.
+    why: the reason in words.
+    certain: False if the user should check the finding.
+    """
 
     columns: list[str]
     unit: str = ""
@@ -70,9 +76,13 @@ class ColumnFinding:
 
 @dataclass
 class Findings:
-    """The finding of each quantity that was found: "t", "a", "g", "speed", "lat", "lon". lacking: the required
-    quantities that are missing, in words. single: columns of single axes of an incomplete sensor, by the keys of
-    REQUIRED. remarks: problems of the existing columns."""
+    """What was found in a table.
+
+    found: the finding of each quantity, by "t", "a", "g", "speed", "lat" and "lon".
+    lacking: the required quantities that are missing, in words.
+    single: columns of single axes of an incomplete sensor, by the keys of REQUIRED.
+    remarks: problems of the existing columns.
+    """
 
     found: dict[str, ColumnFinding] = field(default_factory=dict)
     lacking: list[str] = field(default_factory=list)
@@ -183,7 +193,7 @@ def _step_fits(numbers: Array, name: str) -> bool:
 
 
 def _seconds(sheet: Sheet, time: ColumnFinding | None) -> Array | None:
-    """(n) seconds since the first time; None without a time column."""
+    """Return the seconds since the first time, shape (n), or None without a time column."""
     if time is None:
         return None
     ns = sheet.times(sheet.columns.index(time.columns[0]), time.unit)
@@ -361,8 +371,10 @@ def _first_with_gravity(threes: Sequence[_Triple], seconds: Array | None) -> _Tr
 
 
 def _has_gravity(three: _Triple, seconds: Array | None, near: bool) -> bool:
-    """True if the values contain gravity: their length is constant in calm stretches, and hardly ever near 0. near: the
-    length must be that of gravity in some unit; if False, the length must be more constant instead."""
+    """Return True if the values contain gravity: their length is constant in calm stretches, and hardly ever near 0.
+
+    near: True if the length must also be gravity's length in some unit. If False, the length must be more constant.
+    """
     values = three.values[np.all(np.isfinite(three.values), axis=1)]
     if len(values) < 3:
         return False

@@ -85,12 +85,14 @@ class ImportSign(Message):
 
 @dataclass(eq=False)
 class Imported:
-    """app: name of the app. log: times count from the recording's own start. taken: the file, columns and unit of each
-    quantity. notices: remarks. gaps_s: duration of each
-    gap.
+    """An imported recording.
 
+    app: name of the app.
+    log: times count from the recording's own start.
+    taken: the file, columns and unit of each quantity.
+    notices: remarks.
     vehicle_axes: True if x already points left, y up and z forward on the vehicle, provided that the logger was mounted
-    as its maker requires.
+        as its maker requires.
     """
 
     app: str
@@ -113,7 +115,7 @@ class Imported:
 
     @property
     def gaps_s(self) -> Array:
-        """Duration of each gap, s."""
+        """Return the duration of each gap in s."""
         steps = np.diff(self.log.t_s)
         return steps[steps * 1e9 > GAP_NS]
 
@@ -128,10 +130,14 @@ def import_recording(
     """Read a recording of another app or logger: a file, a folder or a zip.
 
     `kickstand import --help` names the apps whose exports are known. For any other table, columns and units are found
-    from the values. If the values do not show them, pass columns and units. columns: {"t": "time", "ax": "accX", ...},
-    with the keys t, ax, ay, az, gx, gy, gz, and optionally speed, lat, lon, temp. units: {"a": "m/s2", "g": "rad/s",
-    "speed": "km/h"}; a - before a unit reverses the sign. start_s, end_s: the stretch to import, s from the recording's
-    own start. Raises InputError.
+    from the values. If the values do not show them, pass columns and units.
+
+    columns: {"t": "time", "ax": "accX", ...}, with the keys t, ax, ay, az, gx, gy, gz, and optionally speed, lat, lon,
+        temp.
+    units: {"a": "m/s2", "g": "rad/s", "speed": "km/h"}. A - before a unit reverses the sign.
+    start_s, end_s: the stretch to import, in s from the recording's own start.
+
+    Raises InputError.
 
     >>> import pathlib, tempfile
     >>> rows = [f"{10 * k},0.0,9.81,0.0,0.0,0.0,0.1" for k in range(300)]
@@ -148,8 +154,9 @@ def import_recording(
 
 
 def import_of_app(source: Path) -> Imported | None:
-    """Import a recording of a known app. Returns None if source is something else. Raises InputError for a folder or a
-    zip that cannot be read, and like import_recording()."""
+    """Import a recording of a known app. Return None if source is something else.
+
+    Raises InputError as import_recording() does, and for a folder or a zip that cannot be read."""
     try:
         files = read_files(source)
         of_apps = recordings(files)
@@ -220,8 +227,8 @@ def _recording(
 
 
 def recordings(files: list[RecordingFile]) -> list[tuple[Any, list[RecordingFile]]]:
-    """The recordings among some files, as (module in apps/, files of the recording). The module's NAME is the app's
-    name."""
+    """Return the recordings among some files, each as (module, files of the recording). The module is in apps/, and its
+    NAME is the app's name."""
     found, left = [], files
     for app in _APPS:
         for group in app.find_recordings(left):
@@ -254,7 +261,8 @@ def _note_sign(recording: AppRecording, sign: str) -> None:
 
 
 def _stretch(log: Log, start_s: float | None, end_s: float | None) -> Log:
-    """The log from start_s to end_s since the recording's own start; negative: before its end."""
+    """Return the log from start_s to end_s. Both count from the recording's own start; negative times count back from
+    its end."""
     since_us = np.rint((log.start_s + log.t_s) * 1e6)
     last_s = float(since_us[-1]) / 1e6
     start_s, end_s = (s if s is None or s >= 0.0 else max(0.0, s + last_s) for s in (start_s, end_s))

@@ -25,10 +25,13 @@ MOST_HZ = 10_000.0  # highest rate of an inertial sensor; the fastest have 8,000
 
 
 def join(recording: AppRecording, name: str) -> tuple[Log, int]:
-    """Return the log on the accelerometer's clock, beginning at the first sample, and the number of damaged rows that
-    are left out.
+    """Join the sensors on the accelerometer's clock. name: the recording's name in messages.
 
-    name: the recording's name in messages. Raises InputError if the sensors have no time in common.
+    Returns:
+        log: times count from the first sample.
+        damaged: number of damaged rows that are left out.
+
+    Raises InputError if the sensors have no time in common.
     """
     accel = in_order(recording.accel, name)
     gyro = in_order(recording.gyro, name)
@@ -86,7 +89,7 @@ def in_order(sensor: RecordedSensor, name: str) -> RecordedSensor:
 
 
 def _damaged(time_ns: Ints) -> Bools:
-    """(n) True for a time that fits neither its predecessor nor its successor, while these fit each other."""
+    """Find single wrong times, shape (n): the times before and after it fit each other, but not this time."""
     wrong = np.zeros(len(time_ns), dtype=bool)
     if len(time_ns) > 2:
         before, now, after = time_ns[:-2], time_ns[1:-1], time_ns[2:]
@@ -118,8 +121,8 @@ def on_clock(sensor: RecordedSensor, clock_ns: Ints, period_ns: float) -> Array:
 
 
 def _between(at: Array, since: Array, values: Array) -> Array:
-    """Interpolate values (n) at other times, along straight lines between values that are not NaN. NaN outside
-    these."""
+    """Interpolate values (n) linearly at other times, ignoring NaN. The result is NaN before the first and after the
+    last value."""
     there = ~np.isnan(values)
     if not np.any(there):
         return np.full(len(at), np.nan)
@@ -127,7 +130,7 @@ def _between(at: Array, since: Array, values: Array) -> Array:
 
 
 def _averaged(sensor: RecordedSensor, over_ns: float) -> Array:
-    """A sensor's values (n, 3), each averaged over over_ns around it."""
+    """Return a sensor's values (n, 3), each averaged over the time over_ns around it."""
     half = round(over_ns / 2.0)
     begin, end = (np.searchsorted(sensor.time_ns, sensor.time_ns + side, side="right") for side in (-half, half))
     sums = np.cumsum(np.vstack((np.zeros(3), np.nan_to_num(sensor.values))), axis=0)
@@ -139,11 +142,14 @@ def _averaged(sensor: RecordedSensor, over_ns: float) -> Array:
 def with_gravity(
     there: Container[str], sensor: Callable[[str], RecordedSensor], name: str, whose: str, remedy: str, none: str
 ) -> RecordedSensor:
-    """The accelerometer with gravity. there: which of "total" (with gravity), "user" (without gravity) and "gravity"
-    exist.
+    """Return the accelerometer with gravity.
 
-    sensor: a function that returns the sensor of one of these names. Raises InputError if only the acceleration without
-    gravity exists (whose: its name; remedy: what to do), or no acceleration at all (none: the message).
+    there: the existing sensors among "total" (with gravity), "user" (without gravity) and "gravity".
+    sensor: a function that returns the sensor of one of these names.
+    whose, remedy: the name and the advice for the message if only the acceleration without gravity exists.
+    none: the message if there is no acceleration at all.
+
+    Raises InputError in these two cases.
     """
     if "total" in there:
         return sensor("total")

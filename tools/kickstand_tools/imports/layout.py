@@ -43,8 +43,14 @@ _SEVERAL = re.compile(r"([A-Za-z][\w/ ]*?)\s*[:=]\s*((?:[+-]?\d+(?:\.\d+)?[\s,;]
 
 @dataclass(frozen=True)
 class Grid:
-    """Rows of cells. names: number of the line of names, None without such a line. first: number of the first row's
-    line. separator: separates the cells, " " for any blanks. comma: True for decimal commas. width: cells in a row."""
+    """The layout of a table's rows.
+
+    names: number of the line of names, None without such a line.
+    first: number of the first row's line.
+    separator: separates the cells, " " for any blanks.
+    comma: True for decimal commas.
+    width: number of cells in a row.
+    """
 
     names: int | None
     first: int
@@ -131,7 +137,8 @@ def find_grid(lines: Sequence[str]) -> Grid | None:
 
 
 def _rows(lines: Sequence[str], separator: str, comma: bool) -> tuple[int, int, Grid] | None:
-    """(number of rows, number of numbers, the grid) for cells that are separated in this way; None if they are not."""
+    """Return the number of rows, the number of numbers, and the grid for cells separated in this way. None if the cells
+    are not separated so."""
     number = _COMMA_NUMBER if comma else _NUMBER
     split = [split_row(line, separator) for line in lines]
     counts = [sum(bool(number.fullmatch(cell) or _WHEN.fullmatch(cell)) for cell in cells) for cells in split]
@@ -248,8 +255,8 @@ def _by_sensor(sheet: Sheet) -> Sheet:
 
 
 def _sensor_column(sheet: Sheet) -> int | None:
-    """The column that names the sensor of each row. It has few different texts, or numbers under a suitable name, which
-    change repeatedly."""
+    """Return the column that names the sensor of each row, or None. Its cells change repeatedly between a few texts, or
+    between a few numbers if the column's name is suitable."""
     for place, (name, values) in enumerate(zip(sheet.columns, sheet.cells)):
         if values.dtype.kind == "f" or (values.dtype.kind != "O" and not _SENSOR_ID.search(name.lower())):
             continue

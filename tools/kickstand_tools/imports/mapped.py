@@ -101,10 +101,12 @@ def read_mapped(
 ) -> AppRecording:
     """Read a table whose columns are known: t, ax to az, gx to gz and optionally speed, lat, lon and temp.
 
-    columns: for each of these keys, the column's name in the file or its number as #1, #2 ... units: by the keys t, a
-    (for ax to az) or ax, ay, az, g (for gx to gz) or gx, gy, gz, speed, lat, lon; a - before a unit reverses the sign.
-    A missing unit is read from the brackets in the column's name. why: the findings that gave the columns. Raises
-    InputError, also for units in which the rates do not turn gravity.
+    columns: for each of these keys, the column's name in the file, or its number as #1, #2 ...
+    units: by the keys t, a (for ax to az) or ax, ay, az, g (for gx to gz) or gx, gy, gz, speed, lat, lon. A - before a
+        unit reverses the sign. A missing unit is read from the brackets in the column's name.
+    why: the findings that gave the columns.
+
+    Raises InputError, for example if the rates do not explain the turns of gravity.
     """
     check_keys(columns, units)
     places = {key: _place(sheet, key, wanted) for key, wanted in columns.items()}
@@ -132,8 +134,8 @@ def read_mapped(
 
 
 def table_in(files: list[RecordingFile]) -> MappedTable | None:
-    """The table in these files. If the tables of several files do not belong together, the largest. None without a
-    table of sensors."""
+    """Return the table of sensors in these files, or None without one. If the tables of several files do not belong
+    together, return the largest."""
     largest = max(files, key=lambda file: len(file.text))
     sheet = sheet_in(largest)
     found = None if sheet is None else findings.find(sheet)
@@ -213,7 +215,8 @@ def unknown(files: list[RecordingFile], source: str, table: MappedTable | None =
 
 
 def _column_as_typed(table: MappedTable, key: str) -> str:
-    """The column of a key, as the user types it: the name, the number if the name would be misread, or ? if unknown."""
+    """Return the column of a key as the user types it: its name, or its number if the name would be misread. Return ?
+    if the column is unknown."""
     name = table.found.get(key, "?")
     if name != "?" and (any(mark in name for mark in ",=") or table.columns.count(name) > 1):
         return f"#{table.columns.index(name) + 1}"
@@ -275,14 +278,14 @@ def _with_counts(
 
 
 def _seconds(time_ns: Nanoseconds) -> Array:
-    """(n) seconds since the first time; NaN for no time."""
+    """Return the seconds since the first time, shape (n), NaN for a missing time."""
     good = time_ns > REPEATED
     return np.where(good, (time_ns - (time_ns[good][0] if np.any(good) else 0)) * 1e-9, np.nan)
 
 
 def _check_rates(name: str, seconds: Array, force: Array, rates: Array) -> None:
-    """Raise InputError if rates do not fit the turns of gravity: another unit fits, or the rates would turn gravity
-    while its direction is constant."""
+    """Raise InputError if rates do not fit the turns of gravity. Either another unit fits, or gravity's direction is
+    constant although the rates would turn it."""
     fit = fit_rates(seconds, force, rates)
     shown = float(np.degrees(fit.factor))
     if fit.decides and not 1.0 / _TIMES_OFF < shown < _TIMES_OFF:
@@ -302,8 +305,10 @@ def _speed(
     units: Mapping[str, str],
     degrees: tuple[float, float],
 ) -> tuple[int | None, str, list[Message]]:
-    """(column of the speed, its unit, notices). A missing unit is found from the positions. If they do not show it, the
-    speed is left out."""
+    """Return the number of the speed's column, its unit, and notices.
+
+    A missing unit is found from the positions. If they do not show it, the speed is left out: the number is None.
+    """
     place = places.get("speed")
     if place is None:
         return None, "m/s", []
@@ -329,13 +334,13 @@ def _place(sheet: Sheet, key: str, wanted: str) -> int:
 
 
 def _factors(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, str], axes: tuple[str, ...]) -> Array:
-    """(3) the factors of three axes to g or deg/s."""
+    """Return the factors of three axes to g or deg/s, shape (3)."""
     kinds = UNIT_KEYS[axes[0]]
     return np.array([factor(_unit(units, (axis, axis[0]), sheet.columns[places[axis]]), kinds, axis) for axis in axes])
 
 
 def _scaled(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, str], axes: tuple[str, ...]) -> Array:
-    """(n, 3) the readings of three axes in g or deg/s."""
+    """Return the readings of three axes in g or deg/s, shape (n, 3)."""
     return sheet.table([places[axis] for axis in axes]) * _factors(sheet, places, units, axes)
 
 

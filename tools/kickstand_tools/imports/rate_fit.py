@@ -1,10 +1,10 @@
 """Finds the unit of a gyro's rates from the turns of gravity, by least squares.
 
-At rest, and in a hand, the direction u of gravity turns in the sensor's axes by du/dt = u x rate. Over a window of
-WINDOW_S, the change of u is the integral of u x reading, times the unit's factor, plus the effect of a constant bias.
-In a vehicle, the force is not only gravity, so the rates explain it less well, and the factor is too small or not
-found. All 48 signed permutations of the gyro's axes are tried, because exchanged axes are another mistake, which is
-checked later.
+At rest and in a hand, the direction u of gravity turns in the sensor's axes by du/dt = u x rate. So over a window of
+WINDOW_S, the change of u has two parts: the integral of u x reading, times the unit's factor, and the effect of a
+constant bias. In a vehicle the force is not only gravity. Then the rates explain it less well, and the factor is too
+small or not found. All 48 signed permutations of the gyro's axes are tried: exchanged axes are another mistake, which
+is checked later.
 """
 
 from collections.abc import Mapping
@@ -24,16 +24,21 @@ EXPLAINED = 0.5  # least share of the turns' variance that the rates must explai
 # with this share, units that differ by a factor of 2 can be distinguished, as the ranges of raw counts do
 CLEARLY = 0.9
 FEWEST = 8  # least number of windows
-# Gravity keeps its direction over TURNED_S if the mean of its unit vectors is at least KEPT_DIRECTION long. In that
-# case, the mean rate across gravity may be a turn of at most MOST_TURNED degrees; the largest bias of the data sheet,
-# 20 deg/s, makes 80 degrees
+# Gravity keeps its direction over TURNED_S if the mean of its unit vectors is at least KEPT_DIRECTION long. Then the
+# mean rate across gravity must not amount to a turn of over MOST_TURNED degrees in this time. The data sheet's largest
+# bias, 20 deg/s per axis, amounts to less.
 TURNED_S, KEPT_DIRECTION, MOST_TURNED = 2.0, 0.97, 120.0
 
 
 @dataclass
 class RateFit:
-    """factor: rad/s in one unit of the readings. explained: explained share of the turns' variance. turn: rad, rms
-    of gravity's turn in a window. unturned: rad, rms of the turn if the readings were in rad/s."""
+    """The result of fit_rates().
+
+    factor: rad/s in one unit of the readings.
+    explained: explained share of the turns' variance.
+    turn: root mean square of gravity's turn in a window, in rad.
+    unturned: root mean square of the turn that readings in rad/s would cause, in rad.
+    """
 
     factor: float = 0.0
     explained: float = 0.0
@@ -58,8 +63,9 @@ class RateFit:
 
 
 def fit_rates(seconds: Array, force: Array, rates: Array) -> RateFit:
-    """Fit rates to forces. seconds (n), force (n, 3, any unit), rates (n, 3, any unit); NaN is interpolated per sensor,
-    so each sensor may have its own rows."""
+    """Fit rates to forces. seconds: (n). force, rates: (n, 3) in any unit.
+
+    NaN is interpolated in each sensor, so each sensor may have its own rows."""
     cells = _in_cells(seconds, force, rates)
     if cells is None:
         return RateFit()
@@ -132,7 +138,8 @@ def _steady(u: Array) -> bool:
 
 
 def _in_cells(seconds: Array, force: Array, rates: Array) -> tuple[Array, Array] | None:
-    """Average force and rates over even cells, (m, 3) each. None if they are too short."""
+    """Return the means of force and rates in cells of CELL_S, each of shape (m, 3). None if the stretch is too
+    short."""
     there = np.isfinite(seconds)
     seconds, force, rates = seconds[there], force[there], rates[there]
     if len(seconds) < 4:

@@ -23,8 +23,13 @@ _ABSURD = 1e6  # g or deg/s: a larger value is a damaged cell
 
 @dataclass
 class Sheet:
-    """name: the file's name in messages. columns: the columns' names in the file; a name may occur twice. cells: the
-    cells of each column. left_out: number of damaged rows."""
+    """A table as columns.
+
+    name: the file's name in messages.
+    columns: the columns' names in the file. A name may occur twice.
+    cells: the cells of each column.
+    left_out: number of damaged rows.
+    """
 
     name: str
     columns: list[str]
@@ -38,15 +43,19 @@ class Sheet:
         return next((found.index(name) for name in wanted if name in found), None)
 
     def axes(self, *names: str | tuple[str, ...]) -> tuple[list[int], list[str]]:
-        """place() for each name, or for the first that exists of several alternatives. Also returns the (first) names
-        of missing columns."""
+        """Return place() of each name, and the names of missing columns.
+
+        A name may be a tuple of alternatives. Then the first existing one counts; if all are missing, the first name is
+        returned as missing."""
         each = [name if isinstance(name, tuple) else (name,) for name in names]
         found = {one[0]: self.place(*one) for one in each}
         places = [place for place in found.values() if place is not None]
         return places, [name for name, place in found.items() if place is None]
 
     def times(self, place: int, unit: str = "s") -> Nanoseconds:
-        """A column as times (n). unit: the unit of numbers, "" to find the unit from the numbers. Raises InputError."""
+        """Return a column as times, shape (n). Raises InputError.
+
+        unit: the unit of numbers, or "" to find it from the numbers."""
         return times_ns(self.cells[place], unit, self.name)
 
     def named(self, places: list[int]) -> str:
@@ -59,13 +68,13 @@ class Sheet:
         return f"{self.name}: {', '.join(names)}"
 
     def numbers(self, place: int | None) -> Array:
-        """A column as numbers (n), NaN for a cell without a number; all NaN if place is None."""
+        """Return a column as numbers, shape (n), NaN for a cell without a number. All are NaN if place is None."""
         if place is None:
             return np.full(len(self.cells[0]), np.nan)
         return numbers_of(self.cells[place]).astype(float)
 
     def table(self, places: list[int]) -> Array:
-        """Several columns as numbers (n, columns)."""
+        """Return several columns as numbers, shape (n, columns)."""
         return np.column_stack([self.numbers(place) for place in places])
 
 
@@ -135,10 +144,16 @@ def rate_hz(time_ns: Nanoseconds) -> float:
 
 @dataclass
 class RecordedSensor:
-    """n samples. time_ns (n): the recorder's clock. values (n, 3): g, +1 along the axis that points up at rest, or
-    deg/s, right-handed. name: name in messages. damaged: number of rows of the file that are left out, because they
-    have too many cells, or a time or value that cannot be read. A row without values belongs to another sensor. taken:
-    the source."""
+    """n samples of an accelerometer or a gyro.
+
+    name: name in messages.
+    time_ns: times of the recorder's clock, shape (n).
+    values: shape (n, 3). Accelerations are in g, +1 along the axis that points up at rest. Rates are in deg/s,
+        right-handed.
+    damaged: number of rows that are left out because they have too many cells, or a time or value that cannot be read.
+        A row without values does not count, because it belongs to another sensor.
+    taken: the source.
+    """
 
     name: str
     time_ns: Nanoseconds
@@ -172,7 +187,8 @@ def sensor_of(
 
 @dataclass
 class ReceiverTrack:
-    """A satellite receiver's m values on the recorder's clock: speed in m/s, degrees north and east; NaN if missing."""
+    """The m values of a satellite receiver on the recorder's clock: speed in m/s, position in degrees north and east. A
+    missing value is NaN."""
 
     time_ns: Nanoseconds
     speed_mps: Array
@@ -226,11 +242,13 @@ def track_of(
 
 @dataclass
 class AppRecording:
-    """app: the app's name. utc_ns: UTC minus the recorder's clock, ns since 1970; None if unknown.
+    """The sensors of one recording.
 
+    app: the app's name.
+    utc_ns: UTC in ns since 1970, minus the recorder's clock. None if unknown.
     vehicle_axes: True if x already points left, y up and z forward on the vehicle, provided that the logger was mounted
-    as its maker requires. sign_known: True if the app's maker or its files show that up reads +1 g at rest. False if
-    this is only likely.
+        as its maker requires.
+    sign_known: True if the app's maker or its files show that up reads +1 g at rest. False if this is only likely.
     """
 
     app: str

@@ -34,8 +34,10 @@ def unit_by_positions(
     lon: int | None,
     per_degree: tuple[float, float] = (1.0, 1.0),
 ) -> str:
-    """The unit in which the speeds fit the changes of position; "" if several units or none fit. speed, lat, lon:
-    numbers of columns. per_degree: factors from the columns to degrees of latitude and longitude."""
+    """Return the unit in which the speeds fit the changes of position, or "" if several units or none fit.
+
+    speed, lat, lon: numbers of columns. per_degree: factors from the columns to degrees of latitude and longitude.
+    """
     if lat is None or lon is None:
         return ""
     moved = _moved_mps(time_ns, sheet.numbers(lat) * per_degree[0], sheet.numbers(lon) * per_degree[1])
@@ -50,7 +52,7 @@ def unit_by_positions(
 
 
 def _moved_mps(time_ns: Nanoseconds, lat: Array, lon: Array) -> Array:
-    """(n) mean speed from the positions over about a second before each row; NaN if unknown."""
+    """Return the mean speed from the positions over about a second before each row, shape (n). NaN if unknown."""
     steps = np.diff(time_ns)
     back = max(1, round(SECOND_NS / max(float(np.median(steps)), 1.0))) if len(steps) else 1
     apart_s = np.full(len(time_ns), np.nan)

@@ -89,9 +89,9 @@ def counts_per(text: str) -> float:
 
 
 def times_ns(cells: Cells, unit_name: str = "", where: str = "the recording") -> Nanoseconds:
-    """Times (n) in ns, NO_TIME for a cell without a time.
+    """Return the times of cells in ns, shape (n), NO_TIME for a cell without a time.
 
-    unit_name: unit of numbers, "" to find the unit from their size and steps. where: name of the times in messages.
+    unit_name: unit of numbers, or "" to find it from their size and steps. where: name of the times in messages.
     Raises InputError if few cells are times.
     """
     numbers = numbers_of(cells)
@@ -111,7 +111,8 @@ def times_ns(cells: Cells, unit_name: str = "", where: str = "the recording") ->
 
 
 def _date_ns(text: str) -> int:
-    """Nanoseconds since 1970 of a date in ISO 8601, in UTC without a zone; a blank before the zone is accepted."""
+    """Return the nanoseconds since 1970 of a date in ISO 8601. Without a zone it is UTC. A blank before the zone is
+    accepted."""
     try:
         plain = _DAY.sub(lambda day: f"{day[1]}-{int(day[2]):02d}-{int(day[3]):02d}", text.strip())
         plain = _THOUSANDTHS.sub(r"\1.\2", plain)
@@ -124,7 +125,8 @@ def _date_ns(text: str) -> int:
 
 
 def time_unit(cells: Cells, given: str = "") -> str:
-    """The unit of times, found from their size and steps if not given; "date or clock" for dates and clocks."""
+    """Return the unit of times. If it is not given, find it from their size and steps. Dates and clocks return "date or
+    clock"."""
     numbers = numbers_of(cells)
     if np.count_nonzero(np.isfinite(numbers)) <= np.count_nonzero(filled(cells)) // 2:
         return DATES
@@ -137,7 +139,7 @@ def of_seconds(seconds: Array) -> Nanoseconds:
 
 
 def of_day(clock: Array) -> Nanoseconds:
-    """The time of day HHMMSS.SS as numbers (n), in ns; after midnight a day is added."""
+    """Return times of day in ns. clock: numbers of the form HHMMSS.SS, shape (n). After midnight a day is added."""
     whole = np.floor(clock)
     return _after_midnight(whole // 10000 * 3600.0 + whole // 100 % 100 * 60.0 + whole % 100 + (clock - whole))
 

@@ -40,8 +40,8 @@ class Difference:
     rms_deg: rms of the difference.
     constant_deg: mean of the difference, caused by poses and mounts.
     moving_deg: rms of the difference without its mean.
-    p95_deg, worst_deg: 95 % of the absolute differences without the mean are below the first value, all within the
-        second.
+    p95_deg: 95 % of the absolute differences without the mean are below this value.
+    worst_deg: the largest absolute difference without the mean.
     slope: B's lean divided by A's lean, None if the ride leans too little.
     delay_s: delay of B's lean in s, None if the ride leans too little.
     expected_deg: the rms predicted by both standard deviations.
@@ -63,9 +63,14 @@ class Difference:
 
 @dataclass
 class Agreement:
-    """The agreement of rides A and B. live: Difference of the displayed leans while both devices show one; None without
-    such a time. smoothed: Difference of the smoothed leans. t_s (n): s since A's first sample. The leans (n, degrees)
-    at these times, NaN if unknown. names: the names of A's and B's logs."""
+    """The agreement of rides A and B.
+
+    live: Difference of the displayed leans while both devices show one. None without such a time.
+    smoothed: Difference of the smoothed leans.
+    t_s: seconds since A's first sample, shape (n).
+    The leans at these times are in degrees, shape (n), NaN if unknown.
+    names: the names of A's and B's logs.
+    """
 
     clocks: Clocks
     live: Difference | None
@@ -202,7 +207,8 @@ def _interpolated(t_s: Array, values: Array, at_s: Array) -> Array:
 
 
 def _lean_while_riding(ride: SmoothedRide | Any, at_s: Array, riding: Bools) -> tuple[Array, Array]:
-    """Lean and its standard deviation (n, degrees). NaN if one of them is unknown, or the bike is not riding."""
+    """Return the lean and its standard deviation in degrees, both of shape (n). Both are NaN if one of them is unknown,
+    or the bike is not riding."""
     lean, sigma = (_interpolated(ride.t_s, values, at_s) for values in (ride.lean_deg, ride.lean_sigma_deg))
     known = riding & ~np.isnan(sigma)
     return np.where(known, lean, np.nan), np.where(known, sigma, np.nan)

@@ -82,18 +82,19 @@ def clocks(a: CellMotion, b: CellMotion, axes_a: CalibrationFile, axes_b: Calibr
 
 
 def _size(motion: CellMotion) -> Array:
-    """(n) the magnitude of the rates minus its mean, deg/s."""
+    """Return the magnitude of the rates minus its mean, in deg/s, shape (n)."""
     size = moving_mean(np.minimum(np.linalg.norm(motion.rate_dps, axis=1), _MOST_DPS), _SMOOTH)
     return size - np.mean(size[motion.there])
 
 
 def _along(motion: CellMotion, axes: Array) -> Array:
-    """(n, 3) rates about the rows of axes (3, 3), smoothed."""
+    """Return the smoothed rates about the rows of axes (3, 3), shape (n, 3)."""
     return moving_mean(np.clip(motion.rate_dps @ axes.T, -_MOST_DPS, _MOST_DPS), _SMOOTH)
 
 
 def _rotation(a: CellMotion, b: CellMotion, later_s: float) -> Array:
-    """(3, 3): the rotation from B's axes to A's that brings B's rates nearest to A's rates (Kabsch's algorithm)."""
+    """Return the rotation from B's axes to A's, shape (3, 3), that brings B's rates nearest to A's (Kabsch's
+    algorithm)."""
     both = _valid_at(b, a.t_s - later_s) & a.there
     one, other = _along(a, np.eye(3))[both], _interpolated_at(b.t_s, _along(b, np.eye(3)), a.t_s[both] - later_s)
     left, _, right = np.linalg.svd((one - one.mean(axis=0)).T @ (other - other.mean(axis=0)))

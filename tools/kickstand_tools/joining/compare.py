@@ -29,12 +29,15 @@ class Comparison:
         self._edges_s = np.arange(len(motion.there) + 1) * STEP_S
 
     def turned(self, shift_s: float, drift: float = 0.0, axes: int = 3) -> Array:
-        """(axes, p, STEPS): the ride's rotation about its up and two axes across it, degrees, comparable with
-        Segments.turned_deg. drift: seconds per second that the ride's clock loses against the track's."""
+        """Return the ride's rotation about its up and about two axes across it, in degrees, shape (axes, p, STEPS).
+
+        Compare it with Segments.turned_deg. drift: seconds per second that the ride's clock loses against the
+        track's."""
         return self._means(range(axes), shift_s, drift, self.given.course_weight)
 
     def sped_up(self, shift_s: float, drift: float = 0.0) -> Array:
-        """(3, p, STEPS): the integral of the force along the sensor's axes, m/s, comparable with Segments.speed_mps."""
+        """Return the integral of the force along the sensor's axes, in m/s, shape (3, p, STEPS). Compare it with
+        Segments.speed_mps."""
         return self._means(range(3, 6), shift_s, drift, self.given.speed_weight)
 
     def _means(self, columns: range, shift_s: float, drift: float, weight: Array) -> Array:
@@ -50,11 +53,11 @@ class Comparison:
 
 
 def _double_sums(motion: CellMotion, course: Course, shift_s: float) -> Array:
-    """(n + 1, 6): integrals over time of the rotation (degrees; about up and two axes across it) and of the integrated
-    force (m/s; the sensor's axes). Differences of these integrals give means between two times.
+    """Return six integrals over time, shape (n + 1, 6). Their differences give means between two times.
 
-    The rate about up is the yaw rate times the cosine of the lean. The lean of a balanced bike follows from the track's
-    speed and the yaw rate.
+    The first three are of the rotation about up and two axes across it, in degrees. The others are of the integrated
+    force along the sensor's axes, in m/s. The rate about up is the yaw rate times the cosine of the lean. The lean of a
+    balanced bike follows from the track's speed and the yaw rate.
     """
     up = motion.up
     across = np.asarray(np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))]), dtype=float)
@@ -74,5 +77,5 @@ def _double_sums(motion: CellMotion, course: Course, shift_s: float) -> Array:
 
 
 def _sums(values: Array) -> Array:
-    """(n + 1, k) integrals of values (n, k) from the first edge to each edge."""
+    """Return the integrals of values (n, k) from the first edge to each edge, shape (n + 1, k)."""
     return np.vstack((np.zeros(values.shape[1]), np.cumsum(values * STEP_S, axis=0)))

@@ -96,8 +96,8 @@ def _try_shifts(compared: Comparison, rough_s: float) -> tuple[float, float, flo
 
 
 def _costs(compared: Comparison, shift_s: float, drift: float, along: Array) -> Array:
-    """(shifts, p) the cost of each segment at each of _SHIFTS around a shift. along: coefficients of the ride's
-    rotations about the three axes."""
+    """Return the cost of each segment at each of _SHIFTS around a shift, shape (shifts, p). along: coefficients of the
+    ride's rotations about the three axes."""
     given = compared.given
     return np.array(
         [
@@ -108,7 +108,8 @@ def _costs(compared: Comparison, shift_s: float, drift: float, along: Array) -> 
 
 
 def _cost(given: Segments, error_deg: Array) -> Array:
-    """(p) minus the log-likelihood of the errors (p, STEPS) of each segment, by Student's distribution."""
+    """Return minus the log-likelihood of each segment's errors, shape (p), by Student's distribution. error_deg: shape
+    (p, STEPS)."""
     square = error_deg * error_deg * given.course_weight
     return 0.5 * (_FREEDOM + 1.0) * np.log1p(square / _FREEDOM).sum(axis=1)
 
@@ -117,8 +118,9 @@ def _cost(given: Segments, error_deg: Array) -> Array:
 class _Step:
     """The linearisation at one state of the seven unknowns: shift, drift, tilt (2), the sensor's forward axis (3).
 
-    model_deg (p, STEPS): the predicted courses. pulls (p, 7): the gradient of each segment's cost. inverse (7, 7): the
-    inverse of the normal matrix.
+    model_deg: the predicted courses, shape (p, STEPS).
+    pulls: the gradient of each segment's cost, shape (p, 7).
+    inverse: the inverse of the normal matrix, shape (7, 7).
     """
 
     model_deg: Array
@@ -185,14 +187,15 @@ def _with_sigma(compared: Comparison, evidence: float, now: Array, step: _Step) 
 
 
 def _least(columns: Array, values: Array, weight: Array) -> Array:
-    """(k) the coefficients of columns (k, p, STEPS) that fit values best, by weighted least squares."""
+    """Return the coefficients of columns that fit values best, by weighted least squares, shape (k). columns: shape
+    (k, p, STEPS)."""
     root = np.sqrt(weight)
     found = np.linalg.lstsq((columns * root).reshape(len(columns), -1).T, (values * root).ravel(), rcond=None)[0]
     return np.asarray(found, dtype=float)
 
 
 def _robust_weights(error: Array, weight: Array) -> Array:
-    """(p, STEPS) the weight of each error: by its variance, reduced for outliers."""
+    """Return the weight of each error by its variance, reduced for outliers, shape (p, STEPS)."""
     scaled = error * np.sqrt(weight)
     usual = max(float(np.median(np.abs(scaled[weight > 0.0]))) / 0.6745, _LEAST_ERROR)
     return weight / usual**2 * (1.0 + 1.0 / _FREEDOM) / (1.0 + (scaled / usual) ** 2 / _FREEDOM)

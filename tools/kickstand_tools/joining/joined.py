@@ -27,7 +27,7 @@ _FORMAT = {SPEED: "%.3f", "lat_deg": "%.7f", "lon_deg": "%.7f", "utc_s": "%.3f"}
 
 @dataclass
 class Joined:
-    """A ride, its track, and their Match. own_speed: True if the log has a speed, which is kept."""
+    """A ride, its track, and their Match. own_speed: True if the log already has a speed. Then this speed is kept."""
 
     ride: Source
     track: Track
@@ -37,7 +37,7 @@ class Joined:
 
     @property
     def columns(self) -> dict[str, Array]:
-        """The track's values, (m) points each, by the names of the log's columns."""
+        """Return the track's values by the names of the log's columns, each of shape (m)."""
         track = self.track
         values = {SPEED: track.speeds_mps(), "lat_deg": track.lat_deg, "lon_deg": track.lon_deg, "utc_s": track.utc_s}
         return {name: value for name, value in values.items() if name != SPEED or not self.own_speed}

@@ -30,10 +30,15 @@ _MOST_SIGMA_S = 0.3
 
 @dataclass
 class Match:
-    """start_utc_s: the track's time at the ride's first sample, s since 1970. It includes the receiver's
-    delay, so that positions are where the bike is. drift: seconds per second that the ride's clock loses. sigma_s:
-    standard deviation of the match. correlation: correlation of the changes of course, 0 to 1. common_s: time covered
-    by both, s."""
+    """The time of a track in a ride.
+
+    start_utc_s: the track's time at the ride's first sample, in s since 1970. It is corrected for the receiver's delay,
+        so positions are where the bike is.
+    drift: seconds per second that the ride's clock loses.
+    sigma_s: standard deviation of start_utc_s.
+    correlation: correlation of the changes of course, 0 to 1.
+    common_s: time that ride and track have in common, in s.
+    """
 
     start_utc_s: float
     drift: float
@@ -108,7 +113,7 @@ def _check_turns(motion: CellMotion, steps: Course) -> None:
 
 
 def _rough_shifts(motion: CellMotion, steps: Course) -> tuple[bool, list[float]]:
-    """(True if the ride would fit better with the opposite sign of yaw, the shifts that fit best)."""
+    """Return True if the ride would fit better with the opposite sign of yaw, and the shifts that fit best."""
     of_track, track_good = _changes_of_track(steps)
     of_ride, ride_good = _changes_of_ride(motion)
     found, count = correlations(of_track, track_good, of_ride, ride_good)
@@ -121,8 +126,9 @@ def _rough_shifts(motion: CellMotion, steps: Course) -> tuple[bool, list[float]]
 
 
 def _changes_of_track(steps: Course) -> tuple[Array, Bools]:
-    """The change of course within _SPAN_S, every _GRID_S, degrees, as the gyro of a leaning bike would measure it; and
-    True where it is known."""
+    """Return two arrays with a value every _GRID_S: the change of course within _SPAN_S, and True where it is known.
+
+    The change is in degrees, as the gyro of a leaning bike would measure it."""
     middle_s, at_s = (steps.begin_s + steps.end_s) / 2.0, np.arange(0.0, steps.end_s[-1], _GRID_S)
     half = _SPAN_S / 2.0
     heading = np.cumsum(steps.turn_deg)
