@@ -179,7 +179,8 @@ TOOL_ARROWS = {
 
 
 def modules():
-    """(folder, path) of each module. A module outside any folder has its own name instead."""
+    """Yield the folder and the path of each module. For a module outside any folder, its own name replaces the
+    folder."""
     package = firmware_path.PACKAGE
     for path in sorted(package.rglob("*.py")):
         place = path.relative_to(package)
@@ -187,7 +188,8 @@ def modules():
 
 
 def imports(path, package=None):
-    """(module below kickstand, True if imported within a function) of each import of the firmware's own modules."""
+    """Yield each import of the firmware's own modules: the module's name below kickstand, and True if the import is
+    within a function."""
     package = package or firmware_path.PACKAGE
     folders = path.relative_to(package).parts[:-1]
     tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -332,7 +334,7 @@ def is_below(name, place):
 
 
 def tool_arrows(modules):
-    """(folder, its imports from other folders) of these modules."""
+    """Yield the folder of each module, and its imports from other folders."""
     for name, targets in modules.items():
         folder = shortened(name).partition(".")[0]
         yield from ((folder, shortened(target)) for target in targets if not is_below(shortened(target), folder))

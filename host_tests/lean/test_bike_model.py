@@ -36,7 +36,7 @@ def random_state(chance):
 
 
 def equations(x, force, rate):
-    """(1)-(3) and expected (4), (5) and (6) at x, by the model's own step: 6 values."""
+    """Return the rates of change (1) to (3) and the expected (4) to (6) at x, by the model's own step: 6 values."""
     after, sums = list(x), [0.0] * 9
     predict(after, force, rate, STEP_S, sums)
     motion = [(after[i] - x[i]) / STEP_S for i in (LEAN, PITCH, SPEED)]
@@ -45,7 +45,7 @@ def equations(x, force, rate):
 
 
 def numerical(x, force, rate):
-    """(6, STATES): the partial derivatives of equations()."""
+    """Return the partial derivatives of equations(), shape (6, STATES)."""
     out = np.empty((6, STATES))
     for i in range(STATES):
         more, less = x.copy(), x.copy()
@@ -56,7 +56,7 @@ def numerical(x, force, rate):
 
 
 def linearised(x, force, rate):
-    """(6, STATES) by the rows of the model, and the corrected rates that it was given."""
+    """Return the model's derivatives, shape (6, STATES), and the corrected rates that it used."""
     sums = [0.0] * 9
     predict(list(x), force, rate, STEP_S, sums)
     model = Linearisation(list(x), sums[2:5], sums[7])
@@ -68,7 +68,7 @@ def linearised(x, force, rate):
 
 
 def left_out(x, rates):
-    """(6, STATES): the terms that the model omits because pitch and yaw error are small."""
+    """Return the terms that the model omits because pitch and yaw error are small, shape (6, STATES)."""
     (t, q, v), y = x[:3], x[YAW_ERROR]
     wx, wy, _ = rates
     s, c, tan = math.sin(t), math.cos(t), math.tan(q)
@@ -122,7 +122,8 @@ def test_the_state_stays_within_its_bounds():
 @pytest.mark.parametrize("lean", [-0.6, 0.0, 0.6])
 @pytest.mark.parametrize("pitch", [-0.2, 0.2])
 def test_pitch_seen_by_the_yaw_error_is_not_lean(lean, pitch):
-    """(7): the vertical along the bike's axes, then along those of a sensor that is turned about up."""
+    """The test takes the vertical along the bike's axes, rotates it into the axes of a sensor that is turned about up,
+    and computes lean and pitch there. (7) must give the bike's lean."""
     yaw_error = 0.1
     left, up, forward = math.cos(pitch) * math.sin(lean), math.cos(pitch) * math.cos(lean), math.sin(pitch)
     s, c = math.sin(yaw_error), math.cos(yaw_error)

@@ -50,7 +50,8 @@ TOLERANCE = 0.001  # beyond the four digits of known_ride.csv
 
 
 def states():
-    """(seconds, lean in degrees, speed in m/s, slope in degrees; their rates of change; measured) at every 10 ms."""
+    """Yield one tuple per 10 ms: time in s, lean in degrees, speed in m/s, slope in degrees, the rates of change of
+    these three, and whether the speed is measured."""
     t_s, before = 0.0, (3, 0, 2)
     for seconds, *after, measured in LEGS:
         rates = [(b - a) / seconds for a, b in zip(before, after)]

@@ -16,7 +16,9 @@ DT_US = 1_000_000 // HZ
 
 
 def balanced(seconds, lean, speed):
-    """(n, 3) force in g and rate in rad/s of a bike in balance on a level road; lean (rad), speed (m/s): n each."""
+    """Return force (n, 3, in g) and rate (n, 3, in rad/s) of a bike in balance on a level road.
+
+    lean: (n) or one value, rad. speed: (n) or one value, m/s."""
     t = np.arange(int(seconds * HZ)) / HZ
     yaw = np.where(speed > 1.0, -GRAVITY_MPS2 * np.tan(lean) / np.maximum(speed, 1.0), 0.0)
     left = speed * yaw / GRAVITY_MPS2

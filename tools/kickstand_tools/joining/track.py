@@ -37,8 +37,9 @@ class Track(Table):
     name: str
 
     def speeds_mps(self) -> Array:
-        """(n) the file's speeds. If the file has none, the mean speeds over the neighbouring points; NaN if a speed is
-        within the positions' errors, or over a jump or a gap."""
+        """Return the file's speeds, shape (n). If the file has none, return mean speeds over the neighbouring points.
+
+        Such a speed is NaN over a jump or a gap, or if it is not larger than the positions' errors."""
         if np.any(np.isfinite(self.speed_mps)):
             return self.speed_mps
         speed = np.full(len(self.utc_s), np.nan)
@@ -60,7 +61,7 @@ class Track(Table):
         return Track(*(values[first] for values in self.columns().values()), name=self.name)
 
     def steps_m(self) -> tuple[Array, Array]:
-        """(n - 1) metres east and (n - 1) metres north of each point from the previous one."""
+        """Return how far each point is east and north of the previous one, in metres, two arrays of shape (n - 1)."""
         return distance_m(self.lat_deg[:-1], self.lon_deg[:-1], self.lat_deg[1:], self.lon_deg[1:])
 
 
@@ -104,9 +105,13 @@ class Segments(Table):
     """p segments of up to STEPS successive good steps. All arrays are (p, STEPS). Weights are 0 beyond the end of a
     shorter segment.
 
-    begin_s, end_s: times of each step, s since the track's first point. turned_deg: course of each step minus the
-    course of the segment's first step, > 0 to the left. course_weight: 1/deg2. speed_mps; speed_weight: 1 or 0. Mean
-    and trend of turned_deg and speed_mps are subtracted.
+    begin_s, end_s: times of each step, in s since the track's first point.
+    turned_deg: course of each step minus the course of the segment's first step, > 0 to the left.
+    course_weight: weight of turned_deg, in 1/deg2.
+    speed_mps: speed in each step.
+    speed_weight: weight of speed_mps, 1 or 0.
+
+    Mean and trend of turned_deg and speed_mps are subtracted.
     """
 
     begin_s: Array
@@ -118,7 +123,7 @@ class Segments(Table):
 
     @property
     def middle_s(self) -> Array:
-        """(p, STEPS) time of the middle of each step."""
+        """Return the time of the middle of each step, shape (p, STEPS)."""
         return (self.begin_s + self.end_s) / 2.0
 
 

@@ -51,9 +51,10 @@ def cells_of(line: str, separator: str = ",") -> list[str]:
 
 
 def numbers_in(text: bytes, count: int) -> Array | None:
-    """(n, count) the numbers in n lines of `count` cells, NaN for an empty cell. The values equal those of float().
+    """Return the numbers in n lines of `count` cells, shape (n, count), NaN for an empty cell. They equal those of
+    float().
 
-    None if the text is not n lines of `count` plain numbers. The caller must then use another reader.
+    Return None if the text is not n lines of `count` plain numbers. Then the caller must use another reader.
     """
     if text.translate(None, _PLAIN) or not text.strip(b"\n"):
         return None

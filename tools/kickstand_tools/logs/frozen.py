@@ -56,8 +56,8 @@ class FrozenFinder:
         self._stretches: list[tuple[float, float]] = []
 
     def mark(self, time_us: Ints, readings: Array) -> Bools:
-        """(n) True where readings (n, 7), as in a Block, are frozen. The first of several equal readings counts as
-        measured."""
+        """Return True for each frozen reading, shape (n). readings: (n, 7), as in a Block. The first of several equal
+        readings counts as measured."""
         n = len(time_us)
         values, time_s = np.vstack((self._last, readings[:, _MOTION])), time_us.astype(float) * 1e-6
         time_s = np.concatenate(([self._last_s], time_s)) if len(self._last) else time_s

@@ -136,12 +136,12 @@ class Log(Table):
 
     @property
     def time_us(self) -> Ints:
-        """(n) microseconds since the first sample, the firmware's unit."""
+        """The time since the first sample in microseconds, the firmware's unit, shape (n)."""
         return np.rint(self.t_s * 1e6).astype(np.int64)
 
     @property
     def readings(self) -> Array:
-        """(n, 7) the samples in the form of from_readings()."""
+        """The samples in the form of from_readings(), shape (n, 7)."""
         return np.column_stack((self.accel_g, self.temperature_c, self.gyro_dps))
 
     @property
@@ -198,7 +198,7 @@ class Block(Table):
 
     @property
     def t_s(self) -> Array:
-        """(n) seconds since the log's first sample."""
+        """The time since the log's first sample in s, shape (n)."""
         return self.time_us.astype(float) * 1e-6
 
     @property
@@ -254,8 +254,8 @@ class Stretch:
         return Stretch(self.source, *times)
 
     def holds(self, block: Block) -> Bools:
-        """(n) True for the samples of a block of the whole log that are in the stretch. Both times of the stretch must
-        count from the log's start."""
+        """Return True for each sample of a block that is in the stretch, shape (n). The block must be of the whole log.
+        Both times of the stretch must count from the log's start."""
         begin_us, end_us = self._ends_us()
         return (block.time_us >= begin_us) & (block.time_us <= end_us)
 

@@ -89,8 +89,8 @@ def _in_folder(name: str, files: list[RecordingFile]) -> str:
 
 
 def _recordings_among(files: list[RecordingFile]) -> Iterator[tuple[str, list[RecordingFile]]]:
-    """(name, its files) of each recording among single files: the name is that of a folder if there are several
-    files."""
+    """Yield the name and the files of each recording among single files. A recording of several files gets a folder as
+    its name."""
     found = recordings(files)
     used = {id(file) for _, group in found for file in group}
     for app, group in found:

@@ -58,7 +58,7 @@ def lag_ms(shown: NDArray, true: NDArray, rate_hz: float) -> float:
 
 
 def straights(truth: dict[str, NDArray], rate_hz: float) -> NDArray[np.bool_]:
-    """(N,) True where the bike has ridden straight ahead for at least a second, at over 5 m/s."""
+    """Return True where the bike has ridden straight ahead for at least a second at over 5 m/s, shape (n)."""
     now = (
         (np.abs(truth["yaw_rate_dps"]) < _STRAIGHT_DPS)
         & (np.abs(truth["lean_deg"]) < _STRAIGHT_DEG)
