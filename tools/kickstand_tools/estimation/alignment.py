@@ -161,7 +161,7 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
         raise RefusedInput(misfit, log.name)
     step_s = float(log.t_s[-1]) / (len(log.t_s) - 1)
     if step_s * SLOWEST_HZ > 1.0:
-        raise InputError(f"{log.name}: a sample every {step_s:.2f} s: at least {SLOWEST_HZ:.0f} a second are needed")
+        raise InputError(f"{log.name}: a sample every {step_s:.2f} s: at least {SLOWEST_HZ:.0f} per second are needed")
     try:
         windows = mounted_windows(log)
         guess = axes(windows)

@@ -143,7 +143,7 @@ def _checked_blocks(
     whole, stretch = split_stretch(log)
     for block, found in smooth_blocks(whole, calibration, progress, notices):
         if found is None:
-            raise InputError(f"{name_of(log)}: under {SLOWEST_HZ:.0f} samples a second: too few to smooth the lean")
+            raise InputError(f"{name_of(log)}: under {SLOWEST_HZ:.0f} samples per second: too few to smooth the lean")
         yield from within(stretch, block, found)
 
 
