@@ -5,8 +5,8 @@
     python3 tools/dev.py test         ruff, pyright and the tests; further arguments go to pytest
     python3 tools/dev.py mutants imu  lists the single changes of a package's code that its tests do not notice
 
-They create .venv beside pyproject.toml and install the project in it. They install again only if pyproject.toml has
-changed.
+Each command creates .venv beside pyproject.toml, and installs the project in it. It installs again only if
+pyproject.toml has changed.
 """
 
 import hashlib
@@ -28,7 +28,7 @@ COMPILE = "from kickstand_emulator import native; native.build()"  # the emulate
 
 
 class SetupStopped(Exception):
-    """Set-up cannot continue. The text is one line: the reason, and what to do."""
+    """The set-up cannot continue. The text is one line: the reason, and what to do."""
 
 
 def main(arguments):
@@ -56,7 +56,7 @@ def test(arguments):
     pyright = subprocess.Popen(
         [PYTHON, "-m", "pyright"], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, encoding="utf-8"
     )
-    processes = str((os.cpu_count() or 1) + 1)  # one more than the processors, because tests of pages wait for a clock
+    processes = str((os.cpu_count() or 1) + 1)  # one more than the processors, because tests of pages often wait
     failed = []
     for tool, command in (
         ("ruff", ("-m", "ruff", "check", ".")),
@@ -78,7 +78,7 @@ def test(arguments):
 
 
 def prepare(extra):
-    """Create .venv and install the extra of pyproject.toml, unless done."""
+    """Create .venv and install this extra of pyproject.toml, unless this is already done."""
     place = "Python %s in %s" % (sys.version.split()[0], ROOT)
     with open(os.path.join(ROOT, "pyproject.toml"), "rb") as file:
         version = hashlib.sha256(file.read()).hexdigest()
@@ -129,8 +129,11 @@ def has_pip():
 
 
 def install(extra):
-    """Install the project, editable. uv takes a fifth of pip's time. pip is used if its settings name another index,
-    which uv does not know, or if uv fails."""
+    """Install the project in editable mode, with uv or pip.
+
+    uv takes a fifth of pip's time. If pip's settings name another index, pip is used, because uv does not read these
+    settings. pip is also used if uv fails.
+    """
     say("installing %sinto .venv: a few minutes at most" % ("with the %s tools " % extra if extra else ""))
     what = ["--editable", ".[%s]" % extra if extra else "."]
     pip = [PYTHON, "-m", "pip", "install", "--no-input", "--disable-pip-version-check"]
@@ -145,14 +148,16 @@ def install(extra):
 
 
 def own_index():
-    """True if pip's settings name another index than PyPI."""
+    """Return True if pip's settings name another index than PyPI."""
     settings = subprocess.run([PYTHON, "-m", "pip", "config", "list"], stdout=subprocess.PIPE).stdout
     return b".index-url=" in settings
 
 
 def watched(command):
-    """Run a command that may take minutes and return its exit status. Its output goes to install.log, and the last line
-    of it regularly to the terminal."""
+    """Run a command that may take minutes, and return its exit status.
+
+    Its output goes to install.log. The last line of this file is regularly printed to the terminal.
+    """
     begin = time.time()
     with open(LOG, "wb") as log:
         process = subprocess.Popen(command, cwd=ROOT, stdout=log, stderr=subprocess.STDOUT)
@@ -170,7 +175,7 @@ def run(*arguments):
 
 
 def read(path):
-    """Return the content of a text file, "" if it is missing."""
+    """Return the content of a text file, or "" if the file is missing."""
     if not os.path.exists(path):
         return ""
     with open(path, encoding="utf-8", errors="replace") as file:

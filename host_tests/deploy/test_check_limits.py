@@ -19,12 +19,12 @@ def verdicts(findings):
 @pytest.mark.parametrize(
     ("samples", "verdict", "words"),
     [
-        (2000, GOOD, "200.00 samples a second, +0.00 % off 200 (limit 1.5 %)"),
-        (2029, GOOD, "202.90 samples a second, +1.45 % off 200 (limit 1.5 %)"),
-        (2031, LOOK, "203.10 samples a second, +1.55 % off 200 (limit 1.5 %): a clone, or a faulty chip"),
-        (1969, LOOK, "196.90 samples a second, -1.55 % off 200 (limit 1.5 %): a clone, or a faulty chip"),
-        (2399, LOOK, "239.90 samples a second, +19.95 % off 200 (limit 1.5 %): a clone, or a faulty chip"),
-        (2401, BAD, "240.10 samples a second, +20.05 % off 200 (limit 1.5 %): a clone, or a faulty chip"),
+        (2000, GOOD, "200.00 samples per second, +0.00 % off 200 (limit 1.5 %)"),
+        (2029, GOOD, "202.90 samples per second, +1.45 % off 200 (limit 1.5 %)"),
+        (2031, LOOK, "203.10 samples per second, +1.55 % off 200 (limit 1.5 %): a clone, or a faulty chip"),
+        (1969, LOOK, "196.90 samples per second, -1.55 % off 200 (limit 1.5 %): a clone, or a faulty chip"),
+        (2399, LOOK, "239.90 samples per second, +19.95 % off 200 (limit 1.5 %): a clone, or a faulty chip"),
+        (2401, BAD, "240.10 samples per second, +20.05 % off 200 (limit 1.5 %): a clone, or a faulty chip"),
         (0, BAD, "not measured: 0 samples, 0 overflows, 0 failed transfers"),
     ],
 )

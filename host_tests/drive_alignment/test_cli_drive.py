@@ -203,7 +203,7 @@ def test_a_log_with_too_few_samples_per_second_is_refused(tmp_path):
     log = tmp_path / "slow.csv"
     lines = [",".join(f"{v:.3f}" for v in row) + ",0.0" for row in rows]
     log.write_text("\n".join([command.HEADER + ",speed_mps", *lines]) + "\n")
-    refused(tmp_path, "at least 20 a second", log)
+    refused(tmp_path, "at least 20 per second", log)
 
 
 @pytest.mark.parametrize("name", RECORDED)

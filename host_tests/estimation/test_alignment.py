@@ -231,7 +231,7 @@ def test_log_without_a_mounted_sensors_ride_is_refused(name):
 
 def test_slow_log_or_unknown_phone_mounting_is_refused():
     log = log_of(simulated())
-    with pytest.raises(api.InputError, match=r"a sample every 0\.10 s: at least 20 a second"):
+    with pytest.raises(api.InputError, match=r"a sample every 0\.10 s: at least 20 per second"):
         api.fit_ride(log.part(slice(None, None, 20)))
     with pytest.raises(api.InputError, match="portrait, landscape, flat"):
         api.fit_ride(log, phone="upside down")

@@ -90,4 +90,4 @@ def test_slow_log_is_reported_with_the_displayed_lean(tmp_path):
     command.write(ride, table)
     write_calibration(cal, CalibrationFile(aligned=True))
     assert "the smoothed lean needs 10 samples per second" in command.works("report", ride).err
-    command.refused(tmp_path, "smooth", ride, "--out", tmp_path / "LEAN.csv", words="under 10 samples a second")
+    command.refused(tmp_path, "smooth", ride, "--out", tmp_path / "LEAN.csv", words="under 10 samples per second")

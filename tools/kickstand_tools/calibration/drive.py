@@ -104,7 +104,7 @@ def fit_drive(
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("city", seed=3, seconds=240.0)
     >>> log = Log.from_readings(ride.readings, ride.rate_hz)
-    >>> log.speed_mps[::200] = ride.truth["speed_mps"][::200]  # once a second
+    >>> log.speed_mps[::200] = ride.truth["speed_mps"][::200]  # once per second
     >>> found = fit_drive([log], vehicle="motorcycle")
     >>> found.used >= 5, found.quality_deg < 3.0, found.calibration.vehicle_from_sensor.shape
     (True, True, (3, 3))
@@ -189,5 +189,5 @@ def usable(log: Log, others: bool) -> Log:
         raise InputError(f"{log.name}: no speed: record a column speed_mps, from a GPS or a wheel{instead}")
     step_us = int(log.time_us[-1]) / (len(log.t_s) - 1)
     if step_us > _SLOWEST_US:
-        raise InputError(f"{log.name}: a sample every {step_us / 1e6:.2f} s: at least 20 a second are needed")
+        raise InputError(f"{log.name}: a sample every {step_us / 1e6:.2f} s: at least 20 per second are needed")
     return log

@@ -1,2 +1,5 @@
-"""Helpers for all parts of the tools: errors and messages, entry points, complete writing of files, progress, times,
-templates, SVG, the unix port, locations of files."""
+"""Helpers for all parts of the tools.
+
+They cover errors and messages, entry points, files written whole or not at all, progress, times, templates, SVG,
+MicroPython's unix port, and the locations of files.
+"""

@@ -11,8 +11,8 @@ DISTRIBUTION = "kickstand-lean"  # as in pyproject.toml; the package "kickstand"
 class InputError(Exception):
     """Input from the user that cannot be used. The text is one line: what is wrong, and what to do.
 
-    what: a Message, or a text that says what is wrong. remedy: what to do. Leave it out if `what` already says what to
-    do, in words for both a terminal and a page.
+    what: a Message, or a text that says what is wrong.
+    remedy: what to do. Leave it out if `what` already says what to do, in words for both a terminal and a page.
     """
 
     def __init__(self, what: Message | str, remedy: Remedy = NOTHING_TO_DO) -> None:
@@ -28,9 +28,11 @@ class InputError(Exception):
 
 
 class RefusedInput(InputError):
-    """Data refused by a check or by the firmware's own modules. message: the reason, with its code and its fields.
+    """Data that a check or the firmware's own modules refuse.
 
-    where: text before the message, usually the file. advice: text after it.
+    message: the reason, with its code and its fields.
+    where: text before the message, usually the file.
+    advice: text after the message.
     """
 
     def __init__(self, message: Message, where: str = "", advice: str = "") -> None:
@@ -44,7 +46,7 @@ class RefusedInput(InputError):
         return self.message.code
 
     def at(self, where: str) -> "RefusedInput":
-        """The same refusal, with `where` before its message."""
+        """Return the same refusal, with `where` before its message."""
         return RefusedInput(self.message, where, self.advice)
 
     def line(self, page: bool = False) -> str:
@@ -54,20 +56,20 @@ class RefusedInput(InputError):
 
 
 def cause(error: BaseException) -> str:
-    """A short reason for an error of the operating system, without its number: "Permission denied"."""
+    """Return the reason of an operating system's error without its number, such as "Permission denied"."""
     return getattr(error, "strerror", None) or str(error) or type(error).__name__
 
 
 def printable(text: str) -> str:
-    """The text with characters that control a terminal, such as ESC, replaced by their codes."""
+    """Replace characters that control a terminal, such as ESC, by their codes."""
     return "".join(c if c in "\n\t" or c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 def extra(name: str) -> str:
-    """The command that installs an optional part of the project.
+    """Return the command that installs an optional part of the project.
 
-    For a checkout, the command has -e and the path. Otherwise pip would install a copy, and `kickstand flash` would use
-    the copy's firmware.
+    In a checkout, the command has the option -e and the path. Without -e, pip would install a copy, and `kickstand
+    flash` would use the firmware in this copy.
     """
     if firmware_path.installed():
         return f'{sys.executable} -m pip install "{DISTRIBUTION}[{name}]"'

@@ -6,7 +6,7 @@ from pathlib import Path
 import kickstand
 
 TOOLS = Path(__file__).resolve().parents[2]  # the directory that kickstand_tools is imported from
-PACKAGE = Path(kickstand.__file__).resolve().parent  # the firmware's package, also imported by these tools
+PACKAGE = Path(kickstand.__file__).resolve().parent  # the firmware's package, which these tools also import
 
 
 def directory() -> Path:
@@ -24,8 +24,11 @@ def installed() -> bool:
 
 
 def config() -> Path:
-    """The path of the user's config.py. If the current directory is a checkout, the checkout's file. For an installed
-    package, also a config.py in the current directory. Otherwise the file beside these tools."""
+    """Return the path of the user's config.py.
+
+    If the current directory is a checkout, it is the checkout's file. If these tools are an installed package, it is a
+    config.py in the current directory. Otherwise it is the file of these tools.
+    """
     here = Path("firmware").resolve()
     if (here / "kickstand").is_dir() and (here / "config.py").is_file():
         return here / "config.py"
@@ -39,5 +42,5 @@ def documents() -> Path:
 
 
 def search_path() -> str:
-    """The search path with which another Python process can import the firmware and these tools."""
+    """Return the search path with which another Python process can import the firmware and these tools."""
     return os.pathsep.join((str(TOOLS), str(PACKAGE.parent)))

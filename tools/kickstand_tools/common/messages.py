@@ -24,24 +24,25 @@ OPPOSITE_SIGN = f"do all accelerations have the opposite sign? {AT_REST.capitali
 
 @dataclass(frozen=True)
 class Remedy:
-    """A remedy in two versions: for a terminal, with commands and options, and for a page, which has neither.
+    """What the user can do, in words for a terminal and in words for a page.
 
-    page: the version for a page; None if it is the same.
+    terminal: may name commands and options.
+    page: must not name them, because a page has no commands. None if both versions are the same.
     """
 
     terminal: str = ""
     page: str | None = None
 
     def words(self, page: bool = False) -> str:
-        """The text for a page or for a terminal. "" if there is nothing to do."""
+        """Return the text for a page or for a terminal; "" if the user can do nothing."""
         return self.terminal if not page or self.page is None else self.page
 
     def followed(self, more: str) -> "Remedy":
-        """The remedy with these words added to both versions."""
+        """Return the remedy with these words added to both versions."""
         return Remedy(self.terminal + more, None if self.page is None else self.page + more)
 
     def filled(self, **values: object) -> "Remedy":
-        """The remedy with {name} replaced by the value of that name."""
+        """Return the remedy with each {name} replaced by the value of this name."""
         return Remedy(self.terminal.format(**values), None if self.page is None else self.page.format(**values))
 
 
@@ -52,7 +53,9 @@ NOTHING_TO_DO = Remedy()
 class Message:
     """A notice, or the reason for a refusal. JSON has the values of its fields in the order of the fields.
 
-    code: a name for programs. text, todo: templates, in which {name} is a field. Equal messages have equal text.
+    code: a name for programs.
+    text: template of the sentence, in which {name} is a field.
+    todo: template of the remedy, in which {name} is a field.
     """
 
     code: ClassVar[str] = ""
@@ -60,7 +63,7 @@ class Message:
     todo: ClassVar[Remedy] = NOTHING_TO_DO
 
     def sentence(self) -> str:
-        """One line that says what happened, without a full stop."""
+        """Return one line that says what happened, without a full stop."""
         return self.text.format(**vars(self))
 
     def remedy(self) -> Remedy:
@@ -68,13 +71,16 @@ class Message:
         return self.todo.filled(**vars(self))
 
     def line(self, page: bool = False) -> str:
-        """Sentence and remedy in one line, without a full stop. page: True for a page, which has no commands."""
+        """Return sentence and remedy in one line, without a full stop.
+
+        page: True for a page, which has no commands.
+        """
         remedy = self.remedy().words(page)
         return f"{self.sentence()}: {remedy}" if remedy else self.sentence()
 
     @property
     def values(self) -> tuple[Any, ...]:
-        """The values of its fields, in their order."""
+        """The values of the fields, in the order of the fields."""
         return tuple(getattr(self, field.name) for field in fields(self))
 
 
@@ -96,7 +102,7 @@ class Plain(Message):
 
 @dataclass(frozen=True)
 class WrongAxes(Message):
-    """The log's axes, their signs or the unit of the rates are wrong: correct the log before you use it."""
+    """The log's axes, their signs or the unit of the rates are wrong. The log must be corrected before it is used."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +116,7 @@ class WrongMount(Message):
 
 
 def sentence(message: Message, page: bool = False) -> str:
-    """The message in one line without a full stop: what is wrong and, if there is a remedy, what to do.
+    """Return the message in one line without a full stop: what is wrong and, if there is a remedy, what to do.
 
     page: True for a page, which has no commands.
 
@@ -122,17 +128,17 @@ def sentence(message: Message, page: bool = False) -> str:
 
 
 def by_code(*classes: type[Message]) -> dict[str, type[Message]]:
-    """A dictionary of the classes by their codes."""
+    """Return a dictionary from each code to its class."""
     return {one.code: one for one in classes}
 
 
 def is_explained(messages: Iterable[Message]) -> bool:
-    """True if one of the messages, wrong axes or another mount, explains readings that do not fit."""
+    """True if a message about wrong axes or another mount explains readings that do not fit."""
     return any(isinstance(message, (WrongAxes, WrongMount)) for message in messages)
 
 
 def distinct(messages: Iterable[Message]) -> list[Message]:
-    """The messages in their order, without repetitions, because a log that is read twice is also checked twice."""
+    """Return the messages in their order, without repetitions. A log that is read twice is also checked twice."""
     found: dict[str, Message] = {}
     for message in messages:
         found.setdefault(message.line(), message)
@@ -140,7 +146,7 @@ def distinct(messages: Iterable[Message]) -> list[Message]:
 
 
 def as_data(messages: Iterable[Message]) -> list[dict[str, object]]:
-    """Code, values and text of each message, for JSON. A value that is not finite becomes None."""
+    """Return code, values and text of each message, for JSON. A value that is not finite becomes None."""
 
     def plain(value: object) -> object:
         return (round(value, 3) if isfinite(value) else None) if isinstance(value, float) else value

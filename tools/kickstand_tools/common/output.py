@@ -10,11 +10,11 @@ from pathlib import Path
 
 from .errors import InputError, cause
 
-_MOST_LINKS = 40  # the limit of Linux
+_MOST_LINKS = 40  # number of links that are followed, as in Linux
 
 
 def check_output(path: Path, inputs: list[Path]) -> None:
-    """Refuse an output that cannot be written or that would destroy an input. Call it before any work is done."""
+    """Refuse an output that cannot be written or that would destroy an input. Call this before any work is done."""
     _resolved(path)
     if path.is_dir():
         raise InputError(f"{path} is a directory: give --out the name of a file")
@@ -30,7 +30,7 @@ def check_output(path: Path, inputs: list[Path]) -> None:
 
 
 def _resolved(path: Path) -> Path:
-    """The path without symbolic links. Raises InputError for links that lead to each other."""
+    """Return the path without symbolic links. Raises InputError if the links form a circle."""
     try:
         return path.resolve()
     except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle, before Python 3.13
@@ -38,7 +38,7 @@ def _resolved(path: Path) -> Path:
 
 
 def _is_open_here(path: Path) -> bool:
-    """True for standard input, output and error under any name, and for names of open files, such as /dev/fd/3."""
+    """True if the path names an open file of this process: standard input, output or error, or such as /dev/fd/3."""
     with contextlib.suppress(OSError):
         there = path.stat()
         for number in (0, 1, 2):
@@ -56,7 +56,7 @@ def _is_open_here(path: Path) -> bool:
 
 
 def check_directory(path: Path) -> None:
-    """Refuse an output directory that is a file. Call it before any work is done."""
+    """Refuse an output directory that is a file. Call this before any work is done."""
     _resolved(path)
     if path.exists() and not path.is_dir():
         raise InputError(f"{path} is a file: give --out the name of a directory")
@@ -64,7 +64,7 @@ def check_directory(path: Path) -> None:
 
 @contextlib.contextmanager
 def new_directory(path: Path) -> Iterator[None]:
-    """Make a directory and its parents. At the end of the `with`, those that are still empty are removed."""
+    """Make a directory and its parents. At the end of the `with`, new directories that are still empty are removed."""
     made: list[Path] = []
     try:
         try:
@@ -89,10 +89,10 @@ def make_directory(path: Path) -> None:
 
 @contextlib.contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """A context with a temporary path to write to. At its end, the file is renamed to path, and survives a power
-    loss. If writing fails, an earlier file at path stays. Raises InputError.
+    """Give a temporary path to write to, as a context. At its end, the file is renamed to `path`.
 
-    The temporary name has the ending of path, because libraries choose the format by it.
+    The finished file survives a power loss. If writing fails, an earlier file at `path` stays. The temporary name ends
+    like `path`, because libraries choose the format by the ending. Raises InputError.
     """
     path = _resolved(path)  # replace the file that a symbolic link leads to, not the link
     temporary = path.with_name(f".{os.getpid()}-{path.name}")
@@ -111,8 +111,8 @@ def whole_file(path: Path) -> Iterator[Path]:
 def flush_to_disk(path: Path) -> None:
     """Wait until a file, or the entries of a directory, are on the disk. Raises OSError.
 
-    Otherwise a file system may store the new name before the content, and a power loss would leave neither the old
-    content nor the new (fsync(2)).
+    Without this, a file system may store the new name before the content. A power loss would then leave neither the
+    old content nor the new content (fsync(2)).
     """
     directory = path.is_dir()
     # a browser has no disk; Windows cannot open directories

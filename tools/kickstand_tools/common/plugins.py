@@ -14,8 +14,10 @@ SIMULATIONS = "kickstand.simulations"  # functions like simulation.files.simulat
 
 
 def entry_points(group: str) -> dict[str, EntryPoint]:
-    """The entry points of a group, by name. If two have the same name, this project's entry point is preferred,
-    then the first."""
+    """Return the entry points of a group, by name.
+
+    If several have the same name, this project's entry point is used, or else the first.
+    """
     found: dict[str, EntryPoint] = {}
     for distribution in distributions():
         try:
@@ -23,13 +25,13 @@ def entry_points(group: str) -> dict[str, EntryPoint]:
             for entry_point in distribution.entry_points:
                 if entry_point.group == group and (ours or entry_point.name not in found):
                     found[entry_point.name] = entry_point
-        except Exception:  # a package whose metadata cannot be read adds nothing
+        except Exception:  # skip a package whose metadata cannot be read
             continue
     return found
 
 
 def part(group: str, name: str) -> Any:
-    """The object of an entry point. Raises InputError if no installed package has it."""
+    """Return the object of an entry point. Raises InputError if no installed package has this entry point."""
     entry_point = entry_points(group).get(name)
     if entry_point is None:
         raise InputError(f"the part {name} of {DISTRIBUTION} is not installed: install {DISTRIBUTION} again")

@@ -15,10 +15,13 @@ PATIENCE_S = 1.0
 
 
 class Bar:
-    """A progress bar: with Bar("replaying", total) as bar: bar.advance(n). It appears at the first call after
-    patience_s.
+    """A progress bar, used as `with Bar("replaying", total) as bar: bar.advance(n)`.
 
     If a function reports (done, total), pass bar.reach to it and leave out total.
+
+    what: text in front of the bar.
+    total: amount of work; None if unknown.
+    patience_s: the bar appears at the first call after this time.
     lines_s: seconds between two lines if standard error is not a terminal; None for no lines.
     """
 
@@ -45,7 +48,7 @@ class Bar:
         self._show()
 
     def reach(self, done: int, total: int) -> None:
-        """Set the work done and the total; total is 0 if unknown."""
+        """Set the work done and the total. total: 0 if unknown."""
         self._progress.update(self._task, completed=done, total=total or None)
         self._show()
 
@@ -69,7 +72,7 @@ class Bar:
 
 @contextlib.contextmanager
 def spinner(what: str) -> Iterator[None]:
-    """A spinner for work whose progress is unknown."""
+    """Show a spinner during work whose progress is unknown."""
     if not sys.stderr.isatty():
         yield
         return

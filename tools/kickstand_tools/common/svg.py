@@ -1,12 +1,17 @@
-"""Writes SVG drawings for the pages and the READMEs. It writes the elements directly, for speed: a fleet has thousands
-of pictures, and each takes a millisecond."""
+"""Writes SVG drawings for the pages and the READMEs.
+
+A fleet has thousands of pictures. The elements are written as text, because a picture then takes only a millisecond.
+"""
 
 from markupsafe import Markup, escape
 
 
 def element(name: str, *inside: str, **attributes: object) -> Markup:
-    """An SVG element. inside: other elements, and text, which is escaped. attributes: write _ for -, and add _ to a
-    word that Python reserves. Numbers are rounded to hundredths, None is left out.
+    """Return an SVG element.
+
+    inside: other elements, and text, which is escaped.
+    attributes: write _ for -, and add _ to a word that Python reserves. Numbers are rounded to hundredths. An attribute
+        that is None is left out.
 
     >>> print(element("text", "1 < 2", x=1.25, text_anchor="end", class_="small"))
     <text x="1.25" text-anchor="end" class="small">1 &lt; 2</text>
@@ -21,14 +26,14 @@ def element(name: str, *inside: str, **attributes: object) -> Markup:
 
 
 def drawing(size: tuple[float, float], *inside: str, **attributes: object) -> Markup:
-    """A whole SVG file. size: width and height, in pixels or other units."""
+    """Return a whole SVG file. size: width and height, in pixels or other units."""
     box = f"0 0 {_written(size[0])} {_written(size[1])}"
     lines = (Markup("\n") + part for part in inside)
     return element("svg", *lines, Markup("\n"), xmlns="http://www.w3.org/2000/svg", viewBox=box, **attributes) + "\n"
 
 
 def path(points: list[tuple[float, float]]) -> str:
-    """The attribute d of a path from point to point.
+    """Return the attribute d of a path from point to point.
 
     >>> path([(0, 0), (1.5, 2)])
     'M0 0L1.5 2'

@@ -23,11 +23,14 @@ _ENVIRONMENT.policies["json.dumps_kwargs"] = {"allow_nan": False, "ensure_ascii"
 
 
 def filled(template: Path, **values: Any) -> str:
-    """Fill a template with values. A value is escaped unless the template says `| safe`. `| tojson` writes JSON for an
-    HTML element. Raises jinja2.UndefinedError for a missing value."""
+    """Fill a template with values. Raises jinja2.UndefinedError for a missing value.
+
+    In a template, a value is escaped unless it has the filter `| safe`. The filter `| tojson` writes JSON for an HTML
+    element.
+    """
     return _ENVIRONMENT.from_string(template.read_text(encoding="utf-8")).render(values)
 
 
 def source_hash(script: str) -> str:
-    """The hash of a script, for a content security policy that allows only scripts with this hash."""
+    """Return the hash of a script, for a content security policy that allows only scripts with this hash."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"

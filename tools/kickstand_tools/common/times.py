@@ -2,12 +2,12 @@
 
 
 def clock(seconds: float) -> str:
-    """1:02:03 or 2:03."""
+    """Format a time as h:mm:ss or m:ss, such as 1:02:03 or 2:03."""
     whole = round(seconds)
     hours, minutes = whole // 3600, whole // 60 % 60
     return f"{hours}:{minutes:02d}:{whole % 60:02d}" if hours else f"{minutes}:{whole % 60:02d}"
 
 
 def tick_s(seconds: float) -> float:
-    """A round time between ticks, which gives 6 to 12 ticks."""
+    """Return a round time between the ticks of an axis, so that it has 6 to 12 ticks."""
     return next((tick for tick in (1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800) if seconds < 12 * tick), 3600)

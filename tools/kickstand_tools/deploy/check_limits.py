@@ -172,7 +172,7 @@ def clock(samples: int, us: int, rate_hz: int, overflows: int, errors: int) -> l
         words = f"not measured: {samples} samples, {overflows} overflows, {errors} failed transfers"
         return [Finding("sample clock", BAD, words)]
     percent = 100 * (samples / (us / 1e6) / rate_hz - 1)
-    words = f"{samples / (us / 1e6):.2f} samples a second, {percent:+.2f} % off {rate_hz} (limit {CLOCK_PERCENT} %)"
+    words = f"{samples / (us / 1e6):.2f} samples per second, {percent:+.2f} % off {rate_hz} (limit {CLOCK_PERCENT} %)"
     size = abs(percent)
     verdict = BAD if size > MOST_CLOCK_PERCENT else LOOK if size > CLOCK_PERCENT else GOOD
     return [Finding("sample clock", verdict, words + (": a clone, or a faulty chip" if verdict != GOOD else ""))]

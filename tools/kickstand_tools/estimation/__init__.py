@@ -2,12 +2,12 @@
 
     windows.py        readings -> means over 0.2 s
     first_guess.py    when the bike stands, rough lean and speed; for an alignment also rough axes
-    unknowns.py       the states, the parameters, and their prior
+    unknowns.py       the states, the parameters, and the prior of the parameters
     equations.py      process model, measurement model and their Jacobian
     noise.py          process noise and measurement noise
-    hypotheses.py     what else may change during a ride; the posterior weight of each hypothesis
+    hypotheses.py     how mount and wind may change during a ride; the posterior weight of each hypothesis
     solver.py         linear least squares of one step: Schur complement over states, then the chain of blocks
-    least_squares.py  all steps; gives states and parameters with their covariance
+    least_squares.py  all steps; estimates states and parameters with their covariance
 
 There are two results: the alignment with its covariance (alignment.py, `kickstand calibrate ride`), and the smoothed
 lean with its standard deviation (smooth.py, `kickstand smooth`).

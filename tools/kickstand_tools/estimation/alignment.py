@@ -1,11 +1,13 @@
 """Finds the alignment of a motorcycle's sensor, with its covariance, from an ordinary ride. It needs no poses.
 
 The readings are rotated by a first guess of the axes (first_guess.py). Then the misalignment is estimated together with
-the motion, the gyro's bias and the errors of sensor and bike. The prior of the misalignment
-is so wide that it adds no information. The lean follows the gyro through the bends. On straights the bike is balanced,
-so the mean lean there shows the bike's own up; the residual force across the bike is the bias of the accelerometer. A
-lateral offset of the centre of mass cannot be distinguished from a roll misalignment. Errors between the sensor's axes
-cannot be distinguished from the misalignment either. They cause most of the alignment's standard deviation.
+the motion, the gyro's bias and the errors of sensor and bike. The prior of the misalignment is so wide that it adds no
+information. The lean follows the gyro through the bends. On straights the bike is balanced, so the mean lean on
+straights shows the bike's own up. The residual force across the bike is the bias of the accelerometer.
+
+Two errors cannot be distinguished from a misalignment. A centre of mass beside the middle of the bike looks like a roll
+misalignment. Cross-axis errors of the sensor look like any misalignment, and cause most of the alignment's standard
+deviation.
 """
 
 from dataclasses import dataclass
@@ -29,33 +31,34 @@ from .least_squares import Estimate
 from .unknowns import ACCEL, BESIDE, BIAS, BIAS_PER_C, DELAY, LEAN, MEAN, OFFSET, OFFSET_PER_C, ROTATION, SENSOR, Prior
 from .windows import WINDOW_S, Windows, windows_of
 
-SLOWEST_HZ = 20.0
-LONGEST_S = 1800.0  # a longer part of a ride does not improve the result
+SLOWEST_HZ = 20.0  # least sample rate
+LONGEST_S = 1800.0  # the longest part of a ride that is used; a longer part does not improve the result
 # Standard deviations of the prior
-ROTATION_SIGMA = 10.0  # rad: misalignment, which is unknown
-AXES_SIGMA = 0.012  # ratio: scale and cross-axis errors of the accelerometer
-BESIDE_SIGMA_G = 0.005  # force to the side on straights, caused by luggage or camber
-UNSETTLED = np.radians(0.5)  # the estimate has not converged if the last step changed an angle by more
-# If an estimated error of the sensor is over ODD_SIGMAS of its prior, the standard errors are enlarged. If it is over
-# ABSURD_SIGMAS, the ride is refused
+ROTATION_SIGMA = 10.0  # rad: of the misalignment, which is unknown
+AXES_SIGMA = 0.012  # ratio: of scale and cross-axis errors of the accelerometer
+BESIDE_SIGMA_G = 0.005  # of the force to the side on straights, caused by luggage or camber
+UNSETTLED = np.radians(0.5)  # if the last step changed an angle by more than this, the estimate has not converged
+# An estimated error of the sensor over ODD_SIGMAS standard deviations of its prior enlarges the standard errors. An
+# error over ABSURD_SIGMAS standard deviations refuses the ride.
 ODD_SIGMAS, ABSURD_SIGMAS = 4.0, 20.0
-MAX_DEG = np.array([5.0, 5.0, 3.5])  # pitch, yaw, roll: an alignment with a larger standard error is refused
-MOVED_DEG = 8.0  # an alignment is also refused if the two halves of the ride differ by more
-CONSTANT = Hypotheses(*np.array([[1e-5], [1e-5], [1e-4], [0.0], [1.0]]))  # nothing changes in the ride
+MAX_DEG = np.array([5.0, 5.0, 3.5])  # largest accepted standard errors of pitch, yaw and roll
+MOVED_DEG = 8.0  # largest accepted difference between the alignments from the two halves of the ride
+CONSTANT = Hypotheses(*np.array([[1e-5], [1e-5], [1e-4], [0.0], [1.0]]))  # mount and wind do not change during the ride
 
-# The mountings of a phone that its user can name. They check the ride's result, and help if the ride shows little.
+# The mountings of a phone that its user can name. They check the ride's result, and help if the ride has few bends.
 # A phone's axes, as seen by a person looking at the screen, are: x to the right, y to the top, z out of the screen (W3C
 # Device Orientation; the same on Android and iOS).
 X, Y, Z = np.eye(3)
 
-# Rows: left, up, forward. A screen that faces the rider faces backward. landscape: turned to either side.
+# The rows of each matrix are left, up and forward in the phone's axes. The screen faces the rider, so it faces
+# backward. A phone in landscape may be turned to either side.
 PHONES = {
     "portrait": [np.array([-X, Y, -Z])],
     "landscape": [np.array([Y, X, -Z]), np.array([-Y, -X, -Z])],
     "flat": [np.array([-X, Z, Y])],
 }
-PHONE_SIGMA_DEG = 20.0  # a holder may be tilted towards the rider's eyes
-PHONE_MAX_DEG = 45.0  # half the angle between two mountings, which differ by at least 90 degrees
+PHONE_SIGMA_DEG = 20.0  # standard deviation of the mounting, because a holder may be tilted towards the rider's eyes
+PHONE_MAX_DEG = 45.0  # largest accepted difference: half of the 90 degrees between two mountings
 
 
 @dataclass(frozen=True)
@@ -110,16 +113,22 @@ class PhoneUpsideDown(Message):
 
 @dataclass
 class RideFit:
-    """The alignment from a ride, with its quality. Angles in degrees.
+    """The alignment from a ride, with its quality.
 
-    roll_deg, pitch_deg, yaw_deg: standard errors of the alignment about forward, left and up. They come mostly from
-    errors of the sensor that a ride does not show. Upright is the balanced position on straights. halves_deg: roll,
-    pitch and yaw from the second half of the ride minus those from the first half. offset_g (3): bias of the
-    accelerometer along left, up and forward, which the calibration subtracts; offset_sigma_g (3): standard errors.
-    used_s: begin and end of the time in the log, s, during which the sensor was mounted. riding_s, standing_s: seconds
-    of that time. lean_deg: rms of the ride's lean. lag_s: delay of the log's speed, None without a speed. phone_deg:
-    angle between the mounting found and the mounting named by `phone`, None if `phone` was None. notices: remarks about
-    the log.
+    Upright is the balanced position on straights. Angles are in degrees.
+
+    calibration: the alignment.
+    roll_deg, pitch_deg, yaw_deg: its standard errors about forward, left and up. They come mostly from errors of the
+        sensor that a ride does not show.
+    halves_deg: roll, pitch and yaw from the second half of the ride minus those from the first half.
+    offset_g: bias of the accelerometer along left, up and forward, shape (3). The calibration subtracts it.
+    offset_sigma_g: standard errors of offset_g, shape (3).
+    used_s: begin and end of the used part of the log, in s. In this part the sensor was mounted.
+    riding_s, standing_s: seconds of riding and of standing in the used part.
+    lean_deg: rms of the lean.
+    lag_s: delay of the log's speed; None without a speed.
+    phone_deg: angle between the mounting found and the mounting that the user named; None if no mounting was named.
+    notices: remarks about the log.
     """
 
     calibration: CalibrationFile
@@ -141,11 +150,15 @@ class RideFit:
 def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = None) -> RideFit:
     """Find the alignment of a sensor on a motorcycle from a ride with bends, without poses.
 
-    log: see read_log; a speed helps and is optional. phone: None, or the phone's mounting: "portrait", "landscape" or
-    "flat" (see PHONES). progress: called with (steps done, all steps). Up is the direction in which the bike is
-    balanced on straights. Forward is the axis about which the bike leans into bends, and along which it speeds up. The
-    lean in bends distinguishes left from right. Scale errors of the accelerometer are not observable from a ride.
-    Raises InputError; RefusedInput, a subclass with a Message, if the ride does not determine the sensor's mounting.
+    Up is the direction in which the bike is balanced on straights. Forward is the axis about which the bike leans into
+    bends, and along which it speeds up. The lean in bends distinguishes left from right. Scale errors of the
+    accelerometer are not observable from a ride.
+
+    log: see read_log. A speed improves the result, but is optional.
+    phone: the phone's mounting, "portrait", "landscape" or "flat" (see PHONES); None if unknown.
+    progress: called with (steps done, all steps).
+    Raises InputError. Raises its subclass RefusedInput, with a Message, if the ride does not determine the sensor's
+    mounting.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("city", seed=3, seconds=240.0)
@@ -161,7 +174,7 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
         raise RefusedInput(misfit, log.name)
     step_s = float(log.t_s[-1]) / (len(log.t_s) - 1)
     if step_s * SLOWEST_HZ > 1.0:
-        raise InputError(f"{log.name}: a sample every {step_s:.2f} s: at least {SLOWEST_HZ:.0f} a second are needed")
+        raise InputError(f"{log.name}: a sample every {step_s:.2f} s: at least {SLOWEST_HZ:.0f} per second are needed")
     try:
         windows = mounted_windows(log)
         guess = axes(windows)
@@ -179,9 +192,11 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
 def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) -> Estimate:
     """Estimate the motion, and the misalignment relative to a first guess.
 
-    windows: along the sensor's axes. expected: the matrix (3, 3), vehicle from sensor, of the mounting that the user
-    named; None if unknown. Alignment = the result's matrix times the guess's matrix. All blocks of the result have the
-    same parameters. Raises RefusedInput if no alignment fits.
+    The alignment is the result's matrix times the guess's matrix. All blocks of the result have the same parameters.
+
+    windows: along the sensor's axes.
+    expected: the matrix (3, 3), vehicle from sensor, of the mounting that the user named; None if unknown.
+    Raises RefusedInput if no alignment fits.
     """
     sigma, mean = Prior.of_pose(six_done=False).sigma, MEAN.copy()
     sigma[ROTATION], sigma[ACCEL], sigma[BESIDE] = ROTATION_SIGMA, AXES_SIGMA, BESIDE_SIGMA_G
@@ -198,9 +213,11 @@ def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) ->
 
 
 def mounted_windows(log: Log) -> Windows:
-    """The windows, along the sensor's axes, of the longest stretch of a log in which the mean force keeps its
-    direction. Before and after this stretch, a hand held the sensor. Readings beyond MOST_G and MOST_DPS are left out.
-    Raises RefusedInput."""
+    """Return the windows of the part of a log in which the sensor was mounted, along the sensor's axes.
+
+    This part is the longest stretch in which the mean force keeps its direction. Before and after it, a hand held the
+    sensor. Readings beyond MOST_G and MOST_DPS are left out. Raises RefusedInput.
+    """
     log = log.part(np.all(np.abs(log.accel_g) < MOST_G, axis=1) & np.all(np.abs(log.gyro_dps) < MOST_DPS, axis=1))
     windows = _windows(log)
     mean = averaged(windows.force, MOUNTED_S)
@@ -211,14 +228,14 @@ def mounted_windows(log: Log) -> Windows:
     if not len(mounted):
         raise RefusedInput(RideShort(0.0, MIN_RIDING_S))
     begin, end = mounted[np.argmax(np.diff(mounted, axis=1))]
-    margin = round(MOUNTED_S / WINDOW_S)  # this many windows from the edge, the mean contains only the ride
+    margin = round(MOUNTED_S / WINDOW_S)  # a mean this many windows from the edge contains only the ride
     first = windows.edges[begin + margin * (begin > 0)]
     last = windows.edges[end - margin * (end < len(windows))]
     return _windows(log, (log.t_s >= first) & (log.t_s < min(last, first + LONGEST_S)))
 
 
 def _windows(log: Log, part: Bools | slice = slice(None)) -> Windows:
-    """The windows of a part of the log, along the sensor's axes. Raises RefusedInput."""
+    """Return the windows of a part of the log, along the sensor's axes. Raises RefusedInput."""
     t_s, rate = log.t_s[part], np.radians(log.gyro_dps[part])
     if len(t_s) < 2:
         raise RefusedInput(RideShort(0.0, MIN_RIDING_S))
@@ -226,7 +243,7 @@ def _windows(log: Log, part: Bools | slice = slice(None)) -> Windows:
 
 
 def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | None, notices: list[Message]) -> RideFit:
-    """The estimate as a RideFit. Raises RefusedInput if its quality is too low."""
+    """Return the estimate as a RideFit. Raises RefusedInput if its quality is too low."""
     halves = np.degrees(found.split())
     if np.max(np.abs(halves)) > MOVED_DEG:
         raise RefusedInput(RideHalves(float(np.max(np.abs(halves)))))
@@ -234,12 +251,13 @@ def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | N
     odd = float(np.max(np.abs(parameters[SENSOR] / prior.sigma[SENSOR])))
     if odd > ABSURD_SIGMAS:
         raise RefusedInput(RideContradicts())
-    # if the halves differ by more than the standard error, there was a disturbance outside the model
+    # If the halves differ by more than the standard error, the model lacks a disturbance of this ride. So the error is
+    # enlarged by half of their difference.
     error = np.hypot(np.degrees(sigma[ROTATION]), 0.5 * halves) * max(1.0, odd / ODD_SIGMAS)
     if np.any(error > MAX_DEG):
         raise RefusedInput(RideUncertain(*(float(error[i]) for i in (2, 0, 1))))
     pitch, yaw, roll = (float(angle) for angle in error)
-    # with this offset, the calibrated force on a level, upright bike is 1 g up despite scale errors
+    # With this offset, the calibrated force on a level, upright bike is 1 g up, even if the scale is wrong.
     offset = parameters[OFFSET] + parameters[ACCEL].reshape(3, 3)[:, 1]
     matrix, states = found.matrix @ guess.matrix, found.states[: len(windows) + 1]
     bias = guess.bias + np.median(states[:, BIAS], axis=0) @ matrix
@@ -275,8 +293,10 @@ def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | N
 
 
 def _mounting(phone: str, found: Array) -> Array:
-    """The matrix (3, 3) of PHONES[phone] that is nearest to `found`. Raises RefusedInput if the two differ by over
-    PHONE_MAX_DEG."""
+    """Return the matrix (3, 3) of PHONES[phone] that is nearest to `found`.
+
+    Raises RefusedInput if the two differ by over PHONE_MAX_DEG.
+    """
     off, nearest = min(((_off_deg(found, matrix), i) for i, matrix in enumerate(PHONES[phone])))
     if off > PHONE_MAX_DEG:
         mirrored = found * [[1.0], [-1.0], [-1.0]]  # the result if the accelerations have the opposite sign

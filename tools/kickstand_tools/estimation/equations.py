@@ -1,25 +1,29 @@
 """The process model and the measurement model of a motorcycle, and their Jacobian.
 
-The states are lean t, pitch q, and the sensor's velocity to the left, up and forward (l, u, v), in level axes that yaw
-with the bike at the rate p. Rates w and forces f are the readings without the sensor's errors:
+The states are the lean t, the pitch q, and the sensor's velocity to the left l, up u and forward v. The velocity is in
+level axes that yaw with the bike at the yaw rate p. Rates w and forces f are the measured values (w_m, f_m) without the
+sensor's errors. R is the rotation by ROTATION, to second order. The acceleration a is the force in level axes, minus
+1 g upwards.
 
-    w = R w_m + GYRO w_m - bias        f = R f_m + ACCEL f_m + offset        R: ROTATION, to second order
+    w = R w_m + GYRO w_m - bias        f = R f_m + ACCEL f_m + offset
     p = (w_x sin t + w_y cos t) / cos q        t' = w_z - p sin q        q' = w_y sin t - w_x cos t
-    l' = a_l - p v        v' = a_f + p l        u' = a_u        a: the force in level axes, less 1 g upwards
+    l' = a_l - p v        v' = a_f + p l        u' = a_u
 
-These are the equations of the firmware's kickstand.lean.bike_model, which assumes no motion sideways or up. Here, no
-motion is a measurement with noise instead: an error of velocity is brief, while every bump causes errors of
+The firmware's kickstand.lean.bike_model has the same equations, and assumes no motion sideways or up. Here, "no motion"
+is a measurement of the velocity, with noise. A velocity is wrong only briefly, but every bump causes errors of
 acceleration. The wheels' velocity is the sensor's velocity minus the rates times the sensor's position (rigid body).
 The measurements are differences that should be 0:
 
-    SLIDING      the wheels' velocity sideways, because wheels do not slide
-    CLIMBING     the wheels' velocity up minus the part due to the chassis' pitch: the chassis points along the road,
-                 except for dive in braking, (8) in the firmware's kickstand.lean.dive, which moves no wheel
-    SLOPING      the wheels' velocity up, because roads are level on average
-    BALANCED     the force to the side minus TYRES, CAMBER and BESIDE (see unknowns.py): a moving bike is balanced
-    ANY_SPEED    the speed minus USUAL_MPS        MEASURED_SPEED    the speed minus the log's, delayed
-    RESTING      the velocity, and RESTING_RATE the rates, of a standing bike (zero-velocity update)
-    BACKWARD     a speed under 0
+    SLIDING         the wheels' velocity sideways, because wheels do not slide
+    CLIMBING        the wheels' velocity up minus the part due to the chassis' pitch. The chassis points along the road,
+                    except for dive in braking, (8) in the firmware's kickstand.lean.dive. Dive does not move a wheel.
+    SLOPING         the wheels' velocity up, because roads are level on average
+    BALANCED        the force to the side minus TYRES, CAMBER and BESIDE (see unknowns.py): a moving bike is balanced
+    ANY_SPEED       the speed minus USUAL_MPS
+    MEASURED_SPEED  the speed minus the log's delayed speed
+    RESTING         the velocity of a standing bike (zero-velocity update)
+    RESTING_RATE    the rates of a standing bike
+    BACKWARD        a speed under 0
 """
 
 import numpy as np
@@ -35,14 +39,15 @@ SLIDING, CLIMBING, SLOPING, BALANCED, ANY_SPEED, MEASURED_SPEED = range(STATES, 
 RESTING, RESTING_RATE, BACKWARD = slice(14, 17), slice(17, 20), 20
 ROWS = 21
 USUAL_MPS = 15.0  # mean of the speed's prior
-STRAIGHT = 0.1  # rad: up to this lean a road is cambered; in bends with more lean it is banked into the bend
-STEP = 1e-6  # step of the finite differences, in the unknowns' units
+STRAIGHT = 0.1  # rad: a road is cambered up to this lean, and banked in bends with more lean
+STEP = 1e-6  # step of the finite differences, in the units of the unknowns
 
 
 def process_and_measurements(windows: Windows, x: Array) -> Array:
-    """(ROWS, n): the rates of change of the states (first STATES rows), then the measurements.
+    """Evaluate both models in n windows.
 
-    x (STATES + PARAMETERS, n): states in the middle of each window, and parameters.
+    x: states in the middle of each window, then parameters, shape (STATES + PARAMETERS, n).
+    Returns shape (ROWS, n). The first STATES rows are the states' rates of change. The other rows are the measurements.
     """
     t, q, left, up, forward = x[: BIAS.start]
     p = x[STATES:]
@@ -76,8 +81,11 @@ def process_and_measurements(windows: Windows, x: Array) -> Array:
 
 
 def jacobian(windows: Windows, x: Array, unknown: Ints) -> Array:
-    """(len(unknown), ROWS, n): derivatives of process_and_measurements() by the rows `unknown` of x, as finite
-    differences."""
+    """Compute the derivatives of process_and_measurements() by some rows of x, as finite differences.
+
+    unknown: indices of these rows of x.
+    Returns shape (len(unknown), ROWS, n).
+    """
     found, moved = np.empty((len(unknown), ROWS, x.shape[1])), x.copy()
     here = process_and_measurements(windows, x)
     for slot, row in zip(found, unknown, strict=True):
@@ -89,18 +97,23 @@ def jacobian(windows: Windows, x: Array, unknown: Ints) -> Array:
 
 
 def corrected_rates(rate: Array, x: Array, warm: Array) -> Array:
-    """(3, n): rates about left, up, forward (rad/s) without the gyro's errors. rate (3, n): the measured rates. x
-    (STATES + PARAMETERS, n): states and parameters. warm (n): see Windows."""
+    """Remove the gyro's errors from n measured rates.
+
+    rate: measured rates, shape (3, n), in rad/s.
+    x: states, then parameters, shape (STATES + PARAMETERS, n).
+    warm: see Windows, shape (n).
+    Returns the rates about left, up and forward, shape (3, n), in rad/s.
+    """
     return _corrected(rate, x[STATES:], of.GYRO) - x[BIAS] - x[STATES:][of.BIAS_PER_C] * warm
 
 
 def _corrected(readings: Array, p: Array, errors: slice) -> Array:
-    """Turn readings (3, n) by the rotation, and add the matrix of errors times the readings."""
+    """Rotate readings (3, n) by ROTATION, and add the matrix `errors` times the readings."""
     x, y, z = readings
     a, b, c = p[of.ROTATION]
     e = p[errors]
-    # second order is needed: to first order, a yaw of 7 degrees would lengthen the readings by 0.8 %, like a scale
-    # error
+    # Second order is needed. To first order, a yaw of 7 degrees would lengthen the readings by 0.8 %, like a scale
+    # error.
     u, v, w = 0.5 * (b * z - c * y), 0.5 * (c * x - a * z), 0.5 * (a * y - b * x)
     return np.array(
         (

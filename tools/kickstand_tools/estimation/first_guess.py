@@ -1,5 +1,4 @@
-"""Finds the starting point of the estimation: when the bike stands, its rough lean and speed and, for an alignment,
-rough axes."""
+"""Finds the starting point of the estimation: standstills, rough lean and speed and, for an alignment, rough axes."""
 
 import itertools
 from dataclasses import dataclass, replace
@@ -15,24 +14,24 @@ from ..signals import Array, Bools, motionless
 from ..signals.leaning import WINDOW_S, Leaning, averaged, leaning_of, speed_in_radians, without_drift
 from .windows import Windows
 
-STILL_S = 1.6  # shorter standstills look like smooth riding
-STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # 1 sigma over STILL_S; the windows of a standing bike differ by less
-BIAS_RADPS = np.radians(4.0)  # limit of the gyro's bias since its calibration: a higher mean rate is a bend
-MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # while the sensor is mounted, its mean force over MOUNTED_S is this close to up
-BETWEEN_S = 20.0  # a shorter time between two movements in a hand also counts as in the hand
-SURELY_S = 4.0  # a longer movement is certainly in a hand; a shorter one may be riding or a fall
-SLOW_S = 4.0  # slower changes of lean are computed from the yaw rate, faster ones from the roll rate
-TURNS_S = 40.0  # the speed is computed from the bends in this time
-CALM_S = 1.0  # without a standstill, the gyro's bias is the mean over calm stretches of this length
+STILL_S = 1.6  # least length of a standstill; shorter ones look like smooth riding
+STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # largest standard deviations over STILL_S on a standing bike
+BIAS_RADPS = np.radians(4.0)  # largest bias of the gyro since its calibration; a higher mean rate is a bend
+MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # largest angle of a mounted sensor's mean force over MOUNTED_S from up
+BETWEEN_S = 20.0  # between two movements in a hand, a shorter time also counts as in the hand
+SURELY_S = 4.0  # a movement longer than this is certainly in a hand; a shorter one may be riding or a fall
+SLOW_S = 4.0  # changes of lean slower than this are computed from the yaw rate, faster changes from the roll rate
+TURNS_S = 40.0  # the speed is computed from the bends within this time
+CALM_S = 1.0  # length of the calm stretches that show the gyro's bias if the ride has no standstill
 MIN_RIDING_S = 30.0
-MIN_LEAN = np.radians(3.0)  # rms: a ride with less lean does not show forward
+MIN_LEAN = np.radians(3.0)  # least rms of the lean; a ride with less lean does not show forward
 MIN_LIKENESS = 0.5  # least correlation between leaning and turning; bikes have over 0.75
-# largest force to the side, divided by the lean in bends; bikes have 0.1 to 0.2, due to the tyres' width
+# Largest ratio of the force to the side to the lean in bends. Bikes have 0.1 to 0.2, due to the width of the tyres.
 MAX_PUSHED = 0.5
-CAR_G, CAR_LEAN = 0.045, np.radians(5.0)  # rms limits of a car: its force to the side is larger, and its lean smaller
-STUCK_MPS = 0.5  # a log's speed is stuck if it changes by less
-MAX_SPEED_FACTOR = 1.8  # limit of the ratio between the log's speed and the speed from the bends, either way
-# Prior of the speed from the bends: this speed, with the weight of bends of this yaw rate
+CAR_G, CAR_LEAN = 0.045, np.radians(5.0)  # a car has a larger rms of the force to the side, and a smaller rms of lean
+STUCK_MPS = 0.5  # a log's speed is stuck if it changes by less than this
+MAX_SPEED_FACTOR = 1.8  # largest ratio of the log's speed to the speed from the bends, or the reverse
+# The prior of the speed from the bends is USUAL_MPS. It has the weight of bends with the yaw rate USUAL_RADPS.
 USUAL_MPS, USUAL_RADPS = 10.0, 0.14
 
 
@@ -61,7 +60,7 @@ class NoBends(Message):
 
 @dataclass(frozen=True)
 class NotLeaning(Message):
-    """A car's ride."""
+    """The ride is a car's."""
 
     code = "not-leaning"
     text = "in bends it is pushed aside and does not lean, as a car"
@@ -80,8 +79,12 @@ class RideContradicts(Message):
 
 
 def standing(w: Windows) -> Bools:
-    """(n) True where the bike stands still, for zero-velocity updates: rates and forces do not change, the mean rate is
-    under BIAS_RADPS, and the speed, if known, agrees."""
+    """Find the windows in which the bike stands still, for zero-velocity updates.
+
+    Rates and forces do not change, the mean rate is under BIAS_RADPS, and the speed, if known, agrees.
+
+    Returns shape (n), True where the bike stands.
+    """
     return _calm(w, STILL_S) & (np.linalg.norm(averaged(w.rate, STILL_S), axis=1) < BIAS_RADPS)
 
 
@@ -92,18 +95,21 @@ def _calm(w: Windows, over_s: float) -> Bools:
 
 
 def in_hand(w: Windows) -> tuple[Bools, Bools]:
-    """Two arrays (n). The first is True where a hand certainly moves the sensor, or the bike has fallen: up is far from
-    its usual direction. The second is also True in the seconds around these windows, which may not be riding either.
+    """Find the windows in which a hand moves the sensor, or in which the bike has fallen.
 
-    On a balanced bike, the force points along the bike's own up at any lean.
+    In these windows, up is far from its usual direction. On a balanced bike, the force points along the bike's own up
+    at any lean.
+
+    Returns:
+        surely: shape (n), True where a hand certainly moves the sensor, or the bike has fallen.
+        perhaps: shape (n), also True in the seconds around these windows, which may not be riding either.
     """
     there = ~w.gap
     mean = averaged(w.force * there[:, None], MOUNTED_S)
     off = there & (mean[:, 1] < np.cos(np.radians(MOUNTED_DEG)) * np.linalg.norm(mean, axis=1))
     places = np.flatnonzero(off)
-    if len(
-        places
-    ):  # between two such movements, or between a movement and an end of the log, the sensor may not be mounted
+    # Between two movements in a hand, or between one and an end of the log, the sensor may not be mounted.
+    if len(places):
         ends = np.concatenate(([0], places, [len(w) - 1]))
         for begin, end in itertools.pairwise(ends):
             if w.edges[end + 1] - w.edges[begin] < BETWEEN_S:
@@ -113,10 +119,15 @@ def in_hand(w: Windows) -> tuple[Bools, Bools]:
 
 
 def lean_and_speed(w: Windows, still: Bools) -> tuple[Array, Array]:
-    """Approximate lean (n, rad) and speed (n, m/s). still (n): see standing().
+    """Approximate the lean and the speed in n windows.
 
-    If the log has no speed, the force in bends gives the speed: in balance, the force is 1 / cos(lean), and speed x yaw
-    rate = g tan(lean).
+    If the log has no speed, the bends give it. In balance, the force is 1 / cos(lean) in g, and speed x yaw rate =
+    g tan(lean).
+
+    still: see standing(), shape (n).
+    Returns:
+        lean: shape (n), in rad.
+        speed: shape (n), in m/s.
     """
     known, yaw = w.known_speed, w.rate[:, 1]
     force = averaged(np.linalg.norm(w.force[:, :2], axis=1), 2.0)
@@ -133,19 +144,24 @@ def lean_and_speed(w: Windows, still: Bools) -> tuple[Array, Array]:
 
 @dataclass
 class Axes:
-    """matrix (3, 3): vehicle from sensor, rows left, up, forward. bias (3, rad/s): the gyro's bias, in the sensor's
-    axes."""
+    """The vehicle's axes and the gyro's bias.
+
+    matrix: vehicle from sensor, shape (3, 3). The rows are left, up and forward.
+    bias: the gyro's bias along the sensor's axes, shape (3), in rad/s.
+    """
 
     matrix: Array
     bias: Array
 
 
 def axes(w: Windows) -> Axes:
-    """The vehicle's axes, within some degrees, and the gyro's bias. w: windows along the sensor's axes.
+    """Find the vehicle's axes, within some degrees, and the gyro's bias.
 
     In balance, the specific force points along the bike's own up, so the mean force while riding shows "up". For
-    forward and the handedness see signals/leaning.py. Raises RefusedInput if the ride is not a motorcycle's, or has too
-    little lean.
+    forward and the handedness see signals/leaning.py.
+
+    w: windows along the sensor's axes.
+    Raises RefusedInput if the ride is not a motorcycle's, or has too little lean.
     """
     bias = _bias(w)
     w = replace(w, rate=w.rate - bias)
@@ -160,8 +176,11 @@ def axes(w: Windows) -> Axes:
 
 
 def _bias(w: Windows) -> Array:
-    """(3, rad/s) the gyro's bias: the median rate at rest. Without a standstill, the median rate in calm riding;
-    without calm riding, in the whole ride, because most of a ride is nearly straight."""
+    """Return the gyro's bias, shape (3), in rad/s: the median rate at rest.
+
+    Without a standstill it is the median rate in calm riding. Without calm riding it is the median rate in the whole
+    ride, because most of a ride is nearly straight.
+    """
     for over_s in (STILL_S, CALM_S):
         places = _calm(w, over_s)
         if np.any(places):
@@ -170,8 +189,10 @@ def _bias(w: Windows) -> Array:
 
 
 def _refuse_no_motorcycle(found: Leaning, sideways: Array, riding: Bools) -> None:
-    """Raise RefusedInput if the ride is not a motorcycle's, leans too little, or has rates that are not right-handed.
-    sideways (n): force to the left, g, without its slow changes."""
+    """Raise RefusedInput if the ride is not a motorcycle's, has too little lean, or has left-handed rates.
+
+    sideways: the force to the left without its slow changes, shape (n), in g.
+    """
     in_radians_mps = speed_in_radians(found)
     if in_radians_mps is not None:
         raise RefusedInput(RatesInRadians(in_radians_mps))
@@ -184,14 +205,18 @@ def _refuse_no_motorcycle(found: Leaning, sideways: Array, riding: Bools) -> Non
         raise RefusedInput(NoBends(float(np.degrees(lean))))
     if pushed > MAX_PUSHED or found.likeness < MIN_LIKENESS:
         raise RefusedInput(RideContradicts())
-    # a leaning bike that turns also rotates about its own left
+    # A leaning bike that turns also rotates about its own left. The sign of this rotation shows the handedness.
     if found.share < 0.0:
         raise RefusedInput(LeftHanded())
 
 
 def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array) -> None:
-    """Raise RefusedInput if the log's speed is stuck or not in m/s: compare it with the speed at which yaw rate and
-    lean in bends are in balance. known: the log's speed, NaN without one."""
+    """Raise RefusedInput if the log's speed is stuck or not in m/s.
+
+    The log's speed is compared with the speed at which yaw rate and lean balance in the bends.
+
+    known: the log's speed, in m/s; NaN without a speed.
+    """
     if not len(known) or np.isnan(known[0]):
         return
     if np.ptp(known) < STUCK_MPS:

@@ -1,7 +1,8 @@
 """Robust nonlinear least squares for the states and parameters of a stretch of a ride, by Gauss-Newton steps.
 
-The residuals are the measurements, and the states' changes from window to window minus the changes predicted by the
-process model. Each is divided by its standard deviation. Outliers of both are down-weighted (Cauchy).
+There are two kinds of residuals: the measurements, and the errors of the process model. An error of the process model
+is the change of the states from window to window minus the predicted change. Each residual is divided by its standard
+deviation. Outliers of both kinds are down-weighted (Cauchy).
 """
 
 import numpy as np
@@ -15,33 +16,40 @@ from .solver import RandomWalks, Reduced, covariances, posterior_covariance, red
 from .unknowns import BIAS, CAMBER, FORWARD, LEAN, LEFT, PARAMETERS, PITCH, ROTATION, STATES, UP, Prior
 from .windows import Windows
 
-BLOCK = 50  # windows of a block; see solver.py
-ROUNDS, PLAIN_ROUNDS = 20, 2  # largest number of steps; the first PLAIN_ROUNDS do not down-weight outliers
-# rad, a step's largest change of an angle. Under NEAR, the hypotheses are weighted; under CONVERGED, the steps end
+BLOCK = 50  # number of windows per block; see solver.py
+ROUNDS, PLAIN_ROUNDS = 20, 2  # largest number of steps; the first PLAIN_ROUNDS steps do not down-weight outliers
+# The largest change of an angle in a step, in rad. If it is under NEAR, the hypotheses are weighted. If it is under
+# CONVERGED, the steps end.
 NEAR, CONVERGED = np.radians([3.0, 0.02])
 WEIGHING_ROUNDS = 2  # number of steps that recompute the weights of the hypotheses
-CAMBERED = 0.5  # unbalance on roads with camber; camber changes, so a smaller unbalance shows roads with less camber
+# The unbalance of a ride on roads with camber. A changing camber unbalances the bike, so a ride with a smaller
+# unbalance was on roads with less camber.
+CAMBERED = 0.5
 MAX_LEAN = 0.5  # rad: largest change of an angle in one step; the equations are not linear over a larger change
-MAX_PITCH = 1.2  # rad: as in the firmware
+MAX_PITCH = 1.2  # rad: largest pitch, as in the firmware
 START = np.array([1.0, 0.3, 1.0, 1.0, 20.0, 0.03, 0.03, 0.03])  # standard deviations of the first state's prior
-# A steady ride on a straight may look like a standstill for up to BRIEF. Then a residual within AROUND windows is over
-# CONTRADICTED sigmas; at real standstills it is under 2.
+# A steady ride on a straight may look like a standstill for up to BRIEF windows. Then a residual within AROUND windows
+# is over CONTRADICTED standard deviations. At real standstills, all these residuals are under 2 standard deviations.
 BRIEF, AROUND, CONTRADICTED = 15, 25, 4.0
 CONTRADICTING = [PITCH, LEFT, UP, FORWARD, SLIDING, *range(RESTING.start, RESTING_RATE.stop)]
-DRAWN = [PITCH, LEFT, UP, *range(STATES)[BIAS]]  # the components of a state whose prior has mean 0
+DRAWN = [PITCH, LEFT, UP, *range(STATES)[BIAS]]  # components of the first state whose prior has mean 0
 
 
 class Estimate:
     """Estimates the motion at the edges of n windows, and the errors of sensor and bike.
 
-    states (n + 1, STATES). parameters (B, PARAMETERS): parameters of each block of BLOCK windows. matrix (3, 3): the
-    rotation that was applied to the windows, unless the prior comes from a pose. noise: the windows' Noise. change: the
-    last step's largest change of an angle, rad.
+    states: states at the edges, shape (n + 1, STATES).
+    parameters: parameters of each of the B blocks of BLOCK windows, shape (B, PARAMETERS).
+    matrix: the rotation that was applied to the windows, shape (3, 3). The identity if the prior comes from a pose.
+    noise: the Noise of the windows.
+    change: the largest change of an angle in the last step, in rad.
     """
 
     def __init__(self, windows: Windows, prior: Prior, hypotheses: Hypotheses) -> None:
-        """Run the estimation. hypotheses: see hypotheses.py; the first steps use only the first hypothesis. Raises
-        LinAlgError if the equations have no solution."""
+        """Run the estimation. Raises LinAlgError if the equations have no solution.
+
+        hypotheses: see hypotheses.py. The first steps use only the first hypothesis.
+        """
         self._length = min(BLOCK, len(windows))
         self._windows = windows = windows.padded(self._length)
         self.prior, self._hypotheses, self.matrix = prior, hypotheses, np.eye(3)
@@ -55,12 +63,16 @@ class Estimate:
         self._use_own_noise()
 
     def unknowns(self, number: Ints, states: Array) -> Array:
-        """Return states and parameters (STATES + PARAMETERS, k), in the order of equations.py, one column per row of
-        states. states: (k, STATES). number: (k), the index of each row's window."""
+        """Return k columns of states and parameters, in the order of equations.py.
+
+        number: index of the window of each row of `states`, shape (k).
+        states: shape (k, STATES).
+        Returns shape (STATES + PARAMETERS, k).
+        """
         return np.concatenate((states.T, self.parameters[number // self._length].T))
 
     def sigma(self) -> Array:
-        """(n + 1, STATES): standard deviations of the states."""
+        """Return the standard deviations of the states, shape (n + 1, STATES)."""
         blocks = self._reduced(robust=True)
         s = STATES
         found = np.diagonal(
@@ -70,15 +82,17 @@ class Estimate:
         return np.sqrt(np.maximum(edges, 0.0))
 
     def parameter_sigma(self) -> Array:
-        """(PARAMETERS): standard deviations of the first block's parameters."""
+        """Return the standard deviations of the first block's parameters, shape (PARAMETERS)."""
         joint = posterior_covariance(*self._problem(self._reduced(robust=True)))[0]
         found = np.zeros(PARAMETERS)
         found[self.prior.unknown] = np.sqrt(np.maximum(np.diagonal(joint)[2 * STATES :], 0.0))
         return found
 
     def split(self) -> Array:
-        """(3, rad): misalignment in the second half of the ride minus that in the first half, if the prior lets it
-        change."""
+        """Estimate a change of the misalignment in the middle of the ride.
+
+        Returns the misalignment in the second half minus that in the first half, shape (3), in rad.
+        """
         walks = self._likely.random_walks(self.prior, self.parameters)
         middle = len(self.parameters) // 2
         walks.variance[:, middle - 1 : middle, ROTATION] = 1.0
@@ -86,7 +100,7 @@ class Estimate:
         return found[-1] - found[0]
 
     def _start(self, still: Bools) -> None:
-        """Estimate from the beginning. still (n): True where the bike stands."""
+        """Start the estimation again. still: True where the bike stands, shape (n)."""
         self._likely = self._hypotheses.first()
         self.noise = Noise(self._windows, still)
         lean, speed = lean_and_speed(self._windows, still)
@@ -98,7 +112,10 @@ class Estimate:
         self._converge()
 
     def _false_standstill(self, still: Bools) -> Bools:
-        """(n) True in brief standstills that are contradicted by the motion around them."""
+        """Find brief standstills that the motion around them contradicts.
+
+        Returns shape (n), True in these standstills.
+        """
         contradicted = np.max(np.abs(self._residuals() / self.noise.sigma())[:, CONTRADICTING], axis=1) > CONTRADICTED
         false = np.zeros_like(still)
         for begin, end in stretches(still):
@@ -125,8 +142,8 @@ class Estimate:
     def _use_own_noise(self) -> None:
         """Set the noise from this ride's residuals.
 
-        Only the covariance uses this noise. The states are kept. They were found with the larger noise of a rough ride,
-        which gives less weight to lasting errors outside the model.
+        Only the covariance uses this noise. The states are kept. They were estimated with the larger noise of a rough
+        ride, because it gives less weight to lasting errors that the model lacks.
         """
         off = self._residuals()
         self.noise.count_own_misfit()
@@ -135,8 +152,11 @@ class Estimate:
         self.prior.sigma[CAMBER] *= min(1.0, self.noise.unbalance / CAMBERED)
 
     def _step(self, robust: bool, weigh: bool) -> None:
-        """Do one Gauss-Newton step. robust: down-weight outliers. weigh: first compute the hypotheses' posterior
-        weights. Raises LinAlgError."""
+        """Do one Gauss-Newton step. Raises LinAlgError.
+
+        robust: down-weight outliers.
+        weigh: first compute the posterior weights of the hypotheses.
+        """
         blocks = self._reduced(robust)
         if weigh:
             self._likely = self._hypotheses.weighted(blocks, self.prior, self.parameters, self.noise.unbalance)
@@ -155,8 +175,10 @@ class Estimate:
             self._turn_axes()
 
     def _turn_axes(self) -> None:
-        """Rotate the readings by the rotation found so far, then set it to 0, because equations.py is valid for small
-        rotations only."""
+        """Rotate the readings by the estimated rotation, then set the rotation to 0.
+
+        equations.py is valid for small rotations only.
+        """
         rotation = self.parameters[0, ROTATION].copy()
         self.parameters[:, ROTATION] -= rotation
         self.prior.mean[ROTATION] -= rotation
@@ -164,11 +186,15 @@ class Estimate:
         self.matrix, self._windows = turn @ self.matrix, self._windows.turned(turn)
 
     def _middle(self) -> Array:
-        """unknowns() in the middle of each window."""
+        """Return unknowns() in the middle of each window."""
         return self.unknowns(np.arange(len(self._windows)), 0.5 * (self.states[1:] + self.states[:-1]))
 
     def _residuals(self) -> Array:
-        """(n, ROWS): the states' changes over each window minus the process model's, and the measurements."""
+        """Return the residuals of each window, shape (n, ROWS).
+
+        The first STATES columns are the changes of the states minus the changes that the process model predicts. The
+        other columns are the measurements.
+        """
         x = self._middle()
         self.noise.lean, self.noise.pitch, self.noise.speed = x[LEAN], x[PITCH], x[FORWARD]
         found = process_and_measurements(self._windows, x).T
@@ -183,7 +209,7 @@ class Estimate:
         derivatives[:, :s] *= -windows.covered
         derivatives = derivatives.transpose(2, 1, 0) / sigma[..., None]
         found = np.empty((len(windows), ROWS, 2 * s + len(unknown) + 1))
-        # the state in the middle is the mean of the states at both edges
+        # The state in the middle of a window is the mean of the states at its edges.
         found[..., :s] = found[..., s : 2 * s] = 0.5 * derivatives[..., :s]
         step = np.arange(s)
         found[:, step, step] -= 1.0 / sigma[:, :s]

@@ -1,9 +1,9 @@
-"""Process noise and measurement noise for equations.py, with all their parameters. The random walk of the mount and of
-the sensor's errors is in hypotheses.py.
+"""Defines the process noise and the measurement noise of equations.py, with all their parameters. The random walk of
+the mount and of the sensor's errors is in hypotheses.py.
 
-Each line has the form: symbol = default # unit: meaning. Standard deviations are 1 sigma. A disturbance that lasts tau
-seconds is measured in each window of T seconds. Its variance is sigma^2 2 tau / T, because measurements that share an
-error are not independent.
+Each line has the form: symbol = default # unit: meaning. All values are standard deviations. A disturbance that lasts
+for tau seconds appears in many windows of T seconds. Measurements that share an error are not independent. Therefore
+the variance in each window is sigma^2 2 tau / T.
 """
 
 import numpy as np
@@ -17,68 +17,76 @@ from .windows import Windows
 
 # Process noise, per square root of a second
 ANGLE_ROOT = np.radians(0.2)  # rad: lean and pitch, due to vibration of the gyro
-VELOCITY_ROOT = (0.05, 0.05, 0.10)  # m/s: left, up, forward, due to vibration of the accelerometer
+VELOCITY_ROOT = (0.05, 0.05, 0.10)  # m/s: velocity left, up, forward, due to vibration of the accelerometer
 BIAS_ROOT = np.radians(0.005)  # rad/s: the gyro's bias if the log has a temperature
-# rad/s: the gyro's bias without a temperature; a gyro that warms up changes by 0.6 deg/s in five minutes
+# rad/s: the gyro's bias without a temperature. The bias of a gyro that warms up changes by 0.6 deg/s in five minutes.
 WARMING_ROOT = np.radians(0.01)
-# Without readings, and in the hand, per square root of a second: lean and pitch (rad), velocity left, up, forward
-# (m/s). The same values limit the noise over a long time
+# Noise while readings are missing or a hand holds the sensor: lean and pitch (rad), velocity left, up, forward (m/s).
+# LOST_ROOT is per square root of a second, and LOST_MOST is the limit over a long time.
 LOST_ROOT = np.array([np.radians(30.0), np.radians(5.0), 3.0, 1.0, 4.0])
 LOST_MOST = np.array([np.radians(60.0), np.radians(8.0), 20.0, 2.0, 20.0])
-# After a jolt, the angles are wrong by JOLTED_S times (difference of a rate from the window's mean - JOLTED_RADPS)
+# In a jolt, a sample's rate differs from the window's mean by more than JOLTED_RADPS. The angles are then wrong by
+# JOLTED_S times the excess.
 JOLTED_RADPS, JOLTED_S = np.radians(150.0), 0.06
-JOLT = 4.0  # sigmas: a larger residual of the process model is a jolt to the sensor, and down-weighted (Cauchy)
+JOLT = 4.0  # standard deviations: a larger residual of the process model is a jolt, and is down-weighted (Cauchy)
 
-# Measurement noise, 1 sigma, each with the time (..._S) that such an error lasts
-# wheels' sideways velocity: a constant part, and a part in proportion to speed x tan(lean)
+# Measurement noise. Each name that ends in _S is the time that such an error lasts.
+# The sideways velocity of the wheels has a constant part, and a part in proportion to speed x tan(lean).
 SLIDE_MPS, SLIDE_SHARE, SLIDE_S = 0.15, 0.01, 0.5
-# wheels' upward velocity: a constant part, and the pitch of the chassis relative to the road
+# The upward velocity of the wheels has a constant part, and a part due to the chassis' pitch relative to the road.
 DIVE_MPS, DIVE_RAD, DIVE_S = 0.1, np.radians(2.5), 0.5
-# wheels' upward velocity due to slopes: a constant part, and the road's slope
+# On slopes, the upward velocity of the wheels has a constant part, and a part due to the slope.
 SLOPE_MPS, SLOPE_RAD, SLOPE_S = 0.1, np.radians(2.0), 4.0
-STEEP = np.radians(10.0)  # at this pitch DIVE_RAD and SLOPE_RAD double: roads are less steep, wheelies steeper
+STEEP = np.radians(10.0)  # DIVE_RAD and SLOPE_RAD double at this pitch; roads are less steep, wheelies steeper
 BALANCE_G, BALANCE_S = 0.011, 3.0  # force to the side, due to wind, camber and the rider
-# Further noise of the force to the side: a part times sin(lean), and a part (g s2/rad) times the roll acceleration
+# Two more parts of the force to the side: g times sin(lean), and g s2/rad times the roll acceleration
 BALANCE_LEANED_G, BALANCE_ROLLING = 0.045, 0.05
-BALANCE_MIN_MPS = 4.0  # at lower speeds, steering and feet also balance the bike
+BALANCE_MIN_MPS = 4.0  # least speed of a balanced bike; at lower speeds, steering and feet also balance it
 ANY_MPS, ANY_S = 20.0, 60.0  # difference of the speed from USUAL_MPS, for a ride in which nothing else shows the speed
-SPEED_MPS = 1.0  # the log's speed, per second, because a receiver's error lasts for some seconds
+SPEED_MPS = 1.0  # the log's speed, measured once per second, because a receiver's error lasts for some seconds
 REST_MPS, REST_RADPS = 0.05, np.radians(0.15)  # velocity and rates of a bike that stands
-HAND_MPS = 0.5  # velocity over a window of a sensor that a hand moves
-BACKWARD_MPS = 0.3  # speed below 0: bikes hardly roll backwards
-OUTLIER = 2.0  # sigmas: larger residuals of measurements are down-weighted (Cauchy)
+HAND_MPS = 0.5  # velocity in a window of a sensor that a hand moves
+BACKWARD_MPS = 0.3  # speed below 0, because bikes hardly roll backwards
+OUTLIER = 2.0  # standard deviations: larger residuals of measurements are down-weighted (Cauchy)
 LASTING_S = {eq.SLIDING: SLIDE_S, eq.CLIMBING: DIVE_S, eq.SLOPING: SLOPE_S, eq.BALANCED: BALANCE_S, eq.ANY_SPEED: ANY_S}
 
-# A ride's roughness is estimated from the rms of these residuals, divided by the rms expected in a rough ride
+# The roughness of a ride is the rms of these residuals divided by EXPECTED, their rms in a rough ride.
 ROUGH = [LEAN, PITCH, LEFT, UP, FORWARD, eq.SLIDING, eq.CLIMBING]
 EXPECTED = np.array([0.38, 0.38, 0.38, 0.38, 0.38, 0.5, 0.5])
 ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
-# Accelerations that are not the bike's, for example in a resonating mount, are white noise only if they are brief.
-# The residual CLIMBING shows their size and correlation time: it is the difference between the upward velocity from
-# integrated forces and the one from pitch and speed, and lasts for seconds. The misfit is the factor on the velocities'
-# standard deviation. It is the square of a ratio: the rms of this residual in means over LASTING_MISFIT_S, times the
-# root of the number of windows in a mean, divided by the same value of an ordinary ride, USUAL_MISFIT. At any speed,
-# the unit of the residual is CLIMBING's standard deviation at MISFIT_MPS, because a mount's error in m/s is the same in
-# town as on a motorway.
+# A resonating mount causes accelerations that are not the bike's. They are white noise only if they are brief. The
+# residual CLIMBING shows their size and how long they last. It is the upward velocity from integrated forces minus the
+# upward velocity from pitch and speed.
+#
+# The misfit is a factor on the standard deviation of the velocities. It is the square of a ratio. The numerator is the
+# rms of CLIMBING, averaged over LASTING_MISFIT_S, times the root of the number of windows in a mean. The denominator is
+# USUAL_MISFIT, the same value for an ordinary ride. A mount's error in m/s is the same in town as on a motorway.
+# Therefore CLIMBING is divided by its standard deviation at the speed MISFIT_MPS, whatever the actual speed.
 LASTING_MISFIT_S, MISFIT_MPS, USUAL_MISFIT, MOST_MISFIT = 2.0, 25.0, 0.25, 6.0
-# If the misfit is over 1, roughness is at least this factor times the misfit, because lasting errors have small
-# residuals
+# If the misfit is over 1, the roughness is at least MISFIT_ROUGHNESS times the misfit. The residuals alone would give
+# less, because lasting errors have small residuals.
 MISFIT_ROUGHNESS = 0.14
-# A ride's unbalance is estimated in the same way: from the rms of BALANCED in means over some seconds, minus its mean
-# over LASTS_S (which is unknowns.BESIDE), divided by its standard deviation. Longer means average out errors that
-# change sign, such as a rider's corrections. BRIEF_S overestimates the noise for caution; LONG_S does not.
+# The unbalance of a ride is estimated in the same way. Subtract from BALANCED its mean over LASTS_S, which is
+# unknowns.BESIDE, and divide it by its standard deviation. The unbalance follows from the rms of means over BRIEF_S or
+# LONG_S. Longer means average out errors that change sign, such as a rider's corrections. So BRIEF_S overestimates the
+# noise, for caution, and LONG_S does not.
 BRIEF_S, LONG_S, LASTS_S = 3.0, 10.0, 40.0
 LEAST_UNBALANCE, MOST_UNBALANCE = 0.12, 6.0
-LEAST_WINDOWS = 50  # with fewer windows of balanced riding, unbalance stays 1
+LEAST_WINDOWS = 50  # with fewer windows of balanced riding, the unbalance stays 1
 
 
 class Noise:
-    """The standard deviations of n windows. still (n): True where the bike stands.
+    """The standard deviations of n windows.
 
-    lean, pitch (n, rad), speed (n, m/s): estimates, which must be set before sigma() is called. riding (n): True where
-    the bike may be riding. roughness (n): factor on the noise of vibration, 1 for a rough ride. misfit (n): factor on
-    the velocities' noise, 1 if the accelerations are the bike's. doubtful (n): True where the bike is riding and the
-    misfit is at its limit. unbalance: factor on the noise of BALANCED, 1 for an average ride.
+    Set lean, pitch and speed before you call sigma(). All fields but unbalance have the shape (n).
+
+    lean, pitch: estimates in rad.
+    speed: estimate in m/s.
+    riding: True where the bike may be riding.
+    roughness: factor on the noise of vibration; 1 for a rough ride.
+    misfit: factor on the noise of the velocities; 1 if the accelerations are the bike's.
+    doubtful: True where the bike is riding and the misfit is at its limit.
+    unbalance: factor on the noise of BALANCED; 1 for an average ride.
     """
 
     def __init__(self, windows: Windows, still: Bools) -> None:
@@ -91,14 +99,17 @@ class Noise:
         self._own_misfit, self.doubtful = self.misfit, np.zeros(len(windows), dtype=bool)
         seconds = np.maximum(windows.seconds, 1e-4)
         self._root = np.sqrt(seconds)[:, None]
-        # factor on a window's sigma, for errors that last longer than the window
+        # The factor on the standard deviation in a window, for errors that last longer than the window.
         self._lasting = np.ones((len(windows), eq.ROWS))
         for row, over_s in LASTING_S.items():
             self._lasting[:, row] = np.sqrt(np.maximum(1.0, 2.0 * over_s / seconds))
 
     def sigma(self) -> Array:
-        """(n, ROWS): standard deviations of the process noise over a window, and of the measurements; infinite without
-        a measurement."""
+        """Return the standard deviations in each window, shape (n, ROWS).
+
+        The first STATES columns are the process noise over the window. The others are the measurement noise, infinite
+        where there is no measurement.
+        """
         w, riding, balanced = self._windows, self.riding, self._is_balanced
         speed, roughness = np.maximum(self.speed, 0.0), self.roughness
         found = np.full((len(w), eq.ROWS), np.inf)
@@ -127,14 +138,16 @@ class Noise:
         return found
 
     def robust(self, sigma: Array, off: Array) -> Array:
-        """sigma (n, ROWS), enlarged where the residual off (n, ROWS) is an outlier (Cauchy)."""
-        limit = OUTLIER / self._lasting  # in sigmas of the disturbance, without the factor for its duration
+        """Return `sigma`, enlarged where a residual in `off` is an outlier (Cauchy). All have the shape (n, ROWS)."""
+        limit = OUTLIER / self._lasting  # in standard deviations without the factor for the duration of a disturbance
         limit[:, : BIAS.start], limit[:, BIAS] = JOLT, np.inf
         return sigma * np.hypot(1.0, off / sigma / limit)
 
     def estimate_roughness(self, residual: Array) -> None:
-        """Set roughness from the mean square, around each window, of the residuals divided by their standard deviations
-        (n, ROWS)."""
+        """Set the roughness from the mean square of the residuals around each window.
+
+        residual: residuals divided by their standard deviations, shape (n, ROWS).
+        """
         squares = np.mean((residual[:, ROUGH] / EXPECTED) ** 2, axis=1) * self.roughness**2
         share = averaged(self.riding.astype(float), ROUGHNESS_S)
         found = averaged(np.where(self.riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
@@ -142,10 +155,13 @@ class Noise:
         self.roughness = np.where(share > 0.02, np.clip(np.sqrt(found), least, MOST_ROUGHNESS), 1.0)
 
     def estimate_misfit(self, off: Array) -> None:
-        """Estimate from the residuals off (n, ROWS) how much the accelerations differ from a bike's.
+        """Estimate the misfit: how much the accelerations differ from a bike's.
 
-        For the states, the unit is CLIMBING's standard deviation, which grows with speed. Slow rides get too little
-        weight, which costs little. For the covariance, after count_own_misfit(), the unit is m/s.
+        The estimate of the states uses CLIMBING divided by its standard deviation, which grows with speed. Slow rides
+        then get too little weight, which makes the states only slightly worse. The covariance, after
+        count_own_misfit(), uses CLIMBING divided by a constant.
+
+        off: residuals, shape (n, ROWS).
         """
         limit = OUTLIER / self._lasting[:, eq.CLIMBING]
 
@@ -159,14 +175,14 @@ class Noise:
         self.doubtful = self.riding & (self.misfit >= MOST_MISFIT)
 
     def count_own_misfit(self) -> None:
-        """Make sigma() use the misfit in m/s from now on."""
+        """Make sigma() use the misfit of CLIMBING divided by a constant from now on."""
         self.misfit = self._own_misfit
 
     def _misfit(self, residual: Array) -> Array:
-        """(n) the misfit, from the residual of CLIMBING in its unit (n)."""
+        """Return the misfit, shape (n). residual: CLIMBING divided by its unit, shape (n)."""
         count = round(LASTING_MISFIT_S / WINDOW_S)
         lasting = np.where(self.riding, residual, 0.0)
-        # limited, because in a wheelie the residual is large but brief
+        # The squares are limited, because in a wheelie the residual is large but brief.
         squares = np.minimum(count * moving_mean(lasting, count) ** 2, 2.0 * MOST_MISFIT * USUAL_MISFIT**2)
         share = averaged(self.riding.astype(float), ROUGHNESS_S)
         mean = averaged(np.where(self.riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
@@ -174,7 +190,11 @@ class Noise:
         return np.clip(found, 1.0, MOST_MISFIT)
 
     def estimate_unbalance(self, force: Array, over_s: float) -> None:
-        """Set unbalance from the measurement BALANCED (n, g). over_s: BRIEF_S or LONG_S."""
+        """Set the unbalance.
+
+        force: the measurement BALANCED, shape (n), in g.
+        over_s: BRIEF_S or LONG_S.
+        """
         counted = self._is_balanced
         share, whole = averaged(counted.astype(float), LASTS_S), averaged(counted.astype(float), over_s) > 0.97
         self.unbalance = 1.0
@@ -182,15 +202,17 @@ class Noise:
             return
         off = force - averaged(np.where(counted, force, 0.0), LASTS_S) / np.maximum(share, 1e-9)
         mean = averaged(np.where(counted, off / self._of_balance(), 0.0), over_s)[whole]
-        # the share of the variance that is left in a mean over over_s, for an error that lasts BALANCE_S
+        # An error that lasts for BALANCE_S keeps this share of its variance in a mean over over_s.
         ratio = over_s / BALANCE_S
         left = 2.0 * (ratio - 1.0 + np.exp(-ratio)) / ratio**2
         self.unbalance = float(np.clip(np.sqrt(np.mean(mean**2) / left), LEAST_UNBALANCE, MOST_UNBALANCE))
 
     @property
     def _wheelie_factor(self) -> Array:
-        """(n) factor on the noise of the wheels' upward motion, because in a wheelie the chassis does not point along
-        the road."""
+        """The factor on the noise of the wheels' upward motion, shape (n).
+
+        In a wheelie the chassis does not point along the road.
+        """
         return 1.0 + (self.pitch / STEEP) ** 4
 
     @property
@@ -198,10 +220,13 @@ class Noise:
         return self.riding & (self.speed > BALANCE_MIN_MPS)
 
     def _of_balance(self) -> Array:
-        """(n) g: standard deviation of BALANCED in an average ride."""
+        """Return the standard deviation of BALANCED in an average ride, shape (n), in g."""
         return np.hypot(BALANCE_G, BALANCE_LEANED_G * np.sin(self.lean))
 
 
 def jolted(windows: Windows) -> Array:
-    """(n) rad: possible error of the angles in each window, due to a jolt or a gyro at the end of its range."""
+    """Return the possible error of the angles in each window, shape (n), in rad.
+
+    A jolt, or a gyro at the end of its range, causes this error.
+    """
     return JOLTED_S * np.maximum(windows.jolt - JOLTED_RADPS, 0.0)

@@ -1,4 +1,4 @@
-"""Computes the smoothed lean of a recorded ride: at each instant from all readings, earlier and later ones."""
+"""Computes the smoothed lean of a recorded ride. Each lean uses all readings, earlier and later ones."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -21,21 +21,23 @@ from .noise import jolted
 from .unknowns import FORWARD, GYRO, LEAN, PITCH, Prior
 from .windows import Windows, windows_of
 
-SLOWEST_HZ = 10.0
-SEGMENT_S = 120.0  # a log is cut into segments of this length
+SLOWEST_HZ = 10.0  # least sample rate
+SEGMENT_S = 120.0  # longest part of a log between two cuts
 TOGETHER = 8  # number of segments estimated together, with one more before and one after
-# Two more parts of the lean's standard deviation. LEANED_SHARE times the lean: errors outside the model, such as the
-# gyro's sensitivity to acceleration. TIMING_S times the roll rate: the delay of the gyro's low-pass filter, and errors
-# of the samples' times
+# LEANED_SHARE times the lean is added to the standard deviation of the lean. It covers errors that the model lacks,
+# such as the gyro's sensitivity to acceleration.
 LEANED_SHARE = 0.001
-TIMING_S = 0.002  # s
+# TIMING_S times the roll rate is also added to it. It covers the delay of the gyro's low-pass filter, and errors of the
+# samples' times.
+TIMING_S = 0.002
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps", "doubtful")
 DIGITS = 3, 3, 3, 3, 0
-DOUBTFUL = 0.2  # a larger share of doubtful riding gives a remark
-# On straights, a bike balances within this lean if the upright pose was right and no luggage is on one side
+DOUBTFUL = 0.2  # a larger share of doubtful riding causes a remark
+# Largest lean at which a bike balances on straights, if the upright pose was right and no luggage is on one side
 POSE_DEG = 1.8
-# A gyro is faulty if an estimated error is over this many standard deviations of its prior; good gyros stayed under
-# 2.6, on good and bad mounts. The error in standard deviations then multiplies the lean's standard deviation
+# A gyro is faulty if an estimated error is over this many standard deviations of its prior. Good gyros stayed under
+# 2.6, on good and bad mounts. For a faulty gyro, this number of standard deviations multiplies the standard deviation
+# of the lean.
 ODD_SIGMAS = 4.0
 
 
@@ -55,7 +57,7 @@ class SensorOdd(Message):
 
 @dataclass(frozen=True)
 class NotTheBikes(Message):
-    """The accelerations are not a bike's. percent: share of the riding."""
+    """The accelerations are not a bike's. percent: the share of the riding in which they are not."""
 
     percent: float
 
@@ -69,8 +71,10 @@ class NotTheBikes(Message):
 
 @dataclass(frozen=True)
 class PoseOff(Message):
-    """The upright pose was not upright. angle_deg: the lean at which the bike is in balance, relative to that
-    pose, > 0 to the right."""
+    """The upright pose was not upright.
+
+    angle_deg: the lean at which the bike is in balance, relative to the upright pose; positive to the right.
+    """
 
     angle_deg: float
 
@@ -88,12 +92,15 @@ class PoseOff(Message):
 
 @dataclass(eq=False)
 class SmoothedRide(Table):
-    """The motion of a motorcycle on a ride: n samples, NaN where the readings froze.
+    """The motion of a motorcycle on a ride of n samples. Values are NaN where the readings froze.
 
-    t_s: seconds since the log's first sample. lean_deg: > 0 to the right. lean_sigma_deg: its standard deviation.
-    pitch_deg: pitch by road and suspension, > 0 nose up. speed_mps: the sensor's forward speed. doubtful: 1 where the
-    accelerations differ so much from a bike's that the lean is less exact, otherwise 0. notices: remarks about the
-    ride.
+    t_s: seconds since the log's first sample.
+    lean_deg: the lean, positive to the right.
+    lean_sigma_deg: standard deviation of the lean.
+    pitch_deg: pitch caused by road and suspension, positive if the nose is up.
+    speed_mps: forward speed of the sensor.
+    doubtful: 1 where the accelerations differ from a bike's, so the lean is less exact; otherwise 0.
+    notices: remarks about the ride.
     """
 
     t_s: Array
@@ -108,8 +115,12 @@ class SmoothedRide(Table):
 def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None = None) -> SmoothedRide:
     """Compute the lean of a motorcycle from all readings of its ride, with a standard deviation for each sample.
 
-    log: see read_log; a speed helps and is optional. calibration: aligned, of a motorcycle. progress: called with
-    (done, total) of the log. Least squares over the whole ride: see equations.py. Raises InputError.
+    The method is least squares over the whole ride, see equations.py.
+
+    log: see read_log. A speed improves the result, but is optional.
+    calibration: an aligned calibration of a motorcycle.
+    progress: called with (done, total) of the log.
+    Raises InputError.
 
     >>> from kickstand_tools.api import CalibrationFile, Log, simulate_ride
     >>> ride = simulate_ride("street", seed=1, seconds=60.0)
@@ -127,9 +138,9 @@ def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None 
 def smooth_to_csv(
     log: Source, calibration: CalibrationFile, out: Path, progress: Progress | None = None
 ) -> tuple[int, list[Message]]:
-    """Write LEAN.csv with the log's own times and COLUMNS. Returns the number of samples and the notices.
+    """Write LEAN.csv with the log's own times and COLUMNS. The memory used does not grow with the log.
 
-    Memory does not grow with the log. Raises InputError.
+    Returns the number of samples and the notices. Raises InputError.
     """
     notices: list[Message] = []
     return write_lean(out, COLUMNS, DIGITS, _checked_blocks(log, calibration, progress, notices)), notices
@@ -138,12 +149,14 @@ def smooth_to_csv(
 def _checked_blocks(
     log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Message]
 ) -> Iterator[tuple[Block, Array]]:
-    """Yield from smooth_blocks() for the stretch in `log`. Raises InputError, also for under SLOWEST_HZ samples per
-    second."""
+    """Yield the results of smooth_blocks() for the stretch in `log`.
+
+    Raises InputError, also for under SLOWEST_HZ samples per second.
+    """
     whole, stretch = split_stretch(log)
     for block, found in smooth_blocks(whole, calibration, progress, notices):
         if found is None:
-            raise InputError(f"{name_of(log)}: under {SLOWEST_HZ:.0f} samples a second: too few to smooth the lean")
+            raise InputError(f"{name_of(log)}: under {SLOWEST_HZ:.0f} samples per second: too few to smooth the lean")
         yield from within(stretch, block, found)
 
 
@@ -154,8 +167,13 @@ def smooth_blocks(
     notices: list[Message] | None = None,
     lines: bool = True,
 ) -> Iterator[tuple[Block, Array | None]]:
-    """Yield each segment of the log with its values (n, COLUMNS), or None if it has too few samples per second.
-    notices, lines: see read_blocks(). Raises InputError."""
+    """Yield each segment of the log with its values.
+
+    The values have the shape (n, COLUMNS). They are None if the segment has too few samples per second.
+
+    notices, lines: see read_blocks().
+    Raises InputError.
+    """
     if calibration.vehicle == "car":
         raise InputError(f"{name_of(log)}: a car does not lean, and its calibration is a car's")
     if not calibration.aligned:
@@ -168,14 +186,14 @@ def smooth_blocks(
         if len(waiting) > TOGETHER:
             past, waiting, before = waiting[:TOGETHER], waiting[TOGETHER:], past[-1:]
             yield from smoother.together(before, past, waiting)
-    # the end of a ride may be short, so up to TOGETHER segments are estimated with it
+    # The rest of a ride may be short, so up to TOGETHER earlier segments are estimated with it.
     yield from smoother.together(past[-max(1, TOGETHER - len(waiting)) :], waiting, [])
     if notices is not None:
         notices.extend(smoother.remarks(notices))
 
 
 def _segments(blocks: Iterator[Block]) -> Iterator[Block]:
-    """Cut the blocks into segments of at most SEGMENT_S."""
+    """Cut the blocks into segments of at most SEGMENT_S seconds."""
     for block in blocks:
         number = np.floor(block.t_s / SEGMENT_S)
         cuts = np.flatnonzero(np.diff(number)) + 1
@@ -194,8 +212,10 @@ class Smoother:
     def together(
         self, before: list[Block], own: list[Block], after: list[Block]
     ) -> Iterator[tuple[Block, Array | None]]:
-        """Yield the segments `own` with their values. The segments before and after them are estimated together with
-        them."""
+        """Yield the segments `own` with their values.
+
+        The segments before and after them are used in the same estimate, but are not returned.
+        """
         measured = [segment.measured for segment in (*before, *own, *after)]
         ends = np.cumsum([0, *(len(segment.time_us) for segment in measured)])
         first = int(ends[len(before)])
@@ -212,9 +232,12 @@ class Smoother:
             yield segment, found
 
     def estimated(self, segments: list[Block], own: slice) -> Array | None:
-        """The values (samples, COLUMNS), NaN where the readings are not from riding; None for under SLOWEST_HZ samples
-        per second. own: the samples that need a lean. The other samples only improve the estimate. Remarks count
-        only the samples in own."""
+        """Estimate the values of the samples in these segments.
+
+        own: the samples that need a lean. The other samples only improve the estimate, and remarks do not count them.
+        Returns shape (samples, COLUMNS), NaN where the readings are not from riding. Returns None for under SLOWEST_HZ
+        samples per second.
+        """
         t_s = np.concatenate([segment.t_s for segment in segments])
         readings = np.concatenate([segment.readings for segment in segments])
         speed = np.concatenate([segment.speed_mps for segment in segments])
@@ -248,16 +271,21 @@ class Smoother:
         return found
 
     def add(self, seconds: Array, riding: Bools, doubtful: Bools, pose_rad: float) -> None:
-        """Count n windows for the remarks. seconds: the windows' durations. doubtful: True where accelerations are not
-        the bike's. pose_rad: lean to the right, relative to the upright pose, at which the bike is in balance on
-        straights."""
+        """Count n windows for the remarks.
+
+        seconds: duration of each window, shape (n).
+        riding: True where the bike may be riding, shape (n).
+        doubtful: True where the accelerations are not the bike's, shape (n).
+        pose_rad: the lean at which the bike is in balance on straights, relative to the upright pose; positive to the
+            right.
+        """
         riding_s = float(np.sum(seconds[riding]))
         self._riding_s += riding_s
         self._doubtful_s += float(np.sum(seconds[riding & doubtful]))
         self._leaned += riding_s * float(np.degrees(pose_rad))
 
     def remarks(self, known: Iterable[Message]) -> list[Message]:
-        """The remarks about the whole ride. known: remarks that exist already."""
+        """Return the remarks about the whole ride. known: earlier remarks about the log."""
         if not self._riding_s or is_explained(known):
             return []
         if self._odd:
@@ -268,15 +296,16 @@ class Smoother:
 
 
 def oddness(found: Estimate) -> float:
-    """The gyro's largest error of scale or axes, in standard deviations of its prior."""
+    """Return the gyro's largest error of scale or axes, in standard deviations of its prior."""
     return float(np.max(np.abs(found.parameters - found.prior.mean)[:, GYRO] / found.prior.sigma[GYRO]))
 
 
 def at_samples(windows: Windows, rate: Array, found: Estimate, delay_s: float) -> Array:
-    """(samples, 4): lean, its standard deviation, pitch (rad) and speed (m/s). Between the edges of the windows, the
-    lean follows the corrected gyro.
+    """Interpolate the estimate at each sample. Between the edges of the windows, the lean follows the corrected gyro.
 
-    rate (samples, 3): rad/s, as passed to windows_of(). delay_s: delay of the gyro's low-pass filter.
+    rate: the rates that were passed to windows_of(), shape (samples, 3), in rad/s.
+    delay_s: delay of the gyro's low-pass filter.
+    Returns shape (samples, 4): lean, its standard deviation and pitch in rad, and speed in m/s.
     """
     number, sigma = windows.number, found.sigma()[:, LEAN]
     duration = windows.before + windows.after
@@ -284,7 +313,10 @@ def at_samples(windows: Windows, rate: Array, found: Estimate, delay_s: float) -
     window = np.cumsum(last) - last
 
     def integral(rate: Array) -> tuple[Array, Array]:
-        """The integral of rate (samples) from the start of a sample's window to the sample, and over that window."""
+        """Integrate `rate`, shape (samples).
+
+        Returns the integral from the start of each sample's window to the sample, and the integral over that window.
+        """
         until = np.cumsum(rate * duration)
         edges = np.concatenate(([0.0], until[last]))
         return until - rate * windows.after - edges[window], np.diff(edges)[window]

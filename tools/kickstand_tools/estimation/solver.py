@@ -3,9 +3,12 @@
 The windows of a ride are arranged as B blocks of K windows. A link holds the normal equations of two successive states,
 with columns for the parameters of the block and for the right-hand side. Every second state is eliminated by its Schur
 complement, in all blocks at the same time, until one link per block remains (cyclic reduction). The blocks then form a
-chain. Each state of the chain is a block's first state together with the block's parameters. The same elimination
-solves this chain for G hypotheses about the random walk at the same time, and gives the likelihood of each. The result
-equals one least-squares solution over the whole chain.
+chain. Each state of the chain is a block's first state together with the block's parameters.
+
+The same elimination solves this chain, for all G hypotheses about the random walk at the same time. It also computes
+the likelihood of each hypothesis. The result equals one least-squares solution over the whole ride.
+
+In the shapes below, a state has s values, and a block has m parameters.
 """
 
 from dataclasses import dataclass
@@ -17,13 +20,19 @@ from ..signals import Array
 
 @dataclass
 class Reduced:
-    """B chains whose inner states are eliminated. s: number of values of a state; m: number of a chain's parameters.
+    """B chains whose inner states are eliminated.
 
-    gains and covariances have one array per level of the elimination, in order. gains (B, states, s, s + s + m + 1): a
-    state's change is minus this, times (the previous state, the next state, the parameters, 1). covariances (B, states,
-    s, s): the covariance of a state if these are fixed. left (B, s + s + m, s + s + m + 1): the normal equations of the
-    first state, the last one and the parameters; the last column is the gradient. log_determinant (B): the logarithm of
-    the determinant of the eliminated states' information matrix. residual (B): the sum of squares at their optimum.
+    gains and covariances have one array per level of the elimination, in order.
+
+    s: number of values of a state.
+    gains: shape (B, states, s, s + s + m + 1). The change of an eliminated state is minus its gain times the vector
+        (previous state, next state, parameters, 1).
+    covariances: covariance of an eliminated state if its neighbours and the parameters are fixed, shape (B, states, s,
+        s).
+    left: normal equations of the first state, the last state and the parameters, shape (B, s + s + m, s + s + m + 1).
+        The last column is the gradient.
+    log_determinant: logarithm of the determinant of the eliminated states' information matrix, shape (B).
+    residual: sum of squares at the optimum of the eliminated states, shape (B).
     """
 
     s: int
@@ -35,18 +44,24 @@ class Reduced:
 
 
 def reduce_windows(jacobian: Array, states: int) -> Reduced:
-    """Eliminate the inner states of B blocks of K windows. jacobian (B, K, r, s + s + m + 1): derivatives of a window's
-    r residuals by the state at its start, the state at its end and the parameters, then the residuals themselves.
-    states: s. Raises LinAlgError."""
+    """Eliminate the inner states of B blocks of K windows. Raises LinAlgError.
+
+    jacobian: derivatives of each window's r residuals, shape (B, K, r, s + s + m + 1). The columns are the state at the
+        window's start, the state at its end, the parameters, and the residual itself.
+    states: s, the number of values of a state.
+    """
     links = np.matmul(jacobian[..., : 2 * states].transpose(0, 1, 3, 2), jacobian)
     common = _in_rows(jacobian[..., 2 * states :])
     return _reduced(links, np.matmul(common.transpose(0, 2, 1), common))
 
 
 def _reduced(links: Array, common: Array) -> Reduced:
-    """Do the cyclic reduction. links (B, K, s + s, s + s + m + 1): normal equations of both states of each link. common
-    (B, m + 1, m + 1): normal equations of the parameters, with their gradient and the residual's sum of squares in the
-    last row and column."""
+    """Do the cyclic reduction.
+
+    links: normal equations of both states of each link, shape (B, K, s + s, s + s + m + 1).
+    common: normal equations of the parameters, shape (B, m + 1, m + 1). The last row and column hold their gradient and
+        the sum of the squared residuals.
+    """
     s = links.shape[2] // 2
     gains, covariances = [], []
     common, log_determinant = common.copy(), np.zeros(len(links))
@@ -73,13 +88,17 @@ def _reduced(links: Array, common: Array) -> Reduced:
 
 
 def _in_rows(values: Array) -> Array:
-    """(B, K, r, w) -> (B, K r, w)"""
+    """Reshape values from (B, K, r, w) to (B, K r, w)."""
     return values.reshape(len(values), -1, values.shape[3])
 
 
 def back(reduced: Reduced, ends: Array, parameters: Array) -> Array:
-    """Do the back substitution. Returns (B, K + 1, s): the changes of all states. ends (B, 2, s): changes of the first
-    and the last state. parameters (B, m): changes of the parameters."""
+    """Do the back substitution.
+
+    ends: changes of the first and the last state, shape (B, 2, s).
+    parameters: changes of the parameters, shape (B, m).
+    Returns the changes of all states, shape (B, K + 1, s).
+    """
     states = ends
     for gain in reversed(reduced.gains):
         count = gain.shape[1]
@@ -91,10 +110,13 @@ def back(reduced: Reduced, ends: Array, parameters: Array) -> Array:
 
 
 def covariances(reduced: Reduced, joint: Array) -> Array:
-    """(B, K, s + s, s + s + m): covariance of the states at both ends of each link, with each other and with the
-    parameters. joint (B, s + s + m, s + s + m): covariance of the first state, the last state and the parameters."""
+    """Compute the covariance of the states at both ends of each link, with each other and with the parameters.
+
+    joint: covariance of the first state, the last state and the parameters, shape (B, s + s + m, s + s + m).
+    Returns shape (B, K, s + s, s + s + m).
+    """
     s, width = reduced.s, joint.shape[1]
-    ends = np.r_[:s, 2 * s : 3 * s]  # rows of the two outer states of two links, which have three states
+    ends = np.r_[:s, 2 * s : 3 * s]  # two neighbouring links have three states; these are the rows of the outer two
     all_but_inner = np.r_[ends, 3 * s : width + s]
     found, common = joint[:, None, : 2 * s], joint[:, None, 2 * s :]
     for gain, own in zip(reversed(reduced.gains), reversed(reduced.covariances), strict=True):
@@ -102,7 +124,7 @@ def covariances(reduced: Reduced, joint: Array) -> Array:
         split = found[:, :count]
         below = np.repeat(common, count, axis=1)
         below[..., : 2 * s] = split[..., 2 * s :].transpose(0, 1, 3, 2)
-        # covariance of the inner state with the ends and the parameters
+        # The covariance of the inner state with the ends and with the parameters.
         inner = -np.matmul(gain[..., :-1], np.concatenate((split, below), axis=2))
         three = np.empty((len(found), count, 3 * s, width + s))
         three[:, :, ends[:, None], all_but_inner] = split
@@ -119,9 +141,10 @@ def covariances(reduced: Reduced, joint: Array) -> Array:
 class RandomWalks:
     """The parameters' random walks under G hypotheses.
 
-    prior (G, m, m + 1): normal equations of the first block's parameters. variance (G, B - 1, m): process noise, the
-    variance of the parameters' change from block to block. between (B - 1, m): the change from block to block in the
-    values at which the equations were linearised.
+    prior: normal equations of the first block's parameters, shape (G, m, m + 1).
+    variance: variance of the parameters' change from block to block (process noise), shape (G, B - 1, m).
+    between: current change of the parameters from block to block, shape (B - 1, m). The equations were linearised at
+        these parameters.
     """
 
     prior: Array
@@ -130,11 +153,15 @@ class RandomWalks:
 
 
 def _chains(blocks: Reduced, walks: RandomWalks) -> tuple[Reduced, Array, Array]:
-    """Build G chains of blocks. The n = s + m values of a state are a block's first state and its parameters. The
-    values after the last block are a copy.
+    """Build G chains of blocks.
 
-    Returns the chains, the normal equations (G, 2 n, 2 n + 1) of both ends of each chain, and minus twice the
-    log-likelihood (G), up to a constant common to all hypotheses.
+    A state of a chain has n = s + m values: a block's first state and its parameters. The parameters after the last
+    block are equal to those of the last block.
+
+    Returns:
+        reduced: the chains.
+        ends: normal equations of both ends of each chain, shape (G, 2 n, 2 n + 1).
+        minus_two_log: minus twice the log-likelihood, shape (G). A constant is missing, the same for all hypotheses.
     """
     (count, width), s = blocks.left.shape[:2], blocks.s
     hypotheses, n = len(walks.prior), width - s
@@ -158,18 +185,26 @@ def _chains(blocks: Reduced, walks: RandomWalks) -> tuple[Reduced, Array, Array]
 
 
 def _squared(information: Array, gradient: Array) -> Array:
-    """(G): the gradients (G, k, 1) squared, in the metric of the covariance."""
+    """Return the squares of the gradients (G, k, 1) in the metric of the covariance, shape (G)."""
     return np.sum(gradient * np.linalg.solve(information, gradient), axis=(1, 2))
 
 
 def minus_two_log_likelihood(blocks: Reduced, walks: RandomWalks) -> Array:
-    """(G): minus twice the log-likelihood of the readings under each hypothesis, up to a constant common to all."""
+    """Return minus twice the log-likelihood of the readings under each hypothesis, shape (G).
+
+    A constant is missing, the same for all hypotheses.
+    """
     return _chains(blocks, walks)[2]
 
 
 def solve(blocks: Reduced, walks: RandomWalks, weight: Array) -> tuple[Array, Array]:
-    """The posterior mean over the hypotheses with these weights (G): changes of the states (B, K + 1, s), in which the
-    state between two blocks appears twice, and of the parameters (B, m). Raises LinAlgError."""
+    """Compute the posterior mean over the hypotheses. Raises LinAlgError.
+
+    weight: weights of the hypotheses, shape (G).
+    Returns:
+        states: changes of the states, shape (B, K + 1, s). The state between two blocks is in both blocks.
+        parameters: changes of the parameters, shape (B, m).
+    """
     reduced, ends, _ = _chains(blocks, walks)
     mean = np.einsum("g,gbi->bi", weight, _first_states(reduced, ends))
     states, parameters = mean[:, : blocks.s], mean[:-1, blocks.s :]
@@ -177,8 +212,12 @@ def solve(blocks: Reduced, walks: RandomWalks, weight: Array) -> tuple[Array, Ar
 
 
 def posterior_covariance(blocks: Reduced, walks: RandomWalks, weight: Array) -> Array:
-    """(B, s + s + m, s + s + m): covariance of each block's first state, its last state and its parameters. It is
-    the covariance within the hypotheses plus the covariance between their means."""
+    """Compute the covariance of each block's first state, its last state and its parameters.
+
+    It is the mean covariance within the hypotheses plus the covariance between their means.
+
+    Returns shape (B, s + s + m, s + s + m).
+    """
     reduced, ends, _ = _chains(blocks, walks)
     s, n = blocks.s, reduced.s
     states = _first_states(reduced, ends)
@@ -191,6 +230,9 @@ def posterior_covariance(blocks: Reduced, walks: RandomWalks, weight: Array) -> 
 
 
 def _first_states(reduced: Reduced, ends: Array) -> Array:
-    """(G, B + 1, n): the changes of all states of the chains, from the normal equations of their ends."""
+    """Solve the normal equations of the chains' ends.
+
+    Returns the changes of all states of the chains, shape (G, B + 1, n).
+    """
     change = np.linalg.solve(ends[..., :-1], -ends[..., -1:]).astype(float)
     return back(reduced, change.reshape(len(ends), 2, reduced.s), np.zeros((len(ends), 0)))

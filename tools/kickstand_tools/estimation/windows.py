@@ -7,18 +7,22 @@ import numpy as np
 from ..signals import Array, Bools, Ints, cell_numbers, rotated
 from ..signals.leaning import WINDOW_S
 
-GAP_S = 0.17  # after a longer step between two samples, readings are missing
+GAP_S = 0.17  # if the time between two samples is longer, readings are missing
 
 
 @dataclass
 class Windows:
     """n successive windows. A time of missing readings is one window with `gap` True.
 
-    edges (n + 1, s): times of the windows' starts and ends. rate (n, 3, rad/s), force (n, 3, g): means, along the
-    vehicle's axes. jolt (n, rad/s): largest difference of a sample's rate from its window's mean. speed (n, m/s): NaN
-    if unknown. warm (n, C): temperature minus that at the start of the log, 0 if unknown. gap (n): True without
-    readings. Per sample: number, the index of its window; before and after (s): the time before and after it that the
-    sample represents.
+    edges: times at which the windows start and end, shape (n + 1), in s.
+    rate: mean rates along the vehicle's axes, shape (n, 3), in rad/s.
+    force: mean forces along the vehicle's axes, shape (n, 3), in g.
+    jolt: largest difference of a sample's rate from the mean of its window, shape (n), in rad/s.
+    speed: shape (n), in m/s; NaN if unknown.
+    warm: temperature minus the temperature at the start of the log, shape (n), in C; 0 if unknown.
+    gap: True where readings are missing, shape (n).
+    number: index of each sample's window, shape (samples).
+    before, after: time that each sample represents before and after it, shape (samples), in s.
     """
 
     edges: Array
@@ -37,30 +41,36 @@ class Windows:
 
     @property
     def seconds(self) -> Array:
-        """(n) duration of each window, s."""
+        """Duration of each window, shape (n), in s."""
         return np.diff(self.edges)
 
     @property
     def covered(self) -> Array:
-        """(n) duration of the readings in each window, s; 0 in gaps."""
+        """Duration of the readings in each window, shape (n), in s; 0 in gaps."""
         return np.where(self.gap, 0.0, self.seconds)
 
     @property
     def known_speed(self) -> Array:
-        """(n) m/s, interpolated between the logged values; NaN everywhere if there are fewer than two."""
+        """Speed in each window, interpolated between the logged speeds, shape (n), in m/s.
+
+        All values are NaN if the log has fewer than two speeds.
+        """
         there, middle = ~np.isnan(self.speed), 0.5 * (self.edges[1:] + self.edges[:-1])
         if np.count_nonzero(there) < 2:
             return np.full(len(self), np.nan)
         return np.interp(middle, middle[there], self.speed[there])
 
     def turned(self, matrix: Array, bias: Array | float = 0.0) -> "Windows":
-        """A copy with `bias` (3, rad/s) subtracted from the rates, then rates and forces along the rows of `matrix`
-        (3, 3)."""
+        """Return a copy with corrected rates, in other axes.
+
+        matrix: the rows are the new axes, shape (3, 3).
+        bias: subtracted from the rates before they are rotated, shape (3), in rad/s.
+        """
         rate, force = rotated(matrix, self.rate - bias, self.force)
         return replace(self, rate=rate, force=force)
 
     def padded(self, length: int) -> "Windows":
-        """A copy whose number of windows is a multiple of `length`, with gaps of zero duration appended."""
+        """Return a copy with gaps of zero duration appended, so the number of windows is a multiple of `length`."""
         more = -len(self) % length
 
         def longer(values: Array, fill: float = 0.0) -> Array:
@@ -79,12 +89,18 @@ class Windows:
 
 
 def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array, aligned: bool = False) -> Windows:
-    """The Windows of samples: t_s (s), force (samples, 3, g), rate (samples, 3, rad/s), speed (m/s, NaN for no new
-    value), warm (C, see Windows).
+    """Average samples over windows.
 
-    Each sample represents the time up to half way to its neighbours, so the sum over a window is the integral. aligned:
-    the axes are left, up, forward. Then each sample is expressed in the axes that the bike has in the middle of the
-    window. If a bike rolls by 20 degrees in a window, means along rolling axes would be 0.5 % too small.
+    Each sample represents the time up to half way to its neighbours, so the sum over a window is the integral.
+
+    t_s: times of the samples, in s.
+    force: shape (samples, 3), in g.
+    rate: shape (samples, 3), in rad/s.
+    speed: shape (samples), in m/s; NaN for no new value.
+    warm: shape (samples), in C; see Windows.
+    aligned: True if the axes are left, up, forward. Then each sample is expressed in the axes that the bike has in the
+        middle of the window. If a bike rolls by 20 degrees in a window, means along rolling axes would be 0.5 % too
+        small.
     """
     step = np.diff(t_s)
     usual = float(np.median(step)) if len(step) else WINDOW_S
@@ -129,7 +145,10 @@ def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array,
 
 
 def _rolled_back(vectors: Array, roll: Array) -> Array:
-    """Express vectors (samples, 3: left, up, forward) in the axes before the bike rolled to the right by roll (samples,
-    rad)."""
+    """Express vectors in the axes that the bike had before it rolled.
+
+    vectors: left, up and forward components, shape (samples, 3).
+    roll: angle by which the bike has rolled to the right, shape (samples), in rad.
+    """
     (left, up, forward), c, s = vectors.T, np.cos(roll), np.sin(roll)
     return np.column_stack((c * left - s * up, s * left + c * up, forward))

@@ -82,8 +82,8 @@ def in_order(sensor: RecordedSensor, name: str) -> RecordedSensor:
     hz = 1e9 / float(np.median(np.diff(even_ns)))
     if hz > MOST_HZ:
         raise InputError(
-            f"{name}: {sensor.name} has {hz:.0f} samples a second, and no sensor has over {MOST_HZ:.0f}: are the times "
-            "times, and is their unit right?"
+            f"{name}: {sensor.name} has {hz:.0f} samples per second, and no sensor has over {MOST_HZ:.0f}: are "
+            "these values times, and is their unit right?"
         )
     return replace(sensor, time_ns=even_ns, values=values)
 

@@ -1,7 +1,8 @@
 """Functions on arrays of samples, for all other packages. They use only numpy, neither logs nor files.
 
-Moving means, standard deviations and integrals; means over cells of time; lag and correlation of two signals; rotation
-vectors and matrices; standstill; distances. leaning.py relates a motorcycle's lean to its yaw rate.
+This module has moving means, standard deviations and integrals, means over cells of time, lag and correlation of two
+signals, rotation vectors and matrices, standstills, and distances. leaning.py relates a motorcycle's lean to its yaw
+rate.
 """
 
 from collections.abc import Callable, Iterable
@@ -16,19 +17,27 @@ Bools = NDArray[np.bool_]
 Ints = NDArray[np.integer[Any]]
 
 
-# Moving means and integrals of evenly spaced samples. All use one running sum, so their cost does not grow with the
-# window.
+# Moving means and integrals of evenly spaced samples. A running sum makes their cost independent of the window's
+# length.
 
 
 def window_means(values: Array, n: int) -> Array:
-    """(m - n + 1, ...) the means over each n successive values of m values (m, ...)."""
+    """Average each n successive ones of m values.
+
+    values: shape (m, ...).
+    Returns shape (m - n + 1, ...).
+    """
     sums = np.zeros((len(values) + 1, *values.shape[1:]))
     np.cumsum(values, axis=0, out=sums[1:])
     return (sums[n:] - sums[:-n]) / n
 
 
 def window_spreads(values: Array, n: int) -> Array:
-    """(m - n + 1, ...) the standard deviations over each n successive values of m values (m, ...)."""
+    """Compute the standard deviation of each n successive ones of m values.
+
+    values: shape (m, ...).
+    Returns shape (m - n + 1, ...).
+    """
     values = values - np.mean(values, axis=0)  # otherwise the rounding of large squares would hide the spread
     squared = window_means(values, n)
     squared *= -squared
@@ -38,25 +47,40 @@ def window_spreads(values: Array, n: int) -> Array:
 
 
 def moving_mean(values: Array, n: int) -> Array:
-    """(m, ...) the moving mean of m values (m, ...) over n values, from n // 2 before each value on. Beyond the ends,
-    the first and the last value are repeated."""
+    """Compute the moving mean of m values over n values.
+
+    Each mean begins n // 2 values before its own value. Beyond the ends, the first and the last value are repeated.
+
+    values: shape (m, ...).
+    Returns shape (m, ...).
+    """
     return values if n < 2 or not len(values) else window_means(_padded(values, n), n)
 
 
 def moving_spread(values: Array, n: int) -> Array:
-    """(m, ...) the moving standard deviation over the same n values as in moving_mean()."""
+    """Compute the moving standard deviation, shape (m, ...), over the same n values as in moving_mean()."""
     return np.zeros(values.shape) if n < 2 or not len(values) else window_spreads(_padded(values, n), n)
 
 
 def smoothed(values: Array, time_s: Array, over_s: float) -> Array:
-    """(m) moving mean over about over_s seconds, an odd number of samples. time_s (m): the samples' times."""
+    """Compute the moving mean over about over_s seconds, which are an odd number of samples.
+
+    values: shape (m).
+    time_s: times of the samples, shape (m), in s.
+    Returns shape (m).
+    """
     if len(values) < 2:
         return values
     return moving_mean(values, 2 * round(0.5 * over_s / float(np.median(np.diff(time_s)))) + 1)
 
 
 def integral(time_s: Array, values: Array) -> Array:
-    """(m) the integral of values (m) over time_s (m), from the first sample to each, by the trapezoidal rule."""
+    """Integrate values from the first sample to each sample, by the trapezoidal rule.
+
+    time_s: times of the samples, shape (m), in s.
+    values: shape (m).
+    Returns shape (m).
+    """
     return np.append(0.0, np.cumsum(np.diff(time_s) * (values[1:] + values[:-1]) / 2.0))
 
 
@@ -65,29 +89,39 @@ def _padded(values: Array, n: int) -> Array:
     return np.concatenate((before, values, after))
 
 
-# Samples averaged over cells of time, block by block: vibration averages out, and the result is small.
+# Means of samples over cells of time, block by block. They remove vibration and need little memory.
 
 
 def cell_numbers(time_s: Array, cell_s: float) -> Ints:
-    """(n) the number of the cell that contains each time. A time on the edge of two cells, within rounding, belongs to
-    the later cell."""
+    """Return the number of the cell that contains each time, shape (n).
+
+    A time on the edge of two cells, within rounding, belongs to the later cell.
+    """
     return np.floor(time_s / cell_s + 1e-6).astype(np.int64)
 
 
 def runs(values: NDArray[np.generic]) -> Ints:
-    """(m) the first index of each run of equal values among n > 0 values."""
+    """Return the first index of each of the m runs of equal values, shape (m). At least one value is needed."""
     return np.flatnonzero(np.append(True, values[1:] != values[:-1]))
 
 
 def stretches(true: Bools) -> Ints:
-    """(m, 2) the first index, and the index after the last, of each run of True among n values."""
+    """Find the m runs of True among n values.
+
+    Returns shape (m, 2): the first index of each run, and the index after its last.
+    """
     return np.flatnonzero(np.diff(np.concatenate(([False], true, [False])))).reshape(-1, 2)
 
 
 @dataclass
 class EvenCells:
-    """n successive cells, some without samples. first: number of the first cell. count (n): samples in each. means
-    (n, k), latest (n, j): see Cells.add(); NaN for no value."""
+    """n successive cells. Some may have no samples.
+
+    first: number of the first cell.
+    count: number of samples in each cell, shape (n).
+    means: averaged values, shape (n, k); NaN for no value. See Cells.add().
+    latest: last values, shape (n, j); NaN for no value. See Cells.add().
+    """
 
     first: int
     count: Array
@@ -95,8 +129,11 @@ class EvenCells:
     latest: Array
 
     def merged(self, by: int) -> "EvenCells":
-        """Merge into cells that are `by` times as long and begin at multiples of `by`. Their `latest` is the first
-        value in each."""
+        """Merge the cells into longer ones.
+
+        The new cells are `by` times as long, and begin at multiples of `by`. `latest` of a new cell is the first value
+        in it.
+        """
         before = self.first % by
         after = -(before + len(self.count)) % by
 
@@ -116,17 +153,24 @@ class EvenCells:
 class Cells:
     """Averages samples over cells of time. Call add() block by block, in chronological order.
 
-    cell_s: length of a cell, s. most: number of last cells with samples to keep; 0: all.
+    cell_s: length of a cell, in s.
+    most: number of cells with samples to keep, the last ones; 0 to keep all.
     """
 
     def __init__(self, cell_s: float, most: int = 0) -> None:
         self.cell_s, self._most = cell_s, most
-        self._parts: list[Array] = []  # (m, 2 + k + j): number of the cell, count of samples, sums, latest values
+        # Each part has the shape (m, 2 + k + j). Its columns are number of the cell, count of samples, sums, and latest
+        # values.
+        self._parts: list[Array] = []
         self._means = 0
 
     def add(self, time_s: Array, means: Array, latest: Array) -> None:
-        """Add n samples. means (n, k): values to average. latest (n, j): values of which each cell keeps the last one
-        that is not NaN."""
+        """Add n samples.
+
+        time_s: times of the samples, shape (n), in s.
+        means: values to average, shape (n, k).
+        latest: other values, shape (n, j). Each cell keeps the last one of each column that is not NaN.
+        """
         if not len(time_s):
             return
         number = cell_numbers(time_s, self.cell_s)
@@ -149,7 +193,10 @@ class Cells:
             self._parts = [np.vstack(self._parts)[-self._most :]]
 
     def evenly(self, longest: int) -> EvenCells | None:
-        """The cells from the first to the last one with samples; None if there are none, or more than `longest`."""
+        """Return the cells from the first to the last cell with samples.
+
+        Returns None if no cell has samples, or if there are more than `longest` cells.
+        """
         table = np.vstack(self._parts) if self._parts else np.zeros((0, 2))
         place = (table[:, 0] - table[:1, 0]).astype(np.int64)
         if not len(place) or place[-1] >= longest:
@@ -162,25 +209,30 @@ class Cells:
         return EvenCells(int(table[0, 0]), even[:, 0], means, even[:, 1 + self._means :])
 
 
-# The lag of one signal behind another, such as a satellite receiver's speed behind the force. best_lag() tries some
-# lags and uses the one with the largest correlation (cross-correlation). correlations() tries all shifts at once by
-# Fourier transforms.
+# The lag of one signal behind another. For example, the speed of a satellite receiver is later than the force.
+# best_lag() tries some lags, and returns the lag with the largest correlation (cross-correlation). correlations() tries
+# all shifts at once by Fourier transforms.
 
 
 @dataclass
 class Correlation:
-    """value: correlation, 0 to 1. direction (k): unit vector along which the cause has the largest covariance with the
-    effect."""
+    """The correlation of a cause with its effect.
+
+    value: correlation, 0 to 1.
+    direction: unit vector along which the cause has the largest covariance with the effect, shape (k).
+    """
 
     value: float
     direction: Array
 
 
 def correlation(effect: Array, cause: Array, whole: bool = False) -> Correlation:
-    """The correlation of effect (n) with the component of cause (n, k) along the direction of their largest covariance.
+    """Correlate an effect with the component of its cause along the direction of their largest covariance.
 
-    whole: normalise by the variance of all components of the cause, not only of the one along `direction`. The value is
-    then smaller if the cause also varies across that direction.
+    effect: shape (n).
+    cause: shape (n, k).
+    whole: normalise by the variance of all components of the cause, not only of the component along `direction`. The
+        value is then smaller if the cause also varies across that direction.
     """
     effect, cause = effect - np.mean(effect), cause - np.mean(cause, axis=0)
     both = effect @ cause
@@ -192,8 +244,11 @@ def correlation(effect: Array, cause: Array, whole: bool = False) -> Correlation
 
 @dataclass
 class Lag(Correlation):
-    """lag_s: delay of the effect against the cause. inside: True if it is neither the first nor the last of the lags
-    tried."""
+    """The delay of an effect against its cause.
+
+    lag_s: the delay, in s.
+    inside: True if the delay is neither the first nor the last of the tried lags.
+    """
 
     lag_s: float
     inside: bool
@@ -202,10 +257,15 @@ class Lag(Correlation):
 def best_lag(
     lags_s: Iterable[float], pair_at: Callable[[float], tuple[Array, Array] | None], whole: bool = False
 ) -> Lag | None:
-    """The lag of the largest correlation, interpolated by a parabola through three neighbouring squared correlations.
+    """Find the lag with the largest correlation.
 
-    lags_s: evenly spaced, increasing. pair_at: called with a lag, returns the effect (n) and the cause (n, k) earlier
-    by this lag, or None if there are too few values. whole: see correlation(). Returns None if pair_at always does.
+    The lag is interpolated by a parabola through three neighbouring squared correlations.
+
+    lags_s: lags to try, evenly spaced and increasing.
+    pair_at: called with a lag. It returns the effect, shape (n), and the cause earlier by this lag, shape (n, k). It
+        returns None if there are too few values.
+    whole: see correlation().
+    Returns None if pair_at returns None for all lags.
     """
     tried = [(lag_s, pair_at(lag_s)) for lag_s in lags_s]
     found = [(lag_s, correlation(*pair, whole)) for lag_s, pair in tried if pair is not None]
@@ -221,18 +281,27 @@ def best_lag(
 
 
 def peak_offset(three: Array) -> float:
-    """The place of the maximum of the parabola through three neighbours (3), in steps from the middle one, -0.5 to
-    0.5."""
+    """Find the maximum of the parabola through three neighbouring values.
+
+    Returns its distance from the middle value, in steps, from -0.5 to 0.5.
+    """
     before, here, after = three
     bend = before - 2.0 * here + after
     return float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
 
 
 def correlations(first: Array, first_good: Bools, second: Array, second_good: Bools) -> tuple[Array, Array]:
-    """The correlation of two signals of zero mean, and the number of samples in it, at each shift.
+    """Correlate two signals of zero mean and equal sample rate at each shift.
 
-    first (n), second (m): at the same sample rate. first_good, second_good: True for samples that are used. Returns two
-    arrays (n + m - 1): entry j is for second[i] beside first[i + j - (m - 1)].
+    At shift j, sample second[i] belongs to sample first[i + j - (m - 1)].
+
+    first: shape (n).
+    first_good: True for the samples of `first` to use, shape (n).
+    second: shape (m).
+    second_good: True for the samples of `second` to use, shape (m).
+    Returns:
+        correlation: correlation at each shift, shape (n + m - 1).
+        count: number of samples in each correlation, shape (n + m - 1).
     """
     size = 1 << int(np.ceil(np.log2(len(first) + len(second))))
     a, b = np.where(first_good, first, 0.0), np.where(second_good, second, 0.0)
@@ -243,20 +312,30 @@ def correlations(first: Array, first_good: Bools, second: Array, second_good: Bo
 
     there, other = first_good.astype(float), second_good.astype(float)
     count = np.maximum(np.rint(crossed(there, other)), 0.0)
-    # The transforms' rounding errors are a share of the total sums of squares: smaller results mean nothing
+    # The rounding errors of the transforms are a share of the total sums of squares. Smaller results are only rounding
+    # errors, so they are limited.
     square = np.maximum(crossed(a * a, other), 1e-9 * (a @ a)) * np.maximum(crossed(there, b * b), 1e-9 * (b @ b))
     return crossed(a, b) / np.sqrt(np.maximum(square, 1e-30)), count
 
 
 def log_likelihood_ratio(correlation: Array, count: Array, per_sample: float) -> Array:
-    """Natural logarithm of a likelihood ratio: two normal signals with this correlation against two independent ones.
-    0 for a negative correlation. correlation, count: see correlations(). per_sample: independent values per sample."""
+    """Return the natural logarithm of a likelihood ratio.
+
+    The ratio compares two normal signals of this correlation with two independent signals. The result is 0 for a
+    negative correlation.
+
+    correlation, count: see correlations().
+    per_sample: number of independent values per sample.
+    """
     r = np.clip(correlation, 0.0, 0.999)
     return -0.5 * per_sample * count * np.log1p(-r * r)
 
 
 def peaks(values: Array, apart: int, most: int) -> list[int]:
-    """Indices of at most `most` maxima over 0, the largest first. Any two are more than `apart` indices apart."""
+    """Find at most `most` maxima over 0. Any two of them are more than `apart` indices apart.
+
+    Returns their indices, the largest maximum first.
+    """
     left, found = values.copy(), []
     while len(found) < most and np.max(left) > 0.0:
         place = int(np.argmax(left))
@@ -265,17 +344,27 @@ def peaks(values: Array, apart: int, most: int) -> list[int]:
     return found
 
 
-# Rotation vectors (the axis times the angle in rad) and rotation matrices, any number of them at once: the exponential
-# map and its inverse, e.g. Sola, "Quaternion kinematics for the error-state Kalman filter" (2017), section 2.3.
+# Rotation vectors and rotation matrices. A rotation vector is the axis times the angle in rad. The functions convert
+# any number of them at once, by the exponential map and its inverse. See Sola, "Quaternion kinematics for the
+# error-state Kalman filter" (2017), section 2.3.
 
 
 def rotated(matrix: Array, *vectors: Array) -> tuple[Array, ...]:
-    """Each of vectors (n, 3) along the axes that are the rows of matrix (3, 3), such as vehicle_from_sensor."""
+    """Express vectors along other axes.
+
+    matrix: the rows are the new axes, as in vehicle_from_sensor, shape (3, 3).
+    vectors: one or more arrays of shape (n, 3).
+    Returns as many arrays of shape (n, 3).
+    """
     return tuple(vector @ matrix.T for vector in vectors)
 
 
 def cross_matrix(vector: Array) -> Array:
-    """(..., 3, 3) the skew-symmetric matrix K of vectors (..., 3): K @ other = vector x other."""
+    """Return the skew-symmetric matrices K of vectors: K @ other = vector x other.
+
+    vector: shape (..., 3).
+    Returns shape (..., 3, 3).
+    """
     matrix = np.zeros((*vector.shape, 3))
     x, y, z = np.moveaxis(vector, -1, 0)
     matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -z, y, -x
@@ -284,7 +373,11 @@ def cross_matrix(vector: Array) -> Array:
 
 
 def rotation_matrix(vector: Array) -> Array:
-    """(..., 3, 3) exp: the matrix of rotation vectors (..., 3, rad), by Rodrigues' formula."""
+    """Convert rotation vectors to matrices by Rodrigues' formula (the exponential map).
+
+    vector: shape (..., 3), in rad.
+    Returns shape (..., 3, 3).
+    """
     angle = np.linalg.norm(vector, axis=-1)[..., None, None] / np.pi
     cross = cross_matrix(vector)
     # numpy's sinc(x) is sin(pi x) / (pi x), which is exact near 0
@@ -292,27 +385,39 @@ def rotation_matrix(vector: Array) -> Array:
 
 
 def rotation_vector(matrix: Array) -> Array:
-    """(..., 3, rad) log: the rotation vector of matrices (..., 3, 3), each of under 180 degrees."""
+    """Convert rotation matrices to rotation vectors (the logarithm). Each rotation must be under 180 degrees.
+
+    matrix: shape (..., 3, 3).
+    Returns shape (..., 3), in rad.
+    """
     axis = np.stack([matrix[..., i, j] - matrix[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=-1)
     sine = np.linalg.norm(axis, axis=-1, keepdims=True)  # twice the sine of the angle
     angle = np.arctan2(sine, np.trace(matrix, axis1=-2, axis2=-1)[..., None] - 1.0)
     return axis / np.maximum(sine, 1e-12) * angle
 
 
-# Standstill, detected by small changes of the readings: for zero-velocity updates and for the gyro's bias.
+# At a standstill, the readings hardly change. Standstills are used for zero-velocity updates and for the gyro's bias.
 
-STANDING_MPS = 0.3  # a lower speed counts as standing, because a receiver's speed is never quite 0
-STANDS = 4.0  # at such a speed the limits of the changes are larger by this factor
+STANDING_MPS = 0.3  # a speed under this counts as standing, because a receiver's speed is never quite 0
+STANDS = 4.0  # factor on the limits of the changes if the speed is under STANDING_MPS
 
 
 def motionless(
     rate: Array, force: Array, n: int, most_rate: float, most_force: float, speed_mps: Array | None = None
 ) -> Bools:
-    """(m) True where the bike seems to stand still: over n samples around each of the m samples, the standard deviation
-    of each component is at most most_rate for rate (m, 3), and most_force for force (m, 3).
+    """Find the samples at which the bike seems to stand still.
 
-    Each sample is a mean over a fifth of a second, which averages out an idling engine. speed_mps (m): NaN for none.
-    A constant rate passes, because it may be a bias. In a steady bend it is not, so check the mean rate too.
+    At these samples, the readings of the n samples around hardly change. Each of the m samples must be a mean over a
+    fifth of a second, which averages out an idling engine. A constant rate counts as a standstill, because it may be a
+    bias. In a steady bend the rate is also constant, so check the mean rate too.
+
+    rate: shape (m, 3).
+    force: shape (m, 3).
+    n: number of samples around each sample.
+    most_rate: largest standard deviation of each component of the rate.
+    most_force: largest standard deviation of each component of the force.
+    speed_mps: shape (m), in m/s; NaN if unknown.
+    Returns shape (m), True where the bike seems to stand still.
     """
     speed = np.full(len(rate), np.nan) if speed_mps is None else speed_mps
     allowed = np.where(speed < STANDING_MPS, STANDS, 1.0)
@@ -327,8 +432,14 @@ EARTH_M = 6_371_000.0
 
 
 def distance_m(lat: Array, lon: Array, next_lat: Array, next_lon: Array) -> tuple[Array, Array]:
-    """(n) metres east and (n) metres north from each position to the next one (degrees). For distances of
-    kilometres."""
+    """Compute the distance from each position to the next one. It is exact enough for up to some kilometres.
+
+    lat, lon: positions, shape (n), in degrees.
+    next_lat, next_lon: next positions, shape (n), in degrees.
+    Returns:
+        east: metres to the east, shape (n).
+        north: metres to the north, shape (n).
+    """
     apart_deg = (next_lon - lon + 180.0) % 360.0 - 180.0  # also across the meridian of 180 degrees
     east = np.radians(apart_deg) * np.cos(np.radians(lat)) * EARTH_M
     return east, np.radians(next_lat - lat) * EARTH_M

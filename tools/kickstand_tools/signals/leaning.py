@@ -1,8 +1,8 @@
 """Relates a motorcycle's lean to its yaw rate, to find forward, the handedness and the unit of the rates.
 
-A bike that begins to turn leans: tan(lean) = -speed x yaw rate / g. So the rate about forward, which changes the lean,
-correlates with minus the change of the yaw rate. The sign distinguishes forward from backward. A leaning bike's rate
-about its own left is yaw rate x sin(lean). This product shows the handedness and the unit of the rates.
+A bike leans when it begins to turn: tan(lean) = -speed x yaw rate / g. The rate about forward changes the lean, so it
+correlates with minus the change of the yaw rate. The sign distinguishes forward from backward. The rate of a leaning
+bike about its own left is yaw rate x sin(lean). This product shows the handedness and the unit of the rates.
 """
 
 from dataclasses import dataclass
@@ -14,20 +14,27 @@ from . import Array, Bools, moving_mean, moving_spread
 
 WINDOW_S = 0.2  # rates and forces are means over windows of this length
 SMOOTH_S = 0.6  # rates are moving means over this time before their changes are compared
-SLOW_S = 12.0  # changes of lean that take longer cannot be separated from the gyro's drift
-# Rates are in rad/s if a Leaning exceeds all three. Simulated rides and recordings in deg/s have a share of 1.0 to 1.6,
-# in rad/s of 57 to 92, at over 5 sigmas; cars have a likeness under 0.6.
+SLOW_S = 12.0  # changes of lean that take longer than this cannot be separated from the gyro's drift
+# If a Leaning exceeds all three limits, its rates are in rad/s. In simulated and recorded rides, the share was 1.0 to
+# 1.6 for rates in deg/s, and 57 to 92 for rates in rad/s, at over 5 sigmas. Cars had a likeness under 0.6.
 SHARE, SIGMAS, LIKENESS = 15.0, 4.5, 0.65
-LEAST_LEAN = np.radians(2.0 / 57.3)  # rms: a ride with less lean is nearly straight; 2 degrees if rates are in rad/s
+# Least rms of the lean; a ride with less lean is nearly straight. It is small enough for rates in rad/s, in which a
+# lean of 2 degrees looks like 2 / 57.3 degrees.
+LEAST_LEAN = np.radians(2.0 / 57.3)
 
 
 @dataclass
 class Leaning:
-    """matrix (3, 3): vehicle from sensor, rows left, up, forward, roughly. rolled (n, rad): lean without its slow
-    changes (see without_drift()). turned (n, rad/s): yaw rate, positive to the left, also without its slow changes.
-    likeness: correlation of rolled and -turned while riding. speed (m/s): the one that balances yaw rate and lean, by
-    regression. share: rate about left over yaw rate x sin(lean), by regression: 1 if the axes are right-handed and the
-    rates in deg/s. sigmas: |share| over its standard deviation.
+    """How a motorcycle's lean relates to its yaw rate.
+
+    matrix: rough vehicle from sensor, shape (3, 3). The rows are left, up and forward.
+    rolled: lean without its slow changes (see without_drift()), shape (n), in rad.
+    turned: yaw rate without its slow changes, positive to the left, shape (n), in rad/s.
+    likeness: correlation of rolled and -turned while riding.
+    speed: speed at which yaw rate and lean balance, by regression, in m/s.
+    share: ratio of the rate about left to yaw rate x sin(lean), by regression. It is 1 if the axes are right-handed and
+        the rates in deg/s.
+    sigmas: |share| divided by its standard deviation.
     """
 
     matrix: Array
@@ -40,8 +47,12 @@ class Leaning:
 
 
 def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
-    """The Leaning of n windows of WINDOW_S. rate (n, 3, rad/s): without bias. force (n, 3). riding (n): True for the
-    windows to use."""
+    """Compute the Leaning of n windows of WINDOW_S.
+
+    rate: rates without bias, shape (n, 3), in rad/s.
+    force: shape (n, 3).
+    riding: True for the windows to use, shape (n).
+    """
     up = _unit(force[riding].mean(axis=0))
     yaw = averaged(rate @ up, SMOOTH_S)
     level = averaged(rate - np.outer(rate @ up, up), SMOOTH_S)
@@ -71,8 +82,11 @@ def leaning_of(rate: Array, force: Array, riding: Bools) -> Leaning:
 
 
 def speed_in_radians(found: Leaning) -> float | None:
-    """Detect rates in rad/s that are labelled deg/s, and are thus 57 times too small. Returns the impossible speed in
-    bends, m/s, that deg/s would mean; None if the rates are not surely in rad/s."""
+    """Detect rates in rad/s that are labelled deg/s, so they are 57 times too small.
+
+    Returns the impossible speed in bends, in m/s, that these rates would mean in deg/s. Returns None if the rates are
+    not surely in rad/s.
+    """
     wrong = found.share > SHARE and found.sigmas > SIGMAS and found.likeness > LIKENESS
     return float(np.degrees(found.speed)) if wrong and leans(found) else None
 
@@ -83,29 +97,36 @@ def leans(found: Leaning) -> bool:
 
 
 def leaned(rolled: Array, yaw: Array, speed: Array | float) -> Array:
-    """(n, rad): the lean. Its quick changes come from `rolled`; its slow changes (slower than SLOW_S) come from the
-    lean that balances the yaw rate at this speed."""
+    """Return the lean, shape (n), in rad.
+
+    Quick changes come from `rolled`. Changes slower than SLOW_S come from the lean that balances the yaw rate at this
+    speed.
+    """
     balanced = np.arctan(-speed * yaw / STANDARD_GRAVITY)
     return rolled + balanced - without_drift(balanced)
 
 
 def averaged(values: Array, seconds: float) -> Array:
-    """Moving mean over this time of windows' values (n) or (n, k)."""
+    """Compute the moving mean of the windows' values over some seconds. values: shape (n) or (n, k)."""
     return moving_mean(values, _windows(seconds))
 
 
 def without_drift(values: Array) -> Array:
-    """values (n) without their slow changes: minus their moving mean over SLOW_S, taken twice."""
+    """Return values (n) without their slow changes. Their moving mean over SLOW_S, taken twice, is subtracted."""
     return values - averaged(averaged(values, SLOW_S), SLOW_S)
 
 
 def unrest(values: Array, over_s: float) -> Array:
-    """(n): moving standard deviation of values (n, 3) over over_s seconds, the largest of the three components."""
+    """Return the moving standard deviation over over_s seconds, the largest of the three components.
+
+    values: shape (n, 3).
+    Returns shape (n).
+    """
     return moving_spread(values, _windows(over_s)).max(axis=1, initial=0.0)
 
 
 def _windows(seconds: float) -> int:
-    """The odd number of windows that last about this time."""
+    """Return the odd number of windows that last about this many seconds."""
     return 2 * max(1, round(seconds / WINDOW_S / 2.0)) + 1
 
 

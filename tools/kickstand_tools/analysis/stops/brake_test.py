@@ -84,7 +84,7 @@ def find_stops(channels: Channels) -> list[Stop]:
     >>> ride = simulate_ride("street", seed=1, seconds=60.0)
     >>> poses = [Log.from_readings(pose, ride.rate_hz) for pose in (ride.kickstand, ride.upright)]
     >>> log = Log.from_readings(ride.readings, ride.rate_hz)
-    >>> log.speed_mps[::200] = ride.truth["speed_mps"][::200]  # once a second
+    >>> log.speed_mps[::200] = ride.truth["speed_mps"][::200]  # once per second
     >>> stops = find_stops(vehicle_channels(log, fit_two_positions(*poses).calibration))
     >>> stops[-1].speed_from, stops[-1].initial_speed_mps > 3.0, stops[-1].mfdd_mps2 > 1.0
     ('log', True, True)

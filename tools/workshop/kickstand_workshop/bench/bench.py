@@ -57,7 +57,8 @@ def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
 
 def tables(result: dict[str, Any]) -> Group:
     """Format the result of bench() for a terminal."""
-    times = Table(title=f"A turn of the loop at {result['sample_hz']} samples a second: emulated us, {result['chip']}")
+    title = f"A turn of the loop at {result['sample_hz']} samples per second: emulated us, {result['chip']}"
+    times = Table(title=title)
     times.add_column("stage")
     for name in ("median", "p99", "max"):
         times.add_column(name, justify="right")

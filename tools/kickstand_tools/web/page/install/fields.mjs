@@ -40,10 +40,10 @@ export const GROUPS = [
     ["PULSES_PER_METRE", "Wheel, pulses a metre of road"],
   ]],
   ["Sensor", false, [
-    ["SAMPLE_HZ", "Readings a second", numbers(50, 100, 125, 200)],
+    ["SAMPLE_HZ", "Readings per second", numbers(50, 100, 125, 200)],
     ["DLPF", "Low-pass of the chip", [["2", "2: 98 Hz"], ["3", "3: 44 Hz"], ["4", "4: 21 Hz"], ["5", "5: 10 Hz"], ["6", "6: 5 Hz"]]],
     ["ACCEL_RANGE_G", "Range of the accelerometer, g", numbers(2, 4, 8, 16)],
-    ["GYRO_RANGE_DPS", "Range of the gyro, degrees a second", numbers(250, 500, 1000, 2000)],
+    ["GYRO_RANGE_DPS", "Range of the gyro, degrees per second", numbers(250, 500, 1000, 2000)],
     ["ACCEPT_WHO_AM_I", "Number of a chip that is refused as unknown"],
   ]],
   ["SD card, and what else there is", false, [
