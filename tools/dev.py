@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""One command per task, on a machine with only Python 3.11 or newer:
+"""Runs the tasks of development. The machine only needs Python 3.11 or newer.
 
-    python3 tools/dev.py demo         the firmware on a simulated board, live in the terminal
-    python3 tools/dev.py test         ruff, pyright and the tests; further arguments go to pytest
+    python3 tools/dev.py demo         runs the firmware on a simulated board, live in the terminal
+    python3 tools/dev.py test         runs ruff, pyright and the tests; further arguments go to pytest
     python3 tools/dev.py mutants imu  lists the single changes of a package's code that its tests do not notice
 
-They create .venv beside pyproject.toml and install the project in it. They install again only if pyproject.toml has
-changed.
+Each command first creates .venv beside pyproject.toml and installs the project in it. It installs again only if
+pyproject.toml has changed.
 """
 
 import hashlib
@@ -22,13 +22,13 @@ PYTHON = os.path.join(VENV, "Scripts", "python.exe") if os.name == "nt" else os.
 STAMP = os.path.join(VENV, "installed.txt")
 LOG = os.path.join(VENV, "install.log")
 OLDEST = (3, 11)
-EXTRAS = ("", "test", "mutants")  # extras of pyproject.toml; each contains the earlier ones
+EXTRAS = ("", "test", "mutants")  # extras of pyproject.toml. Each contains the earlier ones
 REPORT_S = 5  # time between two lines of progress while installing
 COMPILE = "from kickstand_emulator import native; native.build()"  # the emulated Pico is then twice as fast
 
 
 class SetupStopped(Exception):
-    """Set-up cannot continue. The text is one line: the reason, and what to do."""
+    """The set-up cannot continue. The text is one line with the reason and the remedy."""
 
 
 def main(arguments):
@@ -48,8 +48,10 @@ def main(arguments):
 
 
 def test(arguments):
-    """Run ruff, ruff format, pytest and pyright, each even if an earlier one has failed. Returns 0 if all succeed,
-    otherwise 1."""
+    """Run ruff, ruff format, pytest and pyright. If one of them fails, the others still run.
+
+    Returns 0 if all succeed, otherwise 1.
+    """
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # otherwise each process started by a test compiles its imports
     compiling = subprocess.Popen([PYTHON, "-c", COMPILE], cwd=ROOT)
     # pyright runs beside the other checks, because it uses only one processor for a minute
@@ -78,7 +80,7 @@ def test(arguments):
 
 
 def prepare(extra):
-    """Create .venv and install the extra of pyproject.toml, unless done."""
+    """Create .venv and install the project with this extra of pyproject.toml, unless this is already done."""
     place = "Python %s in %s" % (sys.version.split()[0], ROOT)
     with open(os.path.join(ROOT, "pyproject.toml"), "rb") as file:
         version = hashlib.sha256(file.read()).hexdigest()
@@ -92,7 +94,7 @@ def prepare(extra):
     if (stamp[0] and stamp[0] != place) or not has_pip():
         make_venv()
     if os.path.exists(STAMP):
-        os.remove(STAMP)  # an interrupted installation starts again
+        os.remove(STAMP)  # after an interruption, the next run installs again
     install(extra)
     with open(STAMP, "w", encoding="utf-8") as file:
         file.write("%s\n%s %s\n" % (place, version, extra))
@@ -129,8 +131,10 @@ def has_pip():
 
 
 def install(extra):
-    """Install the project, editable. uv takes a fifth of pip's time. pip is used if its settings name another index,
-    which uv does not know, or if uv fails."""
+    """Install the project, editable. uv takes a fifth of pip's time.
+
+    pip is used if uv fails, or if pip's settings name another package index, because uv does not read these settings.
+    """
     say("installing %sinto .venv: a few minutes at most" % ("with the %s tools " % extra if extra else ""))
     what = ["--editable", ".[%s]" % extra if extra else "."]
     pip = [PYTHON, "-m", "pip", "install", "--no-input", "--disable-pip-version-check"]
@@ -145,14 +149,16 @@ def install(extra):
 
 
 def own_index():
-    """True if pip's settings name another index than PyPI."""
+    """Return True if pip's settings name another package index than PyPI."""
     settings = subprocess.run([PYTHON, "-m", "pip", "config", "list"], stdout=subprocess.PIPE).stdout
     return b".index-url=" in settings
 
 
 def watched(command):
-    """Run a command that may take minutes and return its exit status. Its output goes to install.log, and the last line
-    of it regularly to the terminal."""
+    """Run a command that may take minutes, and return its exit status.
+
+    All output goes to install.log. The last line of the output is also printed every REPORT_S seconds.
+    """
     begin = time.time()
     with open(LOG, "wb") as log:
         process = subprocess.Popen(command, cwd=ROOT, stdout=log, stderr=subprocess.STDOUT)

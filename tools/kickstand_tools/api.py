@@ -8,11 +8,12 @@
     after = api.smooth("RIDE.csv.gz", two.calibration)                    # after.lean_deg, after.lean_sigma_deg, ...
     stops = api.find_stops(api.vehicle_channels("RIDE.csv.gz", two.calibration))
 
-A log is a path, an open file of text or bytes, a Log made of arrays, or a Stretch of one of these. Tables can be
-converted with to_pandas(). Long functions accept `progress`, a function that is called with (done, total).
+A log can be a path, an open file of text or bytes, a Log made of arrays, or a Stretch of one of these. The method
+to_pandas() of a table converts it to a data frame. Slow functions accept `progress`, a function that is called with
+(done, total).
 
 The text of an InputError is one line: what is wrong with the input, and what to do. Its subclass RefusedInput has the
-reason as a Message. Notices are Messages too. A Message has a code and named fields; sentence() returns its text.
+reason as a Message. Notices are Messages too. A Message has a code and named fields. sentence() returns its text.
 """
 
 from .analysis.brake_tests import brake_tests as brake_tests
@@ -59,5 +60,5 @@ from .web.site import site_files as site_files, write_site as write_site
 
 SimulatedRide, simulate_ride = _simulation.SimulatedRide, _simulation.ride
 
-# All names above: without it pydoc leaves out imported names
+# All names imported above. Without this list pydoc leaves out imported names
 __all__ = [name for name in dir() if not name.startswith("_")]  # pyright: ignore[reportUnsupportedDunderAll]

@@ -33,7 +33,7 @@ class Done(Exception):
 class Canary:
     """A piece of heap without a reference, to detect garbage collections.
 
-    A collection frees the piece, which is soon overwritten. gc.mem_alloc() would also show a collection, but takes 7 ms.
+    A collection frees the piece, and it is soon overwritten. gc.mem_alloc() also shows collections, but takes 7 ms.
     """
 
     MARK = 0x5AC3

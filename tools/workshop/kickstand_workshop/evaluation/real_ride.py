@@ -46,7 +46,8 @@ class RecordingScores:
 
     name: Name of the recording's file.
     scores: Score of each estimator, by its name.
-    traces: "time" in s, and the leans in degrees, positive to the right: "reference" and each estimator. Shape (N) each.
+    traces: "time" in s, and the leans in degrees, positive to the right: "reference" and each estimator. Each has shape
+        (N).
     notices: Remarks about the recording, and about readings that contradict its calibration.
     """
 
