@@ -1,4 +1,4 @@
-"""An emulated RP2040 with the corrections of this package, and methods that advance its time."""
+"""Emulates an RP2040 with rp2040py, corrected by this package. Methods advance the emulated time."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -20,30 +20,34 @@ from rp2040py.utils.logging import ConsoleLogger, LogLevel
 from .flash_memory import TimedFlash
 from .i2c_controller import TimedI2C
 
-_SSI = 0x18000  # keys of rp2040py's table of peripherals: address >> 12
+# Keys of rp2040py's table of peripherals, the addresses shifted right by 12 bits
+_SSI = 0x18000
 _I2C = (0x40044, 0x40048)
-_OSCILLATORS = WDSEL_XOSC | WDSEL_ROSC  # the SDK excludes these from a reset by the watchdog
+_OSCILLATORS = WDSEL_XOSC | WDSEL_ROSC  # with the SDK, the watchdog does not reset the oscillators
 _ACCESS = ("read_uint8", "read_uint16", "read_uint32", "write_uint8", "write_uint16", "write_uint32")
 
 
 class EmulatedClock:
-    """Replaces simulated_board.clock.Clock: integer microseconds, driven by the processor's cycles."""
+    """Replaces simulated_board.clock.Clock. Its time follows the processor's cycles, in whole microseconds."""
 
     def __init__(self, clock: IClock) -> None:
         self._clock = clock
 
     @property
     def now_us(self) -> int:
-        """Microseconds since the emulation began."""
+        """The time since the emulation began, in microseconds."""
         return int(self._clock.nanos + 0.5) // 1000
 
     def at(self, due_us: float, function: Callable[[], None]) -> None:
-        """Call function() at due_us, or at once if that time has passed."""
+        """Call function() at the time due_us, or at once if this time has passed."""
         self._clock.create_alarm(function).schedule(max(0.0, due_us * 1000.0 - self._clock.nanos))
 
 
 class EmulatedChip:
-    """rp2040: rp2040py's chip with its flash and I2C controllers replaced. run() advances the time."""
+    """The emulated chip. run() advances the time.
+
+    rp2040: rp2040py's chip, with its flash and its I2C controllers replaced.
+    """
 
     def __init__(self, image: Path) -> None:
         self.rp2040 = RP2040()
@@ -58,7 +62,7 @@ class EmulatedChip:
         self.rp2040.watchdog.on_watchdog_trigger = self.reset
         self._pios = self.rp2040.pio
         self._hurry()
-        self.stopped = False  # execute_batch() reads this attribute, rp2040 and clock
+        self.stopped = False  # execute_batch() reads the attributes stopped, rp2040 and clock
 
     def connect(self, number: int, bus: Bus) -> TimedI2C:
         """Connect the I2C controller with this number to a bus."""
@@ -84,7 +88,10 @@ class EmulatedChip:
         self.clock.tick(seconds * 1e9)
 
     def run(self, seconds: float, between: Callable[[], None] | None = None) -> None:
-        """Advance the emulated time. between: called about every 5 ms of the host's time. Raises PowerCut."""
+        """Advance the emulated time.
+
+        between: function that is called about every 5 ms of the host's time. Raises PowerCut.
+        """
         self.stopped = False
         end = self.clock.create_alarm(self.stop)
         end.schedule(seconds * 1e9)
@@ -120,9 +127,9 @@ class EmulatedChip:
     def _hurry(self) -> None:
         """Double the emulation's speed on the host. The emulated results stay the same.
 
-        rp2040py's compiled core looks up the method of each memory access by name, which makes a new method object
-        each time unless the instance holds one. It also polls both PIO blocks, which MicroPython does not use, after
-        every instruction.
+        At each memory access, rp2040py's compiled core looks up a method by name. This creates a new method object,
+        unless the instance has an attribute with that name. So the methods are stored in the instance. After every
+        instruction the core also polls both PIO blocks. MicroPython does not use them, so they are removed.
         """
         for name in _ACCESS:
             self.rp2040.__dict__[name] = getattr(self.rp2040, name)
@@ -131,8 +138,10 @@ class EmulatedChip:
 
 
 def _hurry_division(rp2040: RP2040) -> None:
-    """Speed up unsigned divisions: MicroPython needs them often, and rp2040py's SIO makes dozens of comparisons before
-    each."""
+    """Speed up unsigned divisions, which MicroPython needs often.
+
+    Before each division, rp2040py's SIO compares the offset with dozens of registers.
+    """
     block, core = rp2040.sio, rp2040.core
     read_other, write_other = block.read_uint32, block.write_uint32
 

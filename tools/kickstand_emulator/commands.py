@@ -8,16 +8,16 @@ CHIP = click.option(
     "--chip",
     type=click.Choice(["rp2040", "esp32"]),
     default="rp2040",
-    help="rp2040, a Pico, or esp32: it needs QEMU's library, see tools/docs/simulation.md.",
+    help="rp2040 is a Pico. esp32 needs QEMU's library: see tools/docs/simulation.md.",
 )
 
 
 @click.command(short_help="An emulated board that flash can deploy to.")
-@click.option("--port", type=click.IntRange(1024, 65535), default=2040, help="On which mpremote finds it.")
+@click.option("--port", type=click.IntRange(1024, 65535), default=2040, help="The TCP port of the board's console.")
 @CHIP
 @DISPLAY
 def emulate_command(port: int, chip: str, display: str) -> None:
-    """An emulated board on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
+    """Start an emulated board on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
     click.echo("starting: the emulator is being loaded, then the board is switched on, which takes some seconds")
     ready_emulator(chip)
     from .emulate import emulate
@@ -26,8 +26,10 @@ def emulate_command(port: int, chip: str, display: str) -> None:
 
 
 def ready_emulator(chip: str) -> None:
-    """Find the files that this chip's emulator needs, and compile the Pico's emulator. Call it before importing the
-    emulator. Raises InputError if something is missing."""
+    """Find the files that this chip's emulator needs. For the Pico, also compile the emulator.
+
+    Call this function before importing the emulator. Raises InputError if a file or a package is missing.
+    """
     from . import esp32_library, image, native
 
     if chip == "esp32":

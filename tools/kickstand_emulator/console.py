@@ -7,10 +7,10 @@ from rp2040py.usb.cdc import USBCDC
 
 
 class QuietConsole(USBCDC):
-    """The board's USB console. received: called with the board's output.
+    """The board's USB console. received: function that is called with the board's output.
 
-    rp2040py's USB host answers every ready buffer with an empty packet: 34,000 per second, which cost the Pico two
-    thirds of its time. Like a real host, this one sends nothing while it has no data.
+    rp2040py's USB host answers every ready buffer with an empty packet. The Pico spent two thirds of its time on 34,000
+    empty packets per second. This class sends nothing while it has no data, like a real host.
     """
 
     def __init__(self, usb: RPUSBController, received: Callable[[bytes], None]) -> None:
@@ -22,7 +22,7 @@ class QuietConsole(USBCDC):
         self.on_serial_data = lambda data: received(bytes(data))
 
     def send(self, data: bytes) -> None:
-        """Send data to the board as fast as it accepts them."""
+        """Send data to the board as fast as the board accepts data."""
         self._waiting += data
         self._give()
 

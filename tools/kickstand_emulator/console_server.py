@@ -1,4 +1,4 @@
-"""An emulated board's console as a socket, for mpremote and `kickstand flash --port socket://...`."""
+"""Offers an emulated board's console as a socket, for mpremote and `kickstand flash --port socket://...`."""
 
 import contextlib
 import socket
@@ -8,9 +8,13 @@ from kickstand_tools.common.errors import InputError, cause
 
 
 class ConsoleServer:
-    """Serves one client at a time, as a serial port does. Call poll() often. Port 0 chooses a free port, see `port`.
+    """Serves one client at a time, as a serial port does. Call poll() often.
 
-    send: called with the client's data.
+    Args:
+        send: Function that is called with the client's data.
+        port: Number of the TCP port. 0 chooses a free port.
+
+    The attribute `port` holds the actual number. Raises InputError if the port cannot be opened.
     """
 
     def __init__(self, send: Callable[[bytes], None], port: int) -> None:
@@ -29,7 +33,7 @@ class ConsoleServer:
         self._server.close()
 
     def poll(self) -> None:
-        """Accept a client, or pass on its data."""
+        """Without a client, accept one. Otherwise pass the client's data to send()."""
         if self._client is None:
             with contextlib.suppress(BlockingIOError):
                 self._client = self._server.accept()[0]

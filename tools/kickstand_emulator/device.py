@@ -1,4 +1,4 @@
-"""The base class of the emulated boards: power, time, the console, and the parts wired to the board."""
+"""The base class of the emulated boards: power, time, console, and the parts that are wired to the board."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -23,14 +23,19 @@ class GuestError(Exception):
 
 
 class EmulatedDevice(ABC):
-    """An emulated board. It is off until power_on(). `with` switches it on, and off at the end. Times are emulated
-    seconds; they also advance through resets and power cycles.
+    """An emulated board. It is off until power_on(). A `with` statement switches it on, and off at the end.
 
-    Arguments: world: as for simulator.Board; level and at rest if None. files: the content of its flash, see
-    flash_image.py. fitted: other arguments of Board.
+    Times are emulated seconds. Resets and power cycles do not set them back.
 
-    NAME: the board's name. FLASH: location of its file system. MPY: the bytecode that it accepts, see bytecode.py.
-    SINK: code for the board: a class Sink whose write() passes bytes to the function given to listen().
+    The subclasses take these arguments:
+        world: The board's motion, as for simulator.Board. None is a board that lies level and at rest.
+        files: The content of its flash, see flash_image.py.
+        fitted: Other arguments of simulator.Board.
+
+    NAME: Name of the board.
+    FLASH: Location of the file system in its flash.
+    MPY: Version of the bytecode that the board accepts, see bytecode.py.
+    SINK: Code for the board. It defines a class Sink, whose write() passes bytes to the function given to listen().
     """
 
     NAME: str
@@ -41,9 +46,9 @@ class EmulatedDevice(ABC):
     def __init__(self, board: Board) -> None:
         self.board = board
         self.said = bytearray()  # the board's output
-        self.heard: Callable[[bytes], None] | None = None  # called with each part of the output
+        self.heard: Callable[[bytes], None] | None = None  # function that is called with each part of the output
         self.powered = False
-        self.resets = 0  # since the start, without power cycles
+        self.resets = 0  # number of resets since the start, not counting power cycles
         self._awaited = b""
         self._raw = False  # True while the console is in the raw REPL
         self._wire(board.button_pin)
@@ -60,19 +65,19 @@ class EmulatedDevice(ABC):
     @property
     @abstractmethod
     def time_s(self) -> float:
-        """Emulated seconds since the object was made."""
+        """The emulated time since the object was created, in s."""
 
     @abstractmethod
     def power_on(self) -> None:
-        """Start everything from power-on."""
+        """Switch on the power of the chip and of all parts."""
 
     @abstractmethod
     def power_off(self) -> None:
-        """Cut the power; only the content of the flash is kept."""
+        """Cut the power. Only the content of the flash is kept."""
 
     @abstractmethod
     def run(self, seconds: float, between: Callable[[], None] | None = None) -> None:
-        """Advance the time. between: called every few ms of the host's time."""
+        """Advance the time. between: function that is called every few ms of the host's time."""
 
     @abstractmethod
     def stop(self) -> None:
@@ -89,7 +94,7 @@ class EmulatedDevice(ABC):
 
     @abstractmethod
     def _set_pin(self, number: int, level: int) -> None:
-        """Set the level of this GPIO from outside: pulled to ground (0) or released (1)."""
+        """Set the level of this GPIO from outside. 0 pulls it to ground, 1 releases it."""
 
     def _wire(self, number: int) -> None:
         """Wire this GPIO to the part that simulator.Board connects to it."""
@@ -101,15 +106,16 @@ class EmulatedDevice(ABC):
         self._wire(self.board.wheel_pin)
 
     def power_cycle(self, off_s: float = 0.5) -> None:
-        """Switch the board off, and on again after off_s."""
+        """Switch the board off, and on again after off_s seconds."""
         self.power_off()
         self.run(off_s)
         self.power_on()
 
     def run_until(self, condition: Callable[[], Any], limit_s: float, step_s: float = 0.005) -> Any:
-        """Advance the time until condition() is true, and return its value. condition() is called every step_s. Raises
-        NotReached if
-        the condition is not met within limit_s."""
+        """Advance the time until condition() is true, and return its value.
+
+        condition() is called every step_s seconds. Raises NotReached if it is not true within limit_s seconds.
+        """
         end_s = self.time_s + limit_s
         while not (reached := condition()):
             if self.time_s >= end_s:
@@ -124,7 +130,7 @@ class EmulatedDevice(ABC):
         return self.board.lcd.text()
 
     def press(self, at_s: float | None = None, for_s: float = 0.15) -> None:
-        """Press the button at at_s (None: now)."""
+        """Press the button at the time at_s, or now if at_s is None. for_s: length of the press."""
         self.board.press(at_s, for_s)
 
     # The flash
@@ -143,23 +149,23 @@ class EmulatedDevice(ABC):
         self.file_system = self.FLASH.build(files)
 
     def files(self) -> dict[str, bytes]:
-        """Every file in flash, by path."""
+        """Return all files in the flash, as {path: content}."""
         return self.FLASH.read(self.file_system)
 
     # The console
 
     @abstractmethod
     def listen(self, sink: Callable[[bytes], Any]) -> None:
-        """Call sink() with the bytes that the board's code passes to Sink.write()."""
+        """From now on call sink() with the bytes that the board's code passes to Sink.write()."""
 
     @abstractmethod
     def send(self, data: bytes) -> None:
-        """Send data to the board's console as fast as it accepts them."""
+        """Send data to the board's console as fast as the board accepts data."""
 
     def exec(self, code: str, limit_s: float = 10.0) -> str:
         """Interrupt the board's program, run code as mpremote does, and return its output.
 
-        Raises GuestError with the board's traceback, and NotReached if it takes longer than limit_s.
+        Raises GuestError with the board's traceback, and NotReached if the code runs longer than limit_s.
         """
         if not self._raw:
             self._until_it_reads()

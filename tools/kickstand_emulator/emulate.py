@@ -1,4 +1,7 @@
-"""kickstand emulate: an emulated board with sensor, display and button on a simulated bike, for `kickstand flash`."""
+"""Runs `kickstand emulate`, an emulated board to which `kickstand flash` can deploy.
+
+The board has a sensor, a display and a button, and is on a simulated bike.
+"""
 
 import contextlib
 import sys
@@ -34,14 +37,16 @@ if TYPE_CHECKING:
 Kind: TypeAlias = "type[Pico] | type[Esp32]"
 
 _STEP_S = 0.02
-_BUTTON = {"b": 0.15, "B": LONG_PRESS_S, " ": LONG_PRESS_S}  # seconds of a press, by key
+_BUTTON = {"b": 0.15, "B": LONG_PRESS_S, " ": LONG_PRESS_S}  # key: length of the press in s
 _HELP = "b button   B long press   a/d lean   k kickstand   u upright   q quit"
 _NO_FIRMWARE = "No firmware on it yet, so the display is blank. In another terminal:\n  kickstand flash --port {}\n"
 
 
 def device_class(chip: str) -> Kind:
-    """The class of the emulated board with this chip, "rp2040" or "esp32". Only the packages of this chip's emulator
-    are imported."""
+    """Return the class of the emulated board with this chip, "rp2040" or "esp32".
+
+    Imports only the packages of this chip's emulator.
+    """
     if chip == "esp32":
         from .esp32 import Esp32
 
@@ -52,7 +57,7 @@ def device_class(chip: str) -> Kind:
 
 
 class ScriptedBike:
-    """The demo's ride. It begins when the display switches on, because then the firmware has started."""
+    """The demo's ride. It begins when the display switches on, because this shows that the firmware has started."""
 
     def __init__(self) -> None:
         self._ride = Ride(SCRIPT)
@@ -73,8 +78,12 @@ class ScriptedBike:
 def emulate(port: int, say: Callable[[str], None], chip: str = "rp2040", display: str = "lcd") -> None:
     """Serve an emulated board's console on socket://127.0.0.1:port until the user quits. Raises InputError.
 
-    In a terminal the user steers the bike with keys. Otherwise say() receives each new text of the display, and the
-    bike follows the demo's ride once the firmware runs. display: "lcd", "ssd1306" or "sh1106".
+    In a terminal the user steers the bike with keys. Otherwise say() receives each new text of the display. The bike
+    then follows the demo's ride as soon as the firmware runs.
+
+    say: Function that prints a text.
+    chip: "rp2040" or "esp32".
+    display: "lcd", "ssd1306" or "sh1106".
     """
     watched = sys.stdin.isatty() and sys.stdout.isatty()
     bike = HandBike() if watched else ScriptedBike()
@@ -94,7 +103,7 @@ def emulate(port: int, say: Callable[[str], None], chip: str = "rp2040", display
 
 
 def _run(device: EmulatedDevice, server: ConsoleServer) -> None:
-    """Advance the time by a step, not faster than real time: the time-outs of mpremote use the host's clock."""
+    """Advance the time by one step, but not faster than real time. The time-outs of mpremote use the host's clock."""
     begun, before = time.monotonic(), device.time_s
     device.run(_STEP_S, server.poll)
     time.sleep(max(0.0, device.time_s - before - (time.monotonic() - begun)))
@@ -119,7 +128,7 @@ def _watch(device: EmulatedDevice, server: ConsoleServer, bike: HandBike, addres
 
 
 def below(on: bool, address: str) -> str:
-    """The text below the picture. on: True if the display is on, which only the firmware does."""
+    """Return the text below the picture. on: True if the display is on. Only the firmware switches it on."""
     return _HELP if on else _NO_FIRMWARE.format(address) + _HELP
 
 

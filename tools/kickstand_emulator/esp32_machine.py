@@ -1,16 +1,20 @@
 """The process in which QEMU emulates an ESP32. QEMU's library can be started only once per process.
 
-python -m kickstand_emulator.esp32_machine SOCKET LIBRARY FLASH SDA,SCL... is started by esp32.py, which has the models
-of sensor and display. The two processes exchange messages over an
-inherited socket. This process converts the levels of the I2C
-wires to bytes, because one message per level would take too long.
+esp32.py starts this process:
 
-Time is counted in instructions, and advances only after a GO. Three parts of QEMU would still make it depend on the
-host. 1. Its main loop may run timers between the turns of the two processors, or set the clock forward before both
-sleep. So it must wait until both sleep (_hold_main_loop). 2. A timer of its scheduler begins at one of two moments. So
-it is postponed for ever (_calm_timers). 3. The main loop does each reset, even of one processor, while the other
-processor continues. So a reset waits for the next full millisecond, the processors wait for the reset (_guard), and the
-reset waits for their thread (_on_reset).
+    python -m kickstand_emulator.esp32_machine SOCKET LIBRARY FLASH SDA,SCL...
+
+The models of sensor and display are in the process of esp32.py. The two processes exchange messages over an inherited
+socket. This process converts the levels of the I2C wires to bytes, because one message per level would take too long.
+
+The emulated time is counted in instructions, and advances only after the message GO. Three parts of QEMU would still
+make the emulation depend on the host:
+
+1. The main loop may run timers between the turns of the two processors, or set the clock forward before both processors
+   sleep. So _hold_main_loop() makes the main loop wait until both sleep.
+2. One timer of the scheduler begins at one of two moments, by chance. So _calm_timers() postpones this timer for ever.
+3. The main loop executes a reset of one processor while the other processor continues. So _guard() delays a reset to
+   the next full millisecond and makes the processors wait for it. _on_reset() makes the reset wait for their thread.
 """
 
 import ctypes as c
@@ -25,7 +29,7 @@ from kickstand_tools.simulated_board.i2c import Bus
 
 from .i2c_wires import Wires
 
-# To the process: kind, a, b, value; from it: nanoseconds, kind, a, b
+# A command to this process consists of kind, a, b, value. A message from it consists of nanoseconds, kind, a, b
 COMMAND, MESSAGE = struct.Struct("<BBHq"), struct.Struct("<qBBH")
 GO, PIN, UART, HANG, LEVEL, SYNC = range(6)
 START, WRITE, READ, STOP, PRINTED, STOPPED = range(6)
@@ -34,7 +38,7 @@ _PINS = 40
 _VIRTUAL = 1  # QEMU_CLOCK_VIRTUAL
 _NEVER = 1 << 62
 _GUARD_NS = 1_000_000
-_SHORTEST_S, _LONGEST_S = 5e-5, 1e-3  # between two checks whether the processors sleep
+_SHORTEST_S, _LONGEST_S = 5e-5, 1e-3  # times between two checks whether the processors sleep
 
 _PIN_CALL = c.CFUNCTYPE(None, c.c_int, c.c_int)
 _I2C_CALL = c.CFUNCTYPE(c.c_int, c.c_uint8, c.c_uint8, c.c_uint16)
@@ -58,7 +62,7 @@ class _Callbacks(c.Structure):
 
 
 class _Timer(c.Structure):
-    """QEMUTimer."""
+    """QEMU's struct QEMUTimer."""
 
 
 _Timer._fields_ = [
@@ -73,7 +77,7 @@ _Timer._fields_ = [
 
 
 class _Poll(c.Structure):
-    """MainLoopPoll. state: 0 before the main loop waits for events."""
+    """QEMU's struct MainLoopPoll. state: 0 before the main loop waits for events."""
 
     _fields_ = [("state", c.c_int), ("timeout", c.c_uint32)]
 
@@ -86,7 +90,7 @@ class _Notifier(c.Structure):
 
 
 class _RemoteBus(Bus):
-    """The bus, whose devices are in the other process. This process only knows whether one of them holds SDA."""
+    """An I2C bus whose devices are in the other process. This process only knows whether a device holds SDA."""
 
     def __init__(self, machine: "Machine", number: int, sda: int, scl: int) -> None:
         super().__init__(None, sda, scl)
@@ -123,10 +127,11 @@ class Machine:
         self._inputs: dict[int, int] = {}  # levels set from outside the chip, by pin
         self._wires_of: dict[int, tuple[Wires, int, int]] = {}
         self._driven = [1] * _PINS
-        self._stale: list[int] = []  # wires whose input QEMU has set to the level that the chip drives
-        self._may_reset = self._resetting = False  # the processors wait for a reset; the main loop does it
+        self._stale: list[int] = []  # pins whose input QEMU has set to the level that the chip drives
+        # _may_reset is True while the processors wait for a reset, _resetting while the main loop executes it
+        self._may_reset = self._resetting = False
         self._fuses: _Timer | None = None
-        self._state = -1  # file that shows whether the processors' thread sleeps
+        self._state = -1  # descriptor of the file that shows whether the processors' thread sleeps
         self._buses = [_RemoteBus(self, i, *pins) for i, pins in enumerate(wires)]
         self._wires = [Wires(bus, self._setter(bus.sda), self._setter(bus.scl)) for bus in self._buses]
         for bus, its in zip(self._buses, self._wires, strict=True):
@@ -142,7 +147,7 @@ class Machine:
         self.tell(kind, a, b)
         answer = self._link.recv(1)
         if not answer:
-            os._exit(0)  # the other process has ended, or cut the power
+            os._exit(0)  # the other process has ended or has cut the power
         return answer[0]
 
     def _receive(self, size: int) -> bytes:
@@ -152,7 +157,7 @@ class Machine:
         return data
 
     def _stopped(self, _: object = None) -> None:
-        """Obey the other process until it advances the time."""
+        """Execute the commands of the other process until it advances the time."""
         if self._state < 0:
             self._begun()
         self.tell(STOPPED)
@@ -199,7 +204,7 @@ class Machine:
             wires[0].driven(self._driven[wires[1]], self._driven[wires[2]])
 
     def _sync(self, number: int, what: int) -> None:
-        """Called before each read of the inputs, and when a pin is set up."""
+        """Correct the inputs of stale pins. QEMU calls this before it reads the inputs, and when it sets up a pin."""
         if what == -1 and self._stale:
             for pin in self._stale:
                 self._qemu.qemu_picsimlab_set_pin(pin + 1, self._inputs[pin])
@@ -210,8 +215,10 @@ class Machine:
             self._qemu.timer_mod_ns(c.addressof(self._stop), self._qemu.qemu_clock_get_ns(_VIRTUAL))
 
     def _on_reset(self, _: object) -> None:
-        """Called in the main loop, with the processors stopped. Wait for their thread to sleep: otherwise it would be
-        random which processor continues first."""
+        """Wait until the processors' thread sleeps. Otherwise chance would decide which processor continues first.
+
+        QEMU calls this in its main loop during a reset, while the processors are stopped.
+        """
         if self._state >= 0:
             while not self._sleeps(_SHORTEST_S):
                 pass
@@ -222,16 +229,19 @@ class Machine:
     # Time
 
     def _begun(self) -> None:
-        """Called in the processors' thread, at its first instruction."""
-        c.pythonapi.PyGILState_Ensure()  # otherwise each call would create a thread state, which is slow
+        """Prepare the emulation. This runs in the processors' thread, at its first instruction."""
+        c.pythonapi.PyGILState_Ensure()  # otherwise each call from QEMU would create a thread state, which is slow
         self._state = os.open(f"/proc/self/task/{threading.get_native_id()}/stat", os.O_RDONLY)
         self._calm_timers()
         self._guard_later()
         self._stale = list(self._inputs)
 
     def _calm_timers(self) -> None:
-        """Postpone the scheduler's timer for ever, by changing its scale. Two timers end after 0.1 s, and the
-        scheduler's is the one without an owner. The other ends a read of the eFuses, see _guard()."""
+        """Postpone the scheduler's timer for ever, by changing its scale.
+
+        Two timers end after 0.1 s. The one without an owner is the scheduler's. The other one ends a read of the
+        eFuses (see _guard()).
+        """
         self._qemu.timer_mod_ns(c.addressof(self._stop), 0)
         following = self._stop.next
         while following:
@@ -246,14 +256,18 @@ class Machine:
         self._qemu.timer_del(c.addressof(self._stop))
 
     def _hold_main_loop(self, _: object, poll) -> None:
-        """Called before and after the main loop waits for an event, with QEMU's lock held."""
+        """Let the main loop continue only while the processors sleep or wait for a reset.
+
+        QEMU calls this before and after the main loop waits for an event, with QEMU's lock held.
+        """
         if poll.contents.state == 0 or self._state < 0:
             return
         qemu, wait_s = self._qemu, _SHORTEST_S
         while qemu.runstate_is_running():
             if qemu.qemu_reset_requested_get() and self._may_reset:
                 self._resetting = True
-                qemu.qemu_clock_enable(_VIRTUAL, False)  # keeps QEMU from setting it; the reset enables it
+                # QEMU does not set a disabled clock forward. The reset enables the clock again
+                qemu.qemu_clock_enable(_VIRTUAL, False)
                 return
             idle = qemu.all_cpu_threads_idle()
             if self._sleeps(0.0 if idle else wait_s) and idle and qemu.all_cpu_threads_idle():
@@ -275,9 +289,11 @@ class Machine:
         self._qemu.timer_mod_ns(c.addressof(self._guard_timer), (now_ns // _GUARD_NS + 1) * _GUARD_NS)
 
     def _guard(self, _: object) -> None:
-        """Called every millisecond, between two turns of the processors: start a requested reset. Also end reads of the
-        eFuses early. The ROM waits for three of them: microseconds on a real chip, 100 ms here, as long as the rest of
-        the start."""
+        """Start a requested reset, and end reads of the eFuses early.
+
+        QEMU calls this every millisecond, between two turns of the processors. The ROM waits for three reads of the
+        eFuses. They take microseconds on a real chip. In QEMU they take 100 ms, as long as the rest of the start.
+        """
         now_ns = self._qemu.qemu_clock_get_ns(_VIRTUAL)
         if self._fuses and self._fuses.expires > now_ns:
             self._qemu.timer_mod_ns(c.addressof(self._fuses), now_ns)
@@ -288,7 +304,10 @@ class Machine:
             self._qemu.async_run_on_cpu(c.c_void_p(self._qemu.qemu_get_cpu(number)), self._calls[3], None)
 
     def _await_reset(self, _cpu: object, _data: object) -> None:
-        """Called in the processors' thread, with QEMU's lock held: let the main loop take the lock."""
+        """Release QEMU's lock so that the main loop can execute a reset, and wait for the reset.
+
+        QEMU calls this in the processors' thread, with its lock held.
+        """
         if not self._qemu.qemu_reset_requested_get():
             return
         self._may_reset = True
@@ -334,13 +353,13 @@ class Machine:
 
 
 def _end(unraisable) -> None:
-    """End the process after an exception in a call from QEMU, which would ignore it."""
+    """End the process after an exception in a call from QEMU. QEMU itself would ignore the exception."""
     sys.__unraisablehook__(unraisable)
     os._exit(1)
 
 
 def main() -> None:
-    sys.unraisablehook = _end  # also if the other process is gone
+    sys.unraisablehook = _end  # ends this process too if the other process has ended
     number, folder, flash, *wires = sys.argv[1:]
     link = socket.socket(fileno=int(number))
     pairs = [(int(sda), int(scl)) for sda, scl in (pair.split(",") for pair in wires)]

@@ -1,4 +1,4 @@
-"""A board's file system, built and read on the host: littlefs with the geometry of the official image."""
+"""Builds and reads a board's file system on the host: littlefs with the geometry of the official image."""
 
 import tempfile
 from dataclasses import dataclass
@@ -12,20 +12,29 @@ from littlefs import LittleFS, UserContext
 
 @dataclass(frozen=True)
 class FileSystem:
-    """The place of a board's littlefs in its flash, in bytes, and how MicroPython mounts it."""
+    """The position of a board's littlefs in its flash, and the sizes with which MicroPython mounts it.
+
+    start: First byte in the flash.
+    blocks: Number of blocks.
+    cache: Size of a read or a write, in bytes.
+    block: Size of a block, in bytes.
+    """
 
     start: int
     blocks: int
-    cache: int  # the size of its reads and writes
+    cache: int
     block = 4096
 
     @property
     def size(self) -> int:
-        """The size of the file system, bytes."""
+        """The size of the file system, in bytes."""
         return self.block * self.blocks
 
     def build(self, files: dict[str, bytes]) -> bytes:
-        """A file system that holds these files: {path on the board, with or without a leading slash: content}."""
+        """Return a file system with these files.
+
+        files: Content of each file, by its path on the board. The path may begin with a slash.
+        """
         context = UserContext(self.size)
         system = self._mount(context, fresh=True)
         for path, content in files.items():
@@ -38,7 +47,10 @@ class FileSystem:
         return bytes(context.buffer)
 
     def read(self, image: bytes) -> dict[str, bytes]:
-        """All files of a file system, by path. Raises littlefs.errors.LittleFSError if it cannot be mounted."""
+        """Return all files of a file system, as {path without a leading slash: content}.
+
+        Raises littlefs.errors.LittleFSError if the file system cannot be mounted.
+        """
         context = UserContext(self.size)
         context.buffer = bytearray(image)
         system = self._mount(context, fresh=False)
@@ -70,15 +82,19 @@ ESP32 = FileSystem(0x200000, 512, 32)
 
 
 def firmware(compiled: bool = False, mpy: int = bytecode.PICO) -> dict[str, bytes]:
-    """The files that `kickstand flash` copies to a board. compiled: the package as .mpy, made by mpy-cross.
+    """Return the files that `kickstand flash` copies to a board.
 
-    mpy: the board's sys.implementation._mpy.
+    compiled: True compiles the package to .mpy files with mpy-cross.
+    mpy: sys.implementation._mpy of the board.
     """
     return firmware_files.contents(mpy if compiled else None)
 
 
 def stored(calibration: Calibration, who_am_i: int = 0x68) -> dict[str, bytes]:
-    """The files in which a board with this sensor, in its range of 8 g, stores this calibration."""
+    """Return the files in which a board stores this calibration. The sensor's range is 8 g.
+
+    who_am_i: the sensor's WHO_AM_I register.
+    """
     with tempfile.TemporaryDirectory() as directory:
         Store(who_am_i, 8, directory).save(calibration)
         return {path.name: path.read_bytes() for path in Path(directory).iterdir()}

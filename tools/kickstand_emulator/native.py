@@ -1,8 +1,9 @@
 """Compiles rp2040py for the running Python version, which makes it 2.3 times as fast.
 
-The modules in its wheel work with any Python (the limited API), but look up each attribute by name. The wheel also
-contains their C sources. build() compiles the five that dominate the run time, once per Python version and user.
-install() makes Python import them instead of the wheel's modules. Cycles and memory are the same with both.
+The modules in rp2040py's wheel use the limited API, so they work with any Python version. But they look up each
+attribute by name, which is slow. The wheel also contains their C sources. build() compiles the five modules that
+dominate the run time, once per Python version and user. install() makes Python import them instead of the wheel's
+modules. Emulated cycles and memory stay the same.
 """
 
 import contextlib
@@ -19,18 +20,22 @@ from importlib.machinery import EXTENSION_SUFFIXES, ModuleSpec
 from pathlib import Path
 
 _PACKAGE = "rp2040py.native"
-_MODULES = ("_rp2040", "_cortex_m0_core", "_bit", "_simulator", "_simulation_clock")  # slowest to compile first
+# The module that takes longest to compile is first
+_MODULES = ("_rp2040", "_cortex_m0_core", "_bit", "_simulator", "_simulation_clock")
 _CHECK = "from kickstand_emulator import native; native.install({!r}); import rp2040py; rp2040py.RP2040()"
 
 
 def folder() -> Path:
-    """The folder of the compiled modules, present or future: one per user, rp2040py version and Python version."""
+    """Return the folder of the compiled modules, even if it does not exist yet.
+
+    There is one folder per user, version of rp2040py and version of Python.
+    """
     version = importlib.metadata.version("rp2040py")
     return Path.home() / ".cache" / "kickstand" / f"rp2040py-{version}-{sysconfig.get_config_var('SOABI')}"
 
 
 def install(directory: str | Path | None = None) -> None:
-    """From now on import the compiled modules that exist. directory: their folder, None for folder()."""
+    """Make Python import the compiled modules that exist. directory: their folder. None uses folder()."""
     sys.meta_path.insert(0, _Finder(directory))
 
 
@@ -47,8 +52,10 @@ class _Finder:
 
 
 def build() -> bool:
-    """Compile the modules (20 s) unless already compiled. Returns False without a compiler or the Python headers; then
-    the wheel's own modules run."""
+    """Compile the modules unless they are already compiled. This takes 20 s.
+
+    Returns False if the compiler or Python's headers are missing. Then the modules of the wheel are used.
+    """
     if not importlib.util.find_spec("rp2040py"):
         return False
     wanted, compiler = folder(), shutil.which("cc")
@@ -56,9 +63,9 @@ def build() -> bool:
         return True
     if sys.platform != "linux" or not compiler or not Path(sysconfig.get_path("include"), "Python.h").is_file():
         return False
-    with contextlib.suppress(OSError):  # a full disk, a read-only home, or another process was first
+    with contextlib.suppress(OSError):  # the disk is full, the home is read-only, or another process was faster
         wanted.parent.mkdir(parents=True, exist_ok=True)
-        # The folder is renamed in the end, and cannot be removed then
+        # The folder is renamed at the end, so the context cannot remove it
         with tempfile.TemporaryDirectory(dir=wanted.parent, ignore_cleanup_errors=True) as made:
             if _compile(compiler, Path(made)):
                 Path(made).rename(wanted)
@@ -66,7 +73,7 @@ def build() -> bool:
 
 
 def _compile(compiler: str, directory: Path) -> bool:
-    """Compile all modules. True if they work together."""
+    """Compile all modules. Returns True if the emulator works with them."""
     spec = importlib.util.find_spec("rp2040py")
     assert spec and spec.origin
     sources = Path(spec.origin).parent / "native"

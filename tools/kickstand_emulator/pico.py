@@ -1,4 +1,4 @@
-"""The emulated Pico with the parts wired to it: for tests, bench, replay and `kickstand emulate`."""
+"""Emulates a Pico with the parts that are wired to it, for tests, bench, replay and `kickstand emulate`."""
 
 from collections.abc import Callable
 from typing import Any
@@ -18,7 +18,7 @@ from .i2c_wires import Wires
 
 
 class Pico(EmulatedDevice):
-    """See Device."""
+    """An emulated Pico. See EmulatedDevice."""
 
     NAME, FLASH, MPY, SINK = "Pico", flash_image.PICO, bytecode.PICO, GUEST
 
@@ -38,25 +38,25 @@ class Pico(EmulatedDevice):
 
     @property
     def time_s(self) -> float:
-        """Emulated seconds since this Pico was made."""
+        """The emulated time since this object was created, in s."""
         return self.chip.clock.nanos / 1e9
 
     def power_on(self) -> None:
-        """Start everything from power-on."""
+        """Switch on the power of the chip and of all parts."""
         self._reset()
         self.board.power_on()
         self.chip.power_on()
         self.powered = True
 
     def power_off(self) -> None:
-        """Cut the power; only the content of the flash is kept."""
+        """Cut the power. Only the content of the flash is kept."""
         self.powered = False
         self.chip.power_off()
         self.board.power_off()
         self._reset()
 
     def run(self, seconds: float, between: Callable[[], None] | None = None) -> None:
-        """Advance the time. A PowerCut ends it early; `powered` is then False."""
+        """Advance the time. After a PowerCut this returns early, and `powered` is False."""
         if not self.powered:
             self.chip.sleep(seconds)
             return
@@ -71,7 +71,7 @@ class Pico(EmulatedDevice):
         return self.chip.controllers[0].reading()
 
     def reset(self) -> None:
-        """Reset the chip, as a watchdog does."""
+        """Reset the chip, like an expired watchdog."""
         self.chip.reset()
 
     def stop(self) -> None:
@@ -79,7 +79,7 @@ class Pico(EmulatedDevice):
         self.chip.stop()
 
     def stall(self, seconds: float) -> None:
-        """Advance the time while the processor is stopped, as in a long flash operation.
+        """Advance the time while the processor is stopped, as during a long flash operation.
 
         A program never starts such an operation in the middle of an I2C transfer. So this method first waits until
         there has been no transfer for a millisecond.
@@ -110,7 +110,7 @@ class Pico(EmulatedDevice):
         HostLink(self.chip, b"", sink)
 
     def send(self, data: bytes) -> None:
-        """Send data to the board's console as fast as it accepts them."""
+        """Send data to the board's console as fast as the board accepts data."""
         self.console.send(data)
 
     # The wires

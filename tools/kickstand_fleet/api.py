@@ -14,5 +14,5 @@ from .manifest import Period as Period, by_pattern as by_pattern, read_manifest 
 from .period import PeriodResult as PeriodResult, work_on_period as work_on_period
 from .run import FleetRun as FleetRun, run_fleet as run_fleet
 
-# All names above: without it pydoc leaves out imported names
+# All names imported above. Without this list pydoc leaves out imported names
 __all__ = [name for name in dir() if not name.startswith("_")]  # pyright: ignore[reportUnsupportedDunderAll]

@@ -1,14 +1,14 @@
 """Runs a function on many items with Dask, on this computer or on a cluster.
 
 Workers on this computer and their scheduler talk over 127.0.0.1 by TLS. Each run creates its own keys, and only its
-processes have them. Another user of the computer can connect, but can neither read nor run anything. Dask has no Unix
-sockets, and our own process pool would have to handle crashes a second time. Dask's web pages are off.
+processes have them. Another user of the computer can connect, but can neither read nor run anything. Unix sockets
+would keep other users out, but Dask does not support them. A process pool of our own would need its own crash handling.
+Dask's web pages are off.
 
-A task that kills its worker must not cost another task. Dask would retry the task on other workers and so kill them
-too. It would also recompute their finished results. So no retries are allowed, only a few tasks run at a time, and Dask
-keeps
-no results. Tasks whose worker died run a second time, after all others and one at a time. If the worker dies again, the
-task is the cause.
+A task that kills its worker must not cost another task. By default Dask retries the task on other workers, which kills
+them too, and then recomputes their finished results. So no retries are allowed, only a few tasks run at a time, and
+Dask keeps no results. A task whose worker died runs a second time, alone, after all other tasks. If its worker dies
+again, the task is the cause.
 """
 
 import contextlib
@@ -40,19 +40,29 @@ def run_tasks(
     workers: int | None = None,
     timeout_s: float = 600.0,
 ) -> Iterator[Outcome]:
-    """Yield (index, result, "", "") of function(*item) for each item, in any order; without a result (index, None,
-    CRASHED or TIMED_OUT, explanation). Starts no workers if there are no items. See Cluster."""
+    """Run function(*item) for each item, and yield one outcome per item, in any order.
+
+    The arguments scheduler, workers and timeout_s are those of Cluster. Starts no workers if there are no items.
+
+    Yields:
+        (index, result, "", ""), if the function returned a result.
+        (index, None, CRASHED or TIMED_OUT, explanation), if it did not.
+    """
     if items:
         with Cluster(scheduler, workers, timeout_s) as cluster:
             yield from cluster.run(function, items)
 
 
 class Cluster:
-    """with Cluster(scheduler, workers, timeout_s) as cluster: for index, outcome in cluster.run(function, items).
+    """A connection to Dask's workers, used as a context: `with Cluster(scheduler, workers, timeout_s) as cluster`.
 
-    scheduler: address of a scheduler, None for workers on this computer. workers: number of workers on this computer,
-    None for one per processor; once connected, the attribute holds the actual number. timeout_s: a task that takes
-    longer is ended. Raises InputError without a cluster.
+    Args:
+        scheduler: Address of a scheduler. None starts workers on this computer.
+        workers: Number of workers on this computer. None starts one per processor.
+        timeout_s: Longest time for one task. A task that takes longer is ended.
+
+    The attribute `workers` holds the actual number of workers after the connection. Entering the context raises
+    InputError if no workers can be reached.
     """
 
     def __init__(self, scheduler: str | None, workers: int | None, timeout_s: float) -> None:
@@ -70,7 +80,7 @@ class Cluster:
             raise InputError("a fleet needs Dask: " + extra("fleet")) from error
 
         class Undisturbed(WorkerPlugin):
-            """Makes workers ignore a terminal's Ctrl-C: this process ends them."""
+            """Makes workers ignore Ctrl-C in a terminal. The main process ends them instead."""
 
             def setup(self, worker: Any) -> None:
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -85,7 +95,7 @@ class Cluster:
                     "distributed.comm.timeouts.connect": "10s",
                     "distributed.scheduler.http.routes": [],
                     "distributed.worker.http.routes": [],
-                    # The same as _silence(), for workers, from their start
+                    # Turns the log messages of workers off from their start, as _silence() does in this process
                     "distributed.nanny.pre-spawn-environ": {
                         **config.get("distributed.nanny.pre-spawn-environ"),
                         "DASK_LOGGING__DISTRIBUTED": "critical",
@@ -111,13 +121,13 @@ class Cluster:
             self._stack.callback(lambda: self._client.close(timeout=2))
             patience_s = _LOCAL_PATIENCE_S if self._address is None else _REMOTE_PATIENCE_S
             self._client.wait_for_workers(1, timeout=patience_s)
-        except BaseException as error:  # Ctrl-C, too
+        except BaseException as error:  # including Ctrl-C
             self.__exit__()
             if not isinstance(error, (OSError, TimeoutError, ValueError)):
                 raise
             where = self._address or "this computer"
             raise InputError(f"no workers at {where}: {cause(error)}") from error
-        self._started: dict[str, tuple[float, str]] = {}  # by key: when it began, and on which worker
+        self._started: dict[str, tuple[float, str]] = {}  # task's key: (time when it began, address of its worker)
         self._client.subscribe_topic(_TOPIC, self._note_begin)
         self.workers = len(self._client.scheduler_info(n_workers=-1)["workers"])
         return self
@@ -127,8 +137,8 @@ class Cluster:
             self._stack.close()
 
     def run(self, function: Callable[..., Any], items: Sequence[tuple[Any, ...]]) -> Iterator[Outcome]:
-        """Yield outcomes as run_tasks() does. function and items must be picklable. Raises InputError if the scheduler
-        is lost."""
+        """Yield the same outcomes as run_tasks(). The function and the items must be picklable. Raises InputError if
+        the connection to the scheduler is lost."""
         self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._under_way: dict[str, tuple[int, Any]] = {}
         suspects: list[int] = []
@@ -152,7 +162,10 @@ class Cluster:
         future.add_done_callback(self._ended.put)
 
     def _collect(self, suspects: list[int]) -> Iterator[Outcome]:
-        """Yield the results that come within _LOOK_S. suspects: tasks whose worker died are appended to it."""
+        """Wait up to _LOOK_S for a task to end, and yield its outcome. Yield the tasks that timed out too.
+
+        If the worker of a task died, append the index of the task to suspects.
+        """
         with contextlib.suppress(queue.Empty):
             future = self._ended.get(timeout=_LOOK_S)
             place = self._under_way.pop(future.key, None)
@@ -169,7 +182,7 @@ class Cluster:
                 else:
                     yield index, None, CRASHED, f"{type(error).__name__}: {error}"
             elif self._client.status == "running":
-                suspects.append(index)  # another task ended its worker
+                suspects.append(index)  # its worker was ended because of another task
             else:
                 raise InputError(f"the cluster{f' at {self._address}' if self._address else ''} was lost; {KEPT}")
             future.release()
@@ -195,15 +208,14 @@ class Cluster:
 
 @contextlib.contextmanager
 def _without_interrupts() -> Iterator[None]:
-    """A context that defers Ctrl-C to its end. If Dask is interrupted while it starts or connects, it prints pages of
-    errors.
+    """A context that defers Ctrl-C to its end. Processes started in this context never receive Ctrl-C.
 
-    Processes started in this context never receive Ctrl-C.
+    If Dask is interrupted while it starts or connects, it prints pages of errors.
     """
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
-    resource_tracker.ensure_running()  # else Python would start it with the first process, and unblock Ctrl-C then
+    resource_tracker.ensure_running()  # otherwise Python starts it with the first process, which unblocks Ctrl-C
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -212,7 +224,7 @@ def _without_interrupts() -> Iterator[None]:
 
 
 def _silence() -> None:
-    """Turn Dask's log messages off: results and InputErrors report what happens to workers and scheduler."""
+    """Turn Dask's log messages off. Outcomes and InputErrors report the failures of workers and scheduler instead."""
     for name in ("distributed", *logging.root.manager.loggerDict):
         if name.split(".")[0] == "distributed":
             logging.getLogger(name).setLevel(logging.CRITICAL)

@@ -11,9 +11,9 @@ from . import KEPT
 
 @click.command(short_help="Align many vehicles, find moved mounts, test their brakes.")
 @click.argument("manifests", nargs=-1, required=True, metavar="MANIFEST.csv|GLOB")
-@click.option("--out", required=True, metavar="DIR", help="The directory to write to, or a place like s3://...")
-@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, tcp://...; this computer if not given.")
-@click.option("--workers", type=click.IntRange(min=1), help="On this computer; one a processor if not given.")
+@click.option("--out", required=True, metavar="DIR", help="The directory to write to, or an address such as s3://...")
+@click.option("--scheduler", metavar="ADDRESS", help="A Dask cluster at tcp://... Default: this computer.")
+@click.option("--workers", type=click.IntRange(min=1), help="Workers on this computer. Default: one per processor.")
 @click.option(
     "--signals", "with_signals", is_flag=True, help="Also write each log's accelerations along the vehicle's axes."
 )
@@ -22,23 +22,23 @@ from . import KEPT
     "timeout_s",
     type=click.FloatRange(min=1.0),
     default=600.0,
-    help="Give up a vehicle after so many seconds.",
+    help="Longest time for one vehicle, in seconds.",
 )
 @click.option(
-    "--vehicle", type=VEHICLES, default="car", help="The vehicle of the logs of a GLOB. A manifest says it itself."
+    "--vehicle", type=VEHICLES, default="car", help="The kind of vehicle, for a GLOB. A manifest has its own column."
 )
 def fleet_command(manifests: tuple[str, ...], out: str, vehicle: str, **how: Any) -> None:
     """Align a whole fleet, find mounts that moved, and measure its brake tests.
 
     The manifest is CSV with the columns vehicle,path,kind and optionally mount: one line per log, in chronological
-    order. With a GLOB each file that matches is one vehicle. Paths may be s3://. Run it again to resume: only what is
-    new is computed.
+    order. With a GLOB each matching file is one vehicle. Paths may start with s3://. To resume a run, repeat the
+    command: only new and changed logs are computed.
     """
     from .manifest import by_pattern, is_pattern, read_manifest  # imported here, because numpy is slow to import
     from .run import run_fleet
 
     manifest = manifests[0]
-    if len(manifests) > 1:  # the shell has replaced a pattern by file names
+    if len(manifests) > 1:  # the shell has expanded a pattern to file names
         raise click.UsageError("One manifest, or one pattern in quotation marks.")
     periods = by_pattern(manifest, vehicle) if is_pattern(manifest) else read_manifest(manifest)
     try:

@@ -1,18 +1,27 @@
-"""The normal equations of a drive for the sensor's alignment, in blocks of some seconds that can be compared.
+"""Collects the normal equations of a regression that finds the sensor's alignment, in blocks of some seconds.
 
-As in the firmware's ForwardRegression, a regression explains the force of each interval between two speeds by
+As in the firmware's ForwardRegression, the regression explains the mean force f between two consecutive speeds of the
+log. Such a stretch is an interval. In a car, in the sensor's own axes:
 
-    f = level + forward a + left c + arm w        a = dv/dt / g, c = v (yaw rate) / g, w = d(yaw rate)/dt
+    f = level + forward a + left c + arm w
 
-in the sensor's own axes. Unlike the firmware, it also uses bends: in a car they show left as well as braking shows
-forward. A sensor ahead of the rear axle is accelerated sideways when a bend begins and ends. Drivers brake and speed up
-at the same moments. The coefficient arm, the sensor's distance from that axle, absorbs this. A motorcycle leans into
-bends: its force stays along its own up and grows to sqrt(1 + c^2). So for a motorcycle
+    a = dv/dt / g               acceleration forward
+    c = v (yaw rate) / g        acceleration to the left
+    w = d(yaw rate)/dt          change of the yaw rate
+
+level, forward, left and arm are vectors, the coefficients. Unlike the firmware, this regression also uses bends. In a
+car, bends show left as well as braking shows forward.
+
+A sensor ahead of the rear axle is accelerated sideways when a bend begins and ends. Drivers brake and speed up at the
+same moments, so this acceleration would falsify forward. The coefficient arm absorbs it. Its length is the distance
+from the sensor to the rear axle.
+
+A motorcycle leans into bends. Its force stays along its own up, and grows to sqrt(1 + c^2). So for a motorcycle
 
     f = level sqrt(1 + c^2) + forward a
 
-A car's body also sways on its springs, mostly sideways. The direction depends on the vehicle but does not change: if it
-changes in the sensor's axes, the mount has moved.
+A car's body also sways on its springs, mostly sideways. The direction of the sway depends on the vehicle, but stays the
+same. If the direction changes in the sensor's axes, the mount has moved.
 """
 
 import math
@@ -29,24 +38,32 @@ from kickstand_tools.signals import STANDING_MPS, Array, moving_mean, runs
 
 INTERVAL_S = 0.9  # least time between two speeds that are used
 MOVING_MPS = 2.0
-STANDING_WEIGHT = 0.3  # weight of a second at a stop: a long stop shows only one slope of the road, like a short one
-LEVEL_S = 20.0  # over this time the mean force is about vertical: the rate about it is the yaw rate
+# Weight of a second at a stop. A long stop shows only one slope of the road, like a short one, so seconds count less
+STANDING_WEIGHT = 0.3
+LEVEL_S = 20.0  # the mean force over this time is about vertical. The rate about this vertical is the yaw rate
 BLOCK_S = 8.0
-# The road: ratio of the variance of its slope to that of all other errors in a mean over 1 s, and its correlation
-# length
+# ROAD_SHARE is the variance of the road's slope, divided by the variance of all other errors in a mean over 1 s.
+# ROAD_M is the correlation length of the road's slope, in m
 ROAD_SHARE, ROAD_M = 1.0, 150.0
-SWING_S = 0.2  # the yaw rate at both ends of an interval is averaged over this
-SWAY_S = 0.05, 0.3  # sway is the mean force over the first minus that over the second: it excludes noise and driving
-# deg/s: at this yaw rate an interval of a car counts half. In a tight turn a sensor ahead of the rear axle moves in a
-# direction that differs from the vehicle's heading by its distance from that axle over the turn's radius.
+SWING_S = 0.2  # the yaw rate at each end of an interval is a mean over this time
+# Sway is the mean force over the first time minus the mean force over the second. This excludes noise and driving
+SWAY_S = 0.05, 0.3
+# deg/s: an interval of a car with this yaw rate counts half. In a tight turn, a sensor ahead of the rear axle does not
+# move along the vehicle's heading. The angle is its distance from that axle divided by the turn's radius.
 TIGHT_DPS = 20.0
 
 
 @dataclass
 class Intervals:
-    """n intervals between two speeds of a log. t_s: their middles. force (n, 3, g): means, in the sensor's axes.
-    terms (n, 4): the regressors of level, forward, left and arm. weight (n): s. speed (n): m/s. sway (n, 3, 3, g^2):
-    the covariance of the force's quick changes; zeros where it is not used."""
+    """n intervals between two consecutive speeds of a log.
+
+    t_s: Middle of each interval, shape (n), in s from the log's beginning.
+    force: Mean force of each interval, shape (n, 3), in g along the sensor's axes.
+    terms: The regressors of level, forward, left and arm, shape (n, 4).
+    weight: Weight of each interval, shape (n), in s.
+    speed: Mean speed of each interval, shape (n), in m/s.
+    sway: Covariance of the quick changes of force, shape (n, 3, 3), in g^2. Zeros where it is not used.
+    """
 
     t_s: Array
     force: Array
@@ -58,11 +75,14 @@ class Intervals:
 
 @dataclass
 class Blocks(Table):
-    """Consecutive blocks (m) of intervals in one or several logs.
+    """m consecutive blocks of intervals in one or several logs.
 
-    square (m, 4, 4), product (m, 4, 3): sums of terms x terms and of terms x force, the road's slope filtered out (see
-    _without_road()). sway (m, 3, 3): mean of the intervals' sway, divided by its trace, because a rough road must not
-    count more than a smooth one. log (m): index of the log; t_s, end_s (m): begin and end in it.
+    square: Sums of terms x terms, shape (m, 4, 4), with the road's slope filtered out (see _without_road()).
+    product: Sums of terms x force, shape (m, 4, 3), with the road's slope filtered out.
+    sway: Sway of each block, shape (m, 3, 3). It is divided by its trace, so a rough road counts like a smooth one.
+    log: Index of each block's log, shape (m).
+    t_s: Beginning of each block in its log, shape (m), in s.
+    end_s: End of each block in its log, shape (m), in s.
     """
 
     square: Array
@@ -74,7 +94,10 @@ class Blocks(Table):
 
 
 def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
-    """The intervals of a log whose speed is delayed by lag_s. bias_dps (3): the gyro's bias."""
+    """Compute the intervals of a log.
+
+    kind: "motorcycle" or "car". lag_s: delay of the log's speed. bias_dps: the gyro's bias along the sensor's axes.
+    """
     step = np.diff(log.t_s, prepend=log.t_s[0])
     step = np.where(step * 1e6 > GAP_US, 0.0, step)
     rate = np.radians(log.gyro_dps - bias_dps)
@@ -97,8 +120,8 @@ def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
     standing = (mean_mps < STANDING_MPS) & (np.abs(a) < 0.01)
     if kind == MOTORCYCLE:
         terms = np.column_stack((np.sqrt(1.0 + c * c), a, np.zeros_like(a), np.zeros_like(a)))
-        weight = length * (mean_mps > MOVING_MPS)  # at lower speeds a foot is down
-        shown = np.zeros_like(a)  # not used for a motorcycle, which sways about its tyre contacts and with its rider
+        weight = length * (mean_mps > MOVING_MPS)  # at lower speeds the rider has a foot on the ground
+        shown = np.zeros_like(a)  # sway is not used: a motorcycle sways about its tyre contacts and with its rider
     else:
         later, sooner = (_integrals(rate.T, log.t_s, step, time + ahead) for ahead in (SWING_S / 2.0, -SWING_S / 2.0))
         swing = (later - sooner) / SWING_S
@@ -134,10 +157,15 @@ def blocks(logs: list[Intervals]) -> Blocks:
 
 
 def fits(square: Array, product: Array) -> tuple[Array, Array]:
-    """Solve k normal equations of t terms. Return two arrays.
+    """Solve k systems of normal equations with t terms.
 
-    (k, t, 3): the coefficients, which are level, forward, left and, if t is 4, arm. (k, 2): how much the regressors a
-    and c of the module's docstring varied, g^2 s.
+    Args:
+        square: Sums of terms x terms, shape (k, t, t).
+        product: Sums of terms x force, shape (k, t, 3).
+
+    Returns:
+        The coefficients level, forward, left and, if t is 4, arm: shape (k, t, 3).
+        The variation of the regressors a and c of the module's docstring: shape (k, 2), in g^2 s.
     """
     ridge = np.diag([1e-9] + [1e-6] * (square.shape[-1] - 1)) * np.maximum(square[..., :1, :1], 1e-3)
     found = np.asarray(np.linalg.solve(square + ridge, product), dtype=float)
@@ -148,7 +176,10 @@ def fits(square: Array, product: Array) -> tuple[Array, Array]:
 
 
 def frames(found: Array, varied: Array) -> Array:
-    """(k, 3, 3) vehicle from sensor, rows left, up, forward, from the two results of fits()."""
+    """Compute k rotations from sensor to vehicle axes, shape (k, 3, 3), from the two results of fits().
+
+    The rows of a rotation are left, up, forward.
+    """
     level, forward, left = found[..., 0, :], found[..., 1, :], found[..., 2, :]
     up = level / np.maximum(np.linalg.norm(level, axis=-1, keepdims=True), 1e-9)
     ahead = varied[..., :1] * forward + varied[..., 1:] * np.cross(left, up)
@@ -156,15 +187,22 @@ def frames(found: Array, varied: Array) -> Array:
 
 
 def frame_of(up: Array, ahead: Array) -> Array:
-    """(..., 3, 3) rows left, up, forward, from up (..., 3, unit vectors) and vectors roughly forward (..., 3)."""
+    """Compute rotations from sensor to vehicle axes, shape (..., 3, 3), with the rows left, up, forward.
+
+    up: Unit vectors, shape (..., 3).
+    ahead: Vectors that point roughly forward, shape (..., 3).
+    """
     side = np.cross(up, ahead)
     side /= np.maximum(np.linalg.norm(side, axis=-1, keepdims=True), 1e-9)
     return np.asarray(np.stack((side, up, np.cross(side, up)), axis=-2), dtype=float)
 
 
 def handedness(found: Array, varied: Array) -> float:
-    """The lateral force in bends divided by the force that the yaw rate requires. The ratio is about 1, or about -1 if
-    the gyro's signs or the axes are mirrored. It is 0 without bends, and on a motorcycle, which leans into them."""
+    """Divide the lateral force measured in bends by the lateral force computed from speed and yaw rate.
+
+    The ratio is about 1. It is about -1 if the gyro's signs or the axes are mirrored. It is 0 without bends, and for a
+    motorcycle, because a motorcycle leans into bends. The arguments are the two results of fits(), with k left out.
+    """
     if varied[1] < 0.05:
         return 0.0
     level, forward, left = found[:3]
@@ -173,13 +211,13 @@ def handedness(found: Array, varied: Array) -> float:
 
 
 def _without_road(log: Intervals) -> tuple[Array, Array]:
-    """Terms and force, whitened: each minus its prediction from the earlier intervals, divided by its standard
-    deviation.
+    """Return the terms and the force with the slope and camber of the road filtered out.
 
-    Slope and camber of the road look like another level for some hundred metres. Neighbouring intervals share these
-    errors, and a plain regression would treat the road's slope during braking as forward. The innovations of a filter
-    that follows the road (a first-order Gauss-Markov process in distance) are uncorrelated: their sums are those of
-    generalized least squares.
+    For some hundred metres, slope and camber look like another level. Neighbouring intervals share this error, and a
+    plain regression would treat the road's slope during braking as forward. So a filter follows the road, modelled as
+    a first-order Gauss-Markov process in distance. It predicts each value from the earlier intervals. The values
+    returned are the differences from the prediction, divided by their standard deviation. They are uncorrelated, so a
+    plain regression of them is a generalized least squares fit.
     """
     rows = np.hstack((log.terms, log.force))
     driven = log.speed * np.diff(log.t_s, prepend=log.t_s[0])
@@ -197,26 +235,43 @@ def _without_road(log: Intervals) -> tuple[Array, Array]:
 
 
 def sway_deg(sway: Array, frame: Array) -> Array:
-    """(k) the direction of the largest sway, degrees from forward towards left, -90 to 90. sway (k, 3, 3), frame (3,
-    3)."""
+    """Compute the horizontal direction of the largest sway, shape (k), in degrees.
+
+    The direction counts from forward towards left, from -90 to 90.
+
+    sway: Covariances in the sensor's axes, shape (k, 3, 3).
+    frame: Rotation from sensor to vehicle axes, shape (3, 3).
+    """
     level = frame[[0, 2]] @ sway @ frame[[0, 2]].T
     return np.degrees(0.5 * np.arctan2(2.0 * level[..., 0, 1], level[..., 1, 1] - level[..., 0, 0]))
 
 
 def _sway(log: Log) -> Array:
-    """(samples, 3) the changes of force that take some tenths of a second, g."""
+    """Return the changes of force that take some tenths of a second, shape (samples, 3), in g."""
     step_s = float(np.median(np.diff(log.t_s)))
     quick, slow = (moving_mean(log.accel_g, round(width_s / step_s)) for width_s in SWAY_S)
     return quick - slow
 
 
 def _integrals(columns: Iterable[Array], t_s: Array, step: Array, time: Array) -> Array:
-    """(len(time), k): the integral of each of k columns (n) until these times. Column by column, to limit memory."""
+    """Integrate each column of samples from the log's beginning until the times `time`.
+
+    Works column by column, to limit memory.
+
+    Args:
+        columns: k columns with one value per sample, shape (n) each.
+        t_s: Time of each sample, shape (n), in s.
+        step: Time since the previous sample, shape (n), in s. 0 after a gap.
+        time: The end times, in s.
+
+    Returns:
+        The integrals, shape (len(time), k).
+    """
     return np.array([np.interp(time, t_s, np.cumsum(column * step)) for column in columns]).T
 
 
 def _thinned(time: Array, speed: Array) -> tuple[Array, Array]:
-    """The speeds, thinned to at most one per INTERVAL_S."""
+    """Keep at most one speed per INTERVAL_S. Returns the times and the speeds that are kept."""
     kept, last = [], -np.inf
     for k, now in enumerate(time.tolist()):
         if now - last >= INTERVAL_S:
@@ -226,7 +281,7 @@ def _thinned(time: Array, speed: Array) -> tuple[Array, Array]:
 
 
 def _local_up(middle: Array, force: Array, length: Array) -> Array:
-    """(n, 3) unit vectors: the mean force of the LEVEL_S around each interval."""
+    """Return the direction of the mean force during the LEVEL_S around each interval: unit vectors, shape (n, 3)."""
     sums = np.vstack((np.zeros(3), np.cumsum(force * length[:, None], axis=0)))
     first = np.searchsorted(middle, middle - LEVEL_S / 2.0)
     last = np.searchsorted(middle, middle + LEVEL_S / 2.0, side="right")

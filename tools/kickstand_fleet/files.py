@@ -17,13 +17,16 @@ from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.logs.source import open_input
 
-MOST_BYTES = 300_000_000  # largest (packed) log in a store: ten hours at 200 Hz have 150 million
-_LONGEST = 100  # longest name in bytes; a file system takes 255, including the ending and a temporary name
+MOST_BYTES = 300_000_000  # largest packed log in a store, in bytes. Ten hours at 200 Hz need 150 million bytes
+# Longest encoded name, in bytes. A file system allows 255, and the ending and the temporary file's prefix need some
+_LONGEST = 100
 
 
 def file_stem(readable: str, *exact: str) -> str:
-    """A unique file name without ending: `readable`, changed where a file system would not take it, and a hash of
-    `exact`. It is the same in every run.
+    """A unique file name without its ending, which is the same in every run.
+
+    readable: Text that begins the name. Characters that a file system does not allow are encoded.
+    exact: Texts that identify the file. The name ends with a hash of them.
 
     >>> file_stem(".bus 12", "bus 12", "front")
     'bus%2012-e9a9b5c8f0'
@@ -41,7 +44,7 @@ def folder_value(value: str) -> str:
 
 
 def printable(text: str) -> str:
-    """text with the bytes that are not UTF-8 (in a file's name) replaced by their codes."""
+    """Return text with each byte that is not UTF-8 replaced by its code. Such bytes occur in names of files."""
     return text.encode("utf-8", "backslashreplace").decode()
 
 
@@ -63,7 +66,7 @@ def is_remote(path: str) -> bool:
 
 
 def join(base: str, path: str) -> str:
-    """path as seen from the directory base."""
+    """Return the path, relative to the directory base unless it is absolute or remote."""
     if is_remote(path) or Path(path).is_absolute():
         return path
     return f"{base.rstrip('/')}/{path}" if base else path
@@ -94,16 +97,17 @@ def read_all(paths: list[str]) -> list[bytes]:
 
 
 def matches(pattern: str) -> list[str]:
-    """The files that match a pattern with * ? [ ], sorted; ** matches any number of directories."""
+    """The files that match a pattern with * ? [ ], sorted. ** matches any number of directories."""
     with _in_store(pattern, "read") as (fs, place):
         found = sorted(str(path) for path in fs.glob(place))
         return [fs.unstrip_protocol(path) for path in found] if is_remote(pattern) else found
 
 
 def identities(paths: Iterable[str]) -> dict[str, str]:
-    """For each path a mark that changes with the file: its ETag, or its size and time; "" without a file.
+    """For each path, a mark that changes when the file changes.
 
-    Each remote directory is listed once.
+    The mark consists of the file's size and its time, or in a store its ETag if it has one. The mark is "" if there is
+    no such file. Each remote directory is listed only once.
     """
     known: dict[str, str] = {}
     directories: dict[str, dict[str, str]] = {}
@@ -140,8 +144,10 @@ class _Named(io.BytesIO):
 
 
 def listed(parent: str) -> dict[str, str]:
-    """For each file in a directory of a store, by path, a mark that changes with the file (see identities()). Empty if
-    the directory does not exist. Raises InputError."""
+    """List a directory of a store, as {path: mark}. A mark changes when the file changes (see identities()).
+
+    The result is empty if the directory does not exist. Raises InputError if it cannot be read.
+    """
     marks: dict[str, str] = {}
     with _in_store(parent, "read") as (fs, place), contextlib.suppress(FileNotFoundError):
         fs.invalidate_cache(place)
@@ -153,8 +159,12 @@ def listed(parent: str) -> dict[str, str]:
 
 @contextlib.contextmanager
 def _in_store(path: str, what: str) -> Iterator[tuple[Any, str]]:
-    """A context with (file system, path in it) of a remote path. It turns any error of the libraries into an
-    InputError."""
+    """A context that yields the file system of a remote path, and the path within that file system.
+
+    It turns any error of the libraries into an InputError.
+
+    path: the remote path. what: the past participle of the attempted action, for the message.
+    """
     try:
         yield _system(path)
     except InputError:
@@ -180,7 +190,7 @@ def _system(path: str):
 
 
 def write_bytes(path: str, content: bytes) -> None:
-    """Write a file, whole or not at all, and the directories for it. Raises InputError."""
+    """Write a file completely or not at all. Create its directory if needed. Raises InputError."""
     if is_remote(path):
         with _in_store(path, "written") as (fs, place):
             fs.pipe_file(place, content)
@@ -196,8 +206,10 @@ def write_bytes(path: str, content: bytes) -> None:
 
 @contextlib.contextmanager
 def to_write(path: str) -> Iterator[Path]:
-    """A context with a temporary path to write to. At its end the file is moved to `path`, whole or not at all. Raises
-    InputError."""
+    """A context that yields a temporary path to write to. At its end the complete file is moved to `path`.
+
+    Raises InputError if the file cannot be written.
+    """
     if not is_remote(path):
         with whole_file(Path(path)) as temporary:
             yield temporary

@@ -1,9 +1,9 @@
-"""Computes forward from all braking and all bends of a mount's logs, with its standard error.
+"""Computes forward, with its standard error, from all braking and all bends in the logs of one mount.
 
-The device keeps eight regression blocks, in which the slope of the road during braking looks like forward. Whole logs
-let us filter out the road (see evidence.py). On simulated buses, which brake gently and seldom, this halves the error.
-On recorded drives sometimes one and sometimes the other method is better. If the device has an alignment, forward is
-the mean of both, weighted by their variances. Up is always the device's.
+The firmware's regression cannot separate the slope of the road during braking from an error of forward. From whole
+logs the slope can be filtered out (see evidence.py). This halves the error on simulated buses, which brake gently and
+seldom. On recorded drives, sometimes this method is better and sometimes the firmware's. If the firmware finds an
+alignment, forward is the mean of both results, weighted by their variances. Up is then always the firmware's.
 """
 
 from dataclasses import dataclass
@@ -17,18 +17,24 @@ from . import evidence
 from .evidence import Intervals
 
 SENSOR_DEG = 0.3  # standard deviation of forward caused by scale errors of 1 % between the sensor's axes
-CORRELATION = 0.5  # between the errors of both methods: they use the same braking
-APART_SIGMAS = 2.0  # above this difference of the two methods, forward's standard error grows
-# The arm is left out: it only helps to compare parts of a drive. Over a whole drive it absorbs other effects too: with
-# it, one of three recorded drives was 2 degrees off; without it, none was off by more than 0.6.
+CORRELATION = 0.5  # correlation between the errors of the two methods, which use the same braking
+APART_SIGMAS = 2.0  # if the two methods differ by more standard deviations, the standard error of forward grows
+# Number of terms of evidence.py that are used: level, forward and left. The arm only helps to compare parts of a drive.
+# Over a whole drive it absorbs other effects too. With the arm, forward was 2 degrees off in one of three recorded
+# drives. Without the arm, it was at most 0.6 degrees off.
 _TERMS = 3
 _LEAST_BLOCKS = 4
 
 
 @dataclass
 class Forward:
-    """frame (3, 3): vehicle from sensor, rows left, up, forward. sigma_deg: standard error of forward about up;
-    attitude_deg: of the whole rotation. halves_deg: difference of forward between two halves of the driving."""
+    """The alignment of a mount.
+
+    frame: Rotation from sensor to vehicle axes, shape (3, 3). Its rows are left, up, forward.
+    sigma_deg: Standard error of forward about up.
+    attitude_deg: Standard error of the whole rotation.
+    halves_deg: Angle between the forwards of the two halves of the driving.
+    """
 
     frame: Array
     sigma_deg: float
@@ -37,13 +43,16 @@ class Forward:
 
     @property
     def sure(self) -> bool:
-        """True if forward is within the limits that the device has."""
+        """True if the errors of forward are within the firmware's limits."""
         return self.sigma_deg <= READY_DEG and abs(self.halves_deg) <= AGREE_DEG
 
 
 def find_forward(logs: list[Intervals], device: DriveFit | None = None) -> Forward | None:
-    """The alignment by these logs (the intervals of each); None if they do not determine it. device: the firmware's
-    alignment by the same logs, None if it has none."""
+    """Compute the alignment from all logs. Returns None if the logs do not determine it.
+
+    logs: The intervals of each log.
+    device: The firmware's alignment from the same logs, or None if the firmware refuses them.
+    """
     whole = evidence.blocks(logs)
     count = len(whole.log)
     if count < _LEAST_BLOCKS:
@@ -56,7 +65,8 @@ def find_forward(logs: list[Intervals], device: DriveFit | None = None) -> Forwa
     frame = frame_of(slice(None))
     others = evidence.frames(*evidence.fits(np.sum(square, axis=0) - square, np.sum(product, axis=0) - product))
     off = np.degrees(rotation_vector(others @ frame.T))
-    pitch, yaw, roll = (count - 1) / count * np.sum(off * off, axis=0)  # the jackknife: each block left out in turn
+    # The jackknife: the variance of the results without each block in turn
+    pitch, yaw, roll = (count - 1) / count * np.sum(off * off, axis=0)
     variance = float(yaw) + SENSOR_DEG**2
     apart = float(_yaw_deg(frame_of(slice(count // 2, None)), frame_of(slice(count // 2))))
     if device is not None:
@@ -66,7 +76,18 @@ def find_forward(logs: list[Intervals], device: DriveFit | None = None) -> Forwa
 
 
 def _mean(frame: Array, variance: float, device: Array, quality_deg: float) -> tuple[Array, float]:
-    """Up of the device, the weighted mean of both forwards, and its variance (deg^2)."""
+    """Merge this module's alignment with the firmware's.
+
+    Args:
+        frame: This module's alignment, shape (3, 3).
+        variance: Variance of its forward, in deg^2.
+        device: The firmware's alignment, shape (3, 3).
+        quality_deg: Standard error of its forward, in degrees.
+
+    Returns:
+        The merged alignment, shape (3, 3), with the firmware's up and the weighted mean of both forwards.
+        The variance of the mean, in deg^2.
+    """
     other = quality_deg**2 + SENSOR_DEG**2
     share = variance / (variance + other)
     common = CORRELATION * float(np.sqrt(variance * other))
@@ -77,5 +98,5 @@ def _mean(frame: Array, variance: float, device: Array, quality_deg: float) -> t
 
 
 def _yaw_deg(frames: Array, before: Array) -> Array:
-    """The angle about up between the forwards of frames and of `before`."""
+    """The angle about up from the alignment `before` to each of frames, in degrees."""
     return np.degrees(rotation_vector(frames @ before.T)[..., 1])

@@ -1,8 +1,8 @@
-"""Saves each result at once: a run that was stopped, or whose disk was full, can be resumed.
+"""Saves each result as soon as it is computed. So a run can be resumed after it was stopped or its disk was full.
 
-In a directory on this computer the journal is one file with a line of JSON per result. In a store such as S3, whose
-files cannot grow, it is one file per result. Each result has a check sum. Cut or damaged lines (power loss, full disk)
-are dropped when the journal is opened again, and their results are recomputed.
+In a directory on this computer, the journal is one file with a line of JSON per result. In a store such as S3 files
+cannot grow, so there is one file per result. Each result has a check sum. A power loss or a full disk can leave lines
+that are cut or damaged. They are dropped when the journal is opened again, and their results are recomputed.
 """
 
 import contextlib
@@ -19,15 +19,17 @@ from kickstand_tools.common.errors import InputError, cause
 from . import KEPT, files
 from .period import PeriodResult
 
-_AT_ONCE = 200  # results that are fetched from a store together
-_LONGEST = 1 << 26  # longest line in bytes, 100 times the line of a thousand logs
+_AT_ONCE = 200  # number of results that are fetched from a store together
+_LONGEST = 1 << 26  # longest line, in bytes: 100 times the line for a mount with a thousand logs
 
 
 class Journal:
-    """with Journal(path) as journal: journal.add(key, result); key in journal; journal.results(keys).
+    """The results of a run in a file, used as a context: `with Journal(path) as journal`.
 
-    key: identifies the logs and the options of a result. Memory only holds the position of each result in the file;
-    results() reads the file again. damaged: number of lines that could not be used.
+    A key identifies the logs and the options of a result. `key in journal` is true if the journal has its final result.
+    Memory holds only the position of each result in the file. results() reads the results from the file again.
+
+    damaged: number of lines that could not be used.
     """
 
     def __init__(self, path: Path) -> None:
@@ -44,7 +46,8 @@ class Journal:
                 if not self._note(line) and line.strip():
                     self.damaged += 1
                     self._file.seek(self._end)
-                    self._file.write(b" " * (len(line) - 1) + b"\n")  # count a damaged line only once
+                    # Overwrite the damaged line with blanks, so the next run does not count it again
+                    self._file.write(b" " * (len(line) - 1) + b"\n")
                 self._end += len(line)
             self._file.flush()
         except OSError as error:
@@ -52,7 +55,7 @@ class Journal:
         return self
 
     def _open(self) -> None:
-        """Open the file and lock it. Repeat this if an earlier run has removed the file meanwhile."""
+        """Open the file and lock it. Open it again if another run has removed it between the two steps."""
         while True:
             self._file = open(os.open(self._path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666), "r+b")
             self._lock()
@@ -62,7 +65,7 @@ class Journal:
             self._file.close()
 
     def _lock(self) -> None:
-        """Lock the file against a second run. Raises InputError."""
+        """Lock the file. Raises InputError if another run has locked it."""
         with contextlib.suppress(ImportError):  # Windows
             import fcntl
 
@@ -74,7 +77,7 @@ class Journal:
 
     def __exit__(self, *exception: object) -> None:
         with contextlib.suppress(OSError):
-            if not self._end and os.name != "nt":  # remove it while it is still locked
+            if not self._end and os.name != "nt":  # remove an empty file while it is still locked
                 self._path.unlink()
         with contextlib.suppress(OSError):
             self._file.close()
@@ -86,7 +89,10 @@ class Journal:
         return key in self._places and key not in self._again
 
     def add(self, key: str, result: PeriodResult, again: bool = False) -> None:
-        """Save a result. again: the next run should recompute it. Raises InputError; earlier results stay."""
+        """Save a result. again: True if the next run should recompute it.
+
+        Raises InputError if the result cannot be written. Earlier results stay in the file.
+        """
         line = _line(key, result, again) + b"\n"
         try:
             self._file.seek(self._end)
@@ -107,7 +113,7 @@ class Journal:
             raise self._write_error(error) from error
 
     def results(self, keys: Iterable[str]) -> Iterator[PeriodResult]:
-        """The latest result of each of these keys that has one."""
+        """Yield the latest result of each of these keys. Keys without a result are skipped."""
         with open(self._path, "rb") as file:
             for key in keys:
                 if key in self._places:
@@ -119,7 +125,7 @@ class Journal:
         return InputError(f"{self._path} cannot be written: {cause(error)}; {KEPT}")
 
     def _note(self, line: bytes) -> bool:
-        """Note the place of a line's result; return False for a damaged line."""
+        """Note the position of a line's result. Returns False for a damaged line."""
         if not (line.endswith(b"\n") and (entry := _entry(line))):
             return False
         key, again, _ = entry
@@ -129,8 +135,11 @@ class Journal:
 
 
 class StoreJournal:
-    """A Journal in a directory of a store. KEY.json is final; KEY.again.json should be recomputed. All files are read
-    when the journal is opened. Damaged ones are recomputed."""
+    """A journal with the methods of Journal, in a directory of a store.
+
+    KEY.json holds a final result, and KEY.again.json one that the next run should recompute. All files are read when
+    the journal is opened. Damaged results are recomputed.
+    """
 
     def __init__(self, directory: str) -> None:
         self._directory = directory
@@ -182,7 +191,7 @@ def _line(key: str, result: PeriodResult, again: bool) -> bytes:
 
 
 def _entry(line: bytes) -> tuple[str, bool, PeriodResult] | None:
-    """Return (key, again, result) of a line, or None for a damaged line."""
+    """Parse a line of the journal. Returns (key, again, result), or None for a damaged line."""
     try:
         entry = json.loads(line)
         sum_then = entry.pop("crc32")

@@ -1,4 +1,4 @@
-"""Assigns logs to vehicles, by MANIFEST.csv or by a pattern of paths."""
+"""Assigns logs to vehicles, from MANIFEST.csv or from a pattern of paths."""
 
 import csv
 import io
@@ -17,10 +17,12 @@ _MOST_BYTES = 100_000_000  # largest manifest: a million logs
 
 @dataclass(frozen=True)
 class Period:
-    """Logs of one vehicle, in chronological order, in which the sensor should have had the same alignment.
+    """The logs of one vehicle during which the sensor should have kept the same alignment.
 
-    kind: "motorcycle" or "car" (anything that does not lean). mount: name of the mounting, "" if the vehicle has only
-    one. paths: the logs' paths, as fsspec takes them.
+    vehicle: Name of the vehicle.
+    mount: Name of this mounting of the sensor, "" if the vehicle has only one.
+    kind: "motorcycle", or "car" for anything that does not lean.
+    paths: Paths of the logs for fsspec, in chronological order.
     """
 
     vehicle: str
@@ -30,10 +32,10 @@ class Period:
 
 
 def read_manifest(path: str) -> list[Period]:
-    """The periods of a manifest: CSV with the columns vehicle,path,kind and optionally mount.
+    """Read the periods of a manifest, a CSV file with the columns vehicle,path,kind and optionally mount.
 
-    Rows of the same vehicle and mount form one period. Paths are relative to the manifest's directory and may be
-    patterns (logs/*.csv.gz). Raises InputError naming the line.
+    Rows with the same vehicle and mount form one period. Paths are relative to the manifest's directory and may be
+    patterns such as logs/*.csv.gz. Raises InputError, which names the wrong line.
 
     >>> import tempfile
     >>> with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
@@ -55,7 +57,7 @@ def read_manifest(path: str) -> list[Period]:
     base = path.rpartition("/")[0] if "/" in path else ""
     base = "/" if path.startswith("/") and not base else base
     kinds: dict[tuple[str, str], str] = {}
-    logs: dict[tuple[str, str], dict[str, None]] = {}  # in order
+    logs: dict[tuple[str, str], dict[str, None]] = {}  # a dictionary keeps the order of the logs
     for line, row in enumerate(rows, 2):
         if not any(row):
             continue
@@ -81,7 +83,9 @@ def read_manifest(path: str) -> list[Period]:
 
 
 def by_pattern(pattern: str, kind: str = CAR) -> list[Period]:
-    """One period per file that the pattern matches: a separate vehicle, named by its path. Raises InputError.
+    """Return one period for each file that the pattern matches. Each file is a separate vehicle, named by its path.
+
+    Raises InputError if no file matches.
 
     >>> import tempfile
     >>> with tempfile.NamedTemporaryFile(suffix=".csv") as file:
@@ -100,5 +104,5 @@ def is_pattern(path: str) -> bool:
 
 
 def _found(path: str) -> list[str]:
-    """The files that match a pattern; the path itself if none does: the run then reports it as missing."""
+    """Return the files that match a pattern. If none matches, return the path itself: the run reports it as missing."""
     return (files.matches(path) or [path]) if is_pattern(path) else [path]

@@ -1,11 +1,14 @@
 """Finds mounts that rotated by a few degrees or more, between two logs or during one.
 
 The firmware only refuses a drive if the mount surely moved, by some 7 to 30 degrees. This module checks every moment in
-all logs of a mount: it compares the alignment before that moment with the alignment after it. A rotation that tilts the
-sensor shows in
-gravity. A rotation about the vertical shows only in braking, in bends, and in the direction in which the vehicle sways
-on its springs, which needs neither. The variance comes from a jackknife over blocks of some seconds. Errors that last
-longer are added: slopes of a road and, from one log to another, load and temperature.
+all logs of a mount. It compares the alignment before that moment with the alignment after it.
+
+A rotation that tilts the sensor shows in gravity. A rotation about the vertical shows only in three things: in braking,
+in bends, and in the direction in which the vehicle sways on its springs. The sway also shows on a straight road without
+braking.
+
+The variance of a rotation comes from a jackknife over blocks of some seconds. The variances of errors that last longer
+are added: slopes of a road and, from one log to another, load and temperature.
 """
 
 from dataclasses import dataclass
@@ -16,34 +19,42 @@ from kickstand_tools.signals import Array, rotation_vector
 from . import evidence
 from .evidence import Blocks, Intervals, blocks, fits, frames
 
-LEAST_DEG = 3.2  # least rotation that is reported: roads, load and temperature can cause smaller ones
-# Least number of standard deviations: between two logs, and within one, where there are many moments to choose from
+LEAST_DEG = 3.2  # smallest rotation that is reported. Roads, load and temperature can cause smaller ones
+# A rotation is reported if it exceeds this number of standard deviations. The limit is higher within a log than between
+# two logs, because a log has many moments, and one of them may exceed a low limit by chance
 BETWEEN_SIGMAS, WITHIN_SIGMAS = 3.3, 4.3
-SUDDEN_SIGMAS = 3.8  # within a log, where the vertical jumps at that moment
-SUSPECTED_SHARE = 0.7  # factor on these limits if the firmware suspects the mount, too
-# Errors that last on each side of the comparison, 1 sigma in degrees: pitch, yaw and roll (about left, up, forward),
-# during a log (ROAD_DEG) and from one log to another (OTHER_ROAD_DEG)
+SUDDEN_SIGMAS = 3.8  # the same limit within a log, for a moment at which the vertical jumps
+SUSPECTED_SHARE = 0.7  # these limits are multiplied by this if the firmware suspects that the mount moved
+# Standard deviations, in degrees, of errors that stay the same on one side of the comparison. The three values are
+# pitch, yaw and roll (about left, up and forward). ROAD_DEG is for two parts of one log, OTHER_ROAD_DEG for two logs
 ROAD_DEG = np.array([0.5, 0.25, 0.35])
 OTHER_ROAD_DEG = np.array([0.75, 0.7, 0.5])
-REACH = 75  # blocks on each side that are compared: ten minutes
+REACH = 75  # number of blocks that are compared on each side of a moment, ten minutes
 LEAST_BLOCKS = 7
-LEAST_VARIED = 0.2  # g^2 s: least variation by braking, speeding up and bends on each side, for a forward
-# If a few blocks happen to agree, the jackknife is too optimistic. So this is added to yaw, 1 sigma in degrees at 1 g^2
-# s
+LEAST_VARIED = 0.2  # g^2 s: least variation by braking, speeding up and bends that determines forward on one side
+# If a few blocks happen to agree, the jackknife is too optimistic. So the yaw gets an additional standard deviation.
+# This is its value, in degrees, at a variation of 1 g^2 s
 YAW_PRIOR_DEG = 0.4
-# The direction of sway: its change by roads on each side, 1 sigma in degrees. It is not used if its standard deviation
-# over both sides is above SWAY_WORST_DEG, or if it contradicts the braking by more than SWAY_SIGMAS
+# Roads change the direction of sway on each side, with the standard deviation SWAY_DEG. The direction is not used if
+# its standard deviation over both sides is above SWAY_WORST_DEG, or if it contradicts the braking by more than
+# SWAY_SIGMAS standard deviations
 SWAY_DEG, SWAY_WORST_DEG, SWAY_SIGMAS = 0.7, 5.0, 3.0
-SURELY_DEG = 8.0  # slopes of roads differ by less. Within a log, a smaller tilt must be sudden
-TILT_DEG = 2.2  # a rotation with less tilt is one about the vertical
-STEP_S, STEP_GAP_S = 8.0, 1.0  # a sudden tilt is measured from STEP_GAP_S to STEP_S on each side of the moment
-STEP_SHARE = 0.7  # share of the tilt that must be sudden
+SURELY_DEG = 8.0  # slopes of roads differ by less than this. Within a log, a smaller tilt must be sudden
+TILT_DEG = 2.2  # a rotation with less tilt counts as a rotation about the vertical
+# The vertical is compared before and after a moment. Each side begins STEP_GAP_S from the moment and lasts STEP_S
+STEP_S, STEP_GAP_S = 8.0, 1.0
+STEP_SHARE = 0.7  # a tilt is sudden if at least this share of it happens at one moment
 
 
 @dataclass
 class Move:
-    """A rotation of the mount. log: index of the log; at_s: seconds from its beginning, None if before it. turn_deg
-    (3): rotation vector along the vehicle's left, up and forward; sigma_deg (3): its standard deviations."""
+    """A rotation of the mount.
+
+    log: Index of the log in which the mount rotated, or of the first log after the rotation.
+    at_s: Time of the rotation from the beginning of that log. None if the mount rotated before that log.
+    turn_deg: Rotation vector along the vehicle's left, up and forward, shape (3).
+    sigma_deg: Standard deviations of turn_deg, shape (3).
+    """
 
     log: int
     at_s: float | None
@@ -70,8 +81,11 @@ class Move:
 
 
 def find_moves(logs: list[Intervals], suspected: bool = False) -> list[Move]:
-    """Find the rotations of the mount, in chronological order. logs: the intervals of each log. suspected: True if the
-    firmware found parts of the drive that differ."""
+    """Find the rotations of the mount, in chronological order.
+
+    logs: The intervals of each log.
+    suspected: True if the firmware found that two parts of the drive differ.
+    """
     return _search(logs, blocks(logs), SUSPECTED_SHARE if suspected else 1.0)
 
 
@@ -89,7 +103,8 @@ def _search(logs: list[Intervals], whole: Blocks, share: float) -> list[Move]:
         score = move.sigmas / share / (BETWEEN_SIGMAS if between else SUDDEN_SIGMAS if tilted else WITHIN_SIGMAS)
         if move.angle_deg < LEAST_DEG or score < 1.0 or (best and score <= best[0]):
             continue
-        # a slope of the road does not change yaw
+        # A slope of the road can look like a tilt, but does not change yaw. So a tilt without a change of yaw must be
+        # sudden
         if not between and tilted and abs(turn[1]) < WITHIN_SIGMAS * sigma[1]:
             moment = _moment_of_jump(logs[move.log], move)
             if moment is None:
@@ -103,17 +118,25 @@ def _search(logs: list[Intervals], whole: Blocks, share: float) -> list[Move]:
 
 
 def _sides(whole: Blocks, at: int, between: bool) -> tuple[Blocks, Blocks]:
-    """The blocks before and after block number `at`: of all logs around if `between` logs, else of this log alone."""
+    """Return the blocks before and after block number `at`.
+
+    between: True if the block is the first of a log. Then the blocks may be of any log, otherwise only of this log.
+    """
     if between:
         return whole.part(slice(max(0, at - REACH), at)), whole.part(slice(at, at + REACH))
     first, last = np.searchsorted(whole.log, [whole.log[at], whole.log[at] + 1])
-    # the block in which the rotation happens is on neither side
+    # The block in which the rotation happens is left out on both sides
     return whole.part(slice(max(first, at - REACH), at)), whole.part(slice(at + 1, min(last, at + 1 + REACH)))
 
 
 def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
-    """The mount's rotation from `before` to `after`, and its standard deviations (3 each, degrees along left, up,
-    forward). None if one of them does not determine an alignment."""
+    """Measure by how much the mount rotated between two groups of blocks.
+
+    Returns:
+        The rotation vector along left, up and forward, shape (3), in degrees.
+        Its standard deviations, shape (3), in degrees.
+        Or None, if one of the groups does not determine an alignment.
+    """
     if min(len(before.log), len(after.log)) < LEAST_BLOCKS:
         return None
     one, other = _align_part(before), _align_part(after)
@@ -122,8 +145,8 @@ def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
     turn = np.degrees(rotation_vector(other.frame @ one.frame.T))
     road = ROAD_DEG if before.log[-1] == after.log[0] else OTHER_ROAD_DEG
     variance = one.variance + other.variance + 2.0 * road**2
-    # The direction of the sway is an independent measurement of yaw: if the two frames differ by an error of yaw, the
-    # sway seems to turn by that error
+    # The direction of the sway is an independent measurement of yaw. If the two alignments differ by an error of yaw,
+    # the sway seems to turn by that error
     swayed = one.sway_variance + other.sway_variance + 2.0 * SWAY_DEG**2
     error = (other.sway_deg - one.sway_deg + 90.0) % 180.0 - 90.0
     if swayed < SWAY_WORST_DEG**2 and error**2 < SWAY_SIGMAS**2 * (swayed + variance[1]):
@@ -134,7 +157,13 @@ def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
 
 @dataclass
 class _PartAlignment:
-    """The alignment on one side: frame (3, 3), its variance (3, degrees^2), and the direction of the sway in it."""
+    """The alignment on one side of a comparison.
+
+    frame: Rotation from sensor to vehicle axes, shape (3, 3).
+    variance: Variances of pitch, yaw and roll, shape (3), in degrees^2.
+    sway_deg: Direction of the sway, in degrees from forward.
+    sway_variance: Variance of sway_deg, in degrees^2. Infinite without sway.
+    """
 
     frame: Array
     variance: Array
@@ -143,7 +172,10 @@ class _PartAlignment:
 
 
 def _align_part(part: Blocks) -> _PartAlignment | None:
-    """The alignment by some blocks, with its variance by the jackknife; None if they do not determine it."""
+    """Compute the alignment from some blocks, with its variance from the jackknife.
+
+    Returns None if the blocks do not determine an alignment.
+    """
     square, product = np.sum(part.square, axis=0), np.sum(part.product, axis=0)
     found, varied = fits(square, product)
     if np.sum(varied) < LEAST_VARIED:
@@ -161,8 +193,10 @@ def _align_part(part: Blocks) -> _PartAlignment | None:
 
 
 def _moment_of_jump(log: Intervals, move: Move) -> float | None:
-    """The time in the log, s, at which the vertical jumped. None if it did not: then the cause may be a slope of the
-    road."""
+    """Find the time in the log at which the vertical jumped, in s.
+
+    Returns None if the vertical did not jump, because then a slope of the road may have caused the tilt.
+    """
     tilt = move.tilt_deg
     if move.at_s is None:
         return None
@@ -172,9 +206,9 @@ def _moment_of_jump(log: Intervals, move: Move) -> float | None:
     if np.count_nonzero(near) < 10:
         return None
     found, varied = fits(terms[near].T @ terms[near], terms[near].T @ force[near])
-    level = (force - terms[:, 1:] @ found[1:]) / terms[:, :1]  # the vertical: the force without the part by driving
+    level = (force - terms[:, 1:] @ found[1:]) / terms[:, :1]  # the vertical is the force without the part from driving
     left, _, forward = frames(found, varied)
-    tips = (left * move.turn_deg[2] - forward * move.turn_deg[0]) / tilt  # the direction in which up moves
+    tips = (left * move.turn_deg[2] - forward * move.turn_deg[0]) / tilt  # unit vector in which the vertical moves
     best, moment = 0.0, move.at_s
     for now in time[np.abs(time - move.at_s) < 2.5 * STEP_S]:
         early = (time > now - STEP_GAP_S - STEP_S) & (time < now - STEP_GAP_S)

@@ -31,22 +31,25 @@ from .moved import Move, find_moves
 
 UNREADABLE, CHANGED, NO_MEMORY, FAULT = "unreadable", "changed", "no-memory", "fault"
 NO_SPEED, MOVED = "no-speed", "mount-moved"
-# AFTERWARDS: the vehicle is aligned, but brake tests or signals of this log are missing. DISK_FULL: no space for
-# signals
+# AFTERWARDS means that the vehicle is aligned, but brake tests or signals of this log are missing. DISK_FULL means that
+# the disk has no space for the signals
 AFTERWARDS, DISK_FULL = "not-finished", "disk-full"
-# Notices about parts of a log that are not used, or of a sensor that is ill
+# Notices about parts of a log that are not used, and about a faulty sensor
 _REPORTED = (CutLine, CutGzip, NulEnd, FrozenReadings, AxisDead, GyroSaturated, AccelClipped)
-_SUSPECTS = (MOVED, "parts-differ", "uncertain")  # refusals of the firmware after which moves are searched
-_PLOTTED = 160  # intervals in a picture
-_AGAINST = -0.5  # evidence.handedness() below this, the gyro or the axes are mirrored
+_SUSPECTS = (MOVED, "parts-differ", "uncertain")  # moves of the mount are searched after these refusals of the firmware
+_PLOTTED = 160  # largest number of intervals in a picture
+_AGAINST = -0.5  # if evidence.handedness() is below this, the gyro or the axes are mirrored
 
 Row = dict[str, Any]
 
 
 @dataclass
 class PeriodResult:
-    """The rows of one mount of one vehicle in tables.TABLES, and the points of its picture. A point is an interval's
-    change of speed, force forward, centripetal acceleration and force to the left (4, g)."""
+    """The rows of one mount of one vehicle in tables.TABLES, and the points of its picture.
+
+    A point of the picture has four numbers of an interval, in g: change of speed, force forward, centripetal
+    acceleration, force to the left.
+    """
 
     alignment: Row
     moved: list[Row] = field(default_factory=list)
@@ -58,9 +61,10 @@ class PeriodResult:
 def work_on_period(period: Period, signals_to: str | None = None) -> PeriodResult:
     """Align a period of a manifest, find where its mount moved, and measure its brake tests.
 
-    signals_to: a directory for each log's accelerations along the vehicle's axes, None for none. Problems of the data
-    are part of the result: a log that cannot be used adds a row of errors. If no log is left, the status is "error" or
-    "refused". Raises nothing, because one vehicle must not stop a fleet.
+    signals_to: directory for each log's accelerations along the vehicle's axes. None writes no accelerations.
+
+    Problems of the data are part of the result. Each log that cannot be used adds a row to the errors. If no log is
+    left, the status is "error" or "refused". This function raises nothing, because one vehicle must not stop a fleet.
 
     >>> found = work_on_period(Period("bus 12", "", "car", ("no-such-file.csv",)))
     >>> found.alignment["status"], found.errors[0]["message"]
@@ -72,21 +76,21 @@ def work_on_period(period: Period, signals_to: str | None = None) -> PeriodResul
         return failed(period, NO_MEMORY, "its logs take more memory than there is")
     except OSError as error:
         return failed(period, UNREADABLE, cause(error))
-    except Exception as error:  # a bug in Kickstand: it must not affect other vehicles
+    except Exception as error:  # a bug in Kickstand must not affect other vehicles
         where = traceback.extract_tb(error.__traceback__)[-1]
         message = f"{type(error).__name__}: {error} ({Path(where.filename).name}, line {where.lineno})"
         return failed(period, FAULT, message)
 
 
 def _printable(result: PeriodResult) -> PeriodResult:
-    """The result with names that are not UTF-8 made printable: tables and pages cannot hold them."""
+    """Make names that are not UTF-8 printable, because tables and pages cannot hold them. Returns the same result."""
     for row in chain([result.alignment], result.moved, result.brake_tests, result.errors):
         row |= {key: files.printable(value) for key, value in row.items() if isinstance(value, str)}
     return result
 
 
 def failed(period: Period, reason: str, message: str) -> PeriodResult:
-    """The result for a period whose task failed."""
+    """Return the result for a period whose task failed, with the reason as a code and the message in words."""
     message = files.printable(message)
     row = _alignment(period, "error", reason, message, [], len(period.paths))
     return PeriodResult(row, errors=[_error(period, "", reason, message)])
@@ -123,8 +127,13 @@ def _result(period: Period, signals_to: str | None) -> PeriodResult:
 
 @dataclass
 class _Drive:
-    """The alignment by the logs of a period: the firmware's own and, if needed, the intervals, the moves of the mount,
-    and forward from all logs."""
+    """The alignment from the logs of a period.
+
+    fit: Alignment by the firmware's method.
+    intervals: Intervals of each log. Empty if the firmware refused the logs for a reason that no other method can mend.
+    moves: Moves of the mount.
+    found: Alignment from all logs, or None if they do not determine it.
+    """
 
     fit: DriveFit
     intervals: list[evidence.Intervals] = field(default_factory=list)
@@ -142,7 +151,7 @@ def _drive(period: Period, logs: list[Log]) -> _Drive:
 
 
 def _refusal(drive: _Drive, logs: list[Log]) -> tuple[str, str]:
-    """The reason for no alignment: code and sentence. Two empty texts if there is an alignment."""
+    """Return the reason why the vehicle is not aligned, as a code and a sentence. Both are empty if it is aligned."""
     fit, found = drive.fit, drive.found
     if drive.moves:
         return MOVED, _moved_words(drive.moves, logs)
@@ -150,7 +159,7 @@ def _refusal(drive: _Drive, logs: list[Log]) -> tuple[str, str]:
     if _mirrored(drive.intervals):
         reason = LeftHanded()
     elif fit.reason == MOVED:
-        late = fit_problem(fit.lag_s or 0.0, 1.0)  # with a late speed, braking looks like a stop on another slope
+        late = fit_problem(fit.lag_s or 0.0, 1.0)  # a late speed makes braking look like a moved mount
         reason = of_firmware(late) if late else None
     elif found and found.sure:
         return "", ""
@@ -181,7 +190,7 @@ def _error(period: Period, log: str, reason: str, message: str) -> Row:
 
 
 def _logs(period: Period) -> tuple[list[Log], list[Row]]:
-    """The logs that can be used, and a row of errors for each other log."""
+    """Read the logs. Returns the logs that can be used, and a row of errors for each of the others."""
     logs, errors = [], []
     for path in period.paths:
         reason = UNREADABLE
@@ -225,7 +234,7 @@ def _alignment(
 
 
 def _mirrored(driven: list[evidence.Intervals]) -> bool:
-    """True if the force in bends is on the opposite side to the one that the gyro's yaw rate requires."""
+    """True if the force in bends points to the opposite side of the one computed from the gyro's yaw rate."""
     whole = evidence.blocks(driven)
     if not len(whole.log):
         return False
@@ -267,12 +276,15 @@ def _stop_row(stop: Stop, log: Log) -> Row:
 
 
 def _utc_s(log: Log, at_s: float) -> float | None:
-    """Universal Time at at_s in the log; None if the log has none."""
+    """Return the Universal Time at at_s of the log, in s since 1970. None if the log has no Universal Time."""
     return None if log.start_utc_s is None else log.start_utc_s + at_s
 
 
 def _picture(drive: _Drive) -> list[list[float]]:
-    """The points of the picture (see PeriodResult). If the mount moved, the frame is a mean, and the points scatter."""
+    """Compute the points of the picture (see PeriodResult).
+
+    If the mount moved, the alignment is a mean over several mountings, so the points scatter.
+    """
     if not drive.found:
         return []
     used = [log.weight > 0.0 for log in drive.intervals]

@@ -1,5 +1,4 @@
-"""Processes a whole fleet: computes new results, and writes all results to a directory, during the run and at its
-end."""
+"""Processes a whole fleet: computes the missing results, and writes all results during the run and at its end."""
 
 import contextlib
 import hashlib
@@ -24,14 +23,20 @@ from .show.page import Glance
 RESULTS_VERSION = 4  # a new number makes all earlier results obsolete
 PLOTS, SIGNALS = "plots", "signals"
 TIMEOUT_S = 600.0  # longest time for one mount of one vehicle
-_WRITE_S, _SHARE = 15.0, 20.0  # s and multiple of the last writing's time until the tables are rewritten
+# During a run, the tables are rewritten at most once in _WRITE_S seconds. If writing them takes long, the pause is
+# _SHARE times as long as the last writing
+_WRITE_S, _SHARE = 15.0, 20.0
 
 
 @dataclass
 class FleetRun:
-    """vehicles: number of mounts of vehicles. new: number of mounts that this run computed. The others were finished
-    earlier. damaged: number of earlier results that could not be read and are recomputed. seen: a summary of all
-    results."""
+    """The numbers of a run.
+
+    vehicles: Number of results, one for each mount of each vehicle.
+    new: Number of results that this run computed. The others were computed earlier.
+    damaged: Number of earlier results that could not be read and are recomputed.
+    seen: Summary of all results.
+    """
 
     vehicles: int
     new: int
@@ -48,15 +53,24 @@ def run_fleet(
     timeout_s: float = TIMEOUT_S,
     progress: Callable[[int, int], None] | None = None,
 ) -> FleetRun:
-    """Work on all periods (see read_manifest), and write tables (see tables.TABLES), pictures and index.html to out, a
-    directory or a place in a store (s3://...).
+    """Process all periods, and write tables (see tables.TABLES), pictures and index.html.
 
-    scheduler: the address of a Dask cluster, None for workers on this computer: `workers`, or one per processor.
-    with_signals: also write each log's accelerations along the vehicle's axes, to out/signals. timeout_s: for one
-    period. progress: called with (done, all). Results of an earlier run into the same directory are reused if their
-    logs have not changed. Raises InputError; finished results are kept and shown even then.
+    Results of an earlier run into the same directory are reused if their logs have not changed.
 
-    A script must call it below `if __name__ == "__main__":`, because workers on this computer import the script.
+    Args:
+        periods: The periods of read_manifest() or by_pattern().
+        out: Directory, or address in a store (s3://...).
+        scheduler: Address of a Dask cluster. None starts workers on this computer.
+        workers: Number of workers on this computer. None starts one per processor.
+        with_signals: Also write each log's accelerations along the vehicle's axes to out/signals.
+        timeout_s: Longest time for one period.
+        progress: Function that is called with the number of finished periods and the number of all.
+
+    Raises:
+        InputError: If the run cannot continue. Finished results are kept, and written to the tables.
+
+    A script must call this function below `if __name__ == "__main__":`, because workers on this computer import the
+    script.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as directory:
@@ -71,7 +85,7 @@ def run_fleet(
             journal = opened.enter_context(StoreJournal(files.join(directory, "journal")))
         else:
             check_directory(Path(out))
-            directory = str(Path(out).resolve())  # workers may run elsewhere
+            directory = str(Path(out).resolve())  # workers may have another working directory
             opened.enter_context(new_directory(Path(directory) / PLOTS))
             journal = opened.enter_context(Journal(Path(directory) / "journal.jsonl"))
         marks = _marks(periods)
@@ -98,8 +112,8 @@ def run_fleet(
                     write_results(directory, journal.results(keys), len(keys))
                     last_s = time.monotonic()
                     pause_s = max(_WRITE_S, _SHARE * (last_s - before_s))
-        except BaseException:  # also runs when the user stops the run
-            with contextlib.suppress(InputError):  # the first error already reports a full disk
+        except BaseException:  # including Ctrl-C
+            with contextlib.suppress(InputError):  # if the disk is full, the first error already reports it
                 if next(journal.results(keys), None):
                     write_results(directory, journal.results(keys), len(keys))
             raise
@@ -108,7 +122,10 @@ def run_fleet(
 
 
 def write_results(directory: str, results: Iterable[PeriodResult], expected: int) -> Glance:
-    """Write the tables and the page of the results so far. expected: final number of results. Raises InputError."""
+    """Write the tables and the page of the results so far.
+
+    expected: number of results at the end of the run. Raises InputError if a file cannot be written.
+    """
     glance = Glance()
 
     def seen() -> Iterator[PeriodResult]:
@@ -122,8 +139,11 @@ def write_results(directory: str, results: Iterable[PeriodResult], expected: int
 
 
 def _note_changed(period: Period, marks: dict[str, str], result: PeriodResult) -> bool:
-    """True if a log on this computer was replaced since the run began, so that the result may be from either version.
-    The result then gets a row of errors. (A file that is read from a store is always one whole version.)"""
+    """Add a row of errors to the result for each log on this computer that was replaced since the run began.
+
+    Returns True if there is such a log, because the result may then come from the old or the new version. Logs in a
+    store are not checked: a file read from a store is always one complete version.
+    """
     now = files.identities(path for path in period.paths if not files.is_remote(path))
     changed = [path for path, mark in now.items() if mark != marks[path]]
     for path in map(files.printable, changed):
@@ -133,7 +153,10 @@ def _note_changed(period: Period, marks: dict[str, str], result: PeriodResult) -
 
 
 def _keep(directory: str, journal: Journal | StoreJournal, key: str, kept: PeriodResult, again: bool) -> None:
-    """Save a result in the journal at once. again: the next run should recompute it. Raises InputError."""
+    """Save a result in the journal, and write its picture. again: True if the next run should recompute the result.
+
+    Raises InputError if a file cannot be written, or if the disk was full when the signals were written.
+    """
     missing = [row for row in kept.errors if row["reason"] in (AFTERWARDS, DISK_FULL)]
     unshown = None
     if kept.picture:
@@ -152,12 +175,12 @@ def _keep(directory: str, journal: Journal | StoreJournal, key: str, kept: Perio
 
 
 def _marks(periods: list[Period]) -> dict[str, str]:
-    """See files.identities()."""
+    """Return the mark of each log of the periods (see files.identities())."""
     return files.identities(dict.fromkeys(path for period in periods for path in period.paths))
 
 
 def _keys(periods: list[Period], marks: dict[str, str], with_signals: bool) -> list[str]:
-    """A key per period: it changes with the logs, the options and the version."""
+    """Return a key for each period. The key changes if a log, an option or the version changes."""
     keys = []
     for period in periods:
         logs = [(path, marks[path]) for path in period.paths]

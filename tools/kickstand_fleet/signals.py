@@ -1,5 +1,7 @@
-"""Writes accelerations along the vehicle's axes as Parquet, in directories by vehicle and day, which data frames can
-read."""
+"""Writes accelerations along the vehicle's axes as Parquet.
+
+The files are in one directory per vehicle and day. Libraries for data frames read them as one table.
+"""
 
 import datetime
 import io
@@ -13,8 +15,8 @@ from .files import file_stem, folder_value, printable, write_bytes
 from .manifest import Period
 
 UNKNOWN_DAY = "unknown"
-_FINE = ("t_s", "utc_s")  # columns for which 32-bit floats are too coarse
-# column: unit
+_FINE = ("t_s", "utc_s")  # columns that need 64-bit floats
+# Each column with its unit
 COLUMNS = {
     "t_s": "s since the log's first sample",
     "utc_s": "s since 1970",
@@ -29,9 +31,13 @@ COLUMNS = {
 
 
 def write(directory: str, period: Period, log: Log, calibration: CalibrationFile) -> list[str]:
-    """Write a log to DIRECTORY/vehicle=.../day=.../NAME.parquet: one file per day of Universal Time, day "unknown" if
-    the log has no time. NAME consists of the mount, the log's name and a hash of its path: two logs never share a file,
-    and another run writes the same files. Returns the paths. calibration: must be aligned. Raises InputError."""
+    """Write a log to DIRECTORY/vehicle=.../day=.../NAME.parquet, one file per day of Universal Time.
+
+    The day is "unknown" if the log has no Universal Time. NAME consists of the mount, the log's name and a hash of its
+    path. So two logs never share a file, and another run writes the same files.
+
+    calibration: must be aligned. Returns the paths of the files. Raises InputError if a file cannot be written.
+    """
     import pyarrow
     from pyarrow import parquet
 

@@ -1,4 +1,7 @@
-"""The tables of a fleet as Parquet: their columns, types and units. Angles about an axis follow the right-hand rule."""
+"""Writes the tables of a fleet as Parquet, and defines their columns, types and units.
+
+Angles about an axis follow the right-hand rule.
+"""
 
 import contextlib
 from collections.abc import Callable, Iterable, Iterator
@@ -12,10 +15,10 @@ from .period import PeriodResult, Row
 if TYPE_CHECKING:
     import pyarrow
 
-_GROUP = 20_000  # rows written at a time
+_GROUP = 20_000  # number of rows that are written at a time
 _TEXT, _NUMBER, _COUNT, _LIST = "string", "double", "int32", "list"
 
-# column: (type, unit, meaning)
+# Each column with its type, unit and meaning
 _WHOSE = {
     "vehicle": (_TEXT, "", "as in the manifest"),
     "mount": (_TEXT, "", "as in the manifest, empty if it has none"),
@@ -80,7 +83,7 @@ TABLES: dict[str, dict[str, tuple[str, str, str]]] = {
 
 
 def schema(table: str) -> "pyarrow.Schema":
-    """The arrow schema of one of TABLES, each column with its unit and meaning in its metadata."""
+    """Return the Arrow schema of one of TABLES. The metadata of each column contains its unit and meaning."""
     import pyarrow
 
     def arrow(kind: str) -> pyarrow.DataType:
@@ -104,8 +107,11 @@ def check() -> None:
 
 
 def write_tables(directory: str, results: Iterable[PeriodResult]) -> None:
-    """Write a file NAME.parquet for each of TABLES, whole or not at all. The results are read once, and memory does not
-    grow with their number. Raises InputError."""
+    """Write a file NAME.parquet for each of TABLES. Each file is written completely or not at all.
+
+    The results are read only once, and memory does not grow with their number. Raises InputError if a file cannot be
+    written.
+    """
     with contextlib.ExitStack() as opened:
         tables = {name: opened.enter_context(_table(directory, name)) for name in TABLES}
         for result in results:
@@ -115,7 +121,7 @@ def write_tables(directory: str, results: Iterable[PeriodResult]) -> None:
 
 @contextlib.contextmanager
 def _table(directory: str, name: str) -> Iterator[Callable[[list[Row]], None]]:
-    """A function that adds rows to the file of a table. It writes them in groups."""
+    """A context that yields a function. The function adds rows to the file of a table, and writes them in groups."""
     from pyarrow import Table
     from pyarrow.parquet import ParquetWriter
 

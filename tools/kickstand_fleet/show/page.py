@@ -42,12 +42,20 @@ _BLUE, _ORANGE = "var(--truth)", "var(--accent)"  # colours of the page
 
 
 class Glance:
-    """A summary of many results for the page; add() takes them one by one. Memory hardly grows with their number.
+    """A summary of many results for the page. add() takes the results one by one, so memory hardly grows with them.
 
-    statuses, reasons: numbers of results with each; moved_count, errors: numbers of rows in these tables; first_errors:
-    (log or vehicle, message) of some of these. decelerations: (s since 1970 or NaN, m/s2) of each brake test. worst:
-    the least certain alignments; moved: the largest rotations of mounts, each with its picture. moved_vehicles: number
-    of mounts that moved, including those for which the time is unknown.
+    count: Number of results.
+    driven_s: Length of all logs that were used.
+    statuses: Number of results with each status.
+    reasons: Number of results with each pair of status and reason.
+    moved_count: Number of rows in the table of moved mounts.
+    moved_vehicles: Number of mounts that moved, including those with an unknown time of the move.
+    errors: Number of rows in the table of errors.
+    first_errors: The first errors, each as the log or vehicle and the message.
+    decelerations: Two columns for all brake tests, the time in s since 1970 or NaN, and the deceleration in m/s2.
+    worst: Rows of the least certain alignments.
+    moved: Rows of the largest rotations of mounts, each with the path of its picture.
+    below: The folder that all names share, with its slash. None before the first result.
     """
 
     def __init__(self) -> None:
@@ -58,10 +66,10 @@ class Glance:
         self.reasons: Counter[tuple[str, str]] = Counter()
         self.decelerations: tuple[array[float], array[float]] = array("d"), array("d")
         self._qualities = array("d")
-        self.below: str | None = None  # the folder that all names share, with its /
+        self.below: str | None = None
         self.worst: list[Row] = []
         self.moved: list[tuple[Row, str]] = []
-        # rows of the table of vehicles, each with its decelerations; key: aligned or not
+        # Rows of the table of vehicles, each with its decelerations. The key is True for aligned vehicles
         self._rows: dict[bool, list[tuple[Row, list[float]]]] = {False: [], True: []}
 
     def add(self, result: PeriodResult) -> None:
@@ -93,7 +101,7 @@ class Glance:
             self._rows[aligned].append((row, [test["mfdd_mps2"] for test in result.brake_tests]))
 
     def page(self, expected: int) -> str:
-        """The page as HTML. expected: final number of results."""
+        """Return the page as HTML. expected: number of results at the end of the run."""
         tests, hours = len(self.decelerations[1]), self.driven_s / 3600.0
         tiles = [
             (self.statuses["aligned"], f"aligned ({_share(self.statuses['aligned'], self.count)})", "good"),
@@ -133,7 +141,10 @@ def _quality(values: Sequence[float]) -> Markup:
 
 
 def _braking(utc_s: Sequence[float], values: Sequence[float]) -> list[Markup]:
-    """The decelerations as a histogram and, if their days are known, over time. Empty without decelerations."""
+    """Draw the decelerations as a histogram and, if their times are known, over time.
+
+    Returns the pictures, none without decelerations.
+    """
     if not values:
         return []
     hardest = min(12.0, max(values) * 1.05)
@@ -171,7 +182,7 @@ def _medians(dated: Sequence[tuple[float, float]], width_s: float) -> list[tuple
 
 
 def _spark(values: Sequence[float]) -> Markup:
-    """Decelerations in sequence, as small bars of up to 8 m/s2."""
+    """Draw decelerations in sequence as small bars. A bar of full height is 8 m/s2."""
     width = min(4.0, 100.0 / len(values))
     path = "".join(f"M{(k + 0.5) * width:.1f} 20v{-max(1.0, min(y, 8.0) * 2.4):.1f}" for k, y in enumerate(values))
     bars = element("path", d=path, stroke=_ORANGE, stroke_width=0.7 * width)
@@ -180,8 +191,8 @@ def _spark(values: Sequence[float]) -> Markup:
 
 _PAGE = Path(__file__).parent / "page.html"
 _SCRIPT = _PAGE.read_text(encoding="utf-8").partition("<script>")[2].partition("</script>")[0]
-# The page loads nothing, and only its own script runs. Bars have their widths in style attributes, which a policy can
-# only allow all together.
+# The page loads nothing, and only its own script runs. The widths of bars are in style attributes. A policy can only
+# allow all style attributes or none, so it allows all.
 _POLICY = (
     "default-src 'none'; base-uri 'none'; form-action 'none'; style-src 'unsafe-inline'; "
     f"script-src {source_hash(_SCRIPT)}"

@@ -9,14 +9,22 @@ from kickstand_tools.common.svg import element, path
 from markupsafe import Markup
 
 Point = tuple[float, float]
-_LETTER = 7.0  # at most, the width of a digit
+_LETTER = 7.0  # largest width of a digit
 _QUIET, _RULE = "#777", "#8883"
 
 
 @dataclass
 class Panel:
-    """x, y, width, height: its place in the picture. across: the values at its left and right edge. along: those at its
-    lower and upper edge. unit, unit_along: their units. words: formats a value of the horizontal axis."""
+    """A panel of a picture.
+
+    x, y, width, height: Position and size of the panel in the picture.
+    across: Values at the left and right edge.
+    along: Values at the lower and upper edge.
+    title: Text above the panel.
+    unit: Label of the horizontal axis.
+    unit_along: Label of the vertical axis.
+    words: Function that formats a value of the horizontal axis.
+    """
 
     x: float
     y: float
@@ -70,7 +78,7 @@ class Panel:
             ((x, _),) = self._places([(value, 0.0)])
             axes.append(element("path", d=path([(x, self._top), (x, self._bottom)]), stroke=_RULE))
             words = self.words(value)
-            middle = min(x, self.x + self.width - 0.5 * _LETTER * len(words))  # keep the whole text in the picture
+            middle = min(x, self.x + self.width - 0.5 * _LETTER * len(words))  # the text must not leave the picture
             axes.append(element("text", words, x=middle, y=self._bottom + 14.0, text_anchor="middle", fill=_QUIET))
         for value in ticks(*self.along, 5):
             ((_, y),) = self._places([(0.0, value)])
@@ -87,7 +95,7 @@ class Panel:
 
 
 def ticks(first: float, last: float, count: int) -> list[float]:
-    """About `count` round values between first and last."""
+    """Return about `count` round values between first and last."""
     rough = (last - first) / count
     if not rough > 0.0:
         return [first]
@@ -98,5 +106,5 @@ def ticks(first: float, last: float, count: int) -> list[float]:
 
 
 def date_text(utc_s: float) -> str:
-    """The day of a time, in the form 2026-09-30."""
+    """Format the day of a time as 2026-09-30. utc_s: s since 1970."""
     return datetime.datetime.fromtimestamp(utc_s, datetime.UTC).strftime("%Y-%m-%d")

@@ -1,4 +1,7 @@
-"""Writes a simulated fleet: logs, MANIFEST.csv, and TRUTH.csv, which lists the results that a run over it must find."""
+"""Writes a simulated fleet: logs, MANIFEST.csv and TRUTH.csv.
+
+TRUTH.csv lists the results that `kickstand fleet` must find.
+"""
 
 import gzip
 from collections.abc import Callable, Iterator
@@ -15,21 +18,21 @@ from kickstand_tools.signals import Array, rotation_matrix
 from .route import random_route
 from .vehicle import HANDLING, Receiver, drive_log, random_sensor
 
-# Troubles of vehicles, and the share of the fleet that has each; the other vehicles are fine
+# Faults of vehicles and their logs, each with its share of the fleet. The other vehicles have no fault
 TROUBLES = {
     "moved-between": 0.06,  # the mount was turned between two logs
     "moved-within": 0.06,  # the mount was turned during a log
-    "late": 0.03,  # the speed comes 2.6 s late
-    "dead": 0.03,  # there is no speed at all
-    "dies": 0.02,  # the receiver dies in the second log
+    "late": 0.03,  # the speed is 2.6 s late
+    "dead": 0.03,  # the logs contain no speed
+    "dies": 0.02,  # the receiver fails during the second log
     "km/h": 0.03,
-    "circles": 0.02,  # it drives in circles: no straight braking
+    "circles": 0.02,  # the vehicle drives in circles, so it never brakes in a straight line
     "garbage": 0.02,  # the first log is not text
-    "empty": 0.02,  # the first log has no byte
+    "empty": 0.02,  # the first log is an empty file
     "cut": 0.02,  # the end of the first log is missing
-    "missing": 0.02,  # the first log is not there
+    "missing": 0.02,  # the first log does not exist
 }
-# The expected codes of the refusal if the alignment cannot be determined; any one of them is right
+# Faults that make an alignment impossible, each with the expected codes of the refusal. Any one of the codes is correct
 _REASONS = {
     "moved-between": "mount-moved",
     "moved-within": "mount-moved",
@@ -46,9 +49,17 @@ MATRIX = tuple(f"{row}_{axis}" for row in ("left", "up", "forward") for axis in 
 
 @dataclass
 class MadeVehicle:
-    """A vehicle of the fleet. trouble: a key of TROUBLES, or "". mounts: rotation from sensor to vehicle axes (3, 3):
-    one, or two if the mount moved. It then moved by moved_deg, moved_s after the start of the log with the index
-    moved_log (NaN: between that log and the previous one)."""
+    """A vehicle of the fleet.
+
+    name: Name of the vehicle in the manifest.
+    kind: "car", "bus" or "motorcycle".
+    trouble: The vehicle's fault, a key of TROUBLES, or "".
+    paths: Paths of the logs.
+    mounts: Rotation of each mounting, shape (3, 3), as in VehicleSensor. Two if the mount moved.
+    moved_deg: Angle by which the mount moved.
+    moved_log: Index of the log in which the mount moved, or of the first log after it moved.
+    moved_s: Time in that log at which the mount moved. NaN if it moved before that log.
+    """
 
     name: str
     kind: str
@@ -61,7 +72,7 @@ class MadeVehicle:
 
     @property
     def reasons(self) -> str:
-        """Codes, separated by spaces; the refusal must have one of them. "" if the vehicle must be aligned."""
+        """The codes that are correct for the refusal, separated by spaces. "" if the vehicle must be aligned."""
         return _REASONS.get(self.trouble, "")
 
 
@@ -74,11 +85,21 @@ def make_fleet(
     troubles: list[str] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[MadeVehicle]:
-    """Simulate a fleet and write it to a directory: drives/*.csv.gz, MANIFEST.csv, TRUTH.csv. Raises InputError.
+    """Simulate a fleet, and write drives/*.csv.gz, MANIFEST.csv and TRUTH.csv to a directory.
 
-    A third each of cars, buses and motorcycles with one to three drives of about `seconds` each. troubles: one per
-    vehicle, "" for none; None: at random, in the shares of TROUBLES. progress: called with (done, vehicles). A seed
-    always gives the same fleet.
+    A third of the vehicles each are cars, buses and motorcycles. Each has one to three drives. The same seed always
+    gives the same fleet.
+
+    Args:
+        out: The directory.
+        vehicles: Number of vehicles.
+        seed: Seed of the random numbers.
+        seconds: About the length of each drive.
+        rate_hz: Samples per second.
+        troubles: The fault of each vehicle, a key of TROUBLES, or "". None draws them with the shares of TROUBLES.
+        progress: Function that is called with the number of finished vehicles and the number of all.
+
+    Raises InputError if the directory cannot be written.
     """
     directory = Path(out)
     check_directory(directory)
@@ -92,7 +113,7 @@ def make_fleet(
             made.append(vehicle)
             if progress:
                 progress(k + 1, len(troubles))
-        kinds = {"motorcycle": "motorcycle", "car": "car", "bus": "car"}  # in a manifest
+        kinds = {"motorcycle": "motorcycle", "car": "car", "bus": "car"}  # a manifest knows only two kinds
         rows = [(v.name, path.relative_to(directory), kinds[v.kind]) for v in made for path in v.paths]
         write_table(directory / "MANIFEST.csv", ("vehicle", "path", "kind"), rows)
         write_table(directory / "TRUTH.csv", (*_COLUMNS, *MATRIX), (list(_truth(v)) for v in made))
@@ -147,13 +168,13 @@ def _vehicle(
 
 
 def _turn(chance: np.random.Generator, degrees: float) -> Array:
-    """(3, 3): a rotation by this angle about a random axis."""
+    """Return a rotation by this angle about a random axis, shape (3, 3)."""
     axis = chance.standard_normal(3)
     return rotation_matrix(np.radians(degrees) * axis / np.linalg.norm(axis))
 
 
 def _write(path: Path, log: Log, broken: str) -> None:
-    """Write a log. broken: the file's trouble, a key of TROUBLES, or ""."""
+    """Write a log. broken: the fault of the file, a key of TROUBLES, or ""."""
     content = log_bytes(log)
     if path.suffix == ".gz":
         content = gzip.compress(content, 1, mtime=0)

@@ -1,4 +1,4 @@
-"""A random route of a few minutes: speed, yaw rate and slope, as chosen by the driver and the road."""
+"""Simulates a random route of a few minutes: speed and yaw rate of the vehicle, slope and camber of the road."""
 
 from dataclasses import dataclass
 
@@ -6,14 +6,21 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.signals import Array, moving_mean
 
-_SMOOTH_S = 0.6  # a driver changes the pedal and the steering wheel within about this
-_SLOPE_M, _SLOPE_DEG, _CAMBER_DEG = 120.0, 1.2, 0.7  # slope and camber change every 120 m; 1 sigma
+_SMOOTH_S = 0.6  # about the time in which a driver moves the pedal or the steering wheel
+# Slope and camber get a new random value every _SLOPE_M metres, with these standard deviations in degrees
+_SLOPE_M, _SLOPE_DEG, _CAMBER_DEG = 120.0, 1.2, 0.7
 _FASTEST_LATERAL_MPS2 = 3.0
 
 
 @dataclass
 class Handling:
-    """How a kind of vehicle is driven: (least, most) of cruising speed, speeding up, braking, lateral acceleration."""
+    """The driving of a kind of vehicle. Each field is a range, as (least, most).
+
+    cruise_mps: Cruising speed.
+    speed_up_mps2: Acceleration when speeding up.
+    brake_mps2: Deceleration when braking.
+    lateral_mps2: Lateral acceleration in bends.
+    """
 
     cruise_mps: tuple[float, float]
     speed_up_mps2: tuple[float, float]
@@ -23,8 +30,15 @@ class Handling:
 
 @dataclass
 class Route:
-    """n samples. time (s), speed (m/s), acceleration (m/s2), yaw_rate (rad/s, > 0 to the left), slope (rad, > 0
-    uphill), camber (rad, > 0 falling to the right)."""
+    """A route of n samples. Each field has shape (n).
+
+    time: In s.
+    speed: In m/s.
+    acceleration: Acceleration forward, in m/s2.
+    yaw_rate: In rad/s, positive to the left.
+    slope: Slope of the road, in rad, positive uphill.
+    camber: Sideways slope of the road, in rad, positive if the road falls to the right.
+    """
 
     time: Array
     speed: Array
@@ -37,8 +51,10 @@ class Route:
 def random_route(
     chance: np.random.Generator, handling: Handling, seconds: float, rate_hz: float, straight: bool = True
 ) -> Route:
-    """A route with stops, bends and braking in straight lines. straight=False: always in circles, as in a car park, so
-    without straight braking."""
+    """Simulate a route with stops, bends and braking in straight lines.
+
+    straight: False drives in circles only, as in a car park. Then there is no braking in a straight line.
+    """
     legs = _Legs(chance, handling)
     legs.stand(chance.uniform(7.0, 14.0))
     while legs.seconds < seconds - 12.0:
@@ -52,7 +68,7 @@ def random_route(
     width = max(2, round(_SMOOTH_S * rate_hz))
     speed = moving_mean(np.interp(time, knots[:, 0], knots[:, 1]), width)
     place = np.searchsorted(knots[:, 0], time, side="right").clip(1, len(knots) - 1)
-    lateral = moving_mean(knots[place, 2], 2 * width)  # a leg's lateral acceleration is in the knot at its end
+    lateral = moving_mean(knots[place, 2], 2 * width)  # the knot at the end of a leg has the leg's lateral acceleration
     yaw_rate = np.where(speed > 0.3, lateral / np.maximum(speed, 1.5), 0.0)
     distance = np.cumsum(speed) / rate_hz
     return Route(
@@ -66,8 +82,11 @@ def random_route(
 
 
 class _Legs:
-    """Collects the legs of a route. knots: (time, speed, lateral acceleration since the previous knot), one at the end
-    of each leg."""
+    """Collects the legs of a route.
+
+    knots: One tuple for the end of each leg. It contains the time, the speed, and the lateral acceleration during the
+    leg.
+    """
 
     def __init__(self, chance: np.random.Generator, handling: Handling) -> None:
         self.chance, self._handling = chance, handling
@@ -130,5 +149,5 @@ def _along(chance: np.random.Generator, distance: Array, mean: float, sigma: flo
 
 
 def balance_lean(route: Route) -> Array:
-    """(n) rad, > 0 to the right: the lean of a motorcycle in balance on this route."""
+    """The lean of a motorcycle in balance on this route, shape (n), in rad; positive to the right."""
     return -np.arctan(route.speed * route.yaw_rate / STANDARD_GRAVITY)

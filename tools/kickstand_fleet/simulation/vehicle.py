@@ -1,4 +1,4 @@
-"""Simulates the readings of a sensor in a car, in a bus or on a motorcycle on a route."""
+"""Simulates the readings of a sensor in a car, in a bus or on a motorcycle during a route."""
 
 from dataclasses import dataclass
 
@@ -15,14 +15,21 @@ HANDLING = {
     "bus": Handling((7.0, 14.0), (0.7, 1.3), (1.0, 2.0), (0.7, 1.6)),
     "motorcycle": Handling((9.0, 22.0), (1.5, 3.2), (1.6, 4.5), (1.5, 4.0)),
 }
-# degrees per g: how far the body rolls outwards under lateral acceleration, and how far it dives under braking
+# Angle by which the body rolls outwards per g of lateral acceleration, and by which it dives per g of braking, in
+# degrees
 _ROLL_DEG, _DIVE_DEG = {"car": 4.0, "bus": 5.5, "motorcycle": 0.0}, {"car": 2.5, "bus": 2.0, "motorcycle": 4.0}
 _COUNT_G, _COUNT_DPS = 1.0 / 16384.0, 1.0 / 131.0
 
 
 @dataclass
 class VehicleSensor:
-    """mount (3, 3): vehicle from sensor, rows left, up, forward; offset_g, slope, bias_dps (3): its errors."""
+    """The mounting and the errors of a sensor.
+
+    mount: Rotation from sensor to vehicle axes, shape (3, 3). Its rows are left, up, forward.
+    offset_g: Offset of the accelerometer, shape (3), in g.
+    slope: Slope of the accelerometer, shape (3).
+    bias_dps: Bias of the gyro, shape (3), in deg/s.
+    """
 
     mount: Array
     offset_g: Array
@@ -32,8 +39,13 @@ class VehicleSensor:
 
 @dataclass
 class Receiver:
-    """The speed source: a value every every_s seconds, delayed by late_s, multiplied by factor (3.6 for km/h). After
-    until_s there are no more values."""
+    """The receiver that measures the speed.
+
+    every_s: Time between two values.
+    late_s: Delay of a value.
+    factor: Factor on each value, 3.6 for a receiver that wrongly gives km/h.
+    until_s: Time of the last value.
+    """
 
     every_s: float = 1.0
     late_s: float = 0.3
@@ -42,7 +54,7 @@ class Receiver:
 
 
 def random_sensor(chance: np.random.Generator) -> VehicleSensor:
-    """A sensor in a random mounting, with random errors of an ordinary, uncalibrated MPU6050."""
+    """Return a sensor in a random mounting, with the random errors of an ordinary, uncalibrated MPU6050."""
     errors = (chance.normal(mean, sigma, 3) for mean, sigma in ((0.0, 0.01), (1.0, 0.01), (0.0, 1.0)))
     return VehicleSensor(random_rotation(chance), *errors)
 
@@ -57,8 +69,11 @@ def drive_log(
     moved: tuple[float, Array] | None = None,
     name: str = "the log",
 ) -> Log:
-    """Simulate the log of a drive. moved: (time in s, matrix (3, 3) of the new mount); the mount rotates to it within
-    0.3 s."""
+    """Simulate the log of a drive.
+
+    moved: Time in s at which the mount moves, and its new rotation, shape (3, 3). The mount takes 0.3 s to rotate. None
+    if the mount does not move.
+    """
     force, rate = _readings(chance, kind, route)
     mount = np.broadcast_to(sensor.mount, (len(force), 3, 3))
     if moved is not None:
@@ -81,10 +96,14 @@ def drive_log(
 
 
 def _readings(chance: np.random.Generator, kind: str, route: Route) -> tuple[Array, Array]:
-    """(n, 3) specific force (m/s2) and (n, 3) rate (rad/s) along the vehicle's left, up, forward.
+    """Compute the readings of a sensor without errors, along the vehicle's left, up and forward.
 
-    To first order in pitch and slope, which are under 5 degrees, and for a sensor on the axis about which the body
-    rolls: hundreds of vehicles are simulated in the time that physics/ takes for one.
+    Returns:
+        The specific force, shape (n, 3), in m/s2.
+        The rate, shape (n, 3), in rad/s.
+
+    Two simplifications make this hundreds of times faster than the package simulation/physics. Pitch and slope are
+    under 5 degrees and count to first order. The sensor is on the axis about which the body rolls.
     """
     step_s = route.time[1]
     lateral = route.speed * route.yaw_rate
@@ -107,6 +126,9 @@ def _readings(chance: np.random.Generator, kind: str, route: Route) -> tuple[Arr
 
 
 def _mount_rates(time: Array, at_s: float, turn: Array, seconds: float = 0.3) -> Array:
-    """(n, 3) rad/s about the vehicle's axes: the rates of a mount that rotates by `turn` (3, 3) around at_s."""
+    """Compute the rates of a mount that rotates at the time at_s, about the vehicle's axes.
+
+    turn: the rotation, shape (3, 3). Returns the rates, shape (n, 3), in rad/s.
+    """
     turning = (time >= at_s - seconds / 2) & (time < at_s + seconds / 2)
     return np.outer(turning, rotation_vector(turn) / seconds)

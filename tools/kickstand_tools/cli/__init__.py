@@ -1,2 +1,1 @@
-"""The command `kickstand`: each command parses its arguments, calls a function of these tools, and prints the
-result."""
+"""The command `kickstand`. Each subcommand parses its arguments, calls a function of these tools, and prints."""

@@ -1,12 +1,13 @@
 """Commands that other packages add to `kickstand`, by entry points of the group "kickstand.commands".
 
-The name of an entry point is the command's name; its object is a click.Command. In the other package's pyproject.toml:
+The name of an entry point is the command's name. Its object is a click.Command. For example, in the other package's
+pyproject.toml:
 
     [project.entry-points."kickstand.commands"]
     laps = "my_package.laps:laps_command"
 
-If names are equal, Kickstand's own command is used. kickstand_fleet and kickstand_emulator add `fleet` and `emulate` in
-this way. A package is imported only when its command runs, or for its line in the help.
+If Kickstand has a command of the same name, that command is used. kickstand_fleet and kickstand_emulator add `fleet`
+and `emulate` in this way. A package is only imported if its command runs, or if the list of commands is printed.
 """
 
 import traceback
@@ -21,12 +22,12 @@ GROUP = "kickstand.commands"
 
 
 def entry_points() -> dict[str, EntryPoint]:
-    """The entry points of all installed commands, by the command's name."""
+    """Return the entry points of all installed commands, by the command's name."""
     return plugins.entry_points(GROUP)
 
 
 def command(entry_point: EntryPoint) -> click.Command:
-    """The command of an entry point. Raises InputError, which names the package, if it cannot be loaded."""
+    """Load the command of an entry point. Raises InputError, which names the package, if loading fails."""
     try:
         loaded = entry_point.load()
     except InputError:
@@ -39,7 +40,7 @@ def command(entry_point: EntryPoint) -> click.Command:
 
 
 def help_line(entry_point: EntryPoint) -> str:
-    """The line for a command in the list of commands. It reports a command that cannot be loaded."""
+    """Return the line for a command in the list of commands. For a command that cannot be loaded it is the reason."""
     try:
         return command(entry_point).get_short_help_str(limit=80)
     except InputError as error:
@@ -47,7 +48,10 @@ def help_line(entry_point: EntryPoint) -> str:
 
 
 def owner(error: Exception) -> str:
-    """The package responsible for an unexpected error: the package of the running command, or kickstand."""
+    """Find the package that is responsible for an unexpected error.
+
+    Returns the name of the package that added the running command, or "kickstand".
+    """
     packages = {entry_point.module.partition(".")[0]: _package(entry_point) for entry_point in entry_points().values()}
     for frame, _ in traceback.walk_tb(error.__traceback__):
         package = packages.get(frame.f_globals.get("__name__", "").partition(".")[0], DISTRIBUTION)
@@ -57,7 +61,7 @@ def owner(error: Exception) -> str:
 
 
 def _package(entry_point: EntryPoint) -> str:
-    """The name of the distribution that an entry point belongs to."""
+    """Return the name of the distribution that contains an entry point."""
     return entry_point.dist.name if entry_point.dist else entry_point.module
 
 

@@ -56,7 +56,10 @@ def flash_command(port: str | None, config: bool, yes: bool) -> None:
 
 
 def _agree(lines: list[str]) -> None:
-    """Ask the user for permission to rename these files. Raises InputError if the user refuses."""
+    """Ask the user for permission to rename files on the board. Raises InputError if the user refuses.
+
+    lines: one line of text for each file.
+    """
     if not sys.stdin.isatty():
         raise InputError(f"{'; '.join(lines)}: run kickstand flash --yes for that")
     for line in lines:
@@ -127,13 +130,16 @@ def record_command(port: str | None, out: Path) -> None:
 
 
 def _live_text(reading: LiveReading) -> str:
-    """One line: the lean as a bar to the left or right (in a car the forces), and the duration of the recording."""
+    """Format a reading as one line of text.
+
+    The line shows the lean as a bar to the left or right, in a car the forces, and the duration of the recording.
+    """
     how_long = f"{reading.rate_hz:3.0f} readings/s  {reading.seconds // 60:.0f}:{reading.seconds % 60:04.1f}"
     lean, forward_g, left_g = reading.moments[-1][1:] if reading.moments else (None, None, None)
-    if left_g is not None:  # a car, and aligned
+    if left_g is not None:  # only an aligned car has this value
         side = "left " if left_g > 0.0 else "right"
         return f"forward {forward_g:+.2f} g  {side} {abs(left_g):.2f} g  {how_long}"
-    if lean is None:  # an uncertain lean is hidden, as on the display
+    if lean is None:  # an uncertain lean is not shown, as on the display
         return f"{'lean --' if reading.aligned else 'not aligned'}  {how_long}"
     bar = "#" * min(20, round(abs(lean) / 3))
     picture = f"{bar if lean < 0 else '':>20}|{bar if lean > 0 else '':<20}"

@@ -36,9 +36,9 @@ def calibrate_command() -> None:
 def six(poses: tuple[Path, ...], out: Path) -> None:
     """Measure the sensor's errors from six still poses, each side up once, in any order.
 
-    One log of the whole procedure calibrates accelerometer and gyro. In it, the sensor lies still for three seconds on
-    each side and once slanted, and the turns between the poses calibrate the gyro. Six logs of one pose each give
-    offset and slope of the accelerometer. A seventh, slanted pose checks them.
+    One log of the whole procedure calibrates accelerometer and gyro. Lay the sensor still for three seconds on each
+    side, and once slanted. The turns between the poses calibrate the gyro. Six logs of one pose each give only offset
+    and slope of the accelerometer. A seventh log, of a slanted pose, checks them.
     """
     check_output(out, list(poses))
     found = fit_procedure(poses[0]) if len(poses) == 1 else fit_six_positions(poses)
@@ -71,7 +71,7 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
 @OUT
 @RIGHT_HANDED
 def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None, method: str, out: Path) -> None:
-    """Find how the sensor is mounted on a vehicle. Needs logs with speed, stops and braking in a straight line."""
+    """Find how the sensor is mounted on a vehicle. The logs must have a speed, stops, and straight-line braking."""
     check_output(out, list(logs))
     before = read_calibration(calibration) if calibration else None
     several = len(logs) > 1
@@ -99,7 +99,7 @@ def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None,
 @OUT
 @RIGHT_HANDED
 def ride(log: Path, phone: str | None, out: Path) -> None:
-    """Find how the sensor is mounted on a motorcycle, from any ride with bends. Needs no poses and no speed."""
+    """Find how the sensor is mounted on a motorcycle, from a ride with bends. No poses and no speed are needed."""
     check_output(out, [log])
     with Bar("aligning") as bar:
         found = fit_ride(log, phone, bar.reach)
@@ -187,7 +187,7 @@ def _drive_lines(found: DriveFit, several: bool) -> Iterable[str]:
 
 
 def _event_lines(event: events.DriveEvent, several: bool) -> Iterable[str]:
-    """Describe the events. With several logs, the name of each log comes before its events."""
+    """Describe an event in a line of text. With several logs, also name each log before its first event."""
     if event.what in (events.LOG_BEGINS, events.LOG_WITHOUT_EVENTS):
         if several:
             yield f"{event.log}:" if event.what == events.LOG_BEGINS else "           no braking in it"

@@ -1,4 +1,4 @@
-"""Shared by commands: arguments, options, their times, and the output of notices on standard error."""
+"""Parts that several commands share: arguments, options, times, and the output of notices on standard error."""
 
 from collections.abc import Callable, Iterable
 from inspect import cleandoc
@@ -17,12 +17,15 @@ Command = Callable[..., Any]
 
 
 class Time(click.ParamType):
-    """Seconds (60, 12.5), minutes and seconds (1:00), or with hours (1:02:03). Negative: before the end (-1:30)."""
+    """A time in a log: seconds (60, 12.5), minutes and seconds (1:00), or hours too (1:02:03).
+
+    A negative time (-1:30) counts from the end of the log.
+    """
 
     name = "time"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """In seconds."""
+        """Convert the text of an option to seconds."""
         if isinstance(value, float):
             return value
         text = str(value)
@@ -50,12 +53,12 @@ VEHICLES = click.Choice(["motorcycle", "car"])
 
 
 def file_argument(name: str, metavar: str, **more: Any) -> Command:
-    """An argument that names a file."""
+    """Return a decorator that adds an argument for a file's name. more: other arguments of click.argument()."""
     return click.argument(name, type=PATH, metavar=metavar, **more)
 
 
 def out_option(words: str) -> Command:
-    """The required option --out."""
+    """Return a decorator that adds the required option --out with this help text."""
     return click.option("--out", required=True, type=PATH, help=words)
 
 
@@ -67,7 +70,10 @@ CALIBRATION = click.option("--calibration", type=PATH, help="A CAL.json. Default
 
 
 def from_to(start: str, end: str) -> Command:
-    """The options --from and --to with these help texts, passed as from_s and to_s."""
+    """Return a decorator that adds the options --from and --to with these help texts.
+
+    The command's function gets their values as from_s and to_s.
+    """
 
     def add(command: Command) -> Command:
         first = click.option("--from", "from_s", type=TIME, metavar="TIME", help=start)
@@ -83,7 +89,7 @@ STRETCH = from_to(
 
 
 def help_adds(text: str) -> Command:
-    """Add a paragraph to a command's help."""
+    """Return a decorator that adds a paragraph to a command's help."""
 
     def add(command: Command) -> Command:
         command.__doc__ = f"{cleandoc(command.__doc__ or '')}\n\n{text}"
@@ -93,7 +99,7 @@ def help_adds(text: str) -> Command:
 
 
 def ride_or_export(command: Command) -> Command:
-    """The argument ride: a log, or a recording that import can read."""
+    """Add the argument `ride` to a command: a log, or a recording that `import` can read."""
     words = "An export of a phone's app (file, folder or zip) is imported and aligned first."
     return file_argument("ride", "RIDE.csv|EXPORT")(help_adds(words)(command))
 
@@ -105,7 +111,7 @@ RIGHT_HANDED = help_adds(
 
 
 def live(command: Command) -> Command:
-    """The option --live: use the lean that was shown instead of the smoothed lean."""
+    """Add the option --live to a command: it uses the lean that the display showed instead of the smoothed lean."""
     smoothed = (
         "The lean is smoothed: computed from the whole ride, and more exact than the lean that the display showed."
     )
@@ -114,18 +120,18 @@ def live(command: Command) -> Command:
 
 
 def known_to(found: "RideFit") -> str:
-    """The standard errors of an alignment by a ride, in words."""
+    """Return the standard errors of an alignment by a ride, in words."""
     return f"known to: roll {found.roll_deg:.1f}, pitch {found.pitch_deg:.1f}, yaw {found.yaw_deg:.1f} degrees"
 
 
 def warn(log: Path | str, notices: Iterable[Message]) -> None:
-    """Print a warning for each notice, once. log: the name of its log."""
+    """Print a warning for each notice. Equal notices are printed once. log: name of the log."""
     for notice in distinct(notices):
         warning(f"{log}: {notice.line()}")
 
 
 def echo(text: object = "", err: bool = False) -> None:
-    """Print text. Control characters, for example in a file name from a zip, are made visible."""
+    """Print text. Control characters are made visible, because names of files in a zip may contain them."""
     click.echo(printable(str(text)), err=err)
 
 

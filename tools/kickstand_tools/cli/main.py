@@ -1,4 +1,7 @@
-"""The `kickstand` command. A refused input gives one line on standard error and status 2; nothing is written."""
+"""The command `kickstand`. If it refuses an input, it prints one line on standard error and writes no file.
+
+The exit status is then 2.
+"""
 
 import contextlib
 import importlib
@@ -13,8 +16,8 @@ import click
 from ..common.errors import DISTRIBUTION, InputError, cause, printable
 from . import added
 
-# name: (module of the function name_command, line of help). A module is imported only when its command runs, because
-# most modules import numpy, which is slow
+# Each command with the module that has its function NAME_command, and its line of help. A module is imported only when
+# its command runs, because most modules import numpy, which is slow
 COMMANDS = {
     "calibrate": (".calibrate", "Compute a calibration from recorded poses or drives."),
     "check": (".board", "Measure a board and everything wired to it, in two minutes."),
@@ -74,7 +77,7 @@ def kickstand(context: click.Context) -> None:
 def main(arguments: list[str] | None = None) -> None:
     """Run a command and exit with its status. This is the console script."""
     # Set this before a command imports numpy. The matrices are small, so more threads would only double the processor
-    #     # time
+    # time
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         with _ended_by_signals():
@@ -107,7 +110,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _remedy(error: OSError) -> str:
-    """The remedy for an error of the operating system."""
+    """Return the remedy for an error of the operating system, as part of a message."""
     if error.filename and isinstance(error, FileNotFoundError | NotADirectoryError):
         return "check the name and its directory"
     if error.filename and isinstance(error, IsADirectoryError):
@@ -116,7 +119,7 @@ def _remedy(error: OSError) -> str:
 
 
 class _Ended(BaseException):
-    """A signal asks this program to end. number: the signal's number."""
+    """A signal asked this program to end. number: number of the signal."""
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
@@ -125,7 +128,7 @@ class _Ended(BaseException):
 
 @contextlib.contextmanager
 def _ended_by_signals() -> Iterator[None]:
-    """A context in which `kill` and a closed terminal raise _Ended, so that temporary files are removed."""
+    """A context in which `kill` and a closed terminal raise _Ended. So temporary files are removed before the end."""
 
     def end(number: int, _frame: object) -> None:
         raise _Ended(number)

@@ -257,8 +257,8 @@ def cut_command(log: Path, from_s: float | None, to_s: float | None, out: Path) 
     "offset_s",
     type=common.TIME,
     metavar="TIME",
-    help="The ride's time at the video's first picture: 12.5 if the video begins 12.5 s after the ride, -3 if 3 s "
-    "before. Not needed for a GoPro on the bike.",
+    help="The ride's time at the video's first picture: 12.5 if the video begins 12.5 s after the ride, -3 if it "
+    "begins 3 s before. Not needed for a GoPro on the bike.",
 )
 @click.option("--fps", type=click.Choice(["30", "60"]), help="Frames per second. Default: as in the video, or 30.")
 @common.from_to("Begin at this time of the ride: 90 or 1:30.", "End at this time; negative: before the end.")
@@ -291,8 +291,13 @@ def overlay_command(
 
 
 def _from_export(source: Path, calibration: Path | None) -> tuple[Imported, CalibrationFile] | None:
-    """Import an app's export or a table. Its calibration is the given one, or the one beside it. Without one, the
-    recording is aligned by its bends, and a line says so. Returns None for anything else, such as a log."""
+    """Import an app's export or a table, and find its calibration.
+
+    The calibration is the file of the option --calibration, or the one beside the source. Without a file, the recording
+    is aligned by its bends, and a line on standard error says so.
+
+    Returns the imported recording and its calibration. Returns None for other files, such as a log.
+    """
     found = None
     if not is_log(source):
         with spinner("importing"):
@@ -314,7 +319,7 @@ def _from_export(source: Path, calibration: Path | None) -> tuple[Imported, Cali
 
 
 def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> tuple[Ride, list[Message]]:
-    """Open a ride. Returns it with notices about its import (see _from_export())."""
+    """Open a ride. Returns the ride, and the notices of its import (see _from_export())."""
     taken = _from_export(source, calibration)
     if taken is None:
         return open_ride(_stretch(source, **stretch), calibration, smoothed=not live), []
@@ -323,8 +328,10 @@ def _opened(source: Path, calibration: Path | None, live: bool, **stretch: float
 
 
 def _log_of(source: Path, calibration: Path | None, out: Path) -> tuple[Path | Log, CalibrationFile]:
-    """The log of a ride and its calibration. Prints notices about its import (see _from_export()). Raises InputError
-    without a calibration, and if writing to out would fail or destroy an input."""
+    """Return the log of a ride and its calibration. Print the notices of the ride's import (see _from_export()).
+
+    Raises InputError if there is no calibration, and if writing to out would fail or destroy an input.
+    """
     if is_log(source) or source.suffix.lower() == ".json":
         return source, read_calibration(_given_or_beside(source, calibration, out))
     check_output(out, [*_inputs(source), *([calibration] if calibration else [])])
@@ -336,35 +343,37 @@ def _log_of(source: Path, calibration: Path | None, out: Path) -> tuple[Path | L
 
 
 def _overview(source: Path, calibration: Path | None, live: bool, **stretch: float | None) -> Overview:
-    """The overview of a ride from _opened(). Prints all its notices, first the notices of the import."""
+    """Return the overview of a ride from _opened(). Print all its notices, first those of the import."""
     opened, imported = _opened(source, calibration, live, **stretch)
     with Bar("reading") as bar:
         seen = overview(opened, bar.reach)
-    seen.notices = distinct([*imported, *seen.notices])  # reading the imported log finds the same notices again
+    seen.notices = distinct([*imported, *seen.notices])  # overview() finds the notices of the import again
     common.warn(source, seen.notices)
     return seen
 
 
 def _inputs(source: Path) -> list[Path]:
-    """The files that the output must not overwrite: the source, or the files in it."""
+    """Return the files that the output must not overwrite: the source, or all files in this directory."""
     return sorted(source.rglob("*")) if source.is_dir() else [source]
 
 
 def _stretch(log: Path | Log, from_s: float | None = None, to_s: float | None = None) -> Source:
-    """The part of a log selected by the options of STRETCH."""
+    """Return the part of a log that the options --from and --to select."""
     return log if from_s is None and to_s is None else Stretch(log, from_s, to_s)
 
 
 def _given_or_beside(ride: Path, calibration: Path | None, out: Path, *inputs: Path) -> Path:
-    """The path of the calibration. Raises InputError without one, and if writing to out would fail or destroy an
-    input."""
+    """Return the path of the calibration: the option's value, or the file beside the ride.
+
+    Raises InputError if there is no calibration, and if writing to out would fail or destroy an input.
+    """
     calibration = calibration or calibration_beside(ride)
     check_output(out, [ride, calibration, *inputs])
     return calibration
 
 
 def _pairs(text: str, option: str) -> dict[str, str]:
-    """KEY=VALUE,KEY=VALUE,..."""
+    """Parse the value of an option, in the form KEY=VALUE,KEY=VALUE. Raises InputError if the form is wrong."""
     pairs = {}
     for part in text.split(",") if text.strip() else []:
         key, equals, value = (word.strip() for word in part.partition("="))

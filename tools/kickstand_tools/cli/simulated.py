@@ -14,7 +14,7 @@ from ..simulation.physics.road import CLASSES
 from ..simulation.profiles import MAIN, PROFILES
 from .common import OUT_DIRECTORY, Command, echo
 
-LINES_S = 10.0  # time between two lines of progress; used without a terminal for a bar
+LINES_S = 10.0  # time between two lines of progress, which replace the progress bar without a terminal
 PROFILE_NAMES = f"{', '.join(MAIN)}; hard ones: {', '.join(name for name in PROFILES if name not in MAIN)}."
 
 
@@ -23,7 +23,7 @@ def seconds_option(least: float, words: str) -> Command:
 
 
 def pose_options(pitch_change_deg: float | None, words: str) -> Command:
-    """The errors of the two poses."""
+    """Return a decorator that adds the options for the errors of the two poses. words: help text of --pitch-change."""
 
     def add(command: Command) -> Command:
         upright, pitch = click.FloatRange(-30.0, 30.0), click.FloatRange(-10.0, 10.0)
@@ -63,7 +63,7 @@ def pose_options(pitch_change_deg: float | None, words: str) -> Command:
 )
 @OUT_DIRECTORY
 def simulate_command(profile: str | None, seed: int, vehicles: int | None, out: Path, **of_a_ride: Any) -> None:
-    """Simulate a ride, with its truth, the six poses and a free one, the kickstand and upright poses; or a fleet."""
+    """Simulate a ride with its true lean, and the poses that calibrate its sensor. With --fleet, simulate a fleet."""
     if vehicles is not None:
         _check_fleet(out)
         with Bar("simulating vehicles", lines_s=LINES_S) as bar:
@@ -83,7 +83,7 @@ def simulate_command(profile: str | None, seed: int, vehicles: int | None, out: 
 
 
 def _check_fleet(out: Path) -> None:
-    """Refuse the options of a single ride, and the directory of a ride."""
+    """Raise an error if the options or the directory belong to a single ride."""
     context = click.get_current_context()
     given = click.core.ParameterSource.COMMANDLINE
     for option in context.command.params:

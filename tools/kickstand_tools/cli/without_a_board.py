@@ -23,7 +23,7 @@ _CPYTHON = click.option("--cpython", is_flag=True, help="Run the firmware on CPy
 @_CPYTHON
 @DISPLAY
 def demo_command(**chosen: Any) -> None:
-    """Watch the firmware on a simulated board: kickstand press, upright press, a ride."""
+    """Watch the firmware on a simulated board: a press on the kickstand, a press upright, and a ride."""
     _demo(**chosen)
 
 

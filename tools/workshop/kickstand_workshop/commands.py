@@ -25,15 +25,15 @@ _WIDTH = 110  # columns of a table not printed to a terminal
 
 
 @click.command()
-@click.option("--profiles", default=",".join(MAIN), help=f"With commas between: {PROFILE_NAMES}")
+@click.option("--profiles", default=",".join(MAIN), help=f"Separated by commas. {PROFILE_NAMES}")
 @click.option("--seeds", type=click.IntRange(min=1), default=3, help="Rides of each profile, or of each fault.")
-@seconds_option(60.0, "Of riding, each; start and stop come on top.")
-@pose_options(1.0, "Between the two poses, degrees.")
-@click.option("--recording", type=PATH, help="A recorded ride with speed to compare on too.")
+@seconds_option(60.0, "Riding time of each ride, without start and stop.")
+@pose_options(1.0, "Change of pitch between the two poses, degrees.")
+@click.option("--recording", type=PATH, help="Also compare the filters on this recorded ride, which needs a speed.")
 @click.option("--out", type=PATH, help="Write evaluation.json and lean.png, or faults.json and faults.png, here.")
-@click.option("--faults", is_flag=True, help="Instead: is a wrong lean shown as good when the sensor is ill?")
-@click.option("--first-seed", type=click.IntRange(min=0), default=0, help="With --faults: other seeds, other rides.")
-@click.option("--whole-device", is_flag=True, help="With --faults: each ride on the simulated board, not some alone.")
+@click.option("--faults", is_flag=True, help="Instead measure how long a faulty sensor's wrong lean is shown as good.")
+@click.option("--first-seed", type=click.IntRange(min=0), default=0, help="With --faults: the lowest seed.")
+@click.option("--whole-device", is_flag=True, help="With --faults: run every ride on the whole simulated board.")
 @JSON
 def evaluate_command(
     profiles: str,
@@ -86,7 +86,7 @@ def _given(option: str) -> bool:
 
 
 def _faults(jobs: list[integrity.FaultJob], out: Path | None, as_json: bool) -> None:
-    """Run `evaluate --faults`."""
+    """Run `evaluate --faults`. out: directory to write to, or None."""
     if out is not None:
         picture.check()
         check_directory(out)
@@ -107,14 +107,17 @@ def _faults(jobs: list[integrity.FaultJob], out: Path | None, as_json: bool) -> 
 @click.command()
 @click.argument("recordings", type=PATH, metavar="[RIDE.csv]...", nargs=-1)
 @click.option("--profile", default="street", help=PROFILE_NAMES)
-@click.option("--seed", type=click.IntRange(min=0), default=0, help="Another seed, another ride.")
-@seconds_option(100.0, "Of riding, each; start and stop come on top.")
-@click.option("--mount", type=click.Choice(list(MOUNTS)), help="What is wrong with the sensor's mount or its logger.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, help="Each seed gives another ride.")
+@seconds_option(100.0, "Riding time of each ride, without start and stop.")
+@click.option("--mount", type=click.Choice(list(MOUNTS)), help="A fault of the sensor's mount or of its logger.")
 @JSON
 def bands_command(
     recordings: tuple[Path, ...], profile: str, seed: int, seconds: float, mount: str | None, as_json: bool
 ) -> None:
-    """How rough rides are, by band of frequency: recorded ones, and a profile on its own road and on roads A to D."""
+    """Print how rough rides are in each frequency band.
+
+    Compares recorded rides with a simulated profile, on the profile's own road and on roads A to D.
+    """
     check_profile(profile)
     with Bar("measuring", len(recordings) + 1 + len(CLASSES), patience_s=0.0, lines_s=LINES_S) as bar:
         found = {}
@@ -133,17 +136,17 @@ def bands_command(
 
 
 def _console() -> Console:
-    """Standard output, wide enough for a table if it is not a terminal."""
+    """Return a console for standard output. Without a terminal it is wide enough for a table."""
     console = Console()
     return console if console.is_terminal else Console(width=_WIDTH)
 
 
 @click.command()
-@click.option("--seconds", type=click.IntRange(1, 600), default=10, help="Emulated, of each of four runs.")
+@click.option("--seconds", type=click.IntRange(1, 600), default=10, help="Emulated time of each run.")
 @CHIP
 @JSON
 def bench_command(seconds: int, chip: str, as_json: bool) -> None:
-    """What the firmware costs on an emulated board: time, memory, flash."""
+    """Measure what the firmware costs on an emulated board: time, memory, flash."""
     ready_emulator(chip)
     from .bench.bench import bench, tables
 

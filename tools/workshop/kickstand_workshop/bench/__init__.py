@@ -1,3 +1,4 @@
-"""`kickstand bench`: measures the costs of the firmware on an emulated board. bench.py runs on the host; bench_guest.py
-and stages_guest.py are copied to the board and run there.
+"""Runs `kickstand bench`, which measures the costs of the firmware on an emulated board.
+
+bench.py runs on the host. bench_guest.py, stages_guest.py and bluetooth_guest.py are copied to the board and run there.
 """

@@ -1,5 +1,7 @@
-"""Measures time, memory and flash of the firmware on an emulated board: bench() measures, tables() formats the
-result."""
+"""Measures time, memory and flash of the firmware on an emulated board.
+
+bench() measures, and tables() formats the result.
+"""
 
 import ast
 from dataclasses import asdict
@@ -19,9 +21,9 @@ from rich.table import Table
 from . import boot
 from .sample_count import SampleCount
 
-SAMPLE_HZ = 200  # as bench_guest sets it
+SAMPLE_HZ = 200  # the same as in bench_guest.py
 _GUEST = ("bench_guest", "stages_guest", "bluetooth_guest")  # modules of this folder that run on the board
-_SENSOR = Sensor(seed=1, share=0.0)  # without errors, mounted at some angle
+_SENSOR = Sensor(seed=1, share=0.0)  # a sensor without errors, mounted at some angle
 _SPEED_MPS = 15.0
 _RIDE = [accelerate(_SPEED_MPS, 1.0)] + [turn(-30.0, 3.0), turn(35.0, 3.0)] * 20
 _MODES: dict[str, dict[str, Any]] = {
@@ -33,10 +35,13 @@ _MODES: dict[str, dict[str, Any]] = {
 
 
 def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
-    """Measure all costs. This takes minutes. The name of each figure ends with its unit.
+    """Measure all costs. This takes minutes.
 
-    seconds: emulated time of each of five runs (four on an ESP32, whose stages are not measured). Raises GuestError if
-    the program on the board fails.
+    seconds: emulated time of each run. A Pico needs six runs, and an ESP32 five, because its stages are not measured.
+    chip: "rp2040" or "esp32".
+
+    Returns the figures by name. A name ends with the figure's unit. Raises GuestError if the program on the board
+    fails.
     """
     plain = loop(seconds, chip)
     modes = {name: loop(seconds, chip, chosen) for name, chosen in _MODES.items()}
@@ -47,7 +52,7 @@ def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
         **plain,
         "chip": chip,
         "stage_us": {name: _spread(us) for name, us in _stages(_run(chip, seconds, detail=True)).items()}
-        if chip == "rp2040"  # on other chips, recording a stage takes longer than the stage
+        if chip == "rp2040"  # on an ESP32, recording the time of a stage takes longer than the stage
         else {},
         "modes": modes,
         "boot": {form: asdict(start(chip, form == "mpy")) for form in ("py", "mpy")},
@@ -93,13 +98,20 @@ def _mode_text(mode: dict[str, Any]) -> str:
 
 
 def start(chip: str, compiled: bool = True) -> boot.Boot:
-    """Measure the time from power-on to the first lean, upright and at rest. compiled: the firmware as .mpy."""
+    """Measure the time from power-on to the first lean. The bike is upright and at rest.
+
+    compiled: True to install the firmware as .mpy files.
+    """
     return boot.boot(device_class(chip), _SENSOR.world(Ride([upright(100.0)]).motion), _calibration(), compiled)
 
 
 def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Measure the costs of the app's loop. seconds: emulated time of the run. chosen: settings by name. The name of
-    each figure ends with its unit."""
+    """Measure the costs of the app's loop.
+
+    seconds: emulated time of the run. chip: "rp2040" or "esp32". chosen: values of settings, by name.
+
+    Returns the figures by name. A name ends with the figure's unit.
+    """
     run = _run(chip, seconds, chosen=chosen)
     figures = run["figures"]
     return {
@@ -119,8 +131,11 @@ def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = Non
 
 
 def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Run the app's loop. seconds: emulated time. chosen: settings by name. Returns the figures and arrays of
-    bench_guest, and the numbers of samples taken and lost.
+    """Run the app's loop on the emulated board.
+
+    seconds: emulated time. detail: True to measure the stages of a turn too. chosen: values of settings, by name.
+
+    Returns the figures and arrays of bench_guest.py, and the numbers of samples that were taken and lost.
     """
     chosen = chosen or {}
     mpy = device_class(chip).MPY
@@ -162,11 +177,11 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
 
 
 def _stages(run: dict[str, Any]) -> dict[str, np.ndarray]:
-    """The time of each stage in each turn in which it ran, us."""
+    """Return the times of each stage in us, one for each turn in which the stage ran."""
     columns = dict(zip(run["figures"]["stages"], run["stages"].T, strict=True))
     sampled = columns["decode and sum"] > 0
     watch = run["figures"]["stopwatch_us"]
-    fetch = columns["fetch"] - 3 * watch  # this stage contains two transfers and add_up()
+    fetch = columns["fetch"] - 3 * watch  # this stage contains three timed calls: two transfers and add_up()
     meter = columns["meter"] - 2 * watch
     stages = {
         "read": columns["read"],
@@ -188,7 +203,7 @@ def _spread(us: np.ndarray) -> dict[str, float]:
 
 
 def _calibration() -> dict[str, bytes]:
-    """Return the calibration files of _SENSOR. The calibration only contains the mounting."""
+    """Return the calibration files of _SENSOR. The calibration contains only the alignment."""
     calibration = Calibration()
     calibration.aligned = True
     for i, value in enumerate(_SENSOR.vehicle_from_sensor):

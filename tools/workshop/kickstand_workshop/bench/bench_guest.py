@@ -11,16 +11,16 @@ from kickstand.settings import Settings
 from machine import mem16
 from uctypes import addressof, bytearray_at
 
-SETTLE_TURNS = 150  # turns before anything is recorded
-# The heap use is recorded after this number of turns without garbage collection. An ESP32's heap is small, and does not
-# grow without collections.
+SETTLE_TURNS = 150  # number of turns before the first turn that is recorded
+# The heap use is recorded after this number of turns without garbage collection. The number is smaller on an ESP32,
+# because its heap is small and only grows during a collection.
 HEAP_TURNS = 3 if sys.platform == "esp32" else 10
 MAX_PAUSES = 2000
 MAX_TURNS_HZ = 200
 
 
 class Config:
-    """The settings of the bench that differ from the defaults. It has the form of config.py."""
+    """The settings of the bench that differ from the defaults, in the form of config.py."""
 
     SAMPLE_HZ = 200
     WATCHDOG = False
@@ -31,9 +31,9 @@ class Done(Exception):
 
 
 class Canary:
-    """A piece of heap without a reference, to detect garbage collections. A freed piece is soon overwritten.
+    """A piece of heap without a reference, to detect garbage collections.
 
-    gc.mem_alloc() would also show a collection, but takes 7 ms.
+    A collection frees the piece, and it is soon overwritten. gc.mem_alloc() also shows collections, but takes 7 ms.
     """
 
     MARK = 0x5AC3
@@ -46,7 +46,7 @@ class Canary:
 
 
 class TimedGc:
-    """Replaces the module gc in the app, to time the collections that the app starts."""
+    """Replaces the module gc in the app, and times the collections that the app starts."""
 
     def __init__(self, app):
         self._app = app
@@ -71,8 +71,11 @@ class MeasuredApp(app_module.App):
     """The app, which records the costs of its turns and stops after a given time."""
 
     def prepare(self, seconds, out, spent):
-        """seconds: recording time. out: a Sink to the host. spent: us of each stage in this turn, or None."""
-        gc.collect()  # otherwise the arrays come after garbage, and lengthen each collection
+        """Prepare the recording.
+
+        seconds: recording time. out: a Sink to the host. spent: array for the us of each stage in a turn, or None.
+        """
+        gc.collect()  # otherwise the arrays are behind garbage in the heap, and lengthen each collection
         turns = seconds * MAX_TURNS_HZ
         self._out, self._spent, self._turns = out, spent, turns
         self._until_us = seconds * 1_000_000
@@ -81,7 +84,7 @@ class MeasuredApp(app_module.App):
         self._spent_bytes = bytearray_at(addressof(spent), 4 * len(spent)) if spent else None
         self.pauses = array("H", bytes(2 * MAX_PAUSES))  # us of each collection that the app started
         self.n_pauses = 0
-        self.automatic = 0  # other collections
+        self.automatic = 0  # number of collections that the app did not start
         self.canary = Canary()
         self.slept_us = 0
 
@@ -97,7 +100,7 @@ class MeasuredApp(app_module.App):
 
     def _begin(self):
         gc.collect()
-        app_module.fill_gaps(app_module.SINGLE_GAPS)  # as the app does
+        app_module.fill_gaps(app_module.SINGLE_GAPS)  # the app does the same after each collection
         self.free_before = gc.mem_free()
         gc.disable()
         self._allocated = gc.mem_alloc()
@@ -115,7 +118,7 @@ class MeasuredApp(app_module.App):
             raise Done
         self.took[turn] = took
         if self._spent:
-            self._out.write(self._spent_bytes)  # written at once: storing it would add to the measured heap
+            self._out.write(self._spent_bytes)  # sent at once, because storing it would add to the measured heap use
             self._clear()
         if self.count == HEAP_TURNS:
             self.heap_bytes = gc.mem_alloc() - self._allocated
@@ -135,8 +138,10 @@ class MeasuredApp(app_module.App):
 
 
 def _attach(app):
-    """Attach a phone that subscribes to everything. The radio is simulated, because a Pico has no radio and an emulated
-    ESP32's radio does not start."""
+    """Attach a phone that subscribes to everything.
+
+    The radio is simulated, because a Pico has no radio, and the radio of an emulated ESP32 does not start.
+    """
     sys.modules["bluetooth"] = __import__("bluetooth_guest")
     from kickstand.live.live import attach
     from kickstand.live.radio import Radio
@@ -146,11 +151,13 @@ def _attach(app):
 
 
 def run(detail, seconds, out, chosen):
-    """Run the app for this time and print one line, a dictionary of figures.
+    """Run the app, and print one line, a dictionary of figures.
 
-    Writes b"begin" to out, b"heap" after HEAP_TURNS, and b"end". Two arrays of 16-bit numbers follow: us of each turn,
-    and us of each collection. detail: True to write the us of each stage after each turn, as 32-bit numbers.
-    chosen: settings by name.
+    detail: True to write the us of each stage to out after each turn, as 32-bit numbers.
+    seconds: recording time.
+    out: a Sink to the host. It receives b"begin", then b"heap" after HEAP_TURNS, and b"end". Two arrays of 16-bit
+        numbers follow: us of each turn, and us of each collection that the app started.
+    chosen: values of settings, by name.
     """
     for name in chosen:
         setattr(Config, name, chosen[name])

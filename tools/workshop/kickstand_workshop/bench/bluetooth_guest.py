@@ -1,5 +1,7 @@
-"""Replaces the module bluetooth on the emulated board and discards all data. A phone is always connected. It subscribes
-to everything at the highest rate."""
+"""Replaces the module bluetooth on the emulated board, and discards all data.
+
+A phone is always connected. It subscribes to everything at the highest rate.
+"""
 
 FASTEST_MS = 40
 

@@ -1,5 +1,7 @@
-"""Measures the parts of the time from reset to the first lean on an emulated board: boot() measures, table() formats
-the result."""
+"""Measures the parts of the time from reset to the first lean on an emulated board.
+
+boot() measures, and table() formats the result.
+"""
 
 import ast
 from collections.abc import Callable, Iterator
@@ -13,9 +15,9 @@ from kickstand_tools.common import firmware_path
 from rich.table import Table
 
 _LIMIT_S = 10.0
-_ROWS = 10  # modules in the table
+_ROWS = 10  # number of modules in the table
 
-# Each module is imported after its own imports. So its time does not contain theirs.
+# Each module is imported after the modules that it imports. So its time does not contain their times.
 _GUEST = """
 from time import ticks_diff, ticks_us
 took = []
@@ -29,9 +31,14 @@ print("took", took)
 
 @dataclass(frozen=True)
 class Boot:
-    """Seconds since power-on. micropython_s: main.py begins. starting_s: the display says that Kickstand starts.
-    sampling_s: the sensor is set up and samples. lean_s: the display shows the first lean. import_s: seconds for each
-    module."""
+    """The parts of a start. All times but the last count from power-on.
+
+    micropython_s: Time at which main.py begins.
+    starting_s: Time at which the display says that Kickstand starts.
+    sampling_s: Time at which the sensor is set up and samples.
+    lean_s: Time at which the display shows the first lean.
+    import_s: Time for importing each module, by its name.
+    """
 
     micropython_s: float
     starting_s: float
@@ -41,9 +48,15 @@ class Boot:
 
 
 def boot(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes], compiled: bool = True) -> Boot:
-    """Measure the parts of the start. kind: the board. world: as for a Device, upright and at rest. files: the
-    calibration files of the board. compiled: True for the firmware as .mpy. Raises NotReached if the display shows no
-    lean within 10 s."""
+    """Measure the parts of the start.
+
+    kind: Class of the emulated board.
+    world: Motion of the board, as for EmulatedDevice. It must be upright and at rest.
+    files: Calibration files of the board.
+    compiled: True to install the firmware as .mpy files.
+
+    Raises NotReached if the display shows no lean within 10 s.
+    """
     board_files = flash_image.firmware(compiled, kind.MPY) | files
     with kind(world, board_files) as device:
         device.run_until(lambda: device.lcd()[1].startswith("starting"), _LIMIT_S, 0.001)
@@ -56,7 +69,7 @@ def boot(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes], c
 
 
 def table(result: dict[str, Any]) -> Table:
-    """Format the result for a terminal. result: the values of a Boot by name."""
+    """Format the result for a terminal. result: the fields of a Boot, by name."""
     rows = Table(title="From reset to the first lean, compiled: emulated ms")
     rows.add_column("what")
     rows.add_column("at", justify="right")
@@ -74,10 +87,10 @@ def table(result: dict[str, Any]) -> Table:
 
 
 def _micropython_s(kind: Kind, files: dict[str, bytes]) -> float:
-    """Time until MicroPython runs main.py, s."""
+    """Measure the time until MicroPython runs main.py, in s."""
     begun: list[bytes] = []
     with kind(files={**files, "/main.py": f"{kind.SINK}Sink().write(b'main')\n".encode()}) as device:
-        device.listen(begun.append)  # not over USB on a Pico: USB starts later than main.py
+        device.listen(begun.append)  # on a Pico this does not use USB, which starts later than main.py
         device.run_until(lambda: begun, _LIMIT_S, 0.001)
         return device.time_s
 
@@ -93,7 +106,7 @@ def _imports(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes
 
 
 def in_order(name: str, found: list[str]) -> list[str]:
-    """Append the module and its imports to found, each module after its own imports. Return found."""
+    """Append a module to found, after the modules that it imports. Returns found."""
     for other in _imported(name):
         if other not in found:
             in_order(other, found)
@@ -103,7 +116,7 @@ def in_order(name: str, found: list[str]) -> list[str]:
 
 
 def _imported(name: str) -> Iterator[str]:
-    """The firmware's modules that this one imports at its top level."""
+    """Yield the firmware's modules that this module imports at its top level."""
     path = _path(name)
     package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
     for node in ast.parse(path.read_text(encoding="utf-8")).body:

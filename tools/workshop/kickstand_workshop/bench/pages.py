@@ -1,6 +1,8 @@
-"""Measures the size of the site's pages, and their loading time on a phone with a quarter of this computer's speed:
+"""Measures the size of the site's pages, and their loading time on a phone with a quarter of this computer's speed.
 
-.venv/bin/python -m kickstand_workshop.bench.pages
+Run it with
+
+    .venv/bin/python -m kickstand_workshop.bench.pages
 """
 
 import gzip
@@ -13,7 +15,7 @@ from kickstand_tools.web import site
 from ..browser import CHROMIUM, opened
 
 PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
-READY = {  # {page: the element that is usable when the page is ready}
+READY = {  # selectors of the element that is usable when the page is ready, by page
     "": "#kind:enabled",  # the firmware has started
     "install.html": "#look:visible, #unable:visible",
     "live.html": "#simulated:enabled",
@@ -25,8 +27,12 @@ _PAINT = "performance.getEntriesByName('first-contentful-paint')[0].startTime"
 
 
 class PageFigures(NamedTuple):
-    """Figures of a page that is opened for the first time. size: bytes of the compressed files that the page loads
-    until it is ready."""
+    """The figures of a page that is opened for the first time.
+
+    paint_ms: Time until the first paint.
+    ready_ms: Time until the page can be used.
+    size: Bytes of the compressed files that the page loads until it is ready.
+    """
 
     paint_ms: float
     ready_ms: float
@@ -34,7 +40,13 @@ class PageFigures(NamedTuple):
 
 
 def measure(browser: Any, address: str, files: dict[str, bytes], name: str) -> PageFigures:
-    """Open the page and measure it. name: a key of READY. address: of a server of the site. files: the site's files."""
+    """Open a page and measure it.
+
+    browser: playwright's browser.
+    address: Address of a server of the site.
+    files: Files of the site.
+    name: The page, a key of READY.
+    """
     context = browser.new_context(service_workers="block", **PHONE)
     asked: set[str] = set()
     context.on("request", lambda request: asked.add(request.url.removeprefix(address)))
@@ -50,7 +62,7 @@ def measure(browser: Any, address: str, files: dict[str, bytes], name: str) -> P
 
 
 def main() -> None:
-    """Print the medians of RUNS."""
+    """Measure each page RUNS times, and print the medians."""
     if CHROMIUM is None:
         sys.exit("no Chromium: on Debian the package chromium")
     files = site.site_files()

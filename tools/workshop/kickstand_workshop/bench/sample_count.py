@@ -1,4 +1,4 @@
-"""Counts the samples of the simulated sensor, and those that are lost unread."""
+"""Counts the samples of the simulated sensor, and the samples that are lost before the board reads them."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ from kickstand_tools.simulated_board.mpu6050 import ACCEL_XOUT_H, Mpu6050
 
 
 class SampleCount:
-    """Counts for one sensor, which may be read through its data registers or through its FIFO."""
+    """Counts the samples of one sensor. The board may read the data registers or the FIFO."""
 
     def __init__(self, sensor: Mpu6050) -> None:
         self._sensor: Any = sensor
@@ -17,23 +17,23 @@ class SampleCount:
         self._read: set[int] = set()
 
     def begin(self) -> None:
-        """Count from here."""
+        """Begin to count."""
         self._sensor._update()
         self._first, self._waiting = self._sensor._next, self._sensor.fifo.count
         self._popped = 0
         self._read = set()
 
     def taken(self) -> int:
-        """Samples the sensor took."""
+        """Return the number of samples that the sensor has taken."""
         self._sensor._update()
         return self._sensor._next - self._first
 
     def delivered(self) -> int:
-        """Samples that were read."""
+        """Return the number of samples that the board has read."""
         return self._popped // (len(self._sensor._fifo_registers) or 1) or len(self._read)
 
     def lost(self) -> int:
-        """Samples that were overwritten, pushed out of the FIFO or cleared with it, before they were read."""
+        """Return the number of samples that are lost: overwritten, or removed from the FIFO before they were read."""
         taken = self.taken()  # called first, because it updates the FIFO
         frame = len(self._sensor._fifo_registers)
         if frame:

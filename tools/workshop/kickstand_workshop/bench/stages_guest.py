@@ -1,4 +1,4 @@
-"""Times the stages of the app's loop on the emulated Pico. Imported only for a run with detail."""
+"""Times the stages of the app's loop on the emulated Pico. bench_guest.py imports it only for a run with detail."""
 
 from array import array
 from time import ticks_diff, ticks_us
@@ -14,11 +14,11 @@ STAGES = (
     ("display", "board.display", "Display", "tick(self, now_ms)"),
 )
 WITHOUT_RESULT = ("apply_sum", "tick")  # methods that return nothing
-BUS = len(STAGES)  # one column more: the sensor's transfers
+BUS = len(STAGES)  # index of an additional column for the sensor's transfers
 COLUMNS = BUS + 1
 
-# The wrapper has no *arguments and few locals. Both would use heap, and the measured allocations would take longer to
-# find free heap.
+# The wrapper has no *arguments and few local variables. Both would use heap, so the allocations of the measured code
+# would take longer.
 _TIMED = """
 def {name}({parameters}):
     begin({i})
@@ -29,7 +29,7 @@ def {name}({parameters}):
 
 
 class TimedBus:
-    """A bus whose transfers are timed."""
+    """An I2C bus that times its transfers."""
 
     def __init__(self, i2c, spent):
         self._i2c = i2c
@@ -60,7 +60,7 @@ def time_stages(spent):
 
 
 def stopwatch_us(spent):
-    """The additional time of a timed call, us."""
+    """Measure by how much a stopwatch lengthens a call, in us."""
 
     def function(self, n):
         pass

@@ -1,6 +1,8 @@
-"""Compares the firmware's shown lean, and other estimators, with the true lean: on simulated rides, whose lean is
-known, and on a recorded one. `kickstand evaluate` prints the results.
+"""Compares the lean that the firmware shows, and the lean of other estimators, with the true lean.
 
-from kickstand_workshop.evaluation.runs import Job, run
-print(run(Job("street", seed=1)).scores["kickstand"].rms_deg)
+The true lean of simulated rides is known. For a recorded ride it is estimated. `kickstand evaluate` prints the results.
+For example:
+
+    from kickstand_workshop.evaluation.runs import Job, run
+    print(run(Job("street", seed=1)).scores["kickstand"].rms_deg)
 """

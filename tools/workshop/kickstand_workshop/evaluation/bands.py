@@ -1,4 +1,4 @@
-"""Measures the roughness of simulated and recorded rides: rms by frequency band."""
+"""Measures the roughness of simulated and recorded rides, as the rms in each frequency band."""
 
 from pathlib import Path
 
@@ -16,14 +16,18 @@ BANDS_HZ = ((0.03, 0.1), (0.1, 0.3), (0.3, 1.0), (1.0, 3.0), (3.0, 10.0))
 QUANTITIES = ("vertical, g", "sideways, g", "pitch rate, deg/s", "yaw rate, deg/s", "roll rate, deg/s")
 _GRID_HZ = 50.0
 _LEAST_S = 2.0 / BANDS_HZ[0][0]
-_RIDING_DPS = 5.0  # a standing bike does not turn so fast
+_RIDING_DPS = 5.0  # a standing bike turns more slowly than this
 
 Figures = dict[str, NDArray[np.float64]]
 
 
 def bands_of(force_g: NDArray[np.float64], rate_dps: NDArray[np.float64], rate_hz: float) -> Figures:
-    """Return the rms in each band (len(BANDS_HZ)) for each of QUANTITIES. force_g, rate_dps: (n, 3) along left, up,
-    forward, evenly spaced."""
+    """Return the rms in each of BANDS_HZ, for each of QUANTITIES.
+
+    force_g: Evenly spaced forces along left, up, forward, shape (n, 3).
+    rate_dps: Rates about the same axes, shape (n, 3).
+    rate_hz: Number of samples per second.
+    """
     columns = force_g[:, 1], force_g[:, 0], *rate_dps.T
     window = np.hanning(len(force_g))
     frequency = np.fft.rfftfreq(len(force_g), 1.0 / rate_hz)
@@ -36,7 +40,10 @@ def bands_of(force_g: NDArray[np.float64], rate_dps: NDArray[np.float64], rate_h
 
 
 def bands_of_log(log: Log, calibration: CalibrationFile) -> Figures:
-    """Return the bands of a log, from the start of riding to its end. Raises InputError if the ride is too short."""
+    """Return the rms in each band for a log, from the start to the end of riding.
+
+    Raises InputError if the ride is too short.
+    """
     step = 1.0 / _GRID_HZ
     time = np.arange(log.t_s[0], log.t_s[-1], step)
     force, rate = calibration.in_vehicle(log.readings)
@@ -58,20 +65,23 @@ def bands_of_log(log: Log, calibration: CalibrationFile) -> Figures:
 
 
 def of_recording(path: Path) -> Figures:
-    """Return the bands of a recorded ride. The alignment is found from the same ride. Raises InputError."""
+    """Return the rms in each band for a recorded ride. The alignment is computed from the same ride.
+
+    Raises InputError if the log cannot be used.
+    """
     log = read_log(path)
     return bands_of_log(log, fit_ride(log).calibration)
 
 
 def of_simulated(profile: str, seed: int, seconds: float, road: str | None, mount: str | None) -> Figures:
-    """The bands of a simulated ride, with its true alignment."""
+    """Return the rms in each band for a simulated ride, with its true alignment."""
     made = ride(profile, seed, seconds, road=road, mount=mount)
     calibration = CalibrationFile(vehicle_from_sensor=made.vehicle_from_sensor, aligned=True)
     return bands_of_log(Log.from_readings(made.readings, made.rate_hz, "RIDE.csv"), calibration)
 
 
 def table(found: dict[str, Figures]) -> Table:
-    """Return a table with a block of lines per quantity. found: bands by the name of the ride."""
+    """Return a table with a block of lines for each quantity. found: the rms in each band, by the name of the ride."""
     made = Table(title="rms by band of frequency, Hz", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     made.add_column("ride", overflow="fold")
     for low, high in BANDS_HZ:

@@ -1,9 +1,11 @@
-"""The compared estimators: the firmware's own lean, the lean smoothed after the ride, and filters of hobby projects and
-of the literature.
+"""The estimators that are compared: the firmware's lean filter, the smoother, and other lean filters.
 
-Each takes Samples and returns the lean in degrees of every sample, > 0 to the right. The filters of the packages
-`ahrs`, `vqf` and `imufusion` run twice: with their authors' default gains, and ("best") with tuned gains. The tuned
-gains have the least error on a ride of each profile with another seed (20). These filters start from the first reading.
+The other filters come from hobby projects and from the literature. Each filter takes Samples, and returns the lean of
+every sample in degrees, positive to the right.
+
+The filters of the packages `ahrs`, `vqf` and `imufusion` run twice: with the default gains of their authors, and with
+tuned gains under the name "... best". The tuned gains have the least error on one ride of each profile with the seed
+20, which is not used in the comparison. These filters start from the first reading.
 """
 
 from collections.abc import Callable
@@ -20,18 +22,22 @@ from kickstand_tools.replay import replay_engine
 from numpy.typing import NDArray
 
 AVERAGE_S = 0.3  # averaging time of the formula's lean
-COMPLEMENTARY = 0.98  # weight of the integrated lean at each sample; the rest is for the direction of the force
+COMPLEMENTARY = 0.98  # weight of the integrated lean at each sample. The force's direction has the remaining weight
 
 _SHOWN, _FORMULA = (replay_engine.COLUMNS.index(name) for name in ("lean_deg", "lean_formula_deg"))
-_TO_XYZ = [2, 0, 1]  # left, up, forward to forward, left, up: the body frame of ahrs and vqf
+_TO_XYZ = [2, 0, 1]  # reorders left, up, forward to forward, left, up, the order of ahrs and vqf
 PACKAGES = {"mahony": "ahrs", "madgwick": "ahrs", "vqf": "vqf", "fusion": "imufusion"}
 PACKAGES |= {f"{name} best": package for name, package in PACKAGES.items()}
 
 
 @dataclass
 class Samples:
-    """A calibrated log: time (N,) in s, evenly spaced; force (N, 3) in g and rate (N, 3) in deg/s along left, up,
-    forward."""
+    """N calibrated samples of a log.
+
+    time: Evenly spaced times, shape (N), in s.
+    force: Force along left, up, forward, shape (N, 3), in g.
+    rate: Rate about the same axes, shape (N, 3), in deg/s.
+    """
 
     time: NDArray[np.float64]
     force: NDArray[np.float64]
@@ -43,12 +49,12 @@ class Samples:
 
 
 def calibrated(log: Log, calibration: CalibrationFile) -> Samples:
-    """Return the calibrated samples of a log, the same for all estimators."""
+    """Return the calibrated samples of a log. All estimators get the same samples."""
     return Samples(log.t_s, *calibration.in_vehicle(log.readings))
 
 
 def trailing_mean(x: NDArray, seconds: float, rate_hz: float) -> NDArray[np.float64]:
-    """Mean over the last `seconds`. At the start the window is shorter."""
+    """Return the mean over the last `seconds` at each sample. At the start the window is shorter."""
     n = max(round(seconds * rate_hz), 1)
     total = np.cumsum(np.concatenate((np.zeros((1, *x.shape[1:])), x)), axis=0)
     first = np.maximum(np.arange(1, len(x) + 1) - n, 0)
@@ -57,7 +63,7 @@ def trailing_mean(x: NDArray, seconds: float, rate_hz: float) -> NDArray[np.floa
 
 
 def complementary(samples: Samples) -> NDArray[np.float64]:
-    """The filter of most hobby projects: the integrated roll rate, pulled towards the direction of the force."""
+    """Run the filter of most hobby projects. It integrates the roll rate, and corrects it by the force's direction."""
     leaned = np.degrees(np.arctan2(samples.force[:, 0], samples.force[:, 1]))
     step = samples.rate[:, 2] / samples.rate_hz
     result = np.empty_like(leaned)
@@ -83,7 +89,7 @@ def vqf(samples: Samples, tau_s: float = 3.0) -> NDArray[np.float64]:
 
 
 def fusion(samples: Samples, **settings: float) -> NDArray[np.float64]:
-    """x-io's Fusion."""
+    """Run the filter Fusion of x-io."""
     import imufusion
 
     gyro, accel = _xyz(samples)
@@ -114,13 +120,15 @@ OTHERS: dict[str, Callable[[Samples], NDArray[np.float64]]] = {
 
 
 def missing() -> list[str]:
-    """Return the packages that are not installed. estimate() leaves out their filters."""
+    """Return the names of the packages that are not installed. estimate() leaves out their filters."""
     return sorted({package for package in PACKAGES.values() if find_spec(package) is None})
 
 
 def estimate(log: Log, calibration: CalibrationFile) -> dict[str, NDArray[np.float64]]:
-    """Return the lean in degrees, > 0 to the right, by the name of each installed estimator. None of them uses the
-    log's speed."""
+    """Run each installed estimator over a log, without the log's speed.
+
+    Returns the lean in degrees, positive to the right, by the name of the estimator.
+    """
     engine = replay_engine.Replay(calibration.to_firmware())
     shown, formula = np.empty(len(log.t_s)), np.empty(len(log.t_s))
     for i, (time_us, reading, _) in enumerate(log.rows()):
@@ -138,12 +146,20 @@ def estimate(log: Log, calibration: CalibrationFile) -> dict[str, NDArray[np.flo
 
 
 def _xyz(samples: Samples) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Rates in rad/s and force in m/s^2, both (N, 3) along forward, left, up."""
+    """Return rates and forces in the axes forward, left, up.
+
+    Returns:
+        The rates, shape (N, 3), in rad/s.
+        The forces, shape (N, 3), in m/s^2.
+    """
     gyro = np.ascontiguousarray(np.radians(samples.rate[:, _TO_XYZ]))
     return gyro, np.ascontiguousarray(samples.force[:, _TO_XYZ] * STANDARD_GRAVITY)
 
 
 def _roll(q: NDArray) -> NDArray[np.float64]:
-    """Lean in degrees from body-to-earth quaternions (N, 4: w, x, y, z); body axes forward, left, up."""
+    """Compute the lean from quaternions, in degrees.
+
+    q: rotations from body to earth, shape (N, 4), in the order w, x, y, z. The body axes are forward, left, up.
+    """
     w, x, y, z = q.T
     return np.degrees(np.arctan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)))

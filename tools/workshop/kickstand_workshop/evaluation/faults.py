@@ -1,7 +1,10 @@
-"""Lists the faults that a sensor may have in a ride. Each fault is a function that changes readings.
+"""Lists the faults that a sensor may have during a ride. Each fault has a function that changes readings.
 
-There are three kinds of faults. SEEN: counts and registers show the fault (an axis is dead, in standby or at the end of
-its range). ILL: the fault only shows when readings contradict each other. HARMLESS: the lean stays nearly right.
+There are three kinds of faults:
+
+SEEN: The sensor's counts and registers show the fault. An axis is dead, in standby or at the end of its range.
+ILL: The fault only shows when readings contradict each other.
+HARMLESS: The lean stays nearly right.
 """
 
 from collections.abc import Callable, Iterator
@@ -19,9 +22,16 @@ ACCEL_RANGE_G, GYRO_RANGE_DPS = 16.0, 500.0  # the board's defaults
 
 @dataclass
 class Part:
-    """The readings while a fault lasts: force (n, 3, g) and rate (n, 3, deg/s) in the chip's axes, to be changed in
-    place; lost (n): True for readings that never arrive. rate_hz: rate of the readings. axis: index of the axis with
-    the fault, for faults of one axis. sign: 1 or -1."""
+    """The n readings while a fault lasts. A fault changes the first three arrays in place.
+
+    force: Force in the chip's axes, shape (n, 3), in g.
+    rate: Rate in the chip's axes, shape (n, 3), in deg/s.
+    lost: True for readings that never arrive, shape (n).
+    rate_hz: Number of readings per second.
+    axis: Index of the faulty axis, for a fault of one axis.
+    sign: Direction of the fault, 1 or -1.
+    chance: Source of random numbers.
+    """
 
     force: Array
     rate: Array
@@ -34,8 +44,14 @@ class Part:
 
 @dataclass(frozen=True)
 class Fault:
-    """change: applies the fault to a Part. seconds: duration of the fault, None for one that lasts to the end of the
-    ride. from_start: True if the fault exists from power-on. Otherwise it begins in mid-ride."""
+    """A fault of the sensor.
+
+    name: Description of the fault.
+    kind: SEEN, ILL or HARMLESS.
+    change: Function that applies the fault to a Part.
+    seconds: Duration of the fault. None if it lasts until the end of the ride.
+    from_start: True if the fault exists from power-on. False if it begins in mid-ride.
+    """
 
     name: str
     kind: str
@@ -45,7 +61,7 @@ class Fault:
 
     @property
     def title(self) -> str:
-        """Its name and its time."""
+        """The name of the fault, and its duration or its beginning."""
         if self.from_start:
             return f"{self.name}, from power-on"
         return self.name if self.seconds is None else f"{self.name}, {self.seconds:g} s"
@@ -97,7 +113,7 @@ def _gyro_bias_drifts(part: Part, dps: float) -> None:
 
 
 def _mount_slips(part: Part, degrees: float) -> None:
-    """Rotate the readings about one of the chip's axes. They are the bike's axes if the chip is mounted square."""
+    """Rotate the readings about one of the chip's axes. If the chip is mounted square, this is an axis of the bike."""
     turned = rotation_matrix(np.radians(part.sign * degrees) * np.eye(3)[part.axis])
     part.force[:] = part.force @ turned
     part.rate[:] = part.rate @ turned
@@ -120,7 +136,7 @@ def _accel_clipped(part: Part, g: float) -> None:
 
 
 def _accel_clipped_now_and_then(part: Part) -> None:
-    """Clip a tenth of a second every five seconds, like blows that reach the end of a small range."""
+    """Clip the force for 0.1 s every five seconds, like blows that exceed a small range."""
     for start in range(0, len(part.force), round(5.0 * part.rate_hz)):
         end = start + round(0.1 * part.rate_hz)
         part.force[start:end] = (part.force[start:end] + 2.0 * part.chance.standard_normal(3)).clip(-2.0, 2.0)
@@ -136,7 +152,7 @@ def _gyro_axis_noisy(part: Part, dps: float) -> None:
 
 
 def _mount_swings(part: Part, degrees: float, hz: float) -> None:
-    """Swing about one axis, as on a loose bracket."""
+    """Let the sensor swing about one axis, as on a loose bracket."""
     phase = 2.0 * np.pi * hz * np.arange(len(part.force)) / part.rate_hz
     part.rate[:, part.axis] += degrees * 2.0 * np.pi * hz * np.cos(phase)
     angle = np.radians(degrees) * np.sin(phase)
@@ -149,13 +165,13 @@ def _readings_lost(part: Part) -> None:
 
 
 def _readings_lost_now_and_then(part: Part) -> None:
-    """Lose readings for 0.3 s, every ten seconds."""
+    """Lose the readings of 0.3 s every ten seconds."""
     every, n = round(10.0 * part.rate_hz), round(0.3 * part.rate_hz)
     part.lost[np.arange(len(part.lost)) % every < n] = True
 
 
 def _all(name: str, kind: str, change: Callable[[Part], None]) -> Iterator[Fault]:
-    """Yield a fault from power-on, from mid-ride to the end, and for 5 s."""
+    """Yield three faults with this change: from power-on, from mid-ride to the end, and for 5 s."""
     yield Fault(name, kind, change, from_start=True)
     yield Fault(name, kind, change)
     yield Fault(name, kind, change, seconds=5.0)
@@ -201,7 +217,13 @@ FAULTS: tuple[Fault, ...] = (
 
 @dataclass
 class Ill:
-    """Readings (n, 7) in the chip's order, lost (n), and first and end: the span in which the fault lasts."""
+    """The readings of a ride with a fault.
+
+    readings: Readings in the chip's order, shape (n, 7).
+    lost: True for readings that never arrive, shape (n).
+    first: Index of the first reading with the fault.
+    end: Index after the last reading with the fault.
+    """
 
     readings: Array
     lost: NDArray[np.bool_]
@@ -210,16 +232,23 @@ class Ill:
 
     @property
     def saturated(self) -> NDArray[np.bool_]:
-        """(n) True where an axis is at the end of its range: the driver treats such a reading as lost."""
+        """True for each reading with an axis at the end of its range. The driver treats these readings as lost."""
         force, rate = np.abs(self.readings[:, :3]), np.abs(self.readings[:, 4:])
         return np.any(np.hstack((force >= ACCEL_RANGE_G, rate >= GYRO_RANGE_DPS)), axis=1)
 
 
 def apply(fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: int, vehicle_from_sensor: Array) -> Ill:
-    """A copy of the readings with the fault. begin_s: start of a fault that does not exist from power-on.
+    """Return a copy of the readings with the fault.
 
-    The seed chooses the axis, the sign, and whether the chip is mounted square. The axes of a square chip are the
-    bike's.
+    The seed chooses the faulty axis, the sign, and whether the chip is mounted square. A square chip has the same axes
+    as the bike.
+
+    fault: The fault.
+    readings: Readings in the chip's order, shape (n, 7).
+    rate_hz: Number of readings per second.
+    begin_s: Start of a fault that begins in mid-ride.
+    seed: The seed.
+    vehicle_from_sensor: Rotation from sensor to bike axes, shape (3, 3).
     """
     chance = np.random.default_rng([seed, *fault.title.encode()])
     made = readings.copy()
@@ -227,7 +256,7 @@ def apply(fault: Fault, readings: Array, rate_hz: float, begin_s: float, seed: i
     first = 0 if fault.from_start else round(begin_s * rate_hz)
     end = len(made) if fault.seconds is None else min(len(made), first + round(fault.seconds * rate_hz))
     span = slice(first, end)
-    # A fault that is visible in the counts must be in the chip's own axes
+    # A fault of the kind SEEN must be in the chip's own axes, otherwise the counts would not show it
     square = seed // 3 % 2 == 0 and fault.kind != SEEN
     turned = vehicle_from_sensor if square else np.eye(3)
     part = Part(

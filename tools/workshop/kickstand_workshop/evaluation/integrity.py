@@ -1,8 +1,7 @@
-"""Tests whether the meter ever shows a wrong lean as good. It runs the firmware's meter over simulated rides with each
-fault.
+"""Tests whether the lean meter ever shows a wrong lean as good. It runs over simulated rides with each fault.
 
-The result is judged as in aviation: at each instant a lean is good (shown and right), hidden, or misleading. A lean is
-right if its error is at most WRONG_DEG. A wrong lean counts as misleading after it was shown for STANDS_S.
+The result is judged as in aviation. At each instant a lean is good (shown and right), hidden, or misleading. A lean is
+right if its error is at most WRONG_DEG. A wrong lean counts as misleading if it is shown for over STANDS_S.
 """
 
 from collections.abc import Callable
@@ -29,19 +28,27 @@ Array = NDArray[np.float64]
 WRONG_DEG = 8.0
 STANDS_S = 1.0
 RECOVERY_S = 10.0
-TURN = 2  # readings per turn of the loop
+TURN = 2  # number of readings in one turn of the app's loop
 GPS_LATE_S = 0.4
 PROFILES = "street", "track", "hills", "city", "sweeper"
-SIGMA_EDGES = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0])  # degrees, claimed
-# Classes of claimed accuracy. "display" is the class of a displayed lean, which has no sigma
+SIGMA_EDGES = np.array([0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0])  # edges of the classes of claimed sigma, degrees
+# Classes of claimed accuracy. "display" is for the lean on the display of the whole device, which shows no sigma
 CLAIMS = [f"{low:g}-{high:g}" for low, high in pairwise(SIGMA_EDGES)] + ["display", "hidden"]
-ERROR_EDGES = np.array([0.0, 1.0, 2.0, 3.0, 5.0, WRONG_DEG, 12.0, 20.0, 40.0, 180.0])  # degrees
+ERROR_EDGES = np.array([0.0, 1.0, 2.0, 3.0, 5.0, WRONG_DEG, 12.0, 20.0, 40.0, 180.0])  # edges of error classes, degrees
 
 
 @dataclass(frozen=True)
 class FaultJob:
-    """A ride with a fault, or without one. road, mount: as for simulation.ride.ride(). profile: None if the seed
-    chooses it from PROFILES. device: True to run the whole device, False for only the meter."""
+    """A ride to simulate, with or without a fault.
+
+    fault: The fault, or None.
+    seed: Seed of the ride and of the fault.
+    seconds: Riding time.
+    road: Class of the road, as for simulation.ride.ride().
+    mount: Fault of the mount, as for simulation.ride.ride().
+    profile: Profile of the ride. None lets the seed choose it from PROFILES.
+    device: True to run the whole device, False to run only the lean meter.
+    """
 
     fault: Fault | None
     seed: int
@@ -53,7 +60,7 @@ class FaultJob:
 
     @property
     def gps(self) -> bool:
-        """True for every fourth ride. Its speed comes late and once per second, as from GPS."""
+        """True for every fourth ride. These rides have a speed, late and once per second, as from a GPS receiver."""
         return self.seed % 4 == 3
 
     @property
@@ -65,9 +72,18 @@ class FaultJob:
 
 @dataclass
 class Trace:
-    """A ride as shown, one entry per turn of the loop (n): time (s), lean and sigma (degrees), shown, true lean
-    (degrees), speed (m/s). named_s: time at which a fault was named, or NaN. first_s, end_s: start and end of the
-    fault."""
+    """What the rider saw during a ride, and the truth. The arrays have one entry per turn of the loop, shape (n).
+
+    time: In s.
+    lean: Lean of the meter, in degrees.
+    sigma: Standard deviation that the meter claims, in degrees.
+    shown: True if the lean is shown.
+    true: True lean, in degrees.
+    speed: In m/s.
+    named_s: Time at which the display named a fault, or NaN.
+    first_s: Start of the fault.
+    end_s: End of the fault.
+    """
 
     time: Array
     lean: Array
@@ -82,12 +98,16 @@ class Trace:
 
 @dataclass
 class Outcome:
-    """The result of a ride. Only the time from setting off counts.
+    """The result of a ride. Only the time after the bike set off counts.
 
-    misleading_s: time with a misleading lean. hidden, available: shares of the riding time. hidden_after_s,
-    named_after_s: since the fault's start, NaN for never. recovered: True if the lean is right RECOVERY_S after the
-    fault ends, None for a fault that does not end. diagram: seconds (len(CLAIMS), len(ERROR_EDGES) - 1) for each claim
-    and error.
+    job: The ride.
+    misleading_s: Time with a misleading lean.
+    longest_s: Longest single stretch with a misleading lean.
+    available: Share of the riding time in which a lean is shown.
+    hidden_after_s: Time from the start of the fault until the lean is hidden. NaN if it is never hidden.
+    named_after_s: Time from the start of the fault until the display names the fault. NaN if it never does.
+    recovered: True if the lean is right RECOVERY_S after the fault ends. None for a fault that does not end.
+    diagram: Seconds in each class of CLAIMS and each class of ERROR_EDGES, shape (len(CLAIMS), len(ERROR_EDGES) - 1).
     """
 
     job: FaultJob
@@ -101,7 +121,7 @@ class Outcome:
 
 
 def stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return (first, end) of each run of True."""
+    """Find the runs of True in the mask. Returns for each the index of its first entry and the index after its last."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
@@ -150,12 +170,12 @@ def _made(
     made = ride(profile, seed, seconds, road=road, mount=mount)
     try:
         return made, calibrated_by_poses(made)
-    except InputError:  # some sensors' cross-axis errors exceed the limit for the slanted pose
+    except InputError:  # the slanted pose refuses sensors with large cross-axis errors
         return made, calibrated_by_poses(replace(made, poses=made.poses[:6]))
 
 
 def follow(job: FaultJob) -> Trace:
-    """Simulate the job's ride and return it as shown."""
+    """Simulate the job's ride, and return what the rider saw."""
     made, calibration = _made(
         job.profile or PROFILES[job.seed % len(PROFILES)], job.seed, job.seconds, job.road, job.mount
     )
@@ -164,7 +184,7 @@ def follow(job: FaultJob) -> Trace:
 
 
 def _ill(job: FaultJob, readings: Array, rate_hz: float, calibration: CalibrationFile) -> Ill:
-    """The readings with the job's fault."""
+    """Return the readings with the job's fault."""
     if not job.fault:
         return Ill(readings, np.zeros(len(readings), dtype=bool), 0, len(readings))
     begin_s = (0.35 + 0.2 * (job.seed * 0.618 % 1.0)) * len(readings) / rate_hz
@@ -174,7 +194,10 @@ def _ill(job: FaultJob, readings: Array, rate_hz: float, calibration: Calibratio
 def device_trace_of(
     job: FaultJob, readings: Array, rate_hz: float, calibration: CalibrationFile, true: Array, speed: Array
 ) -> Trace:
-    """trace_of() for the whole device, one entry per tenth of a second; sigma is NaN."""
+    """Run the whole device over any ride. The arguments are those of trace_of().
+
+    The Trace has ten entries per second. Its sigma is NaN, because the display shows none.
+    """
     ill = _ill(job, readings, rate_hz, calibration)
     end = len(readings) - 1
 
@@ -192,8 +215,15 @@ def device_trace_of(
 def trace_of(
     job: FaultJob, readings: Array, rate_hz: float, calibration: CalibrationFile, true: Array, speed: Array
 ) -> Trace:
-    """Run only the firmware's meter, without the driver, over any ride: readings (n, 7) in the chip's order, true lean
-    (n, degrees) and speed (n, m/s)."""
+    """Run only the firmware's lean meter, without the driver, over any ride.
+
+    job: The fault, and whether the ride has a speed.
+    readings: Readings in the chip's order, shape (n, 7).
+    rate_hz: Number of readings per second.
+    calibration: Calibration of the sensor.
+    true: True lean, shape (n), in degrees.
+    speed: True speed, shape (n), in m/s.
+    """
     ill = _ill(job, readings, rate_hz, calibration)
     readings, lost, first, end = ill.readings, ill.lost | ill.saturated, ill.first, ill.end
     force, rate = calibration.in_vehicle(readings)
@@ -228,14 +258,16 @@ def trace_of(
 
 
 def run(job: FaultJob) -> Outcome:
-    """follow() and judge()."""
+    """Simulate the job's ride, and judge the lean that the rider saw."""
     return judge(job, follow(job))
 
 
 def jobs(seeds: int, first_seed: int = 0, seconds: float = 120.0, device: bool = False) -> list[FaultJob]:
-    """Return the jobs: for each seed, rides without a fault on good and bad mounts and roads, and one ride with each
-    fault. device: True to run all on the whole device. Otherwise only rides with a fault that the driver sees run on
-    it."""
+    """Return the jobs for each seed: rides without a fault on good and bad mounts and roads, and one ride per fault.
+
+    device: True runs all rides on the whole device. False runs only rides with a fault of the kind SEEN on the whole
+    device, and the others on the lean meter alone.
+    """
     numbers = range(first_seed, first_seed + seeds)
     conditions: list[tuple[str | None, str | None]] = [(None, None), *[(None, road) for road in CLASSES]]
     conditions += [(mount, None) for mount in MOUNTS]
@@ -248,13 +280,16 @@ def jobs(seeds: int, first_seed: int = 0, seconds: float = 120.0, device: bool =
 
 
 def evaluate(jobs: list[FaultJob], done: Callable[[], None] = lambda: None) -> list[Outcome]:
-    """run() for each job, on all processors, in the order of the jobs. done(): called after each."""
+    """Run all jobs on all processors. Returns the outcomes in the order of the jobs.
+
+    done: function that is called after each job.
+    """
 
     def ride_of(k: int) -> tuple[int | str, ...]:
         job = jobs[k]
         return (job.seed, str(job.profile), str(job.road), str(job.mount))
 
-    order = sorted(range(len(jobs)), key=ride_of)  # jobs of the same ride are adjacent, so the ride is simulated once
+    order = sorted(range(len(jobs)), key=ride_of)  # jobs with the same ride are adjacent, so _made() can reuse the ride
     found: dict[int, Outcome] = {}
     for k, outcome in zip(order, on_all_processors(run, [jobs[k] for k in order], chunk=8), strict=True):
         found[k] = outcome

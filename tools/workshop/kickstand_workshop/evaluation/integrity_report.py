@@ -1,6 +1,6 @@
-"""Reports the results of integrity.py over all rides of each fault: tables for a terminal, data for JSON, a picture.
+"""Reports the results of integrity.py for each fault, as tables for a terminal, data for JSON, and a picture.
 
-The picture is aviation's Stanford diagram: error against claimed accuracy.
+The picture is a Stanford diagram, which aviation uses. It shows the error against the claimed accuracy.
 """
 
 import json
@@ -26,9 +26,20 @@ _UNKNOWN = "--"
 
 @dataclass
 class FaultSummary:
-    """The results of all rides with one fault. misleading_s, most_s: mean and largest misleading time. available: mean
-    share of the riding time with a lean. hidden_s, named_s: median delays, NaN for never. hidden, named: shares of the
-    rides. recovered: share of the rides, NaN for a fault that does not end."""
+    """The results of all rides with one fault.
+
+    kind: Kind of the fault, or "none".
+    title: Name of the fault.
+    rides: Number of rides.
+    misleading_s: Mean time with a misleading lean.
+    most_s: Largest time with a misleading lean.
+    available: Mean share of the riding time in which a lean is shown.
+    hidden_s: Median time from the start of the fault until the lean is hidden. NaN if it never is.
+    hidden: Share of the rides in which the lean is hidden.
+    named_s: Median time from the start of the fault until the display names the fault. NaN if it never does.
+    named: Share of the rides in which the display names the fault.
+    recovered: Share of the rides in which the lean is right after the fault. NaN for a fault that does not end.
+    """
 
     kind: str
     title: str
@@ -44,7 +55,7 @@ class FaultSummary:
 
 
 def summaries(outcomes: list[Outcome]) -> list[FaultSummary]:
-    """Return one FaultSummary per fault, in the order in which faults first appear."""
+    """Return one FaultSummary per fault, in the order in which the faults first appear."""
     groups: dict[tuple[str, str], list[Outcome]] = {}
     for outcome in outcomes:
         fault = outcome.job.fault
@@ -77,13 +88,16 @@ def _median(values: NDArray[np.float64]) -> float:
 
 
 def diagram(outcomes: list[Outcome], faulty: bool) -> NDArray[np.float64]:
-    """Shares of the riding time, one row per entry of CLAIMS, by ERROR_EDGES. faulty: True for rides with a fault."""
+    """Return the shares of the riding time, with a row for each of CLAIMS and a column for each class of ERROR_EDGES.
+
+    faulty: True for the rides with a fault, False for those without.
+    """
     total = sum((o.diagram for o in outcomes if bool(o.job.fault) == faulty), np.zeros_like(outcomes[0].diagram))
     return total / max(float(total.sum()), 1e-9)
 
 
 def fault_table(outcomes: list[Outcome]) -> Table:
-    """A table with a line per fault and a block per kind."""
+    """Return a table with one line per fault, and one block of lines per kind of fault."""
     made = Table(title="Rides with a fault of the sensor", caption=CAPTION, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     made.add_column("fault", overflow="fold")
     for head in (
@@ -117,7 +131,7 @@ def fault_table(outcomes: list[Outcome]) -> Table:
 
 
 def diagram_table(outcomes: list[Outcome]) -> Table:
-    """The shares of good, hidden and misleading, with a fault and without."""
+    """Return a table of the results of diagram(), for rides without a fault and rides with one."""
     made = Table(title="Error against claim, % of the riding", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     made.add_column("claimed sigma")
     for low, high in pairwise(ERROR_EDGES):
@@ -134,7 +148,7 @@ def diagram_table(outcomes: list[Outcome]) -> Table:
 
 
 def document(outcomes: list[Outcome]) -> dict[str, Any]:
-    """Return all figures for a JSON file. A missing figure is null."""
+    """Return all figures for a JSON file. A figure that is NaN becomes null."""
     rides = [
         {
             "fault": o.job.title,
@@ -159,7 +173,7 @@ def document(outcomes: list[Outcome]) -> dict[str, Any]:
 
 
 def draw(path: Path, outcomes: list[Outcome]) -> None:
-    """Write a PNG with both diagrams. Needs matplotlib: see picture.check()."""
+    """Write a PNG with the diagrams of rides without and with a fault. Needs matplotlib (see picture.check())."""
     from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure
 
@@ -190,7 +204,7 @@ def draw(path: Path, outcomes: list[Outcome]) -> None:
 
 
 def write(outcomes: list[Outcome], directory: Path) -> tuple[Path, Path]:
-    """Write faults.json and faults.png; return their paths."""
+    """Write faults.json and faults.png, and return their paths."""
     figures, drawing = directory / "faults.json", directory / "faults.png"
     figures.write_text(json.dumps(document(outcomes), indent=2) + "\n", encoding="ascii")
     draw(drawing, outcomes)

@@ -1,4 +1,7 @@
-"""Draws every estimator's lean over time: the whole first ride, and the minute of each ride with the most leaning."""
+"""Draws the lean of every estimator over time.
+
+The picture shows the whole first ride, and from each ride the minute with the most leaning.
+"""
 
 from importlib.util import find_spec
 from pathlib import Path
@@ -9,7 +12,7 @@ from kickstand_tools.signals import window_spreads
 from numpy.typing import NDArray
 
 ZOOM_S = 60.0
-# Colour and line width, in the order of drawing: noisy leans are drawn first
+# Colour and line width of each lean. The leans are drawn in this order, the noisy ones first
 _STYLES = {
     "formula": ("0.8", 0.4),
     "formula 0.3 s": ("tab:olive", 0.7),
@@ -39,7 +42,10 @@ def check() -> None:
 
 
 def draw(path: Path, rides: dict[str, dict[str, NDArray[np.float64]]]) -> None:
-    """Write a PNG. rides: the traces of Result or of real_ride.Comparison by title of the ride. Needs matplotlib."""
+    """Write a PNG. Needs matplotlib.
+
+    rides: traces of runs.Result or of real_ride.RecordingScores, by the title of the ride.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(15, 3.7 * (len(rides) + 1)), layout="constrained")
@@ -54,7 +60,7 @@ def draw(path: Path, rides: dict[str, dict[str, NDArray[np.float64]]]) -> None:
 
 
 def zoom_start(time: NDArray, true: NDArray) -> float:
-    """Start of the ZOOM_S with the largest variance of the lean, s."""
+    """Find the stretch of ZOOM_S with the largest variance of the lean. Returns its start, in s."""
     n = max(int(np.searchsorted(time, time[0] + ZOOM_S)), 1)
     if n >= len(time):
         return float(time[0])

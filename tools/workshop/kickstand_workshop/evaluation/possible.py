@@ -1,8 +1,8 @@
-"""Computes the best possible leans, from data that no board has: the sensor's true errors or a perfect position.
+"""Computes the best possible leans, from data that no board has.
 
-oracle() is the firmware's own filter with readings without the sensor's errors (except noise), the true alignment and
-the true speed. The filter only has to estimate the motion. gps_lean() is the lean that phone apps show: speed x yaw
-rate from a receiver's course.
+oracle() runs the firmware's own filter with the true alignment, the true speed, and readings that have noise but no
+other sensor errors. So the filter only has to estimate the motion. gps_lean() computes the lean that phone apps show,
+from the speed and the change of course of a GPS receiver.
 """
 
 from collections.abc import Iterator
@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 
 NAME = "possible"
 GPS_HZ = (1.0, 10.0)
-GPS_MPS = 0.05  # noise of each component of a receiver's velocity, 1 sigma: data sheet of u-blox M8 and M9
-# The filter's noises with the least error for the oracle, found on two seeds of each profile
+# Standard deviation of the noise of each component of a receiver's velocity, from the data sheets of u-blox M8 and M9
+GPS_MPS = 0.05
+# Parameters of the filter that give the oracle the least error, found on two seeds of each profile
 _ORACLE = {
     "SIGMA_START": tuple(s if i < BIAS_LEFT else 1e-3 * s for i, s in enumerate(measurements.SIGMA_START)),
     "SIGMA_FRESH_BIAS": 1e-4,
@@ -38,7 +39,7 @@ _ORACLE = {
 
 
 def oracle(made: SimulatedRide) -> NDArray[np.float64]:
-    """(N,) lean in degrees, with the least error that a filter on this sensor can reach."""
+    """The lean with the least error that a filter can reach with this sensor, shape (N), in degrees."""
     readings, chip = made.readings, made.chip
     warm = (readings[:, 3] - CALIBRATED_C)[:, None]
     force = readings[:, :3] - chip.accel_offset - warm * chip.accel_per_c
@@ -53,13 +54,18 @@ def oracle(made: SimulatedRide) -> NDArray[np.float64]:
 
 @contextmanager
 def _oracle_parameters() -> Iterator[None]:
-    """A context that sets the filter's parameters for readings without errors, in this process."""
+    """A context that sets the filter's parameters to _ORACLE, in this process."""
     with patch.multiple(measurements, **_ORACLE), patch.object(upright_trim, "MAX_TRIM", 0.0):
         yield
 
 
 def gps_lean(made: SimulatedRide, rate_hz: float) -> NDArray[np.float64]:
-    """(N,) lean in degrees as in phone apps: atan(speed x change of course / g), held until the next position."""
+    """The lean as in phone apps, shape (N), in degrees.
+
+    It is atan(speed x change of course / g) at each position, and stays the same until the next position.
+
+    rate_hz: number of positions per second.
+    """
     time, truth = made.time, made.truth
     chance = np.random.default_rng(len(time))
     at = np.arange(time[0], time[-1], 1.0 / rate_hz)
@@ -75,5 +81,5 @@ def gps_lean(made: SimulatedRide, rate_hz: float) -> NDArray[np.float64]:
 
 
 def leans(made: SimulatedRide) -> dict[str, NDArray[np.float64]]:
-    """Return the leans by name: the oracle's, and the GPS formula's at each rate in GPS_HZ."""
+    """Return the lean of oracle(), and that of gps_lean() at each rate in GPS_HZ, by name."""
     return {NAME: oracle(made), **{f"GPS {rate_hz:g} Hz": gps_lean(made, rate_hz) for rate_hz in GPS_HZ}}

@@ -1,9 +1,9 @@
 """Compares estimators on a recorded ride. The calibration and a reference lean are computed from the ride itself.
 
-The calibration comes from `kickstand calibrate ride`. The reference lean is atan(v * yaw rate / g), averaged over
-1 s, with the yaw rate about the bike's own up axis. It reads low (1 Hz speed, wide tyres, an axis that leans with the
-bike) and ignores slope and bank of the road. It can compare methods and reveal a lean that decays in a turn. Do not
-trust its values in degrees.
+The calibration comes from `kickstand calibrate ride`. The reference lean is atan(v * yaw rate / g), averaged over 1 s,
+with the yaw rate about the bike's own up axis. Do not trust its values in degrees. The reference lean is too small for
+three reasons: the speed changes only once per second, tyres are wide, and the up axis leans with the bike. It also
+ignores slope and bank of the road. But it can compare methods, and reveal a lean that decays in a turn.
 """
 
 from dataclasses import dataclass, field
@@ -24,13 +24,17 @@ from .estimators import calibrated, estimate
 from .metrics import rms, slope
 
 AVERAGE_S = 1.0
-_RIDING_MPS = 2.0  # only higher speeds are scored
-_LEANED_DEG = 5.0  # the slope is fitted above this: the reference is rarely over 10 degrees
+_RIDING_MPS = 2.0  # only samples with a higher speed are scored
+_LEANED_DEG = 5.0  # the slope is fitted at larger leans. The limit is low, because the reference is rarely over 10
 
 
 @dataclass
 class RealScore:
-    """Errors against the rough reference. slope: shown over reference lean, for reference leans over 5 degrees."""
+    """The errors of a lean against the rough reference.
+
+    rms_deg: Root of the mean square of the error.
+    slope: Shown lean divided by reference lean, for reference leans over 5 degrees.
+    """
 
     rms_deg: float
     slope: float
@@ -38,10 +42,13 @@ class RealScore:
 
 @dataclass
 class RecordingScores:
-    """name: of the recording's file. scores: by estimator.
+    """The scores of all estimators on a recording.
 
-    traces: (N,) each: "time" in s; "reference" and each estimator's lean in degrees, > 0 to the right. notices: remarks
-    about the recording, and contradictions to the calibration found in it.
+    name: Name of the recording's file.
+    scores: Score of each estimator, by its name.
+    traces: "time" in s, and the leans in degrees, positive to the right: "reference" and each estimator. Each has shape
+        (N).
+    notices: Remarks about the recording, and about readings that contradict its calibration.
     """
 
     name: str
@@ -51,7 +58,7 @@ class RecordingScores:
 
 
 def compare(path: Path) -> RecordingScores:
-    """Run every estimator over a recorded ride with speed. Raises InputError if it cannot be used."""
+    """Run every estimator over a recorded ride with speed. Raises InputError if the recording cannot be used."""
     log = read_log(path)
     speed, calibration = _speed(log), fit_ride(log).calibration
     reference = reference_lean(log, calibration)
@@ -67,7 +74,7 @@ def compare(path: Path) -> RecordingScores:
 
 
 def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64]:
-    """atan(v * yaw rate / g) in degrees, > 0 to the right, averaged over 1 s."""
+    """Compute the reference lean atan(v * yaw rate / g), averaged over 1 s, in degrees; positive to the right."""
     samples = calibrated(log, calibration)
     centripetal = _speed(log) * np.radians(samples.rate[:, 1])
     lean = -np.degrees(np.arctan(centripetal / STANDARD_GRAVITY))
@@ -75,7 +82,7 @@ def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64
 
 
 def _speed(log: Log) -> NDArray[np.float64]:
-    """Speed in m/s at each sample, interpolated between the logged values."""
+    """Return the speed at each sample in m/s, interpolated between the logged values."""
     there = ~np.isnan(log.speed_mps)
     if np.count_nonzero(there) < 2:
         raise InputError(f"{log.name} has no speed: without it there is no reference")

@@ -1,4 +1,4 @@
-"""Reports an evaluation, pooled over the seeds: tables for a terminal, data for JSON, files."""
+"""Reports an evaluation, as tables for a terminal, data for JSON, and files. Figures are pooled over the seeds."""
 
 import json
 from collections.abc import Mapping
@@ -26,8 +26,10 @@ _UNKNOWN = "--"
 
 
 def pooled(scores: list[LeanScore]) -> dict[str, float]:
-    """Pool one estimator's scores on one profile over the seeds. Units: degrees, lag in ms. NaN if no ride can show a
-    figure."""
+    """Pool the scores of one estimator on one profile over the seeds.
+
+    Returns the figures by name, in degrees, the lag in ms. A figure is NaN if no ride can show it.
+    """
     rms = np.array([s.rms_deg for s in scores])
     slopes, lags, biases = (
         [value for s in scores if not np.isnan(value := getattr(s, name))]
@@ -48,7 +50,10 @@ def pooled(scores: list[LeanScore]) -> dict[str, float]:
 
 
 def by_profile(results: list[Result]) -> dict[str, dict[str, dict[str, float]]]:
-    """profile -> estimator -> pooled(), with the ratio of its rms to that of the best possible lean."""
+    """Return the figures of pooled() for each profile and estimator, as {profile: {estimator: figures}}.
+
+    The additional figure "ratio" is the rms divided by the rms of the best possible lean.
+    """
     summary: dict[str, dict[str, dict[str, float]]] = {}
     for profile in dict.fromkeys(r.job.profile for r in results):
         rides = [r for r in results if r.job.profile == profile and r.refusal is None]
@@ -61,7 +66,7 @@ def by_profile(results: list[Result]) -> dict[str, dict[str, dict[str, float]]]:
 
 
 def table(results: list[Result]) -> Table:
-    """A table of the simulated rides: a block of lines per profile."""
+    """Return a table of the simulated rides, with a block of lines per profile."""
     made = _table("Shown lean against the truth of simulated rides", CAPTION)
     made.add_column("profile (rides)", no_wrap=True)
     for head in ("rms", "ratio", "worst\nride", "95 %", "worst", "slope", "range", "lag ms", "bias"):
@@ -88,7 +93,7 @@ def table(results: list[Result]) -> Table:
 
 
 def real_table(scores: dict[str, RealScore], name: str) -> Table:
-    """A table of the recorded ride. name: of its file."""
+    """Return a table of the recorded ride. name: name of its file."""
     made = _table(
         f"{name}: against atan(v * yaw rate / g) averaged over 1 s",
         "a rough reference that reads low: it compares methods, it claims no degrees",
@@ -103,7 +108,7 @@ def real_table(scores: dict[str, RealScore], name: str) -> Table:
 
 
 def _table(title: str, caption: str) -> Table:
-    """An empty table that fits into 80 columns."""
+    """Return an empty table that fits into 80 columns."""
     return Table(title=title, caption=caption, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), min_width=78)
 
 
@@ -115,11 +120,11 @@ def document(evaluation: Evaluation) -> dict[str, Any]:
     ]
     recorded = None if evaluation.recorded is None else _scores(evaluation.recorded.scores)
     found = {"profiles": by_profile(evaluation.results), "rides": rides, "recorded": recorded}
-    return json.loads(json.dumps(found), parse_constant=lambda _: None)  # NaN and infinity, which JSON does not have
+    return json.loads(json.dumps(found), parse_constant=lambda _: None)  # JSON has no NaN and no infinity
 
 
 def write(evaluation: Evaluation, directory: Path) -> tuple[Path, Path]:
-    """Write evaluation.json and lean.png; return their paths. Needs matplotlib: see picture.check()."""
+    """Write evaluation.json and lean.png, and return their paths. Needs matplotlib (see picture.check())."""
     figures, drawing = directory / "evaluation.json", directory / "lean.png"
     figures.write_text(json.dumps(document(evaluation), indent=2) + "\n", encoding="ascii")
     rides = {r.job.profile: r.traces for r in evaluation.results if r.traces}
@@ -130,7 +135,7 @@ def write(evaluation: Evaluation, directory: Path) -> tuple[Path, Path]:
 
 
 def _scores(scores: Mapping[str, LeanScore | RealScore]) -> dict[str, dict[str, float]]:
-    """Return the scores by estimator for the file. Names of figures in degrees have no unit."""
+    """Return the scores of each estimator for the file. The suffix _deg is removed from the names of figures."""
     return {name: {key.removesuffix("_deg"): value for key, value in asdict(s).items()} for name, s in scores.items()}
 
 

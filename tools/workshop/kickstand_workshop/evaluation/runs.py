@@ -1,5 +1,7 @@
-"""Simulates rides, calibrates them with the firmware's own code and scores every estimator, on all processors, for
-`kickstand evaluate`."""
+"""Simulates rides, calibrates them with the firmware's own code, and scores every estimator.
+
+`kickstand evaluate` uses this module. It runs on all processors.
+"""
 
 import multiprocessing
 import os
@@ -25,7 +27,15 @@ from .metrics import LeanScore, score
 
 @dataclass(frozen=True)
 class Job:
-    """One ride to simulate. The signs of the two set-up errors depend on the seed. traces: True to keep the leans."""
+    """One ride to simulate.
+
+    profile: Profile of the ride.
+    seed: Seed of the ride. It also sets the signs of the next two errors.
+    seconds: Riding time.
+    upright_error_deg: Error of the upright pose.
+    pitch_change_deg: Change of pitch between the two poses.
+    traces: True to keep the leans.
+    """
 
     profile: str
     seed: int
@@ -37,9 +47,13 @@ class Job:
 
 @dataclass
 class Result:
-    """scores: by estimator. refusal: the firmware's reason for refusing the poses, or None.
+    """The result of a simulated ride.
 
-    traces: (N,) each: "time" in s; "true" and each estimator's lean in degrees. Empty unless the job asks for them.
+    job: The ride.
+    scores: Score of each estimator, by its name.
+    traces: "time" in s, and the leans in degrees: "true" and each estimator. Shape (N) each. Empty unless the job keeps
+        the leans.
+    refusal: The firmware's reason for refusing the poses, or None.
     """
 
     job: Job
@@ -49,8 +63,15 @@ class Result:
 
 
 def jobs(profiles: list[str], seeds: int, traces: bool = False, **each: float) -> list[Job]:
-    """One Job for each profile and seed. traces: for the first seed. each: other fields of Job. Raises InputError for
-    an unknown profile."""
+    """Return one Job for each profile and seed.
+
+    profiles: Names of the profiles.
+    seeds: Number of seeds, from 0.
+    traces: True to keep the leans of the rides with the first seed.
+    each: Other fields of all jobs.
+
+    Raises InputError for an unknown profile.
+    """
     for name in profiles:
         check_profile(name)
     return [Job(name, seed, traces=traces and seed == 0, **each) for seed in range(seeds) for name in profiles]
@@ -58,16 +79,20 @@ def jobs(profiles: list[str], seeds: int, traces: bool = False, **each: float) -
 
 @dataclass
 class Evaluation:
-    """results: of the simulated rides, by profile, then by seed. recorded: of the recorded ride, None without one."""
+    """The results of all rides.
+
+    results: Results of the simulated rides, ordered by profile and then by seed.
+    recorded: Scores on the recorded ride, or None without a recording.
+    """
 
     results: list[Result]
     recorded: real_ride.RecordingScores | None
 
 
 def evaluate(jobs: list[Job], recording: Path | None = None, done: Callable[[], None] = lambda: None) -> Evaluation:
-    """Simulate and score every ride, on all processors; score the estimators on the recording if one is given.
+    """Simulate and score every ride on all processors. Also score the estimators on a recording, if there is one.
 
-    done(): called after each ride. Raises InputError if the recording cannot be used.
+    done: function that is called after each ride. Raises InputError if the recording cannot be used.
     """
     profiles = list(dict.fromkeys(job.profile for job in jobs))
     recorded = real_ride.compare(recording) if recording else None
@@ -79,7 +104,10 @@ def evaluate(jobs: list[Job], recording: Path | None = None, done: Callable[[], 
 
 
 def run(job: Job) -> Result:
-    """Simulate, calibrate by the six positions in one log and by the two poses, estimate and score."""
+    """Simulate a ride, calibrate it, run every estimator over it, and score their leans.
+
+    The calibration uses one log of the six positions, and the two poses.
+    """
     upright_sign, pitch_sign = (1, -1)[job.seed % 2], (1, -1)[job.seed // 2 % 2]
     made = ride(
         job.profile, job.seed, job.seconds, upright_sign * job.upright_error_deg, pitch_sign * job.pitch_change_deg
@@ -95,28 +123,36 @@ def run(job: Job) -> Result:
 
 
 def run_all(jobs: list[Job]) -> Iterator[Result]:
-    """Yield the result of run() for each job when it is ready."""
+    """Yield the result of run() for each job, as soon as it is ready."""
     yield from on_all_processors(run, jobs, ordered=False)
 
 
 def on_all_processors(function: Callable, jobs: list, chunk: int = 1, ordered: bool = True) -> Iterator:
-    """Yield function(job) for each job. ordered: in the order of the jobs, otherwise as results become ready."""
+    """Yield function(job) for each job, computed on all processors.
+
+    ordered: True yields the results in the order of the jobs, False as soon as they are ready.
+    """
     with multiprocessing.Pool(min(len(jobs), os.cpu_count() or 1), _begin_worker) as pool:
         yield from (pool.imap if ordered else pool.imap_unordered)(function, jobs, chunk)
-        # Do not stop the workers by SIGTERM: a worker that gets it before _begin_worker() would wait forever
+        # Do not stop the workers by SIGTERM. A worker that gets SIGTERM before _begin_worker() would wait forever
         pool.close()
         pool.join()
 
 
 def calibrated_by_poses(made: SimulatedRide) -> CalibrationFile:
-    """Calibrate by `kickstand calibrate six` and `two`, with one log per pose. Raises InputError."""
+    """Calibrate a ride like `kickstand calibrate six` and `two`, with one log per pose.
+
+    Raises InputError if the poses are refused.
+    """
     seven = [Log.from_readings(pose, made.rate_hz, f"POSE_{k}.csv") for k, pose in enumerate(made.poses, 1)]
     return _aligned(made, fit_six_positions(seven).calibration)
 
 
 def calibrated_by_log(made: SimulatedRide) -> CalibrationFile:
-    """Calibrate by `kickstand calibrate six` over one log of the whole procedure, as on the board, and by `two`. Raises
-    InputError."""
+    """Calibrate a ride like `kickstand calibrate six` and `two`, with one log of all six positions as on the board.
+
+    Raises InputError if the poses are refused.
+    """
     return _aligned(made, fit_procedure(Log.from_readings(made.procedure, made.rate_hz, "SIX.csv")).calibration)
 
 
@@ -127,13 +163,16 @@ def _aligned(made: SimulatedRide, six: CalibrationFile) -> CalibrationFile:
 
 
 def as_log(made: SimulatedRide) -> Log:
-    """Return the ride as a log, as if it were read from its file."""
+    """Return the ride as the log that a reader of its file would return."""
     readings = made.readings
     return Log(made.time, readings[:, :3], readings[:, 4:], temperature_c=readings[:, 3], name="RIDE.csv")
 
 
 def _begin_worker() -> None:
-    """Close standard error, because every worker would print a traceback after Ctrl-C. Let SIGTERM end the worker at
-    once: the inherited handler of the command would wait for a lock."""
+    """Prepare a worker process.
+
+    Close standard error, because every worker would print a traceback after Ctrl-C. Let SIGTERM end the worker at once.
+    The handler that it inherits from the command would wait for a lock.
+    """
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     sys.stderr = open(os.devnull, "w", encoding="utf-8")

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from .faults import ACCEL_RANGE_G
 
 LOOK_S = 0.1
-# Texts that name a fault of the sensor: not `Lean --`, and no text about a speed source or a display
+# Texts that name a fault of the sensor. `Lean --` and texts about a speed source or a display do not match
 NAMES = re.compile("Sensor|Gyro|Accel|No sensor", re.IGNORECASE)
 STARTED_S = 2.0  # before this time, the display shows the start
-WRITING = 2  # successive reads that may catch a half-written display
+WRITING = 2  # largest number of successive reads that see a half-written line
 
 
 def display_of(
@@ -31,9 +31,19 @@ def display_of(
     lost: NDArray[np.bool_],
     speed: Callable[[float], float] | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-    """time (n, s), the lean on the display (n, degrees, NaN where it shows none), and the time at which a fault was
-    named, or NaN. readings (m, 7): of the chip, in its order. lost (m): True where the sensor does not answer.
-    speed(t_s): in m/s, from a GPS.
+    """Run the whole device, and read its display every LOOK_S.
+
+    Args:
+        readings: Readings in the chip's order, shape (m, 7).
+        rate_hz: Number of readings per second.
+        calibration: Calibration of the sensor.
+        lost: True for readings at which the sensor does not answer, shape (m).
+        speed: Function that returns the speed of a GPS receiver in m/s at a time in s. None for no receiver.
+
+    Returns:
+        The times, shape (n), in s.
+        The lean on the display, shape (n), in degrees. NaN where the display shows no lean.
+        The time at which the display first names a fault, in s, or NaN.
     """
     rows = readings[:, [0, 1, 2, 4, 5, 6, 3]].tolist()
     last = len(rows) - 1
@@ -58,7 +68,7 @@ def display_of(
 
     board.every(LOOK_S, look)
     config = {"SPEED": "gps"} if speed else {}
-    gc.freeze()  # the firmware often collects garbage, and must not scan earlier objects
+    gc.freeze()  # the firmware often collects garbage. Scanning all earlier objects would take too long
     try:
         with tempfile.TemporaryDirectory() as flash, contextlib.chdir(flash):
             with board, contextlib.redirect_stdout(io.StringIO()):

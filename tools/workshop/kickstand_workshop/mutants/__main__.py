@@ -1,10 +1,10 @@
 """Changes the code of a package one place at a time and says which changes its tests do not notice.
 
     python3 tools/dev.py mutants imu              all changes of the package
-    python3 tools/dev.py mutants imu --sample 50  a random sample of them, the same one each time for the same --seed
+    python3 tools/dev.py mutants imu --sample 50  50 random changes, always the same for the same --seed
     python3 tools/dev.py mutants imu --file sensor.py --lines 60 90
 
-It works on a copy of the project, on Linux and macOS only, because each change is tested in a fork.
+It works on a copy of the project. It needs Linux or macOS, because each change is tested in a forked process.
 """
 
 import argparse
@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parents[4]
 
 def main() -> int:
     options = _options()
-    # turn the signal into an exit, so the copy is removed
+    # End by an exception after this signal, so that the copy is removed
     signal.signal(signal.SIGTERM, lambda *_: sys.exit("stopped"))
     package = PACKAGES[options.package]
     with tempfile.TemporaryDirectory(prefix="mutants-") as directory:
@@ -54,8 +54,10 @@ def main() -> int:
 
 
 def _judge(wanted: list[Change], runner: Tests) -> int:
-    """Test each change, print the surviving ones and the counts of each file. Returns 0 if none survived, otherwise
-    1."""
+    """Test each change, and print the changes that no test noticed and the counts of each file.
+
+    Returns 0 if the tests noticed all changes, otherwise 1.
+    """
     counts = collections.defaultdict(collections.Counter)
     begin = time.monotonic()
     for number, change in enumerate(wanted, 1):
@@ -77,7 +79,7 @@ def _judge(wanted: list[Change], runner: Tests) -> int:
 
 
 def _diff(before: str, after: str) -> list[str]:
-    """Only the changed lines."""
+    """Return only the changed lines, in the form of a unified diff."""
     lines = difflib.unified_diff(before.split("\n"), after.split("\n"), n=0, lineterm="")
     return [line for line in lines if not line.startswith(("---", "+++", "@@"))]
 

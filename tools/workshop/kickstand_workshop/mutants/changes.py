@@ -1,5 +1,7 @@
-"""Makes single changes to a file, by some of cosmic-ray's operators of each kind and two of our own. An operator in the
-code is replaced by only one or two similar ones, because all eleven would repeat the result.
+"""Makes single changes to a file, with some operators of cosmic-ray and two of our own.
+
+cosmic-ray can replace an operator in the code by eleven others. Here it is replaced by only one or two similar ones,
+because the others would give the same result.
 """
 
 import ast
@@ -21,14 +23,19 @@ OPERATORS = (
     *["ReplaceUnaryOperator_Delete_" + name for name in ("USub", "Not", "Invert")],
     *("ReplaceTrueWithFalse", "ReplaceFalseWithTrue", "ReplaceAndWithOr", "ReplaceOrWithAnd"),
     *("ReplaceBreakWithContinue", "ReplaceContinueWithBreak", "ExceptionReplacer", "ZeroIterationForLoop"),
-    "AddNot",  # the opposite of a condition
+    "AddNot",  # replaces a condition by its opposite
 )
-SMALL = 16  # integers up to this are counts and indices: changed by +1 and -1. Others are doubled and halved
+SMALL = 16  # integers up to this are counts and indices. They are changed by +1 and -1, others are doubled and halved
 
 
 class Change(NamedTuple):
-    """path: of the file, relative to the project's root. line: number of the changed line, from 1. operator and
-    occurrence identify the change."""
+    """A change of one place in a file.
+
+    path: Path of the file, relative to the project's root.
+    line: Number of the changed line, from 1.
+    operator: Kind of the change.
+    occurrence: Number of the place in the file, among all places for this operator.
+    """
 
     path: Path
     line: int
@@ -36,16 +43,19 @@ class Change(NamedTuple):
     occurrence: int
 
     def mutant(self, source: str) -> str | None:
-        """The changed text of the file; None if it is not Python, or differs only in annotations and decorators."""
+        """Return the changed text of the file.
+
+        Returns None if the text is not Python, or if only annotations and decorators differ.
+        """
         try:
             text = mutate_code(source, self.operator, self.occurrence)
-        except AttributeError:  # cosmic-ray replaces exceptions that have a plain name, not gzip.BadGzipFile
+        except AttributeError:  # cosmic-ray cannot replace an exception with a dotted name, such as gzip.BadGzipFile
             return None
         return None if text is None or _bare(text) in (None, _bare(source)) else text
 
 
 class Number(Operator):
-    """Changes numbers, to find limits that no test checks."""
+    """Changes numbers. This finds limits that no test checks."""
 
     def mutation_positions(self, node):
         if is_number(node):
@@ -100,12 +110,12 @@ class Drop(Operator):
 
 
 def operators() -> list[Operator]:
-    """One of each kind of change."""
+    """Return one operator for each kind of change."""
     return [*[get_operator("core/" + name)() for name in OPERATORS], Number(), Drop()]
 
 
 def changes(path: Path, root: Path) -> list[Change]:
-    """Every change of the file path, relative to root, in the order of its lines."""
+    """Return all changes of a file in the order of its lines. path: path of the file, relative to root."""
     nodes = list(ast_nodes(get_ast((root / path).read_text("utf-8"))))
     found = []
     for operator in operators():

@@ -1,5 +1,7 @@
-"""Runs tests in forks of a process that has already imported numpy and similar packages, because imports take longer
-than most tests."""
+"""Runs tests in forks of a process that has already imported numpy and similar packages.
+
+Imports take longer than most tests.
+"""
 
 import contextlib
 import gc
@@ -16,16 +18,21 @@ import pytest
 
 WARM = ("numpy", "hypothesis", "click", "rich.console", "matplotlib.pyplot", "pandas", "plotly.graph_objects")
 WARM += ("pyarrow.parquet",)
-# Skips variants of tests on MicroPython: it is slow, and the same tests run on CPython.
+# These arguments skip the variants of tests on MicroPython. They are slow, and the same tests run on CPython.
 ARGUMENTS = ("-x", "-q", "-k", "not micropython", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0")
 KILLED, SURVIVED, TIMED_OUT = "killed", "survived", "timed out"
-TIMES, EXTRA_S = 3, 5  # processor time for a change: 3 times that of the unchanged tests, plus 5 s
-WALL_TIMES = 10  # factor on the wall-clock time, for tests that wait for ever
+# The tests of a change may use TIMES the processor time of the tests of the unchanged code, plus EXTRA_S
+TIMES, EXTRA_S = 3, 5
+WALL_TIMES = 10  # a change is timed out after this multiple of the same time on the wall clock
 
 
 class Tests:
-    """root: of the copy of the project. files: the tests, relative to root. seconds: processor time of the tests of
-    the unchanged code, once pass_unchanged() has run."""
+    """The tests of a package.
+
+    root: Root of the copy of the project.
+    files: Paths of the tests, relative to root.
+    seconds: Processor time of the tests of the unchanged code. pass_unchanged() sets it.
+    """
 
     def __init__(self, root: Path, files: list[str]):
         self.root, self._files = root, files
@@ -39,10 +46,10 @@ class Tests:
         for name in WARM:
             with contextlib.suppress(ImportError):
                 importlib.import_module(name)
-        gc.freeze()  # pytest collects garbage at its end, and must not scan all this each time
+        gc.freeze()  # at its end pytest collects garbage. Scanning the imported modules each time would take too long
 
     def pass_unchanged(self) -> bool:
-        """True if the tests pass without changes. Leaves their bytecode in the copy."""
+        """Run the tests of the unchanged code. Returns True if they pass. The copy keeps their bytecode."""
         self._run(self._files)  # the first run writes bytecode, the second is timed
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         passed = self._run(self._files) == SURVIVED
@@ -53,12 +60,14 @@ class Tests:
         return passed
 
     def judge(self, path: Path, mutant: str) -> str:
-        """KILLED, SURVIVED or TIMED_OUT: the result of the tests with this text of the file path, relative to root.
-        Tests of the same name run first."""
+        """Run the tests with a changed file. Tests with the same name as the file run first.
+
+        path: path of the file, relative to root. mutant: its changed text. Returns KILLED, SURVIVED or TIMED_OUT.
+        """
         file = self.root / path
         original = file.read_text("utf-8")
         for bytecode in file.parent.glob(f"__pycache__/{file.stem}.*"):
-            bytecode.unlink()  # Python would use it for another text of equal length written in the same second
+            bytecode.unlink()  # Python would use it for a text of the same length, written in the same second
         try:
             file.write_text(mutant, "utf-8")
             return self._run(sorted(self._files, key=lambda name: file.stem not in name))
@@ -66,7 +75,7 @@ class Tests:
             file.write_text(original, "utf-8")
 
     def output(self) -> str:
-        """The output of the last run."""
+        """Return the output of the last run."""
         self._output.seek(0)
         return self._output.read()
 
@@ -93,7 +102,7 @@ class Tests:
         return SURVIVED if os.WEXITSTATUS(status) == 0 else KILLED
 
     def _test(self, files: list[str]):
-        """Never returns."""
+        """Run the tests in the forked process, and end the process. Does not return."""
         status = 3
         try:
             os.setpgid(0, 0)

@@ -1,4 +1,4 @@
-"""The packages whose tests are judged by mutants: the code of each, and the tests that should notice its changes."""
+"""Lists the packages whose tests can be judged. Each has its code, and the tests that should notice changes of it."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -7,8 +7,12 @@ UNTESTABLE = ("_viper.py", "_guest.py")  # these files run only on a board or on
 
 
 class Package(NamedTuple):
-    """sources: patterns of files, from the project's root. tests: patterns in host_tests, in running order: the fastest
-    and most sensitive first. Tests of the same name as the code run before them."""
+    """A package with its tests.
+
+    sources: Patterns of the files of the code, relative to the project's root.
+    tests: Patterns of the files of the tests, in their running order. The fastest and most sensitive come first. Tests
+        with the same name as the changed file run before all others.
+    """
 
     sources: tuple[str, ...]
     tests: tuple[str, ...]
@@ -80,12 +84,12 @@ PACKAGES = {
 
 
 def sources(package: Package, root: Path) -> list[Path]:
-    """The files of the package's code, relative to root."""
+    """Return the files of the package's code, relative to root."""
     return [path for path in _files(package.sources, root) if not path.name.endswith(UNTESTABLE)]
 
 
 def tests(package: Package, root: Path) -> list[Path]:
-    """The files of the package's tests, relative to root."""
+    """Return the files of the package's tests, relative to root."""
     return [path for path in _files(package.tests, root) if path.name.startswith("test_")]
 
 

@@ -1,7 +1,7 @@
 """Reads the display of a simulated device at chosen moments of the demo's ride.
 
-It runs in a separate process, because the firmware uses the simulated board's clock and files. It prints JSON,
-{name: [codes of both lines, character memory]}, or of an OLED {name: pixels}.
+The device runs in a separate process, because the firmware uses the simulated board's clock and files. The process
+prints JSON: {name: [codes of both lines, character memory]} for a character display, {name: pixels} for an OLED.
 """
 
 import json
@@ -18,8 +18,9 @@ from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted.script import Ride
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 
-# From the demo's script: a turn to the right from 32 to 39 s, brakes from 50 to 56 s, then stands.
-PRESSES_S = (KICKSTAND_PRESS_S, UPRIGHT_PRESS_S, 48.0, 51.0)  # stand, upright, page of maxima, page of braking
+# The demo's bike turns to the right from 32 to 39 s, brakes from 50 to 56 s, and then stands. The presses capture the
+# pose on the kickstand and the upright pose, then show the page of maxima and the page of braking
+PRESSES_S = (KICKSTAND_PRESS_S, UPRIGHT_PRESS_S, 48.0, 51.0)
 LONG_PRESS_AT_S = 58.0
 MOMENTS_S = {
     "starting": 0.26,
@@ -34,17 +35,17 @@ MOMENTS_S = {
 }
 
 
-UNPLUGGED_S = 44.0, 0.3  # of the sensor, before "unsure": start and duration
+UNPLUGGED_S = 44.0, 0.3  # start and duration of the fault that causes the page "unsure", an unplugged sensor
 OLED_MOMENTS_S = {"lean": 36.0, "unsure": 44.9, "maxima": 50.05, "brake": 53.07, "menu": 60.0}
 
 
 def lcd_pages() -> dict[str, tuple[list[list[int]], bytes]]:
-    """{name of a moment: (codes of both lines, the 64 bytes of character memory)}."""
+    """Return {name of a moment: (codes of both lines, the 64 bytes of character memory)}."""
     return {name: (codes, bytes(cgram)) for name, (codes, cgram) in _device_pages("lcd").items()}
 
 
 def oled_pages() -> dict[str, bytes]:
-    """{name of a moment: pixels, see Oled.pixels()}."""
+    """Return {name of a moment: pixels}, in the form of Oled.pixels()."""
     return {name: bytes(pixels) for name, pixels in _device_pages("ssd1306").items()}
 
 
@@ -62,7 +63,7 @@ def _device_pages(display: str) -> dict[str, Any]:
 
 
 def _run(display: str) -> dict[str, Any]:
-    """Run the device. Afterwards, this process cannot run another one."""
+    """Run the device. Afterwards, this process cannot run another device."""
     ride = Ride(SCRIPT)
     board = Board(Sensor(seed=PART_SEED, share=PART_SHARE).world(ride.motion), display=display)
     for at_s in PRESSES_S:

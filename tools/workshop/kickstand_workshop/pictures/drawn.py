@@ -1,4 +1,4 @@
-"""All drawn pictures by file name."""
+"""Collects all pictures that are drawn as SVG."""
 
 from kickstand_tools.pictures import building, lcd, oled
 
@@ -7,8 +7,11 @@ from .device_pages import lcd_pages, oled_pages
 
 
 def drawn() -> dict[str, str]:
-    """{file name: SVG}: pages of both displays, wiring of both boards, drawings of what to build, the demo, the forces
-    in a bend. Takes some seconds."""
+    """Return {file name: SVG}. This takes some seconds.
+
+    The pictures show pages of both displays, the wiring of both boards, the parts to build, the demo, and the forces in
+    a bend.
+    """
     pictures = {f"lcd_{name}.svg": lcd.draw(codes, cgram) for name, (codes, cgram) in lcd_pages().items()}
     pictures |= {f"oled_{name}.svg": oled.draw(pixels) for name, pixels in oled_pages().items()}
     return (

@@ -1,4 +1,4 @@
-"""Draws how the lean is found: the forces in a bend, and three leans of one simulated ride."""
+"""Draws two pictures that explain the lean: the forces in a bend, and three leans of one simulated ride."""
 
 import io
 from math import cos, radians, sin, tan
@@ -11,7 +11,7 @@ from kickstand_tools.replay.replay import replay
 from kickstand_tools.simulation.ride import ride as simulate_ride
 
 _LEAN_DEG = 35.0
-_G = 150.0  # pixels
+_G = 150.0  # length of an arrow of 1 g, in pixels
 _DARK, _PAINT, _QUIET = "#22252b", "#c63c06", "#5b6270"
 _COLOURS = 64
 _PROFILE, _SEED, _SECONDS, _SHOWN_S = "track", 1, 120.0, (40.0, 100.0)
@@ -23,7 +23,7 @@ def forces() -> str:
     foot, lean = (330.0, 340.0), radians(_LEAN_DEG)
 
     def at(along: float, aside: float = 0.0) -> tuple[float, float]:
-        """Return the pixels of a point on the bike: along units above the tyre, aside units to the right."""
+        """Return a point on the bike in pixels. along: distance above the tyre. aside: distance to the right."""
         return foot[0] + along * sin(lean) + aside * cos(lean), foot[1] - along * cos(lean) + aside * sin(lean)
 
     page.box(0, 340, 900, 60, "#dcd6c6", 0)
@@ -54,7 +54,7 @@ def forces() -> str:
 
 
 def _arrow(page: Drawing, colour: str, tail: tuple[float, float], tip: tuple[float, float]) -> None:
-    """A line that ends in a point."""
+    """Draw an arrow from tail to tip."""
     away = np.subtract(tip, tail)
     along = away / np.hypot(*away)
     aside = np.array([-along[1], along[0]])
@@ -65,8 +65,10 @@ def _arrow(page: Drawing, colour: str, tail: tuple[float, float], tip: tuple[flo
 
 
 def lean_compared() -> bytes:
-    """A PNG of the true lean, the formula's and the one shown, over one minute of a simulated ride; 5 s. Needs what
-    `pip install -e ".[rides]"` installs."""
+    """Return a PNG of three leans during one minute of a simulated ride: true, by the formula, and shown.
+
+    This takes 5 s. It needs the packages of `pip install -e ".[rides]"`.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from PIL import Image

@@ -13,29 +13,32 @@ from .. import browser
 
 NAME = "first_minute.webp"
 _SIZE = (1000, 560)
-_WIDTH = 720  # of the picture, pixels
+_WIDTH = 720  # width of the picture, in pixels
 _WAIT_MS = 60_000
 _FRAME_S = 0.2
-_QUICKER = 1.5  # factor on the speed
+_QUICKER = 1.5  # the animation is faster than the page by this factor
 _LAST_S = 2.5  # duration of the last picture
 _QUALITY = 32
-_MOST = 100  # pictures
-_LEANS = (("ArrowRight", 7), ("ArrowLeft", 14))  # keys of 5 degrees each
+_MOST = 100  # largest number of pictures
+_LEANS = (("ArrowRight", 7), ("ArrowLeft", 14))  # a key, and how often it is pressed. Each press leans by 5 degrees
 _HELD_S = 3.0
 _BASE = ("../templates/base.html", "../../common/theme.css")
-# files that determine the page's look
+# Files that determine the page's look
 _DRAWN = (*_BASE, "index.html", "style.css", "bike.mjs", "road.mjs", "display.mjs", "guide.mjs")
 _SAYS = "text => document.querySelector('#display').ariaLabel.includes(text)"
 _ASKS = "text => document.querySelector('#todo').textContent.includes(text)"
 
 
 def looks() -> str:
-    """A hash of the files that determine the page's look. The picture contains it, and a test detects a stale one."""
+    """Return a hash of the files that determine the page's look.
+
+    The picture contains this hash, so a test can find a picture that is out of date.
+    """
     return hashlib.sha256(b"".join((site.PAGE / name).read_bytes() for name in _DRAWN)).hexdigest()
 
 
 def draw() -> bytes:
-    """The first minute on the page as an animated WebP file."""
+    """Return the first minute on the page as an animated WebP file."""
     with browser.opened(site.site_files()) as (chromium, address):
         page = chromium.new_page(viewport={"width": _SIZE[0], "height": _SIZE[1]}, color_scheme="light")
         page.set_default_timeout(_WAIT_MS)
@@ -45,7 +48,7 @@ def draw() -> bytes:
 
 
 def _ride(page: Any) -> list[tuple[float, bytes]]:
-    """[(s, PNG)] of the two presses and of a bend to each side."""
+    """Press the button twice, and ride a bend to each side. Returns the screenshots, each as (time in s, PNG)."""
     shots: list[tuple[float, bytes]] = []
 
     def film(done: Callable[[], bool]) -> None:
@@ -82,7 +85,7 @@ def _ride(page: Any) -> list[tuple[float, bytes]]:
 
 
 def _animated(shots: list[tuple[float, bytes]]) -> bytes:
-    """One animation of pictures taken at these times."""
+    """Return one animation of the screenshots of _ride()."""
     from PIL import Image
 
     shots = shots[:: -(-len(shots) // _MOST)]

@@ -1,4 +1,4 @@
-"""The plot of a simulated ride, made by the commands themselves: simulate, calibrate, plot."""
+"""Draws the plot of a simulated ride with the commands `simulate`, `calibrate` and `plot`."""
 
 import io
 import os
@@ -10,7 +10,7 @@ from pathlib import Path
 from kickstand_tools.common import firmware_path
 from PIL import Image
 
-COLOURS = 64  # enough for a plot, and a third of the file
+COLOURS = 64  # enough for a plot. The file is then a third of its size with all colours
 _COMMANDS = (
     "simulate --profile track --seed 1 --seconds 200 --speed --out ride",
     "calibrate six {poses} --out ride/SIX.json",
@@ -20,7 +20,7 @@ _COMMANDS = (
 
 
 def draw() -> bytes:
-    """Return the plot as PNG. Drawing takes 10 s. Needs what `pip install -e ".[rides]"` installs."""
+    """Return the plot as PNG. This takes 10 s, and needs the packages of `pip install -e ".[rides]"`."""
     with tempfile.TemporaryDirectory() as directory:
         for command in _COMMANDS:
             poses = " ".join(sorted(str(p.relative_to(directory)) for p in Path(directory).glob("ride/POSE_*.csv")))

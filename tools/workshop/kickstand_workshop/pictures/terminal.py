@@ -16,12 +16,12 @@ _KEYS = "b button  B long press  p pause  q quit"
 _FONT = "DejaVu Sans Mono, Menlo, Consolas, monospace"
 _COLOURS = [(24, 26, 31), (224, 82, 78), (90, 180, 110), (242, 201, 76), (31, 79, 200), (200, 120, 220), (90, 200, 230)]
 _THEME = TerminalTheme((24, 26, 31), (220, 223, 228), [*_COLOURS, (220, 223, 228)], [*_COLOURS, (255, 255, 255)])
-# Rich's format without its comment, and without fonts that a browser would load from another server
+# Rich's SVG format without its comment, and without the fonts that a browser would load from another server
 _FORMAT = re.sub(r"@font-face \{\{.*?\}\}\s*|<!--.*?-->\s*", "", CONSOLE_SVG_FORMAT, flags=re.DOTALL)
 
 
 def draw() -> str:
-    """The demo's screen in the middle of a turn, from a run of the demo's own device."""
+    """Run the demo's device, and return its screen in the middle of a turn as SVG."""
     console = Console(width=WIDTH, file=io.StringIO(), force_terminal=True, color_system="truecolor", record=True)
     console.print(screen(_state(), "Kickstand on a simulated board", _KEYS, paused=False))
     drawn = _FORMAT.replace("Fira Code, monospace", _FONT)
@@ -31,7 +31,7 @@ def draw() -> str:
 
 
 def _state() -> State:
-    """The device's tick at MOMENT_S."""
+    """Run the demo's device, and return its state at MOMENT_S."""
     with DeviceProcess("cpython", "script", 0.0) as device:
         while not device.ended:
             for state in device.ticks(1.0):

@@ -1,4 +1,7 @@
-"""python -m kickstand_workshop.soak --hours 24 --seed 1: prints the table, and what was found; exit status 1 then."""
+"""Runs `python -m kickstand_workshop.soak --hours 24 --seed 1`, and prints a table and the broken invariants.
+
+The exit status is 1 if an invariant was broken.
+"""
 
 import sys
 
@@ -16,7 +19,7 @@ _WORST = {
 
 
 def table(figures: Tallies) -> str:
-    """As Markdown."""
+    """Format the tallies as a table in Markdown."""
     rows = [
         ("simulated time", f"{figures.hours:.1f} h in {figures.host_s / 60:.0f} minutes, seed {figures.seed}"),
         ("trips", f"{figures.trips}, of which {figures.alignments} on a bike not aligned before"),
@@ -33,9 +36,9 @@ def table(figures: Tallies) -> str:
 
 @click.command(context_settings={"max_content_width": 120})
 @click.option("--hours", default=24.0, show_default=True, help="Simulated hours.")
-@click.option("--seed", default=1, show_default=True, help="Of all that is random.")
+@click.option("--seed", default=1, show_default=True, help="Seed of the random numbers.")
 def main(hours: float, seed: int) -> None:
-    """Random rides, faults and presses on the simulated board, for hours."""
+    """Test the firmware on the simulated board for hours, with random rides, faults and presses."""
     figures = soak(hours, seed, say=lambda line: click.echo(line, err=True))
     click.echo(table(figures))
     for line in figures.found:

@@ -1,7 +1,7 @@
 """Runs trips on the simulated board, keeps tallies of them, and records broken invariants.
 
-Invariants: the calibration is not lost, memory does not grow, the program neither ends nor hangs, and those of
-watch.py. __main__.py prints the figures and fails if an invariant was broken.
+The invariants of this module are: the calibration is not lost, memory does not grow, and the program does not end.
+watch.py has further invariants. __main__.py prints the tallies, and fails if an invariant was broken.
 """
 
 import gc
@@ -24,16 +24,33 @@ from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 from .trip import Trip, make_trip
 from .watch import Watch
 
-TRIPS_WITH_A_BIKE = 8  # after this number of trips: another sensor, mounting and speed source, and an empty flash
-PART_SHARE = 0.5  # the sensor's errors over the data sheet's limits; the six positions have found offset and scale
+# Number of trips with the same bike. The next bike has another sensor, mounting and speed source, and an empty flash
+TRIPS_WITH_A_BIKE = 8
+# Limits of the sensor's errors, as a share of the data sheet's limits. Offset and scale are calibrated
+PART_SHARE = 0.5
 WHO_AM_I, RANGE_G = 0x68, 8
-WARM_TRIPS = 3  # in the first trips memory may grow: modules are imported when they are first needed
-MAX_GROWTH = 3000  # memory blocks, from a trip's second minute to its end; recording a ride uses a few hundred
+WARM_TRIPS = 3  # memory may grow in the first trips, because modules are imported when they are first needed
+# Largest growth from a trip's second minute to its end, in memory blocks. Recording a ride uses a few hundred
+MAX_GROWTH = 3000
 
 
 @dataclass
 class Tallies:
-    """Counts of trips, faults and presses, and the worst figures. found: one line per broken invariant."""
+    """Counts and worst figures of all trips.
+
+    seed: Seed of the random numbers.
+    hours: Simulated time.
+    trips: Number of trips.
+    rides: Number of trips with each kind of ride.
+    faults: Number of faults, by name.
+    presses: Number of presses.
+    saves_cut: Number of times the power was cut while a calibration was saved.
+    alignments: Number of trips that aligned a bike for the first time.
+    pages: Number of changes of the display.
+    worst: Largest value of each figure, by name.
+    host_s: Time on this computer.
+    found: One line per broken invariant.
+    """
 
     seed: int
     hours: float = 0.0
@@ -49,7 +66,7 @@ class Tallies:
     found: list[str] = field(default_factory=list)
 
     def keep_worst(self, name: str, value: float) -> None:
-        """Keep the largest value of each name."""
+        """Keep the value if it is the largest value with this name."""
         self.worst[name] = max(self.worst.get(name, 0.0), value)
 
 
@@ -75,7 +92,7 @@ class SoakBoard:
         return Store(WHO_AM_I, RANGE_G, str(self.flash))
 
     def do_six_positions(self) -> None:
-        """Do the six positions, as the rider did before mounting the sensor on the bike."""
+        """Store a calibration by six positions, as if the rider did them before mounting the sensor on the bike."""
         from kickstand.calibration.parameters import Calibration
 
         calibration = Calibration()
@@ -88,8 +105,10 @@ class SoakBoard:
 
 
 def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: None) -> Tallies:
-    """Run trips. hours: total time on the board's clock. say: called with the progress after each of these hours. The
-    same seed gives the same trips. Files are in a temporary directory."""
+    """Run trips. The same seed gives the same trips. All files are in a temporary directory.
+
+    hours: total time on the board's clock. say: function that is called with the progress after each of these hours.
+    """
     figures = Tallies(seed)
     begun, said_h = time.monotonic(), 0.0
     chance = random.Random(seed)
@@ -144,7 +163,7 @@ def _run(bike: SoakBoard, trip: Trip, figures: Tallies) -> None:
     board.every(60.0, lambda: blocks.append(_blocks()))
     console = io.StringIO()
     gc.collect()
-    gc.freeze()  # the app often collects garbage, and must not scan earlier objects
+    gc.freeze()  # the app often collects garbage. Scanning all earlier objects would take too long
     try:
         with board, redirect_stdout(console):
             from kickstand import settings, start
@@ -185,13 +204,13 @@ def _run(bike: SoakBoard, trip: Trip, figures: Tallies) -> None:
 
 
 def _blocks() -> int:
-    """Blocks of memory in use."""
+    """Return the number of memory blocks in use."""
     gc.collect()
     return sys.getallocatedblocks()
 
 
 def _check_calibration(bike: SoakBoard, watch: Watch, figures: Tallies) -> None:
-    """Check that the board has its old calibration or a new one after a power cut at any moment."""
+    """Check that the board still has a calibration, its old one or a new one. The power may have been cut in a save."""
     calibration = bike.store().load()
     if bike.aligned and not calibration.aligned:
         watch.found.append("the alignment is lost")

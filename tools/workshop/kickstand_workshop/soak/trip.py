@@ -1,4 +1,4 @@
-"""A random trip from power-on to power-off: motion of the bike, faults and presses."""
+"""Makes a random trip from power-on to power-off: motion of the bike, faults and presses."""
 
 import random
 from dataclasses import dataclass, field
@@ -8,10 +8,10 @@ from kickstand_tools.simulation.scripted import script
 
 SHORT_S, LONG_S = 0.15, 1.2
 KICKSTAND_S, UPRIGHT_S = 14.0, 12.0  # time in each pose, long enough for an alignment through the menu
-QUIET_S = 12.0  # from the end of a fault to the next one
+QUIET_S = 12.0  # least time from the end of a fault to the next fault
 SENSOR, LCD = 0x68, 0x27
 
-# For each kind of ride: ranges of lean (degrees), speed (m/s) and slope (degrees) of its manoeuvres
+# Each kind of ride, with the ranges of lean (degrees), speed (m/s) and slope (degrees) of its manoeuvres
 RIDES = {
     "street": ((10, 38), (8, 20), (0, 0)),
     "track": ((30, 52), (18, 35), (0, 0)),
@@ -19,7 +19,8 @@ RIDES = {
     "walking pace": ((0, 4), (1.5, 3.5), (-2, 2)),
 }
 
-# name: (method of Faults; function that computes its arguments from start, duration and a random source)
+# Each fault has a method of Faults, and a function that computes the method's arguments. The function gets the start,
+# the duration and a source of random numbers
 FAULTS: dict[str, tuple[str, Any]] = {
     "sensor unplugged": ("unplug_sensor", lambda at, s, r: (at, s)),
     "sensor not acknowledging": ("nack_for", lambda at, s, r: (SENSOR, at, s)),
@@ -44,10 +45,17 @@ GPS_FAULTS = ("unplugged", "garbled", "void", "stuck")
 
 @dataclass
 class Trip:
-    """until_s: time of the power cut. presses: (start, duration). faults: (name, start, end). calls: (method of Faults,
-    its arguments) that cause the faults. gps_faults: as for Gps. cut_save: number of bytes of the next calibration that
-    are written
-    before the power cut, or None."""
+    """A trip.
+
+    kind: Kind of the ride, a key of RIDES.
+    ride: Motion of the bike.
+    until_s: Time of the power cut.
+    presses: Start and duration of each press.
+    faults: Name, start and end of each fault.
+    calls: Method of Faults and its arguments, for each fault.
+    gps_faults: Faults of the GPS receiver, as for Gps.
+    cut_save: Number of bytes of the next calibration that are written before the power is cut. None for no such cut.
+    """
 
     kind: str
     ride: script.Ride
@@ -60,8 +68,11 @@ class Trip:
 
 
 def make_trip(chance: random.Random, speed: str | None, aligned: bool) -> Trip:
-    """A trip of some minutes. speed: the speed source, "gps", "wheel" or None. aligned: False if the trip must begin
-    with an alignment. If True, a few trips repeat the alignment."""
+    """Make a trip of some minutes.
+
+    speed: The speed source, "gps", "wheel" or None.
+    aligned: True if the bike is aligned. Then some trips repeat the alignment. Otherwise the trip begins with it.
+    """
     kind = chance.choice(list(RIDES))
     ride = script.Ride(_manoeuvres(chance, kind), vibration_g=chance.uniform(0.01, 0.08))
     ride_s = KICKSTAND_S + UPRIGHT_S + 2 * script.MOVE_S
@@ -69,16 +80,16 @@ def make_trip(chance: random.Random, speed: str | None, aligned: bool) -> Trip:
     again = aligned and chance.random() < 0.3
     if not aligned:
         presses += [(3.0, SHORT_S), (ride_s - 6.0, SHORT_S)]
-    elif again:  # through the menu: the alignment is its first entry
+    elif again:  # the alignment is the first entry of the menu
         presses += [(2.0, LONG_S), (4.5, LONG_S), (7.0, SHORT_S), (ride_s - 6.0, SHORT_S)]
-    # most trips have no presses, because a press leaves the page with the lean
+    # Most trips have no presses during the ride, because a press leaves the page with the lean
     t_s = ride_s + chance.uniform(5, 40) if chance.random() < 0.4 else ride.seconds
     while t_s < ride.seconds - 5.0:
         presses.append((t_s, chance.choice((SHORT_S, SHORT_S, SHORT_S, LONG_S))))
         t_s += chance.choice((1.0, 3.0, 20.0, 60.0))
     names = [name for name in FAULTS if name != "wheel storm" or speed == "wheel"]
     faults, calls = [], []
-    # no fault during the poses of an alignment
+    # Faults begin after the poses of an alignment
     t_s = chance.uniform(3, 20) if aligned and not again else ride_s
     while (t_s := t_s + QUIET_S + chance.expovariate(1 / 20)) < ride.seconds - 10.0:
         name, for_s = chance.choice(names), chance.choice((0.05, 0.3, 1.0, 4.0))

@@ -9,17 +9,23 @@ from kickstand_tools.simulated_board.simulator import Board
 from .trip import QUIET_S, SENSOR, Trip
 
 LOOK_S = 0.1
-WRONG_DEG, WRONG_S = 10.0, 5.0  # a lean with this error may be shown for this time at most
-LAG_S = 0.6  # the display may show the lean of any instant since then
-STILL_S = 2.0  # after this time without a transfer to the sensor, the program hangs
-STALE_S = 0.7  # longest age of a shown lean without new readings: half a second, a page and a check
+WRONG_DEG, WRONG_S = 10.0, 5.0  # a lean with a larger error may be shown for at most this time
+LAG_S = 0.6  # the display may show the lean of any instant within this time
+STILL_S = 2.0  # the program counts as hanging after this time without a transfer to the sensor
+# Longest time for which a lean may be shown without new readings: half a second, and the time for a page and a check
+STALE_S = 0.7
 SAYS_WHY = re.compile("No sensor|Sensor |Readings lost|Kickstand|Lean  --")
 
 
 class Watch:
-    """found: lines about faults. wrong_s: the longest time of a lean with an error over WRONG_DEG. error_deg: the
-    largest error of a lean shown for a second. stale_s: the longest time that a lean was shown while no sample was
-    read. without_s: the longest time without a lean while riding without a fault. changes: of the display.
+    """Checks the invariants during a trip.
+
+    found: One line per broken invariant.
+    wrong_s: Longest time for which a lean with an error over WRONG_DEG was shown.
+    error_deg: Largest error that was shown for a second.
+    stale_s: Longest time for which a lean was shown while no sample was read.
+    without_s: Longest time without a lean while the bike was riding without a fault.
+    changes: Number of changes of the display.
     """
 
     def __init__(self, board: Board, trip: Trip, readings: Callable[[], int]) -> None:
@@ -84,7 +90,7 @@ class Watch:
     def _fresh(self, t_s: float, lean: float | None) -> None:
         """Check that a lean disappears when no more readings arrive, unless the display cannot be reached."""
         count = self._readings()
-        # the program cannot change a display that is not reached, nor one while it gets no processor time
+        # The program cannot change the display if the display does not answer or the program gets no processor time
         excused = any(
             begin <= t_s < end + (QUIET_S if "display" in name else 0.0)
             for name, begin, end in self._trip.faults
@@ -98,7 +104,7 @@ class Watch:
             self._report("an old lean is shown")
 
     def _explained(self, t_s: float, line: str) -> None:
-        """Check that the message shown instead of the lean disappears when the fault is over."""
+        """Check that the lean replaces a fault's message when the fault is over."""
         if self._trip.ride.truth(t_s)[1] < 4.0 or self._during_fault(t_s) or not SAYS_WHY.match(line):
             self._why_since = None
             return
