@@ -54,7 +54,8 @@ PACKAGES = {
     "estimation": _package("tools/kickstand_tools/estimation/*.py", "estimation/test_[esa]*"),
     "analysis": _package(
         "tools/kickstand_tools/analysis/*.py tools/kickstand_tools/analysis/plot/*.py",
-        "analysis/test_riding analysis/test_analysis_channels analysis/test_al* analysis/test_c* analysis/test_map",
+        "analysis/test_by_hand analysis/test_riding analysis/test_analysis_channels"
+        " analysis/test_al* analysis/test_c* analysis/test_map",
     ),
     "overlay": _package("tools/kickstand_tools/overlay/*.py", "overlay/test_[!h]*"),
     "deploy": _package(
