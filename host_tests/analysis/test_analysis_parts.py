@@ -25,7 +25,7 @@ def made(n: int, step_s: float = 0.01, **columns) -> Channels:
 
 
 def seen(course: Channels, found: Quality | None = None, stops=(), riding_s=60.0, notices=(), **calibration):
-    log = api.Log([0.0, 0.01], [[0.0, 1.0, 0.0]] * 2, [[0.0] * 3] * 2, name="trip/RIDE.csv")
+    log = api.Log(np.array([0.0, 0.01]), np.tile([0.0, 1.0, 0.0], (2, 1)), np.zeros((2, 3)), name="trip/RIDE.csv")
     ride = Ride(log, api.CalibrationFile(aligned=True, **calibration))
     none = np.zeros(1)
     found = found or Quality(0.1, None, 1.0, 1.0, 30.0, none, none)
@@ -229,7 +229,9 @@ def test_the_reason_for_no_stops():
     assert report.words(seen(made(100, speed_mps=5.0))).remark == "No stop from over 10 km/h found."
 
 
-def alignment(roll=0.1, pitch=None, yaw=1.0, gravity=1.0, **more) -> str:
+def alignment(
+    roll: float | None = 0.1, pitch: float | None = None, yaw: float | None = 1.0, gravity: float | None = 1.0, **more
+) -> str:
     found = Quality(roll, pitch, yaw, gravity, 30.0, np.zeros(1), np.zeros(1))
     return report.words(seen(made(100), found, **more)).alignment
 

@@ -8,7 +8,7 @@ from kickstand_tools import api
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.joining import agreement, clocks, compare, fit, joined, match, track_files
 from kickstand_tools.joining.motion import CellMotion, motion
-from kickstand_tools.joining.track import Course, Segments
+from kickstand_tools.joining.track import Course, Segments, segments
 
 STEP_S = 0.05
 
@@ -315,6 +315,84 @@ def test_the_standard_deviation_of_a_fit_by_hand():
     assert found.sigma_s == pytest.approx(np.sqrt(0.18 + 0.49 + 0.0025))
     assert (found.drift, found.correlation, found.evidence, found.segments) == pytest.approx((1e-3, 1.0, 7.0, 3))
     assert found.tilt.tolist() == [0.01, 0.02]
+
+
+START_S, SLOW = 50.3, -200e-6  # the track's time at the ride's first sample, and the drift of its clock
+
+
+@pytest.fixture(scope="module")
+def exact() -> tuple[CellMotion, Course]:
+    """A ride of 1500 s from 50.3 s of a track with a step per second, on a road of random bends at changing speed. The
+    ride's clock is fast."""
+    at_s, knots_s = np.arange(0.0, 1700.0, 0.01), np.arange(0.0, 1706.0, 5.0)
+    chance = np.random.default_rng(1)
+    yaw, speed = (np.interp(at_s, knots_s, chance.uniform(*bounds, len(knots_s))) for bounds in ((-0.4, 0.4), (10, 20)))
+    on_track_s = START_S + (np.arange(30_000) + 0.5) * STEP_S / (1.0 - SLOW)
+    yaw_then, speed_then = (np.interp(on_track_s, at_s, values) for values in (yaw, speed))
+    force = np.outer(np.ones(30_000), [0.0, 1.0, 0.0])
+    force[:, 2] = np.gradient(speed_then, STEP_S) / 9.80665
+    rates = np.outer(np.degrees(yaw_then * np.cos(np.arctan(speed_then * yaw_then / 9.80665))), [0.0, 1.0, 0.0])
+    direction = np.degrees(np.cumsum(yaw) * 0.01).reshape(1700, 100).mean(axis=1)
+    t_s = np.arange(1701.0)
+    turn = np.diff(direction, prepend=direction[:1])
+    ones = np.ones(1700)
+    track = Course(t_s[:-1], t_s[1:], 4.0 * ones, speed.reshape(1700, 100).mean(axis=1), ones > 0.0, turn)
+    return CellMotion(force, rates, np.ones(30_000, dtype=bool), False, False), track
+
+
+def test_the_fit_finds_the_shift_and_the_drift(exact):
+    moved, track = exact
+    found = fit.fitted(moved, track, segments(track), START_S + 3.0)
+    assert found is not None
+    assert found.shift_s == pytest.approx(START_S, abs=0.05)
+    assert found.drift == pytest.approx(SLOW, abs=60e-6)
+    assert found.correlation == pytest.approx(1.0, abs=0.005)
+    assert found.tilt == pytest.approx([0.0, 0.0], abs=0.005)
+    assert 0.05 <= found.sigma_s < 0.07 and found.segments == 49
+    assert fit.fitted(moved, track, segments(track), 1660.0) is None
+    far = fit.fitted(moved, track, segments(track), START_S + 60.0)
+    assert far is not None and far.evidence < found.evidence - match.LEAST_LEAD
+
+
+def test_the_rough_fit_tries_shifts_and_drifts(exact):
+    """The shift in the middle of the ride differs from that at its start by the drift: 200 ppm of about 700 s."""
+    moved, track = exact
+    compared = compare.Comparison(moved, track, segments(track), START_S + 2.0, 7.0)
+    shift_s, drift, evidence = fit._try_shifts(compared, START_S + 2.0)
+    assert shift_s == pytest.approx(START_S + SLOW * (compared.middle_s - START_S), abs=0.11)
+    assert drift == pytest.approx(SLOW, abs=150e-6) and drift < 0.0
+    assert evidence > 100.0
+
+
+def test_a_single_shift_costs_little_on_the_same_ride(exact):
+    """If every second segment is a second late, each wants its own shift."""
+    moved, track = exact
+    found = fit.fitted(moved, track, segments(track), START_S)
+    assert found is not None and fit.cost_of_one_shift(moved, track, segments(track), found) < 1.0
+    parts = segments(track)
+    parts.begin_s[::2] += 1.0
+    parts.end_s[::2] += 1.0
+    assert fit.cost_of_one_shift(moved, track, parts, found) > 4.0
+
+
+def test_the_forward_axis_follows_from_the_speed(exact):
+    moved, track = exact
+    compared = compare.Comparison(moved, track, segments(track), START_S, 2.0)
+    forward = fit._least(compared.sped_up(START_S, SLOW), compared.given.speed_mps, compared.given.speed_weight)
+    assert forward[2] == pytest.approx(1.0, abs=0.02)
+    step = fit._step(compared, np.array([START_S, SLOW, 0.0, 0.0, *forward]))
+    assert np.std(step.model_deg - compared.given.turned_deg) < 1.5
+    late = fit._step(compared, np.array([START_S + 0.5, SLOW, 0.0, 0.0, *forward]))
+    by = late.inverse @ late.pulls.sum(axis=0)
+    assert by[0] == pytest.approx(-0.5, abs=0.15)  # one step of Gauss and Newton leads most of the way back
+
+
+def test_the_rough_shifts_contain_the_right_one(exact):
+    moved, track = exact
+    mirrored, found = match._rough_shifts(moved, track)
+    assert not mirrored and abs(found[0] - START_S) <= 0.5
+    moved = CellMotion(moved.force_g, -moved.rate_dps, moved.there, False, False)
+    assert match._rough_shifts(moved, track)[0]
 
 
 def gpx(path, points: str):
