@@ -53,7 +53,9 @@ PACKAGES = {
     "joining": _package(
         "tools/kickstand_tools/joining/*.py", "joining/test_joining_parts joining/test_[!m]* imports/test_joining"
     ),
-    "estimation": _package("tools/kickstand_tools/estimation/*.py", "estimation/test_[esa]*"),
+    "estimation": _package(
+        "tools/kickstand_tools/estimation/*.py", "estimation/test_estimation_parts estimation/test_[esa]*"
+    ),
     "analysis": _package(
         "tools/kickstand_tools/analysis/*.py tools/kickstand_tools/analysis/plot/*.py",
         "analysis/test_analysis_parts analysis/test_riding analysis/test_analysis_channels"
