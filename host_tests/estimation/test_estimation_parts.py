@@ -18,7 +18,8 @@ G = 9.80665
 def windows(n: int = 20, speed: Any = np.nan, rate=(0.0, 0.0, 0.0), force=(0.0, 1.0, 0.0), **more) -> Windows:
     """n windows of 0.2 s."""
     made = Windows(
-        np.asarray(np.arange(n + 1) * 0.2, dtype=float), np.tile(np.array(rate), (n, 1)), np.tile(np.array(force), (n, 1)), np.zeros(n),
+        np.asarray(np.arange(n + 1) * 0.2, dtype=float),
+        np.tile(np.array(rate), (n, 1)), np.tile(np.array(force), (n, 1)), np.zeros(n),
         np.full(n, speed), np.zeros(n), np.zeros(n, dtype=bool), np.arange(n), np.full(n, 0.1), np.full(n, 0.1),
     )  # fmt: skip
     return replace(made, **more)

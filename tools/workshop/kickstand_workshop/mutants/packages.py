@@ -48,7 +48,7 @@ PACKAGES = {
         "calibration/test_sensor_fit calibration/test_cli_calibration_file calibration/test_cli_calibrate"
         " drive_alignment/test_drive_bins drive_alignment/test_cli_drive",
     ),
-    "logs": _package("tools/kickstand_tools/logs/*.py", "logs/test_[!cm]* logs/test_c*"),
+    "logs": _package("tools/kickstand_tools/logs/*.py", "logs/test_log_parts logs/test_[!cm]* logs/test_c*"),
     "imports": _package("tools/kickstand_tools/imports/**/*.py", "imports/test_apps imports/test_[!a]*"),
     "joining": _package(
         "tools/kickstand_tools/joining/*.py", "joining/test_joining_parts joining/test_[!m]* imports/test_joining"
