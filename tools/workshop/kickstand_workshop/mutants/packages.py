@@ -72,7 +72,7 @@ PACKAGES = {
     ),
     "pull": _package(
         "tools/kickstand_tools/rides/*.py",
-        "rides/test_ride_file rides/test_stream rides/test_cli_pull rides/test_cli_record",
+        "rides/test_pull_parts rides/test_ride_file rides/test_stream rides/test_cli_pull rides/test_cli_record",
     ),
     "signals": _package("tools/kickstand_tools/signals/*.py", "signals/*"),
     "checks": _package("tools/kickstand_tools/checks/*.py", "checks/*"),
