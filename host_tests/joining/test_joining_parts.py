@@ -8,7 +8,7 @@ from kickstand_tools import api
 from kickstand_tools.common.errors import InputError
 from kickstand_tools.joining import agreement, clocks, compare, fit, joined, match, track_files
 from kickstand_tools.joining.motion import CellMotion, motion
-from kickstand_tools.joining.track import Course, Segments, segments
+from kickstand_tools.joining.track import Course, Segments, Track, course, segments
 
 STEP_S = 0.05
 
@@ -454,3 +454,23 @@ def test_a_log_of_one_row_takes_the_points_at_its_time():
     rows, points = joined._nearest(np.array([5]), np.array([4, 5, 6]))
     assert (rows.tolist(), points.tolist()) == ([0], [1])
     assert joined._placed(np.array([7.0]), np.array([1]), 3) == pytest.approx([np.nan, 7.0, np.nan], nan_ok=True)
+
+
+def test_a_fit_of_clocks_needs_60_s_in_common():
+    rates = bends(60.0)
+    a, along = cells(rates), clocks._along(cells(rates), np.eye(3))
+    assert clocks._fitted(a, a, along, along, 0.0).common_s == pytest.approx(60.0, abs=0.06)
+    with pytest.raises(InputError, match="they have less than 60 s of riding in common"):
+        clocks._fitted(a, a, along, along, 3.0)
+
+
+def test_a_step_of_exactly_6_s_is_good():
+    track = Track(np.array([0.0, 6.0, 12.1]), np.zeros(3), np.array([0.0, 1e-3, 2e-3]), np.full(3, np.nan), "t")
+    assert course(track).good.tolist() == [True, False]
+
+
+def test_a_track_of_over_50_mb_is_refused(tmp_path):
+    with (tmp_path / "a.gpx").open("wb") as file:
+        file.truncate(50_000_001)
+    with pytest.raises(InputError, match="too large for a track: over 50 MB"):
+        track_files.read_track(tmp_path / "a.gpx")

@@ -71,6 +71,7 @@ BIKES = [
     3.908052,
     3.2,
 ]
+PROCEDURE = [0.3769084, 0.4134439, 0.3870794, 22.32059, 11.45963, 19.6481, 15.72397]
 RIDE = [
     0.5444498,
     0.5243995,
@@ -113,3 +114,9 @@ def test_a_seed_gives_the_ride_of_earlier_versions():
     found = [*np.abs(made.readings).mean(axis=0), *np.abs(np.array(list(made.truth.values()))).mean(axis=1)]
     found += [*made.kickstand.mean(axis=0)[:3], *made.upright.mean(axis=0)[:3], made.stand_deg, made.home_c]
     assert [float(value) for value in found] == pytest.approx(RIDE, rel=1e-4)
+
+
+def test_a_seed_gives_the_procedure_of_earlier_versions():
+    """The mean size of force and rate while a hand turns the sensor between its six positions."""
+    made = ride("parked", 1, 20.0)
+    assert np.abs(made.procedure).mean(axis=0).tolist() == pytest.approx(PROCEDURE, rel=1e-4)
