@@ -52,23 +52,31 @@ PACKAGES = {
         "calibration/test_sensor_fit calibration/test_cli_calibration_file calibration/test_cli_calibrate"
         " drive_alignment/test_drive_bins drive_alignment/test_cli_drive",
     ),
-    "logs": _package("tools/kickstand_tools/logs/*.py", "logs/test_[!cm]* logs/test_c*"),
+    "logs": _package("tools/kickstand_tools/logs/*.py", "logs/test_log_parts logs/test_[!cm]* logs/test_c*"),
     "imports": _package("tools/kickstand_tools/imports/**/*.py", "imports/test_apps imports/test_[!a]*"),
-    "joining": _package("tools/kickstand_tools/joining/*.py", "joining/test_[!m]* imports/test_joining"),
-    "estimation": _package("tools/kickstand_tools/estimation/*.py", "estimation/test_[esa]*"),
+    "joining": _package(
+        "tools/kickstand_tools/joining/*.py", "joining/test_joining_parts joining/test_[!m]* imports/test_joining"
+    ),
+    "estimation": _package(
+        "tools/kickstand_tools/estimation/*.py", "estimation/test_estimation_parts estimation/test_[esa]*"
+    ),
     "analysis": _package(
         "tools/kickstand_tools/analysis/*.py tools/kickstand_tools/analysis/plot/*.py",
-        "analysis/test_riding analysis/test_analysis_channels analysis/test_al* analysis/test_c* analysis/test_map",
+        "analysis/test_analysis_parts analysis/test_riding analysis/test_analysis_channels"
+        " analysis/test_al* analysis/test_c* analysis/test_map",
     ),
     "overlay": _package("tools/kickstand_tools/overlay/*.py", "overlay/test_[!h]*"),
     "deploy": _package(
         "tools/kickstand_tools/deploy/*.py",
         "deploy/test_check* deploy/test_config* deploy/test_[unmo]* deploy/test_cli_flash",
     ),
-    "simulation": _package("tools/kickstand_tools/simulation/**/*.py", "simulation/test_*"),
+    "simulation": _package(
+        "tools/kickstand_tools/simulation/**/*.py",
+        "simulation/test_simulation_parts simulation/test_known_plans simulation/test_*",
+    ),
     "pull": _package(
         "tools/kickstand_tools/rides/*.py",
-        "rides/test_ride_file rides/test_stream rides/test_cli_pull rides/test_cli_record",
+        "rides/test_pull_parts rides/test_ride_file rides/test_stream rides/test_cli_pull rides/test_cli_record",
     ),
     "signals": _package("tools/kickstand_tools/signals/*.py", "signals/*"),
     "checks": _package("tools/kickstand_tools/checks/*.py", "checks/*"),
